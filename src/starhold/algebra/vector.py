@@ -1,0 +1,196 @@
+"""3-vectors and 3x3 matrices as tuples (a matrix is a tuple of rows)."""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias, TypeGuard
+
+from numba import types  # pyright: ignore
+
+from starhold.algebra.scalar import Scalar, absolute, clip, compiled_as, equation, maximum, minimum, sign, sqrt
+
+Vector: TypeAlias = tuple[Scalar, Scalar, Scalar]
+Matrix: TypeAlias = tuple[Vector, Vector, Vector]
+
+ZERO: Vector = (0.0, 0.0, 0.0)
+IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@equation
+def add(a: Vector, b: Vector) -> Vector:
+    """a + b."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+@equation
+def subtract(a: Vector, b: Vector) -> Vector:
+    """a - b."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+@equation
+def scale(c: Scalar, a: Vector) -> Vector:
+    """c a."""
+    return (c * a[0], c * a[1], c * a[2])
+
+
+@equation
+def times(a: Vector, b: Vector) -> Vector:
+    """The product component by component."""
+    return (a[0] * b[0], a[1] * b[1], a[2] * b[2])
+
+
+@equation
+def dot(a: Vector, b: Vector) -> Scalar:
+    """The scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@equation
+def cross(a: Vector, b: Vector) -> Vector:
+    """The vector product."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+@equation
+def norm(a: Vector) -> Scalar:
+    """The Euclidean length."""
+    return sqrt(dot(a, a))
+
+
+@equation
+def unit(a: Vector) -> Vector:
+    """a / |a|; not defined at zero."""
+    return scale(1.0 / norm(a), a)
+
+
+@equation
+def signs(a: Vector) -> Vector:
+    """The sign of each component."""
+    return (sign(a[0]), sign(a[1]), sign(a[2]))
+
+
+@equation
+def clip_axes(a: Vector, limit: Scalar) -> Vector:
+    """Each component kept within [-limit, limit]."""
+    return (clip(a[0], limit), clip(a[1], limit), clip(a[2], limit))
+
+
+@equation
+def clip_norm(a: Vector, limit: Scalar) -> Vector:
+    """a shortened to the given length where it is longer; the direction is kept. The limit must be positive."""
+    return scale(minimum(1.0, limit / maximum(limit, norm(a))), a)
+
+
+@equation
+def peak(a: Vector) -> Scalar:
+    """The largest magnitude among the components."""
+    return maximum(maximum(absolute(a[0]), absolute(a[1])), absolute(a[2]))
+
+
+def apply(m: Matrix | Vector, a: Vector) -> Vector:
+    """The matrix-vector product; a vector in place of the matrix is a diagonal one."""
+    return _apply_diagonal(m, a) if _is_diagonal(m) else _apply_matrix(m, a)
+
+
+def swing(m: Matrix | Vector, a: Vector) -> Vector:
+    """a x (m a) for a symmetric m: the gyroscopic torque is swing(J, w). A vector stands for a diagonal m."""
+    return _swing_diagonal(m, a) if _is_diagonal(m) else _swing_matrix(m, a)
+
+
+def _is_diagonal(m: Matrix | Vector) -> TypeGuard[Vector]:
+    return not isinstance(m[0], tuple)
+
+
+@equation
+def _apply_diagonal(m: Any, a: Vector) -> Vector:
+    return times(m, a)
+
+
+@equation
+def _apply_matrix(m: Any, a: Vector) -> Vector:
+    return (dot(m[0], a), dot(m[1], a), dot(m[2], a))
+
+
+@equation
+def _swing_diagonal(m: Any, a: Vector) -> Vector:
+    return ((m[2] - m[1]) * (a[1] * a[2]), (m[0] - m[2]) * (a[2] * a[0]), (m[1] - m[0]) * (a[0] * a[1]))
+
+
+@equation
+def _swing_matrix(m: Any, a: Vector) -> Vector:
+    return cross(a, _apply_matrix(m, a))
+
+
+@compiled_as(apply)
+def _compiled_apply(m: Any, a: Any) -> Any:
+    if isinstance(m[0], types.BaseTuple):
+        return lambda m, a: _apply_matrix(m, a)  # pyright: ignore
+    return lambda m, a: _apply_diagonal(m, a)  # pyright: ignore
+
+
+@compiled_as(swing)
+def _compiled_swing(m: Any, a: Any) -> Any:
+    if isinstance(m[0], types.BaseTuple):
+        return lambda m, a: _swing_matrix(m, a)  # pyright: ignore
+    return lambda m, a: _swing_diagonal(m, a)  # pyright: ignore
+
+
+@equation
+def column(m: Matrix, a: Vector) -> Vector:
+    """The product of the transposed matrix and a vector."""
+    return (
+        m[0][0] * a[0] + m[1][0] * a[1] + m[2][0] * a[2],
+        m[0][1] * a[0] + m[1][1] * a[1] + m[2][1] * a[2],
+        m[0][2] * a[0] + m[1][2] * a[1] + m[2][2] * a[2],
+    )
+
+
+@equation
+def transpose(m: Matrix) -> Matrix:
+    """The transposed matrix."""
+    return (
+        (m[0][0], m[1][0], m[2][0]),
+        (m[0][1], m[1][1], m[2][1]),
+        (m[0][2], m[1][2], m[2][2]),
+    )
+
+
+@equation
+def multiply(a: Matrix, b: Matrix) -> Matrix:
+    """The matrix product a b."""
+    return (column(b, a[0]), column(b, a[1]), column(b, a[2]))
+
+
+@equation
+def combine(c: Scalar, a: Matrix, d: Scalar, b: Matrix) -> Matrix:
+    """c a + d b."""
+    return (
+        add(scale(c, a[0]), scale(d, b[0])),
+        add(scale(c, a[1]), scale(d, b[1])),
+        add(scale(c, a[2]), scale(d, b[2])),
+    )
+
+
+@equation
+def skew(a: Vector) -> Matrix:
+    """[a]x, the matrix of the vector product: apply(skew(a), b) = a x b."""
+    return ((0.0, -a[2], a[1]), (a[2], 0.0, -a[0]), (-a[1], a[0], 0.0))
+
+
+@equation
+def diagonal(a: Vector) -> Matrix:
+    """The diagonal matrix."""
+    return ((a[0], 0.0, 0.0), (0.0, a[1], 0.0), (0.0, 0.0, a[2]))
+
+
+@equation
+def determinant(m: Matrix) -> Scalar:
+    """The determinant."""
+    return dot(m[0], cross(m[1], m[2]))
+
+
+@equation
+def inverse(m: Matrix) -> Matrix:
+    """The inverse by the adjugate; not defined for a singular matrix."""
+    c = 1.0 / determinant(m)
+    return transpose((scale(c, cross(m[1], m[2])), scale(c, cross(m[2], m[0])), scale(c, cross(m[0], m[1]))))

@@ -1,0 +1,107 @@
+"""Finds the laws: modules of this package with a `CARD`, and the entry points `starhold.laws` of other packages."""
+
+from __future__ import annotations
+
+import importlib.util
+import pkgutil
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import starhold.laws
+from starhold.laws.interface import Card, Craft, Field, NoMemory, fields
+
+INTERFACE = ("CARD", "Gains", "torque", "examples")
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law file as an object; its name is the file's, with hyphens."""
+
+    name: str
+    module: ModuleType
+
+    @property
+    def card(self) -> Card:
+        return self.module.CARD
+
+    @property
+    def gains(self) -> Any:
+        """The class of the gains, a NamedTuple."""
+        return self.module.Gains
+
+    @property
+    def torque(self) -> Callable[..., Any]:
+        """The equation of the control torque."""
+        return self.module.torque
+
+    @property
+    def lyapunov(self) -> Callable[..., Any] | None:
+        """The equation of the Lyapunov function, where the law has one."""
+        return getattr(self.module, "lyapunov", None)
+
+    @property
+    def forms(self) -> dict[str, Any]:
+        """Design forms: name to the NamedTuple class of its inputs."""
+        return getattr(self.module, "FORMS", {})
+
+    def fields(self, form: str | None = None) -> list[Field]:
+        """The gains in order, or the inputs of a design form."""
+        return fields(self.gains if form is None else self.forms[form])
+
+    def examples(self) -> list[Any]:
+        """Gains that tests, docs and benchmarks run."""
+        return self.module.examples()
+
+    def design(self, craft: Craft, spec: Any) -> Any:
+        """Gains from the inputs of a design form."""
+        return self.module.design(craft, spec)
+
+    def remember(self, gains: Any, craft: Craft, period: float) -> Any:
+        """The memory at the start of a run, made anew for each trajectory."""
+        maker = getattr(self.module, "remember", None)
+        return NoMemory() if maker is None else maker(gains, craft, period)
+
+
+@cache
+def catalogue() -> dict[str, Law]:
+    """All laws by name. A package whose entry point does not load is named in the error."""
+    found = [
+        _as_law(import_module(f"{starhold.laws.__name__}.{entry.name}"))
+        for entry in pkgutil.iter_modules(starhold.laws.__path__)
+        if _declares_card(entry)
+    ]
+    for point in entry_points(group="starhold.laws"):
+        found.append(_as_law(point.load()))
+    return {law.name: law for law in sorted(found, key=lambda law: law.name)}
+
+
+def from_file(path: Path) -> Law:
+    """The law in a file outside the package. ValueError when it lacks a part of the interface."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    if spec is None or spec.loader is None:
+        raise ValueError(f"{path}: not a Python file")
+    module = importlib.util.module_from_spec(spec)
+    # Registered so that the equations' sources and NamedTuples can be found by their module name.
+    sys.modules[path.stem] = module
+    spec.loader.exec_module(module)
+    return _as_law(module)
+
+
+def _declares_card(entry: pkgutil.ModuleInfo) -> bool:
+    spec = importlib.util.find_spec(f"{starhold.laws.__name__}.{entry.name}")
+    origin = None if spec is None else spec.origin
+    return origin is not None and "\nCARD = " in Path(origin).read_text(encoding="utf-8")
+
+
+def _as_law(module: ModuleType) -> Law:
+    missing = [name for name in INTERFACE if not hasattr(module, name)]
+    if missing:
+        raise ValueError(f"{module.__file__}: a law needs {', '.join(missing)}")
+    return Law(module.__name__.rpartition(".")[2].replace("_", "-"), module)

@@ -1,0 +1,153 @@
+"""What a law sees, and what a law file declares.
+
+A law file holds `CARD`, `class Gains(NamedTuple)`, the equation `torque(seen, gains, craft, memory) -> (torque, memory)`
+and `examples()`. It may add `lyapunov(seen, gains, craft)`, design forms (`FORMS` with `design(craft, spec)`) and
+`remember(gains, craft, period)` for a memory that is not empty.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Literal, NamedTuple, TypeAlias, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from starhold.algebra.quaternion import Quaternion
+from starhold.algebra.scalar import equation
+from starhold.algebra.vector import Matrix, Vector, add, apply, subtract, swing
+from starhold.models.craft import Craft, matrix
+
+
+class Seen(NamedTuple):
+    """What a law is told at a control instant.
+
+    attitude: turn from the target axes to the body axes (scalar first); rate: angular velocity relative to the target
+    (rad/s); body_rate: absolute angular velocity; target_rate: the target's (rad/s); target_acceleration: the derivative
+    of target_rate as the turning body sees it (rad/s2); external_torque: the modelled torque at this attitude (N m); position: from the centre of attraction (m); period: for
+    which the torque will be held (s). Vectors are in body axes.
+    """
+
+    attitude: Quaternion
+    rate: Vector
+    body_rate: Vector
+    target_rate: Vector
+    target_acceleration: Vector
+    external_torque: Vector
+    position: Vector
+    period: float
+
+
+class NoMemory(NamedTuple):
+    """The memory of a law that keeps nothing."""
+
+
+Claim: TypeAlias = Literal["global", "almost-global", "local", "none"]
+
+
+@dataclass(frozen=True)
+class Card:
+    """What a law is: title, sources, assumptions, the stability it claims, and what its readers must know."""
+
+    title: str
+    summary: str
+    sources: tuple[str, ...]
+    assumptions: tuple[str, ...]
+    claims: Claim
+    double_cover: Literal["odd", "even"] = "odd"
+    """odd: feeding back -q in place of q changes the torque; even: it does not."""
+    compiled_only: bool = False
+    rest_tolerance: float = 0.0
+    """Largest torque (N m) at rest on target; zero but for laws that solve a problem to a tolerance."""
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Unit and bounds of one gain, as an annotation. `shape`: () a number, (3,) a vector, (3, 3) a matrix, for which a
+    number stands for that multiple of the identity and a vector for a diagonal."""
+
+    unit: str = "1"
+    above: float | None = None
+    at_least: float | None = None
+    at_most: float | None = None
+    shape: tuple[int, ...] = ()
+    whole: bool = False
+    choices: tuple[str, ...] = ()
+    text: str = ""
+
+    def check(self, value: Any) -> Any:
+        """The value as the law wants it; ValueError says what is allowed."""
+        if self.choices:
+            if value not in self.choices:
+                raise ValueError(f"must be one of {', '.join(self.choices)}")
+            return self.choices.index(value)
+        array = np.asarray(value, dtype=float)
+        if self.shape == (3, 3) and array.ndim < 2:
+            array = array * np.eye(3) if array.ndim == 0 else np.diag(array)
+        elif array.ndim == 0 and self.shape:
+            array = np.full(self.shape, float(array))
+        if array.shape != self.shape:
+            raise ValueError(f"must be {self.describe()}")
+        if not np.isfinite(array).all():
+            raise ValueError("must be finite")
+        # Bounds of a matrix speak of its eigenvalues' sign only where the law says so; entries are free.
+        if self.shape != (3, 3):
+            self._check_bounds(array)
+        if self.whole:
+            return int(array)
+        if not self.shape:
+            return float(array)
+        return matrix(array) if self.shape == (3, 3) else tuple(array.tolist())
+
+    def _check_bounds(self, array: Any) -> None:
+        if self.above is not None and not (array > self.above).all():
+            raise ValueError(f"must be above {self.above:g}")
+        if self.at_least is not None and not (array >= self.at_least).all():
+            raise ValueError(f"must be at least {self.at_least:g}")
+        if self.at_most is not None and not (array <= self.at_most).all():
+            raise ValueError(f"must be at most {self.at_most:g}")
+        if self.whole and float(array) != math.floor(float(array)):
+            raise ValueError("must be a whole number")
+
+    def describe(self) -> str:
+        """What may be written for this gain."""
+        kind = {(): "a whole number" if self.whole else "a number", (3, 3): "a number, three numbers or a 3x3 matrix"}
+        return kind.get(self.shape, f"a number or {'x'.join(map(str, self.shape))} numbers")
+
+
+@dataclass(frozen=True)
+class Field:
+    """One gain of a law or one input of a design form: its name, declaration and default."""
+
+    name: str
+    gain: Gain
+    required: bool
+    default: Any = field(default=None)
+
+
+def fields(cls: Any) -> list[Field]:
+    """The declared gains of a `Gains` class (or of a design form), in order."""
+    found: list[Field] = []
+    hints = get_type_hints(cls, include_extras=True)
+    for name in cls._fields:
+        hint = hints[name]
+        gain = next((a for a in get_args(hint)[1:] if isinstance(a, Gain)), None)
+        if get_origin(hint) is not Annotated or gain is None:
+            raise TypeError(f"{cls.__module__}.{cls.__name__}.{name} declares no unit: annotate it with Gain")
+        defaults: dict[str, Any] = cls._field_defaults
+        found.append(Field(name, gain, name not in defaults, defaults.get(name)))
+    return found
+
+
+@equation
+def tracking_torque(seen: Seen, craft: Craft) -> Vector:
+    """The torque (N m) that makes the motion relative to a moving target obey the equations of a target at rest,
+    J w_e' + w_e x J w_e = rest of the torque; zero for a target at rest."""
+    gyroscopic = subtract(swing(craft.inertia, seen.body_rate), swing(craft.inertia, seen.rate))
+    return add(gyroscopic, apply(craft.inertia, seen.target_acceleration))
+
+
+__all__ = [
+    "Card", "Claim", "Craft", "Field", "Gain", "Matrix", "NoMemory", "Quaternion", "Seen", "Vector",
+    "fields", "tracking_torque",
+]  # fmt: skip

@@ -1,0 +1,84 @@
+"""PD feedback with matrix gains, and the two classical families that make it stable."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+
+from starhold.algebra.quaternion import vector_part
+from starhold.algebra.scalar import Scalar, equation
+from starhold.algebra.vector import IDENTITY, Matrix, Vector, add, apply, dot, inverse, scale, subtract
+from starhold.laws.interface import Card, Gain, NoMemory, Seen, tracking_torque
+from starhold.models.craft import Craft, matrix, tensor
+
+CARD = Card(
+    title="Matrix-gain PD",
+    summary="u = -K_rate w - K_attitude q with 3x3 gains",
+    sources=("Quaternion feedback regulator for spacecraft eigenaxis rotations (1989)", "equations A: matrix-gain family"),
+    assumptions=(
+        "rigid body",
+        "no external torque",
+        "torque not limited",
+        "K_attitude^-1 J > 0, K_attitude^-1 K_rate > 0 and w.K_attitude^-1(w x Jw) = 0 for all w",
+    ),
+    claims="almost-global",
+)
+
+
+class Gains(NamedTuple):
+    """Damping and stiffness matrices."""
+
+    k_rate: Annotated[Matrix, Gain("N m s", shape=(3, 3), text="damping")]
+    k_attitude: Annotated[Matrix, Gain("N m", shape=(3, 3), text="stiffness")]
+
+
+class Inertial(NamedTuple):
+    """K_attitude = (a J + b E)^-1, K_rate = d J, for any inertia."""
+
+    a: Annotated[float, Gain("1/(N m kg m^2)", at_least=0.0, text="weight of the inertia in K_attitude^-1")]
+    b: Annotated[float, Gain("1/(N m)", at_least=0.0, text="weight of the identity in K_attitude^-1")]
+    d: Annotated[float, Gain("1/s", above=0.0, text="damping per inertia")]
+
+
+class Diagonal(NamedTuple):
+    """K_attitude = (a J + b E)^-1, K_rate = diag(d1, d2, d3) J, for a diagonal inertia."""
+
+    a: Annotated[float, Gain("1/(N m kg m^2)", at_least=0.0, text="weight of the inertia in K_attitude^-1")]
+    b: Annotated[float, Gain("1/(N m)", at_least=0.0, text="weight of the identity in K_attitude^-1")]
+    d: Annotated[Vector, Gain("1/s", above=0.0, shape=(3,), text="damping per inertia of each axis")]
+
+
+FORMS: dict[str, Any] = {"inertial": Inertial, "diagonal": Diagonal}
+
+
+def design(craft: Craft, spec: Inertial | Diagonal) -> Gains:
+    """Gains of one of the two classical families; ValueError when its condition fails."""
+    inertia = tensor(craft.inertia)
+    if spec.a == 0.0 and spec.b == 0.0:
+        raise ValueError("a and b must not both be zero")
+    if isinstance(spec, Diagonal) and np.count_nonzero(inertia - np.diag(np.diagonal(inertia))):
+        raise ValueError("form 'diagonal' needs a diagonal inertia; use form 'inertial'")
+    k_rate = np.diag(np.broadcast_to(np.asarray(spec.d, dtype=float), 3)) @ inertia
+    return Gains(matrix(k_rate), matrix(np.linalg.inv(spec.a * inertia + spec.b * np.eye(3))))
+
+
+@equation
+def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
+    """Control torque (N m, body)."""
+    feedback = add(apply(gains.k_rate, seen.rate), apply(gains.k_attitude, vector_part(seen.attitude)))
+    return subtract(tracking_torque(seen, craft), feedback), memory
+
+
+@equation
+def lyapunov(seen: Seen, gains: Gains, craft: Craft) -> Scalar:
+    """V = w.K_attitude^-1 Jw/2 + 2 (1 - q0); V' = -w.K_attitude^-1 K_rate w under the law's assumptions."""
+    weighted = apply(inverse(gains.k_attitude), apply(craft.inertia, seen.rate))
+    return 0.5 * dot(seen.rate, weighted) + 2.0 * (1.0 - seen.attitude[0])
+
+
+def examples() -> list[Gains]:
+    """Stiffness a multiple of the identity (b alone), for any inertia."""
+    rate: Matrix = (scale(0.09, IDENTITY[0]), scale(0.12, IDENTITY[1]), scale(0.15, IDENTITY[2]))
+    stiffness: Matrix = (scale(0.009, IDENTITY[0]), scale(0.009, IDENTITY[1]), scale(0.009, IDENTITY[2]))
+    return [Gains(rate, stiffness)]

@@ -1,0 +1,195 @@
+"""The step of a closed loop, and the compiled kernels that repeat it over one lane or many.
+
+All readers share `decide` (what the law commands at a control instant) and `hold` (the motion under the held command),
+so one lane, any lane of a batch and plain Python agree bit for bit. No fast-math anywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple
+
+import numba
+
+from starhold.algebra.quaternion import Quaternion, relative, to_body
+from starhold.algebra.scalar import both, equation, is_finite, less, opposite, where
+from starhold.algebra.structure import LANES, load, move, store
+from starhold.algebra.vector import ZERO, Vector, add, cross, dot, subtract
+from starhold.laws.interface import Seen
+from starhold.loop.closed_loop import Carry, Parts
+from starhold.loop.fingerprint import fingerprint, outside_modules
+from starhold.models.rigid_body import motion, tidy, with_torque
+from starhold.models.target import inertial
+
+
+class Sample(NamedTuple):
+    """One recorded instant: the true state, the error relative to the target, the command."""
+
+    attitude: Quaternion
+    rate: Vector
+    position: Vector
+    velocity: Vector
+    torque: Vector
+    command: Vector
+    attitude_error: Quaternion
+    rate_error: Vector
+
+
+class Step(NamedTuple):
+    """The equations of one control step. `look` gives what the law sees before the double cover is folded."""
+
+    look: Callable[..., Any]
+    decide: Callable[..., Any]
+    hold: Callable[..., Any]
+    check: Callable[..., Any]
+    sample: Callable[..., Any]
+
+
+class Kernels(NamedTuple):
+    """Compiled: `one` flies a trajectory and records it, `many` flies the columns of an array."""
+
+    one: Callable[..., Any]
+    many: Callable[..., Any]
+
+
+@cache
+def make_step(parts: Parts) -> Step:
+    """The equations of a control step made of these parts."""
+    environment, target, sense, disturb, cover, law, limit, begin, response = parts
+
+    @equation
+    def look(carry, step, run, craft, setup):  # type: ignore[no-untyped-def]
+        state = carry.state
+        goal = target(setup.target, state.position, state.velocity, step)
+        attitude, rate = sense(state.attitude, state.rate, setup.noise, setup.seed, run, step)
+        error = relative(goal.attitude, attitude)
+        external = environment(state.position, attitude, craft)[1]
+        position = to_body(attitude, state.position)
+        target_rate, target_acceleration = to_body(error, goal.rate), to_body(error, goal.acceleration)
+        error_rate = subtract(rate, target_rate)
+        target_acceleration = subtract(target_acceleration, cross(error_rate, target_rate))
+        return Seen(error, error_rate, rate, target_rate, target_acceleration, external, position, setup.period)
+
+    @equation
+    def look_at_rest(carry, step, run, craft, setup):  # type: ignore[no-untyped-def]
+        # The same for a target that does not turn, spared the arithmetic on zeros that a compiler may not drop.
+        state = carry.state
+        goal = target(setup.target, state.position, state.velocity, step)
+        attitude, rate = sense(state.attitude, state.rate, setup.noise, setup.seed, run, step)
+        external = environment(state.position, attitude, craft)[1]
+        position = to_body(attitude, state.position)
+        return Seen(relative(goal.attitude, attitude), rate, rate, ZERO, ZERO, external, position, setup.period)
+
+    see = look_at_rest if target is inertial else look
+
+    @equation
+    def decide(carry, step, run, gains, craft, setup):  # type: ignore[no-untyped-def]
+        seen = see(carry, step, run, craft, setup)
+        shown, h = cover(seen.attitude, carry.h, setup.width)
+        seen = Seen(
+            shown,
+            seen.rate,
+            seen.body_rate,
+            seen.target_rate,
+            seen.target_acceleration,
+            seen.external_torque,
+            seen.position,
+            seen.period,
+        )
+        command, memory = law(seen, gains, craft, carry.memory)
+        command = limit(command, craft.torque_limit)
+        state = with_torque(carry.state, begin(carry.state.torque, command))
+        disturbance = disturb(setup.noise, setup.seed, run, step)
+        return Carry(state, memory, h, command, disturbance, carry.lost_at)
+
+    @equation
+    def slope(state, begun, carry, craft, setup):  # type: ignore[no-untyped-def]
+        acceleration, external = environment(state.position, state.attitude, craft)
+        torque_rate = response(state.torque, carry.command, begun, setup.substep, setup.dynamics)
+        total = add(add(state.torque, carry.disturbance), external)
+        return motion(state, total, acceleration, torque_rate, craft)
+
+    @equation
+    def hold(carry, craft, setup):  # type: ignore[no-untyped-def]
+        """One substep: the classical Runge-Kutta method of fourth order."""
+        s, h = carry.state, setup.substep
+        a = slope(s, s.torque, carry, craft, setup)
+        b = slope(move(s, 0.5 * h, a), s.torque, carry, craft, setup)
+        c = slope(move(s, 0.5 * h, b), s.torque, carry, craft, setup)
+        d = slope(move(s, h, c), s.torque, carry, craft, setup)
+        end = move(s, h / 6.0, move(move(move(a, 2.0, b), 2.0, c), 1.0, d))
+        return Carry(tidy(end), carry.memory, carry.h, carry.command, carry.disturbance, carry.lost_at)
+
+    @equation
+    def check(carry, step, setup):  # type: ignore[no-untyped-def]
+        """Note the step at which the motion is not finite, or turns by more than a radian in one substep."""
+        s = carry.state
+        turn = setup.substep * setup.substep * dot(s.rate, s.rate)
+        sound = both(less(turn, 1.0), both(is_finite(s.attitude[0]), is_finite(dot(s.position, s.position))))
+        lost = where(both(opposite(sound), less(carry.lost_at, 0.0)), 1.0 * step, carry.lost_at)
+        return Carry(s, carry.memory, carry.h, carry.command, carry.disturbance, lost)
+
+    @equation
+    def sample(carry, step, setup):  # type: ignore[no-untyped-def]
+        s = carry.state
+        goal = target(setup.target, s.position, s.velocity, step)
+        error = relative(goal.attitude, s.attitude)
+        rate = subtract(s.rate, to_body(error, goal.rate))
+        return Sample(s.attitude, s.rate, s.position, s.velocity, s.torque, carry.command, error, rate)
+
+    return Step(see, decide, hold, check, sample)
+
+
+@cache
+def make_kernels(parts: Parts) -> Kernels:
+    """Kernels for these parts, from the disk cache where nothing they are built from has changed."""
+    mark = fingerprint(outside_modules(parts))
+    return Kernels(_one(make_step(parts), mark), _many(make_step(parts), mark))
+
+
+def _one(equations: Step, mark: str) -> Callable[..., Any]:
+    _, decide, hold, check, sample = equations
+
+    @numba.njit(error_model="numpy", cache=True, nogil=True)
+    def one(carry, first, count, finish, every, run, gains, craft, setup, substeps, out):  # type: ignore[no-untyped-def]
+        """Fly control steps first .. first+count-1; write every `every`-th into a column of `out`, and with `finish` the
+        end as well. Returns what is carried on; stops where the motion is lost."""
+        mark  # noqa: B018
+        for step in range(first, first + count):
+            carry = check(carry, step, setup)
+            if carry.lost_at >= 0.0:
+                return carry
+            carry = decide(carry, step, run, gains, craft, setup)
+            if step % every == 0:
+                store(out, step // every, sample(carry, step, setup))
+            for _ in range(substeps):
+                carry = hold(carry, craft, setup)
+        last = first + count
+        carry = check(carry, last, setup)
+        if finish and carry.lost_at < 0.0 and last % every == 0:
+            store(out, last // every, sample(decide(carry, last, run, gains, craft, setup), last, setup))
+        return carry
+
+    return one
+
+
+def _many(equations: Step, mark: str) -> Callable[..., Any]:
+    _, decide, hold, check, _ = equations
+
+    @numba.njit(error_model="numpy", cache=True, nogil=True)
+    def many(x, like, first, count, run, gains, like_gains, craft, like_craft, setup, substeps):  # type: ignore[no-untyped-def]
+        """Fly control steps first .. first+count-1 of every lane of the block x, in place; lane 0 is
+        run number `run`. Gains and craft are NamedTuples shared by all lanes, or blocks too."""
+        mark  # noqa: B018
+        for step in range(first, first + count):
+            for k in range(LANES):
+                c = check(load(x, k, like), step, setup)
+                store(x, k, decide(c, step, run + k, load(gains, k, like_gains), load(craft, k, like_craft), setup))
+            for _ in range(substeps):
+                for k in range(LANES):
+                    store(x, k, hold(load(x, k, like), load(craft, k, like_craft), setup))
+        for k in range(LANES):
+            store(x, k, check(load(x, k, like), first + count, setup))
+
+    return many

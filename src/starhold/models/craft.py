@@ -1,0 +1,79 @@
+"""What a law and the equations of motion know of the spacecraft."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.vector import Matrix, Vector
+
+EARTH = 3.986e14
+"""Gravitational parameter of the Earth, m3/s2, as the published experiment uses it."""
+
+
+class Craft(NamedTuple):
+    """A rigid spacecraft: inertia about the centre of mass in body axes (kg m2; three moments when these are principal
+    axes, else a matrix: `apply` and `swing` take both), its inverse, the torque limit (N m, per axis or in norm; infinite
+    for none) and the gravitational parameter of the body it orbits (m3/s2)."""
+
+    inertia: Matrix | Vector
+    inverse_inertia: Matrix | Vector
+    torque_limit: float
+    gravity: float
+
+
+def make_craft(inertia: Any, torque_limit: float = math.inf, gravity: float = EARTH) -> Craft:
+    """A validated craft from three principal moments or a 3x3 tensor (kg m2).
+
+    Raises ValueError when the tensor is not symmetric, not positive definite, breaks the triangle inequality
+    J1 + J2 >= J3, which every real mass distribution obeys, or when the limit is not positive.
+    """
+    full = check_inertia(inertia)
+    if not torque_limit > 0.0:
+        raise ValueError(f"the torque limit must be positive, not {torque_limit:g}")
+    moments = np.diagonal(full)
+    if np.count_nonzero(full - np.diag(moments)) == 0:
+        return Craft(vector(moments), vector(1.0 / moments), float(torque_limit), float(gravity))
+    return Craft(matrix(full), matrix(np.linalg.inv(full)), float(torque_limit), float(gravity))
+
+
+def tensor(inertia: Matrix | Vector) -> NDArray[np.float64]:
+    """The 3x3 array of a craft's inertia."""
+    array = np.array(inertia)
+    return np.diag(array) if array.ndim == 1 else array
+
+
+def check_inertia(inertia: Any) -> NDArray[np.float64]:
+    """The 3x3 tensor of three principal moments or a 3x3 array; ValueError says what no rigid body can have."""
+    tensor = np.asarray(inertia, dtype=float)
+    if tensor.shape == (3,):
+        tensor = np.diag(tensor)
+    if tensor.shape != (3, 3):
+        raise ValueError(f"inertia must be three moments or a 3x3 matrix, not an array of shape {tensor.shape}")
+    if not np.isfinite(tensor).all():
+        raise ValueError("inertia must be finite")
+    if not np.allclose(tensor, tensor.T, rtol=1e-9, atol=0.0):
+        raise ValueError("inertia must be symmetric")
+    tensor = 0.5 * (tensor + tensor.T)
+    moments = np.linalg.eigvalsh(tensor)
+    shown = ", ".join(f"{m:g}" for m in moments)
+    if moments[0] <= 0.0:
+        raise ValueError(f"inertia must be positive definite; its principal moments are {shown}")
+    if moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-9):
+        raise ValueError(f"no body has these principal moments ({shown}): the largest exceeds the sum of the others")
+    return tensor
+
+
+def vector(array: Any) -> Vector:
+    """Three numbers as a tuple of floats."""
+    a: list[float] = np.asarray(array, dtype=float).tolist()
+    return (a[0], a[1], a[2])
+
+
+def matrix(array: Any) -> Matrix:
+    """A 3x3 array as a tuple of rows of floats."""
+    a: list[list[float]] = np.asarray(array, dtype=float).tolist()
+    return ((a[0][0], a[0][1], a[0][2]), (a[1][0], a[1][1], a[1][2]), (a[2][0], a[2][1], a[2][2]))

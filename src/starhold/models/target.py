@@ -1,0 +1,75 @@
+"""The attitude to be held or followed, with its rate and acceleration."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.cosines import to_quaternion
+from starhold.algebra.quaternion import Quaternion
+from starhold.algebra.scalar import equation, sqrt
+from starhold.algebra.vector import ZERO, Vector, cross, dot, scale
+
+
+class Target(NamedTuple):
+    """q_RN (inertial to target axes), and the target's angular velocity (rad/s) and acceleration (rad/s2), both in
+    target axes."""
+
+    attitude: Quaternion
+    rate: Vector
+    acceleration: Vector
+
+
+@equation
+def inertial(fixed: Quaternion, position: Vector, velocity: Vector, step: int) -> Target:
+    """A constant attitude."""
+    return Target(fixed, ZERO, ZERO)
+
+
+@equation
+def orbital(offset: Any, position: Vector, velocity: Vector, step: int) -> Target:
+    """The orbital frame: third axis to the centre of attraction, second against the orbit normal, first along the motion.
+
+    Its rate is h/r2 about the normal, and its acceleration -2 h (r.v)/r4, exact for two-body motion.
+    """
+    h = cross(position, velocity)
+    r2, h2 = dot(position, position), dot(h, h)
+    size = sqrt(h2)
+    down, against = scale(-1.0 / sqrt(r2), position), scale(-1.0 / size, h)
+    attitude = to_quaternion((cross(against, down), against, down))
+    rate = size / r2
+    return Target(attitude, (0.0, -rate, 0.0), (0.0, 2.0 * rate * dot(position, velocity) / r2, 0.0))
+
+
+@equation
+def history(table: Any, position: Vector, velocity: Vector, step: int) -> Target:
+    """A row of a table prepared by `tabulate`, one row a control step."""
+    return Target(
+        (table[step, 0], table[step, 1], table[step, 2], table[step, 3]),
+        (table[step, 4], table[step, 5], table[step, 6]),
+        (table[step, 7], table[step, 8], table[step, 9]),
+    )
+
+
+def tabulate(times: Any, attitudes: Any, sample_times: Any) -> NDArray[np.float64]:
+    """Rows (attitude, rate, acceleration) at the sample times, through a twice differentiable rotation spline.
+
+    times: (n,) s, increasing; attitudes: (n, 4) quaternions, scalar first; sample times within [times[0], times[-1]].
+    Raises ValueError when they are not. Target axes are the body axes to be followed.
+    """
+    from scipy.spatial.transform import Rotation, RotationSpline
+
+    times, samples = np.asarray(times, dtype=float), np.asarray(sample_times, dtype=float)
+    if samples[0] < times[0] or samples[-1] > times[-1]:
+        raise ValueError(
+            f"the target history covers {times[0]:g} to {times[-1]:g} s, the run needs {samples[0]:g} to {samples[-1]:g} s"
+        )
+    spline = RotationSpline(times, Rotation.from_quat(np.asarray(attitudes, dtype=float), scalar_first=True))
+    q = spline(samples).as_quat(scalar_first=True)
+    q *= np.sign(q[0, 0] or 1.0)
+    flips = np.cumprod(np.where(np.sum(q[1:] * q[:-1], axis=1) < 0.0, -1.0, 1.0))
+    q[1:] *= flips[:, None]
+    # The spline's rates are in the moving axes, which is the convention of this module.
+    return np.ascontiguousarray(np.hstack([q, spline(samples, 1), spline(samples, 2)]))
