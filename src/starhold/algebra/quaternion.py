@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
-from starhold.algebra.scalar import Scalar, absolute, equation, sqrt
+from starhold.algebra.scalar import Scalar, absolute, equation, side, sqrt
 from starhold.algebra.vector import Vector, add, cross, dot, scale
 
 Quaternion: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar]
@@ -53,7 +53,7 @@ def normalise(q: Quaternion) -> Quaternion:
 
 @equation
 def renormalise(q: Quaternion) -> Quaternion:
-    """A quaternion of nearly unit length brought back to it, by one Newton step: an error e of |q|2 becomes 3/8 e2."""
+    """A quaternion of nearly unit length brought back to it by one Newton step: an error e of |q|2 leaves 3/8 e2 of |q|."""
     return stretch(1.5 - 0.5 * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), q)
 
 
@@ -85,6 +85,12 @@ def derivative(q: Quaternion, rate: Vector) -> Quaternion:
 def relative(target: Quaternion, q: Quaternion) -> Quaternion:
     """The turn from the target axes to the body axes, target* q; no turn when the attitudes agree."""
     return multiply(conjugate(target), q)
+
+
+@equation
+def nearer(q: Quaternion, other: Quaternion) -> Quaternion:
+    """Of q and -q, the same attitude, the one nearer to `other`."""
+    return stretch(side(q[0] * other[0] + q[1] * other[1] + q[2] * other[2] + q[3] * other[3]), q)
 
 
 @equation

@@ -69,15 +69,14 @@ def sqrt(x: Scalar) -> Scalar:
 def less(a: Scalar, b: Scalar) -> Truth:
     """a < b."""
     reader = _reader(a, b)
-    return a < b if reader is None else reader.less(a, b)
+    return bool(a < b) if reader is None else reader.less(a, b)
 
 
 def where(condition: Truth, a: Scalar, b: Scalar) -> Scalar:
     """a where the condition holds, else b; both are always evaluated."""
-    reader = None if isinstance(condition, bool) else _reader(condition, a, b)
-    if reader is not None:
-        return reader.where(condition, a, b)
-    return a if condition else b
+    if isinstance(condition, bool):
+        return a if condition else b
+    return _truth_reader(condition).where(condition, a, b)
 
 
 def both(a: Truth, b: Truth) -> Truth:

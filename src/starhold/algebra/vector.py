@@ -6,7 +6,7 @@ from typing import Any, TypeAlias, TypeGuard
 
 from numba import types  # pyright: ignore
 
-from starhold.algebra.scalar import Scalar, absolute, clip, compiled_as, equation, maximum, minimum, sign, sqrt
+from starhold.algebra.scalar import Scalar, absolute, clip, compiled_as, equation, less, maximum, sign, sqrt, where
 
 Vector: TypeAlias = tuple[Scalar, Scalar, Scalar]
 Matrix: TypeAlias = tuple[Vector, Vector, Vector]
@@ -77,8 +77,10 @@ def clip_axes(a: Vector, limit: Scalar) -> Vector:
 
 @equation
 def clip_norm(a: Vector, limit: Scalar) -> Vector:
-    """a shortened to the given length where it is longer; the direction is kept. The limit must be positive."""
-    return scale(minimum(1.0, limit / maximum(limit, norm(a))), a)
+    """a shortened to the given length where it is longer; the direction is kept. The limit must be positive; it may be
+    infinite."""
+    length = norm(a)
+    return scale(where(less(limit, length), limit / maximum(limit, length), 1.0), a)
 
 
 @equation

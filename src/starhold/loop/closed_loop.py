@@ -10,10 +10,13 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.quaternion import NO_TURN, Quaternion
+from starhold.algebra.quaternion import NO_TURN, Quaternion, relative
+from starhold.algebra.scalar import side
+from starhold.algebra.structure import unflatten
 from starhold.algebra.vector import ZERO, Vector
 from starhold.laws.catalogue import Law
 from starhold.laws.double_cover import COVERS
+from starhold.laws.interface import NoMemory
 from starhold.models import actuator, environment, sensor, target
 from starhold.models.craft import Craft
 from starhold.models.rigid_body import State
@@ -50,11 +53,13 @@ class Parts(NamedTuple):
 
 
 class Carry(NamedTuple):
-    """What a trajectory carries from step to step: the state, the law's memory, the side h = +-1 of the double cover,
-    the command and the random torque held, and the control step at which the motion was lost (-1: not lost)."""
+    """What a trajectory carries from step to step: the state, the law's memory, the target attitude seen last (only where
+    the target has to be continued from it), the side h = +-1 of the double cover, the command and the random torque held,
+    and the control step at which the motion was lost (-1: not lost)."""
 
     state: State
     memory: Any
+    goal: Any
     h: float
     command: Vector
     disturbance: Vector
@@ -118,4 +123,13 @@ class ClosedLoop:
         """What a trajectory starts with."""
         start = self.start if start is None else start
         memory = self.law.remember(self.gains, self.craft, self.period)
-        return Carry(start, memory, 1.0 if start.attitude[0] >= 0.0 else -1.0, ZERO, ZERO, -1.0)
+        goal = NoMemory()
+        if isinstance(self.target, str):
+            goal = target.orbital(None, start.position, start.velocity, 0, NO_TURN).attitude
+        error = relative(self._goal_at_start(goal), start.attitude)
+        return Carry(start, memory, goal, side(error[0]), ZERO, ZERO, -1.0)
+
+    def _goal_at_start(self, followed: Any) -> Quaternion:
+        if isinstance(self.target, np.ndarray):
+            return unflatten(self.target[0, :4], NO_TURN)
+        return followed if isinstance(self.target, str) else self.target

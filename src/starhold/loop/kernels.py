@@ -20,7 +20,7 @@ from starhold.laws.interface import Seen
 from starhold.loop.closed_loop import Carry, Parts
 from starhold.loop.fingerprint import fingerprint, outside_modules
 from starhold.models.rigid_body import motion, tidy, with_torque
-from starhold.models.target import inertial
+from starhold.models.target import inertial, orbital
 
 
 class Sample(NamedTuple):
@@ -53,6 +53,13 @@ class Kernels(NamedTuple):
     many: Callable[..., Any]
 
 
+class Replay(NamedTuple):
+    """Compiled: `see` turns recorded samples into what the law saw, `call` shows these to the law again."""
+
+    see: Callable[..., Any]
+    call: Callable[..., Any]
+
+
 @cache
 def make_step(parts: Parts) -> Step:
     """The equations of a control step made of these parts."""
@@ -61,7 +68,7 @@ def make_step(parts: Parts) -> Step:
     @equation
     def look(carry, step, run, craft, setup):  # type: ignore[no-untyped-def]
         state = carry.state
-        goal = target(setup.target, state.position, state.velocity, step)
+        goal = target(setup.target, state.position, state.velocity, step, carry.goal)
         attitude, rate = sense(state.attitude, state.rate, setup.noise, setup.seed, run, step)
         error = relative(goal.attitude, attitude)
         external = environment(state.position, attitude, craft)[1]
@@ -75,13 +82,22 @@ def make_step(parts: Parts) -> Step:
     def look_at_rest(carry, step, run, craft, setup):  # type: ignore[no-untyped-def]
         # The same for a target that does not turn, spared the arithmetic on zeros that a compiler may not drop.
         state = carry.state
-        goal = target(setup.target, state.position, state.velocity, step)
+        goal = target(setup.target, state.position, state.velocity, step, carry.goal)
         attitude, rate = sense(state.attitude, state.rate, setup.noise, setup.seed, run, step)
         external = environment(state.position, attitude, craft)[1]
         position = to_body(attitude, state.position)
         return Seen(relative(goal.attitude, attitude), rate, rate, ZERO, ZERO, external, position, setup.period)
 
+    @equation
+    def keep(carry, step, setup):  # type: ignore[no-untyped-def]
+        return carry.goal
+
+    @equation
+    def renew(carry, step, setup):  # type: ignore[no-untyped-def]
+        return target(setup.target, carry.state.position, carry.state.velocity, step, carry.goal).attitude
+
     see = look_at_rest if target is inertial else look
+    follow = renew if target is orbital else keep
 
     @equation
     def decide(carry, step, run, gains, craft, setup):  # type: ignore[no-untyped-def]
@@ -101,7 +117,7 @@ def make_step(parts: Parts) -> Step:
         command = limit(command, craft.torque_limit)
         state = with_torque(carry.state, begin(carry.state.torque, command))
         disturbance = disturb(setup.noise, setup.seed, run, step)
-        return Carry(state, memory, h, command, disturbance, carry.lost_at)
+        return Carry(state, memory, follow(carry, step, setup), h, command, disturbance, carry.lost_at)
 
     @equation
     def slope(state, begun, carry, craft, setup):  # type: ignore[no-untyped-def]
@@ -119,7 +135,7 @@ def make_step(parts: Parts) -> Step:
         c = slope(move(s, 0.5 * h, b), s.torque, carry, craft, setup)
         d = slope(move(s, h, c), s.torque, carry, craft, setup)
         end = move(s, h / 6.0, move(move(move(a, 2.0, b), 2.0, c), 1.0, d))
-        return Carry(tidy(end), carry.memory, carry.h, carry.command, carry.disturbance, carry.lost_at)
+        return Carry(tidy(end), carry.memory, carry.goal, carry.h, carry.command, carry.disturbance, carry.lost_at)
 
     @equation
     def check(carry, step, setup):  # type: ignore[no-untyped-def]
@@ -128,12 +144,12 @@ def make_step(parts: Parts) -> Step:
         turn = setup.substep * setup.substep * dot(s.rate, s.rate)
         sound = both(less(turn, 1.0), both(is_finite(s.attitude[0]), is_finite(dot(s.position, s.position))))
         lost = where(both(opposite(sound), less(carry.lost_at, 0.0)), 1.0 * step, carry.lost_at)
-        return Carry(s, carry.memory, carry.h, carry.command, carry.disturbance, lost)
+        return Carry(s, carry.memory, carry.goal, carry.h, carry.command, carry.disturbance, lost)
 
     @equation
     def sample(carry, step, setup):  # type: ignore[no-untyped-def]
         s = carry.state
-        goal = target(setup.target, s.position, s.velocity, step)
+        goal = target(setup.target, s.position, s.velocity, step, carry.goal)
         error = relative(goal.attitude, s.attitude)
         rate = subtract(s.rate, to_body(error, goal.rate))
         return Sample(s.attitude, s.rate, s.position, s.velocity, s.torque, carry.command, error, rate)
@@ -193,3 +209,34 @@ def _many(equations: Step, mark: str) -> Callable[..., Any]:
             store(x, k, check(load(x, k, like), first + count, setup))
 
     return many
+
+
+@cache
+def make_replay(parts: Parts) -> Replay:
+    """Kernels that repeat the calls of a law, to time them."""
+    mark = fingerprint(outside_modules(parts))
+    look, law, cover = make_step(parts).look, parts.law, parts.cover
+
+    @numba.njit(error_model="numpy", cache=True)
+    def see(samples, carry, craft, setup):  # type: ignore[no-untyped-def]
+        """What the law is shown at each sample (numbers of Seen, samples)."""
+        mark  # noqa: B018
+        seen = np.empty((SEEN, samples.shape[1]))
+        for k in range(samples.shape[1]):
+            state = unflatten_state(samples, k, carry.state)
+            now = Carry(state, carry.memory, carry.goal, carry.h, carry.command, carry.disturbance, carry.lost_at)
+            what = look(now, k, 0, craft, setup)
+            store(seen, k, with_attitude(what, cover(what.attitude, carry.h, setup.width)[0]))
+        return seen
+
+    @numba.njit(error_model="numpy", cache=True)
+    def call(seen, like, first, last, gains, craft, memory):  # type: ignore[no-untyped-def]
+        """Call the law on columns first .. last-1; each call waits for the torque of the one before."""
+        mark  # noqa: B018
+        torque = (0.0, 0.0, 0.0)
+        for k in range(first, last):
+            what = load(seen, k, like)
+            torque, memory = law(with_rate(what, add(what.rate, scale(0.0, torque))), gains, craft, memory)
+        return torque
+
+    return Replay(see, call)

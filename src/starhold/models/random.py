@@ -59,15 +59,15 @@ compiled_as(threefry)(lambda key, counter: _written_rounds())  # pyright: ignore
 
 
 def to_unit(word: int) -> float:
-    """A number strictly between 0 and 1 from the upper 53 bits of a word."""
-    return ((word >> 11) + 0.5) * 2.0**-53
+    """A number strictly between 0 and 1 from the upper 52 bits of a word (with 53, the half would round, up to 1)."""
+    return ((word >> 12) + 0.5) * 2.0**-52
 
 
 @compiled_as(to_unit)
 def _compiled_to_unit(word: Any) -> Any:
-    shift = np.uint64(11)
+    shift = np.uint64(12)
     # Through a signed integer: the value fits, and its conversion to float is the one that vector units have.
-    return lambda word: (np.int64(np.uint64(word) >> shift) + 0.5) * 2.0**-53  # pyright: ignore
+    return lambda word: (np.int64(np.uint64(word) >> shift) + 0.5) * 2.0**-52  # pyright: ignore
 
 
 @equation

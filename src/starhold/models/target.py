@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.cosines import to_quaternion
-from starhold.algebra.quaternion import Quaternion
+from starhold.algebra.quaternion import Quaternion, nearer
 from starhold.algebra.scalar import equation, sqrt
 from starhold.algebra.vector import ZERO, Vector, cross, dot, scale
 
@@ -23,28 +23,29 @@ class Target(NamedTuple):
 
 
 @equation
-def inertial(fixed: Quaternion, position: Vector, velocity: Vector, step: int) -> Target:
+def inertial(fixed: Quaternion, position: Vector, velocity: Vector, step: int, before: Any) -> Target:
     """A constant attitude."""
     return Target(fixed, ZERO, ZERO)
 
 
 @equation
-def orbital(offset: Any, position: Vector, velocity: Vector, step: int) -> Target:
+def orbital(table: Any, position: Vector, velocity: Vector, step: int, before: Quaternion) -> Target:
     """The orbital frame: third axis to the centre of attraction, second against the orbit normal, first along the motion.
 
-    Its rate is h/r2 about the normal, and its acceleration -2 h (r.v)/r4, exact for two-body motion.
+    Its rate is h/r2 about the normal, and its acceleration -2 h (r.v)/r4, exact for two-body motion. Of the two quaternions
+    it gives the one nearer to `before`, so that a law that feeds back q never sees a jump.
     """
     h = cross(position, velocity)
     r2, h2 = dot(position, position), dot(h, h)
     size = sqrt(h2)
     down, against = scale(-1.0 / sqrt(r2), position), scale(-1.0 / size, h)
-    attitude = to_quaternion((cross(against, down), against, down))
+    attitude = nearer(to_quaternion((cross(against, down), against, down)), before)
     rate = size / r2
     return Target(attitude, (0.0, -rate, 0.0), (0.0, 2.0 * rate * dot(position, velocity) / r2, 0.0))
 
 
 @equation
-def history(table: Any, position: Vector, velocity: Vector, step: int) -> Target:
+def history(table: Any, position: Vector, velocity: Vector, step: int, before: Any) -> Target:
     """A row of a table prepared by `tabulate`, one row a control step."""
     return Target(
         (table[step, 0], table[step, 1], table[step, 2], table[step, 3]),
@@ -62,9 +63,10 @@ def tabulate(times: Any, attitudes: Any, sample_times: Any) -> NDArray[np.float6
     from scipy.spatial.transform import Rotation, RotationSpline
 
     times, samples = np.asarray(times, dtype=float), np.asarray(sample_times, dtype=float)
-    if samples[0] < times[0] or samples[-1] > times[-1]:
+    first, last = samples.min(), samples.max()
+    if not (times[0] <= first and last <= times[-1]):
         raise ValueError(
-            f"the target history covers {times[0]:g} to {times[-1]:g} s, the run needs {samples[0]:g} to {samples[-1]:g} s"
+            f"the target history covers {times[0]:g} to {times[-1]:g} s, the run needs {first:g} to {last:g} s"
         )
     spline = RotationSpline(times, Rotation.from_quat(np.asarray(attitudes, dtype=float), scalar_first=True))
     q = spline(samples).as_quat(scalar_first=True)

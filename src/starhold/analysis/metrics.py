@@ -1,0 +1,114 @@
+"""Numbers that say how well a run went, all in SI units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+DECADES = range(1, 7)
+"""The k of the accuracies 10^-k whose iterations are counted."""
+LAST = 0.25
+"""Share of the run over which chatter and the final error are measured."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """How a metric is shown: its heading, unit, what it means, and whether less is better."""
+
+    heading: str
+    unit: str
+    meaning: str
+    scale: float = 1.0
+
+
+MEASURES: dict[str, Measure] = {
+    "settling_time": Measure("settling", "s", "time after which attitude and rate stay within their tolerances"),
+    "iterations_1e-3": Measure("steps to 1e-3", "", "control steps after which |q| stays within 10^-3"),
+    "overshoot": Measure("overshoot", "%", "largest turn beyond the target, of the initial angle", 100.0),
+    "peak_torque": Measure("peak torque", "mN m", "largest torque component", 1e3),
+    "effort": Measure("effort", "N m s", "integral of |u| over the run"),
+    "limit_share": Measure("on limit", "%", "share of the time with a torque on its limit", 100.0),
+    "chatter": Measure("chatter", "mN m", "mean change of torque between samples, last quarter of the run", 1e3),
+    "final_attitude_error": Measure("final angle", "mdeg", "largest angle to the target, last quarter", 180e3 / np.pi),
+    "final_rate_error": Measure("final rate", "mdeg/s", "largest relative rate, last quarter", 180e3 / np.pi),
+    "cost_median": Measure("call", "ns", "processor time of one call of the law, median", 1e9),
+    "cost_worst": Measure("worst call", "ns", "processor time of one call of the law, worst", 1e9),
+}
+"""The metrics a comparison shows; in each, less is better."""
+
+
+def error_angle(q: Any) -> NDArray[np.float64]:
+    """Angle (rad, 0..pi) of each quaternion in an array (..., 4), accurate for small angles too."""
+    q = np.asarray(q, dtype=float)
+    return 2.0 * np.arctan2(np.linalg.norm(q[..., 1:], axis=-1), np.abs(q[..., 0]))
+
+
+def stays_within(values: Any, bound: float) -> int | None:
+    """The index from which all values are at most the bound, or None."""
+    outside = np.flatnonzero(~(np.asarray(values) <= bound))
+    first = int(outside[-1]) + 1 if outside.size else 0
+    return first if first < len(values) else None
+
+
+def measure(run: xr.Dataset, attitude_tolerance: float, rate_tolerance: float) -> dict[str, Any]:
+    """Metrics of a run as `simulate` gives it. Times that are never reached are None, as are all final values and times of
+    a run that diverged; `diverged_at` (s) is None for one that did not."""
+    times = run["time"].values
+    q, w, u = (run[name].values for name in ("attitude_error", "rate_error", "torque"))
+    angle, speed = error_angle(q), np.linalg.norm(w, axis=1)
+    lost = run.attrs.get("diverged_at")
+    reached = {} if lost is not None else _reached(times, angle, speed, attitude_tolerance, rate_tolerance)
+    steps = int(run.attrs["record_every"])
+    deviation, found = np.linalg.norm(q[:, 1:], axis=1), dict[str, int | None]()
+    for k in DECADES:
+        for name, values in (("", deviation), ("rate_", speed)):
+            index = None if lost is not None else stays_within(values, 10.0**-k)
+            found[f"{name}iterations_1e-{k}"] = None if index is None else index * steps
+    tail = slice(int(len(times) * (1.0 - LAST)), None)
+    return {
+        "diverged_at": lost,
+        "settling_time": reached.get("both"),
+        "attitude_settling_time": reached.get("attitude"),
+        "rate_settling_time": reached.get("rate"),
+        **found,
+        "overshoot": _overshoot(q),
+        "peak_torque": float(np.abs(u).max()),
+        "peak_torque_norm": float(np.linalg.norm(u, axis=1).max()),
+        "effort": float(np.sum(np.linalg.norm(u[:-1], axis=1) * np.diff(times))),
+        "limit_share": _limit_share(u, run.attrs["torque_limit"], run.attrs["limit"]),
+        "chatter": float(np.linalg.norm(np.diff(u[tail], axis=0), axis=1).mean()) if len(u[tail]) > 1 else 0.0,
+        "final_attitude_error": None if lost is not None else float(angle[tail].max()),
+        "final_rate_error": None if lost is not None else float(speed[tail].max()),
+    }
+
+
+def _reached(times: Any, angle: Any, speed: Any, attitude_tolerance: float, rate_tolerance: float) -> dict[str, float | None]:
+    indices = {"attitude": stays_within(angle, attitude_tolerance), "rate": stays_within(speed, rate_tolerance)}
+    indices["both"] = None if None in indices.values() else max(i for i in indices.values() if i is not None)
+    return {name: None if index is None else float(times[index]) for name, index in indices.items()}
+
+
+def _overshoot(q: NDArray[np.float64]) -> float:
+    """Largest turn against the direction of the first error, as a share of that error; 0 for a start on target."""
+    turn = np.where(q[:, :1] < 0.0, -1.0, 1.0) * q[:, 1:]
+    vectors = turn * (error_angle(q) / np.maximum(np.linalg.norm(turn, axis=1), 1e-300))[:, None]
+    start = float(np.linalg.norm(vectors[0]))
+    if start < 1e-9:
+        return 0.0
+    along = vectors @ vectors[0] / start**2
+    # A body that starts near a half turn may pass it first; what counts is what follows the first crossing of the target.
+    crossed = np.flatnonzero(np.abs(along) < 0.5)
+    return max(0.0, float(-along[crossed[0] :].min())) if crossed.size else 0.0
+
+
+def _limit_share(u: NDArray[np.float64], limit: float, kind: str) -> float:
+    if kind == "none" or not np.isfinite(limit):
+        return 0.0
+    size = np.linalg.norm(u, axis=1) if kind == "norm" else np.abs(u).max(axis=1)
+    return float((size >= limit * (1.0 - 1e-9)).mean())

@@ -1,0 +1,106 @@
+"""From a scenario to closed loops."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from starhold.algebra.cosines import from_angles
+from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise, to_body
+from starhold.algebra.vector import ZERO, add
+from starhold.errors import InputError
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.models.actuator import Dynamics
+from starhold.models.rigid_body import State
+from starhold.models.sensor import Noise
+from starhold.models.target import Target, inertial, orbital, tabulate
+from starhold.scenario.reading import LawEntry, Scenario
+from starhold.scenario.schema import Pointing
+
+
+def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
+    """The closed loop of one law on the scenario's spacecraft."""
+    table = scenario.table
+    goal = _target(scenario)
+    body = table.spacecraft
+    return ClosedLoop(
+        craft=scenario.craft,
+        law=entry.law,
+        gains=entry.gains,
+        start=_start(scenario, goal),
+        period=table.simulation.control_period,
+        substeps=table.simulation.substeps,
+        orbit=table.orbit is not None,
+        gravity_gradient=table.environment.gravity_gradient,
+        target=goal,
+        noise=Noise(table.environment.torque_noise, table.sensor.attitude_noise, table.sensor.rate_noise),
+        limit="none" if np.isinf(body.torque_limit) else body.limit,
+        dynamics=Dynamics(body.actuator_lag, body.torque_rate_limit),
+        cover=entry.double_cover,
+        hysteresis_width=entry.hysteresis_width,
+        seed=table.simulation.seed,
+    )
+
+
+def _attitude(pointing: Pointing) -> Quaternion:
+    if pointing.angles is not None:
+        return from_angles(*pointing.angles)
+    return NO_TURN if pointing.attitude is None else normalise(pointing.attitude)
+
+
+def _target(scenario: Scenario) -> Any:
+    table = scenario.table.target
+    if table.mode == "orbital":
+        return "orbital"
+    return _attitude(table) if table.mode == "inertial" else _history(scenario)
+
+
+def _history(scenario: Scenario) -> Any:
+    simulation = scenario.table.simulation
+    path = scenario.folder / str(scenario.table.target.file)
+    allowed = "a CSV file with a line 'time,q0,q1,q2,q3' or none, then numbers, at least two rows"
+    try:
+        lines = [line for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
+        numbers = np.loadtxt(lines[1:] if lines and not _is_number(lines[0].split(",")[0]) else lines, delimiter=",", ndmin=2)
+        if numbers.shape[0] < 2 or numbers.shape[1] != 5 or not np.isfinite(numbers).all():
+            raise ValueError(f"a table of shape {numbers.shape}")
+        if (np.diff(numbers[:, 0]) <= 0.0).any():
+            raise ValueError("times that do not increase")
+        if (np.linalg.norm(numbers[:, 1:], axis=1) == 0.0).any():
+            raise ValueError("a zero quaternion")
+        times = np.arange(simulation.steps + 1) * simulation.control_period
+        return tabulate(numbers[:, 0], numbers[:, 1:], times)
+    except OSError as error:
+        raise InputError(scenario.name, "target.file", f"{path}: {error.strerror}", allowed) from None
+    except ValueError as error:
+        raise InputError(scenario.name, "target.file", f"{path}: {error}", allowed) from None
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _start(scenario: Scenario, goal: Any) -> State:
+    table = scenario.table
+    orbit = table.orbit
+    position, velocity = (ZERO, ZERO) if orbit is None else (orbit.position, orbit.velocity)
+    attitude, rate = _attitude(table.initial), table.initial.rate
+    if table.initial.relative_to == "target":
+        held = _target_at_start(goal, position, velocity)
+        rate = add(rate, to_body(attitude, held.rate))
+        attitude = multiply(held.attitude, attitude)
+    return State(attitude, rate, position, velocity, ZERO)
+
+
+def _target_at_start(goal: Any, position: Any, velocity: Any) -> Target:
+    if isinstance(goal, str):
+        return orbital(None, position, velocity, 0, NO_TURN)
+    if isinstance(goal, np.ndarray):
+        row = goal[0].tolist()
+        return Target(tuple(row[:4]), tuple(row[4:7]), tuple(row[7:]))
+    return inertial(goal, position, velocity, 0, None)

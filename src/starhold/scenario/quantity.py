@@ -1,0 +1,86 @@
+"""Quantities in scenario files: plain numbers are SI, strings carry units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, cast
+
+from pydantic import BeforeValidator, WithJsonSchema
+from pydantic_core import PydanticCustomError
+
+from starhold.laws.interface import Gain
+
+
+def quantity(gain: Gain) -> tuple[BeforeValidator, WithJsonSchema]:
+    """What pydantic needs to read a quantity: `Annotated[Any, *quantity(Gain("N m", above=0.0))]`."""
+    return BeforeValidator(reader(gain)), WithJsonSchema(_schema(gain))
+
+
+def reader(gain: Gain) -> Callable[[Any], Any]:
+    """A function from what the file holds to SI numbers of the declared shape and bounds."""
+
+    def read(value: Any) -> Any:
+        try:
+            return gain.check(value if gain.choices else _to_si(value, gain))
+        except (ValueError, TypeError) as error:
+            raise PydanticCustomError("quantity", "{reason}", {"reason": _plain(error)}) from None
+
+    return read
+
+
+def _plain(error: Exception) -> str:
+    return " ".join(str(error).split())
+
+
+def _to_si(value: Any, gain: Gain) -> Any:
+    if isinstance(value, list):
+        return [_to_si(item, gain) for item in cast(list[Any], value)]
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise ValueError(f"{gain.describe()} in {_shown(gain.unit)}")
+    return _parse(value, gain.unit) if isinstance(value, str) else value
+
+
+def _parse(text: str, unit: str) -> float:
+    import pint
+
+    registry = _registry()
+    try:
+        return float(registry.Quantity(text).to(_for_pint(unit)).magnitude)
+    except pint.DimensionalityError:
+        raise ValueError(f"a quantity in {_shown(unit)}") from None
+    except Exception:
+        # pint raises errors of many kinds, tokeniser errors included, on text that is no quantity.
+        raise ValueError(f"a number, or a string with a number and a unit such as '1 {_shown(unit)}'") from None
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry(cache_folder=":auto:")
+
+
+def _for_pint(unit: str) -> str:
+    return "dimensionless" if unit == "1" else unit
+
+
+def _shown(unit: str) -> str:
+    return "no unit" if unit == "1" else unit
+
+
+def _schema(gain: Gain) -> dict[str, Any]:
+    described = {"description": f"{gain.text or 'quantity'} ({_shown(gain.unit)})"}
+    if gain.choices:
+        return {"enum": list(gain.choices)} | described
+    number: dict[str, Any] = {"type": "integer" if gain.whole else "number"}
+    bounds = {"exclusiveMinimum": gain.above, "minimum": gain.at_least, "maximum": gain.at_most}
+    number |= {key: bound for key, bound in bounds.items() if bound is not None}
+    single: list[dict[str, Any]] = [number, {"type": "string"}]
+    if not gain.shape:
+        return {"anyOf": single} | described
+    row = {"type": "array", "items": {"anyOf": single}, "minItems": gain.shape[-1], "maxItems": gain.shape[-1]}
+    forms = [*single, row]
+    if gain.shape == (3, 3):
+        forms.append({"type": "array", "items": row, "minItems": 3, "maxItems": 3})
+    return {"anyOf": forms} | described

@@ -1,0 +1,228 @@
+"""The tables of a scenario file as pydantic models. Units and bounds stand with each field."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
+from pydantic_core import PydanticCustomError
+
+from starhold.laws.catalogue import Law, catalogue
+from starhold.laws.interface import Gain
+from starhold.models.craft import EARTH, check_inertia
+from starhold.scenario.quantity import quantity, reader
+
+QUATERNION = Gain("1", shape=(4,), text="quaternion, scalar first, normalised on reading")
+ANGLES = Gain("rad", shape=(3,), text="Euler-Krylov angles yaw, pitch, roll")
+
+
+class Table(BaseModel):
+    """A table that refuses keys it does not know."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def refuse(reason: str) -> PydanticCustomError:
+    """An error whose text says what is allowed."""
+    return PydanticCustomError("quantity", "{reason}", {"reason": reason})
+
+
+class Spacecraft(Table):
+    """The body and its actuators."""
+
+    inertia: Annotated[Any, Field(description="three principal moments or a 3x3 matrix (kg m^2)")]
+    torque_limit: Annotated[float, *quantity(Gain("N m", above=0.0, text="largest torque"))] = math.inf
+    limit: Annotated[
+        Literal["axis", "norm", "none"], Field(description="whether the limit holds for each axis, the norm, or not at all")
+    ] = "axis"
+    actuator_lag: Annotated[float, *quantity(Gain("s", at_least=0.0, text="time constant of the actuators"))] = 0.0
+    torque_rate_limit: Annotated[float, *quantity(Gain("N m/s", above=0.0, text="fastest change of each torque"))] = math.inf
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_inertia(cls, data: Any) -> Any:
+        if not isinstance(data, dict) or "inertia" not in data:
+            return data
+        given: Any = data["inertia"]
+        if not isinstance(given, list) or len(given) != 3:
+            raise _at("inertia", "three principal moments or a 3x3 matrix, in kg m^2", given)
+        try:
+            shape = (3, 3) if any(isinstance(row, list) for row in given) else (3,)
+            tensor = check_inertia(reader(Gain("kg m^2", shape=shape))(given))
+        except (ValueError, PydanticCustomError) as error:
+            raise _at("inertia", str(error), given) from None
+        return {**data, "inertia": tensor}
+
+
+def _at(key: str, reason: str, found: Any) -> PydanticCustomError:
+    return PydanticCustomError("quantity_at", "{reason}", {"reason": reason, "key": key, "found": found})
+
+
+class Orbit(Table):
+    """Where the spacecraft starts; without this table it floats in free space."""
+
+    position: Annotated[Any, *quantity(Gain("m", shape=(3,), text="inertial position"))]
+    velocity: Annotated[Any, *quantity(Gain("m/s", shape=(3,), text="inertial velocity"))]
+    gravitational_parameter: Annotated[float, *quantity(Gain("m^3/s^2", above=0.0, text="of the central body"))] = EARTH
+
+    @model_validator(mode="after")
+    def _off_centre(self) -> Orbit:
+        if not any(self.position):
+            raise _at("position", "a point away from the centre of attraction", list(self.position))
+        return self
+
+
+class Pointing(Table):
+    """An attitude as a quaternion or as angles."""
+
+    attitude: Annotated[Any, *quantity(QUATERNION)] = None
+    angles: Annotated[Any, *quantity(ANGLES)] = None
+
+    @model_validator(mode="after")
+    def _one_attitude(self) -> Pointing:
+        if self.attitude is not None and self.angles is not None:
+            raise _at("angles", "either attitude or angles, not both", list(self.angles))
+        if self.attitude is not None and not any(self.attitude):
+            raise _at("attitude", "a quaternion that is not zero", list(self.attitude))
+        return self
+
+
+class Initial(Pointing):
+    """Attitude and rate at the start, in the inertial frame or relative to the target."""
+
+    rate: Annotated[Any, *quantity(Gain("rad/s", shape=(3,), text="angular velocity, body axes"))] = (0.0, 0.0, 0.0)
+    relative_to: Annotated[Literal["inertial", "target"], Field(description="what attitude and rate are relative to")] = (
+        "inertial"
+    )
+
+
+class TargetTable(Pointing):
+    """What to point at."""
+
+    mode: Literal["inertial", "orbital", "history"] = "inertial"
+    file: Annotated[str | None, Field(description="CSV of a history: time (s), q0, q1, q2, q3; beside the scenario")] = None
+
+    @model_validator(mode="after")
+    def _fits_mode(self) -> TargetTable:
+        if (self.mode == "history") != (self.file is not None):
+            raise _at("file", "a file exactly when mode = \"history\"", self.file)
+        if self.mode != "inertial" and (self.attitude is not None or self.angles is not None):
+            raise _at("mode", "\"inertial\" where attitude or angles are given", self.mode)
+        return self
+
+
+class Environment(Table):
+    """External torques."""
+
+    gravity_gradient: bool = False
+    torque_noise: Annotated[float, *quantity(Gain("N m", at_least=0.0, text="standard deviation per axis and step"))] = 0.0
+
+
+class Sensor(Table):
+    """Errors of the measured state."""
+
+    attitude_noise: Annotated[float, *quantity(Gain("1", at_least=0.0, text="standard deviation, vector part"))] = 0.0
+    rate_noise: Annotated[float, *quantity(Gain("rad/s", at_least=0.0, text="standard deviation per axis"))] = 0.0
+
+
+class Simulation(Table):
+    """How long and how finely."""
+
+    duration: Annotated[float, *quantity(Gain("s", above=0.0, text="length of the run"))]
+    control_period: Annotated[float, *quantity(Gain("s", above=0.0, text="for which a torque is held"))] = 0.1
+    substeps: Annotated[int, *quantity(Gain("1", at_least=1, whole=True, text="integration steps a control period"))] = 1
+    record_every: Annotated[int, *quantity(Gain("1", at_least=1, whole=True, text="control steps a sample"))] = 1
+    seed: Annotated[int, *quantity(Gain("1", at_least=0, at_most=2**53, whole=True, text="of all random numbers"))] = 1
+
+    @model_validator(mode="after")
+    def _whole_steps(self) -> Simulation:
+        count = self.duration / self.control_period
+        if self.control_period > self.duration:
+            raise _at("control_period", f"at most the duration, {self.duration:g} s", self.control_period)
+        if abs(count - round(count)) > 1e-6:
+            raise _at("duration", f"a whole number of control periods of {self.control_period:g} s", self.duration)
+        return self
+
+    @property
+    def steps(self) -> int:
+        """Control steps of a run."""
+        return round(self.duration / self.control_period)
+
+
+class Tolerances(Table):
+    """When the target counts as reached."""
+
+    attitude_tolerance: Annotated[float, *quantity(Gain("rad", above=0.0, text="angle to the target"))] = 2e-3
+    rate_tolerance: Annotated[float, *quantity(Gain("rad/s", above=0.0, text="rate relative to the target"))] = 1e-3
+
+
+class LawTable(Table):
+    """What every law table may say beside the law's own gains."""
+
+    type: str
+    name: Annotated[str | None, Field(description="how tables and folders call it; the type if absent", min_length=1)] = None
+    double_cover: Annotated[
+        Literal["as_published", "shortest", "hysteresis"], Field(description="which of q and -q is fed back")
+    ] = "as_published"
+    hysteresis_width: Annotated[float, *quantity(Gain("1", above=0.0, at_most=0.999, text="flips when h q0 < -width"))] = 0.5
+
+
+class ScenarioTable(Table):
+    """A whole file, but for its law tables, which are read law by law."""
+
+    name: Annotated[str, Field(min_length=1)]
+    description: str = ""
+    spacecraft: Spacecraft
+    orbit: Orbit | None = None
+    initial: Initial = Initial()
+    target: TargetTable = TargetTable()
+    environment: Environment = Environment()
+    sensor: Sensor = Sensor()
+    simulation: Simulation
+    settling: Tolerances = Tolerances()
+
+    @model_validator(mode="after")
+    def _has_orbit(self) -> ScenarioTable:
+        if self.orbit is None and self.environment.gravity_gradient:
+            raise _at("environment.gravity_gradient", "false without an [orbit] table", True)
+        if self.orbit is None and self.target.mode == "orbital":
+            raise _at("target.mode", "\"orbital\" only with an [orbit] table", "orbital")
+        return self
+
+
+@cache
+def law_model(name: str, form: str | None = None) -> type[LawTable]:
+    """The table of a law, or of one of its design forms."""
+    law = catalogue()[name]
+    entries: dict[str, Any] = {"type": (Literal[name], name)}
+    if form is not None:
+        entries["form"] = (Literal[form], form)
+    for item in law.fields(form):
+        default = ... if item.required else item.default
+        entries[item.name] = (Annotated[Any, *quantity(item.gain)], default)
+    title = name.replace("-", " ").title().replace(" ", "") + (form or "").title()
+    return create_model(title, __base__=LawTable, __doc__=law.card.summary, **entries)
+
+
+def law_models(law: Law) -> list[type[LawTable]]:
+    """All tables of a law: its gains, and each design form."""
+    return [law_model(law.name), *(law_model(law.name, form) for form in law.forms)]
+
+
+def json_schema() -> dict[str, Any]:
+    """A JSON Schema of scenario files, for completion and checks in editors."""
+    models = [model for law in catalogue().values() for model in law_models(law)]
+    schema = ScenarioTable.model_json_schema()
+    tables: list[dict[str, Any]] = []
+    for model in models:
+        table = model.model_json_schema()
+        schema.setdefault("$defs", {}).update(table.pop("$defs", {}))
+        # TOML tables name their type, though pydantic has a default for it.
+        table["required"] = sorted({"type", *table.get("required", [])} | ({"form"} & set(table["properties"])))
+        tables.append(table)
+    schema["properties"]["law"] = {"type": "array", "minItems": 1, "items": {"anyOf": tables}}
+    schema["required"].append("law")
+    schema["title"] = "starhold scenario"
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}

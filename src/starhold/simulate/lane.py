@@ -1,0 +1,108 @@
+"""Flies one trajectory and labels the result."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.loop.closed_loop import Carry, ClosedLoop
+from starhold.loop.kernels import Sample, make_kernels
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Progress: TypeAlias = Callable[[int, int], None]
+"""Called with the number of steps done and the number of all."""
+
+PULSE = 0.1
+"""Seconds of work between two reports of progress."""
+
+COLUMNS: dict[str, tuple[str, str, str]] = {
+    "attitude": ("quaternion", "1", "attitude, inertial to body, scalar first"),
+    "rate": ("axis", "rad/s", "angular velocity, body axes"),
+    "position": ("axis", "m", "position, inertial"),
+    "velocity": ("axis", "m/s", "velocity, inertial"),
+    "torque": ("axis", "N m", "torque applied by the actuators, body axes"),
+    "command": ("axis", "N m", "torque commanded, within the limits, body axes"),
+    "attitude_error": ("quaternion", "1", "turn from the target to the body, scalar first"),
+    "rate_error": ("axis", "rad/s", "angular velocity relative to the target, body axes"),
+}
+"""Recorded quantities in the order of `Sample`: dimension, unit, meaning."""
+
+
+def simulate(loop: ClosedLoop, steps: int, record_every: int = 1, run: int = 0, progress: Progress | None = None) -> xr.Dataset:
+    """Fly a closed loop for `steps` control periods.
+
+    Returns an xarray Dataset over `time` (s), a sample every `record_every` control steps, the state before and the torque
+    after each. `run` numbers the random numbers. A motion that was lost (not finite, or faster than the integration can
+    follow) ends the samples, and its time stands in `attrs["diverged_at"]` (s); else that attribute is absent.
+    """
+    samples, carry = fly(loop, steps, record_every, run, progress)
+    return label(loop, samples, carry, record_every)
+
+
+def fly(
+    loop: ClosedLoop, steps: int, record_every: int = 1, run: int = 0, progress: Progress | None = None
+) -> tuple[NDArray[np.float64], Carry]:
+    """The samples (number, sample) of a trajectory, one row for each number of `Sample`, and what it carries at its end."""
+    kernel = make_kernels(loop.parts()).one
+    setup = loop.setup()
+    samples = np.full((_WIDTH, steps // record_every + 1), np.nan)
+    carry, done, chunk = loop.carry(), 0, max(1, steps // 50) if progress is None else 1
+    while done < steps:
+        begun = time.perf_counter()
+        count = min(chunk, steps - done) if progress is not None else steps
+        carry = kernel(
+            carry, done, count, done + count == steps, record_every, run, loop.gains, loop.craft, setup, loop.substeps, samples
+        )
+        carry = _as_given(carry)
+        done += count
+        if progress is not None:
+            progress(done, steps)
+            # Chunks grow until each takes about a pulse; the result does not depend on where they end.
+            chunk = max(1, int(chunk * min(8.0, PULSE / max(time.perf_counter() - begun, 1e-9))))
+        if carry.lost_at >= 0.0:
+            kept = int(np.ceil(carry.lost_at / record_every))
+            return samples[:, :kept], carry
+    return samples, carry
+
+
+def label(loop: ClosedLoop, samples: NDArray[np.float64], carry: Carry, record_every: int) -> xr.Dataset:
+    """The samples as a Dataset with units."""
+    import xarray as xr
+
+    times = np.arange(samples.shape[1]) * (loop.period * record_every)
+    data: dict[str, Any] = {}
+    row = 0
+    for name in Sample._fields:
+        dimension, unit, meaning = COLUMNS[name]
+        size = 4 if dimension == "quaternion" else 3
+        data[name] = (("time", dimension), samples[row : row + size].T, {"units": unit, "long_name": meaning})
+        row += size
+    coords = {
+        "time": ("time", times, {"units": "s", "long_name": "time"}),
+        "quaternion": ("quaternion", ["q0", "q1", "q2", "q3"]),
+        "axis": ("axis", ["x", "y", "z"]),
+    }
+    attrs: dict[str, Any] = {
+        "law": loop.law.name,
+        "control_period": loop.period,
+        "record_every": record_every,
+        "torque_limit": loop.craft.torque_limit,
+        "limit": loop.limit,
+    }
+    if carry.lost_at >= 0.0:
+        attrs["diverged_at"] = carry.lost_at * loop.period
+    return xr.Dataset(data, coords, attrs)
+
+
+def _as_given(carry: Any) -> Carry:
+    """A compiled kernel returns NamedTuples of the same classes; this only states the type."""
+    return carry
+
+
+_WIDTH = sum(4 if COLUMNS[name][0] == "quaternion" else 3 for name in Sample._fields)

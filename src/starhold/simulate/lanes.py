@@ -1,0 +1,104 @@
+"""Flies many trajectories at once: blocks of lanes, blocks shared out over threads."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.structure import LANES, flatten, pack, unflatten, unpack
+from starhold.loop.closed_loop import Carry, ClosedLoop
+from starhold.loop.kernels import make_kernels
+from starhold.models.rigid_body import State
+from starhold.simulate.lane import Progress, fly
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Where many trajectories ended. states: (16, lanes), rows in the order of `State`; lost_at: (lanes,) control step at
+    which the motion was lost, -1 where it was not."""
+
+    states: NDArray[np.float64]
+    lost_at: NDArray[np.float64]
+
+    def state(self, lane: int) -> State:
+        """The state of a lane."""
+        return unflatten(self.states[:, lane], _STATE)
+
+
+def simulate_many(
+    loop: ClosedLoop,
+    starts: Sequence[State] | NDArray[np.float64],
+    steps: int,
+    gains: NDArray[np.float64] | None = None,
+    first_run: int = 0,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Batch:
+    """Fly `loop` from each of many states for `steps` control periods.
+
+    starts: states, or an array (16, lanes); gains: (numbers of the law's gains, lanes) where they differ between lanes;
+    first_run: the run number of lane 0, which with the seed fixes its random numbers. The result is the same, bit for bit,
+    for any number of threads, and equals that of `simulate` lane by lane.
+    """
+    start = np.asarray(starts if isinstance(starts, np.ndarray) else [flatten(s) for s in starts], dtype=float)
+    start = start if isinstance(starts, np.ndarray) else start.T
+    workers = os.cpu_count() or 1 if threads is None else threads
+    if loop.law.card.compiled_only:
+        return _one_by_one(loop, start, steps, gains, first_run, workers, progress)
+    carries = np.array([flatten(loop.carry(unflatten(column, _STATE))) for column in start.T]).T
+    blocks = pack(carries)
+    gain_blocks = None if gains is None else pack(gains)
+    kernel, setup, like = make_kernels(loop.parts()).many, loop.setup(), loop.carry()
+
+    def work(block: int) -> None:
+        own = loop.gains if gain_blocks is None else gain_blocks[block]
+        run = first_run + block * LANES
+        kernel(blocks[block], like, 0, steps, run, own, loop.gains, loop.craft, loop.craft, setup, loop.substeps)
+
+    _share_out(work, len(blocks), workers, progress)
+    ends = unpack(blocks, start.shape[1])
+    return Batch(ends[: len(start)], ends[-1])
+
+
+def _one_by_one(
+    loop: ClosedLoop, start: Any, steps: int, gains: Any, first_run: int, workers: int, progress: Progress | None
+) -> Batch:
+    """For laws whose memory is not a handful of numbers: threads over single trajectories."""
+    from dataclasses import replace
+
+    carries: list[Carry | None] = [None] * start.shape[1]
+
+    def work(lane: int) -> None:
+        own = loop.gains if gains is None else unflatten(gains[:, lane], loop.gains)
+        flown = replace(loop, start=unflatten(start[:, lane], _STATE), gains=own)
+        carries[lane] = fly(flown, steps, max(steps, 1), first_run + lane)[1]
+
+    _share_out(work, len(carries), workers, progress)
+    ends = [carry for carry in carries if carry is not None]
+    return Batch(np.array([flatten(c.state) for c in ends]).T, np.array([c.lost_at for c in ends]))
+
+
+def _share_out(work: Any, count: int, workers: int, progress: Progress | None) -> None:
+    with ThreadPoolExecutor(max_workers=max(1, workers)) as pool:
+        todo = {pool.submit(work, item) for item in range(count)}
+        done = 0
+        try:
+            while todo:
+                finished, todo = wait(todo, return_when=FIRST_COMPLETED)
+                for future in finished:
+                    future.result()
+                done += len(finished)
+                if progress is not None:
+                    progress(done, count)
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+_STATE = State((1.0, 0.0, 0.0, 0.0), (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3)

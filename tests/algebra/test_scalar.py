@@ -1,0 +1,216 @@
+"""The scalar operations mean the same to every reader."""
+
+from __future__ import annotations
+
+import decimal
+import itertools
+import math
+
+import numpy as np
+import pytest
+import sympy
+from flint import arb
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from starhold.algebra import scalar
+from starhold.algebra.scalar import (
+    absolute,
+    both,
+    clip,
+    either,
+    is_finite,
+    less,
+    maximum,
+    minimum,
+    opposite,
+    side,
+    sign,
+    sqrt,
+    where,
+)
+from tests.algebra.readers import SPECIAL, agree, anything, contains, numbers, positives, same
+
+UNARY = (absolute, sign, side, is_finite)
+BINARY = (less, minimum, maximum, clip)
+TRUTHS = (True, False, None)
+truths = st.sampled_from(TRUTHS)
+
+
+@scalar.equation
+def select(a, b, x, y):
+    return where(less(a, b), x, y)
+
+
+@scalar.equation
+def logic(a, b, c):
+    p, q = less(a, b), less(b, c)
+    return both(p, q), either(p, q), opposite(p), both(p, opposite(q)), either(opposite(p), opposite(q))
+
+
+@given(numbers, numbers, positives)
+def test_every_reader_gives_the_same(x, y, limit):
+    for operation in UNARY:
+        agree(operation, x)
+    for operation in BINARY:
+        agree(operation, x, y)
+    agree(clip, x, limit)
+    agree(sqrt, limit)
+    agree(select, x, y, limit, x)
+    agree(logic, x, y, limit)
+
+
+@given(anything, anything, anything)
+def test_compiled_equals_floats_for_any_float(x, y, z):
+    for operation in (*UNARY, sqrt):
+        same(operation, x)
+    for operation in BINARY:
+        same(operation, x, y)
+    same(select, x, y, z, x)
+    same(logic, x, y, z)
+
+
+def test_compiled_equals_floats_for_special_values():
+    for operation in (*UNARY, sqrt):
+        for x in SPECIAL:
+            same(operation, x)
+    for operation, (x, y) in itertools.product(BINARY, itertools.product(SPECIAL, SPECIAL)):
+        same(operation, x, y)
+
+
+@given(anything, anything)
+def test_floats_mean_what_the_names_say(x, y):
+    assert less(x, y) is (x < y)
+    assert is_finite(x) is math.isfinite(x)
+    if not math.isnan(x):
+        assert absolute(x) == abs(x)
+        assert sign(x) == (x > 0.0) - (x < 0.0)
+        if not math.isnan(y):
+            assert minimum(x, y) == min(x, y)
+            assert maximum(x, y) == max(x, y)
+            assert clip(x, abs(y)) == max(-abs(y), min(abs(y), x))
+    assert side(x) == (-1.0 if x < 0.0 else 1.0)
+
+
+def test_not_a_number():
+    for operation in (absolute, sign, sqrt):
+        assert math.isnan(operation(math.nan))
+    assert math.isnan(clip(math.nan, 1.0))
+    assert side(math.nan) == 1.0
+    assert is_finite(math.nan) is False
+    assert is_finite(math.inf) is False
+    assert is_finite(-math.inf) is False
+    assert is_finite(1.7976931348623157e308) is True
+    # Only a NaN in the second place is seen.
+    assert math.isnan(minimum(1.0, math.nan))
+    assert math.isnan(maximum(1.0, math.nan))
+    assert minimum(math.nan, 1.0) == 1.0
+    assert maximum(math.nan, 1.0) == 1.0
+
+
+def test_square_root_outside_its_domain():
+    assert math.isnan(same(sqrt, -1.0))
+    assert math.isnan(same(sqrt, -math.inf))
+    assert same(sqrt, math.inf) == math.inf
+    assert math.copysign(1.0, same(sqrt, -0.0)) == -1.0
+    assert not arb(-1).sqrt().is_finite()
+    assert not sqrt(arb(-1)).is_finite()
+    assert sqrt(sympy.Integer(-1)) == sympy.I
+
+
+def test_unlimited_clip_changes_nothing():
+    for x in (0.0, -0.0, 1e308, -3.0, math.inf, -math.inf):
+        assert clip(x, math.inf) == x
+
+
+def completions(truth):
+    return (True, False) if truth is None else (truth,)
+
+
+def known(values):
+    """The truth that holds whatever the undecided ones are, or None."""
+    values = set(values)
+    return values.pop() if len(values) == 1 else None
+
+
+@pytest.mark.parametrize(("a", "b"), itertools.product(TRUTHS, TRUTHS))
+def test_three_valued_tables(a, b):
+    pairs = list(itertools.product(completions(a), completions(b)))
+    assert both(a, b) is known(p and q for p, q in pairs)
+    assert either(a, b) is known(p or q for p, q in pairs)
+    assert opposite(a) is known(not p for p in completions(a))
+
+
+@given(truths, truths)
+def test_de_morgan(a, b):
+    assert opposite(both(a, b)) is either(opposite(a), opposite(b))
+    assert opposite(opposite(a)) is a
+
+
+def test_undecided_comparison_gives_the_hull():
+    wide = arb(1.0, 0.5)
+    assert less(wide, arb(1.25)) is None
+    assert less(wide, arb(2.0)) is True
+    assert less(wide, arb(0.25)) is False
+    # An exact tie is decided, a tie at the edge of a ball is not.
+    assert less(arb(1), arb(1)) is False
+    assert less(wide, wide) is None
+    hull = where(less(wide, 1.25), -3.0, 7.0)
+    assert contains(hull, -3.0)
+    assert contains(hull, 7.0)
+    assert where(None, 1.0, 2.0).overlaps(arb(1.5))
+    assert where(less(wide, 2.0), arb(5), arb(9)) == 5
+    assert is_finite(arb("nan")) is not True
+    assert is_finite(arb("inf")) is not True
+    assert is_finite(arb(3)) is True
+
+
+@given(st.data(), numbers, numbers, st.floats(0.0, 10.0), st.floats(0.0, 10.0))
+def test_a_ball_encloses_the_value_at_each_of_its_points(data, x, y, dx, dy):
+    wide_x, wide_y = arb(x, dx), arb(y, dy)
+    u, v = data.draw(st.floats(-1.0, 1.0)), data.draw(st.floats(-1.0, 1.0))
+    # Points of the balls, exactly: half-way numbers stay inside whatever the rounding.
+    at_x, at_y = arb(x) + arb(dx) * arb(u) * 0.999, arb(y) + arb(dy) * arb(v) * 0.999
+    at_x, at_y = arb(at_x.mid()), arb(at_y.mid())
+    if not (wide_x.contains(at_x) and wide_y.contains(at_y)):
+        at_x, at_y = arb(x), arb(y)
+    for operation in (absolute, sign, side):
+        assert contains(operation(wide_x), operation(at_x)), operation
+    for operation in (minimum, maximum):
+        assert contains(operation(wide_x, wide_y), operation(at_x, at_y)), operation
+    assert contains(clip(wide_x, absolute(wide_y)), clip(at_x, absolute(at_y)))
+    assert less(wide_x, wide_y) in (None, less(at_x, at_y))
+
+
+def test_symbols():
+    x, y = sympy.symbols("x y", real=True)
+    for a, b in itertools.product((-2, 0, 3), (-1, 0, 3)):
+        here = {x: a, y: b}
+        assert absolute(x).subs(here) == abs(a)
+        assert minimum(x, y).subs(here) == min(a, b)
+        assert maximum(x, y).subs(here) == max(a, b)
+        assert sign(x).subs(here) == np.sign(a)
+        assert side(x).subs(here) == (-1 if a < 0 else 1)
+        assert where(both(less(x, y), less(y, 2)), x, y).subs(here) == (a if a < b < 2 else b)
+        assert where(either(less(x, y), less(y, 0.0)), x, y).subs(here) == (a if a < b or b < 0 else b)
+        assert where(opposite(less(x, y)), x, y).subs(here) == (b if a < b else a)
+    assert sqrt(x**2) == sympy.Abs(x)
+
+
+def test_numpy_scalars_are_plain_numbers():
+    x = np.float64(2.0)
+    assert clip(x, 1.0) == 1.0
+    assert maximum(1.0, x) == 2.0
+    assert less(x, 3.0) is True
+    assert both(less(x, 3.0), less(x, 1.0)) is False
+    assert is_finite(x) is True
+
+
+@settings(max_examples=10)
+@given(numbers)
+def test_other_kinds_of_numbers_are_refused(x):
+    for stranger in (decimal.Decimal(x), complex(x), str(x), np.array([x])):
+        with pytest.raises(TypeError, match="no reader"):
+            sqrt(stranger)
+        with pytest.raises(TypeError, match="no reader"):
+            less(x, stranger)
