@@ -1,2 +1,30 @@
-"""starhold designs, certifies, flies and compares attitude-control laws of spacecraft."""
+"""starhold designs, certifies, flies and compares control laws for spacecraft.
+
+    import starhold as sh
+
+    scenario = sh.load("three-laws")
+    run = sh.simulate(scenario, law="lyapunov")      # an xarray Dataset
+    flights = sh.compare(scenario)                   # runs and metrics of every law
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from starhold.api import compare, load, simulate
+    from starhold.errors import InputError
+
 __version__ = "0.1.0"
+__all__ = ["InputError", "__version__", "compare", "load", "simulate"]
+
+
+def __getattr__(name: str) -> Any:
+    # Loaded on first use, so that `import starhold` and the command line start at once.
+    from importlib import import_module
+
+    if name == "InputError":
+        return import_module("starhold.errors").InputError
+    if name in __all__:
+        return getattr(import_module("starhold.api"), name)
+    raise AttributeError(f"module 'starhold' has no attribute {name!r}")

@@ -24,8 +24,8 @@ EXACT_BITS = 400
 
 @cache
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The equation compiled as kernels compile it, once for the whole test run."""
-    return numba.njit(error_model="numpy")(function)
+    """The equation called from compiled code, as kernels call it; compiled once for the whole test run."""
+    return numba.njit(error_model="numpy")(lambda *arguments: function(*arguments))
 
 
 def bits(number: Any) -> Any:

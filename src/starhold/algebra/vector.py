@@ -80,7 +80,7 @@ def clip_norm(a: Vector, limit: Scalar) -> Vector:
     """a shortened to the given length where it is longer; the direction is kept. The limit must be positive; it may be
     infinite."""
     length = norm(a)
-    return scale(where(less(limit, length), limit / maximum(limit, length), 1.0), a)
+    return scale(where(less(length, limit), 1.0, limit / maximum(limit, length)), a)
 
 
 @equation

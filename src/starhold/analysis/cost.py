@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,26 +19,26 @@ CHUNK = 2e-5
 def call_costs(loop: ClosedLoop, samples: NDArray[np.float64], calls: int = CALLS, seconds: float = 1.0) -> dict[str, float]:
     """Median and worst time (s) of a call, over chunks of calls that replay the samples of `simulate.fly` in order.
 
-    Each call waits for the one before it, so the figures are latencies. The worst holds what the machine did meanwhile.
+    A call goes from the measured state to the limited torque, models the law needs included, and waits for the call before
+    it, so the figures are latencies. The worst holds what the machine did meanwhile.
     """
-    watch = make_replay(loop.parts())
-    seen = watch.see(samples, loop.carry(), loop.craft, loop.setup())
-    memory = loop.carry().memory
-    args = (loop.gains, loop.craft, memory)
-    watch.call(seen, 0, 1, *args)
-    overhead = min(_timed(watch.call, seen, 0, 0, args) for _ in range(50))
-    single = max(_timed(watch.call, seen, 0, 20, args) - overhead, 1e-9) / 20
-    chunk = max(1, min(seen.shape[1], int(CHUNK / single)))
+    replay, setup = make_replay(loop.parts()), loop.setup()
+    carry = loop.carry()
+    few = min(20, samples.shape[1])
+
+    def timed(first: int, last: int) -> float:
+        begun = time.perf_counter()
+        replay(samples, first, last, carry, loop.gains, loop.craft, setup)
+        return time.perf_counter() - begun
+
+    timed(0, 1)
+    overhead = min(timed(0, 0) for _ in range(50))
+    single = max(timed(0, few) - overhead, 1e-9) / few
+    chunk = max(1, min(samples.shape[1], int(CHUNK / single)))
     costs: list[float] = []
     begun, first = time.perf_counter(), 0
     while len(costs) * chunk < calls and time.perf_counter() - begun < seconds:
-        first = first if first + chunk <= seen.shape[1] else 0
-        costs.append(max(_timed(watch.call, seen, first, first + chunk, args) - overhead, 0.0) / chunk)
+        first = first if first + chunk <= samples.shape[1] else 0
+        costs.append(max(timed(first, first + chunk) - overhead, 0.0) / chunk)
         first += chunk
     return {"cost_median": float(np.median(costs)), "cost_worst": float(np.max(costs))}
-
-
-def _timed(call: Any, seen: Any, first: int, last: int, args: Any) -> float:
-    begun = time.perf_counter()
-    call(seen, first, last, *args)
-    return time.perf_counter() - begun

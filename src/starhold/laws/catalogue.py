@@ -82,6 +82,14 @@ def catalogue() -> dict[str, Law]:
     return {law.name: law for law in sorted(found, key=lambda law: law.name)}
 
 
+def adopt(law: Law) -> None:
+    """Make a law from elsewhere known to this process; ValueError when its name is taken by another file."""
+    known = catalogue().get(law.name)
+    if known is not None and known.module.__file__ != law.module.__file__:
+        raise ValueError(f"a law named {law.name} exists already; rename the file")
+    catalogue()[law.name] = law
+
+
 def from_file(path: Path) -> Law:
     """The law in a file outside the package. ValueError when it lacks a part of the interface."""
     spec = importlib.util.spec_from_file_location(path.stem, path)

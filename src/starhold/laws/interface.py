@@ -38,6 +38,21 @@ class Seen(NamedTuple):
     period: float
 
 
+@equation
+def with_attitude(seen: Seen, attitude: Quaternion) -> Seen:
+    """The same but for the error attitude."""
+    return Seen(
+        attitude,
+        seen.rate,
+        seen.body_rate,
+        seen.target_rate,
+        seen.target_acceleration,
+        seen.external_torque,
+        seen.position,
+        seen.period,
+    )
+
+
 class NoMemory(NamedTuple):
     """The memory of a law that keeps nothing."""
 

@@ -2,9 +2,6 @@
 # Basic, not strict: every function is compiled, and Numba's own types are not visible to a type checker.
 """Quadratic programs of predictive control, solved inside a compiled kernel: no allocation, no Python, no library.
 
-    minimise   sum over k < N of x_k'Q x_k + v_k'R v_k,  plus x_N'P x_N,   x_{k+1} = A x_k + B v_k,
-    subject to |v_k - centre| <= bound, on each axis (box) or in norm (ball).
-
 The method is a projected Newton method of two metrics (Bertsekas 1982, "Projected Newton methods for optimization
 problems with simple constraints"). What presses against a limit is held there, for a ball with the curvature of the
 sphere; the rest takes the Newton step, which one backward Riccati sweep gives in time proportional to N. The step is
@@ -12,92 +9,35 @@ flown with its feedback through the limits, so moves further on already answer t
 not bring the cost down, a search along the projected line does, and where that fails too, a scaled gradient step, which
 always does. A run ends when the gap to the optimum is proved small: for multipliers of the right sign, strong
 convexity bounds the gap of half the cost by g'R^-1 g / 2, g being the gradient that is not held.
-
-Matrices are flat arrays, row after row: with fixed offsets the compiler unrolls the loops.
 """
 
 from __future__ import annotations
 
-import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from starhold.algebra.scalar import equation
-
-compiled = numba.njit(error_model="numpy", cache=False)
+from starhold.laws.mpc_problem import (
+    Problem,
+    box_inverse,
+    compiled,
+    held,
+    inverse3,
+    loose,
+    make_space,
+    plane_inverse,
+    pressure,
+    project,
+    put,
+    triple,
+)
 
 TOLERANCE = 1e-16
 """Relative gap of the objective at which a solution is accepted."""
 SUFFICIENT = 1e-4
-ON_SPHERE = 1.0 - 1e-12
-
-
-class Space(NamedTuple):
-    """Work arrays of a horizon of N: all that a solution needs, so that a call allocates nothing."""
-
-    states: Any
-    bend: Any
-    gradient: Any
-    trial: Any
-    step: Any
-    feedback: Any
-    stiffness: Any
-    value: Any
-    small: Any
-
-
-class Problem(NamedTuple):
-    """A (36), B (18), Q (36), R (9), R^-1 (9), P (36), the limit's centre, its size (inf: none), and ball or box."""
-
-    a: Any
-    b: Any
-    q: Any
-    r: Any
-    r_inverse: Any
-    p: Any
-    centre: Any
-    bound: Any
-    ball: Any
-
-
-def make_space(horizon: int) -> Space:
-    """Work arrays for a horizon of that many moves."""
-    n = horizon
-    sizes = (6 * (n + 1), 6 * (n + 1), 3 * n, 3 * n, 3 * n, 18 * n, n, 42, 96)
-    return Space(*(np.zeros(size) for size in sizes))
-
-
-@equation
-def project(v, problem):
-    """The point of the admissible set nearest to v, and whether v was outside."""
-    c, bound = problem.centre, problem.bound
-    d = (v[0] - c[0], v[1] - c[1], v[2] - c[2])
-    if problem.ball:
-        square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
-        if square > bound * bound:
-            s = bound / math.sqrt(square)
-            return (c[0] + s * d[0], c[1] + s * d[1], c[2] + s * d[2]), True
-        return v, False
-    w = (
-        min(max(v[0], c[0] - bound), c[0] + bound),
-        min(max(v[1], c[1] - bound), c[1] + bound),
-        min(max(v[2], c[2] - bound), c[2] + bound),
-    )
-    return w, w[0] != v[0] or w[1] != v[1] or w[2] != v[2]
-
-
-@equation
-def triple(array, k):
-    """Three numbers from the k-th triple of a flat array."""
-    return (array[3 * k], array[3 * k + 1], array[3 * k + 2])
-
-
-@equation
-def put(array, k, v):
-    """Write the k-th triple."""
-    array[3 * k], array[3 * k + 1], array[3 * k + 2] = v[0], v[1], v[2]
+"""Share of the decrease promised by the slope that a step must bring."""
+HALVINGS = 8
 
 
 @equation
@@ -174,114 +114,6 @@ def adjoint(problem, plan, space):
         for i in range(6):
             y[i] = y[6 + i]
     return 0.5 * gap
-
-
-@equation
-def held(problem, v, g):
-    """Which axes of a box press against a limit."""
-    c, bound = problem.centre, problem.bound
-    return (
-        (g[0] < 0.0 and v[0] >= c[0] + bound) or (g[0] > 0.0 and v[0] <= c[0] - bound),
-        (g[1] < 0.0 and v[1] >= c[1] + bound) or (g[1] > 0.0 and v[1] <= c[1] - bound),
-        (g[2] < 0.0 and v[2] >= c[2] + bound) or (g[2] > 0.0 and v[2] <= c[2] - bound),
-    )
-
-
-@equation
-def pressure(problem, v, g):
-    """For a ball: the outward normal (zero inside) and the multiplier of (|v - centre|2 - bound2)/2, zero when not
-    pressing."""
-    c, bound = problem.centre, problem.bound
-    d = (v[0] - c[0], v[1] - c[1], v[2] - c[2])
-    square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
-    if not square >= ON_SPHERE * bound * bound:
-        return (0.0, 0.0, 0.0), 0.0
-    s = 1.0 / math.sqrt(square)
-    normal = (s * d[0], s * d[1], s * d[2])
-    outward = -(g[0] * normal[0] + g[1] * normal[1] + g[2] * normal[2])
-    return normal, max(outward, 0.0) / bound
-
-
-@equation
-def loose(problem, v, g):
-    """The part of the gradient that no limit holds."""
-    if problem.ball:
-        normal, multiplier = pressure(problem, v, g)
-        if multiplier > 0.0:
-            s = multiplier * problem.bound
-            return (g[0] + s * normal[0], g[1] + s * normal[1], g[2] + s * normal[2])
-        return g
-    fixed = held(problem, v, g)
-    return (0.0 if fixed[0] else g[0], 0.0 if fixed[1] else g[1], 0.0 if fixed[2] else g[2])
-
-
-@equation
-def inverse3(m):
-    """The inverse of a symmetric matrix (m00, m01, m02, m11, m12, m22), in the same order."""
-    c0 = m[3] * m[5] - m[4] * m[4]
-    c1 = m[2] * m[4] - m[1] * m[5]
-    c2 = m[1] * m[4] - m[2] * m[3]
-    s = 1.0 / (m[0] * c0 + m[1] * c1 + m[2] * c2)
-    d0 = m[0] * m[5] - m[2] * m[2]
-    d1 = m[1] * m[2] - m[0] * m[4]
-    return (s * c0, s * c1, s * c2, s * d0, s * d1, s * (m[0] * m[3] - m[1] * m[1]))
-
-
-@equation
-def box_inverse(m, fixed):
-    """Inverse of a symmetric matrix on the axes that are not fixed, zero on the others."""
-    f0, f1, f2 = fixed
-    cut = (
-        1.0 if f0 else m[0],
-        0.0 if f0 or f1 else m[1],
-        0.0 if f0 or f2 else m[2],
-        1.0 if f1 else m[3],
-        0.0 if f1 or f2 else m[4],
-        1.0 if f2 else m[5],
-    )
-    w = inverse3(cut)
-    return (0.0 if f0 else w[0], w[1], w[2], 0.0 if f1 else w[3], w[4], 0.0 if f2 else w[5])
-
-
-@equation
-def plane_inverse(m, n, multiplier):
-    """Inverse of a symmetric matrix plus multiplier on the plane normal to n, zero along n."""
-    # The first tangent: n crossed with the axis it is farthest from.
-    a0, a1, a2 = abs(n[0]), abs(n[1]), abs(n[2])
-    if a0 <= a1 and a0 <= a2:
-        t = (0.0, n[2], -n[1])
-    elif a1 <= a2:
-        t = (-n[2], 0.0, n[0])
-    else:
-        t = (n[1], -n[0], 0.0)
-    s = 1.0 / math.sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
-    t = (s * t[0], s * t[1], s * t[2])
-    u = (n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0])
-    mt = (
-        m[0] * t[0] + m[1] * t[1] + m[2] * t[2],
-        m[1] * t[0] + m[3] * t[1] + m[4] * t[2],
-        m[2] * t[0] + m[4] * t[1] + m[5] * t[2],
-    )
-    mu = (
-        m[0] * u[0] + m[1] * u[1] + m[2] * u[2],
-        m[1] * u[0] + m[3] * u[1] + m[4] * u[2],
-        m[2] * u[0] + m[4] * u[1] + m[5] * u[2],
-    )
-    tt = t[0] * mt[0] + t[1] * mt[1] + t[2] * mt[2] + multiplier
-    tu = u[0] * mt[0] + u[1] * mt[1] + u[2] * mt[2]
-    uu = u[0] * mu[0] + u[1] * mu[1] + u[2] * mu[2] + multiplier
-    s = 1.0 / (tt * uu - tu * tu)
-    # Columns of the inverse in the tangent basis, carried back to the axes.
-    y = (s * (uu * t[0] - tu * u[0]), s * (uu * t[1] - tu * u[1]), s * (uu * t[2] - tu * u[2]))
-    z = (s * (tt * u[0] - tu * t[0]), s * (tt * u[1] - tu * t[1]), s * (tt * u[2] - tu * t[2]))
-    return (
-        t[0] * y[0] + u[0] * z[0],
-        t[0] * y[1] + u[0] * z[1],
-        t[0] * y[2] + u[0] * z[2],
-        t[1] * y[1] + u[1] * z[1],
-        t[1] * y[2] + u[1] * z[2],
-        t[2] * y[2] + u[2] * z[2],
-    )
 
 
 @compiled
@@ -402,3 +234,203 @@ def sweep(problem, plan, space, free):
                     s = 0.5 * (value[6 * i + j] + value[6 * j + i])
                     value[6 * i + j], value[6 * j + i] = s, s
     return decrement, holding
+
+
+@compiled
+def follow(problem, plan, space):
+    """Fly the policy of a sweep through the limits from space.bend[0:6]: the trial plan, and its change of the states.
+    Says whether a limit cut anything."""
+    cut = False
+    bend, feedback = space.bend, space.feedback
+    for k in range(plan.size // 3):
+        v = triple(plan, k)
+        w0, w1, w2 = v[0] + space.step[3 * k], v[1] + space.step[3 * k + 1], v[2] + space.step[3 * k + 2]
+        o = 18 * k
+        for j in range(6):
+            s = bend[6 * k + j]
+            w0 += feedback[o + j] * s
+            w1 += feedback[o + 6 + j] * s
+            w2 += feedback[o + 12 + j] * s
+        w, outside = project((w0, w1, w2), problem)
+        cut = cut or outside
+        put(space.trial, k, w)
+        transition(problem, bend, 6 * k, (w[0] - v[0], w[1] - v[1], w[2] - v[2]), bend, 6 * k + 6)
+    return cut
+
+
+@compiled
+def unroll(plan, problem, space):
+    """Turn the policy into a direction: step becomes the Newton step without limits."""
+    bend, feedback = space.bend, space.feedback
+    for i in range(6):
+        bend[i] = 0.0
+    for k in range(plan.size // 3):
+        d0, d1, d2 = triple(space.step, k)
+        o = 18 * k
+        for j in range(6):
+            s = bend[6 * k + j]
+            d0 += feedback[o + j] * s
+            d1 += feedback[o + 6 + j] * s
+            d2 += feedback[o + 12 + j] * s
+        put(space.step, k, (d0, d1, d2))
+        transition(problem, bend, 6 * k, (d0, d1, d2), bend, 6 * k + 6)
+
+
+@compiled
+def along(problem, plan, space, length):
+    """The trial plan at that length of the step, brought within the limits, and its change of the states."""
+    for k in range(plan.size // 3):
+        v, d = triple(plan, k), triple(space.step, k)
+        w, _ = project((v[0] + length * d[0], v[1] + length * d[1], v[2] + length * d[2]), problem)
+        put(space.trial, k, w)
+        transition(problem, space.bend, 6 * k, (w[0] - v[0], w[1] - v[1], w[2] - v[2]), space.bend, 6 * k + 6)
+
+
+@compiled
+def change(problem, plan, space):
+    """Slope and curvature of half the cost towards the trial plan: it changes by slope + curvature / 2, free of the
+    cancellation that a difference of two costs suffers."""
+    slope, curvature = 0.0, 0.0
+    n = plan.size // 3
+    for k in range(n):
+        v, w, g = triple(plan, k), triple(space.trial, k), triple(space.gradient, k)
+        d = (w[0] - v[0], w[1] - v[1], w[2] - v[2])
+        slope += g[0] * d[0] + g[1] * d[1] + g[2] * d[2]
+        curvature += form3(problem.r, d) + form(problem.q, space.bend, 6 * k)
+    return slope, curvature + form(problem.p, space.bend, 6 * n)
+
+
+@compiled
+def search(problem, plan, space, decrement):
+    """A trial plan that brings the cost down; returns the change of half the cost, zero where rounding hides any."""
+    slope, curvature = change(problem, plan, space)
+    if slope + 0.5 * curvature <= -0.25 * decrement:
+        return slope + 0.5 * curvature
+    unroll(plan, problem, space)
+    length = 1.0
+    for _ in range(HALVINGS):
+        along(problem, plan, space, length)
+        slope, curvature = change(problem, plan, space)
+        if slope < 0.0 and slope + 0.5 * curvature <= SUFFICIENT * slope:
+            return slope + 0.5 * curvature
+        length *= 0.5
+    # The gradient, each move in its own scale: the projection then guarantees descent for short steps.
+    for k in range(plan.size // 3):
+        s = -1.0 / space.stiffness[k]
+        g = triple(space.gradient, k)
+        put(space.step, k, (s * g[0], s * g[1], s * g[2]))
+    length = 1.0
+    for _ in range(60):
+        along(problem, plan, space, length)
+        slope, curvature = change(problem, plan, space)
+        if slope < 0.0 and slope + 0.5 * curvature <= SUFFICIENT * slope:
+            return slope + 0.5 * curvature
+        length *= 0.5
+    return 0.0
+
+
+@compiled
+def accept(plan, space):
+    """Take the trial plan over."""
+    for i in range(plan.size):
+        plan[i] = space.trial[i]
+    for i in range(6, space.states.size):
+        space.states[i] += space.bend[i]
+
+
+@compiled
+def improve(problem, plan, space, budget, warm):
+    """Solve the program from the state in space.states[0:6], starting with `plan` if warm; the plan is overwritten.
+
+    Returns the number of Riccati sweeps, whether the optimum was reached within `budget` of them, and whether limits
+    shape it. The plan respects the limits in any case.
+    """
+    x = space.states
+    sweeps = 0
+    if not warm:
+        # The policy without limits, flown through them: the optimum if nothing is cut, else a good start.
+        for i in range(plan.size):
+            plan[i] = 0.0
+        for i in range(6):
+            space.bend[i] = x[i]
+        for i in range(6, x.size):
+            x[i] = 0.0
+        sweep(problem, plan, space, True)
+        sweeps = 1
+        cut = follow(problem, plan, space)
+        accept(plan, space)
+        if not cut:
+            return sweeps, True, False
+    half = rollout(problem, plan, x)
+    while True:
+        if adjoint(problem, plan, space) <= TOLERANCE * half:
+            return sweeps, True, True
+        if sweeps >= budget:
+            return sweeps, False, True
+        decrement, holding = sweep(problem, plan, space, False)
+        sweeps += 1
+        for i in range(6):
+            space.bend[i] = 0.0
+        cut = follow(problem, plan, space)
+        if not cut and (holding == 0 or not problem.ball):
+            # The exact optimum of what is not held.
+            accept(plan, space)
+            half -= 0.5 * decrement
+            if holding == 0:
+                return sweeps, True, False
+            if decrement <= TOLERANCE * half:
+                return sweeps, True, True
+            continue
+        fall = search(problem, plan, space, decrement)
+        if fall == 0.0:
+            # Rounding hides any further descent.
+            return sweeps, decrement <= 1e-12 * half, True
+        accept(plan, space)
+        half += fall
+
+
+@compiled
+def advance(problem, plan, tail, space):
+    """Shift a solved plan by one move; the last is the feedback -tail x at its end."""
+    n = plan.size // 3
+    last = 6 * n
+    for i in range(plan.size - 3):
+        plan[i] = plan[i + 3]
+    v0, v1, v2 = 0.0, 0.0, 0.0
+    for j in range(6):
+        s = space.states[last + j]
+        v0 -= tail[j] * s
+        v1 -= tail[6 + j] * s
+        v2 -= tail[12 + j] * s
+    put(plan, n - 1, (v0, v1, v2))
+    for k in range(n):
+        # The centre moves with the target.
+        w, _ = project(triple(plan, k), problem)
+        put(plan, k, w)
+
+
+class Solution(NamedTuple):
+    """plan (N, 3), its cost, the number of Riccati sweeps, and whether the optimum was reached."""
+
+    plan: np.ndarray
+    cost: float
+    sweeps: int
+    solved: bool
+
+
+@compiled
+def solve(a, b, q, r, p, x, horizon, bound, centre, ball, budget):
+    """Solve one program from scratch: A (6, 6), B (6, 3), Q (6, 6), R (3, 3) and P (6, 6) symmetric, Q and P positive
+    semidefinite, R positive definite; x (6); limits |v - centre| <= bound per axis or, with ball, in norm (inf: none).
+    For use outside kernels: it allocates.
+    """
+    space = make_space(horizon)
+    problem = Problem(
+        a.ravel(), b.ravel(), q.ravel(), r.ravel(), np.linalg.inv(r).ravel(), p.ravel(), centre, bound, ball
+    )
+    plan = np.zeros(3 * horizon)
+    space.states[:6] = x
+    sweeps, solved, _ = improve(problem, plan, space, budget, False)
+    space.states[:6] = x
+    cost = 2.0 * rollout(problem, plan, space.states)
+    return Solution(plan.reshape((horizon, 3)), cost, sweeps, solved)

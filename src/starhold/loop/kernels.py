@@ -16,7 +16,7 @@ from starhold.algebra.quaternion import Quaternion, relative, to_body
 from starhold.algebra.scalar import both, equation, is_finite, less, opposite, where
 from starhold.algebra.structure import LANES, load, move, store
 from starhold.algebra.vector import ZERO, Vector, add, cross, dot, subtract
-from starhold.laws.interface import Seen
+from starhold.laws.interface import Seen, with_attitude
 from starhold.loop.closed_loop import Carry, Parts
 from starhold.loop.fingerprint import fingerprint, outside_modules
 from starhold.models.rigid_body import motion, tidy, with_torque
@@ -51,13 +51,6 @@ class Kernels(NamedTuple):
 
     one: Callable[..., Any]
     many: Callable[..., Any]
-
-
-class Replay(NamedTuple):
-    """Compiled: `see` turns recorded samples into what the law saw, `call` shows these to the law again."""
-
-    see: Callable[..., Any]
-    call: Callable[..., Any]
 
 
 @cache
@@ -103,17 +96,7 @@ def make_step(parts: Parts) -> Step:
     def decide(carry, step, run, gains, craft, setup):  # type: ignore[no-untyped-def]
         seen = see(carry, step, run, craft, setup)
         shown, h = cover(seen.attitude, carry.h, setup.width)
-        seen = Seen(
-            shown,
-            seen.rate,
-            seen.body_rate,
-            seen.target_rate,
-            seen.target_acceleration,
-            seen.external_torque,
-            seen.position,
-            seen.period,
-        )
-        command, memory = law(seen, gains, craft, carry.memory)
+        command, memory = law(with_attitude(seen, shown), gains, craft, carry.memory)
         command = limit(command, craft.torque_limit)
         state = with_torque(carry.state, begin(carry.state.torque, command))
         disturbance = disturb(setup.noise, setup.seed, run, step)
@@ -212,31 +195,22 @@ def _many(equations: Step, mark: str) -> Callable[..., Any]:
 
 
 @cache
-def make_replay(parts: Parts) -> Replay:
-    """Kernels that repeat the calls of a law, to time them."""
+def make_replay(parts: Parts) -> Callable[..., Any]:
+    """A kernel that repeats the control calls of a run, to time them: from the state to the limited command."""
     mark = fingerprint(outside_modules(parts))
-    look, law, cover = make_step(parts).look, parts.law, parts.cover
+    decide = make_step(parts).decide
 
     @numba.njit(error_model="numpy", cache=True)
-    def see(samples, carry, craft, setup):  # type: ignore[no-untyped-def]
-        """What the law is shown at each sample (numbers of Seen, samples)."""
+    def replay(samples, first, last, carry, gains, craft, setup):  # type: ignore[no-untyped-def]
+        """Decide on the states in columns first .. last-1 of recorded samples, each call after the one before."""
         mark  # noqa: B018
-        seen = np.empty((SEEN, samples.shape[1]))
-        for k in range(samples.shape[1]):
-            state = unflatten_state(samples, k, carry.state)
-            now = Carry(state, carry.memory, carry.goal, carry.h, carry.command, carry.disturbance, carry.lost_at)
-            what = look(now, k, 0, craft, setup)
-            store(seen, k, with_attitude(what, cover(what.attitude, carry.h, setup.width)[0]))
-        return seen
-
-    @numba.njit(error_model="numpy", cache=True)
-    def call(seen, like, first, last, gains, craft, memory):  # type: ignore[no-untyped-def]
-        """Call the law on columns first .. last-1; each call waits for the torque of the one before."""
-        mark  # noqa: B018
-        torque = (0.0, 0.0, 0.0)
         for k in range(first, last):
-            what = load(seen, k, like)
-            torque, memory = law(with_rate(what, add(what.rate, scale(0.0, torque))), gains, craft, memory)
-        return torque
+            # The first rows of a sample are the state; every number of it waits for the torque of the call before.
+            u = carry.command
+            wait = 0.0 * (u[0] + u[1] + u[2])
+            state = move(load(samples, k, carry.state), wait, load(samples, k, carry.state))
+            carry = Carry(state, carry.memory, carry.goal, carry.h, u, carry.disturbance, carry.lost_at)
+            carry = decide(carry, k, 0, gains, craft, setup)
+        return carry
 
-    return Replay(see, call)
+    return replay

@@ -57,7 +57,7 @@ class Scenario:
         for entry in self.laws:
             if entry.name == name:
                 return entry
-        raise InputError(self.name, "law", name, _nearest(name, [entry.name for entry in self.laws]))
+        raise InputError(self.name, "law", name, nearest(name, [entry.name for entry in self.laws]))
 
 
 def builtin_names() -> list[str]:
@@ -79,7 +79,7 @@ def load(source: str | Path) -> Scenario:
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
-        known = _nearest(str(source), builtin_names())
+        known = nearest(str(source), builtin_names())
         raise InputError(str(source), "", "no such file", f"a scenario file, or a built-in scenario: {known}") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(str(source), "", _reason(error), "a readable text file") from None
@@ -114,11 +114,11 @@ def _read_law(data: Any, craft: Craft, where: str, key: str, taken: set[str]) ->
     table = cast(dict[str, Any], data)
     kind = table.get("type")
     if kind not in catalogue():
-        raise InputError(where, f"{key}.type", _show(kind), _nearest(str(kind), list(catalogue())))
+        raise InputError(where, f"{key}.type", _show(kind), nearest(str(kind), list(catalogue())))
     law = catalogue()[str(kind)]
     form = table.get("form")
     if form is not None and form not in law.forms:
-        allowed = _nearest(str(form), list(law.forms)) if law.forms else f"no form; {law.name} takes its gains"
+        allowed = nearest(str(form), list(law.forms)) if law.forms else f"no form; {law.name} takes its gains"
         raise InputError(where, f"{key}.form", _show(form), allowed)
     read = _validate(law_model(law.name, form), table, where, key, extra=["form"] if law.forms else [])
     values = [getattr(read, item.name) for item in law.fields(form)]
@@ -162,7 +162,7 @@ def _translate(
     found = _show(context.get("found", fault.get("input")))
     if fault["type"] == "extra_forbidden":
         known = list(_model_at(model, place[:-1]).model_fields) + (extra if len(place) == 1 else [])
-        return InputError(where, key, "an unknown key", _nearest(place[-1], known))
+        return InputError(where, key, "an unknown key", nearest(place[-1], known))
     if fault["type"] == "missing":
         return InputError(where, key, "nothing", "this key is required")
     if fault["type"] in ("quantity", "quantity_at"):
@@ -192,7 +192,7 @@ def _reason(error: Exception) -> str:
     return getattr(error, "strerror", None) or type(error).__name__
 
 
-def _nearest(word: str, known: list[str]) -> str:
+def nearest(word: str, known: list[str]) -> str:
     """The nearest known words first; all of them when none is near."""
     near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
     return f"did you mean {near[0]}?" if near else f"one of {', '.join(sorted(known))}"

@@ -1,0 +1,5 @@
+"""`python -m starhold`."""
+
+from starhold.cli.main import main
+
+main()

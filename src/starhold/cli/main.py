@@ -1,0 +1,206 @@
+"""The command line. Commands read, call and print; they import what they need when they run, so that each starts fast."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from starhold.errors import InputError
+
+if TYPE_CHECKING:
+    from starhold.report.flight import Flight
+    from starhold.scenario.reading import LawEntry, Scenario
+
+app = typer.Typer(
+    help="Design, certify, fly and compare control laws for spacecraft.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+DEFAULT = "three-laws"
+USER_ERROR, DIVERGED, FAILED_CHECK, INTERRUPTED = 2, 1, 1, 130
+
+ScenarioFile = Annotated[str, typer.Argument(metavar="FILE", help="a scenario file or the name of a built-in scenario")]
+Output = Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="folder for results, created")]
+Force = Annotated[bool, typer.Option("--force", help="replace results that are already there")]
+
+
+@app.command()
+def run(
+    file: ScenarioFile = DEFAULT,
+    law: Annotated[str | None, typer.Option(help="which law of the file; the first if not given")] = None,
+    output: Output = None,
+    force: Force = False,
+) -> None:
+    """Fly one law: run.nc, summary.json, pictures and report.html."""
+    from starhold.scenario.reading import load
+
+    scenario = load(file)
+    entry = scenario.laws[0] if law is None else scenario.pick(law)
+    flights = _fly(scenario, [entry], output or Path("results") / f"{scenario.name}-{entry.name}", force, nested=False)
+    if flights[0].metrics["diverged_at"] is not None:
+        raise typer.Exit(DIVERGED)
+
+
+@app.command()
+def compare(file: ScenarioFile = DEFAULT, output: Output = None, force: Force = False) -> None:
+    """Fly every law of a file on the same problem: ranked table, pictures and report.html."""
+    from starhold.scenario.reading import load
+
+    scenario = load(file)
+    _fly(scenario, list(scenario.laws), output or Path("results") / scenario.name, force, nested=True)
+
+
+def _fly(scenario: Scenario, entries: list[LawEntry], folder: Path, force: bool, nested: bool) -> list[Flight]:
+    from starhold.cli.show import console, flying, print_table
+    from starhold.report.compare import fly_law, write, write_run
+    from starhold.report.results import open_folder
+    from starhold.scenario.building import build
+
+    for entry in entries:
+        build(scenario, entry)
+    open_folder(folder, force)
+    flights: list[Flight] = []
+    with flying(entries, scenario.table.simulation.steps) as notice:
+        for entry in entries:
+            flight = fly_law(scenario, entry, notice)
+            write_run(flight.run, scenario, (folder / entry.name if nested else folder) / "run.nc")
+            flights.append(flight)
+    page = write(scenario, flights, folder)
+    print_table(flights)
+    for flight in flights:
+        lost = flight.metrics["diverged_at"]
+        if lost is not None:
+            console.print(f"{flight.name} diverged at {lost:g} s; its results end there", style="red")
+        if flight.metrics.get("solver_budget_hits"):
+            hits, calls = flight.metrics["solver_budget_hits"], flight.metrics["solver_calls"]
+            console.print(f"{flight.name}: the solver used up its budget in {hits} of {calls} calls", style="yellow")
+    console.print(f"Report: {page}", soft_wrap=True)
+    return flights
+
+
+@app.command()
+def laws(name: Annotated[str | None, typer.Argument(help="show this law's card and gains")] = None) -> None:
+    """List the control laws, or describe one."""
+    from starhold.cli.show import print_law, print_laws
+    from starhold.laws.catalogue import catalogue
+    from starhold.scenario.reading import nearest
+
+    if name is None:
+        print_laws(catalogue())
+    elif name not in catalogue():
+        raise InputError("laws", "", name, nearest(name, list(catalogue())))
+    else:
+        print_law(catalogue()[name])
+
+
+@app.command()
+def scenarios(name: Annotated[str | None, typer.Argument(help="print this scenario's text")] = None) -> None:
+    """List the built-in scenarios, or print one."""
+    from starhold.cli.show import console
+    from starhold.scenario.reading import builtin_names, builtin_text, load, nearest
+
+    if name is None:
+        for known in builtin_names():
+            console.print(f"[bold]{known}[/bold]  {load(known).table.description}", soft_wrap=True)
+    elif name not in builtin_names():
+        raise InputError("scenarios", "", name, nearest(name, builtin_names()))
+    else:
+        typer.echo(builtin_text(name), nl=False)
+
+
+@app.command()
+def new(
+    path: Annotated[Path, typer.Argument(metavar="FILE.toml", help="the file to write")],
+    start: Annotated[str | None, typer.Option("--from", help="copy this built-in scenario instead of the template")] = None,
+    schema: Annotated[bool, typer.Option("--schema", help="write a JSON Schema beside it, for editors")] = False,
+    force: Force = False,
+) -> None:
+    """Write a commented scenario file that runs as it is."""
+    from starhold.cli.show import console
+    from starhold.report.results import whole
+    from starhold.scenario.reading import builtin_names, builtin_text, nearest
+    from starhold.scenario.template import template_text
+
+    if start is not None and start not in builtin_names():
+        raise InputError("new", "--from", start, nearest(start, builtin_names()))
+    text = template_text() if start is None else builtin_text(start)
+    beside = path.with_name("starhold.schema.json")
+    if schema:
+        text = f"#:schema ./{beside.name}\n{text}"
+    if path.exists() and not force:
+        raise InputError(str(path), "", "a file that exists", "another name, or --force")
+    try:
+        with whole(path) as hidden:
+            hidden.write_text(text, encoding="utf-8")
+        if schema:
+            with whole(beside) as hidden:
+                hidden.write_text(_schema_text(), encoding="utf-8")
+    except OSError as error:
+        raise InputError(str(path), "", f"cannot write there: {error.strerror}", "a file you may write") from None
+    console.print(f"Wrote {path}. Try: starhold compare {path}", soft_wrap=True)
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON Schema of scenario files."""
+    typer.echo(_schema_text(), nl=False)
+
+
+def _schema_text() -> str:
+    import json
+
+    from starhold.scenario.schema import json_schema
+
+    return json.dumps(json_schema(), indent=1) + "\n"
+
+
+@app.command("check-law")
+def check_law(path: Annotated[Path, typer.Argument(metavar="FILE", help="a Python file that holds a law")]) -> None:
+    """Run the conformance suite over a law of your own."""
+    from starhold.cli.show import console
+    from starhold.conformance.suite import examine
+    from starhold.laws.catalogue import adopt, from_file
+
+    if not path.is_file():
+        raise InputError(str(path), "", "no such file", "a Python file with CARD, Gains, torque and examples")
+    try:
+        law = from_file(path)
+        adopt(law)
+    except Exception as error:
+        raise InputError(str(path), "", f"{type(error).__name__}: {error}", "a Python file that holds a law") from None
+    failed = 0
+    for verdict in examine(law):
+        failed += verdict.outcome == "failed"
+        colour = {"passed": "green", "failed": "red", "does not apply": "dim"}[verdict.outcome]
+        console.print(f"[{colour}]{verdict.outcome:>14}[/{colour}]  {verdict.name}", highlight=False)
+        if verdict.reason:
+            console.print(f"{'':16}{verdict.reason}", highlight=False, markup=False)
+    if failed:
+        raise typer.Exit(FAILED_CHECK)
+
+
+@app.callback(invoke_without_command=True)
+def _root(version: Annotated[bool, typer.Option("--version", help="print the version and leave")] = False) -> None:
+    if version:
+        import starhold
+
+        typer.echo(f"starhold {starhold.__version__}")
+        raise typer.Exit
+
+
+def main() -> None:
+    """Entry point: user errors become one line and exit code 2, an interrupt 130."""
+    try:
+        app(standalone_mode=True)
+    except InputError as error:
+        print(f"starhold: {error}", file=sys.stderr)
+        sys.exit(USER_ERROR)
+    except KeyboardInterrupt:
+        print("starhold: interrupted; files already written are whole", file=sys.stderr)
+        sys.exit(INTERRUPTED)

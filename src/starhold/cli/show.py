@@ -1,0 +1,103 @@
+"""What the commands print: tables and progress bars."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from starhold.laws.catalogue import Law
+    from starhold.report.flight import Flight
+    from starhold.scenario.reading import LawEntry
+
+WIDE = 132
+console = Console()
+if not console.is_terminal:
+    # A file or a pipe has no width to keep to.
+    console = Console(width=WIDE)
+
+
+@contextmanager
+def flying(entries: Sequence[LawEntry], steps: int) -> Iterator[Callable[[str, int, int], None]]:
+    """Progress bars, one a law; yields what the simulation calls."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("steps"), TimeRemainingColumn())
+    with Progress(*columns, console=console) as bars:
+        tasks: dict[str, TaskID] = {}
+
+        def notice(name: str, done: int, total: int) -> None:
+            bars.update(tasks[name], completed=done, total=total, description=name)
+
+        for entry in entries:
+            tasks[entry.name] = bars.add_task(f"{entry.name} (compiling)", total=steps)
+        yield notice
+
+
+def print_table(flights: Sequence[Flight]) -> None:
+    """The ranked comparison; a star marks the best of each metric. On a narrow screen laws become columns."""
+    from starhold.analysis.metrics import MEASURES
+    from starhold.analysis.ranking import ranked, shown, winners
+
+    results: Mapping[str, Mapping[str, Any]] = {flight.name: flight.metrics for flight in flights}
+    won, order = winners(results), ranked(results)
+    heads = [f"{m.heading}\n[dim]{m.unit}[/dim]" for m in MEASURES.values()]
+    cells = [[_cell(shown(metric, results[name].get(metric)), name in won[metric]) for metric in MEASURES] for name in order]
+    table = Table(title_justify="left", show_edge=False, pad_edge=False)
+    if console.width >= WIDE:
+        for head in ("law", *heads):
+            table.add_column(head, justify="left" if head == "law" else "right")
+        for name, row in zip(order, cells, strict=True):
+            table.add_row(name, *row)
+    else:
+        for head in ("", *order):
+            table.add_column(head, justify="right" if head else "left")
+        for column, head in enumerate(heads):
+            table.add_row(head.replace("\n", " "), *(row[column] for row in cells))
+    console.print()
+    console.print(table)
+    if len(flights) > 1:
+        console.print("Ranked by settling, then final angle, then effort; [bold green]*[/bold green] best of its kind.", highlight=False)
+
+
+def _cell(text: str, best: bool) -> str:
+    return f"[bold green]{text}*[/bold green]" if best else text
+
+
+def print_laws(known: Mapping[str, Law]) -> None:
+    """Name, claim and summary of each law."""
+    table = Table(show_edge=False, pad_edge=False)
+    for head in ("law", "claims", "summary"):
+        table.add_column(head)
+    for law in known.values():
+        table.add_row(law.name, law.card.claims, law.card.summary)
+    console.print(table)
+
+
+def print_law(law: Law) -> None:
+    """A law's card, gains and design forms."""
+    card = law.card
+    console.print(f"[bold]{law.name}[/bold]: {card.title}", highlight=False)
+    console.print(card.summary, highlight=False)
+    console.print(f"Claims: {card.claims} asymptotic stability, if: {'; '.join(card.assumptions)}", highlight=False)
+    for source in card.sources:
+        console.print(f"Source: {source}", highlight=False)
+    for form in (None, *law.forms):
+        console.print("\n[bold]Gains[/bold]" if form is None else f'\n[bold]form = "{form}"[/bold]', highlight=False)
+        table = Table(show_edge=False, pad_edge=False)
+        for head in ("key", "unit", "allowed", "default", "meaning"):
+            table.add_column(head)
+        for item in law.fields(form):
+            allowed = ", ".join(item.gain.choices) or _bounds(item.gain)
+            default = "required" if item.required else str(item.gain.choices[item.default] if item.gain.choices else item.default)
+            table.add_row(item.name, item.gain.unit, allowed, default, item.gain.text)
+        console.print(table)
+
+
+def _bounds(gain: Any) -> str:
+    parts = [(gain.above, "> "), (gain.at_least, ">= "), (gain.at_most, "<= ")]
+    bounds = ", ".join(f"{sign}{bound:g}" for bound, sign in parts if bound is not None)
+    return gain.describe() + (f", {bounds}" if bounds else "")

@@ -1,0 +1,64 @@
+"""The spacecraft, states and loops that laws are examined on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import cache
+from typing import Any
+
+import numba
+import numpy as np
+
+from starhold.algebra.quaternion import Quaternion
+from starhold.algebra.structure import unflatten
+from starhold.algebra.vector import ZERO, Vector
+from starhold.laws.catalogue import Law
+from starhold.laws.interface import Seen
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.models.craft import Craft, make_craft
+from starhold.models.rigid_body import State
+
+CRAFT = make_craft([2.0, 3.0, 4.0], torque_limit=0.05)
+PERIOD = 0.1
+
+
+def random_quaternions(count: int, seed: int = 7) -> list[Quaternion]:
+    """Attitudes uniform on the rotation group."""
+    numbers = np.random.default_rng(seed).normal(size=(count, 4))
+    return [unflatten(q / np.linalg.norm(q), (0.0,) * 4) for q in numbers]
+
+
+def random_seen(count: int, external: bool = True, seed: int = 11) -> Iterator[Seen]:
+    """What a law sees at random states of a body at a target at rest, with or without a modelled torque."""
+    random = np.random.default_rng(seed)
+    for attitude in random_quaternions(count, seed + 1):
+        rate: Vector = unflatten(random.normal(scale=0.05, size=3), ZERO)
+        torque: Vector = unflatten(random.normal(scale=1e-5, size=3), ZERO) if external else ZERO
+        position: Vector = unflatten(random.normal(scale=4e6, size=3), ZERO) if external else ZERO
+        yield Seen(attitude, rate, rate, ZERO, ZERO, torque, position, PERIOD)
+
+
+def sample_loop(law: Law, gains: Any) -> ClosedLoop:
+    """A full 3x3 inertia in orbit under the gravity gradient, with hysteresis and a limit for each axis."""
+    craft = make_craft([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]], torque_limit=0.05)
+    start = State((0.2, 0.4, -0.7, 0.5567764362830022), (0.04, 0.03, 0.02), (7e6, 1e5, 0.0), (0.0, 7.4e3, 1.2e3), ZERO)
+    goal: Quaternion = (0.6, 0.0, 0.8, 0.0)
+    return ClosedLoop(
+        craft, law, gains, start, PERIOD, orbit=True, gravity_gradient=True, target=goal, limit="axis", cover="hysteresis"
+    )
+
+
+def call(law: Law, seen: Seen, gains: Any, craft: Craft = CRAFT) -> Vector:
+    """The torque of a law called once, with a fresh memory; compiled if the law is compiled-only."""
+    memory = law.remember(gains, craft, seen.period)
+    torque = _compiled(law.torque) if law.card.compiled_only else law.torque
+    return torque(seen, gains, craft, memory)[0]
+
+
+@cache
+def _compiled(torque: Callable[..., Any]) -> Callable[..., Any]:
+    @numba.njit(error_model="numpy")
+    def compiled(seen, gains, craft, memory):  # type: ignore[no-untyped-def]
+        return torque(seen, gains, craft, memory)
+
+    return compiled

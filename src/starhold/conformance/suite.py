@@ -1,0 +1,229 @@
+"""The checks, and `examine`, which runs them over a law."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from starhold.algebra.quaternion import derivative, multiply, normalise, to_reference
+from starhold.algebra.structure import flatten, move
+from starhold.algebra.vector import ZERO
+from starhold.conformance.bench import CRAFT, call, random_quaternions, random_seen, sample_loop
+from starhold.conformance.units import rescaled
+from starhold.errors import InputError
+from starhold.laws.catalogue import Law
+from starhold.laws.interface import Card, Seen, fields, with_attitude
+from starhold.loop.kernels import make_step
+from starhold.models.rigid_body import angular_acceleration
+from starhold.scenario.reading import parse
+from starhold.scenario.writing import scenario_with
+from starhold.simulate.lane import fly
+from starhold.simulate.lanes import simulate_many
+
+STEPS = 40
+ON_TARGET = Seen((1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.1)
+
+
+class Fault(Exception):
+    """A law breaks the check; the text says how."""
+
+
+class NotApplicable(Exception):
+    """The check says nothing about this law; the text says why."""
+
+
+class Verdict(NamedTuple):
+    """What a check found."""
+
+    name: str
+    outcome: Literal["passed", "failed", "does not apply"]
+    reason: str
+
+
+def examine(law: Law) -> Iterator[Verdict]:
+    """Run every check over a law, in order, going on after failures."""
+    for check in CHECKS:
+        name = (check.__doc__ or check.__name__).splitlines()[0].rstrip(".")
+        try:
+            check(law)
+        except NotApplicable as reason:
+            yield Verdict(name, "does not apply", str(reason))
+        except Exception as reason:
+            kind = "" if isinstance(reason, Fault) else f"{type(reason).__name__}: "
+            yield Verdict(name, "failed", kind + str(reason))
+        else:
+            yield Verdict(name, "passed", "")
+
+
+def _require(condition: bool, reason: str) -> None:
+    if not condition:
+        raise Fault(reason)
+
+
+def declares_itself(law: Law) -> None:
+    """The file declares a card, gains with units, and examples within their bounds."""
+    _require(isinstance(law.card, Card), "CARD is not a Card")
+    declared = fields(law.gains)
+    _require(bool(law.examples()), "examples() is empty")
+    for gains in law.examples():
+        _require(isinstance(gains, law.gains), f"the example {gains} is not a Gains")
+        for item, value in zip(declared, gains, strict=True):
+            shown = item.gain.choices[value] if item.gain.choices else value
+            _require(item.gain.check(shown) == value, f"the example's {item.name} = {value} changes when it is read")
+    if law.card.claims != "none":
+        _require(bool(law.card.assumptions), "a law that claims stability states its assumptions")
+
+
+def is_pure(law: Law) -> None:
+    """The torque depends on nothing but its arguments."""
+    for gains in law.examples():
+        for seen in random_seen(10):
+            _require(call(law, seen, gains) == call(law, seen, gains), f"two calls differ at {seen}")
+
+
+def reads_alike(law: Law) -> None:
+    """Compiled, every lane of a batch, and for plain laws Python floats, agree bit for bit."""
+    for gains in law.examples():
+        loop = sample_loop(law, gains)
+        one = flatten(fly(loop, STEPS)[1].state)
+        starts = [replace_rate(loop.start, factor) for factor in (1.0, 0.5, 1.0, 2.0)]
+        for threads in (1, 2):
+            batch = simulate_many(loop, starts, STEPS, threads=threads)
+            same = all(batch.states[:, lane].tolist() == one for lane in (0, 2))
+            _require(same, f"a lane of a batch on {threads} threads differs from a single flight")
+        if law.card.compiled_only:
+            continue
+        step, carry, setup = make_step(loop.parts()), loop.carry(), loop.setup()
+        for k in range(STEPS):
+            carry = step.decide(step.check(carry, k, setup), k, 0, gains, loop.craft, setup)
+            carry = step.hold(carry, loop.craft, setup)
+        _require(flatten(carry.state) == one, "plain Python differs from the compiled kernel")
+
+
+def replace_rate(state: Any, factor: float) -> Any:
+    """The state with its rate multiplied."""
+    return state._replace(rate=tuple(factor * w for w in state.rate))
+
+
+def rests_on_target(law: Law) -> None:
+    """No torque at rest on target."""
+    for gains in law.examples():
+        torque = call(law, ON_TARGET, gains)
+        size = float(np.abs(torque).max())
+        _require(size <= law.card.rest_tolerance, f"torque {size:g} N m at rest on target")
+
+
+def treats_double_cover_as_stated(law: Law) -> None:
+    """q and -q give what the card says of the double cover."""
+    for gains in law.examples():
+        differences: list[float] = []
+        for seen in random_seen(20):
+            other = with_attitude(seen, tuple(-x for x in seen.attitude))
+            differences.append(float(np.abs(np.subtract(call(law, seen, gains), call(law, other, gains))).max()))
+        if law.card.double_cover == "even":
+            _require(max(differences) < 1e-12, f"q and -q differ by {max(differences):g} N m, the card says they do not")
+        else:
+            _require(max(differences) > 1e-12, "q and -q never differ, the card says they do")
+
+
+def ignores_inertial_frame(law: Law) -> None:
+    """Turning the inertial frame changes nothing."""
+    for gains, turn in zip(law.examples(), random_quaternions(len(law.examples())), strict=True):
+        loop = sample_loop(law, gains)
+        s = loop.start
+        turned = s._replace(
+            attitude=normalise(multiply(turn, s.attitude)),
+            position=to_reference(turn, s.position),
+            velocity=to_reference(turn, s.velocity),
+        )
+        goal = loop.target
+        if isinstance(goal, (str, np.ndarray)):
+            raise TypeError("the sample loop holds an inertial attitude")
+        other = replace(loop, start=turned, target=normalise(multiply(turn, goal)))
+        rows = slice(13, 16)
+        difference = np.abs(fly(loop, STEPS)[0][rows] - fly(other, STEPS)[0][rows]).max()
+        _require(difference <= 1e-9, f"the torque changes by {difference:g} N m")
+
+
+def stays_finite(law: Law) -> None:
+    """Finite torque at half turns, at zero error and at rest."""
+    halves = [(0.0, *axis) for axis in ((1.0, 0.0, 0.0), (0.0, 0.6, -0.8), (1 / math.sqrt(3.0),) * 3)]
+    for gains in law.examples():
+        for attitude in [(1.0, 0.0, 0.0, 0.0), (-1.0, 0.0, 0.0, 0.0), *halves]:
+            for rate in (ZERO, (0.1, -0.2, 0.05)):
+                seen = ON_TARGET._replace(attitude=attitude, rate=rate, body_rate=rate)
+                _require(bool(np.isfinite(call(law, seen, gains)).all()), f"not finite at {attitude}, rate {rate}")
+
+
+def survives_toml(law: Law) -> None:
+    """Gains written to a scenario file and read back are the same; unknown keys are refused."""
+    for gains in law.examples():
+        text = scenario_with(law, gains)
+        _require(parse(text, law.name).laws[0].gains == gains, "gains change on the way through TOML")
+        try:
+            parse(text + "no_such_key = 1\n", law.name)
+        except InputError:
+            continue
+        raise Fault("an unknown key is accepted")
+
+
+def keeps_units(law: Law) -> None:
+    """The declared units are right: the torque is the same in any system of units."""
+    for gains in law.examples():
+        for seen in random_seen(5):
+            plain = np.array(call(law, seen, gains))
+            size = max(float(np.abs(plain).max()), 1e-9)
+            for factors in ((7.0, 1.0, 1.0), (1.0, 3.0, 1.0), (1.0, 1.0, 0.2), (2.0, 0.3, 5.0)):
+                seen2, gains2, craft2, back = rescaled(law, seen, gains, CRAFT, factors)
+                other = np.array(call(law, seen2, gains2, craft2)) * back
+                error = float(np.abs(other - plain).max()) / size
+                _require(error < 1e-6, f"with kg, m, s scaled by {factors} the torque changes by {error:.1e} of itself")
+
+
+def decreases_lyapunov(law: Law) -> None:
+    """V is positive and does not rise, at random states, for a body free of other torques."""
+    if law.lyapunov is None:
+        raise NotApplicable("the law has no `lyapunov`")
+    if law.card.claims == "none":
+        raise NotApplicable("the card claims nothing")
+    for gains in law.examples():
+        _require(abs(law.lyapunov(ON_TARGET, gains, CRAFT)) < 1e-15, "V is not zero at rest on target")
+        for seen in random_seen(300, external=False):
+            value = law.lyapunov(seen, gains, CRAFT)
+            _require(value > 0.0, f"V = {value:g} at {seen}")
+            slope = _slope(law, seen, gains)
+            _require(slope <= 1e-7 * value, f"dV/dt = {slope:g} at {seen}")
+
+
+def _slope(law: Law, seen: Seen, gains: Any) -> float:
+    """dV/dt along the closed loop, by a central difference."""
+    rates = angular_acceleration(seen.body_rate, call(law, seen, gains), CRAFT)
+    turning = derivative(seen.attitude, seen.rate)
+    assert law.lyapunov is not None
+
+    def value(h: float) -> float:
+        rate = move(seen.rate, h, rates)
+        moved = seen._replace(attitude=move(seen.attitude, h, turning), rate=rate, body_rate=rate)
+        return law.lyapunov(moved, gains, CRAFT)  # type: ignore[misc]
+
+    return (value(1e-4) - value(-1e-4)) / 2e-4
+
+
+CHECKS: tuple[Callable[[Law], None], ...] = (
+    declares_itself,
+    is_pure,
+    reads_alike,
+    rests_on_target,
+    treats_double_cover_as_stated,
+    ignores_inertial_frame,
+    stays_finite,
+    survives_toml,
+    keeps_units,
+    decreases_lyapunov,
+)
+
+__all__ = ["CHECKS", "Fault", "NotApplicable", "Verdict", "examine"]

@@ -1,0 +1,53 @@
+"""Physics in other units: everything a law takes is rescaled by its declared unit."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from starhold.laws.catalogue import Law
+from starhold.laws.interface import Seen
+from starhold.models.craft import Craft
+
+SEEN_UNITS = ("1", "1/s", "1/s", "1/s", "1/s^2", "N m", "m", "s")
+CRAFT_UNITS = ("kg m^2", "1/(kg m^2)", "N m", "m^3/s^2")
+
+
+def rescaled(
+    law: Law, seen: Seen, gains: Any, craft: Craft, factors: tuple[float, float, float]
+) -> tuple[Seen, Any, Craft, float]:
+    """The arguments of a law in a system of units where 1 kg, 1 m and 1 s are `factors` units, and the factor that takes
+    the torque it gives back to N m."""
+
+    def scaled(values: Any, units: Any) -> list[Any]:
+        return [_times(value, _factor(unit, factors)) for value, unit in zip(values, units, strict=True)]
+
+    gain_units = [None if item.gain.choices or item.gain.whole else item.gain.unit for item in law.fields()]
+    own = [v if unit is None else _times(v, _factor(unit, factors)) for v, unit in zip(gains, gain_units, strict=True)]
+    return (
+        Seen(*scaled(seen, SEEN_UNITS)),
+        law.gains(*own),
+        Craft(*scaled(craft, CRAFT_UNITS)),
+        1.0 / _factor("N m", factors),
+    )
+
+
+def _times(value: Any, factor: float) -> Any:
+    return tuple(_times(part, factor) for part in value) if isinstance(value, tuple) else value * factor
+
+
+def _factor(unit: str, factors: tuple[float, float, float]) -> float:
+    product = 1.0
+    for power, factor in zip(_powers(unit), factors, strict=True):
+        product *= factor**power
+    return product
+
+
+@cache
+def _powers(unit: str) -> tuple[float, float, float]:
+    """Exponents of mass, length and time in a unit."""
+    import pint
+
+    registry = pint.UnitRegistry(cache_folder=":auto:")
+    dimensions: Any = registry.parse_units("dimensionless" if unit == "1" else unit).dimensionality
+    return (dimensions.get("[mass]", 0.0), dimensions.get("[length]", 0.0), dimensions.get("[time]", 0.0))

@@ -1,0 +1,163 @@
+"""Model-predictive control: the best sequence of moves over a horizon inside the torque limit, of which the first is
+applied."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from scipy.linalg import solve_discrete_are  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
+
+from starhold.algebra.scalar import equation
+from starhold.algebra.vector import Vector, add, clip_axes, clip_norm, scale
+from starhold.laws.interface import Card, Gain, Seen, tracking_torque
+from starhold.laws.mpc_problem import Problem, Space, hold, linearise, make_space
+from starhold.laws.mpc_solver import advance, improve
+from starhold.models.craft import Craft, tensor
+
+CARD = Card(
+    title="Predictive",
+    summary="minimises the sum of x'Qx + u'Ru over a horizon of the motion linearised anew, inside the torque limit",
+    sources=(
+        "Comparison of Lyapunov, sliding-mode and predictive attitude control",
+        "equations B: MPC; F.6",
+    ),
+    assumptions=(
+        "rigid body",
+        "inertia known",
+        "no external torque but the gravity gradient",
+        "small attitude error, or a horizon short against the turn",
+    ),
+    claims="local",
+    compiled_only=True,
+)
+
+TERMINALS = ("riccati", "stage", "none")
+LIMITS = ("axis", "norm", "none")
+
+
+class Gains(NamedTuple):
+    """Weights of the cost, horizon and limits. Choices are given by their place in the list."""
+
+    q_attitude: Annotated[Vector, Gain("1", above=0.0, shape=(3,), text="weight of the quaternion's vector part")]
+    q_rate: Annotated[Vector, Gain("s^2", at_least=0.0, shape=(3,), text="weight of the rate")]
+    r: Annotated[Vector, Gain("1/(N m)^2", above=0.0, shape=(3,), text="weight of the torque")]
+    horizon: Annotated[int, Gain(at_least=1, at_most=500, whole=True, text="moves planned ahead")] = 10
+    terminal: Annotated[int, Gain(choices=TERMINALS, text="weight of the state after the last move: Riccati, Q or 0")] = 0
+    limit: Annotated[int, Gain(choices=LIMITS, text="how the craft's torque limit is respected")] = 0
+    budget: Annotated[int, Gain(at_least=1, at_most=10000, whole=True, text="most Riccati sweeps a call")] = 50
+
+
+class Counters(NamedTuple):
+    """Places in the counters: calls, sweeps in all, most sweeps in a call, calls that ended at the budget without the
+    optimum, and whether limits shaped the last plan (1) or not (0)."""
+
+    calls: int = 0
+    sweeps: int = 1
+    worst: int = 2
+    exhausted: int = 3
+    shaped: int = 4
+
+
+COUNTERS = Counters()
+
+
+class Memory(NamedTuple):
+    """What the law keeps between calls, changed in place and made anew for each trajectory.
+
+    plan (3N): the moves planned, beyond the torque that tracks the target (N m); a (36), b (18): the sampled motion;
+    q (36), r (9), r_inverse (9), p (36): weights, made from the gains; tail (18): feedback for the move that
+    a shifted plan lacks; counters (5, see Counters); space: work arrays.
+    """
+
+    plan: Any
+    a: Any
+    b: Any
+    q: Any
+    r: Any
+    r_inverse: Any
+    p: Any
+    tail: Any
+    counters: Any
+    space: Space
+
+
+def remember(gains: Gains, craft: Craft, period: float) -> Memory:
+    """The memory of one trajectory, for control instants `period` apart (s).
+
+    Raises ValueError where the Riccati equation of the terminal weight has no solution in double precision.
+    """
+    terminal, tail = terminal_weight(gains, craft, period)
+    r = np.array(gains.r, dtype=float)
+    return Memory(
+        plan=np.zeros(3 * gains.horizon),
+        a=np.zeros(36),
+        b=np.zeros(18),
+        q=np.diag(np.array([*gains.q_attitude, *gains.q_rate], dtype=float)).ravel(),
+        r=np.diag(r).ravel(),
+        r_inverse=np.diag(1.0 / r).ravel(),
+        p=terminal.ravel(),
+        tail=tail.ravel(),
+        counters=np.zeros(len(COUNTERS), dtype=np.int64),
+        space=make_space(gains.horizon),
+    )
+
+
+def terminal_weight(gains: Gains, craft: Craft, period: float) -> tuple[Any, Any]:
+    """The weight P (6, 6) of the state after the last move, and the feedback (3, 6) that is best before it:
+    u = -feedback x. For "riccati" they are those of the endless horizon at w = 0 without gravity.
+
+    Raises ValueError where the Riccati equation has no solution in double precision.
+    """
+    # In periods and in a typical torque, so that the weights of any craft are of comparable size.
+    inertia = tensor(craft.inertia)
+    typical = np.trace(inertia) / 3.0
+    push = typical * np.linalg.inv(inertia)
+    a = np.block([[np.eye(3), 0.5 * np.eye(3)], [np.zeros((3, 3)), np.eye(3)]])
+    b = np.vstack([0.25 * push, push])
+    q = np.diag([*gains.q_attitude, *(weight / period**2 for weight in gains.q_rate)])
+    r = np.diag(gains.r) * (typical / period**2) ** 2
+    name = TERMINALS[gains.terminal]
+    p: Any = q if name == "stage" else np.zeros((6, 6))
+    if name == "riccati":
+        try:
+            p = solve_discrete_are(a, b, q, r)
+        except (np.linalg.LinAlgError, ValueError) as error:
+            raise ValueError(f"the weights give no terminal weight: {error}") from None
+        p = 0.5 * (p + p.T)
+    feedback = np.linalg.solve(r + b.T @ p @ b, b.T @ p @ a)
+    units = np.array([1.0, 1.0, 1.0, period, period, period])
+    return p * np.outer(units, units), feedback * units * (typical / period**2)
+
+
+@equation
+def torque(seen: Seen, gains: Gains, craft: Craft, memory: Memory) -> tuple[Vector, Memory]:
+    """Control torque (N m, body). Weights and horizon are those the memory was made for."""
+    ahead = tracking_torque(seen, craft)
+    bound = np.inf if gains.limit == 2 else craft.torque_limit
+    linearise(seen, craft, memory.a, memory.b)
+    hold(memory.a, memory.b, seen.period, memory.space.small)
+    problem = Problem(
+        memory.a, memory.b, memory.q, memory.r, memory.r_inverse, memory.p, scale(-1.0, ahead), bound, gains.limit == 1
+    )
+    counters = memory.counters
+    warm = counters[4] == 1
+    if warm:
+        advance(problem, memory.plan, memory.tail, memory.space)
+    q, w, states = seen.attitude, seen.rate, memory.space.states
+    states[0], states[1], states[2], states[3], states[4], states[5] = q[1], q[2], q[3], w[0], w[1], w[2]
+    sweeps, solved, shaped = improve(problem, memory.plan, memory.space, gains.budget, warm)
+    counters[0] += 1
+    counters[1] += sweeps
+    counters[2] = max(counters[2], sweeps)
+    counters[3] += 0 if solved else 1
+    counters[4] = 1 if shaped else 0
+    command = add((memory.plan[0], memory.plan[1], memory.plan[2]), ahead)
+    # Adding the tracking torque back rounds; the limit is kept exactly.
+    return clip_norm(command, bound) if gains.limit == 1 else clip_axes(command, bound), memory
+
+
+def examples() -> list[Gains]:
+    """The published weights within a limit on each axis, and within a limit on the norm."""
+    q, r = (0.2, 0.2, 0.2), (50.0, 50.0, 50.0)
+    return [Gains(q, q, r, limit=LIMITS.index("axis")), Gains(q, q, r, limit=LIMITS.index("norm"))]

@@ -1,0 +1,87 @@
+"""Flies the laws of a scenario, measures them, and writes what came of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from starhold.analysis.cost import call_costs
+from starhold.analysis.metrics import measure
+from starhold.laws.interface import Field
+from starhold.report.flight import Flight
+from starhold.report.results import SUMMARY, whole, write_run, write_summary
+from starhold.scenario.building import build
+from starhold.scenario.reading import LawEntry, Scenario
+from starhold.simulate.lane import fly, label
+
+Notice: TypeAlias = Callable[[str, int, int], None]
+"""Called with a law's name, the control steps done and those in all."""
+
+
+def fly_law(scenario: Scenario, entry: LawEntry, notice: Notice | None = None) -> Flight:
+    """One law of the scenario flown, measured and timed."""
+    simulation, settling = scenario.table.simulation, scenario.table.settling
+    loop = build(scenario, entry)
+    progress = None if notice is None else lambda done, total: notice(entry.name, done, total)
+    samples, carry = fly(loop, simulation.steps, simulation.record_every, progress=progress)
+    run = label(loop, samples, carry, simulation.record_every)
+    metrics = measure(run, settling.attitude_tolerance, settling.rate_tolerance)
+    metrics |= call_costs(loop, samples)
+    metrics |= _law_counters(carry.memory)
+    gains = {item.name: _gain_text(item, value) for item, value in zip(entry.law.fields(), entry.gains, strict=True)}
+    return Flight(entry.name, entry.law.name, run, metrics, gains)
+
+
+def compare(scenario: Scenario, notice: Notice | None = None) -> list[Flight]:
+    """Every law of the scenario flown on it, in the order of the file."""
+    return [fly_law(scenario, entry, notice) for entry in scenario.laws]
+
+
+def write(scenario: Scenario, flights: Sequence[Flight], folder: Path) -> Path:
+    """Summary, pictures and the page into an existing folder; returns the page's path. The runs are written as they are
+    flown, by `write_run`."""
+    from starhold.report.figures import draw
+    from starhold.report.page import write_page
+
+    write_summary(scenario, {flight.name: flight.metrics for flight in flights}, folder / SUMMARY)
+    draw(flights, folder)
+    page = folder / "report.html"
+    with whole(page) as hidden:
+        write_page(hidden, scenario, flights)
+    return page
+
+
+def _law_counters(memory: Any) -> dict[str, Any]:
+    """What an iterating law counted during the run: solver iterations and the calls that used up their budget."""
+    counters = getattr(memory, "counters", None)
+    if counters is None:
+        return {}
+    calls, total, worst, hits = (int(value) for value in np.asarray(counters)[:4])
+    return {
+        "solver_calls": calls,
+        "solver_iterations_mean": total / max(calls, 1),
+        "solver_iterations_worst": worst,
+        "solver_budget_hits": hits,
+    }
+
+
+def _gain_text(item: Field, value: Any) -> str:
+    if item.gain.choices:
+        return item.gain.choices[value]
+    unit = "" if item.gain.unit == "1" else f" {item.gain.unit}"
+    return f"{_compact(value)}{unit}"
+
+
+def _compact(value: Any) -> str:
+    array = np.asarray(value, dtype=float)
+    if array.ndim == 2 and np.array_equal(array, np.diag(np.diagonal(array))):
+        array = np.diagonal(array)
+    if array.ndim == 1 and (array == array[0]).all():
+        array = array[0]
+    return np.array2string(array, separator=", ", precision=6) if array.ndim else f"{float(array):.6g}"
+
+
+__all__ = ["compare", "fly_law", "write", "write_run"]

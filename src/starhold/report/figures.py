@@ -1,0 +1,146 @@
+"""Figures of a comparison as PNG files, every law in every figure."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from starhold.analysis.metrics import DECADES
+from starhold.report.flight import Flight, colour
+from starhold.report.plots import Plot, collect, steps_within
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import Scenario
+
+DPI = 110
+POINTS = 2000
+"""Samples of a curve, about two for each column of pixels."""
+
+
+def draw(flights: Sequence[Flight], folder: Path, scenario: Scenario | None = None) -> list[Path]:
+    """Write the figures into `folder`, which exists, and return their paths.
+
+    A scenario gives them its name as title and its tolerances as dashed lines.
+    """
+    name = "" if scenario is None else scenario.name
+    plots = collect(flights, POINTS, scenario)
+    paths: list[Path] = []
+    with warnings.catch_warnings():
+        # A name in a script that the font lacks is drawn as boxes; that is no news to whoever runs a simulation.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
+        for plot in (plots.scalar, plots.attitude, plots.rate, plots.torque, plots.angle):
+            paths.append(_save(_over_time(plot, plots.times, flights, name), folder / f"{plot.name}.png"))
+        paths.append(_save(_accuracy(flights, name), folder / "accuracy.png"))
+    return paths
+
+
+def _over_time(plot: Plot, times: Any, flights: Sequence[Flight], name: str) -> Any:
+    count = len(plot.panels)
+    figure, axes = _figure(count, 1, {1: 3.6, 2: 5.2, 3: 6.4}[count], f"{plot.title}", flights, name, plot.dashed)
+    for axis, panel in zip(axes, plot.panels, strict=True):
+        for number in _back_to_front(flights, plot.name):
+            curve = panel.curves[number]
+            width = _width(number, len(flights), plot.name)
+            axis.plot(times[: len(curve)], curve, color=colour(number), linewidth=width)
+        if panel.log:
+            axis.set_yscale("log")
+        for level in panel.levels:
+            axis.axhline(level, color="0.35", linewidth=0.9, dashes=(5, 3))
+        if panel.span is not None:
+            axis.set_ylim(*panel.span)
+        axis.set_ylabel(panel.label)
+        axis.set_xlim(0.0, max(float(times[-1]), 1e-9))
+    axes[-1].set_xlabel("time, s")
+    return figure
+
+
+def _accuracy(flights: Sequence[Flight], name: str) -> Any:
+    figure, axes = _figure(1, 2, 3.9, "control steps needed to stay within 10⁻ᵏ", flights, name, "")
+    for axis, (kind, label) in zip(axes, (("", "attitude, |q| ≤ 10⁻ᵏ"), ("rate_", "rate, |ω| ≤ 10⁻ᵏ rad/s")), strict=True):
+        for number, flight in enumerate(flights):
+            steps = np.array([np.nan if s is None else s for s in steps_within(flight, kind)])
+            width = _width(number, len(flights), "accuracy")
+            axis.plot(list(DECADES), steps, color=colour(number), linewidth=width, marker="os^Dv<>"[number % 7], markersize=5)
+        axis.set_xlim(DECADES[0] - 0.4, DECADES[-1] + 0.4)
+        axis.set_ylim(bottom=0.0)
+        axis.set_xlabel("k")
+        axis.set_title(label, fontsize=9)
+    axes[0].set_ylabel("control steps")
+    return figure
+
+
+def _figure(
+    rows: int, columns: int, height: float, title: str, flights: Sequence[Flight], name: str, dashed: str
+) -> tuple[Any, Any]:
+    """A figure with its title, its legend and its axes, placed by fixed distances: layout engines draw everything twice."""
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    per_row = 4
+    entries = [(flight.name, _line(Line2D, number)) for number, flight in enumerate(flights)]
+    if dashed:
+        entries.append((dashed, Line2D([], [], color="0.35", linewidth=0.9, dashes=(5, 3))))
+    lines = -(-len(entries) // per_row)
+    head = 0.40 + 0.20 * lines + (0.22 if columns > 1 else 0.0)
+    figure = Figure(figsize=(8.0, height + 0.20 * lines), dpi=DPI)
+    total = height + 0.20 * lines
+    grid: Any = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    figure.subplots_adjust(
+        left=0.098, right=0.985, bottom=0.48 / total, top=1.0 - (head + 0.06) / total, hspace=0.09, wspace=0.14
+    )
+    heading = _short(f"{name}: {title}" if name else title)
+    figure.text(0.098, 1.0 - 0.26 / total, heading, fontsize=11, fontweight="bold", parse_math=False)
+    legend = figure.legend(
+        [line for _, line in entries],
+        [f"law {i}" for i in range(len(entries))],
+        loc="upper left",
+        bbox_to_anchor=(0.09, 1.0 - 0.30 / total),
+        ncols=min(len(entries), per_row),
+        fontsize=8.5,
+        frameon=False,
+        borderpad=0.0,
+        handlelength=1.8,
+        columnspacing=1.6,
+    )
+    # Set afterwards, for a name may start with an underscore or hold a dollar sign, which labels read as commands.
+    for text, (label, _) in zip(legend.get_texts(), entries, strict=True):
+        text.set_parse_math(False)
+        text.set_text(_short(label, 40))
+    axes = grid.ravel()
+    for axis in axes:
+        axis.grid(True, color="0.9", linewidth=0.6)
+        axis.tick_params(labelsize=8.5)
+        for side in ("top", "right"):
+            axis.spines[side].set_visible(False)
+    return figure, axes
+
+
+def _line(kind: Any, number: int) -> Any:
+    return kind([], [], color=colour(number), linewidth=2.2)
+
+
+def _short(text: str, most: int = 86) -> str:
+    return text if len(text) <= most else f"{text[: most - 1]}…"
+
+
+def _back_to_front(flights: Sequence[Flight], name: str) -> list[int]:
+    """Torques that chatter go behind those that do not, which they would hide."""
+    numbers = list(range(len(flights)))
+    if name == "torque":
+        numbers.sort(key=lambda i: -float(flights[i].metrics.get("chatter") or 0.0))
+    return numbers
+
+
+def _width(number: int, count: int, name: str) -> float:
+    """Later laws get thinner lines, so that equal curves show as a line within a line."""
+    return (1.2 if name == "torque" else 2.4) - (0.5 if name == "torque" else 1.3) * number / max(count - 1, 1)
+
+
+def _save(figure: Any, path: Path) -> Path:
+    # Fast compression: the files are small either way. No software entry, lest equal figures differ between releases.
+    figure.savefig(path, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
+    return path

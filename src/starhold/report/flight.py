@@ -1,0 +1,62 @@
+"""One flown law with all that a report says about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from starhold.laws.catalogue import Law
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8A8A8A")
+"""Okabe and Ito's palette, distinct to colour-blind readers, without what white or black paper swallows."""
+
+
+@dataclass(frozen=True)
+class Flight:
+    """One law's run of a scenario: the name the scenario gives the law, the law's type, the run as `simulate` gives it,
+    its metrics as `measure` gives them, and its gains, field name to text with unit."""
+
+    name: str
+    law: str
+    run: xr.Dataset
+    metrics: dict[str, Any]
+    gains: dict[str, str]
+
+    @property
+    def lost(self) -> float | None:
+        """When the motion was lost (s), None for a run that did not diverge."""
+        return self.metrics.get("diverged_at")
+
+
+def colour(number: int) -> str:
+    """The colour of the law at this place of a comparison, the same in every picture."""
+    return COLOURS[number % len(COLOURS)]
+
+
+def gain_texts(law: Law, gains: Any) -> dict[str, str]:
+    """Gains of a law as texts with units."""
+    return {item.name: _text(getattr(gains, item.name), item.gain) for item in law.fields()}
+
+
+def _text(value: Any, gain: Any) -> str:
+    if gain.choices:
+        return str(gain.choices[int(value)])
+    unit = "" if gain.unit == "1" else f" {gain.unit}"
+    return f"{number_text(value)}{unit}"
+
+
+def number_text(value: Any) -> str:
+    """A number, vector or matrix for reading; of a diagonal matrix the diagonal."""
+    array = np.asarray(value, dtype=float)
+    if array.ndim == 0:
+        return f"{array:.6g}"
+    if array.ndim == 2 and array.shape[0] == array.shape[1]:
+        diagonal = np.diagonal(array)
+        if np.count_nonzero(array - np.diag(diagonal)) == 0:
+            return f"diag({', '.join(f'{v:.6g}' for v in diagonal)})"
+    return f"[{', '.join(number_text(row) for row in array)}]"

@@ -1,0 +1,164 @@
+"""What the plots of a report show, whoever draws them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.analysis.metrics import DECADES, error_angle
+from starhold.report.flight import Flight
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import Scenario
+
+Curve: TypeAlias = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes: the label with its unit, a curve for each flight, and levels drawn as dashed lines."""
+
+    label: str
+    curves: list[Curve]
+    log: bool = False
+    levels: tuple[float, ...] = ()
+    span: tuple[float, float] | None = None
+    """The ordinates to show, where the curves would not say it well."""
+
+
+@dataclass(frozen=True)
+class Plot:
+    """Panels over one time axis, and what their dashed lines are."""
+
+    name: str
+    title: str
+    panels: list[Panel]
+    dashed: str = ""
+
+
+@dataclass(frozen=True)
+class Plots:
+    """All plots over time, with the times (s) that all curves share; a run that was lost has shorter curves."""
+
+    times: Curve
+    scalar: Plot
+    attitude: Plot
+    rate: Plot
+    torque: Plot
+    angle: Plot
+
+
+def collect(flights: Sequence[Flight], points: int, scenario: Scenario | None = None) -> Plots:
+    """The plots of a comparison, each curve thinned to about `points` samples."""
+    longest = max((flight.run["time"].values for flight in flights), key=len)
+    factor = 1 if len(longest) <= points else int(np.ceil(2 * len(longest) / points))
+
+    def curves(name: str, column: int, scale: float = 1.0) -> list[Curve]:
+        return [thin(flight.run[name].values[:, column] * scale, factor) for flight in flights]
+
+    rate_scale, rate_unit = _rate_unit(flights)
+    torque_scale, torque_unit = _torque_unit(flights)
+    levels, dashed = _limit(flights, torque_scale, torque_unit)
+    rates = [Panel(f"{axis}, {rate_unit}", curves("rate_error", i, rate_scale)) for i, axis in enumerate("xyz")]
+    torques = [Panel(f"{axis}, {torque_unit}", curves("torque", i, torque_scale), False, levels) for i, axis in enumerate("xyz")]
+    scalar = Panel("q₀", curves("attitude_error", 0), span=(-1.05, 1.05))
+    vector = [Panel(f"q{'₁₂₃'[i]}", curves("attitude_error", i + 1)) for i in range(3)]
+    return Plots(
+        thin_times(longest, factor),
+        Plot("scalar", "scalar part of the error quaternion", [scalar]),
+        Plot("attitude", "vector part of the error quaternion", vector),
+        Plot("rate", "angular velocity relative to the target", [_sound(panel, flights) for panel in rates]),
+        Plot("torque", "torque applied", torques, dashed),
+        _angle(flights, factor, scenario),
+    )
+
+
+def thin(values: Curve, factor: int) -> Curve:
+    """The least and the greatest of every `factor` samples, in the order they came: chatter stays as high as it is.
+
+    Drawn over `thin_times`, a sample moves by less than `factor` periods; the first and the last stay exact.
+    """
+    if factor == 1 or not len(values):
+        return values
+    groups = np.pad(values, (0, -len(values) % factor), mode="edge").reshape(-1, factor)
+    places = np.sort(np.stack([groups.argmin(axis=1), groups.argmax(axis=1)], axis=1), axis=1)
+    kept = np.take_along_axis(groups, places, axis=1).ravel()
+    kept[0], kept[-1] = values[0], values[-1]
+    return kept
+
+
+def thin_times(times: Curve, factor: int) -> Curve:
+    """The times over which curves made by `thin` are drawn."""
+    if factor == 1:
+        return times
+    starts = np.arange(0, len(times), factor)
+    places = np.minimum(np.stack([starts, starts + factor // 2], axis=1).ravel(), len(times) - 1)
+    places[-1] = len(times) - 1
+    return times[places]
+
+
+def steps_within(flight: Flight, kind: str) -> list[int | None]:
+    """Control steps after which the error stays within 10^-k, for every k of `DECADES`; kind: "" attitude, "rate_" rate."""
+    return [flight.metrics.get(f"{kind}iterations_1e-{k}") for k in DECADES]
+
+
+def _angle(flights: Sequence[Flight], factor: int, scenario: Scenario | None) -> Plot:
+    degrees = 180.0 / np.pi
+    angles = [thin(error_angle(flight.run["attitude_error"].values) * degrees, factor) for flight in flights]
+    speeds = [thin(np.linalg.norm(flight.run["rate_error"].values, axis=1) * degrees, factor) for flight in flights]
+    settling = None if scenario is None else scenario.table.settling
+    within = () if settling is None else (settling.attitude_tolerance * degrees,)
+    slow = () if settling is None else (settling.rate_tolerance * degrees,)
+    panels = [_positive("angle, deg", angles, within), _sound(_positive("rate, deg/s", speeds, slow), flights)]
+    return Plot("angle", "error angle and relative rate", panels, "tolerance" if settling else "")
+
+
+def _positive(label: str, curves: list[Curve], levels: tuple[float, ...]) -> Panel:
+    """A logarithmic panel; zeros have no place on it and leave gaps, and a panel of zeros is linear."""
+    log = any((curve > 0.0).any() for curve in curves)
+    shown = [np.where(curve > 0.0, curve, np.nan) for curve in curves] if log else curves
+    return Panel(label, shown, log, levels)
+
+
+def _sound(panel: Panel, flights: Sequence[Flight]) -> Panel:
+    """The panel scaled by the runs that did not diverge, lest the lost ones flatten the others."""
+    kept = [c for c, flight in zip(panel.curves, flights, strict=True) if flight.lost is None and np.isfinite(c).any()]
+    if not kept or all(flight.lost is None for flight in flights):
+        return panel
+    low = min(float(np.nanmin(curve)) for curve in kept)
+    high = max(float(np.nanmax(curve)) for curve in kept)
+    span = (low / 2.0, high * 10.0) if panel.log else (low - 0.5 * (high - low) - 1e-9, high + 0.5 * (high - low) + 1e-9)
+    return Panel(panel.label, panel.curves, panel.log, panel.levels, span)
+
+
+def _peak(flights: Sequence[Flight], name: str) -> float:
+    sound = [flight for flight in flights if flight.lost is None] or flights
+    return max(float(np.abs(flight.run[name].values).max(initial=0.0)) for flight in sound)
+
+
+def _rate_unit(flights: Sequence[Flight]) -> tuple[float, str]:
+    degrees = 180.0 / np.pi
+    return (degrees, "deg/s") if _peak(flights, "rate_error") * degrees >= 0.1 else (degrees * 1e3, "mdeg/s")
+
+
+def _torque_unit(flights: Sequence[Flight]) -> tuple[float, str]:
+    peak = _peak(flights, "torque")
+    if peak >= 1.0:
+        return 1.0, "N m"
+    return (1e3, "mN m") if peak >= 1e-3 or peak == 0.0 else (1e6, "µN m")
+
+
+def _limit(flights: Sequence[Flight], scale: float, unit: str) -> tuple[tuple[float, ...], str]:
+    attrs: dict[Any, Any] = flights[0].run.attrs
+    limit, kind = float(attrs["torque_limit"]), attrs["limit"]
+    if kind == "none" or not np.isfinite(limit):
+        return (), "no limit"
+    words = f"limit of {'each axis' if kind == 'axis' else 'the norm'}, {limit * scale:g} {unit}"
+    # A limit far above all torques would flatten them.
+    if limit > 5.0 * _peak(flights, "torque"):
+        return (), f"{words}, off the scale"
+    return (-limit * scale, limit * scale), words

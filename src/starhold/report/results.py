@@ -1,0 +1,80 @@
+"""Files of results: every one appears under its name only when it is whole."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import starhold
+from starhold.errors import InputError
+from starhold.scenario.reading import Scenario
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SUMMARY = "summary.json"
+MARKS = (SUMMARY, "run.nc", "report.html")
+"""A folder with one of these holds results."""
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """A path to write to, in a hidden folder beside `path`, renamed to it on success and removed on failure."""
+    hidden = Path(tempfile.mkdtemp(prefix=".writing-", dir=path.parent))
+    try:
+        yield hidden / path.name
+        os.replace(hidden / path.name, path)
+    finally:
+        shutil.rmtree(hidden, ignore_errors=True)
+
+
+def open_folder(folder: Path, force: bool) -> Path:
+    """Create the folder for results. One that holds results is refused unless `force`, which clears those results alone."""
+    held = [mark for mark in MARKS if (folder / mark).exists()]
+    if held and not force:
+        raise InputError(str(folder), "", f"results already there ({held[0]})", "another folder with -o, or --force")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise InputError(str(folder), "", f"cannot write there: {error.strerror}", "a folder you may write to") from None
+    if held:
+        _clear(folder)
+    return folder
+
+
+def _clear(folder: Path) -> None:
+    """Remove what an earlier command wrote, and nothing else."""
+    try:
+        laws = list(json.loads((folder / SUMMARY).read_text(encoding="utf-8"))["laws"])
+    except (OSError, ValueError, KeyError, TypeError):
+        laws = []
+    for name in laws:
+        (folder / Path(name).name / "run.nc").unlink(missing_ok=True)
+        if (folder / name).is_dir() and not any((folder / name).iterdir()):
+            (folder / name).rmdir()
+    for mark in MARKS:
+        (folder / mark).unlink(missing_ok=True)
+
+
+def write_run(run: xr.Dataset, scenario: Scenario, path: Path) -> None:
+    """A run as netCDF-4, with the scenario's text, the version and the seed among its attributes."""
+    seed = scenario.table.simulation.seed
+    attrs = {"scenario": scenario.text, "starhold_version": starhold.__version__, "seed": seed, **run.attrs}
+    path.parent.mkdir(exist_ok=True)
+    with whole(path) as hidden:
+        run.assign_attrs(attrs).to_netcdf(hidden, engine="h5netcdf")
+
+
+def write_summary(scenario: Scenario, results: dict[str, dict[str, Any]], path: Path) -> None:
+    """The metrics of each law, SI units, as JSON; a value that does not exist is null."""
+    content = {"scenario": scenario.name, "starhold_version": starhold.__version__, "laws": results}
+    with whole(path) as hidden:
+        hidden.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")

@@ -1,0 +1,32 @@
+"""Laws back to TOML."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from starhold.laws.catalogue import Law
+
+_BODY = """\
+name = "written"
+[spacecraft]
+inertia = [2.0, 3.0, 4.0]
+[simulation]
+duration = 1.0
+control_period = 0.1
+"""
+
+
+def law_table(law: Law, gains: Any) -> str:
+    """A [[law]] table with these gains, exact: floats are written so that they read back as the same numbers."""
+    lines = ["[[law]]", f'type = "{law.name}"']
+    for item, value in zip(law.fields(), gains, strict=True):
+        shown = item.gain.choices[value] if item.gain.choices else value
+        # JSON's strings, integers, finite floats and arrays are TOML's too.
+        lines.append(f"{item.name} = {json.dumps(shown, allow_nan=False)}")
+    return "\n".join(lines) + "\n"
+
+
+def scenario_with(law: Law, gains: Any) -> str:
+    """A small scenario that holds one law."""
+    return _BODY + law_table(law, gains)

@@ -1,0 +1,187 @@
+"""Vector and matrix algebra: the identities of the theory, and agreement of every reader."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from starhold.algebra import vector
+from starhold.algebra.vector import (
+    IDENTITY,
+    ZERO,
+    add,
+    apply,
+    clip_axes,
+    clip_norm,
+    column,
+    combine,
+    cross,
+    determinant,
+    diagonal,
+    dot,
+    inverse,
+    multiply,
+    norm,
+    peak,
+    scale,
+    signs,
+    skew,
+    subtract,
+    swing,
+    times,
+    transpose,
+    unit,
+)
+from tests.algebra.readers import agree, close, leaves, matrices, numbers, positives, same, symbols, vanishes, vectors
+
+A, B, C, D = (symbols(f"{name}1:4") for name in "abcd")
+M = (symbols("m1:4"), symbols("m4:7"), symbols("m7:10"))
+N = (symbols("n1:4"), symbols("n4:7"), symbols("n7:10"))
+SYMMETRIC = ((M[0][0], M[0][1], M[0][2]), (M[0][1], M[1][1], M[1][2]), (M[0][2], M[1][2], M[2][2]))
+
+
+def zero(expression):
+    """Whether every component of an expression vanishes identically."""
+    return all(vanishes(part) for part in leaves(expression))
+
+
+@settings(max_examples=40)
+@given(vectors, vectors, numbers, positives)
+def test_every_reader_gives_the_same_for_vectors(a, b, c, limit):
+    for operation in (add, subtract, times, dot, cross, swing, apply):
+        agree(operation, a, b)
+    for operation in (norm, signs, peak, skew, diagonal):
+        agree(operation, a)
+    agree(scale, c, a)
+    agree(clip_axes, a, limit)
+    agree(clip_norm, a, limit)
+    assume(a != ZERO)
+    agree(unit, a)
+
+
+@settings(max_examples=25)
+@given(matrices, matrices, vectors, numbers, numbers)
+def test_every_reader_gives_the_same_for_matrices(m, n, a, c, d):
+    for operation in (apply, swing, column):
+        agree(operation, m, a)
+    for operation in (transpose, determinant):
+        agree(operation, m)
+    agree(multiply, m, n)
+    agree(combine, c, m, d, n)
+
+
+@settings(max_examples=40)
+@given(st.lists(st.floats(), min_size=22, max_size=22))
+def test_compiled_equals_floats_for_any_float(x):
+    a, b, c, m = tuple(x[:3]), tuple(x[3:6]), x[21], (tuple(x[6:9]), tuple(x[9:12]), tuple(x[12:15]))
+    for operation in (add, subtract, times, dot, cross, swing, apply):
+        same(operation, a, b)
+    for operation in (norm, signs, peak, skew, diagonal):
+        same(operation, a)
+    for operation in (apply, swing, column):
+        same(operation, m, a)
+    same(scale, c, a)
+    same(clip_axes, a, c)
+
+
+def test_products_of_vectors():
+    assert zero(add(cross(A, B), cross(B, A)))
+    assert zero((dot(A, cross(A, B)), dot(B, cross(A, B))))
+    assert zero(add(cross(A, cross(B, C)), add(cross(B, cross(C, A)), cross(C, cross(A, B)))))
+    assert zero(subtract(cross(A, cross(B, C)), subtract(scale(dot(A, C), B), scale(dot(A, B), C))))
+    assert zero(dot(cross(A, B), cross(C, D)) - dot(A, C) * dot(B, D) + dot(A, D) * dot(B, C))
+    assert cross((1, 0, 0), (0, 1, 0)) == (0, 0, 1)
+    assert zero(norm(A) ** 2 - dot(A, A))
+
+
+def test_matrices():
+    assert zero(subtract(apply(skew(A), B), cross(A, B)))
+    assert zero(subtract(apply(diagonal(A), B), apply(A, B)))
+    assert zero(subtract(apply(A, B), times(A, B)))
+    assert zero(subtract(apply(multiply(M, N), A), apply(M, apply(N, A))))
+    assert zero(subtract(column(M, A), apply(transpose(M), A)))
+    assert zero(dot(A, apply(M, B)) - dot(column(M, A), B))
+    assert zero(combine(1, transpose(multiply(M, N)), -1, multiply(transpose(N), transpose(M))))
+    assert zero(determinant(multiply(M, N)) - determinant(M) * determinant(N))
+    assert zero(determinant(diagonal(A)) - A[0] * A[1] * A[2])
+    assert zero(combine(1, multiply(M, IDENTITY), -1, M))
+    assert zero(subtract(apply(combine(2, M, -3, N), A), subtract(scale(2, apply(M, A)), scale(3, apply(N, A)))))
+
+
+def test_inverse_is_exact():
+    assert zero(combine(1, multiply(inverse(M), M), -1, IDENTITY))
+    assert zero(combine(1, multiply(M, inverse(M)), -1, IDENTITY))
+
+
+@given(st.tuples(*[st.tuples(*[st.floats(-1.0, 1.0)] * 3)] * 3), positives)
+def test_inverse_of_floats(m, size):
+    m = tuple(scale(size, row) for row in m)
+    array = np.array(m)
+    assume(abs(np.linalg.det(array)) > 1e-3 * size**3)
+    agree(inverse, m)
+    np.testing.assert_allclose(array @ np.array(inverse(m)), np.eye(3), atol=1e-10)
+
+
+def test_swing_is_the_gyroscopic_torque():
+    assert zero(subtract(swing(SYMMETRIC, A), cross(A, apply(SYMMETRIC, A))))
+    assert zero(subtract(swing(B, A), cross(A, apply(B, A))))
+    assert zero(subtract(swing(diagonal(B), A), swing(B, A)))
+    # It does no work and turns no momentum into length.
+    assert zero((dot(A, swing(SYMMETRIC, A)), dot(apply(SYMMETRIC, A), swing(SYMMETRIC, A))))
+    assert zero((dot(A, swing(B, A)), dot(apply(B, A), swing(B, A))))
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_swing_vanishes_exactly_along_a_principal_axis(axis):
+    moments = (2.1, 3.3, 4.7)
+    rate = tuple(0.7 * (i == axis) for i in range(3))
+    assert same(swing, moments, rate) == ZERO
+    assert same(swing, diagonal(moments), rate) == ZERO
+
+
+@given(vectors, positives)
+def test_limits(a, limit):
+    boxed = clip_axes(a, limit)
+    assert all(abs(x) <= limit for x in boxed)
+    assert clip_axes(boxed, limit) == boxed
+    assert all(x == y for x, y in zip(a, boxed, strict=True) if abs(x) <= limit)
+    short = clip_norm(a, limit)
+    assert norm(short) <= limit * (1.0 + 4e-16)
+    if norm(a) <= limit:
+        assert short == a
+    else:
+        assert math.isclose(norm(short), limit, rel_tol=4e-16)
+        assert close(cross(unit(a), unit(short)), ZERO, 4e-16)
+        assert dot(a, short) > 0.0
+
+
+def test_limits_at_their_ends():
+    assert same(clip_norm, ZERO, 1.0) == ZERO
+    assert same(clip_axes, ZERO, 1.0) == ZERO
+    for a in ((3.0, -4.0, 12.0), ZERO, (1e-300, 0.0, 0.0)):
+        assert same(clip_norm, a, math.inf) == a
+        assert same(clip_axes, a, math.inf) == a
+    assert same(clip_norm, (3.0, -4.0, 0.0), 5.0) == (3.0, -4.0, 0.0)
+    for x in same(clip_norm, (math.nan, 1.0, 0.0), 2.0):
+        assert math.isnan(x)
+    assert math.isnan(same(clip_axes, (math.nan, 1.0, 0.0), 2.0)[0])
+
+
+@given(vectors)
+def test_lengths(a):
+    assert math.isclose(norm(a), math.hypot(*a), rel_tol=4e-16)
+    assert peak(a) == max(map(abs, a))
+    assert signs(a) == tuple(float((x > 0) - (x < 0)) for x in a)
+    assume(a != ZERO)
+    assert math.isclose(norm(unit(a)), 1.0, rel_tol=4e-16)
+
+
+def test_a_matrix_is_told_from_a_diagonal_in_every_reader():
+    moments, rate = (2.0, 3.0, 4.0), (0.1, -0.2, 0.3)
+    for operation in (vector.apply, vector.swing):
+        full, short = agree(operation, diagonal(moments), rate), agree(operation, moments, rate)
+        assert close(full, short, 1e-16)
