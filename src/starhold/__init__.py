@@ -1,10 +1,10 @@
 """starhold designs, certifies, flies and compares control laws for spacecraft.
 
-    import starhold as sh
+import starhold as sh
 
-    scenario = sh.load("three-laws")
-    run = sh.simulate(scenario, law="lyapunov")      # an xarray Dataset
-    flights = sh.compare(scenario)                   # runs and metrics of every law
+scenario = sh.load("three-laws")
+run = sh.simulate(scenario, law="lyapunov")      # an xarray Dataset
+flights = sh.compare(scenario)                   # runs and metrics of every law
 """
 
 from __future__ import annotations

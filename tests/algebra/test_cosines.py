@@ -66,9 +66,7 @@ def test_orthogonality_is_exact():
 
 def test_homomorphism_and_action_are_exact():
     # First P, then Q about the axes already turned: the matrices multiply from the left.
-    assert zero(
-        combine(1, from_quaternion(multiply(P, Q)), -1, vector.multiply(from_quaternion(Q), from_quaternion(P)))
-    )
+    assert zero(combine(1, from_quaternion(multiply(P, Q)), -1, vector.multiply(from_quaternion(Q), from_quaternion(P))))
     difference = vector.subtract(apply(from_quaternion(Q), R), to_body(Q, R))
     assert zero(vector.subtract(difference, vector.scale(N2 - 1, R)))
 

@@ -168,12 +168,14 @@ def test_a_state_stands_for_every_lane(get):
     assert get(state, 77, LIKE) == state
 
 
-def test_nothing_to_store():
+def test_plain_and_compiled_store_write_alike():
     x = numbered(3, 4)
     before = x.copy()
     store(x, 1, (1.0, 2.0, 3.0))
     compiled_store(x, 2, (1.0, 2.0, 3.0))
     np.testing.assert_array_equal(x[:, 1], x[:, 2])
+    store(x, 0, Empty())
+    compiled_store(x, 0, Empty())
     np.testing.assert_array_equal(x[:, [0, 3]], before[:, [0, 3]])
 
 

@@ -20,7 +20,8 @@ from numba.extending import overload, register_jitable  # pyright: ignore[report
 
 Scalar: TypeAlias = float
 """A number of any reader; typed as float, the reader that type checkers can follow."""
-Truth: TypeAlias = bool
+Truth: TypeAlias = Any
+"""What a comparison yields: a bool, a SymPy relation, or True, False or None of balls."""
 
 STRICT: dict[str, Any] = {"forceinline": True, "error_model": "numpy"}
 """Compiler options of an equation: inlined into kernels, IEEE arithmetic, division by zero gives inf as in C."""
@@ -32,17 +33,16 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 def equation(function: _Function) -> _Function:
     """Mark a function as an equation: it stays plain Python, and is inlined where a compiled kernel calls it."""
-    return cast(_Function, register_jitable(**STRICT)(function))
+    return register_jitable(**STRICT)(function)
 
 
 def compiled_as(function: Callable[..., Any]) -> Callable[[_Function], _Function]:
     """Register the compiled meaning of a scalar operation, under the compiler options of an equation."""
 
-
     def register(maker: _Function) -> _Function:
         # Numba compares the maker's signature with that of the function it makes, annotations included.
         maker.__annotations__ = {}
-        return cast(_Function, overload(function, jit_options=STRICT)(maker))
+        return overload(function, jit_options=cast(Any, STRICT))(maker)
 
     return register
 

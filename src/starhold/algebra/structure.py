@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator
 from typing import Any, TypeVar, cast
 
 import numpy as np
-from numpy.typing import NDArray
 from numba import types  # pyright: ignore
+from numpy.typing import NDArray
 
 from starhold.algebra.scalar import compiled_as
 
@@ -65,7 +65,7 @@ def unpack(blocks: Any, lanes: int) -> NDArray[np.float64]:
 
 def flatten(state: Any) -> list[float]:
     """The numbers of a state in order."""
-    return [number for part in state for number in flatten(part)] if isinstance(state, tuple) else [state]
+    return [x for part in cast(Any, state) for x in flatten(part)] if isinstance(state, tuple) else [state]
 
 
 def unflatten(numbers: Any, like: _State) -> _State:

@@ -88,7 +88,9 @@ def measure(run: xr.Dataset, attitude_tolerance: float, rate_tolerance: float) -
     }
 
 
-def _reached(times: Any, angle: Any, speed: Any, attitude_tolerance: float, rate_tolerance: float) -> dict[str, float | None]:
+def _reached(
+    times: Any, angle: Any, speed: Any, attitude_tolerance: float, rate_tolerance: float
+) -> dict[str, float | None]:
     indices = {"attitude": stays_within(angle, attitude_tolerance), "rate": stays_within(speed, rate_tolerance)}
     indices["both"] = None if None in indices.values() else max(i for i in indices.values() if i is not None)
     return {name: None if index is None else float(times[index]) for name, index in indices.items()}

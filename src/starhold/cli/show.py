@@ -25,7 +25,13 @@ if not console.is_terminal:
 @contextmanager
 def flying(entries: Sequence[LawEntry], steps: int) -> Iterator[Callable[[str, int, int], None]]:
     """Progress bars, one a law; yields what the simulation calls."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("steps"), TimeRemainingColumn())
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("steps"),
+        TimeRemainingColumn(),
+    )
     with Progress(*columns, console=console) as bars:
         tasks: dict[str, TaskID] = {}
 
@@ -60,7 +66,10 @@ def print_table(flights: Sequence[Flight]) -> None:
     console.print()
     console.print(table)
     if len(flights) > 1:
-        console.print("Ranked by settling, then final angle, then effort; [bold green]*[/bold green] best of its kind.", highlight=False)
+        console.print(
+            "Ranked by settling, then final angle, then effort; [bold green]*[/bold green] best of its kind.",
+            highlight=False,
+        )
 
 
 def _cell(text: str, best: bool) -> str:
@@ -92,7 +101,9 @@ def print_law(law: Law) -> None:
             table.add_column(head)
         for item in law.fields(form):
             allowed = ", ".join(item.gain.choices) or _bounds(item.gain)
-            default = "required" if item.required else str(item.gain.choices[item.default] if item.gain.choices else item.default)
+            default = (
+                "required" if item.required else str(item.gain.choices[item.default] if item.gain.choices else item.default)
+            )
             table.add_row(item.name, item.gain.unit, allowed, default, item.gain.text)
         console.print(table)
 

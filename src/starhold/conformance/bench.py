@@ -9,7 +9,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from starhold.algebra.quaternion import Quaternion
+from starhold.algebra.quaternion import NO_TURN, Quaternion
 from starhold.algebra.structure import unflatten
 from starhold.algebra.vector import ZERO, Vector
 from starhold.laws.catalogue import Law
@@ -25,7 +25,7 @@ PERIOD = 0.1
 def random_quaternions(count: int, seed: int = 7) -> list[Quaternion]:
     """Attitudes uniform on the rotation group."""
     numbers = np.random.default_rng(seed).normal(size=(count, 4))
-    return [unflatten(q / np.linalg.norm(q), (0.0,) * 4) for q in numbers]
+    return [unflatten(q / np.linalg.norm(q), NO_TURN) for q in numbers]
 
 
 def random_seen(count: int, external: bool = True, seed: int = 11) -> Iterator[Seen]:
@@ -44,7 +44,16 @@ def sample_loop(law: Law, gains: Any) -> ClosedLoop:
     start = State((0.2, 0.4, -0.7, 0.5567764362830022), (0.04, 0.03, 0.02), (7e6, 1e5, 0.0), (0.0, 7.4e3, 1.2e3), ZERO)
     goal: Quaternion = (0.6, 0.0, 0.8, 0.0)
     return ClosedLoop(
-        craft, law, gains, start, PERIOD, orbit=True, gravity_gradient=True, target=goal, limit="axis", cover="hysteresis"
+        craft,
+        law,
+        gains,
+        start,
+        PERIOD,
+        orbit=True,
+        gravity_gradient=True,
+        target=goal,
+        limit="axis",
+        cover="hysteresis",
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from starhold.algebra.quaternion import derivative, multiply, normalise, to_reference
+from starhold.algebra.quaternion import derivative, multiply, normalise, stretch, to_reference
 from starhold.algebra.structure import flatten, move
 from starhold.algebra.vector import ZERO
 from starhold.conformance.bench import CRAFT, call, random_quaternions, random_seen, sample_loop
@@ -28,11 +28,11 @@ STEPS = 40
 ON_TARGET = Seen((1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.1)
 
 
-class Fault(Exception):
+class NonconformityError(Exception):
     """A law breaks the check; the text says how."""
 
 
-class NotApplicable(Exception):
+class NotApplicableError(Exception):
     """The check says nothing about this law; the text says why."""
 
 
@@ -50,10 +50,10 @@ def examine(law: Law) -> Iterator[Verdict]:
         name = (check.__doc__ or check.__name__).splitlines()[0].rstrip(".")
         try:
             check(law)
-        except NotApplicable as reason:
+        except NotApplicableError as reason:
             yield Verdict(name, "does not apply", str(reason))
         except Exception as reason:
-            kind = "" if isinstance(reason, Fault) else f"{type(reason).__name__}: "
+            kind = "" if isinstance(reason, NonconformityError) else f"{type(reason).__name__}: "
             yield Verdict(name, "failed", kind + str(reason))
         else:
             yield Verdict(name, "passed", "")
@@ -61,7 +61,7 @@ def examine(law: Law) -> Iterator[Verdict]:
 
 def _require(condition: bool, reason: str) -> None:
     if not condition:
-        raise Fault(reason)
+        raise NonconformityError(reason)
 
 
 def declares_itself(law: Law) -> None:
@@ -122,7 +122,7 @@ def treats_double_cover_as_stated(law: Law) -> None:
     for gains in law.examples():
         differences: list[float] = []
         for seen in random_seen(20):
-            other = with_attitude(seen, tuple(-x for x in seen.attitude))
+            other = with_attitude(seen, stretch(-1.0, seen.attitude))
             differences.append(float(np.abs(np.subtract(call(law, seen, gains), call(law, other, gains))).max()))
         if law.card.double_cover == "even":
             _require(max(differences) < 1e-12, f"q and -q differ by {max(differences):g} N m, the card says they do not")
@@ -168,7 +168,7 @@ def survives_toml(law: Law) -> None:
             parse(text + "no_such_key = 1\n", law.name)
         except InputError:
             continue
-        raise Fault("an unknown key is accepted")
+        raise NonconformityError("an unknown key is accepted")
 
 
 def keeps_units(law: Law) -> None:
@@ -187,9 +187,9 @@ def keeps_units(law: Law) -> None:
 def decreases_lyapunov(law: Law) -> None:
     """V is positive and does not rise, at random states, for a body free of other torques."""
     if law.lyapunov is None:
-        raise NotApplicable("the law has no `lyapunov`")
+        raise NotApplicableError("the law has no `lyapunov`")
     if law.card.claims == "none":
-        raise NotApplicable("the card claims nothing")
+        raise NotApplicableError("the card claims nothing")
     for gains in law.examples():
         _require(abs(law.lyapunov(ON_TARGET, gains, CRAFT)) < 1e-15, "V is not zero at rest on target")
         for seen in random_seen(300, external=False):
@@ -225,5 +225,3 @@ CHECKS: tuple[Callable[[Law], None], ...] = (
     keeps_units,
     decreases_lyapunov,
 )
-
-__all__ = ["CHECKS", "Fault", "NotApplicable", "Verdict", "examine"]

@@ -1,1 +1,4 @@
-"""Control laws, one file each. A module here with a `CARD` is a law; `catalogue` finds them, `interface` says what one holds."""
+"""Control laws, one file each.
+
+A module here with a `CARD` is a law; `catalogue` finds them, `interface` says what one holds.
+"""

@@ -15,7 +15,7 @@ import numpy as np
 
 from starhold.algebra.quaternion import Quaternion
 from starhold.algebra.scalar import equation
-from starhold.algebra.vector import Matrix, Vector, add, apply, subtract, swing
+from starhold.algebra.vector import Vector, add, apply, subtract, swing
 from starhold.models.craft import Craft, matrix
 
 
@@ -24,8 +24,8 @@ class Seen(NamedTuple):
 
     attitude: turn from the target axes to the body axes (scalar first); rate: angular velocity relative to the target
     (rad/s); body_rate: absolute angular velocity; target_rate: the target's (rad/s); target_acceleration: the derivative
-    of target_rate as the turning body sees it (rad/s2); external_torque: the modelled torque at this attitude (N m); position: from the centre of attraction (m); period: for
-    which the torque will be held (s). Vectors are in body axes.
+    of target_rate as the turning body sees it (rad/s2); external_torque: the modelled torque at this attitude (N m);
+    position: from the centre of attraction (m); period: for which the torque will be held (s). Vectors are in body axes.
     """
 
     attitude: Quaternion
@@ -126,7 +126,10 @@ class Gain:
 
     def describe(self) -> str:
         """What may be written for this gain."""
-        kind = {(): "a whole number" if self.whole else "a number", (3, 3): "a number, three numbers or a 3x3 matrix"}
+        kind: dict[tuple[int, ...], str] = {
+            (): "a whole number" if self.whole else "a number",
+            (3, 3): "a number, three numbers or a 3x3 matrix",
+        }
         return kind.get(self.shape, f"a number or {'x'.join(map(str, self.shape))} numbers")
 
 
@@ -160,9 +163,3 @@ def tracking_torque(seen: Seen, craft: Craft) -> Vector:
     J w_e' + w_e x J w_e = rest of the torque; zero for a target at rest."""
     gyroscopic = subtract(swing(craft.inertia, seen.body_rate), swing(craft.inertia, seen.rate))
     return add(gyroscopic, apply(craft.inertia, seen.target_acceleration))
-
-
-__all__ = [
-    "Card", "Claim", "Craft", "Field", "Gain", "Matrix", "NoMemory", "Quaternion", "Seen", "Vector",
-    "fields", "tracking_torque",
-]  # fmt: skip

@@ -15,7 +15,10 @@ from starhold.models.craft import Craft, matrix, tensor
 CARD = Card(
     title="Matrix-gain PD",
     summary="u = -K_rate w - K_attitude q with 3x3 gains",
-    sources=("Quaternion feedback regulator for spacecraft eigenaxis rotations (1989)", "equations A: matrix-gain family"),
+    sources=(
+        "Quaternion feedback regulator for spacecraft eigenaxis rotations (1989)",
+        "equations A: matrix-gain family",
+    ),
     assumptions=(
         "rigid body",
         "no external torque",

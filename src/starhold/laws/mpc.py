@@ -11,7 +11,7 @@ from scipy.linalg import solve_discrete_are  # pyright: ignore[reportMissingType
 from starhold.algebra.scalar import equation
 from starhold.algebra.vector import Vector, add, clip_axes, clip_norm, scale
 from starhold.laws.interface import Card, Gain, Seen, tracking_torque
-from starhold.laws.mpc_problem import Problem, Space, hold, linearise, make_space
+from starhold.laws.mpc_problem import Problem, carve, compiled, hold, linearise, make_store
 from starhold.laws.mpc_solver import advance, improve
 from starhold.models.craft import Craft, tensor
 
@@ -34,6 +34,7 @@ CARD = Card(
 
 TERMINALS = ("riccati", "stage", "none")
 LIMITS = ("axis", "norm", "none")
+BALL, UNLIMITED = LIMITS.index("norm"), LIMITS.index("none")
 
 
 class Gains(NamedTuple):
@@ -48,38 +49,21 @@ class Gains(NamedTuple):
     budget: Annotated[int, Gain(at_least=1, at_most=10000, whole=True, text="most Riccati sweeps a call")] = 50
 
 
-class Counters(NamedTuple):
-    """Places in the counters: calls, sweeps in all, most sweeps in a call, calls that ended at the budget without the
-    optimum, and whether limits shaped the last plan (1) or not (0)."""
-
-    calls: int = 0
-    sweeps: int = 1
-    worst: int = 2
-    exhausted: int = 3
-    shaped: int = 4
-
-
-COUNTERS = Counters()
+CALLS, SWEEPS, WORST, EXHAUSTED, SHAPED = range(5)
+"""Places in the counters: calls, Riccati sweeps in all, most sweeps in a call, calls that ended at the budget without
+the optimum, and whether limits shaped the last plan (1) or not (0), which decides how the next call starts."""
 
 
 class Memory(NamedTuple):
     """What the law keeps between calls, changed in place and made anew for each trajectory.
 
-    plan (3N): the moves planned, beyond the torque that tracks the target (N m); a (36), b (18): the sampled motion;
-    q (36), r (9), r_inverse (9), p (36): weights, made from the gains; tail (18): feedback for the move that
-    a shifted plan lacks; counters (5, see Counters); space: work arrays.
+    plan (3N): the moves planned, beyond the torque that tracks the target (N m); numbers: weights, matrices and work
+    arrays, see `carve`; counters (5): see CALLS.
     """
 
     plan: Any
-    a: Any
-    b: Any
-    q: Any
-    r: Any
-    r_inverse: Any
-    p: Any
-    tail: Any
+    numbers: Any
     counters: Any
-    space: Space
 
 
 def remember(gains: Gains, craft: Craft, period: float) -> Memory:
@@ -89,18 +73,14 @@ def remember(gains: Gains, craft: Craft, period: float) -> Memory:
     """
     terminal, tail = terminal_weight(gains, craft, period)
     r = np.array(gains.r, dtype=float)
-    return Memory(
-        plan=np.zeros(3 * gains.horizon),
-        a=np.zeros(36),
-        b=np.zeros(18),
-        q=np.diag(np.array([*gains.q_attitude, *gains.q_rate], dtype=float)).ravel(),
-        r=np.diag(r).ravel(),
-        r_inverse=np.diag(1.0 / r).ravel(),
-        p=terminal.ravel(),
-        tail=tail.ravel(),
-        counters=np.zeros(len(COUNTERS), dtype=np.int64),
-        space=make_space(gains.horizon),
-    )
+    numbers = make_store(gains.horizon)
+    store = carve(numbers, gains.horizon)
+    store.q[:] = np.diag(np.array([*gains.q_attitude, *gains.q_rate], dtype=float)).ravel()
+    store.r[:] = np.diag(r).ravel()
+    store.r_inverse[:] = np.diag(1.0 / r).ravel()
+    store.p[:] = terminal.ravel()
+    store.tail[:] = tail.ravel()
+    return Memory(np.zeros(3 * gains.horizon), numbers, np.zeros(5, dtype=np.int64))
 
 
 def terminal_weight(gains: Gains, craft: Craft, period: float) -> tuple[Any, Any]:
@@ -132,29 +112,37 @@ def terminal_weight(gains: Gains, craft: Craft, period: float) -> tuple[Any, Any
 
 @equation
 def torque(seen: Seen, gains: Gains, craft: Craft, memory: Memory) -> tuple[Vector, Memory]:
-    """Control torque (N m, body). Weights and horizon are those the memory was made for."""
+    """Control torque (N m, body). Weights and horizon are those the memory was made for; the memory is changed."""
+    return first_move(seen, gains, craft, memory), memory
+
+
+@compiled
+def first_move(seen: Seen, gains: Gains, craft: Craft, memory: Memory) -> Vector:
+    """Linearise, solve, and give the first move (N m, body)."""
+    plan, counters = memory.plan, memory.counters
+    store = carve(memory.numbers, plan.size // 3)
+    space = store.space
     ahead = tracking_torque(seen, craft)
-    bound = np.inf if gains.limit == 2 else craft.torque_limit
-    linearise(seen, craft, memory.a, memory.b)
-    hold(memory.a, memory.b, seen.period, memory.space.small)
-    problem = Problem(
-        memory.a, memory.b, memory.q, memory.r, memory.r_inverse, memory.p, scale(-1.0, ahead), bound, gains.limit == 1
-    )
-    counters = memory.counters
-    warm = counters[4] == 1
+    bound = np.inf if gains.limit == UNLIMITED else craft.torque_limit
+    ball = gains.limit == BALL and bound < np.inf
+    linearise(seen, craft, store.a, store.b)
+    hold(store.a, store.b, seen.period, space.small)
+    centre = scale(-1.0, ahead)
+    problem = Problem(store.a, store.b, store.q, store.r, store.r_inverse, store.p, centre, bound, ball)
+    warm = counters[SHAPED] == 1
     if warm:
-        advance(problem, memory.plan, memory.tail, memory.space)
-    q, w, states = seen.attitude, seen.rate, memory.space.states
+        advance(problem, plan, store.tail, space)
+    states, q, w = space.states, seen.attitude, seen.rate
     states[0], states[1], states[2], states[3], states[4], states[5] = q[1], q[2], q[3], w[0], w[1], w[2]
-    sweeps, solved, shaped = improve(problem, memory.plan, memory.space, gains.budget, warm)
-    counters[0] += 1
-    counters[1] += sweeps
-    counters[2] = max(counters[2], sweeps)
-    counters[3] += 0 if solved else 1
-    counters[4] = 1 if shaped else 0
-    command = add((memory.plan[0], memory.plan[1], memory.plan[2]), ahead)
+    sweeps, solved, shaped = improve(problem, plan, space, gains.budget, warm)
+    counters[CALLS] += 1
+    counters[SWEEPS] += sweeps
+    counters[WORST] = max(counters[WORST], sweeps)
+    counters[EXHAUSTED] += 0 if solved else 1
+    counters[SHAPED] = 1 if shaped else 0
+    command = add((plan[0], plan[1], plan[2]), ahead)
     # Adding the tracking torque back rounds; the limit is kept exactly.
-    return clip_norm(command, bound) if gains.limit == 1 else clip_axes(command, bound), memory
+    return clip_norm(command, bound) if ball else clip_axes(command, bound)
 
 
 def examples() -> list[Gains]:

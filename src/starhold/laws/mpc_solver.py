@@ -21,11 +21,12 @@ from starhold.algebra.scalar import equation
 from starhold.laws.mpc_problem import (
     Problem,
     box_inverse,
+    carve,
     compiled,
     held,
     inverse3,
     loose,
-    make_space,
+    make_store,
     plane_inverse,
     pressure,
     project,
@@ -117,10 +118,10 @@ def adjoint(problem, plan, space):
 
 
 @compiled
-def sweep(problem, plan, space, free):
-    """One backward Riccati sweep: the Newton step as a policy, step + feedback (x - x of the plan). With `free`
-    nothing is held and there is no gradient, which gives the policy without limits. Returns the Newton decrement and
-    the number of limits held."""
+def sweep(problem, plan, space):
+    """One backward Riccati sweep: the Newton step as a policy, step + feedback (x - x of the plan). With a
+    gradient of zeros nothing is held, which gives the policy without limits. Returns the Newton decrement and the number
+    of limits held."""
     a, b, q, r, value, small = problem.a, problem.b, problem.q, problem.r, space.value, space.small
     n = plan.size // 3
     va, vb, qux = 0, 36, 54
@@ -175,23 +176,20 @@ def sweep(problem, plan, space, free):
                 w5 += s * small[va + 6 * j + 5]
             small[qux + 6 * i], small[qux + 6 * i + 1], small[qux + 6 * i + 2] = w0, w1, w2
             small[qux + 6 * i + 3], small[qux + 6 * i + 4], small[qux + 6 * i + 5] = w3, w4, w5
-        if free:
-            w = inverse3(m)
-        else:
-            v, g = triple(plan, k), triple(space.gradient, k)
-            g0, g1, g2 = g0 + g[0], g1 + g[1], g2 + g[2]
-            space.stiffness[k] = m0 + m3 + m5
-            if problem.ball:
-                normal, multiplier = pressure(problem, v, g)
-                if multiplier > 0.0:
-                    holding += 1
-                    w = plane_inverse(m, normal, multiplier)
-                else:
-                    w = inverse3(m)
+        v, g = triple(plan, k), triple(space.gradient, k)
+        g0, g1, g2 = g0 + g[0], g1 + g[1], g2 + g[2]
+        space.stiffness[k] = m0 + m3 + m5
+        if problem.ball:
+            normal, multiplier = pressure(problem, v, g)
+            if multiplier > 0.0:
+                holding += 1
+                w = plane_inverse(m, normal, multiplier)
             else:
-                fixed = held(problem, v, g)
-                holding += fixed[0] + fixed[1] + fixed[2]
-                w = box_inverse(m, fixed)
+                w = inverse3(m)
+        else:
+            fixed = held(problem, v, g)
+            holding += fixed[0] + fixed[1] + fixed[2]
+            w = box_inverse(m, fixed)
         e0 = -(w[0] * g0 + w[1] * g1 + w[2] * g2)
         e1 = -(w[1] * g0 + w[3] * g1 + w[4] * g2)
         e2 = -(w[2] * g0 + w[4] * g1 + w[5] * g2)
@@ -350,12 +348,12 @@ def improve(problem, plan, space, budget, warm):
     if not warm:
         # The policy without limits, flown through them: the optimum if nothing is cut, else a good start.
         for i in range(plan.size):
-            plan[i] = 0.0
+            plan[i], space.gradient[i] = 0.0, 0.0
         for i in range(6):
             space.bend[i] = x[i]
         for i in range(6, x.size):
             x[i] = 0.0
-        sweep(problem, plan, space, True)
+        sweep(problem, plan, space)
         sweeps = 1
         cut = follow(problem, plan, space)
         accept(plan, space)
@@ -367,7 +365,7 @@ def improve(problem, plan, space, budget, warm):
             return sweeps, True, True
         if sweeps >= budget:
             return sweeps, False, True
-        decrement, holding = sweep(problem, plan, space, False)
+        decrement, holding = sweep(problem, plan, space)
         sweeps += 1
         for i in range(6):
             space.bend[i] = 0.0
@@ -424,10 +422,8 @@ def solve(a, b, q, r, p, x, horizon, bound, centre, ball, budget):
     semidefinite, R positive definite; x (6); limits |v - centre| <= bound per axis or, with ball, in norm (inf: none).
     For use outside kernels: it allocates.
     """
-    space = make_space(horizon)
-    problem = Problem(
-        a.ravel(), b.ravel(), q.ravel(), r.ravel(), np.linalg.inv(r).ravel(), p.ravel(), centre, bound, ball
-    )
+    space = carve(make_store(horizon), horizon).space
+    problem = Problem(a.ravel(), b.ravel(), q.ravel(), r.ravel(), np.linalg.inv(r).ravel(), p.ravel(), centre, bound, ball)
     plan = np.zeros(3 * horizon)
     space.states[:6] = x
     sweeps, solved, _ = improve(problem, plan, space, budget, False)

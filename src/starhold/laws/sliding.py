@@ -18,7 +18,13 @@ CARD = Card(
         "Comparison of Lyapunov, sliding-mode and predictive attitude control, eq. (18)",
         "equations B",
     ),
-    assumptions=("rigid body", "inertia known", "|M_ext| < reach on every axis", "torque not limited", "q0 > 0 on the surface"),
+    assumptions=(
+        "rigid body",
+        "inertia known",
+        "|M_ext| < reach on every axis",
+        "torque not limited",
+        "q0 > 0 on the surface",
+    ),
     claims="local",
 )
 

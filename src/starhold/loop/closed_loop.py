@@ -83,9 +83,9 @@ class ClosedLoop:
     orbit: bool = False
     gravity_gradient: bool = False
     target: Quaternion | Literal["orbital"] | NDArray[np.float64] = NO_TURN
-    noise: sensor.Noise = sensor.Noise(0.0, 0.0, 0.0)
+    noise: sensor.Noise = sensor.SILENT
     limit: Limit = "axis"
-    dynamics: actuator.Dynamics = actuator.Dynamics(0.0, math.inf)
+    dynamics: actuator.Dynamics = actuator.IDEAL
     cover: Cover = "as_published"
     hysteresis_width: float = 0.5
     seed: int = 1

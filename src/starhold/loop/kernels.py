@@ -154,7 +154,7 @@ def _one(equations: Step, mark: str) -> Callable[..., Any]:
     def one(carry, first, count, finish, every, run, gains, craft, setup, substeps, out):  # type: ignore[no-untyped-def]
         """Fly control steps first .. first+count-1; write every `every`-th into a column of `out`, and with `finish` the
         end as well. Returns what is carried on; stops where the motion is lost."""
-        mark  # noqa: B018
+        _ = mark
         for step in range(first, first + count):
             carry = check(carry, step, setup)
             if carry.lost_at >= 0.0:
@@ -180,7 +180,7 @@ def _many(equations: Step, mark: str) -> Callable[..., Any]:
     def many(x, like, first, count, run, gains, like_gains, craft, like_craft, setup, substeps):  # type: ignore[no-untyped-def]
         """Fly control steps first .. first+count-1 of every lane of the block x, in place; lane 0 is
         run number `run`. Gains and craft are NamedTuples shared by all lanes, or blocks too."""
-        mark  # noqa: B018
+        _ = mark
         for step in range(first, first + count):
             for k in range(LANES):
                 c = check(load(x, k, like), step, setup)
@@ -203,7 +203,7 @@ def make_replay(parts: Parts) -> Callable[..., Any]:
     @numba.njit(error_model="numpy", cache=True)
     def replay(samples, first, last, carry, gains, craft, setup):  # type: ignore[no-untyped-def]
         """Decide on the states in columns first .. last-1 of recorded samples, each call after the one before."""
-        mark  # noqa: B018
+        _ = mark
         for k in range(first, last):
             # The first rows of a sample are the state; every number of it waits for the torque of the call before.
             u = carry.command

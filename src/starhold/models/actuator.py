@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from starhold.algebra.scalar import Scalar, equation
@@ -13,6 +14,9 @@ class Dynamics(NamedTuple):
 
     lag: float
     rate_limit: float
+
+
+IDEAL = Dynamics(0.0, math.inf)
 
 
 @equation
@@ -48,7 +52,7 @@ def start_lagging(torque: Vector, command: Vector) -> Vector:
 @equation
 def ideal(torque: Vector, command: Vector, begun: Vector, step: Scalar, dynamics: Dynamics) -> None:
     """d(torque)/dt of an ideal actuator: none, the command is held."""
-    return None
+    return
 
 
 @equation

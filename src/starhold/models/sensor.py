@@ -19,6 +19,7 @@ class Noise(NamedTuple):
     rate: float
 
 
+SILENT = Noise(0.0, 0.0, 0.0)
 TORQUE, ATTITUDE, RATE = 0, 2, 4
 """Channels of the random numbers."""
 

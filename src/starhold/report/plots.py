@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 Curve: TypeAlias = NDArray[np.float64]
 
+ACCURACIES = (("", "attitude, |q| ≤ 10⁻ᵏ"), ("rate_", "rate, |ω| ≤ 10⁻ᵏ rad/s"))
+"""What the steps to an accuracy are counted for: the prefix of the metric, and the heading."""
+
 
 @dataclass(frozen=True)
 class Panel:
@@ -64,8 +67,10 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario | None = 
     torque_scale, torque_unit = _torque_unit(flights)
     levels, dashed = _limit(flights, torque_scale, torque_unit)
     rates = [Panel(f"{axis}, {rate_unit}", curves("rate_error", i, rate_scale)) for i, axis in enumerate("xyz")]
-    torques = [Panel(f"{axis}, {torque_unit}", curves("torque", i, torque_scale), False, levels) for i, axis in enumerate("xyz")]
-    scalar = Panel("q₀", curves("attitude_error", 0), span=(-1.05, 1.05))
+    torques = [
+        Panel(f"{axis}, {torque_unit}", curves("torque", i, torque_scale), False, levels) for i, axis in enumerate("xyz")
+    ]
+    scalar = Panel("q₀", curves("attitude_error", 0))
     vector = [Panel(f"q{'₁₂₃'[i]}", curves("attitude_error", i + 1)) for i in range(3)]
     return Plots(
         thin_times(longest, factor),
@@ -102,7 +107,10 @@ def thin_times(times: Curve, factor: int) -> Curve:
 
 
 def steps_within(flight: Flight, kind: str) -> list[int | None]:
-    """Control steps after which the error stays within 10^-k, for every k of `DECADES`; kind: "" attitude, "rate_" rate."""
+    """Control steps after which the error stays within 10^-k, for every k of `DECADES`.
+
+    kind: "" for the attitude, "rate_" for the rate.
+    """
     return [flight.metrics.get(f"{kind}iterations_1e-{k}") for k in DECADES]
 
 
@@ -131,7 +139,8 @@ def _sound(panel: Panel, flights: Sequence[Flight]) -> Panel:
         return panel
     low = min(float(np.nanmin(curve)) for curve in kept)
     high = max(float(np.nanmax(curve)) for curve in kept)
-    span = (low / 2.0, high * 10.0) if panel.log else (low - 0.5 * (high - low) - 1e-9, high + 0.5 * (high - low) + 1e-9)
+    margin = 0.5 * (high - low) + 1e-9
+    span = (low / 2.0, high * 10.0) if panel.log else (low - margin, high + margin)
     return Panel(panel.label, panel.curves, panel.log, panel.levels, span)
 
 

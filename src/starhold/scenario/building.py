@@ -62,8 +62,12 @@ def _history(scenario: Scenario) -> Any:
     allowed = "a CSV file with a line 'time,q0,q1,q2,q3' or none, then numbers, at least two rows"
     try:
         lines = [line for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
-        numbers = np.loadtxt(lines[1:] if lines and not _is_number(lines[0].split(",")[0]) else lines, delimiter=",", ndmin=2)
-        if numbers.shape[0] < 2 or numbers.shape[1] != 5 or not np.isfinite(numbers).all():
+        if lines and not _is_number(lines[0].split(",")[0]):
+            del lines[0]
+        if len(lines) < 2:
+            raise ValueError(f"{len(lines)} rows of numbers")
+        numbers = np.loadtxt(lines, delimiter=",", ndmin=2)
+        if numbers.shape[1] != 5 or not np.isfinite(numbers).all():
             raise ValueError(f"a table of shape {numbers.shape}")
         if (np.diff(numbers[:, 0]) <= 0.0).any():
             raise ValueError("times that do not increase")
@@ -72,9 +76,9 @@ def _history(scenario: Scenario) -> Any:
         times = np.arange(simulation.steps + 1) * simulation.control_period
         return tabulate(numbers[:, 0], numbers[:, 1:], times)
     except OSError as error:
-        raise InputError(scenario.name, "target.file", f"{path}: {error.strerror}", allowed) from None
+        raise InputError(scenario.where, "target.file", f"{path}: {error.strerror}", allowed) from None
     except ValueError as error:
-        raise InputError(scenario.name, "target.file", f"{path}: {error}", allowed) from None
+        raise InputError(scenario.where, "target.file", f"{path}: {error}", allowed) from None
 
 
 def _is_number(text: str) -> bool:

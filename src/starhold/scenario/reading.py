@@ -33,11 +33,13 @@ class LawEntry:
 
 @dataclass(frozen=True)
 class Scenario:
-    """A scenario file read and checked: its tables, its laws with their gains, its text and the folder it lies in."""
+    """A scenario file read and checked: its tables, its laws with their gains, its text, what errors call it, and the
+    folder that file names in it are relative to."""
 
     table: ScenarioTable
     laws: tuple[LawEntry, ...]
     text: str = field(repr=False)
+    where: str = ""
     folder: Path = Path()
 
     @property
@@ -57,7 +59,7 @@ class Scenario:
         for entry in self.laws:
             if entry.name == name:
                 return entry
-        raise InputError(self.name, "law", name, nearest(name, [entry.name for entry in self.laws]))
+        raise InputError(self.where, "law", name, nearest(name, [entry.name for entry in self.laws]))
 
 
 def builtin_names() -> list[str]:
@@ -97,7 +99,7 @@ def parse(text: str, where: str, folder: Path = Path()) -> Scenario:
     if not isinstance(laws, list) or not laws:
         found = "no law" if laws is None else _show(laws)
         raise InputError(where, "law", found, "at least one [[law]] table")
-    scenario = Scenario(table, (), text, folder)
+    scenario = Scenario(table, (), text, where, folder)
     try:
         craft = scenario.craft
     except ValueError as error:
@@ -105,7 +107,7 @@ def parse(text: str, where: str, folder: Path = Path()) -> Scenario:
     entries: list[LawEntry] = []
     for number, item in enumerate(cast(list[Any], laws), 1):
         entries.append(_read_law(item, craft, where, f"law[{number}]", {entry.name for entry in entries}))
-    return Scenario(table, tuple(entries), text, folder)
+    return Scenario(table, tuple(entries), text, where, folder)
 
 
 def _read_law(data: Any, craft: Craft, where: str, key: str, taken: set[str]) -> LawEntry:

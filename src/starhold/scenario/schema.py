@@ -35,7 +35,8 @@ class Spacecraft(Table):
     inertia: Annotated[Any, Field(description="three principal moments or a 3x3 matrix (kg m^2)")]
     torque_limit: Annotated[float, *quantity(Gain("N m", above=0.0, text="largest torque"))] = math.inf
     limit: Annotated[
-        Literal["axis", "norm", "none"], Field(description="whether the limit holds for each axis, the norm, or not at all")
+        Literal["axis", "norm", "none"],
+        Field(description="whether the limit holds for each axis, the norm, or not at all"),
     ] = "axis"
     actuator_lag: Annotated[float, *quantity(Gain("s", at_least=0.0, text="time constant of the actuators"))] = 0.0
     torque_rate_limit: Annotated[float, *quantity(Gain("N m/s", above=0.0, text="fastest change of each torque"))] = math.inf
@@ -107,9 +108,9 @@ class TargetTable(Pointing):
     @model_validator(mode="after")
     def _fits_mode(self) -> TargetTable:
         if (self.mode == "history") != (self.file is not None):
-            raise _at("file", "a file exactly when mode = \"history\"", self.file)
+            raise _at("file", 'a file exactly when mode = "history"', self.file)
         if self.mode != "inertial" and (self.attitude is not None or self.angles is not None):
-            raise _at("mode", "\"inertial\" where attitude or angles are given", self.mode)
+            raise _at("mode", '"inertial" where attitude or angles are given', self.mode)
         return self
 
 
@@ -188,7 +189,7 @@ class ScenarioTable(Table):
         if self.orbit is None and self.environment.gravity_gradient:
             raise _at("environment.gravity_gradient", "false without an [orbit] table", True)
         if self.orbit is None and self.target.mode == "orbital":
-            raise _at("target.mode", "\"orbital\" only with an [orbit] table", "orbital")
+            raise _at("target.mode", '"orbital" only with an [orbit] table', "orbital")
         return self
 
 

@@ -34,7 +34,9 @@ COLUMNS: dict[str, tuple[str, str, str]] = {
 """Recorded quantities in the order of `Sample`: dimension, unit, meaning."""
 
 
-def simulate(loop: ClosedLoop, steps: int, record_every: int = 1, run: int = 0, progress: Progress | None = None) -> xr.Dataset:
+def simulate(
+    loop: ClosedLoop, steps: int, record_every: int = 1, run: int = 0, progress: Progress | None = None
+) -> xr.Dataset:
     """Fly a closed loop for `steps` control periods.
 
     Returns an xarray Dataset over `time` (s), a sample every `record_every` control steps, the state before and the torque
@@ -57,7 +59,17 @@ def fly(
         begun = time.perf_counter()
         count = min(chunk, steps - done) if progress is not None else steps
         carry = kernel(
-            carry, done, count, done + count == steps, record_every, run, loop.gains, loop.craft, setup, loop.substeps, samples
+            carry,
+            done,
+            count,
+            done + count == steps,
+            record_every,
+            run,
+            loop.gains,
+            loop.craft,
+            setup,
+            loop.substeps,
+            samples,
         )
         carry = _as_given(carry)
         done += count

@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra.quaternion import NO_TURN
 from starhold.algebra.structure import LANES, flatten, pack, unflatten, unpack
+from starhold.algebra.vector import ZERO
 from starhold.loop.closed_loop import Carry, ClosedLoop
 from starhold.loop.kernels import make_kernels
 from starhold.models.rigid_body import State
@@ -101,4 +103,4 @@ def _share_out(work: Any, count: int, workers: int, progress: Progress | None) -
             raise
 
 
-_STATE = State((1.0, 0.0, 0.0, 0.0), (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3)
+_STATE = State(NO_TURN, ZERO, ZERO, ZERO, ZERO)

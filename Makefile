@@ -1,0 +1,40 @@
+# `make demo` and `make test` are all a new machine needs: they create the environment they use.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet -c constraints.txt
+
+.PHONY: demo test test-all check bench docs clean
+
+demo: $(VENV)/.run
+	$(BIN)/starhold compare three-laws -o demo --force
+
+test: check
+	$(BIN)/python -m pytest -n 2 --dist loadgroup
+
+test-all: check
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -m ""
+
+check: $(VENV)/.test
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright --pythonpath $(BIN)/python
+	$(BIN)/lint-imports
+
+bench: $(VENV)/.bench
+	for script in benchmarks/[a-z]*.py; do case $$script in */common.py) ;; *) echo "== $$script"; $(BIN)/python $$script ;; esac; done
+
+docs: $(VENV)/.docs
+	$(BIN)/mkdocs build --strict
+
+$(VENV)/.run: pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(PIP) -e .
+	touch $@
+
+$(VENV)/.test $(VENV)/.bench $(VENV)/.docs: $(VENV)/.%: $(VENV)/.run
+	$(PIP) -e .[$*]
+	touch $@
+
+clean:
+	rm -rf $(VENV) demo results build dist site

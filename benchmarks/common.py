@@ -1,0 +1,265 @@
+"""What the benchmarks share: the machine in words, fair timing, tables, and one problem stated for several engines.
+
+The problem is the published spacecraft (J = 2, 3, 4 kg m2, low orbit, gravity gradient, torque held for 0.1 s, classical
+Runge-Kutta) under Basilisk's feedback on modified Rodrigues parameters: that law is the one both programs can fly with
+compiled code alone. `tests/oracles/test_basilisk.py` holds that they agree.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Annotated, Any, NamedTuple, cast
+
+import numpy as np
+
+from starhold.algebra.quaternion import Quaternion, vector_part
+from starhold.algebra.scalar import equation
+from starhold.algebra.vector import ZERO, Vector, add, scale
+from starhold.laws.catalogue import Law
+from starhold.laws.interface import Card, Gain, NoMemory, Seen
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.models.craft import EARTH, Craft, make_craft
+from starhold.models.rigid_body import State
+
+PERIOD = 0.1
+INERTIA = (2.0, 3.0, 4.0)
+PUBLISHED = State((0.0, *(3.0**-0.5,) * 3), (0.04, 0.03, 0.02), (7e6, 0.0, 0.0), (0.0, 7550.0, 0.0), ZERO)
+"""The published start. It is half a turn from the target, where the two sets of Rodrigues parameters meet."""
+START = PUBLISHED._replace(attitude=(0.2, 0.4, -0.7, 0.31**0.5))
+"""A start away from half a turn, for laws that have to choose between the two sets."""
+
+
+def header(*packages: str) -> str:
+    """The machine and the versions, for the top of a report."""
+    names = ("starhold", "numba", "numpy", *packages)
+    versions = ", ".join(f"{name} {_version(name)}" for name in names)
+    system = f"{platform.system()} {platform.machine()}, Python {platform.python_version()}"
+    return f"{_processor()}, {os.cpu_count()} threads, {system}\n{versions}\n"
+
+
+def _processor() -> str:
+    facts = Path("/proc/cpuinfo")
+    lines = facts.read_text(encoding="utf-8").splitlines() if facts.exists() else []
+    named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(named, platform.processor() or "unknown processor")
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        import starhold
+
+        return starhold.__version__ if name == "starhold" else "not installed"
+
+
+def interleaved(tasks: Mapping[str, Callable[[], Any]], repeats: int = 5) -> dict[str, list[float]]:
+    """Wall seconds of each task, `repeats` times, after one untimed call of each.
+
+    The tasks take turns, so what the machine does meanwhile falls on all of them alike: compare minima or medians of one
+    call of this function, never figures of two.
+    """
+    times: dict[str, list[float]] = {name: [] for name in tasks}
+    for task in tasks.values():
+        task()
+    for _ in range(repeats):
+        for name, task in tasks.items():
+            begun = time.perf_counter()
+            task()
+            times[name].append(time.perf_counter() - begun)
+    return times
+
+
+def best(times: Mapping[str, list[float]]) -> dict[str, float]:
+    """The least of each: what the machine can do when it is left alone."""
+    return {name: min(values) for name, values in times.items()}
+
+
+def show(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a table: the first column to the left, the others to the right."""
+    widths = [max(len(line[i]) for line in (heads, *rows)) for i in range(len(heads))]
+    for line in (heads, ["-" * width for width in widths], *rows):
+        cells = [cell.rjust(width) for cell, width in zip(line, widths, strict=True)]
+        print("  ".join([line[0].ljust(widths[0]), *cells[1:]]))
+    print()
+
+
+class FeedbackGains(NamedTuple):
+    """Gains of the feedback on modified Rodrigues parameters."""
+
+    k: Annotated[float, Gain("N m", above=0.0, text="stiffness")]
+    p: Annotated[float, Gain("N m s", above=0.0, text="damping")]
+
+
+@equation
+def feedback(seen: Seen, gains: FeedbackGains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
+    """u = -k sigma - p w, sigma = q/(1 + q0); the loop shows it the quaternion with q0 >= 0, so |sigma| <= 1."""
+    q = seen.attitude
+    return add(scale(-gains.k / (1.0 + q[0]), vector_part(q)), scale(-gains.p, seen.rate)), memory
+
+
+@equation
+def steady(seen: Seen, gains: Vector, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
+    """A constant torque, no control at all."""
+    return gains, memory
+
+
+def _as_law(name: str, torque: Callable[..., Any]) -> Law:
+    card = Card(title=name, summary="", sources=(), assumptions=(), claims="none")
+    return Law(name, cast(Any, SimpleNamespace(CARD=card, torque=torque)))
+
+
+FEEDBACK = _as_law("feedback", feedback)
+FEEDBACK_GAINS = FeedbackGains(0.036, 0.09)
+STEADY = _as_law("steady", steady)
+STEADY_TORQUE: Vector = (1e-4, -2e-4, 1.5e-4)
+
+
+def problem(law: Law, gains: Any, start: State = START, **options: Any) -> ClosedLoop:
+    """The closed loop of a law on the problem; without further options the torque is not limited."""
+    craft = make_craft(INERTIA, options.pop("torque_limit", np.inf))
+    around = {"orbit": True, "gravity_gradient": True, "limit": "none"}
+    return ClosedLoop(craft, law, gains, start, PERIOD, **(around | options))
+
+
+FEEDBACK_LOOP = problem(FEEDBACK, FEEDBACK_GAINS, cover="shortest")
+STEADY_LOOP = problem(STEADY, STEADY_TORQUE)
+
+
+def gap(a: State, b: State) -> tuple[float, float, float]:
+    """How far two states are apart: attitude (rad), rate (rad/s), position relative to the distance."""
+    one, other = np.array(a.attitude), np.array(b.attitude)
+    # The chord between the unit quaternions; the arc cosine of their product would lose half the digits.
+    chord = np.linalg.norm(one - other if one @ other >= 0.0 else one + other)
+    angle = 4.0 * np.arcsin(0.5 * chord)
+    rate = float(np.abs(np.array(a.rate) - b.rate).max())
+    away = float(np.linalg.norm(np.array(a.position) - b.position) / np.linalg.norm(a.position))
+    return float(angle), rate, away
+
+
+Control = Callable[[Quaternion, Any, Any], Any]
+"""Torque from attitude, rate and position (inertial), called at each control instant."""
+
+
+def in_basilisk(control: Control | str, start: State = START) -> Callable[[int], State]:
+    """The problem in Basilisk; the result flies it for a number of steps from where it was, and gives the state reached.
+
+    control: "feedback" (Basilisk's own flight-software modules), "steady" (a constant torque, no flight software), or a
+    function, called from a Basilisk module in Python. The models run in such an order that the torque of a state is held
+    from that instant on.
+    """
+    from Basilisk.simulation import GravityGradientEffector, extForceTorque, spacecraft
+    from Basilisk.utilities import SimulationBaseClass, macros, simIncludeGravBody
+
+    simulation = SimulationBaseClass.SimBaseClass()
+    process, tick = simulation.CreateNewProcess("process"), macros.sec2nano(PERIOD)
+    process.addTask(simulation.CreateNewTask("task", tick))
+
+    body = spacecraft.Spacecraft()
+    body.ModelTag = "body"
+    body.hub.mHub = 100.0
+    body.hub.IHubPntBc_B = np.diag(INERTIA).tolist()
+    body.hub.r_CN_NInit, body.hub.v_CN_NInit = list(start.position), list(start.velocity)
+    body.hub.sigma_BNInit = [[x / (1.0 + start.attitude[0])] for x in start.attitude[1:]]
+    body.hub.omega_BN_BInit = [[x] for x in start.rate]
+    simulation.AddModelToTask("task", body)
+
+    factory = simIncludeGravBody.gravBodyFactory()
+    earth = factory.createEarth()
+    earth.mu, earth.isCentralBody = EARTH, True
+    factory.addBodiesTo(body)
+    gradient = GravityGradientEffector.GravityGradientEffector()
+    gradient.ModelTag = "gradient"
+    gradient.addPlanetName(earth.planetName)
+    body.addDynamicEffector(gradient)
+    simulation.AddModelToTask("task", gradient)
+    actuator = extForceTorque.ExtForceTorque()
+    body.addDynamicEffector(actuator)
+
+    # Basilisk's models hold each other by bare pointers.
+    kept: list[Any] = [body, factory, earth, gradient, actuator]
+    if control == "feedback":
+        kept += _flight_software(simulation, body, actuator)
+    elif control == "steady":
+        actuator.extTorquePntB_B = [[x] for x in STEADY_TORQUE]
+    else:
+        kept += _python_control(simulation, body, actuator, cast(Control, control))
+    simulation.AddModelToTask("task", actuator)
+    simulation.InitializeSimulation()
+    done = 0
+
+    def fly(steps: int) -> State:
+        nonlocal done
+        done += steps
+        simulation.ConfigureStopTime(done * tick)
+        simulation.ExecuteSimulation()
+        reached = kept[0].scStateOutMsg.read()
+        attitude = _quaternion(reached.sigma_BN)
+        return State(attitude, *(tuple(x) for x in (reached.omega_BN_B, reached.r_CN_N, reached.v_CN_N)), ZERO)
+
+    return fly
+
+
+def _quaternion(sigma: Sequence[float]) -> Quaternion:
+    s = np.array(sigma)
+    square = float(s @ s)
+    v = (2.0 * s / (1.0 + square)).tolist()
+    return ((1.0 - square) / (1.0 + square), v[0], v[1], v[2])
+
+
+def _flight_software(simulation: Any, body: Any, actuator: Any) -> list[Any]:
+    from Basilisk.architecture import messaging
+    from Basilisk.fswAlgorithms import attTrackingError, inertial3D, mrpFeedback
+    from Basilisk.simulation import simpleNav
+
+    sensor = simpleNav.SimpleNav()
+    sensor.scStateInMsg.subscribeTo(body.scStateOutMsg)
+    goal = inertial3D.inertial3D()
+    goal.sigma_R0N = [0.0, 0.0, 0.0]
+    error = attTrackingError.attTrackingError()
+    error.attNavInMsg.subscribeTo(sensor.attOutMsg)
+    error.attRefInMsg.subscribeTo(goal.attRefOutMsg)
+    law = mrpFeedback.mrpFeedback()
+    law.guidInMsg.subscribeTo(error.attGuidOutMsg)
+    law.K, law.P, law.Ki = FEEDBACK_GAINS.k, FEEDBACK_GAINS.p, -1.0
+    known = messaging.VehicleConfigMsgPayload()
+    known.ISCPntB_B = np.diag(INERTIA).ravel().tolist()
+    told = messaging.VehicleConfigMsg().write(known)
+    law.vehConfigInMsg.subscribeTo(told)
+    actuator.cmdTorqueInMsg.subscribeTo(law.cmdTorqueOutMsg)
+    for model in (sensor, goal, error, law):
+        simulation.AddModelToTask("task", model)
+    return [sensor, goal, error, law, told]
+
+
+def _python_control(simulation: Any, body: Any, actuator: Any, control: Control) -> list[Any]:
+    from Basilisk.architecture import messaging, sysModel
+
+    class Controller(sysModel.SysModel):
+        """Calls `control` with the state Basilisk has reached."""
+
+        def __init__(self) -> None:
+            super().__init__()
+            self.ModelTag = "controller"
+            self.command = messaging.CmdTorqueBodyMsg()
+
+        def Reset(self, CurrentSimNanos: int) -> None:
+            pass
+
+        def UpdateState(self, CurrentSimNanos: int) -> None:
+            reached = body.scStateOutMsg.read()
+            torque = control(_quaternion(reached.sigma_BN), np.array(reached.omega_BN_B), np.array(reached.r_CN_N))
+            payload = messaging.CmdTorqueBodyMsgPayload()
+            payload.torqueRequestBody = np.asarray(torque).tolist()
+            self.command.write(payload, CurrentSimNanos, self.moduleID)
+
+    controller = Controller()
+    actuator.cmdTorqueInMsg.subscribeTo(controller.command)
+    simulation.AddModelToTask("task", controller)
+    return [controller]

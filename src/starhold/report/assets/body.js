@@ -1,0 +1,236 @@
+// The turning body, one view for each law: hub, panels and axes as polygons drawn from back to front.
+"use strict";
+
+const scene = report.scene;
+const views = [...document.querySelectorAll(".view")].map((box, law) => ({
+  canvas: box.querySelector("canvas"), angle: box.querySelector("output"), frames: scene.attitudes[law],
+}));
+const slider = document.getElementById("moment");
+const clock = document.getElementById("clock");
+const button = document.getElementById("play");
+const last = scene.times.length - 1;
+// Where the reader stands, as turns about the target's third axis and above its horizon; dragging changes both.
+const eye = { around: -0.9, above: 0.42 };
+let place = 0;
+let playing = false;
+
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const plus = (a, b, s = 1) => [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]];
+
+// q v q*: from body to target components.
+function turn(q, v) {
+  const u = [q[1], q[2], q[3]];
+  const t = cross(u, v).map((c) => 2 * c);
+  return plus(plus(v, t, q[0]), cross(u, t));
+}
+
+// Between two frames, the shorter way.
+function between(frames, where) {
+  const k = Math.min(Math.floor(where), frames.length - 1);
+  const a = frames[k];
+  const b = frames[Math.min(k + 1, frames.length - 1)];
+  const s = Math.min(where - k, 1) * (a.reduce((sum, c, i) => sum + c * b[i], 0) < 0 ? -1 : 1);
+  const w = 1 - Math.abs(s);
+  const q = a.map((c, i) => w * c + s * b[i]);
+  const size = Math.hypot(...q);
+  return q.map((c) => c / size);
+}
+
+function timeAt(where) {
+  const k = Math.min(Math.floor(where), last - 1);
+  return scene.times[k] + (where - k) * (scene.times[k + 1] - scene.times[k]);
+}
+
+// Corners of a box between two opposite corners, in principal axes, as six faces seen from outside.
+function faces(low, high, colours) {
+  return [0, 1, 2].flatMap((axis) => [-1, 1].map((way) => {
+    const [i, j] = way > 0 ? [(axis + 1) % 3, (axis + 2) % 3] : [(axis + 2) % 3, (axis + 1) % 3];
+    const corner = (a, b) => {
+      const c = [0, 0, 0];
+      c[axis] = way > 0 ? high[axis] : low[axis];
+      c[i] = a ? high[i] : low[i];
+      c[j] = b ? high[j] : low[j];
+      return c;
+    };
+    return { points: [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)], colour: colours[axis], axis, way };
+  }));
+}
+
+// The outline has the proportions of the uniform box with the craft's inertia; its longest edge is split in panel, hub, panel.
+function craft() {
+  const half = scene.size;
+  const long = half.indexOf(Math.max(...half));
+  const thin = half.indexOf(Math.min(...half));
+  const cut = 0.42 * half[long];
+  const part = (from, to, thick, colours, kind) => {
+    const low = half.map((h) => -h);
+    const high = half.slice();
+    low[long] = from;
+    high[long] = to;
+    low[thin] *= thick;
+    high[thin] *= thick;
+    return { centre: (from + to) / 2, list: faces(low, high, colours), kind, long, thin };
+  };
+  const panel = ["#34456b", "#34456b", "#34456b"];
+  panel[thin] = "#23407e";
+  const gap = 0.07 * half[long];
+  return {
+    long,
+    parts: [part(-half[long], -cut - gap, 0.12, panel, "panel"), part(-cut, cut, 1, ["#c9a24b", "#d9b766", "#e7cd8f"], "hub"),
+      part(cut + gap, half[long], 0.12, panel, "panel")],
+  };
+}
+const model = craft();
+// Principal axes are the columns of scene.axes.
+const toBody = (p) => [0, 1, 2].map((i) => dot(scene.axes[i], p));
+
+function shade(colour, light) {
+  const n = parseInt(colour.slice(1), 16);
+  return `rgb(${[n >> 16, (n >> 8) & 255, n & 255].map((c) => Math.round(Math.min(255, c * light))).join(",")})`;
+}
+
+function paint(view, where) {
+  const { canvas, frames } = view;
+  const ratio = window.devicePixelRatio || 1;
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+  if (canvas.width !== Math.round(width * ratio)) canvas.width = Math.round(width * ratio);
+  if (canvas.height !== Math.round(height * ratio)) canvas.height = Math.round(height * ratio);
+  const pen = canvas.getContext("2d");
+  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  pen.clearRect(0, 0, width, height);
+  const q = between(frames, where);
+  view.angle.textContent = `${(2 * Math.atan2(Math.hypot(q[1], q[2], q[3]), Math.abs(q[0])) * 180 / Math.PI).toPrecision(3)}°`
+    + (where > frames.length - 1 ? " lost" : "");
+
+  const away = [Math.cos(eye.above) * Math.cos(eye.around), Math.cos(eye.above) * Math.sin(eye.around), Math.sin(eye.above)];
+  const right = [-Math.sin(eye.around), Math.cos(eye.around), 0];
+  const up = cross(away, right);
+  const lamp = plus(plus(away, up, 0.6), right, -0.5).map((c) => c / 1.27);
+  const scale = Math.min(width, height) * 0.36;
+  const flat = (p) => [width / 2 + scale * dot(p, right), height / 2 - scale * dot(p, up)];
+
+  function line(from, to, colour, thick, dash) {
+    pen.beginPath();
+    pen.setLineDash(dash);
+    pen.moveTo(...flat(from));
+    pen.lineTo(...flat(to));
+    pen.strokeStyle = colour;
+    pen.lineWidth = thick;
+    pen.stroke();
+    pen.setLineDash([]);
+  }
+  function label(p, text, colour, style) {
+    const [x, y] = flat(plus(p, p, 0.07));
+    pen.font = `${style} 13px system-ui, sans-serif`;
+    pen.fillStyle = colour;
+    pen.textAlign = "center";
+    pen.textBaseline = "middle";
+    pen.fillText(text, x, y);
+  }
+  const unit = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+  const names = ["x", "y", "z"];
+  const colours = names.map((n) => css(`--axis-${n}`));
+  // Half lines that point away are painted before the body, those towards the reader after it.
+  const drawAxes = (front) => unit.forEach((e, i) => {
+    if (dot(e, away) > 0 === front) {
+      line([0, 0, 0], e.map((c) => 1.24 * c), colours[i], 1.4, [6, 5]);
+    }
+    const b = turn(q, e);
+    if (dot(b, away) > 0 === front) {
+      const root = b.map((c) => c * reach(i));
+      const tip = b.map((c) => c * 1.08);
+      line(root, tip, colours[i], 3, []);
+      pen.beginPath();
+      pen.arc(...flat(tip), 3.6, 0, 7);
+      pen.fillStyle = colours[i];
+      pen.fill();
+      label(tip, names[i], colours[i], "bold");
+    }
+  });
+
+  drawAxes(false);
+  const along = turn(q, toBody(unit[model.long]));
+  // Planes separate the parts, so that their order along the view is exact.
+  const order = model.parts.slice().sort((a, b) => (a.centre - b.centre) * dot(along, away));
+  for (const part of order) {
+    for (const face of part.list) {
+      const corners = face.points.map((p) => turn(q, toBody(p)));
+      const normal = cross(plus(corners[1], corners[0], -1), plus(corners[2], corners[0], -1));
+      const size = Math.hypot(...normal);
+      if (size === 0 || dot(normal, away) <= 0) continue;
+      pen.beginPath();
+      corners.forEach((p) => pen.lineTo(...flat(p)));
+      pen.closePath();
+      pen.fillStyle = shade(face.colour, 0.62 + 0.5 * Math.max(0, dot(normal, lamp) / size));
+      pen.fill();
+      pen.strokeStyle = "rgba(10, 14, 22, 0.65)";
+      pen.lineWidth = 1;
+      pen.lineJoin = "round";
+      pen.stroke();
+      if (part.kind === "panel" && face.axis === part.thin) cells(corners, face, part);
+    }
+  }
+  drawAxes(true);
+  unit.forEach((e, i) => label(e.map((c) => 1.27 * c), `${names[i]} target`, colours[i], "italic"));
+
+  // Solar cells, five along the panel and three across.
+  function cells(c, face, part) {
+    const first = face.way > 0 ? (face.axis + 1) % 3 : (face.axis + 2) % 3;
+    const counts = first === part.long ? [5, 3] : [3, 5];
+    const mix = (a, b, s) => plus(a.map((v) => v * (1 - s)), b, s);
+    for (let n = 1; n < counts[0]; n++) {
+      line(mix(c[0], c[1], n / counts[0]), mix(c[3], c[2], n / counts[0]), "rgba(200, 215, 255, 0.45)", 0.8, []);
+    }
+    for (let n = 1; n < counts[1]; n++) {
+      line(mix(c[0], c[3], n / counts[1]), mix(c[1], c[2], n / counts[1]), "rgba(200, 215, 255, 0.45)", 0.8, []);
+    }
+  }
+}
+
+// How far from the centre a body axis leaves the outline.
+function reach(i) {
+  const e = [0, 1, 2].map((k) => scene.axes[i][k]);
+  return Math.min(...e.map((c, k) => scene.size[k] / Math.max(Math.abs(c), 1e-9)));
+}
+
+function show(where) {
+  place = Math.max(0, Math.min(last, where));
+  slider.value = place;
+  const text = `${timeAt(place).toFixed(scene.digits)} s`;
+  clock.textContent = text;
+  slider.setAttribute("aria-valuetext", text);
+  views.forEach((view) => paint(view, place));
+}
+
+function play(on) {
+  if (on && !playing && place >= last) place = 0;
+  playing = on;
+  button.textContent = on ? "Pause" : "Play";
+  if (!on) return;
+  let before = null;
+  const tick = (now) => {
+    if (!playing) return;
+    if (before !== null) show(place + (now - before) * last / (scene.seconds * 1000));
+    before = now;
+    if (place >= last) play(false);
+    else requestAnimationFrame(tick);
+  };
+  requestAnimationFrame(tick);
+}
+
+slider.max = last;
+slider.addEventListener("input", () => { play(false); show(Number(slider.value)); });
+button.addEventListener("click", () => play(!playing));
+for (const { canvas } of views) {
+  canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
+  canvas.addEventListener("pointermove", (event) => {
+    if (!canvas.hasPointerCapture(event.pointerId)) return;
+    eye.around -= 0.01 * event.movementX;
+    eye.above = Math.max(-1.5, Math.min(1.5, eye.above + 0.01 * event.movementY));
+    show(place);
+  });
+}
+new ResizeObserver(() => show(place)).observe(views[0].canvas);
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => show(place));
+show(Number(slider.value));

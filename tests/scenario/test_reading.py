@@ -1,0 +1,242 @@
+"""Scenario files: what is read, and that every fault becomes one clear line."""
+
+import json
+import math
+
+import jsonschema
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from starhold.errors import InputError
+from starhold.laws.catalogue import catalogue
+from starhold.laws.interface import Gain
+from starhold.scenario.building import build
+from starhold.scenario.quantity import reader
+from starhold.scenario.reading import builtin_names, builtin_text, load, parse
+from starhold.scenario.schema import json_schema
+from starhold.scenario.template import template_text
+from starhold.scenario.writing import law_table
+
+BASE = builtin_text("three-laws")
+
+
+def fault(old, new, text=BASE):
+    assert old in text
+    with pytest.raises(InputError) as caught:
+        parsed = parse(text.replace(old, new), "my.toml")
+        for entry in parsed.laws:
+            build(parsed, entry)
+    message = str(caught.value)
+    assert "\n" not in message
+    return message
+
+
+@pytest.mark.parametrize("name", builtin_names())
+def test_builtin_scenarios_build(name):
+    scenario = load(name)
+    assert scenario.table.description
+    assert len([build(scenario, entry) for entry in scenario.laws]) >= 3
+
+
+def test_the_published_experiment_is_as_published():
+    scenario = load("three-laws")
+    loop = build(scenario, scenario.laws[0])
+    assert loop.craft.inertia == (2.0, 3.0, 4.0)
+    assert loop.craft.torque_limit == 0.01
+    assert loop.craft.gravity == 3.986e14
+    assert loop.start.attitude == pytest.approx((0.0, *(3**-0.5,) * 3), rel=1e-15)
+    assert loop.start.rate == (0.04, 0.03, 0.02)
+    assert (loop.start.position, loop.start.velocity) == ((7e6, 0.0, 0.0), (0.0, 7550.0, 0.0))
+    assert (loop.period, loop.limit, loop.gravity_gradient) == (0.1, "axis", True)
+    assert scenario.pick("lyapunov").gains == (0.09, 0.009)
+    assert np.array_equal(scenario.pick("sliding").gains.slope, 0.08 * np.eye(3))
+
+
+FAULTS = {
+    "unknown key": ("torque_limit =", "torqe_limit =", ["spacecraft.torqe_limit", "unknown key", "torque_limit?"]),
+    "unknown table": ("[orbit]", "[orbits]", ["orbits", "unknown key", "orbit?"]),
+    "unknown gain": ("k_rate = 0.09", "k_ratee = 0.09", ["law[1].k_ratee", "unknown key", "k_rate?"]),
+    "missing gain": ("k_rate = 0.09", "", ["law[1].k_rate", "required"]),
+    "missing table": ("[spacecraft]", "[other]", ["other", "unknown key"]),
+    "wrong type": ("duration = 600.0", "duration = true", ["simulation.duration", "True", "a number in s"]),
+    "wrong type of a table": ("[orbit]", "orbit = 3\n[x]", ["orbit"]),
+    "text for a number": ("duration = 600.0", 'duration = "long"', ["simulation.duration", '"long"', "1 s"]),
+    "wrong unit": ('"0.01 N m"', '"0.01 kg"', ["spacecraft.torque_limit", '"0.01 kg"', "N m"]),
+    "negative limit": ('"0.01 N m"', "-0.01", ["spacecraft.torque_limit", "-0.01", "above 0"]),
+    "negative inertia": ("[2.0, 3.0, 4.0]", "[2.0, -3.0, 4.0]", ["spacecraft.inertia", "positive definite"]),
+    "impossible inertia": ("[2.0, 3.0, 4.0]", "[2.0, 3.0, 6.0]", ["spacecraft.inertia", "largest exceeds the sum"]),
+    "unsymmetric inertia": ("[2.0, 3.0, 4.0]", "[[2,1,0],[0,3,0],[0,0,4]]", ["spacecraft.inertia", "symmetric"]),
+    "inertia of two": ("[2.0, 3.0, 4.0]", "[2.0, 3.0]", ["spacecraft.inertia", "[2.0, 3.0]", "three principal moments"]),
+    "ragged inertia": ("[2.0, 3.0, 4.0]", "[[2.0], 3.0, 4.0]", ["spacecraft.inertia"]),
+    "zero quaternion": ("attitude = [0, 1, 1, 1]", "attitude = [0, 0, 0, 0]", ["initial.attitude", "not zero"]),
+    "three for a quaternion": ("attitude = [0, 1, 1, 1]", "attitude = [0, 1, 1]", ["initial.attitude", "4 numbers"]),
+    "nan": ("rate = [0.04", "rate = [nan", ["initial.rate", "finite"]),
+    "inf": ("duration = 600.0", "duration = inf", ["simulation.duration", "finite"]),
+    "control period zero": ("control_period = 0.1", "control_period = 0", ["simulation.control_period", "above 0"]),
+    "control period too long": ("control_period = 0.1", "control_period = 700", ["simulation.control_period", "600 s"]),
+    "no whole steps": ("control_period = 0.1", "control_period = 0.7", ["simulation.duration", "whole number"]),
+    "half a substep": ("control_period = 0.1", "control_period = 0.1\nsubsteps = 1.5", ["substeps", "whole number"]),
+    "unknown law": ('type = "lyapunov"', 'type = "lyapunow"', ["law[1].type", "lyapunov?"]),
+    "law without type": ('type = "lyapunov"', "", ["law[1].type"]),
+    "gain out of bounds": ("k_rate = 0.09", "k_rate = -0.09", ["law[1].k_rate", "-0.09", "above 0"]),
+    "unknown mode": ('mode = "inertial"', 'mode = "inertia"', ["target.mode", "inertial"]),
+    "unknown cover": ("k_rate = 0.09", 'k_rate = 0.09\ndouble_cover = "short"', ["law[1].double_cover", "shortest"]),
+    "form of a law without": ("k_rate = 0.09", 'k_rate = 0.09\nform = "I"', ["law[1].form"]),
+    "gravity without orbit": ("[orbit]\nposition = [7.0e6, 0, 0]         # m, inertial\nvelocity = [0, 7550, 0]", "#", ["gravity"]),
+    "centre of the Earth": ("position = [7.0e6, 0, 0]", "position = [0, 0, 0]", ["orbit.position", "away from the centre"]),
+    "history without file": ('mode = "inertial"\nattitude = [1, 0, 0, 0]', 'mode = "history"', ["target.file"]),
+    "missing history": (
+        'mode = "inertial"\nattitude = [1, 0, 0, 0]',
+        'mode = "history"\nfile = "no.csv"',
+        ["target.file", "no.csv"],
+    ),
+    "attitude twice": ("attitude = [0, 1, 1, 1]", "attitude = [0, 1, 1, 1]\nangles = [0, 0, 0]", ["initial.angles", "either"]),
+    "not TOML": ("[orbit]", "[orbit", ["not TOML"]),
+}
+
+
+@pytest.mark.parametrize("name", sorted(FAULTS))
+def test_a_fault_is_one_line_with_file_key_and_what_is_allowed(name):
+    old, new, words = FAULTS[name]
+    message = fault(old, new)
+    assert message.startswith("my.toml: ")
+    for word in words:
+        assert word in message
+
+
+def test_file_without_laws():
+    text = BASE[: BASE.index("[[law]]")]
+    with pytest.raises(InputError, match=r"law: found no law"):
+        parse(text, "my.toml")
+
+
+def test_names_must_differ():
+    text = BASE.replace('type = "lyapunov"', 'type = "lyapunov"\nname = "a"').replace('type = "sliding"', 'type = "sliding"\nname = "a"')
+    with pytest.raises(InputError, match=r"law\[2\]\.name"):
+        parse(text, "my.toml")
+    for name in ("../evil", "a/b", ".hidden", ""):
+        with pytest.raises(InputError, match=r"law\[1\]\.name"):
+            parse(BASE.replace('type = "lyapunov"', f'type = "lyapunov"\nname = "{name}"'), "my.toml")
+
+
+def test_same_law_twice_gets_numbers():
+    text = BASE + '\n[[law]]\ntype = "lyapunov"\nk_rate = 1\nk_attitude = 1\n'
+    assert [entry.name for entry in parse(text, "x").laws] == ["lyapunov", "sliding", "mpc", "lyapunov-2"]
+
+
+def test_missing_file_names_the_nearest_builtin(tmp_path):
+    with pytest.raises(InputError, match="did you mean three-laws"):
+        load("three-law")
+    with pytest.raises(InputError, match="readable"):
+        load(tmp_path)
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="readable"):
+        load(tmp_path / "binary.toml")
+
+
+def test_units_convert():
+    text = BASE.replace("[2.0, 3.0, 4.0]", '["20000 kg cm^2", 3.0, "4 kg m²"]').replace(
+        "rate = [0.04, 0.03, 0.02]", 'rate = ["90 deg/s", "1 rpm", 0.02]'
+    )
+    scenario = parse(text, "x")
+    assert np.allclose(np.diag(scenario.table.spacecraft.inertia), [2, 3, 4], rtol=1e-14)
+    assert scenario.table.initial.rate == pytest.approx((math.pi / 2, 2 * math.pi / 60, 0.02))
+
+
+def test_matrix_gain_takes_number_diagonal_or_matrix():
+    matrices = [
+        parse(BASE.replace("slope = 0.08", f"slope = {text}"), "x").pick("sliding").gains.slope
+        for text in ("0.08", "[0.08, 0.08, 0.08]", "[[0.08, 0, 0], [0, 0.08, 0], [0, 0, 0.08]]")
+    ]
+    assert matrices[0] == matrices[1] == matrices[2]
+
+
+def test_design_form_gives_gains():
+    text = BASE[: BASE.index("[[law]]")] + '[[law]]\ntype = "matrix-pd"\nform = "inertial"\na = 10\nb = 20\nd = 0.1\n'
+    gains = parse(text, "x").laws[0].gains
+    inertia = np.diag([2.0, 3.0, 4.0])
+    assert np.allclose(np.linalg.inv(gains.k_attitude), 10 * inertia + 20 * np.eye(3))
+    assert np.allclose(gains.k_rate, 0.1 * inertia)
+    with pytest.raises(InputError, match="must not both be zero"):
+        parse(text.replace("a = 10\nb = 20", "a = 0\nb = 0"), "x")
+
+
+def test_relative_start_is_relative_to_the_target():
+    scenario = load("geostationary")
+    loop = build(scenario, scenario.laws[0])
+    from starhold.simulate.lane import fly
+
+    samples, _ = fly(loop, 1)
+    from starhold.algebra.cosines import from_angles
+
+    expected = from_angles(*np.radians([8, -5, 12]))
+    assert np.abs(samples[19:23, 0]) == pytest.approx(np.abs(expected), abs=1e-12)
+    assert samples[23:26, 0] == pytest.approx(np.radians([0.01, -0.02, 0.01]), abs=1e-15)
+
+
+def test_history_file(tmp_path):
+    times = np.linspace(0, 600, 61)
+    rows = np.c_[times, np.cos(times / 1000), np.zeros_like(times), np.sin(times / 1000), np.zeros_like(times)]
+    np.savetxt(tmp_path / "h.csv", rows, delimiter=",", header="time,q0,q1,q2,q3", comments="")
+    text = BASE.replace('mode = "inertial"\nattitude = [1, 0, 0, 0]', 'mode = "history"\nfile = "h.csv"')
+    (tmp_path / "s.toml").write_text(text)
+    scenario = load(tmp_path / "s.toml")
+    table = build(scenario, scenario.laws[0]).target
+    assert table.shape == (6001, 10)
+    assert table[3000, 5] == pytest.approx(2e-3, rel=1e-3)
+    for bad in ("0,1,0,0,0\n", "0,1,0,0,0\n0,1,0,0,0\n", "0,0,0,0,0\n700,1,0,0,0\n", "0,1,0,0,0\n5,1,0,0,0\n", "a,b\nc,d\n", ""):
+        (tmp_path / "h.csv").write_text(bad)
+        with pytest.raises(InputError, match=r"target\.file"):
+            build(load(tmp_path / "s.toml"), scenario.laws[0])
+
+
+def test_json_schema_accepts_what_is_read_and_refuses_a_misspelling():
+    import tomllib
+
+    schema = json.loads(json.dumps(json_schema()))
+    check = jsonschema.Draft202012Validator(schema)
+    check.check_schema(schema)
+    for text in [template_text(), *(builtin_text(name) for name in builtin_names())]:
+        assert not list(check.iter_errors(tomllib.loads(text)))
+    assert list(check.iter_errors(tomllib.loads(BASE.replace("k_rate", "k_ratee"))))
+    assert list(check.iter_errors(tomllib.loads(BASE.replace("[orbit]", "[orbits]"))))
+
+
+def test_template_runs_as_it_is_and_names_every_key():
+    scenario = parse(template_text(), "new.toml")
+    assert len(scenario.laws) == 4
+    from starhold.scenario.schema import ScenarioTable
+
+    for name, field in ScenarioTable.model_fields.items():
+        options = [field.annotation, *getattr(field.annotation, "__args__", ())]
+        for model in (o for o in options if hasattr(o, "model_fields")):
+            assert f"[{name}]" in template_text()
+            for key in model.model_fields:
+                assert f"{key} = " in template_text()
+
+
+@given(st.floats(-1e12, 1e12, allow_nan=False))
+def test_numbers_read_as_they_are_written(value):
+    read = reader(Gain("N m"))
+    assert read(value) == value
+    assert read(f"{value!r} N m") == pytest.approx(value, rel=1e-15)
+
+
+@given(st.text(max_size=12))
+def test_any_text_gives_a_number_or_one_line(text):
+    from pydantic_core import PydanticCustomError
+
+    try:
+        assert math.isfinite(reader(Gain("N m"))(text))
+    except PydanticCustomError as error:
+        assert "\n" not in error.message()
+
+
+@given(st.sampled_from(sorted(catalogue())))
+def test_gains_survive_toml_exactly(name):
+    law = catalogue()[name]
+    head = BASE[: BASE.index("[[law]]")]
+    for gains in law.examples():
+        assert parse(head + law_table(law, gains), "x").laws[0].gains == gains
