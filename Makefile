@@ -25,6 +25,7 @@ bench: $(VENV)/.bench
 	for script in benchmarks/[a-z]*.py; do case $$script in */common.py) ;; *) echo "== $$script"; $(BIN)/python $$script ;; esac; done
 
 docs: $(VENV)/.docs
+	$(BIN)/python docs/generate.py
 	$(BIN)/mkdocs build --strict
 
 $(VENV)/.run: pyproject.toml constraints.txt

@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Annotated, Any, NamedTuple, cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -22,7 +22,8 @@ from starhold.algebra.quaternion import Quaternion, vector_part
 from starhold.algebra.scalar import equation
 from starhold.algebra.vector import ZERO, Vector, add, scale
 from starhold.laws.catalogue import Law
-from starhold.laws.interface import Card, Gain, NoMemory, Seen
+from starhold.laws.interface import Card, NoMemory, Seen
+from starhold.laws.pd import Gains
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.models.craft import EARTH, Craft, make_craft
 from starhold.models.rigid_body import State
@@ -31,8 +32,8 @@ PERIOD = 0.1
 INERTIA = (2.0, 3.0, 4.0)
 PUBLISHED = State((0.0, *(3.0**-0.5,) * 3), (0.04, 0.03, 0.02), (7e6, 0.0, 0.0), (0.0, 7550.0, 0.0), ZERO)
 """The published start. It is half a turn from the target, where the two sets of Rodrigues parameters meet."""
-START = PUBLISHED._replace(attitude=(0.2, 0.4, -0.7, 0.31**0.5))
-"""A start away from half a turn, for laws that have to choose between the two sets."""
+START = PUBLISHED._replace(attitude=(0.01, 0.4, 0.7, 0.3499**0.5))
+"""A start just short of half a turn, which the rate carries past it."""
 
 
 def header(*packages: str) -> str:
@@ -90,18 +91,11 @@ def show(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     print()
 
 
-class FeedbackGains(NamedTuple):
-    """Gains of the feedback on modified Rodrigues parameters."""
-
-    k: Annotated[float, Gain("N m", above=0.0, text="stiffness")]
-    p: Annotated[float, Gain("N m s", above=0.0, text="damping")]
-
-
 @equation
-def feedback(seen: Seen, gains: FeedbackGains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
-    """u = -k sigma - p w, sigma = q/(1 + q0); the loop shows it the quaternion with q0 >= 0, so |sigma| <= 1."""
+def feedback(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
+    """u = -k_attitude sigma - k_rate w, sigma = q/(1 + q0); shown the quaternion with q0 >= 0, it keeps |sigma| <= 1."""
     q = seen.attitude
-    return add(scale(-gains.k / (1.0 + q[0]), vector_part(q)), scale(-gains.p, seen.rate)), memory
+    return add(scale(-gains.k_attitude / (1.0 + q[0]), vector_part(q)), scale(-gains.k_rate, seen.rate)), memory
 
 
 @equation
@@ -116,7 +110,7 @@ def _as_law(name: str, torque: Callable[..., Any]) -> Law:
 
 
 FEEDBACK = _as_law("feedback", feedback)
-FEEDBACK_GAINS = FeedbackGains(0.036, 0.09)
+FEEDBACK_GAINS = Gains(k_rate=0.09, k_attitude=0.036)
 STEADY = _as_law("steady", steady)
 STEADY_TORQUE: Vector = (1e-4, -2e-4, 1.5e-4)
 
@@ -227,7 +221,7 @@ def _flight_software(simulation: Any, body: Any, actuator: Any) -> list[Any]:
     error.attRefInMsg.subscribeTo(goal.attRefOutMsg)
     law = mrpFeedback.mrpFeedback()
     law.guidInMsg.subscribeTo(error.attGuidOutMsg)
-    law.K, law.P, law.Ki = FEEDBACK_GAINS.k, FEEDBACK_GAINS.p, -1.0
+    law.K, law.P, law.Ki = FEEDBACK_GAINS.k_attitude, FEEDBACK_GAINS.k_rate, -1.0
     known = messaging.VehicleConfigMsgPayload()
     known.ISCPntB_B = np.diag(INERTIA).ravel().tolist()
     told = messaging.VehicleConfigMsg().write(known)
@@ -249,10 +243,10 @@ def _python_control(simulation: Any, body: Any, actuator: Any, control: Control)
             self.ModelTag = "controller"
             self.command = messaging.CmdTorqueBodyMsg()
 
-        def Reset(self, CurrentSimNanos: int) -> None:
+        def Reset(self, CurrentSimNanos: int) -> None:  # noqa: N802 Basilisk calls it by this name
             pass
 
-        def UpdateState(self, CurrentSimNanos: int) -> None:
+        def UpdateState(self, CurrentSimNanos: int) -> None:  # noqa: N802
             reached = body.scStateOutMsg.read()
             torque = control(_quaternion(reached.sigma_BN), np.array(reached.omega_BN_B), np.array(reached.r_CN_N))
             payload = messaging.CmdTorqueBodyMsgPayload()

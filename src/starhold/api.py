@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from starhold.report import compare as comparing
 from starhold.scenario import reading
 from starhold.scenario.building import build
-from starhold.simulate import lane
+from starhold.simulation import lane
 
 if TYPE_CHECKING:
     import xarray as xr

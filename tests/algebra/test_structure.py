@@ -174,9 +174,14 @@ def test_plain_and_compiled_store_write_alike():
     store(x, 1, (1.0, 2.0, 3.0))
     compiled_store(x, 2, (1.0, 2.0, 3.0))
     np.testing.assert_array_equal(x[:, 1], x[:, 2])
-    store(x, 0, Empty())
-    compiled_store(x, 0, Empty())
     np.testing.assert_array_equal(x[:, [0, 3]], before[:, [0, 3]])
+
+
+@pytest.mark.parametrize(("put", "get"), [(store, load), (compiled_store, compiled_load)])
+def test_a_state_without_numbers(put, get):
+    x = numbered(0, 4)
+    put(x, 2, Empty())
+    assert get(x, 2, Empty()) == Empty()
 
 
 @pytest.mark.parametrize("lanes", LANE_COUNTS)

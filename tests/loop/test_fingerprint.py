@@ -15,7 +15,7 @@ from pathlib import Path
 from starhold.conformance.bench import sample_loop
 from starhold.laws.catalogue import from_file
 from starhold.loop.kernels import make_kernels
-from starhold.simulate.lane import fly
+from starhold.simulation.lane import fly
 law = from_file(Path(sys.argv[1]))
 loop = sample_loop(law, law.examples()[0])
 print(repr(fly(loop, 5)[1].command))
@@ -43,7 +43,8 @@ def test_second_start_does_not_compile_and_an_edit_does(flown, tmp_path):
     law = tmp_path / "edited.py"
     law.write_text(
         text.replace("scale(-gains.k_rate,", "scale(FACTOR * gains.k_rate,").replace(
-            "from starhold.models.craft import Craft", "from starhold.models.craft import Craft\nfrom my_constants import FACTOR"
+            "from starhold.models.craft import Craft",
+            "from starhold.models.craft import Craft\nfrom my_constants import FACTOR",
         )
     )
     law.write_text(f"import sys\nsys.path.insert(0, {str(tmp_path)!r})\n" + law.read_text().replace("from __future__", "#"))

@@ -13,7 +13,7 @@ from starhold.loop.closed_loop import ClosedLoop
 from starhold.models.actuator import Dynamics
 from starhold.models.craft import make_craft
 from starhold.models.rigid_body import State, angular_momentum, kinetic_energy
-from starhold.simulate.lane import fly
+from starhold.simulation.lane import fly
 
 J = np.array([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]])
 MU = 3.986e14
@@ -133,7 +133,9 @@ def test_limits_hold(kind):
 
 
 def test_motion_too_fast_to_follow_is_reported_and_ends_the_samples():
-    wild = loop("pd", gains=catalogue()["pd"].gains(40.0, 0.01), orbit=False, gravity_gradient=False, limit="none", period=0.5)
+    wild = loop(
+        "pd", gains=catalogue()["pd"].gains(40.0, 0.01), orbit=False, gravity_gradient=False, limit="none", period=0.5
+    )
     samples, carry = fly(wild, 2000)
     assert 0 < carry.lost_at < 2000
     assert samples.shape[1] == carry.lost_at

@@ -84,7 +84,11 @@ FAULTS = {
     "unknown mode": ('mode = "inertial"', 'mode = "inertia"', ["target.mode", "inertial"]),
     "unknown cover": ("k_rate = 0.09", 'k_rate = 0.09\ndouble_cover = "short"', ["law[1].double_cover", "shortest"]),
     "form of a law without": ("k_rate = 0.09", 'k_rate = 0.09\nform = "I"', ["law[1].form"]),
-    "gravity without orbit": ("[orbit]\nposition = [7.0e6, 0, 0]         # m, inertial\nvelocity = [0, 7550, 0]", "#", ["gravity"]),
+    "gravity without orbit": (
+        "[orbit]\nposition = [7.0e6, 0, 0]         # m, inertial\nvelocity = [0, 7550, 0]",
+        "#",
+        ["gravity"],
+    ),
     "centre of the Earth": ("position = [7.0e6, 0, 0]", "position = [0, 0, 0]", ["orbit.position", "away from the centre"]),
     "history without file": ('mode = "inertial"\nattitude = [1, 0, 0, 0]', 'mode = "history"', ["target.file"]),
     "missing history": (
@@ -92,7 +96,11 @@ FAULTS = {
         'mode = "history"\nfile = "no.csv"',
         ["target.file", "no.csv"],
     ),
-    "attitude twice": ("attitude = [0, 1, 1, 1]", "attitude = [0, 1, 1, 1]\nangles = [0, 0, 0]", ["initial.angles", "either"]),
+    "attitude twice": (
+        "attitude = [0, 1, 1, 1]",
+        "attitude = [0, 1, 1, 1]\nangles = [0, 0, 0]",
+        ["initial.angles", "either"],
+    ),
     "not TOML": ("[orbit]", "[orbit", ["not TOML"]),
 }
 
@@ -113,7 +121,9 @@ def test_file_without_laws():
 
 
 def test_names_must_differ():
-    text = BASE.replace('type = "lyapunov"', 'type = "lyapunov"\nname = "a"').replace('type = "sliding"', 'type = "sliding"\nname = "a"')
+    text = BASE.replace('type = "lyapunov"', 'type = "lyapunov"\nname = "a"').replace(
+        'type = "sliding"', 'type = "sliding"\nname = "a"'
+    )
     with pytest.raises(InputError, match=r"law\[2\]\.name"):
         parse(text, "my.toml")
     for name in ("../evil", "a/b", ".hidden", ""):
@@ -166,7 +176,7 @@ def test_design_form_gives_gains():
 def test_relative_start_is_relative_to_the_target():
     scenario = load("geostationary")
     loop = build(scenario, scenario.laws[0])
-    from starhold.simulate.lane import fly
+    from starhold.simulation.lane import fly
 
     samples, _ = fly(loop, 1)
     from starhold.algebra.cosines import from_angles
@@ -186,7 +196,14 @@ def test_history_file(tmp_path):
     table = build(scenario, scenario.laws[0]).target
     assert table.shape == (6001, 10)
     assert table[3000, 5] == pytest.approx(2e-3, rel=1e-3)
-    for bad in ("0,1,0,0,0\n", "0,1,0,0,0\n0,1,0,0,0\n", "0,0,0,0,0\n700,1,0,0,0\n", "0,1,0,0,0\n5,1,0,0,0\n", "a,b\nc,d\n", ""):
+    for bad in (
+        "0,1,0,0,0\n",
+        "0,1,0,0,0\n0,1,0,0,0\n",
+        "0,0,0,0,0\n700,1,0,0,0\n",
+        "0,1,0,0,0\n5,1,0,0,0\n",
+        "a,b\nc,d\n",
+        "",
+    ):
         (tmp_path / "h.csv").write_text(bad)
         with pytest.raises(InputError, match=r"target\.file"):
             build(load(tmp_path / "s.toml"), scenario.laws[0])

@@ -165,13 +165,12 @@ def check_law(path: Annotated[Path, typer.Argument(metavar="FILE", help="a Pytho
     """Run the conformance suite over a law of your own."""
     from starhold.cli.show import console
     from starhold.conformance.suite import examine
-    from starhold.laws.catalogue import adopt, from_file
+    from starhold.laws.catalogue import from_file
 
     if not path.is_file():
         raise InputError(str(path), "", "no such file", "a Python file with CARD, Gains, torque and examples")
     try:
         law = from_file(path)
-        adopt(law)
     except Exception as error:
         raise InputError(str(path), "", f"{type(error).__name__}: {error}", "a Python file that holds a law") from None
     failed = 0

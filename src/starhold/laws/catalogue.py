@@ -5,7 +5,8 @@ from __future__ import annotations
 import importlib.util
 import pkgutil
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -82,24 +83,34 @@ def catalogue() -> dict[str, Law]:
     return {law.name: law for law in sorted(found, key=lambda law: law.name)}
 
 
-def adopt(law: Law) -> None:
-    """Make a law from elsewhere known to this process; ValueError when its name is taken by another file."""
-    known = catalogue().get(law.name)
-    if known is not None and known.module.__file__ != law.module.__file__:
+@contextmanager
+def adopted(law: Law) -> Iterator[None]:
+    """Make a law from elsewhere known for a while; ValueError when its name is taken by another file."""
+    known = catalogue()
+    if known.get(law.name, law).module.__file__ != law.module.__file__:
         raise ValueError(f"a law named {law.name} exists already; rename the file")
-    catalogue()[law.name] = law
+    before = known.get(law.name)
+    known[law.name] = law
+    try:
+        yield
+    finally:
+        del known[law.name]
+        if before is not None:
+            known[law.name] = before
 
 
 def from_file(path: Path) -> Law:
     """The law in a file outside the package. ValueError when it lacks a part of the interface."""
-    spec = importlib.util.spec_from_file_location(path.stem, path)
+    # A name of its own, so that a file called random.py does not hide the library's.
+    name = f"starhold_law_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise ValueError(f"{path}: not a Python file")
     module = importlib.util.module_from_spec(spec)
     # Registered so that the equations' sources and NamedTuples can be found by their module name.
-    sys.modules[path.stem] = module
+    sys.modules[name] = module
     spec.loader.exec_module(module)
-    return _as_law(module)
+    return _as_law(module, path.stem)
 
 
 def _declares_card(entry: pkgutil.ModuleInfo) -> bool:
@@ -108,8 +119,9 @@ def _declares_card(entry: pkgutil.ModuleInfo) -> bool:
     return origin is not None and "\nCARD = " in Path(origin).read_text(encoding="utf-8")
 
 
-def _as_law(module: ModuleType) -> Law:
+def _as_law(module: ModuleType, name: str | None = None) -> Law:
     missing = [name for name in INTERFACE if not hasattr(module, name)]
     if missing:
         raise ValueError(f"{module.__file__}: a law needs {', '.join(missing)}")
-    return Law(module.__name__.rpartition(".")[2].replace("_", "-"), module)
+    name = module.__name__.rpartition(".")[2] if name is None else name
+    return Law(name.replace("_", "-"), module)

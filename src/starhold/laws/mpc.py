@@ -3,7 +3,7 @@ applied."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, cast
 
 import numpy as np
 from scipy.linalg import solve_discrete_are  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
@@ -91,21 +91,22 @@ def terminal_weight(gains: Gains, craft: Craft, period: float) -> tuple[Any, Any
     """
     # In periods and in a typical torque, so that the weights of any craft are of comparable size.
     inertia = tensor(craft.inertia)
+    riccati = cast(Any, solve_discrete_are)
     typical = np.trace(inertia) / 3.0
     push = typical * np.linalg.inv(inertia)
     a = np.block([[np.eye(3), 0.5 * np.eye(3)], [np.zeros((3, 3)), np.eye(3)]])
-    b = np.vstack([0.25 * push, push])
+    b = cast(Any, np.vstack([0.25 * push, push]))
     q = np.diag([*gains.q_attitude, *(weight / period**2 for weight in gains.q_rate)])
     r = np.diag(gains.r) * (typical / period**2) ** 2
     name = TERMINALS[gains.terminal]
     p: Any = q if name == "stage" else np.zeros((6, 6))
     if name == "riccati":
         try:
-            p = solve_discrete_are(a, b, q, r)
+            p = riccati(a, b, q, r)
         except (np.linalg.LinAlgError, ValueError) as error:
             raise ValueError(f"the weights give no terminal weight: {error}") from None
         p = 0.5 * (p + p.T)
-    feedback = np.linalg.solve(r + b.T @ p @ b, b.T @ p @ a)
+    feedback = cast(Any, np.linalg.solve(r + b.T @ p @ b, b.T @ p @ a))
     units = np.array([1.0, 1.0, 1.0, period, period, period])
     return p * np.outer(units, units), feedback * units * (typical / period**2)
 
@@ -139,7 +140,8 @@ def first_move(seen: Seen, gains: Gains, craft: Craft, memory: Memory) -> Vector
     counters[SWEEPS] += sweeps
     counters[WORST] = max(counters[WORST], sweeps)
     counters[EXHAUSTED] += 0 if solved else 1
-    counters[SHAPED] = 1 if shaped else 0
+    # A plan that is not finite must not start the next one.
+    counters[SHAPED] = 1 if shaped and abs(plan[0]) < np.inf else 0
     command = add((plan[0], plan[1], plan[2]), ahead)
     # Adding the tracking torque back rounds; the limit is kept exactly.
     return clip_norm(command, bound) if ball else clip_axes(command, bound)

@@ -36,6 +36,8 @@ class Space(NamedTuple):
     step: Any
     feedback: Any
     stiffness: Any
+    multipliers: Any
+    spare: Any
     value: Any
     small: Any
 
@@ -69,12 +71,12 @@ class Store(NamedTuple):
 
 
 FIXED = 312
-PER_MOVE = 40
+PER_MOVE = 46
 """A store has FIXED + 12 numbers, and PER_MOVE for each move; the 12 are the state's at the end of the horizon."""
 
 
 @equation
-def carve(numbers, horizon):
+def carve(numbers: Any, horizon: int) -> Store:
     """The store that lives in the flat array of `make_store`: views, nothing is copied.
 
     One array rather than twenty travels with a trajectory; that halves the time a kernel takes to compile.
@@ -89,6 +91,8 @@ def carve(numbers, horizon):
         per[18 * n + 12 : 21 * n + 12],
         per[21 * n + 12 : 39 * n + 12],
         per[39 * n + 12 : 40 * n + 12],
+        per[40 * n + 12 : 43 * n + 12],
+        per[43 * n + 12 : 46 * n + 12],
         numbers[162:204],
         numbers[204:312],
     )
@@ -105,13 +109,13 @@ def carve(numbers, horizon):
 
 
 @equation
-def make_store(horizon):
+def make_store(horizon: int) -> Any:
     """The numbers of a store for that many moves, all zero."""
     return np.zeros(FIXED + 12 + PER_MOVE * horizon)
 
 
 @compiled
-def linearise(seen, craft, a, b):
+def linearise(seen: Any, craft: Any, a: Any, b: Any) -> None:
     """Fill a (36) and b (18) with A_c and B_c of x' = A_c x + B_c u for x = (q; w), small about the motion seen.
 
     A_c = [[-[w]x, E/2], [J^-1 G, J^-1 ([Jw]x - [w]x J)]], B_c = [0; J^-1], G = 6 (mu/R^5) ([R]x J - [JR]x) [R]x with
@@ -142,7 +146,7 @@ def linearise(seen, craft, a, b):
 
 
 @compiled
-def hold(a, b, period, work):
+def hold(a: Any, b: Any, period: float, work: Any) -> None:
     """Exact sampling with a held input, in place: a = exp(A_c h), b = (integral of exp(A_c s) over 0..h) B_c.
 
     Both come from S = sum of (A_c h)^k / (k + 1)!, which loses no digits where A_c is singular. work holds 108 numbers.
@@ -293,6 +297,51 @@ def loose(problem, v, g):
         return g
     fixed = held(problem, v, g)
     return (0.0 if fixed[0] else g[0], 0.0 if fixed[1] else g[1], 0.0 if fixed[2] else g[2])
+
+
+@equation
+def slack(problem, v):
+    """(bound2 - d2)/2 for d = v - centre: on each axis of a box, or thrice that of a ball; positive inside."""
+    c, bound = problem.centre, problem.bound
+    d = (v[0] - c[0], v[1] - c[1], v[2] - c[2])
+    # As a product, which does not cancel near the limit.
+    if problem.ball:
+        size = math.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+        s = 0.5 * (bound - size) * (bound + size)
+        return (s, s, s)
+    return (
+        0.5 * (bound - d[0]) * (bound + d[0]),
+        0.5 * (bound - d[1]) * (bound + d[1]),
+        0.5 * (bound - d[2]) * (bound + d[2]),
+    )
+
+
+@equation
+def repelled(problem, v, multipliers, barrier, m):
+    """A symmetric matrix with the curvature of the limits added, and their push: the interior-point step."""
+    c, s = problem.centre, slack(problem, v)
+    d = (v[0] - c[0], v[1] - c[1], v[2] - c[2])
+    push = (barrier / s[0] * d[0], barrier / s[1] * d[1], barrier / s[2] * d[2])
+    if problem.ball:
+        y = multipliers[0]
+        z = y / s[0]
+        return (
+            m[0] + y + z * d[0] * d[0],
+            m[1] + z * d[0] * d[1],
+            m[2] + z * d[0] * d[2],
+            m[3] + y + z * d[1] * d[1],
+            m[4] + z * d[1] * d[2],
+            m[5] + y + z * d[2] * d[2],
+        ), push
+    y0, y1, y2 = multipliers
+    return (
+        m[0] + y0 * (1.0 + d[0] * d[0] / s[0]),
+        m[1],
+        m[2],
+        m[3] + y1 * (1.0 + d[1] * d[1] / s[1]),
+        m[4],
+        m[5] + y2 * (1.0 + d[2] * d[2] / s[2]),
+    ), push
 
 
 @equation

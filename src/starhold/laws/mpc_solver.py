@@ -6,232 +6,30 @@ The method is a projected Newton method of two metrics (Bertsekas 1982, "Project
 problems with simple constraints"). What presses against a limit is held there, for a ball with the curvature of the
 sphere; the rest takes the Newton step, which one backward Riccati sweep gives in time proportional to N. The step is
 flown with its feedback through the limits, so moves further on already answer to those that were cut; where that does
-not bring the cost down, a search along the projected line does, and where that fails too, a scaled gradient step, which
-always does. A run ends when the gap to the optimum is proved small: for multipliers of the right sign, strong
-convexity bounds the gap of half the cost by g'R^-1 g / 2, g being the gradient that is not held.
+not bring the cost down, a search along the projected line does. Programs on which this is slow are handed to an
+interior-point method, whose answer is the next start; a scaled gradient step, which always descends, is the last
+resort. A run ends when the gap to the optimum is proved small: for multipliers of the right sign, strong convexity
+bounds the gap of half the cost by g'R^-1 g / 2, g being the gradient that is not held.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from starhold.algebra.scalar import equation
-from starhold.laws.mpc_problem import (
-    Problem,
-    box_inverse,
-    carve,
-    compiled,
-    held,
-    inverse3,
-    loose,
-    make_store,
-    plane_inverse,
-    pressure,
-    project,
-    put,
-    triple,
-)
+from starhold.laws.mpc_horizon import adjoint, form, form3, rollout, sweep, transition, unroll
+from starhold.laws.mpc_problem import Problem, carve, compiled, make_store, project, put, slack, triple
 
 TOLERANCE = 1e-16
 """Relative gap of the objective at which a solution is accepted."""
 SUFFICIENT = 1e-4
 """Share of the decrease promised by the slope that a step must bring."""
 HALVINGS = 8
-
-
-@equation
-def transition(problem, x, o, v, y, p):
-    """y[p:p+6] = A x[o:o+6] + B v."""
-    a, b = problem.a, problem.b
-    for i in range(6):
-        s = b[3 * i] * v[0] + b[3 * i + 1] * v[1] + b[3 * i + 2] * v[2]
-        for j in range(6):
-            s += a[6 * i + j] * x[o + j]
-        y[p + i] = s
-
-
-@equation
-def form(m, x, o):
-    """x'Mx for a 6x6 M and x[o:o+6]."""
-    total = 0.0
-    for i in range(6):
-        s = 0.0
-        for j in range(6):
-            s += m[6 * i + j] * x[o + j]
-        total += s * x[o + i]
-    return total
-
-
-@equation
-def form3(m, v):
-    """v'Mv for a 3x3 M."""
-    return (
-        v[0] * (m[0] * v[0] + m[1] * v[1] + m[2] * v[2])
-        + v[1] * (m[3] * v[0] + m[4] * v[1] + m[5] * v[2])
-        + v[2] * (m[6] * v[0] + m[7] * v[1] + m[8] * v[2])
-    )
-
-
-@compiled
-def rollout(problem, plan, x):
-    """States under the plan from x[0:6]; half the cost."""
-    n = plan.size // 3
-    total = 0.0
-    for k in range(n):
-        v = triple(plan, k)
-        total += form(problem.q, x, 6 * k) + form3(problem.r, v)
-        transition(problem, x, 6 * k, v, x, 6 * k + 6)
-    return 0.5 * (total + form(problem.p, x, 6 * n))
-
-
-@compiled
-def adjoint(problem, plan, space):
-    """The gradient of half the cost, and a bound on its gap to the optimum if all that is held has to be."""
-    a, b, q, r, x = problem.a, problem.b, problem.q, problem.r, space.states
-    n = plan.size // 3
-    y = space.small
-    for i in range(6):
-        s = 0.0
-        for j in range(6):
-            s += problem.p[6 * i + j] * x[6 * n + j]
-        y[i] = s
-    gap = 0.0
-    for k in range(n - 1, -1, -1):
-        v = triple(plan, k)
-        for i in range(3):
-            s = r[3 * i] * v[0] + r[3 * i + 1] * v[1] + r[3 * i + 2] * v[2]
-            for j in range(6):
-                s += b[3 * j + i] * y[j]
-            space.gradient[3 * k + i] = s
-        g = triple(space.gradient, k)
-        gap += form3(problem.r_inverse, loose(problem, v, g))
-        for i in range(6):
-            s = 0.0
-            for j in range(6):
-                s += q[6 * i + j] * x[6 * k + j] + a[6 * j + i] * y[j]
-            y[6 + i] = s
-        for i in range(6):
-            y[i] = y[6 + i]
-    return 0.5 * gap
-
-
-@compiled
-def sweep(problem, plan, space):
-    """One backward Riccati sweep: the Newton step as a policy, step + feedback (x - x of the plan). With a
-    gradient of zeros nothing is held, which gives the policy without limits. Returns the Newton decrement and the number
-    of limits held."""
-    a, b, q, r, value, small = problem.a, problem.b, problem.q, problem.r, space.value, space.small
-    n = plan.size // 3
-    va, vb, qux = 0, 36, 54
-    decrement, holding = 0.0, 0
-    for i in range(36):
-        value[i] = problem.p[i]
-    for i in range(36, 42):
-        value[i] = 0.0
-    for k in range(n - 1, -1, -1):
-        for i in range(6):
-            w0, w1, w2, w3, w4, w5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            y0, y1, y2 = 0.0, 0.0, 0.0
-            for j in range(6):
-                s = value[6 * i + j]
-                w0 += s * a[6 * j]
-                w1 += s * a[6 * j + 1]
-                w2 += s * a[6 * j + 2]
-                w3 += s * a[6 * j + 3]
-                w4 += s * a[6 * j + 4]
-                w5 += s * a[6 * j + 5]
-                y0 += s * b[3 * j]
-                y1 += s * b[3 * j + 1]
-                y2 += s * b[3 * j + 2]
-            small[va + 6 * i], small[va + 6 * i + 1], small[va + 6 * i + 2] = w0, w1, w2
-            small[va + 6 * i + 3], small[va + 6 * i + 4], small[va + 6 * i + 5] = w3, w4, w5
-            small[vb + 3 * i], small[vb + 3 * i + 1], small[vb + 3 * i + 2] = y0, y1, y2
-        m0, m1, m2, m3, m4, m5 = r[0], r[1], r[2], r[4], r[5], r[8]
-        g0, g1, g2 = 0.0, 0.0, 0.0
-        for j in range(6):
-            b0, b1, b2 = b[3 * j], b[3 * j + 1], b[3 * j + 2]
-            y0, y1, y2 = small[vb + 3 * j], small[vb + 3 * j + 1], small[vb + 3 * j + 2]
-            m0 += b0 * y0
-            m1 += b0 * y1
-            m2 += b0 * y2
-            m3 += b1 * y1
-            m4 += b1 * y2
-            m5 += b2 * y2
-            s = value[36 + j]
-            g0 += b0 * s
-            g1 += b1 * s
-            g2 += b2 * s
-        m = (m0, m1, m2, m3, m4, m5)
-        for i in range(3):
-            w0, w1, w2, w3, w4, w5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            for j in range(6):
-                s = b[3 * j + i]
-                w0 += s * small[va + 6 * j]
-                w1 += s * small[va + 6 * j + 1]
-                w2 += s * small[va + 6 * j + 2]
-                w3 += s * small[va + 6 * j + 3]
-                w4 += s * small[va + 6 * j + 4]
-                w5 += s * small[va + 6 * j + 5]
-            small[qux + 6 * i], small[qux + 6 * i + 1], small[qux + 6 * i + 2] = w0, w1, w2
-            small[qux + 6 * i + 3], small[qux + 6 * i + 4], small[qux + 6 * i + 5] = w3, w4, w5
-        v, g = triple(plan, k), triple(space.gradient, k)
-        g0, g1, g2 = g0 + g[0], g1 + g[1], g2 + g[2]
-        space.stiffness[k] = m0 + m3 + m5
-        if problem.ball:
-            normal, multiplier = pressure(problem, v, g)
-            if multiplier > 0.0:
-                holding += 1
-                w = plane_inverse(m, normal, multiplier)
-            else:
-                w = inverse3(m)
-        else:
-            fixed = held(problem, v, g)
-            holding += fixed[0] + fixed[1] + fixed[2]
-            w = box_inverse(m, fixed)
-        e0 = -(w[0] * g0 + w[1] * g1 + w[2] * g2)
-        e1 = -(w[1] * g0 + w[3] * g1 + w[4] * g2)
-        e2 = -(w[2] * g0 + w[4] * g1 + w[5] * g2)
-        decrement -= e0 * g0 + e1 * g1 + e2 * g2
-        put(space.step, k, (e0, e1, e2))
-        o = 18 * k
-        feedback = space.feedback
-        for j in range(6):
-            s0, s1, s2 = small[qux + j], small[qux + 6 + j], small[qux + 12 + j]
-            feedback[o + j] = -(w[0] * s0 + w[1] * s1 + w[2] * s2)
-            feedback[o + 6 + j] = -(w[1] * s0 + w[3] * s1 + w[4] * s2)
-            feedback[o + 12 + j] = -(w[2] * s0 + w[4] * s1 + w[5] * s2)
-        if k > 0:
-            for i in range(6):
-                s0, s1, s2 = small[qux + i], small[qux + 6 + i], small[qux + 12 + i]
-                t = s0 * e0 + s1 * e1 + s2 * e2
-                for j in range(6):
-                    t += a[6 * j + i] * value[36 + j]
-                small[72 + i] = t
-                w0 = q[6 * i] + s0 * feedback[o] + s1 * feedback[o + 6] + s2 * feedback[o + 12]
-                w1 = q[6 * i + 1] + s0 * feedback[o + 1] + s1 * feedback[o + 7] + s2 * feedback[o + 13]
-                w2 = q[6 * i + 2] + s0 * feedback[o + 2] + s1 * feedback[o + 8] + s2 * feedback[o + 14]
-                w3 = q[6 * i + 3] + s0 * feedback[o + 3] + s1 * feedback[o + 9] + s2 * feedback[o + 15]
-                w4 = q[6 * i + 4] + s0 * feedback[o + 4] + s1 * feedback[o + 10] + s2 * feedback[o + 16]
-                w5 = q[6 * i + 5] + s0 * feedback[o + 5] + s1 * feedback[o + 11] + s2 * feedback[o + 17]
-                for j in range(6):
-                    s = a[6 * j + i]
-                    w0 += s * small[va + 6 * j]
-                    w1 += s * small[va + 6 * j + 1]
-                    w2 += s * small[va + 6 * j + 2]
-                    w3 += s * small[va + 6 * j + 3]
-                    w4 += s * small[va + 6 * j + 4]
-                    w5 += s * small[va + 6 * j + 5]
-                value[6 * i], value[6 * i + 1], value[6 * i + 2] = w0, w1, w2
-                value[6 * i + 3], value[6 * i + 4], value[6 * i + 5] = w3, w4, w5
-            for i in range(6):
-                value[36 + i] = small[72 + i]
-                for j in range(i):
-                    # Kept symmetric against rounding, which long horizons would amplify.
-                    s = 0.5 * (value[6 * i + j] + value[6 * j + i])
-                    value[6 * i + j], value[6 * j + i] = s, s
-    return decrement, holding
+PATIENCE = 12
+"""Sweeps without a solution after which the interior-point method takes over."""
+INTERIOR_SWEEPS = 30
 
 
 @compiled
@@ -254,24 +52,6 @@ def follow(problem, plan, space):
         put(space.trial, k, w)
         transition(problem, bend, 6 * k, (w[0] - v[0], w[1] - v[1], w[2] - v[2]), bend, 6 * k + 6)
     return cut
-
-
-@compiled
-def unroll(plan, problem, space):
-    """Turn the policy into a direction: step becomes the Newton step without limits."""
-    bend, feedback = space.bend, space.feedback
-    for i in range(6):
-        bend[i] = 0.0
-    for k in range(plan.size // 3):
-        d0, d1, d2 = triple(space.step, k)
-        o = 18 * k
-        for j in range(6):
-            s = bend[6 * k + j]
-            d0 += feedback[o + j] * s
-            d1 += feedback[o + 6 + j] * s
-            d2 += feedback[o + 12 + j] * s
-        put(space.step, k, (d0, d1, d2))
-        transition(problem, bend, 6 * k, (d0, d1, d2), bend, 6 * k + 6)
 
 
 @compiled
@@ -300,7 +80,8 @@ def change(problem, plan, space):
 
 @compiled
 def search(problem, plan, space, decrement):
-    """A trial plan that brings the cost down; returns the change of half the cost, zero where rounding hides any."""
+    """A trial plan along the Newton step that brings the cost down; returns the change of half the cost, zero where
+    none was found."""
     slope, curvature = change(problem, plan, space)
     if slope + 0.5 * curvature <= -0.25 * decrement:
         return slope + 0.5 * curvature
@@ -312,7 +93,13 @@ def search(problem, plan, space, decrement):
         if slope < 0.0 and slope + 0.5 * curvature <= SUFFICIENT * slope:
             return slope + 0.5 * curvature
         length *= 0.5
-    # The gradient, each move in its own scale: the projection then guarantees descent for short steps.
+    return 0.0
+
+
+@compiled
+def descend(problem, plan, space):
+    """A trial plan along the gradient, each move in its own scale: the projection guarantees descent for short steps.
+    Returns the change of half the cost, zero where rounding hides any."""
     for k in range(plan.size // 3):
         s = -1.0 / space.stiffness[k]
         g = triple(space.gradient, k)
@@ -337,7 +124,83 @@ def accept(plan, space):
 
 
 @compiled
-def improve(problem, plan, space, budget, warm):
+def interior(problem, plan, space, half, budget):
+    """The primal-dual interior-point method (Boyd and Vandenberghe 2004, section 11.7), for programs on which the
+    projected Newton method is slow: it comes near the optimum in a number of sweeps that hardly depends on the program,
+    and what then lies near a limit is put on it. The better of its plan and the one given is kept. Returns the sweeps.
+    """
+    n = plan.size // 3
+    c, bound, spare, multipliers, x = problem.centre, problem.bound, space.spare, space.multipliers, space.states
+    per = 1 if problem.ball else 3
+    count = per * n
+    barrier = 0.1 * half / count
+    for k in range(n):
+        v = triple(plan, k)
+        put(spare, k, v)
+        w = (c[0] + 0.9 * (v[0] - c[0]), c[1] + 0.9 * (v[1] - c[1]), c[2] + 0.9 * (v[2] - c[2]))
+        put(plan, k, w)
+        s = slack(problem, w)
+        put(multipliers, k, (barrier / s[0], barrier / s[1], barrier / s[2]))
+    now = rollout(problem, plan, x)
+    sweeps = 0
+    while sweeps < min(budget, INTERIOR_SWEEPS):
+        adjoint(problem, plan, space)
+        sweep(problem, plan, space, barrier)
+        sweeps += 1
+        unroll(plan, problem, space)
+        length = 1.0
+        for k in range(n):
+            v, d, s = triple(plan, k), triple(space.step, k), slack(problem, triple(plan, k))
+            e = (v[0] - c[0], v[1] - c[1], v[2] - c[2])
+            dot = (e[0] * d[0], e[1] * d[1], e[2] * d[2])
+            square = (d[0] * d[0], d[1] * d[1], d[2] * d[2])
+            if problem.ball:
+                total, long = dot[0] + dot[1] + dot[2], square[0] + square[1] + square[2]
+                dot, square = (total, total, total), (long, long, long)
+            for i in range(per):
+                old = multipliers[3 * k + i]
+                new = barrier / s[i] - old + old / s[i] * dot[i]
+                space.trial[3 * k + i] = new
+                if new < 0.0:
+                    length = min(length, -0.95 * old / new)
+                # Where the step leaves the limit: slack(v + t d) = 0.
+                ahead = dot[i] + math.sqrt(dot[i] * dot[i] + 2.0 * s[i] * square[i])
+                if ahead > 0.0:
+                    length = min(length, 0.95 * 2.0 * s[i] / ahead)
+        gap = 0.0
+        for k in range(n):
+            v, d = triple(plan, k), triple(space.step, k)
+            w = (v[0] + length * d[0], v[1] + length * d[1], v[2] + length * d[2])
+            put(plan, k, w)
+            s = slack(problem, w)
+            for i in range(per):
+                multipliers[3 * k + i] += length * space.trial[3 * k + i]
+                gap += multipliers[3 * k + i] * s[i]
+        now = rollout(problem, plan, x)
+        barrier = (0.1 if length > 0.5 else 0.5) * gap / count
+        if gap <= 1e-9 * now and length > 0.5:
+            break
+    for k in range(n):
+        v, s = triple(plan, k), slack(problem, triple(plan, k))
+        near = 1e-5 * bound * bound
+        d = (v[0] - c[0], v[1] - c[1], v[2] - c[2])
+        stretch = (
+            2.0 if s[0] < near else 1.0,
+            2.0 if s[per // 2] < near else 1.0,
+            2.0 if s[per - 1] < near else 1.0,
+        )
+        w, _ = project((c[0] + stretch[0] * d[0], c[1] + stretch[1] * d[1], c[2] + stretch[2] * d[2]), problem)
+        put(plan, k, w)
+    now = rollout(problem, plan, x)
+    if not now <= half:
+        for i in range(plan.size):
+            plan[i] = spare[i]
+        rollout(problem, plan, x)
+    return sweeps
+
+
+@compiled
+def improve(problem: Any, plan: Any, space: Any, budget: int, warm: bool) -> tuple[int, bool, bool]:
     """Solve the program from the state in space.states[0:6], starting with `plan` if warm; the plan is overwritten.
 
     Returns the number of Riccati sweeps, whether the optimum was reached within `budget` of them, and whether limits
@@ -353,19 +216,25 @@ def improve(problem, plan, space, budget, warm):
             space.bend[i] = x[i]
         for i in range(6, x.size):
             x[i] = 0.0
-        sweep(problem, plan, space)
+        sweep(problem, plan, space, 0.0)
         sweeps = 1
         cut = follow(problem, plan, space)
         accept(plan, space)
         if not cut:
             return sweeps, True, False
     half = rollout(problem, plan, x)
+    rescued = False
     while True:
         if adjoint(problem, plan, space) <= TOLERANCE * half:
             return sweeps, True, True
         if sweeps >= budget:
             return sweeps, False, True
-        decrement, holding = sweep(problem, plan, space)
+        if sweeps >= PATIENCE and not rescued:
+            sweeps += interior(problem, plan, space, half, budget - sweeps)
+            half = rollout(problem, plan, x)
+            rescued = True
+            continue
+        decrement, holding = sweep(problem, plan, space, 0.0)
         sweeps += 1
         for i in range(6):
             space.bend[i] = 0.0
@@ -380,6 +249,13 @@ def improve(problem, plan, space, budget, warm):
                 return sweeps, True, True
             continue
         fall = search(problem, plan, space, decrement)
+        if fall == 0.0 and decrement > 1e-12 * half and not rescued and sweeps < budget:
+            sweeps += interior(problem, plan, space, half, budget - sweeps)
+            half = rollout(problem, plan, x)
+            rescued = True
+            continue
+        if fall == 0.0:
+            fall = descend(problem, plan, space)
         if fall == 0.0:
             # Rounding hides any further descent.
             return sweeps, decrement <= 1e-12 * half, True
@@ -388,7 +264,7 @@ def improve(problem, plan, space, budget, warm):
 
 
 @compiled
-def advance(problem, plan, tail, space):
+def advance(problem: Any, plan: Any, tail: Any, space: Any) -> None:
     """Shift a solved plan by one move; the last is the feedback -tail x at its end."""
     n = plan.size // 3
     last = 6 * n

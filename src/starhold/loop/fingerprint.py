@@ -1,6 +1,6 @@
 """A hash of all sources that a kernel is built from.
 
-Numba's disk cache watches the file of the kernel alone. A kernel that closes over this hash is looked up anew when any
+Numba's disk cache watches the file of the kernel alone. A kernel that is filed under this hash is looked up anew when any
 equation, model or law has changed, so the cache is never stale.
 """
 

@@ -6,6 +6,7 @@ so one lane, any lane of a batch and plain Python agree bit for bit. No fast-mat
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
@@ -143,18 +144,25 @@ def make_step(parts: Parts) -> Step:
 @cache
 def make_kernels(parts: Parts) -> Kernels:
     """Kernels for these parts, from the disk cache where nothing they are built from has changed."""
-    mark = fingerprint(outside_modules(parts))
-    return Kernels(_one(make_step(parts), mark), _many(make_step(parts), mark))
+    return Kernels(_one(parts), _many(parts))
 
 
-def _one(equations: Step, mark: str) -> Callable[..., Any]:
-    _, decide, hold, check, sample = equations
+def _compile(function: Callable[..., Any], parts: Parts) -> Callable[..., Any]:
+    """Compile a kernel, or find it in the disk cache under a name made of its parts and all their sources.
 
-    @numba.njit(error_model="numpy", cache=True, nogil=True)
+    A name of its own for each kernel also means that a law which is no longer there spoils no other law's cache entry.
+    """
+    mark = fingerprint(outside_modules(parts)) + "".join(f"{part.__module__}.{part.__qualname__}" for part in parts)
+    function.__qualname__ = f"{function.__name__}-{hashlib.sha256(mark.encode()).hexdigest()[:32]}"
+    return numba.njit(error_model="numpy", cache=True, nogil=True)(function)
+
+
+def _one(parts: Parts) -> Callable[..., Any]:
+    _, decide, hold, check, sample = make_step(parts)
+
     def one(carry, first, count, finish, every, run, gains, craft, setup, substeps, out):  # type: ignore[no-untyped-def]
         """Fly control steps first .. first+count-1; write every `every`-th into a column of `out`, and with `finish` the
         end as well. Returns what is carried on; stops where the motion is lost."""
-        _ = mark
         for step in range(first, first + count):
             carry = check(carry, step, setup)
             if carry.lost_at >= 0.0:
@@ -170,17 +178,15 @@ def _one(equations: Step, mark: str) -> Callable[..., Any]:
             store(out, last // every, sample(decide(carry, last, run, gains, craft, setup), last, setup))
         return carry
 
-    return one
+    return _compile(one, parts)
 
 
-def _many(equations: Step, mark: str) -> Callable[..., Any]:
-    _, decide, hold, check, _ = equations
+def _many(parts: Parts) -> Callable[..., Any]:
+    _, decide, hold, check, _ = make_step(parts)
 
-    @numba.njit(error_model="numpy", cache=True, nogil=True)
     def many(x, like, first, count, run, gains, like_gains, craft, like_craft, setup, substeps):  # type: ignore[no-untyped-def]
         """Fly control steps first .. first+count-1 of every lane of the block x, in place; lane 0 is
         run number `run`. Gains and craft are NamedTuples shared by all lanes, or blocks too."""
-        _ = mark
         for step in range(first, first + count):
             for k in range(LANES):
                 c = check(load(x, k, like), step, setup)
@@ -191,19 +197,16 @@ def _many(equations: Step, mark: str) -> Callable[..., Any]:
         for k in range(LANES):
             store(x, k, check(load(x, k, like), first + count, setup))
 
-    return many
+    return _compile(many, parts)
 
 
 @cache
 def make_replay(parts: Parts) -> Callable[..., Any]:
     """A kernel that repeats the control calls of a run, to time them: from the state to the limited command."""
-    mark = fingerprint(outside_modules(parts))
     decide = make_step(parts).decide
 
-    @numba.njit(error_model="numpy", cache=True)
     def replay(samples, first, last, carry, gains, craft, setup):  # type: ignore[no-untyped-def]
         """Decide on the states in columns first .. last-1 of recorded samples, each call after the one before."""
-        _ = mark
         for k in range(first, last):
             # The first rows of a sample are the state; every number of it waits for the torque of the call before.
             u = carry.command
@@ -213,4 +216,4 @@ def make_replay(parts: Parts) -> Callable[..., Any]:
             carry = decide(carry, k, 0, gains, craft, setup)
         return carry
 
-    return replay
+    return _compile(replay, parts)

@@ -15,7 +15,7 @@ from starhold.report.flight import Flight
 from starhold.report.results import SUMMARY, whole, write_run, write_summary
 from starhold.scenario.building import build
 from starhold.scenario.reading import LawEntry, Scenario
-from starhold.simulate.lane import fly, label
+from starhold.simulation.lane import fly, label
 
 Notice: TypeAlias = Callable[[str, int, int], None]
 """Called with a law's name, the control steps done and those in all."""

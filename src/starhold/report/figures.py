@@ -48,6 +48,9 @@ def _over_time(plot: Plot, times: Any, flights: Sequence[Flight], name: str) -> 
             axis.plot(times[: len(curve)], curve, color=colour(number), linewidth=width)
         if panel.log:
             axis.set_yscale("log")
+            # Ticks are what drawing spends its time on.
+            if panel.decades() > 2.0:
+                axis.minorticks_off()
         for level in panel.levels:
             axis.axhline(level, color="0.35", linewidth=0.9, dashes=(5, 3))
         if panel.span is not None:
@@ -68,7 +71,7 @@ def _accuracy(flights: Sequence[Flight], name: str) -> Any:
                 list(DECADES), steps, color=colour(number), linewidth=width, marker="os^Dv<>"[number % 7], markersize=5
             )
         axis.set_xlim(DECADES[0] - 0.4, DECADES[-1] + 0.4)
-        axis.set_ylim(bottom=0.0)
+        axis.set_ylim(0.0, max(axis.get_ylim()[1], 1.0))
         axis.set_xlabel("k")
         axis.set_title(label, fontsize=9)
     axes[0].set_ylabel("control steps")
@@ -93,12 +96,12 @@ def _figure(
     figure = Figure(figsize=(8.0, total), dpi=DPI)
     grid: Any = figure.subplots(rows, columns, sharex=True, squeeze=False)
     figure.subplots_adjust(
-        left=0.098, right=0.985, bottom=0.48 / total, top=1.0 - (head + 0.06) / total, hspace=0.09, wspace=0.14
+        left=0.098, right=0.978, bottom=0.48 / total, top=1.0 - (head + 0.06) / total, hspace=0.09, wspace=0.14
     )
     heading = _short(f"{name}: {title}" if name else title, 86 - len(dashed))
     figure.text(0.098, 1.0 - 0.26 / total, heading, fontsize=11, fontweight="bold", parse_math=False)
     if dashed:
-        figure.text(0.985, 1.0 - 0.26 / total, f"– –  {dashed}", fontsize=8.5, ha="right", color="0.3")
+        figure.text(0.978, 1.0 - 0.26 / total, f"– –  {dashed}", fontsize=8.5, ha="right", color="0.3")
     legend = figure.legend(
         [Line2D([], [], color=colour(number), linewidth=2.2) for number in range(len(flights))],
         [f"law {number}" for number in range(len(flights))],

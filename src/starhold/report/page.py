@@ -29,6 +29,7 @@ EARLY = 1.6
 SECONDS = 14.0
 """How long the animation plays."""
 
+BEST, LOST = '<td class="best">', '<tr class="lost">'
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 
 
@@ -51,8 +52,8 @@ def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
         "<h2>The turning body</h2>",
         _views(flights, data["scene"]),
         "<h2>Over time</h2>",
-        '<p class="note">Click a law in the legend to hide it, double-click to see it alone; drag to zoom, double-click '
-        "to zoom out.</p>",
+        '<p class="note">Click a law in the legend to hide it, double-click to see it alone; drag to zoom, '
+        "double-click to zoom out.</p>",
         *(_plot(plot) for plot in data["plots"]),
         _laws(flights),
         _settings(scenario),
@@ -112,21 +113,21 @@ def _ranking(flights: Sequence[Flight]) -> str:
     for place, name in enumerate(ranked(results), 1):
         flight = flights[numbers[name]]
         lost = flight.lost is not None
-        # Where no law has won because only one is there, nothing is marked.
         cells = "".join(
-            f"<td{' class="best"' if name in best[metric] else ''}>{shown(metric, flight.metrics.get(metric))}</td>"
+            f"{BEST if name in best[metric] else '<td>'}{shown(metric, flight.metrics.get(metric))}</td>"
             for metric in columns
         )
         fate = f"lost at {flight.lost:.6g} s" if lost else flight.law if flight.law != name else ""
         rows.append(
-            f"<tr{' class="lost"' if lost else ''}><td>{place}</td>"
+            f"{LOST if lost else '<tr>'}<td>{place}</td>"
             f'<th scope="row" style="text-align:left">{_swatch(numbers[name])}{escape(name)}'
             f"{f'<small>{escape(fate)}</small>' if fate else ''}</th>{cells}</tr>"
         )
     order = ", then ".join(MEASURES[metric].heading for metric in ORDER)
     return (
         '<h2>Ranking</h2>\n<div class="wide"><table><thead><tr><th scope="col">#</th>'
-        f'<th scope="col" style="text-align:left">law</th>{head}</tr></thead>\n<tbody>{"".join(rows)}</tbody></table></div>\n'
+        f'<th scope="col" style="text-align:left">law</th>{head}</tr></thead>\n'
+        f"<tbody>{''.join(rows)}</tbody></table></div>\n"
         f'<p class="note">Ordered by {escape(order)}; less is better in every column, and the best value is marked. '
         "A dash: never reached, or not measured.</p>"
     )
@@ -139,10 +140,12 @@ def _views(flights: Sequence[Flight], scene: Mapping[str, Any]) -> str:
         for number, flight in enumerate(flights)
     )
     return (
-        '<p class="note">Seen in the axes of the target (dashed); solid axes are the body\'s, and the angle is what is '
-        "left to turn. The outline is that of the uniform box with this inertia. Drag a view to look from elsewhere.</p>\n"
+        '<p class="note">Seen in the axes of the target (dashed, x* y* z*); solid axes are the body\'s, and the angle '
+        "is what is left to turn. The outline is that of the uniform box with this inertia. "
+        "Drag a view to look from elsewhere.</p>\n"
         '<div class="player"><button id="play" type="button">Play</button>'
-        f'<input id="moment" type="range" min="0" max="{len(scene["times"]) - 1}" step="0.01" value="0" aria-label="time">'
+        f'<input id="moment" type="range" min="0" max="{len(scene["times"]) - 1}" step="0.01" value="0" '
+        'aria-label="time">'
         f'<output id="clock"></output></div>\n<div class="views">{views}</div>'
     )
 
@@ -183,7 +186,7 @@ def _table(name: str, table: Any) -> str:
     for key in type(table).model_fields:
         value = getattr(table, key)
         if value is not None:
-            meaning = str(properties.get(key, {}).get("description", ""))
+            meaning = str(properties.get(key, {}).get("description", "")).replace("^2", "²").replace("^3", "³")
             rows.append(f"<tr><td>{escape(key)}</td><td>{escape(_value(value))}</td><td>{escape(meaning)}</td></tr>")
     title = name.replace("_", " ")
     return f'<section><h3>{escape(title)}</h3><table class="text"><tbody>{"".join(rows)}</tbody></table></section>'
@@ -241,16 +244,14 @@ def _over_time(plot: Plot, flights: Sequence[Flight]) -> dict[str, Any]:
 def _panel(panel: Panel, order: list[int], thin: bool = False) -> dict[str, Any]:
     # Later laws get thinner lines, so that equal curves show as a line within a line.
     slimmer = [1.0 - 0.5 * number / max(len(order) - 1, 1) for number in range(len(order))]
-    positive = [v for curve in panel.curves for v in (float(np.nanmin(curve, initial=np.inf)),) if 0.0 < v < np.inf]
-    highest = max((float(np.nanmax(curve, initial=0.0)) for curve in panel.curves), default=0.0)
-    decades = math.log10(highest / min(positive)) if panel.log and positive and highest > 0.0 else 1.0
     return {
         "label": panel.label,
         "curves": [_numbers(curve) for curve in panel.curves],
-        "widths": [round((1.2 if thin else 2.6) * share, 2) for share in slimmer],
+        "widths": [round((1.7 if thin else 2.6) * share, 2) for share in slimmer],
         "order": order,
         "log": panel.log,
-        "decades": max(1, math.ceil(decades / 6.0)),
+        # Ticks at powers of ten where there are several of them, else where Plotly likes.
+        "ticks": max(1, math.ceil(panel.decades() / 6.0)) if panel.decades() > 2.0 else None,
         "levels": _numbers(panel.levels),
         "span": None if panel.span is None else _numbers(panel.span),
     }
@@ -298,8 +299,8 @@ def _scene(scenario: Scenario, flights: Sequence[Flight]) -> dict[str, Any]:
 def _box(inertia: Any) -> tuple[Any, Any]:
     """Half edges of the uniform box with this inertia, the longest 0.95, and its axes as columns, in body axes.
 
-    For edges 2a, 2b, 2c a moment is proportional to b^2 + c^2, thus a^2 to the other two moments' sum less its own. Edges
-    that would vanish (a flat body has them) are shown as a tenth of the longest.
+    For edges 2a, 2b, 2c a moment is proportional to b^2 + c^2, thus a^2 to the other two moments' sum less its own.
+    Edges that would vanish (a flat body has them) are shown as a tenth of the longest.
     """
     full = np.asarray(inertia, dtype=float)
     if full.ndim == 1:
@@ -315,4 +316,6 @@ def _box(inertia: Any) -> tuple[Any, Any]:
 
 def _numbers(values: Iterable[float], digits: int = 6) -> list[float | None]:
     """Numbers of a few digits for JSON, which has none for what is not finite."""
-    return [float(f"{v:.{digits}g}") if math.isfinite(v) else None for v in np.asarray(list(values), dtype=float).tolist()]
+    return [
+        float(f"{v:.{digits}g}") if math.isfinite(v) else None for v in np.asarray(list(values), dtype=float).tolist()
+    ]

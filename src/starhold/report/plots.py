@@ -32,6 +32,16 @@ class Panel:
     span: tuple[float, float] | None = None
     """The ordinates to show, where the curves would not say it well."""
 
+    def decades(self) -> float:
+        """How many powers of ten a logarithmic panel spans."""
+        if not self.log:
+            return 0.0
+        levels = [np.array(self.levels)] if self.levels else []
+        known = np.concatenate([*self.curves, *levels])
+        known = known[known > 0.0]
+        low, high = self.span or (float(known.min()), float(known.max()))
+        return float(np.log10(high / low))
+
 
 @dataclass(frozen=True)
 class Plot:
@@ -68,7 +78,8 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario | None = 
     levels, dashed = _limit(flights, torque_scale, torque_unit)
     rates = [Panel(f"{axis}, {rate_unit}", curves("rate_error", i, rate_scale)) for i, axis in enumerate("xyz")]
     torques = [
-        Panel(f"{axis}, {torque_unit}", curves("torque", i, torque_scale), False, levels) for i, axis in enumerate("xyz")
+        Panel(f"{axis}, {torque_unit}", curves("torque", i, torque_scale), False, levels)
+        for i, axis in enumerate("xyz")
     ]
     scalar = Panel("q₀", curves("attitude_error", 0))
     vector = [Panel(f"q{'₁₂₃'[i]}", curves("attitude_error", i + 1)) for i in range(3)]
@@ -83,17 +94,22 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario | None = 
 
 
 def thin(values: Curve, factor: int) -> Curve:
-    """The least and the greatest of every `factor` samples, in the order they came: chatter stays as high as it is.
+    """Two of every `factor` samples, to be drawn over `thin_times`.
 
-    Drawn over `thin_times`, a sample moves by less than `factor` periods; the first and the last stay exact.
+    Where the samples left out swing further than those kept, the least and the greatest take their places: chatter
+    stays as high as it is, and moves by less than `factor` periods.
     """
     if factor == 1 or not len(values):
         return values
     groups = np.pad(values, (0, -len(values) % factor), mode="edge").reshape(-1, factor)
-    places = np.sort(np.stack([groups.argmin(axis=1), groups.argmax(axis=1)], axis=1), axis=1)
-    kept = np.take_along_axis(groups, places, axis=1).ravel()
-    kept[0], kept[-1] = values[0], values[-1]
-    return kept
+    kept = groups[:, [0, factor // 2]]
+    following = np.append(groups[1:, 0], values[-1])
+    swing = np.ptp(np.column_stack([kept, following]), axis=1)
+    wild = np.ptp(groups, axis=1) > 3.0 * swing
+    places = np.sort(np.column_stack([groups.argmin(axis=1), groups.argmax(axis=1)]), axis=1)
+    flat = np.where(wild[:, None], np.take_along_axis(groups, places, axis=1), kept).ravel()
+    flat[0], flat[-1] = values[0], values[-1]
+    return flat
 
 
 def thin_times(times: Curve, factor: int) -> Curve:

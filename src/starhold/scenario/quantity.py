@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from typing import Any, cast
 
@@ -42,6 +43,11 @@ def _to_si(value: Any, gain: Gain) -> Any:
 
 
 def _parse(text: str, unit: str) -> float:
+    number, _, rest = text.strip().partition(" ")
+    if rest.split() == unit.split() and unit != "1":
+        # The common case, spared the start-up of the units library.
+        with suppress(ValueError):
+            return float(number)
     import pint
 
     registry = _registry()

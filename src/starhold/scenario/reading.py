@@ -122,7 +122,7 @@ def _read_law(data: Any, craft: Craft, where: str, key: str, taken: set[str]) ->
     if form is not None and form not in law.forms:
         allowed = nearest(str(form), list(law.forms)) if law.forms else f"no form; {law.name} takes its gains"
         raise InputError(where, f"{key}.form", _show(form), allowed)
-    read = _validate(law_model(law.name, form), table, where, key, extra=["form"] if law.forms else [])
+    read = _validate(law_model(law, form), table, where, key, extra=["form"] if law.forms else [])
     values = [getattr(read, item.name) for item in law.fields(form)]
     try:
         gains = law.gains(*values) if form is None else law.design(craft, law.forms[form](*values))

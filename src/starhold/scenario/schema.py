@@ -194,22 +194,21 @@ class ScenarioTable(Table):
 
 
 @cache
-def law_model(name: str, form: str | None = None) -> type[LawTable]:
+def law_model(law: Law, form: str | None = None) -> type[LawTable]:
     """The table of a law, or of one of its design forms."""
-    law = catalogue()[name]
-    entries: dict[str, Any] = {"type": (Literal[name], name)}
+    entries: dict[str, Any] = {"type": (Literal[law.name], law.name)}
     if form is not None:
         entries["form"] = (Literal[form], form)
     for item in law.fields(form):
         default = ... if item.required else item.default
         entries[item.name] = (Annotated[Any, *quantity(item.gain)], default)
-    title = name.replace("-", " ").title().replace(" ", "") + (form or "").title()
+    title = law.name.replace("-", " ").title().replace(" ", "") + (form or "").title()
     return create_model(title, __base__=LawTable, __doc__=law.card.summary, **entries)
 
 
 def law_models(law: Law) -> list[type[LawTable]]:
     """All tables of a law: its gains, and each design form."""
-    return [law_model(law.name), *(law_model(law.name, form) for form in law.forms)]
+    return [law_model(law), *(law_model(law, form) for form in law.forms)]
 
 
 def json_schema() -> dict[str, Any]:

@@ -77,8 +77,8 @@ function craft() {
   const gap = 0.07 * half[long];
   return {
     long,
-    parts: [part(-half[long], -cut - gap, 0.12, panel, "panel"), part(-cut, cut, 1, ["#c9a24b", "#d9b766", "#e7cd8f"], "hub"),
-      part(cut + gap, half[long], 0.12, panel, "panel")],
+    parts: [part(-half[long], -cut - gap, 0.06, panel, "panel"), part(-cut, cut, 1, ["#c9a24b", "#d9b766", "#e7cd8f"], "hub"),
+      part(cut + gap, half[long], 0.06, panel, "panel")],
   };
 }
 const model = craft();
@@ -107,8 +107,9 @@ function paint(view, where) {
   const right = [-Math.sin(eye.around), Math.cos(eye.around), 0];
   const up = cross(away, right);
   const lamp = plus(plus(away, up, 0.6), right, -0.5).map((c) => c / 1.27);
-  const scale = Math.min(width, height) * 0.36;
-  const flat = (p) => [width / 2 + scale * dot(p, right), height / 2 - scale * dot(p, up)];
+  const scale = Math.min(width, 0.95 * height) * 0.385;
+  // Below the middle, for the target's axes have only upper halves.
+  const flat = (p) => [width / 2 + scale * dot(p, right), 0.56 * height - scale * dot(p, up)];
 
   function line(from, to, colour, thick, dash) {
     pen.beginPath();
@@ -121,7 +122,10 @@ function paint(view, where) {
     pen.setLineDash([]);
   }
   function label(p, text, colour, style) {
-    const [x, y] = flat(plus(p, p, 0.07));
+    const [x0, y0] = flat([0, 0, 0]);
+    const [x1, y1] = flat(p);
+    const far = 1 + 12 / Math.max(Math.hypot(x1 - x0, y1 - y0), 12);
+    const [x, y] = [x0 + far * (x1 - x0), y0 + far * (y1 - y0)];
     pen.font = `${style} 13px system-ui, sans-serif`;
     pen.fillStyle = colour;
     pen.textAlign = "center";
@@ -172,7 +176,7 @@ function paint(view, where) {
     }
   }
   drawAxes(true);
-  unit.forEach((e, i) => label(e.map((c) => 1.27 * c), `${names[i]} target`, colours[i], "italic"));
+  unit.forEach((e, i) => label(e.map((c) => 1.24 * c), `${names[i]}*`, colours[i], "italic"));
 
   // Solar cells, five along the panel and three across.
   function cells(c, face, part) {

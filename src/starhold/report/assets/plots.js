@@ -12,6 +12,7 @@ function look() {
     axis,
     layout: {
       font: { family: "system-ui, sans-serif", size: 12.5, color: css("--ink") },
+      modebar: { bgcolor: "rgba(0,0,0,0)", color: css("--line"), activecolor: css("--soft") },
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
       hoverlabel: { bgcolor: css("--card"), bordercolor: css("--line"), font: { color: css("--ink") } },
       legend: { orientation: "h", x: 0, y: 1, yanchor: "bottom", xanchor: "left", traceorder: "normal" },
@@ -27,7 +28,7 @@ function lines(panel, k, plot) {
       x: plot.x || report.times, y: panel.curves[number], yaxis: k ? `y${k + 1}` : "y", xaxis: plot.split && k ? `x${k + 1}` : "x",
       name: plain(law.name), legendgroup: `law${number}`, legendrank: number + 1, showlegend: k === 0,
       line: { color: law.colour, width: panel.widths[number] }, marker: { size: 8 },
-      hovertemplate: `%{y:.4~g}<extra>${plain(law.name)}${plot.panels.length > 1 ? ", " + plain(panel.label) : ""}</extra>`,
+      hovertemplate: `%{y:${panel.log ? ".3~e" : ".4~g"}}<extra>${plain(law.name)}${plot.panels.length > 1 ? ", " + plain(panel.label) : ""}</extra>`,
     };
   });
 }
@@ -44,7 +45,7 @@ function draw(plot) {
     const id = k ? k + 1 : "";
     const x = { ...axis, title: { text: plot.xlabel, standoff: 8 }, hoverformat: ".5~g" };
     if (plot.split) {
-      layout[`xaxis${id}`] = { ...x, dtick: 1, domain: [k / count + (k ? 0.05 : 0), (k + 1) / count], anchor: `y${id}` };
+      layout[`xaxis${id}`] = { ...x, dtick: 1, domain: [k / count + (k ? 0.04 : 0), (k + 1) / count - (k < count - 1 ? 0.04 : 0)], anchor: `y${id}` };
     } else {
       layout.xaxis = { ...x, anchor: `y${count > 1 ? count : ""}` };
     }
@@ -52,7 +53,7 @@ function draw(plot) {
     layout[`yaxis${id}`] = {
       ...axis, title: { text: plain(panel.label), standoff: 6 }, anchor: plot.split ? `x${id}` : "x",
       domain: plot.split ? [0, 1] : [top - 1 / rows + (k < rows - 1 ? 0.025 : 0), top - (k ? 0.025 : 0)],
-      ...(panel.log ? { type: "log", exponentformat: "power", dtick: panel.decades } : {}),
+      ...(panel.log ? { type: "log", exponentformat: "power", ...(panel.ticks ? { dtick: panel.ticks } : {}) } : {}),
       ...(panel.span ? { range: panel.log ? panel.span.map(Math.log10) : panel.span } : {}),
       ...(plot.split ? { rangemode: "tozero" } : {}),
     };

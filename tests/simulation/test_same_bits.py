@@ -10,8 +10,8 @@ from starhold.conformance.bench import sample_loop
 from starhold.laws.catalogue import catalogue
 from starhold.loop.kernels import make_step
 from starhold.models.sensor import Noise
-from starhold.simulate.lane import fly, simulate
-from starhold.simulate.lanes import simulate_many
+from starhold.simulation.lane import fly, simulate
+from starhold.simulation.lanes import simulate_many
 
 STEPS, LANES = 60, 300
 

@@ -17,7 +17,7 @@ from starhold.algebra.vector import ZERO
 from starhold.loop.closed_loop import Carry, ClosedLoop
 from starhold.loop.kernels import make_kernels
 from starhold.models.rigid_body import State
-from starhold.simulate.lane import Progress, fly
+from starhold.simulation.lane import Progress, fly
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,179 @@
+"""The commands as a user meets them."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from starhold.laws.catalogue import catalogue
+from starhold.scenario.reading import builtin_text
+
+SHORT = builtin_text("three-laws").replace("duration = 600.0", "duration = 20.0")
+
+
+def starhold(*words, cwd, **options):
+    return subprocess.run([sys.executable, "-m", "starhold", *words], cwd=cwd, capture_output=True, text=True, **options)
+
+
+@pytest.fixture
+def short(tmp_path):
+    (tmp_path / "short.toml").write_text(SHORT)
+    return tmp_path
+
+
+@pytest.mark.xdist_group("cli")
+def test_compare_writes_everything_and_prints_the_table(short):
+    done = starhold("compare", "short.toml", "-o", "out", cwd=short)
+    assert done.returncode == 0, done.stderr
+    out = short / "out"
+    assert "Report: out/report.html" in done.stdout
+    for name in ("lyapunov", "sliding", "mpc"):
+        assert name in done.stdout
+        run = xr.open_dataset(out / name / "run.nc", engine="h5netcdf")
+        assert run.attrs["scenario"] == SHORT
+        assert run.attrs["seed"] == 1
+        assert run.attrs["starhold_version"]
+        assert run["torque"].attrs["units"] == "N m"
+        assert run.sizes["time"] == 201
+        run.close()
+    summary = json.loads((out / "summary.json").read_text())
+    assert set(summary["laws"]) == {"lyapunov", "sliding", "mpc"}
+    assert summary["laws"]["lyapunov"]["peak_torque"] <= 0.01
+    assert len(list(out.glob("*.png"))) >= 5
+    page = (out / "report.html").read_text()
+    assert "</html>" in page
+    assert not list(out.rglob(".writing-*"))
+    again = starhold("compare", "short.toml", "-o", "out", cwd=short)
+    assert again.returncode == 2
+    assert again.stderr.count("\n") == 1
+    assert "--force" in again.stderr
+    (out / "mine.txt").write_text("keep")
+    forced = starhold("compare", "short.toml", "-o", "out", "--force", cwd=short)
+    assert forced.returncode == 0
+    assert (out / "mine.txt").read_text() == "keep"
+
+
+@pytest.mark.xdist_group("cli")
+def test_run_flies_the_law_that_is_asked_for(short):
+    done = starhold("run", "short.toml", "--law", "sliding", cwd=short)
+    assert done.returncode == 0, done.stderr
+    folder = short / "results" / "three-laws-sliding"
+    assert (folder / "run.nc").exists()
+    assert set(json.loads((folder / "summary.json").read_text())["laws"]) == {"sliding"}
+    wrong = starhold("run", "short.toml", "--law", "slidding", cwd=short)
+    assert wrong.returncode == 2
+    assert "did you mean sliding?" in wrong.stderr
+
+
+@pytest.mark.xdist_group("cli")
+def test_a_motion_that_is_lost_is_said_so(short):
+    text = SHORT.replace("k_rate = 0.09", "k_rate = 900").replace('torque_limit = "0.01 N m"', "")
+    (short / "wild.toml").write_text(text)
+    done = starhold("run", "wild.toml", "-o", "wild", cwd=short)
+    assert done.returncode == 1
+    assert "lyapunov diverged at" in done.stdout
+    row = json.loads((short / "wild" / "summary.json").read_text())["laws"]["lyapunov"]
+    assert 0 < row["diverged_at"] < 20
+    assert row["settling_time"] is None
+    assert "diverged" in (short / "wild" / "report.html").read_text()
+
+
+@pytest.mark.xdist_group("cli")
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("compare", "no.toml"), "no.toml: found no such file"),
+        (("run", "short.toml", "-o", "short.toml"), "cannot write there"),
+        (("run", "short.toml", "-o", "/proc/here"), "cannot write there"),
+        (("laws", "lyapunow"), "did you mean lyapunov?"),
+        (("scenarios", "three"), "three-laws"),
+        (("new", "short.toml"), "exists"),
+        (("new", "x.toml", "--from", "cubesat"), "cubesat-slew"),
+        (("new", "no/such/folder/x.toml"), "cannot write there"),
+        (("check-law", "short.toml"), "short.toml"),
+        (("check-law", "absent.py"), "no such file"),
+    ],
+)
+def test_user_errors_are_one_line_and_exit_code_2(words, said, short):
+    done = starhold(*words, cwd=short)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert "Traceback" not in done.stderr + done.stdout
+
+
+@pytest.mark.xdist_group("cli")
+def test_new_writes_a_file_that_runs(tmp_path):
+    assert starhold("new", "my.toml", "--schema", cwd=tmp_path).returncode == 0
+    assert (tmp_path / "my.toml").read_text().startswith("#:schema ./starhold.schema.json")
+    assert json.loads((tmp_path / "starhold.schema.json").read_text())["title"] == "starhold scenario"
+    done = starhold("run", "my.toml", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.xdist_group("cli")
+def test_lists(tmp_path):
+    listed = starhold("laws", cwd=tmp_path).stdout
+    for name in catalogue():
+        assert name in listed
+        assert "key" in starhold("laws", name, cwd=tmp_path).stdout
+    assert "cubesat-slew" in starhold("scenarios", cwd=tmp_path).stdout
+    assert starhold("scenarios", "three-laws", cwd=tmp_path).stdout == builtin_text("three-laws")
+    assert starhold("--version", cwd=tmp_path).stdout.startswith("starhold ")
+    assert json.loads(starhold("schema", cwd=tmp_path).stdout)["type"] == "object"
+
+
+@pytest.mark.xdist_group("cli")
+def test_check_law_passes_a_good_law_and_fails_a_bad_one(tmp_path):
+    text = Path(catalogue()["pd"].module.__file__).read_text()
+    (tmp_path / "my_pd.py").write_text(text)
+    good = starhold("check-law", "my_pd.py", cwd=tmp_path)
+    assert good.returncode == 0, good.stdout + good.stderr
+    assert "failed" not in good.stdout
+    (tmp_path / "bad_pd.py").write_text(text.replace("scale(-gains.k_rate, seen.rate)", "scale(gains.k_rate, seen.rate)"))
+    bad = starhold("check-law", "bad_pd.py", cwd=tmp_path)
+    assert bad.returncode == 1
+    assert "failed" in bad.stdout
+
+
+@pytest.mark.xdist_group("cli")
+def test_interrupt_leaves_no_half_written_file(short):
+    (short / "long.toml").write_text(SHORT.replace("duration = 20.0", "duration = 20000000.0"))
+    child = subprocess.Popen(
+        [sys.executable, "-m", "starhold", "run", "long.toml", "--law", "lyapunov", "-o", "out"],
+        cwd=short,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    deadline = time.monotonic() + 60
+    while not (short / "out").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    time.sleep(1.0)
+    child.send_signal(signal.SIGINT)
+    _, said = child.communicate(timeout=60)
+    assert child.returncode == 130
+    assert "interrupted" in said
+    assert "Traceback" not in said
+    assert os.listdir(short / "out") == []
+
+
+def test_python_interface_mirrors_the_commands(short):
+    import starhold as sh
+
+    scenario = sh.load(short / "short.toml")
+    run = sh.simulate(scenario, law="sliding")
+    assert run.attrs["law"] == "sliding"
+    flights = sh.compare(scenario)
+    assert [flight.name for flight in flights] == ["lyapunov", "sliding", "mpc"]
+    assert flights[1].run.equals(run)
+    with pytest.raises(sh.InputError):
+        sh.simulate(scenario, law="nobody")
+    with pytest.raises(AttributeError):
+        _ = sh.no_such_thing

@@ -1,0 +1,109 @@
+"""The figures exist, show something, and survive odd names, lost runs and runs at rest."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from starhold.report.figures import draw
+from starhold.report.flight import COLOURS, colour
+from starhold.report.plots import collect, thin, thin_times
+from tests.report import flown
+
+NAMES = ["scalar", "attitude", "rate", "torque", "angle", "accuracy"]
+
+
+def pixels(path: Path) -> np.ndarray:
+    """The picture as an array (rows, columns, 3)."""
+    with Image.open(path) as image:
+        return np.asarray(image.convert("RGB"))
+
+
+def test_every_figure_is_drawn_with_every_law(tmp_path: Path) -> None:
+    paths = draw(flown.flights(), tmp_path, flown.scenario())
+    assert [path.name for path in paths] == [f"{name}.png" for name in NAMES]
+    for path in paths:
+        picture = pixels(path)
+        assert 300 < picture.shape[0] < 900
+        assert picture.shape[1] == 880
+        for number in range(len(flown.flights())):
+            wanted = np.array([int(colour(number)[i : i + 2], 16) for i in (1, 3, 5)])
+            assert (np.abs(picture.astype(int) - wanted).max(axis=2) < 12).sum() > 20, (path.name, number)
+
+
+def test_equal_flights_give_equal_files(tmp_path: Path) -> None:
+    folders = [tmp_path / "a", tmp_path / "b"]
+    for folder in folders:
+        folder.mkdir()
+    first, second = (draw(flown.flights(), folder, flown.scenario()) for folder in folders)
+    assert [p.read_bytes() for p in first] == [p.read_bytes() for p in second]
+
+
+def test_odd_names_are_shown_as_they_stand(tmp_path: Path) -> None:
+    first, second = flown.flights()
+    odd = [flown.renamed(first, "_$\\frac{"), flown.renamed(second, "転 " + "long " * 30)]
+    assert len(draw(odd, tmp_path, flown.scenario(flown.HOSTILE))) == len(NAMES)
+
+
+@pytest.mark.parametrize("extra", [flown.lost, flown.still])
+def test_lost_and_resting_runs_are_drawn(tmp_path: Path, extra: object) -> None:
+    assert callable(extra)
+    assert len(draw([*flown.flights(), extra()], tmp_path)) == len(NAMES)
+    assert len(draw([extra()], tmp_path)) == len(NAMES)
+
+
+def test_a_lost_run_does_not_flatten_the_others() -> None:
+    sound = collect(flown.flights(), 2000)
+    mixed = collect([*flown.flights(), flown.lost()], 2000)
+    highest = max(float(np.abs(curve).max()) for curve in sound.rate.panels[0].curves)
+    span = mixed.rate.panels[0].span
+    assert span is not None
+    assert max(map(abs, span)) < 10.0 * highest
+    assert mixed.rate.panels[0].label == sound.rate.panels[0].label
+
+
+def test_a_law_keeps_its_colour_and_many_laws_have_one() -> None:
+    assert len(set(COLOURS)) == len(COLOURS)
+    assert [colour(i) for i in range(2 * len(COLOURS))] == [*COLOURS, *COLOURS]
+
+
+def test_a_limit_is_shown_where_it_matters() -> None:
+    run = flown.flights()[0].run
+    assert collect(flown.flights(), 2000).torque.panels[0].levels == (-10.0, 10.0)
+    far = run.assign_attrs(torque_limit=5.0)
+    first = flown.flights()[0]
+    plot = collect([type(first)(first.name, first.law, far, first.metrics, {})], 2000).torque
+    assert plot.panels[0].levels == ()
+    assert "off the scale" in plot.dashed
+
+
+@pytest.mark.parametrize("factor", [2, 3, 8])
+def test_thinning_keeps_chatter_and_smooth_values(factor: int) -> None:
+    times = np.arange(1000) * 0.1
+    kept = thin_times(times, factor)
+    assert len(kept) == len(thin(times, factor)) == 2 * -(-1000 // factor)
+    assert (np.diff(kept) >= 0.0).all()
+    assert (kept[0], kept[-1]) == (times[0], times[-1])
+    # A smooth curve keeps true samples at true times.
+    smooth = np.exp(-0.1 * times)
+    np.testing.assert_array_equal(thin(smooth, factor), np.exp(-0.1 * kept))
+    chatter = np.where(np.arange(1000) % 2, 1.0, -1.0)
+    thinned = thin(chatter, factor)
+    assert (thinned.min(), thinned.max()) == (-1.0, 1.0)
+    assert np.abs(np.diff(thinned)).mean() > 0.9
+    # A single spike survives.
+    spike = np.zeros(1000)
+    spike[501] = 5.0
+    assert thin(spike, factor).max() == 5.0
+    # A run that was lost is thinned on the same grid.
+    assert len(thin(smooth[:100], factor)) == 2 * -(-100 // factor)
+
+
+def test_nothing_to_thin() -> None:
+    values = np.arange(5.0)
+    assert thin(values, 1) is values
+    assert thin_times(values, 1) is values
+    assert not len(thin(np.empty(0), 4))

@@ -1,0 +1,179 @@
+"""The page opens offline, holds every number, and takes nothing from files for markup."""
+
+from __future__ import annotations
+
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from starhold.analysis.metrics import MEASURES
+from starhold.analysis.ranking import shown, winners
+from starhold.models.craft import check_inertia
+from starhold.report.page import _box, render, write_page
+from tests.report import flown
+
+
+class Reader(HTMLParser):
+    """Collects tags with attributes, the text outside scripts, and the scripts."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.words: list[str] = []
+        self.scripts: list[str] = []
+        self.inside = ""
+        self.feed(page)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        self.inside = tag
+
+    def handle_endtag(self, tag: str) -> None:
+        self.inside = ""
+
+    def handle_data(self, data: str) -> None:
+        if self.inside == "script":
+            self.scripts.append(data)
+        elif self.inside != "style":
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return " ".join(self.words)
+
+    def data(self) -> Any:
+        """What the scripts read."""
+        return json.loads(self.scripts[0], parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
+
+
+@pytest.fixture(scope="module")
+def page() -> str:
+    return render(flown.scenario(), flown.flights())
+
+
+@pytest.fixture(scope="module")
+def reader(page: str) -> Reader:
+    return Reader(page)
+
+
+def test_nothing_is_loaded(page: str, reader: Reader) -> None:
+    for tag, attrs in reader.tags:
+        assert tag not in {"link", "iframe", "img", "object", "embed", "base"}, tag
+        assert not {"src", "href", "srcset", "action", "data", "poster"} & set(attrs), (tag, attrs)
+    styles = page.split("<style>")[1].split("</style>")[0]
+    assert "url(" not in styles
+    assert "@import" not in styles
+    policy = next(
+        attrs["content"] for tag, attrs in reader.tags if attrs.get("http-equiv") == "Content-Security-Policy"
+    )
+    assert policy is not None
+    assert policy.startswith("default-src 'none'")
+    assert "http" not in policy
+    assert page.count("* plotly.js v") == 1
+
+
+def test_every_law_and_every_metric_is_there(reader: Reader) -> None:
+    flights = flown.flights()
+    best = winners({flight.name: flight.metrics for flight in flights})
+    for flight in flights:
+        assert flight.name in reader.words
+        for metric in MEASURES:
+            if metric in flight.metrics:
+                assert shown(metric, flight.metrics[metric]) in reader.words, metric
+    for metric in flights[0].metrics:
+        if metric in MEASURES:
+            assert ("th", {"scope": "col", "title": MEASURES[metric].meaning}) in reader.tags
+    marked = sum(tag == "td" and attrs.get("class") == "best" for tag, attrs in reader.tags)
+    assert marked == sum(map(len, best.values())) > 0
+    assert flown.text().split("[spacecraft]")[1] in reader.text
+
+
+def test_the_data_is_json_and_small(reader: Reader) -> None:
+    data = reader.data()
+    assert [law["name"] for law in data["laws"]] == [flight.name for flight in flown.flights()]
+    assert [plot["name"] for plot in data["plots"]] == ["angle", "quaternion", "rate", "torque", "accuracy"]
+    ids = {attrs.get("id") for _, attrs in reader.tags}
+    assert {plot["name"] for plot in data["plots"]} <= ids
+    for plot in data["plots"][:-1]:
+        for panel in plot["panels"]:
+            assert sorted(panel["order"]) == list(range(len(data["laws"])))
+            assert all(len(curve) == len(data["times"]) for curve in panel["curves"])
+    assert max(len(str(number)) for number in data["times"]) <= 12
+    assert len(reader.scripts[0]) < 200_000
+
+
+def test_the_views_show_the_recorded_attitudes(reader: Reader) -> None:
+    scene = reader.data()["scene"]
+    run = flown.flights()[0].run
+    assert scene["times"][0] == 0.0
+    assert scene["times"][-1] == pytest.approx(float(run["time"][-1]))
+    shown_attitudes = np.array(scene["attitudes"][0])
+    recorded = run["attitude_error"].sel(time=np.array(scene["times"]), method="nearest").values
+    np.testing.assert_allclose(shown_attitudes, recorded, atol=2e-4)
+    assert sum(tag == "canvas" for tag, _ in reader.tags) == len(flown.flights())
+
+
+def test_names_from_files_are_no_markup() -> None:
+    name = flown.HOSTILE.replace("'", "")
+    first, second = flown.flights()
+    made = render(flown.scenario(name, name), [flown.renamed(first, name), second])
+    found = Reader(made)
+    assert sum(tag == "script" for tag, _ in found.tags) == 4
+    assert not any(tag == "b" for tag, _ in found.tags)
+    assert found.words.count(name) >= 3
+    assert found.data()["laws"][0]["name"] == name
+    assert "<5> mN m" in found.text
+    assert "alert(" not in "".join(found.scripts[1:])
+
+
+def test_equal_flights_give_equal_bytes(tmp_path: Path, page: str) -> None:
+    path = tmp_path / "report.html"
+    write_page(path, flown.scenario(), flown.flights())
+    assert path.read_bytes() == page.encode()
+
+
+def test_a_lost_run_is_told_and_the_others_are_shown() -> None:
+    found = Reader(render(flown.scenario(), [*flown.flights(), flown.lost("wild <one>")]))
+    assert "lost at 6.7 s" in found.text
+    assert any(attrs.get("class") == "alarm" for _, attrs in found.tags)
+    assert sum(tag == "tr" and attrs.get("class") == "lost" for tag, attrs in found.tags) == 1
+    data = found.data()
+    assert len(data["scene"]["attitudes"][2]) < len(data["scene"]["attitudes"][0])
+    assert "wild <one>" in found.words
+
+
+def test_one_law_and_a_run_at_rest() -> None:
+    found = Reader(render(flown.scenario(), [flown.still()]))
+    assert not any(attrs.get("class") == "best" for _, attrs in found.tags)
+    assert found.data()["plots"][0]["panels"][0]["log"] is False
+
+
+def test_a_name_with_dashes_inside_the_scripts_is_harmless() -> None:
+    first = flown.renamed(flown.flights()[0], "<!--<script>")
+    made = render(flown.scenario(), [first])
+    assert "<!--" not in re.split(r'id="data">', made)[1].split("</script>")[0]
+    assert Reader(made).data()["laws"][0]["name"] == "<!--<script>"
+
+
+@pytest.mark.parametrize(
+    "inertia", [(2.0, 3.0, 4.0), ((9000, 120, -60), (120, 2500, 90), (-60, 90, 9800)), (1.0, 1.0, 1.0)]
+)
+def test_the_outline_has_the_inertia_of_a_uniform_box(inertia: Any) -> None:
+    size, axes = _box(inertia)
+    a2, b2, c2 = size**2
+    made = axes @ np.diag([b2 + c2, a2 + c2, a2 + b2]) @ axes.T
+    wanted = check_inertia(inertia)
+    np.testing.assert_allclose(made / np.trace(made), wanted / np.trace(wanted), atol=1e-12)
+    assert np.linalg.det(axes) == pytest.approx(1.0)
+    assert size.max() == pytest.approx(0.95)
+
+
+def test_a_flat_body_has_an_outline() -> None:
+    size, _ = _box((1.0, 1.0, 2.0))
+    assert size.min() == pytest.approx(0.095)
