@@ -43,7 +43,12 @@ def page() -> str:
         lines += [f"## {law.name}: {card.title}", "", card.summary, "", f"* claims: {card.claims}"]
         lines += [f"* assumes: {'; '.join(card.assumptions)}", f"* sources: {'; '.join(card.sources)}", ""]
         for form in (None, *law.forms):
-            lines += ["Gains:" if form is None else f'Form `"{form}"`:', "", "| key | unit | meaning | default |", "|---|---|---|---|"]
+            lines += [
+                "Gains:" if form is None else f'Form `"{form}"`:',
+                "",
+                "| key | unit | meaning | default |",
+                "|---|---|---|---|",
+            ]
             for item in law.fields(form):
                 default = item.gain.choices[item.default] if item.gain.choices and not item.required else item.default
                 shown = "required" if item.required else f"`{default}`"

@@ -6,8 +6,8 @@ from functools import cache
 from typing import Any
 
 import clarabel
+import daqp
 import numpy as np
-import osqp
 import piqp
 import pytest
 import scipy.sparse as sp
@@ -99,14 +99,17 @@ def by_piqp(program: Program) -> Any:
     return solver.result.x
 
 
-def by_osqp(program: Program) -> Any:
-    solver = osqp.OSQP()
-    # Scaled: OSQP's tolerances are mostly absolute.
-    size = np.abs(program.hessian).max()
-    hessian, identity = sp.csc_matrix(np.triu(program.hessian / size)), sp.eye(3 * program.horizon, format="csc")
-    settings = {"eps_abs": 1e-7, "eps_rel": 1e-7, "max_iter": 200_000, "polishing": True, "verbose": False}
-    solver.setup(hessian, program.linear / size, identity, program.low, program.high, **settings)
-    return np.clip(solver.solve(raise_error=True).x, program.low, program.high)
+def by_daqp(program: Program) -> Any:
+    # Scaled: its tolerances are absolute.
+    size = program.bound
+    hessian = program.hessian / np.abs(program.hessian).max()
+    linear = program.linear / np.abs(program.hessian).max() / size
+    none = np.zeros((0, 3 * program.horizon))
+    high, low = program.high / size, program.low / size
+    settings = {"primal_tol": 1e-10, "dual_tol": 1e-14}
+    moves, _, flag, _ = daqp.solve(hessian, linear, none, high, low, np.zeros(high.size, dtype=np.int32), **settings)
+    assert flag == 1
+    return moves * size
 
 
 def by_clarabel(program: Program) -> Any:
@@ -156,7 +159,7 @@ def test_box_against_two_solvers():
         assert away.max() <= program.bound + 1e-9
         assert cost == pytest.approx(program.cost(plan), rel=1e-9)
         pressing.append(float(np.mean(away > program.bound * (1.0 - 1e-9))))
-        for reference in (by_piqp(program), by_osqp(program)):
+        for reference in (by_piqp(program), by_daqp(program)):
             assert abs(program.cost(plan) - program.cost(reference)) <= 1e-6 * abs(cost), f"seed {seed}"
     assert np.mean(pressing) > 0.4
     assert np.mean(np.array(pressing) > 0.0) > 0.8
@@ -306,15 +309,16 @@ def fresh(gains: Any, craft: Any = CRAFTS["principal"], period: float = 0.1) -> 
 
 @pytest.mark.parametrize("limit", ["axis", "norm"])
 def test_budget_is_reported_and_the_limit_kept(limit: str):
-    craft = make_craft([2.0, 3.0, 4.0], 0.002)
-    gains = mpc.Gains(*WEIGHTS, horizon=20, limit=mpc.LIMITS.index(limit), budget=1)
-    seen = seen_at((0.3, 0.8, -0.4, 0.2), (0.05, -0.04, 0.06))
-    command, memory = mpc.torque(seen, gains, craft, fresh(gains, craft))
+    # A long period: the limits bind early and late moves, not all of them.
+    craft, period = CRAFTS["principal"], 2.0
+    gains = mpc.Gains(*WEIGHTS[:2], (0.5, 0.5, 0.5), horizon=20, limit=mpc.LIMITS.index(limit), budget=1)
+    seen = seen_at((0.9, 0.3, -0.2, 0.1), (0.05, -0.04, 0.06), period=period)
+    command, memory = mpc.torque(seen, gains, craft, fresh(gains, craft, period))
     counters = memory.counters
     assert (counters[mpc.CALLS], counters[mpc.SWEEPS], counters[mpc.EXHAUSTED]) == (1, 1, 1)
     assert spread(command, limit) <= craft.torque_limit + 1e-9
     enough = gains._replace(budget=50)
-    command, memory = mpc.torque(seen, enough, craft, fresh(enough, craft))
+    command, memory = mpc.torque(seen, enough, craft, fresh(enough, craft, period))
     assert memory.counters[mpc.EXHAUSTED] == 0
     assert 1 < memory.counters[mpc.WORST] < 50
     assert spread(command, limit) == pytest.approx(craft.torque_limit, rel=1e-6)

@@ -69,9 +69,7 @@ def test_nothing_is_loaded(page: str, reader: Reader) -> None:
     styles = page.split("<style>")[1].split("</style>")[0]
     assert "url(" not in styles
     assert "@import" not in styles
-    policy = next(
-        attrs["content"] for tag, attrs in reader.tags if attrs.get("http-equiv") == "Content-Security-Policy"
-    )
+    policy = next(attrs["content"] for tag, attrs in reader.tags if attrs.get("http-equiv") == "Content-Security-Policy")
     assert policy is not None
     assert policy.startswith("default-src 'none'")
     assert "http" not in policy
@@ -161,9 +159,7 @@ def test_a_name_with_dashes_inside_the_scripts_is_harmless() -> None:
     assert Reader(made).data()["laws"][0]["name"] == "<!--<script>"
 
 
-@pytest.mark.parametrize(
-    "inertia", [(2.0, 3.0, 4.0), ((9000, 120, -60), (120, 2500, 90), (-60, 90, 9800)), (1.0, 1.0, 1.0)]
-)
+@pytest.mark.parametrize("inertia", [(2.0, 3.0, 4.0), ((9000, 120, -60), (120, 2500, 90), (-60, 90, 9800)), (1.0, 1.0, 1.0)])
 def test_the_outline_has_the_inertia_of_a_uniform_box(inertia: Any) -> None:
     size, axes = _box(inertia)
     a2, b2, c2 = size**2

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic_core import PydanticCustomError
 
 from starhold.errors import InputError
 from starhold.laws.catalogue import catalogue
@@ -22,12 +23,15 @@ from starhold.scenario.writing import law_table
 BASE = builtin_text("three-laws")
 
 
+def build_all(text):
+    parsed = parse(text, "my.toml")
+    return [build(parsed, entry) for entry in parsed.laws]
+
+
 def fault(old, new, text=BASE):
     assert old in text
     with pytest.raises(InputError) as caught:
-        parsed = parse(text.replace(old, new), "my.toml")
-        for entry in parsed.laws:
-            build(parsed, entry)
+        build_all(text.replace(old, new))
     message = str(caught.value)
     assert "\n" not in message
     return message
@@ -243,12 +247,12 @@ def test_numbers_read_as_they_are_written(value):
 
 @given(st.text(max_size=12))
 def test_any_text_gives_a_number_or_one_line(text):
-    from pydantic_core import PydanticCustomError
-
     try:
-        assert math.isfinite(reader(Gain("N m"))(text))
+        value, message = reader(Gain("N m"))(text), ""
     except PydanticCustomError as error:
-        assert "\n" not in error.message()
+        value, message = 0.0, error.message()
+    assert math.isfinite(value)
+    assert "\n" not in message
 
 
 @given(st.sampled_from(sorted(catalogue())))

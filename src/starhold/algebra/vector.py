@@ -6,7 +6,7 @@ from typing import Any, TypeAlias, TypeGuard
 
 from numba import types  # pyright: ignore
 
-from starhold.algebra.scalar import Scalar, absolute, clip, compiled_as, equation, less, maximum, sign, sqrt, where
+from starhold.algebra.scalar import Scalar, clip, compiled_as, equation, less, maximum, sign, sqrt, where
 
 Vector: TypeAlias = tuple[Scalar, Scalar, Scalar]
 Matrix: TypeAlias = tuple[Vector, Vector, Vector]
@@ -81,12 +81,6 @@ def clip_norm(a: Vector, limit: Scalar) -> Vector:
     infinite."""
     length = norm(a)
     return scale(where(less(length, limit), 1.0, limit / maximum(limit, length)), a)
-
-
-@equation
-def peak(a: Vector) -> Scalar:
-    """The largest magnitude among the components."""
-    return maximum(maximum(absolute(a[0]), absolute(a[1])), absolute(a[2]))
 
 
 def apply(m: Matrix | Vector, a: Vector) -> Vector:

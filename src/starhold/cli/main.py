@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -193,13 +194,22 @@ def _root(version: Annotated[bool, typer.Option("--version", help="print the ver
         raise typer.Exit
 
 
+class InterruptedByUserError(BaseException):
+    """Ctrl-C, under a name that the command-line library does not turn into an exit code of its own."""
+
+
+def _interrupt(number: int, frame: object) -> None:
+    raise InterruptedByUserError
+
+
 def main() -> None:
     """Entry point: user errors become one line and exit code 2, an interrupt 130."""
+    signal.signal(signal.SIGINT, _interrupt)
     try:
         app(standalone_mode=True)
     except InputError as error:
         print(f"starhold: {error}", file=sys.stderr)
         sys.exit(USER_ERROR)
-    except KeyboardInterrupt:
+    except InterruptedByUserError:
         print("starhold: interrupted; files already written are whole", file=sys.stderr)
         sys.exit(INTERRUPTED)

@@ -102,9 +102,12 @@ def terminal_weight(gains: Gains, craft: Craft, period: float) -> tuple[Any, Any
     p: Any = q if name == "stage" else np.zeros((6, 6))
     if name == "riccati":
         try:
-            p = riccati(a, b, q, r)
+            with np.errstate(all="ignore"):
+                p = riccati(a, b, q, r)
         except (np.linalg.LinAlgError, ValueError) as error:
             raise ValueError(f"the weights give no terminal weight: {error}") from None
+        if not np.isfinite(p).all():
+            raise ValueError("the weights give no terminal weight: they differ too much in size")
         p = 0.5 * (p + p.T)
     feedback = cast(Any, np.linalg.solve(r + b.T @ p @ b, b.T @ p @ a))
     units = np.array([1.0, 1.0, 1.0, period, period, period])

@@ -178,7 +178,8 @@ def interior(problem, plan, space, half, budget):
                 gap += multipliers[3 * k + i] * s[i]
         now = rollout(problem, plan, x)
         barrier = (0.1 if length > 0.5 else 0.5) * gap / count
-        if gap <= 1e-9 * now and length > 0.5:
+        # Short steps near the end: the slacks have lost their digits.
+        if gap <= (1e-8 if length > 0.5 else 1e-5) * now:
             break
     for k in range(n):
         v, s = triple(plan, k), slack(problem, triple(plan, k))

@@ -47,7 +47,7 @@ def write(scenario: Scenario, flights: Sequence[Flight], folder: Path) -> Path:
     from starhold.report.page import write_page
 
     write_summary(scenario, {flight.name: flight.metrics for flight in flights}, folder / SUMMARY)
-    draw(flights, folder)
+    draw(flights, folder, scenario)
     page = folder / "report.html"
     with whole(page) as hidden:
         write_page(hidden, scenario, flights)

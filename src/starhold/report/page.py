@@ -316,6 +316,4 @@ def _box(inertia: Any) -> tuple[Any, Any]:
 
 def _numbers(values: Iterable[float], digits: int = 6) -> list[float | None]:
     """Numbers of a few digits for JSON, which has none for what is not finite."""
-    return [
-        float(f"{v:.{digits}g}") if math.isfinite(v) else None for v in np.asarray(list(values), dtype=float).tolist()
-    ]
+    return [float(f"{v:.{digits}g}") if math.isfinite(v) else None for v in np.asarray(list(values), dtype=float).tolist()]

@@ -78,8 +78,7 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario | None = 
     levels, dashed = _limit(flights, torque_scale, torque_unit)
     rates = [Panel(f"{axis}, {rate_unit}", curves("rate_error", i, rate_scale)) for i, axis in enumerate("xyz")]
     torques = [
-        Panel(f"{axis}, {torque_unit}", curves("torque", i, torque_scale), False, levels)
-        for i, axis in enumerate("xyz")
+        Panel(f"{axis}, {torque_unit}", curves("torque", i, torque_scale), False, levels) for i, axis in enumerate("xyz")
     ]
     scalar = Panel("q₀", curves("attitude_error", 0))
     vector = [Panel(f"q{'₁₂₃'[i]}", curves("attitude_error", i + 1)) for i in range(3)]
