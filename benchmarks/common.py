@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -60,26 +60,28 @@ def _version(name: str) -> str:
         return starhold.__version__ if name == "starhold" else "not installed"
 
 
-def interleaved(tasks: Mapping[str, Callable[[], Any]], repeats: int = 5) -> dict[str, list[float]]:
-    """Wall seconds of each task, `repeats` times, after one untimed call of each.
+class Spent(NamedTuple):
+    """Least seconds of a task: by the clock on the wall, and by the processor's work for this process."""
 
-    The tasks take turns, so what the machine does meanwhile falls on all of them alike: compare minima or medians of one
-    call of this function, never figures of two.
+    wall: float
+    work: float
+
+
+def interleaved(tasks: Mapping[str, Callable[[], Any]], repeats: int = 7) -> dict[str, Spent]:
+    """The least time of each task in `repeats` rounds, after one untimed call of each.
+
+    The tasks take turns, so what the machine does meanwhile falls on all alike: compare figures of one call of this
+    function, never of two. Of a task on one thread take `work`, which leaves out the time it waits for a processor.
     """
-    times: dict[str, list[float]] = {name: [] for name in tasks}
+    times: dict[str, list[Spent]] = {name: [] for name in tasks}
     for task in tasks.values():
         task()
     for _ in range(repeats):
         for name, task in tasks.items():
-            begun = time.perf_counter()
+            wall, work = time.perf_counter(), time.process_time()
             task()
-            times[name].append(time.perf_counter() - begun)
-    return times
-
-
-def best(times: Mapping[str, list[float]]) -> dict[str, float]:
-    """The least of each: what the machine can do when it is left alone."""
-    return {name: min(values) for name, values in times.items()}
+            times[name].append(Spent(time.perf_counter() - wall, time.process_time() - work))
+    return {name: Spent(min(t.wall for t in spent), min(t.work for t in spent)) for name, spent in times.items()}
 
 
 def show(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

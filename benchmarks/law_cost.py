@@ -3,11 +3,12 @@
 The published experiment is flown once with each law. Then the states of that flight are shown to the law again, in order and
 over and over, 50 000 times. Timed is everything from the measured state to the limited torque: the attitude error, the
 gravity-gradient model where the law uses it, the double cover, the law and the torque limit; each call waits for the torque
-of the one before, so these are latencies. Median and worst come from `starhold.analysis.cost.call_costs`; a cheap law is timed
-in chunks of some microseconds, of which the worst is the mean over a chunk, a dear one call by call: the median over the rounds and the worst of all rounds
-are shown, the worst with whatever the machine did meanwhile. Total and mean are those of one uninterrupted replay, the
-fastest of the rounds (of the predictive law there is but one: it solves harder problems at the start of each flight, so its
-mean lies far above its median).
+of the one before, so these are latencies.
+
+Total and mean are those of one replay of 50 000 calls (of cheap laws the fastest of several). Median and worst come from
+`starhold.analysis.cost.call_costs`, which times a dear law call by call and a cheap one in chunks of some microseconds;
+shown are the median of its medians over the rounds and the worst of all, which holds what the machine did meanwhile. The
+predictive law solves harder problems at the start of a flight, so its mean lies far above its median.
 
 The NumPy versions do the same work as a user would write it. They are checked against the compiled torque.
 
@@ -93,13 +94,12 @@ def main() -> None:
 
     cheap = {name: whole(*pair) for name, pair in flown.items() if not pair[0].law.card.compiled_only}
     hand = {f"{name} in NumPy": by_hand(law, flown[name][1]) for name, law in BY_HAND.items()}
-    times = interleaved(cheap | hand, ROUNDS)
-    totals = {name: min(values) for name, values in times.items()}
+    totals = {name: spent.work for name, spent in interleaved(cheap | hand, ROUNDS).items()}
     for name, (loop, samples) in flown.items():
         if name not in totals:
-            begun = time.perf_counter()
+            begun = time.process_time()
             whole(loop, samples)()
-            totals[name] = time.perf_counter() - begun
+            totals[name] = time.process_time() - begun
     costs: dict[str, list[dict[str, float]]] = {name: [] for name in flown}
     for _ in range(ROUNDS):
         for name, (loop, samples) in flown.items():

@@ -7,9 +7,9 @@ instant, with the right-hand side in NumPy. For each the state reached is compar
 
 Then starhold alone, for its laws with a full inertia matrix, hysteresis and noise.
 
-One task at a time takes its turn, round after round; the fastest round counts, and the ratios are of one run. A step is one
-control period of one spacecraft. "per core" is on one thread; times of many lanes are what `simulate_many` adds for more
-steps, its setting-up is shown beside.
+The tasks take turns, round after round, and the fastest round counts; the ratios are of one run. On one thread the
+processor's time is counted, on all threads the time by the clock. A step is one control period of one spacecraft. Times of
+many lanes are those of `simulate_many` less those of the same call for no steps, which stand below the table.
 
 Run: python benchmarks/steps.py    (Basilisk is left out where `bsk` is not installed)
 """
@@ -26,7 +26,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import common
-from common import EARTH, FEEDBACK_GAINS, INERTIA, PERIOD, header, interleaved, show
+from common import EARTH, FEEDBACK_GAINS, INERTIA, PERIOD, Spent, header, interleaved, show
 from starhold.algebra.structure import flatten
 from starhold.algebra.vector import ZERO
 from starhold.laws.catalogue import catalogue
@@ -37,12 +37,12 @@ from starhold.models.sensor import Noise
 from starhold.simulation.lane import fly
 from starhold.simulation.lanes import simulate_many
 
-LANES, FEW, MANY = 2048, 200, 1200
-"""Lanes of a batch, and the two numbers of steps whose difference is timed."""
+LANES, TOGETHER = 2048, 6000
+"""Lanes of a batch and steps of each."""
 ALONE, BASILISK, SCIPY = 50_000, 2000, 100
 """Steps of a timed run."""
 CHECKED = 1000
-REPEATS = 7
+REPEATS = 5
 GOAL_ALONE, GOAL_MANY = 70, 700
 """How many times faster than Basilisk one lane, and many lanes on one core, are meant to be."""
 FULL = make_craft([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]], torque_limit=0.01)
@@ -94,18 +94,22 @@ class Batch:
         self.loop, self.states, self.threads = loop, starts(loop), threads
 
     def tasks(self, name: str) -> dict[str, Callable[[], Any]]:
-        """A short and a long run, and one of no steps."""
-        lengths = {"none": 0, "few": FEW, "many": MANY}
-        return {f"{name} {key}": (lambda n=n: self.run(n)) for key, n in lengths.items()}
+        """A run, and one of no steps."""
+        return {name: lambda: self.run(TOGETHER), f"{name}, none": lambda: self.run(0)}
 
     def run(self, steps: int) -> Any:
         """Fly all lanes."""
         return simulate_many(self.loop, self.states, steps, threads=self.threads)
 
 
-def per_lane_step(times: dict[str, list[float]], name: str) -> float:
-    """Seconds of a step of one lane: the fastest long run less the fastest short one."""
-    return (min(times[f"{name} many"]) - min(times[f"{name} few"])) / ((MANY - FEW) * LANES)
+def per_core(times: dict[str, Spent], name: str) -> float:
+    """Processor seconds of a step of one lane."""
+    return (times[name].work - times[f"{name}, none"].work) / (TOGETHER * LANES)
+
+
+def per_machine(times: dict[str, Spent], name: str) -> float:
+    """Seconds of a step of one lane with all threads at work."""
+    return (times[name].wall - times[f"{name}, none"].wall) / (TOGETHER * LANES)
 
 
 def engines() -> None:
@@ -128,19 +132,19 @@ def engines() -> None:
     rows: list[list[str]] = []
     cost: dict[str, float] = {}
     for name in loops:
-        one = cost[f"{name} alone"] = min(times[f"{name} alone"]) / ALONE
-        core = cost[f"{name} core"] = per_lane_step(times, f"{name} core")
-        both = per_lane_step(times, f"{name} all")
+        one = cost[f"{name} alone"] = times[f"{name} alone"].work / ALONE
+        core = cost[f"{name} core"] = per_core(times, f"{name} core")
+        both = per_machine(times, f"{name} all")
         same = simulate_many(loops[name], starts(loops[name], 200), CHECKED).state(0) == ends[name]
         rows.append([f"starhold, {name}, one lane", _ns(one), "1", "reference"])
         equal = "equal, bit for bit" if same else "DIFFERENT"
         rows.append([f"starhold, {name}, {LANES} lanes, 1 thread", _ns(core), f"{core / one:.3f}", equal])
         rows.append([f"starhold, {name}, {LANES} lanes, {threads} threads", _ns(both), f"{both / one:.3f}", equal])
         if basilisk:
-            slow = cost[f"{name} basilisk"] = min(times[f"{name} basilisk"]) / BASILISK
+            slow = cost[f"{name} basilisk"] = times[f"{name} basilisk"].work / BASILISK
             rows.append([f"Basilisk, {name}", _ns(slow), f"{slow / one:.0f}", _gap(ends[name], _basilisk_end(name))])
     for method, rtol in SCIPY_METHODS.items():
-        slow = min(times[method]) / SCIPY
+        slow = times[method].work / SCIPY
         apart = _gap(fly(loops["feedback"], SCIPY, SCIPY)[1].state, in_scipy(method, rtol, SCIPY))
         rows.append([f"SciPy {method}, feedback", _ns(slow), f"{slow / cost['feedback alone']:.0f}", apart])
     print(f"Attitude and rate are compared after {CHECKED} steps, SciPy's after {SCIPY}.")
@@ -149,7 +153,7 @@ def engines() -> None:
         alone, core = (cost[f"{name} basilisk"] / cost[f"{name} {way}"] for way in ("alone", "core"))
         print(f"Basilisk / starhold, {name}: one lane {alone:.0f} ({_verdict(alone, GOAL_ALONE)}), ", end="")
         print(f"many lanes per core {core:.0f} ({_verdict(core, GOAL_MANY)})")
-    setting_up = min(times["feedback core none"]) / LANES
+    setting_up = times["feedback core, none"].work / LANES
     print(f"Setting up a batch: {setting_up * 1e6:.1f} us a lane, once: {setting_up / cost['feedback core']:.0f} steps\n")
 
 
@@ -194,14 +198,12 @@ def laws() -> None:
             tasks[f"{extra} alone"] = lambda loop=loop: fly(loop, ALONE, ALONE)
             tasks |= Batch(loop, 1).tasks(f"{extra} core") | Batch(loop, threads).tasks(f"{extra} all")
         times = interleaved(tasks, REPEATS)
-        first = per_lane_step(times, "plain core")
+        first = per_core(times, "plain core")
         for extra in variants(plain):
-            one = min(times[f"{extra} alone"]) / ALONE
-            core, both = per_lane_step(times, f"{extra} core"), per_lane_step(times, f"{extra} all")
-            rate = f"{1e-6 / both:.0f}"
-            rows.append(
-                [f"{name}, {extra}", _ns(one), _ns(core), _ns(both), f"{one / core:.1f}", f"{core / first:.2f}", rate]
-            )
+            one, core = times[f"{extra} alone"].work / ALONE, per_core(times, f"{extra} core")
+            both = per_machine(times, f"{extra} all")
+            row = [f"{name}, {extra}", _ns(one), _ns(core), _ns(both), f"{one / core:.1f}", f"{core / first:.2f}"]
+            rows.append([*row, f"{1e-6 / both:.0f}"])
     heads = ["law, setting", "one lane ns", "many, 1 thread ns", f"many, {threads} threads ns"]
     show([*heads, "one / many", "of plain", "million steps/s"], rows)
 

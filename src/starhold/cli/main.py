@@ -13,7 +13,6 @@ from starhold.errors import InputError
 
 if TYPE_CHECKING:
     from starhold.report.flight import Flight
-    from starhold.scenario.reading import LawEntry, Scenario
 
 app = typer.Typer(
     help="Design, certify, fly and compare control laws for spacecraft.",
@@ -39,11 +38,7 @@ def run(
     force: Force = False,
 ) -> None:
     """Fly one law: run.nc, summary.json, pictures and report.html."""
-    from starhold.scenario.reading import load
-
-    scenario = load(file)
-    entry = scenario.laws[0] if law is None else scenario.pick(law)
-    flights = _fly(scenario, [entry], output or Path("results") / f"{scenario.name}-{entry.name}", force, nested=False)
+    flights = _fly(file, law, output, force, nested=False)
     if flights[0].metrics["diverged_at"] is not None:
         raise typer.Exit(DIVERGED)
 
@@ -51,37 +46,35 @@ def run(
 @app.command()
 def compare(file: ScenarioFile = DEFAULT, output: Output = None, force: Force = False) -> None:
     """Fly every law of a file on the same problem: ranked table, pictures and report.html."""
-    from starhold.scenario.reading import load
-
-    scenario = load(file)
-    _fly(scenario, list(scenario.laws), output or Path("results") / scenario.name, force, nested=True)
+    _fly(file, None, output, force, nested=True)
 
 
-def _fly(scenario: Scenario, entries: list[LawEntry], folder: Path, force: bool, nested: bool) -> list[Flight]:
-    from starhold.cli.show import console, flying, print_table
-    from starhold.report.compare import fly_law, write, write_run
-    from starhold.report.results import open_folder
-    from starhold.scenario.building import build
+def _fly(file: str, law: str | None, output: Path | None, force: bool, nested: bool) -> list[Flight]:
+    """Fly one law of a file (the first if `law` is None) or, nested, all of them, each into a folder of its own."""
+    from starhold.report.painter import Painter
 
-    for entry in entries:
-        build(scenario, entry)
-    open_folder(folder, force)
-    flights: list[Flight] = []
-    with flying(entries, scenario.table.simulation.steps) as notice:
+    # First of all, for it takes as long to get ready as the flight takes.
+    with Painter() as painter:
+        from starhold.cli.show import flying, print_outcome
+        from starhold.report.compare import fly_law, write, write_run
+        from starhold.report.results import open_folder
+        from starhold.scenario.building import build
+        from starhold.scenario.reading import load
+
+        scenario = load(file)
+        entries = list(scenario.laws) if nested else [scenario.laws[0] if law is None else scenario.pick(law)]
         for entry in entries:
-            flight = fly_law(scenario, entry, notice)
-            write_run(flight.run, scenario, (folder / entry.name if nested else folder) / "run.nc")
-            flights.append(flight)
-    page = write(scenario, flights, folder)
-    print_table(flights)
-    for flight in flights:
-        lost = flight.metrics["diverged_at"]
-        if lost is not None:
-            console.print(f"{flight.name} diverged at {lost:g} s; its results end there", style="red")
-        if flight.metrics.get("solver_budget_hits"):
-            hits, calls = flight.metrics["solver_budget_hits"], flight.metrics["solver_calls"]
-            console.print(f"{flight.name}: the solver used up its budget in {hits} of {calls} calls", style="yellow")
-    console.print(f"Report: {page}", soft_wrap=True)
+            build(scenario, entry)
+        name = scenario.name if nested else f"{scenario.name}-{entries[0].name}"
+        folder = open_folder(output or Path("results") / name, force)
+        flights: list[Flight] = []
+        with flying(entries, scenario.table.simulation.steps) as notice:
+            for entry in entries:
+                flight = fly_law(scenario, entry, notice)
+                write_run(flight.run, scenario, (folder / entry.name if nested else folder) / "run.nc")
+                flights.append(flight)
+        page = write(scenario, flights, folder, painter)
+    print_outcome(flights, page)
     return flights
 
 
@@ -124,7 +117,7 @@ def new(
 ) -> None:
     """Write a commented scenario file that runs as it is."""
     from starhold.cli.show import console
-    from starhold.report.results import whole
+    from starhold.report.files import whole
     from starhold.scenario.reading import builtin_names, builtin_text, nearest
     from starhold.scenario.template import template_text
 

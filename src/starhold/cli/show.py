@@ -11,6 +11,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 from rich.table import Table
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from starhold.laws.catalogue import Law
     from starhold.report.flight import Flight
     from starhold.scenario.reading import LawEntry
@@ -41,6 +43,19 @@ def flying(entries: Sequence[LawEntry], steps: int) -> Iterator[Callable[[str, i
         for entry in entries:
             tasks[entry.name] = bars.add_task(f"{entry.name} (compiling)", total=steps)
         yield notice
+
+
+def print_outcome(flights: Sequence[Flight], page: Path) -> None:
+    """The table, what went wrong, and where the report is."""
+    print_table(flights)
+    for flight in flights:
+        lost = flight.metrics["diverged_at"]
+        if lost is not None:
+            console.print(f"{flight.name} diverged at {lost:g} s; its results end there", style="red")
+        if flight.metrics.get("solver_budget_hits"):
+            hits, calls = flight.metrics["solver_budget_hits"], flight.metrics["solver_calls"]
+            console.print(f"{flight.name}: the solver used up its budget in {hits} of {calls} calls", style="yellow")
+    console.print(f"Report: {page}", soft_wrap=True)
 
 
 def print_table(flights: Sequence[Flight]) -> None:

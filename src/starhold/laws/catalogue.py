@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 import pkgutil
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
@@ -84,7 +84,7 @@ def catalogue() -> dict[str, Law]:
 
 
 @contextmanager
-def adopted(law: Law) -> Iterator[None]:
+def adopted(law: Law) -> Generator[None]:
     """Make a law from elsewhere known for a while; ValueError when its name is taken by another file."""
     known = catalogue()
     if known.get(law.name, law).module.__file__ != law.module.__file__:

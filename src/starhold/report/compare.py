@@ -11,8 +11,10 @@ import numpy as np
 from starhold.analysis.cost import call_costs
 from starhold.analysis.metrics import measure
 from starhold.laws.interface import Field
+from starhold.report.files import whole
 from starhold.report.flight import Flight
-from starhold.report.results import SUMMARY, whole, write_run, write_summary
+from starhold.report.painter import Painter
+from starhold.report.results import SUMMARY, write_run, write_summary
 from starhold.scenario.building import build
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.simulation.lane import fly, label
@@ -40,17 +42,17 @@ def compare(scenario: Scenario, notice: Notice | None = None) -> list[Flight]:
     return [fly_law(scenario, entry, notice) for entry in scenario.laws]
 
 
-def write(scenario: Scenario, flights: Sequence[Flight], folder: Path) -> Path:
+def write(scenario: Scenario, flights: Sequence[Flight], folder: Path, painter: Painter) -> Path:
     """Summary, pictures and the page into an existing folder; returns the page's path. The runs are written as they are
     flown, by `write_run`."""
-    from starhold.report.figures import draw
     from starhold.report.page import write_page
 
+    painter.start(flights, folder, scenario)
     write_summary(scenario, {flight.name: flight.metrics for flight in flights}, folder / SUMMARY)
-    draw(flights, folder, scenario)
     page = folder / "report.html"
     with whole(page) as hidden:
         write_page(hidden, scenario, flights)
+    painter.finish()
     return page
 
 

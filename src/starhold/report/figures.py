@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from starhold.analysis.metrics import DECADES
+from starhold.report.files import whole
 from starhold.report.flight import Flight, colour
-from starhold.report.plots import ACCURACIES, Plot, collect, steps_within
+from starhold.report.plots import ACCURACIES, Plot, Plots, collect, steps_within
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -21,13 +23,31 @@ POINTS = 2000
 """Samples of a curve, about two for each column of pixels."""
 
 
+class Sketch(NamedTuple):
+    """All that the figures show, without the runs it was taken from: small, and quickly sent to another process."""
+
+    plots: Plots
+    flights: list[Flight]
+    name: str
+
+
 def draw(flights: Sequence[Flight], folder: Path, scenario: Scenario | None = None) -> list[Path]:
     """Write the figures into `folder`, which exists, and return their paths.
 
     A scenario gives them its name as title and its tolerances as dashed lines.
     """
-    name = "" if scenario is None else scenario.name
+    return paint(sketch(flights, scenario), folder)
+
+
+def sketch(flights: Sequence[Flight], scenario: Scenario | None = None) -> Sketch:
+    """What `paint` needs."""
     plots = collect(flights, POINTS, scenario)
+    return Sketch(plots, [replace(flight, run=None) for flight in flights], "" if scenario is None else scenario.name)
+
+
+def paint(what: Sketch, folder: Path) -> list[Path]:
+    """Write the figures into `folder`, which exists, and return their paths."""
+    plots, flights, name = what
     paths: list[Path] = []
     with warnings.catch_warnings():
         # A name in a script that the font lacks is drawn as boxes; that is no news to whoever runs a simulation.
@@ -146,5 +166,6 @@ def _width(number: int, count: int, name: str) -> float:
 
 def _save(figure: Any, path: Path) -> Path:
     # Fast compression: the files are small either way. No software entry, lest equal figures differ between releases.
-    figure.savefig(path, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
+    with whole(path) as hidden:
+        figure.savefig(hidden, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
     return path

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
-import shutil
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import starhold
 from starhold.errors import InputError
+from starhold.report.files import whole
 from starhold.scenario.reading import Scenario
 
 if TYPE_CHECKING:
@@ -21,17 +18,6 @@ if TYPE_CHECKING:
 SUMMARY = "summary.json"
 MARKS = (SUMMARY, "run.nc", "report.html")
 """A folder with one of these holds results."""
-
-
-@contextmanager
-def whole(path: Path) -> Iterator[Path]:
-    """A path to write to, in a hidden folder beside `path`, renamed to it on success and removed on failure."""
-    hidden = Path(tempfile.mkdtemp(prefix=".writing-", dir=path.parent))
-    try:
-        yield hidden / path.name
-        os.replace(hidden / path.name, path)
-    finally:
-        shutil.rmtree(hidden, ignore_errors=True)
 
 
 def open_folder(folder: Path, force: bool) -> Path:

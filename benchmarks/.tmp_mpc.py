@@ -1,0 +1,264 @@
+"""The predictive law against OSQP, PIQP and DAQP on the programs met in one flight.
+
+    python benchmarks/mpc.py
+
+The published experiment is flown with the law; each of its control instants gives one quadratic program, and every
+solver gets the same sequence in the same order. Ours is timed as the law runs: linearisation, exact sampling and
+solution, inside compiled code, with the clock read there. The libraries get finished matrices, so forming them costs them
+nothing, and are timed around `update` and `solve` from Python; `own` is the time that the library itself reports, which
+leaves Python out where it is known. Forms, each the best for its solver that we found: OSQP sparse, states and moves as variables, matrices
+updated in place, started from its last solution; PIQP dense in the moves alone (an interior-point method starts anew);
+DAQP dense in the moves alone, its working set kept. Moves are counted in units of the limit.
+
+Accuracy: the largest gap of the objective relative to the best of all solvers is printed; OSQP's tolerances were
+tightened until it is about 1e-6 or better, the others are as exact as ours or nearly so.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import daqp
+import numba
+import numpy as np
+import osqp
+import piqp
+import scipy.sparse as sp
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from common import INERTIA, PERIOD, PUBLISHED, header, show
+from starhold.laws import mpc
+from starhold.laws.catalogue import catalogue
+from starhold.laws.interface import Seen
+from starhold.laws.mpc_problem import carve, hold, linearise
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.loop.kernels import make_kernels
+from starhold.models.craft import Craft, make_craft
+
+ZERO = (0.0, 0.0, 0.0)
+
+_clock = ctypes.CDLL(None).clock_gettime
+_clock.argtypes, _clock.restype = (ctypes.c_int, ctypes.c_void_p), ctypes.c_int
+MONOTONIC = 1
+
+
+class Program(NamedTuple):
+    """One program: sampled motion A (6, 6), B (6, 3), state x (6), and in the moves alone, in units of the limit,
+    v'Hv/2 + f'v + constant."""
+
+    a: Any
+    b: Any
+    x: Any
+    hessian: Any
+    linear: Any
+    constant: float
+
+    def cost(self, moves: Any) -> float:
+        return float(0.5 * moves @ self.hessian @ moves + self.linear @ moves + self.constant)
+
+
+def fly(gains: Any, craft: Craft, steps: int) -> Any:
+    """Rows of what the law sees: attitude (4), rate (3), position in body axes (3)."""
+    loop = ClosedLoop(craft, catalogue()["mpc"], gains, PUBLISHED, PERIOD, orbit=True, gravity_gradient=True)
+    record = np.zeros((26, steps))
+    one = make_kernels(loop.parts()).one
+    one(loop.carry(), 0, steps, False, 1, 0, gains, craft, loop.setup(), 1, record)
+    q, inertial = record[:4], record[7:10]
+    # Body axes from inertial ones: r - 2 q0 (q x r) + 2 q x (q x r).
+    once = np.cross(q[1:], inertial, axis=0)
+    body = inertial - 2.0 * q[0] * once + 2.0 * np.cross(q[1:], once, axis=0)
+    return np.ascontiguousarray(np.vstack([record[19:23], record[23:26], body]).T)
+
+
+@numba.njit(error_model="numpy")
+def timed(rows, gains, craft, memory, moves, start, stop):  # type: ignore[no-untyped-def]
+    """Run the law over the rows; nanoseconds go to start and stop (n, 2 each: s, ns), plans to moves."""
+    for k in range(len(rows)):
+        r = rows[k]
+        rate = (r[4], r[5], r[6])
+        q, position = (r[0], r[1], r[2], r[3]), (r[7], r[8], r[9])
+        seen = Seen(q, rate, rate, ZERO, ZERO, ZERO, position, PERIOD)
+        _clock(MONOTONIC, start[k:].ctypes.data)
+        mpc.first_move(seen, gains, craft, memory)
+        _clock(MONOTONIC, stop[k:].ctypes.data)
+        moves[k] = memory.plan
+
+
+def ours(rows: Any, gains: Any, craft: Craft) -> tuple[Any, Any, Any]:
+    """Plans, microseconds a call, and the counters, from one run of the sequence after an untimed one."""
+    moves = np.zeros((len(rows), 3 * gains.horizon))
+    for _ in range(2):
+        start, stop = np.zeros((2, len(rows), 2), dtype=np.int64)
+        memory = mpc.remember(gains, craft, PERIOD)
+        timed(rows, gains, craft, memory, moves, start, stop)
+    spent = (stop - start) @ np.array([1e9, 1.0]) * 1e-3
+    return moves / craft.torque_limit, spent, memory.counters
+
+
+def state_programs(rows: Any, gains: Any, craft: Craft) -> tuple[list[Program], Any]:
+    """The programs of the rows, and P."""
+    memory = mpc.remember(gains, craft, PERIOD)
+    n, store = gains.horizon, carve(memory.numbers, gains.horizon)
+    q, r, p = store.q.reshape(6, 6), store.r.reshape(3, 3), store.p.reshape(6, 6)
+    weight = np.kron(np.eye(n), q)
+    weight[-6:, -6:] = p
+    programs = []
+    for row in rows:
+        rate = tuple(row[4:7].tolist())
+        seen = Seen(tuple(row[:4].tolist()), rate, rate, ZERO, ZERO, ZERO, tuple(row[7:].tolist()), PERIOD)
+        linearise(seen, craft, store.a, store.b)
+        hold(store.a, store.b, PERIOD, store.space.small)
+        a, b = store.a.reshape(6, 6).copy(), store.b.reshape(6, 3) * craft.torque_limit
+        x = row[1:7].copy()
+        free, forced = np.zeros((6 * n, 6)), np.zeros((6 * n, 3 * n))
+        power = np.eye(6)
+        for k in range(n):
+            for j in range(n - k):
+                forced[6 * (j + k) : 6 * (j + k) + 6, 3 * j : 3 * j + 3] = power @ b
+            power = a @ power
+            free[6 * k : 6 * k + 6] = power
+        hessian = 2.0 * (forced.T @ weight @ forced + np.kron(np.eye(n), r * craft.torque_limit**2))
+        drift = free @ x
+        linear, constant = 2.0 * forced.T @ weight @ drift, float(drift @ weight @ drift + x @ q @ x)
+        programs.append(Program(a, b, x, np.asfortranarray(0.5 * (hessian + hessian.T)), linear, constant))
+    return programs, p
+
+
+Timed = tuple[Any, Any, Any]
+
+
+def sequence(programs: list[Program], solve: Callable[[Program], tuple[Any, float]]) -> Timed:
+    """Plans, wall microseconds, and the library's own microseconds, over the programs in order."""
+    plans, wall, own = [], [], []
+    for program in programs:
+        begun = time.perf_counter()
+        plan, spent = solve(program)
+        wall.append(1e6 * (time.perf_counter() - begun))
+        own.append(1e6 * spent)
+        plans.append(np.array(plan))
+    return np.array(plans), np.array(wall), np.array(own)
+
+
+def by_piqp(programs: list[Program]) -> Timed:
+    size = len(programs[0].linear)
+    low, high = -np.ones(size), np.ones(size)
+    solver = piqp.DenseSolver()
+    solver.settings.eps_abs, solver.settings.eps_rel = 1e-9, 1e-9
+    solver.settings.compute_timings = True
+    solver.setup(programs[0].hessian, programs[0].linear, x_l=low, x_u=high)
+
+    def solve(program: Program) -> tuple[Any, float]:
+        solver.update(P=program.hessian, c=program.linear)
+        solver.solve()
+        return solver.result.x, solver.result.info.update_time + solver.result.info.solve_time
+
+    return sequence(programs, solve)
+
+
+def by_daqp(programs: list[Program]) -> Timed:
+    size = len(programs[0].linear)
+    none, one = np.zeros((0, size)), np.ones(size)
+    model = daqp.Model()
+    model.settings = {"primal_tol": 1e-9, "dual_tol": 1e-12}
+    model.setup(programs[0].hessian, programs[0].linear, none, one, -one, np.zeros(size, dtype=np.int32))
+
+    def solve(program: Program) -> tuple[Any, float]:
+        model.update(H=program.hessian, f=program.linear)
+        plan, _, flag, _ = model.solve()
+        if flag < 1:
+            raise RuntimeError(f"DAQP: exit flag {flag}")
+        # It does not report the time of an update, which is most of the work.
+        return plan, np.nan
+
+    return sequence(programs, solve)
+
+
+def by_osqp(programs: list[Program], gains: Any, craft: Craft, terminal: Any) -> Timed:
+    n = gains.horizon
+    q = np.diag([*gains.q_attitude, *gains.q_rate])
+    r = np.diag(gains.r) * craft.torque_limit**2
+    hessian = sp.block_diag([*[sp.csc_matrix(2.0 * q)] * (n - 1), 2.0 * terminal, *[2.0 * r] * n], format="csc")
+
+    def rows(a: Any, b: Any) -> Any:
+        # Every entry of A and B is kept, zeros too, so that the pattern never changes.
+        motion = sp.block_array(
+            [[sp.eye(6) if j == i else sp.coo_matrix(full(-a)) if j == i - 1 else None for j in range(n)] for i in range(n)]
+        )
+        push = sp.block_array([[sp.coo_matrix(full(-b)) if j == i else None for j in range(n)] for i in range(n)])
+        box = sp.hstack([sp.csc_matrix((3 * n, 6 * n)), sp.eye(3 * n)])
+        return sp.csc_matrix(sp.vstack([sp.hstack([motion, push]), box]))
+
+    def full(block: Any) -> Any:
+        # A sparse matrix drops exact zeros; this one is far below what counts.
+        return np.where(block == 0.0, 1e-300, block)
+
+    data = [rows(program.a, program.b).data for program in programs]
+    bounds = [np.concatenate([program.a @ program.x, np.zeros(6 * (n - 1))]) for program in programs]
+    one = np.ones(3 * n)
+    lows, highs = [np.concatenate([e, -one]) for e in bounds], [np.concatenate([e, one]) for e in bounds]
+    solver = osqp.OSQP()
+    settings = {"eps_abs": 1e-5, "eps_rel": 1e-5, "max_iter": 100_000, "polishing": False, "verbose": False}
+    first = rows(programs[0].a, programs[0].b)
+    solver.setup(sp.triu(hessian, format="csc"), np.zeros(9 * n), first, lows[0], highs[0], **settings)
+    turn = iter(zip(data, lows, highs, strict=True))
+
+    def solve(program: Program) -> tuple[Any, float]:
+        entries, low, high = next(turn)
+        solver.update(Ax=entries, l=low, u=high)
+        result = solver.solve()
+        return result.x[6 * n :], result.info.update_time + result.info.solve_time + result.info.polish_time
+
+    plans, wall, own = sequence(programs, solve)
+    # Its moves may pass the limits by its tolerance.
+    return np.clip(plans, -1.0, 1.0), wall, own
+
+
+def compare(horizon: int, torque_limit: float, steps: int) -> None:
+    """Fly, solve with every solver, and print a table."""
+    q, r = (0.2, 0.2, 0.2), (50.0, 50.0, 50.0)
+    gains, craft = mpc.Gains(q, q, r, horizon=horizon), make_craft(INERTIA, torque_limit)
+    rows = fly(gains, craft, steps)
+    programs, terminal = state_programs(rows, gains, craft)
+    plans, spent, counters = ours(rows, gains, craft)
+    results = {
+        "starhold": (plans, spent, spent),
+        "PIQP": by_piqp(programs),
+        "DAQP": by_daqp(programs),
+        "OSQP": by_osqp(programs, gains, craft, terminal),
+    }
+    costs = {
+        name: np.array([p.cost(v) for p, v in zip(programs, plan, strict=True)]) for name, (plan, _, _) in results.items()
+    }
+    least = np.min(list(costs.values()), axis=0)
+    active = float(np.mean(np.abs(plans).max(axis=1) > 1.0 - 1e-9))
+    print(f"N = {horizon}, limit {torque_limit:g} N m, {steps} programs, limits active in {active:.0%} of them")
+    print(f"ours: {counters[mpc.SWEEPS] / counters[mpc.CALLS]:.2f} sweeps a call, at most {counters[mpc.WORST]}")
+    table = []
+    for name, (_, wall, own) in results.items():
+        gap = float(np.max((costs[name] - least) / least))
+        ratio = float(np.median(wall) / np.median(spent))
+        share = float(np.median(own) / np.median(spent))
+        figures = [np.median(wall), np.percentile(wall, 99.0), wall.max(), np.median(own)]
+        cells = ["-" if np.isnan(x) else f"{x:.1f}" for x in (*figures, ratio, share)]
+        table.append([name, *cells, f"{gap:.0e}"])
+    show(["solver", "median us", "99 % us", "worst us", "own us", "median/ours", "own/ours", "gap"], table)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--steps", type=int, default=1400)
+    steps = parser.parse_args().steps
+    print(header("osqp", "piqp", "daqp"))
+    for horizon, torque_limit in ((10, 0.01), (10, 0.002)):
+        compare(horizon, torque_limit, steps)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,60 @@
+"""Draws the figures in a process of its own, which loads the plotting library while the laws are still flying."""
+
+from __future__ import annotations
+
+import pickle
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from starhold.report.figures import paint, sketch
+
+if TYPE_CHECKING:
+    from starhold.report.flight import Flight
+    from starhold.scenario.reading import Scenario
+
+
+class Painter:
+    """A waiting process; `start` sends it what to draw, `finish` waits until it has. Leaving the context ends it."""
+
+    def __init__(self) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "starhold.report.painter"], stdin=subprocess.PIPE, stderr=subprocess.PIPE
+        )
+
+    def __enter__(self) -> Painter:
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        if self._process.poll() is None:
+            self._process.kill()
+        self._process.communicate()
+
+    def start(self, flights: Sequence[Flight], folder: Path, scenario: Scenario) -> None:
+        """Let it draw into `folder`, which exists."""
+        assert self._process.stdin is not None
+        pickle.dump((sketch(flights, scenario), folder.absolute()), self._process.stdin)
+        self._process.stdin.flush()
+
+    def finish(self) -> None:
+        """Wait for the files. RuntimeError tells what went wrong."""
+        _, said = self._process.communicate()
+        if self._process.returncode != 0:
+            raise RuntimeError(f"the figures could not be drawn: {said.decode(errors='replace').strip()[-2000:]}")
+
+
+def main() -> None:
+    """The waiting process: load what drawing needs, read what to draw, draw it."""
+    # Ctrl-C goes to the parent alone, which ends this process.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    import matplotlib.backends.backend_agg
+    import matplotlib.figure  # noqa: F401
+
+    paint(*pickle.load(sys.stdin.buffer))
+
+
+if __name__ == "__main__":
+    main()
