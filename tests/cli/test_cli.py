@@ -24,6 +24,7 @@ def starhold(*words, cwd, **options):
 @pytest.fixture
 def short(tmp_path):
     (tmp_path / "short.toml").write_text(SHORT)
+    (tmp_path / "huge.toml").write_text(SHORT.replace("duration = 20.0", "duration = 1e10"))
     return tmp_path
 
 
@@ -94,6 +95,7 @@ def test_a_motion_that_is_lost_is_said_so(short):
         (("laws", "lyapunow"), "did you mean lyapunov?"),
         (("scenarios", "three"), "three-laws"),
         (("new", "short.toml"), "exists"),
+        (("run", "huge.toml"), "simulation.record_every: found 1,"),
         (("new", "x.toml", "--from", "cubesat"), "cubesat-slew"),
         (("new", "no/such/folder/x.toml"), "cannot write there"),
         (("check-law", "short.toml"), "short.toml"),
@@ -144,7 +146,7 @@ def test_check_law_passes_a_good_law_and_fails_a_bad_one(tmp_path):
 
 @pytest.mark.xdist_group("cli")
 def test_interrupt_leaves_no_half_written_file(short):
-    (short / "long.toml").write_text(SHORT.replace("duration = 20.0", "duration = 20000000.0"))
+    (short / "long.toml").write_text(SHORT.replace("duration = 20.0", "duration = 20000000.0\nrecord_every = 10000"))
     child = subprocess.Popen(
         [sys.executable, "-m", "starhold", "run", "long.toml", "--law", "lyapunov", "-o", "out"],
         cwd=short,

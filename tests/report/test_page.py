@@ -138,7 +138,7 @@ def test_equal_flights_give_equal_bytes(tmp_path: Path, page: str) -> None:
 
 def test_a_lost_run_is_told_and_the_others_are_shown() -> None:
     found = Reader(render(flown.scenario(), [*flown.flights(), flown.lost("wild <one>")]))
-    assert "lost at 6.7 s" in found.text
+    assert "diverged at 6.7 s" in found.text
     assert any(attrs.get("class") == "alarm" for _, attrs in found.tags)
     assert sum(tag == "tr" and attrs.get("class") == "lost" for tag, attrs in found.tags) == 1
     data = found.data()

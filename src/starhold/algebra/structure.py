@@ -64,18 +64,22 @@ def unpack(blocks: Any, lanes: int) -> NDArray[np.float64]:
 
 
 def flatten(state: Any) -> list[float]:
-    """The numbers of a state in order."""
+    """The numbers of a state in order. Arrays, which a law's memory may hold, are not among them: they change in place."""
+    if isinstance(state, np.ndarray):
+        return []
     return [x for part in cast(Any, state) for x in flatten(part)] if isinstance(state, tuple) else [state]
 
 
 def unflatten(numbers: Any, like: _State) -> _State:
-    """The state shaped like `like` that holds these numbers in order."""
+    """The state shaped like `like` that holds these numbers in order, and the arrays of `like`."""
     return _fill(iter(np.asarray(numbers, dtype=float).tolist()), like)
 
 
 def _fill(source: Iterator[float], like: Any) -> Any:
+    if isinstance(like, np.ndarray):
+        return cast(Any, like)
     if not isinstance(like, tuple):
-        return next(source)
+        return type(like)(next(source))
     return _rebuild(like, [_fill(source, part) for part in cast(tuple[Any, ...], like)])
 
 
@@ -91,6 +95,8 @@ class _Writer:
 
     def expression(self, kind: Any, path: str = "") -> str:
         if not isinstance(kind, types.BaseTuple):
+            if isinstance(kind, types.Array):
+                return f"like{path}"
             self.leaves += 1
             return self.leaf(path, self.leaves - 1)
         parts = [self.expression(part, f"{path}[{i}]") for i, part in enumerate(cast(Any, kind))]
@@ -129,7 +135,8 @@ def _compiled_load(x: Any, lane: Any, like: Any) -> Any:
 
 @compiled_as(store)
 def _compiled_store(x: Any, lane: Any, state: Any) -> Any:
-    lines = [f"{_place(x, i)} = state{path}" for i, (path, _) in enumerate(_leaves(state))]
+    numbers = [path for path, kind in _leaves(state) if not isinstance(kind, types.Array)]
+    lines = [f"{_place(x, i)} = state{path}" for i, path in enumerate(numbers)]
     return _Writer(lambda path, index: path).function("x, lane, state", "\n    ".join([*lines, "return"]))
 
 

@@ -7,6 +7,7 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra.structure import flatten
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import make_replay
 
@@ -24,11 +25,12 @@ def call_costs(loop: ClosedLoop, samples: NDArray[np.float64], calls: int = CALL
     """
     replay, setup = make_replay(loop.parts()), loop.setup()
     carry = loop.carry()
+    end = np.empty((len(flatten(carry)), 1))
     few = min(20, samples.shape[1])
 
     def timed(first: int, last: int) -> float:
         begun = time.perf_counter()
-        replay(samples, first, last, carry, loop.gains, loop.craft, setup)
+        replay(samples, first, last, carry, loop.gains, loop.craft, setup, end)
         return time.perf_counter() - begun
 
     timed(0, 1)

@@ -160,13 +160,14 @@ def _compile(function: Callable[..., Any], parts: Parts) -> Callable[..., Any]:
 def _one(parts: Parts) -> Callable[..., Any]:
     _, decide, hold, check, sample = make_step(parts)
 
-    def one(carry, first, count, finish, every, run, gains, craft, setup, substeps, out):  # type: ignore[no-untyped-def]
+    def one(carry, first, count, finish, every, run, gains, craft, setup, substeps, out, end):  # type: ignore[no-untyped-def]
         """Fly control steps first .. first+count-1; write every `every`-th into a column of `out`, and with `finish` the
-        end as well. Returns what is carried on; stops where the motion is lost."""
+        last state as well. What is carried on goes into the one column of `end`; stops where the motion is lost."""
+        # Nothing is returned: a result made of Python objects would be built by code that a signal can break into.
         for step in range(first, first + count):
             carry = check(carry, step, setup)
             if carry.lost_at >= 0.0:
-                return carry
+                break
             carry = decide(carry, step, run, gains, craft, setup)
             if step % every == 0:
                 store(out, step // every, sample(carry, step, setup))
@@ -176,7 +177,7 @@ def _one(parts: Parts) -> Callable[..., Any]:
         carry = check(carry, last, setup)
         if finish and carry.lost_at < 0.0 and last % every == 0:
             store(out, last // every, sample(decide(carry, last, run, gains, craft, setup), last, setup))
-        return carry
+        store(end, 0, carry)
 
     return _compile(one, parts)
 
@@ -205,7 +206,7 @@ def make_replay(parts: Parts) -> Callable[..., Any]:
     """A kernel that repeats the control calls of a run, to time them: from the state to the limited command."""
     decide = make_step(parts).decide
 
-    def replay(samples, first, last, carry, gains, craft, setup):  # type: ignore[no-untyped-def]
+    def replay(samples, first, last, carry, gains, craft, setup, end):  # type: ignore[no-untyped-def]
         """Decide on the states in columns first .. last-1 of recorded samples, each call after the one before."""
         for k in range(first, last):
             # The first rows of a sample are the state; every number of it waits for the torque of the call before.
@@ -214,6 +215,6 @@ def make_replay(parts: Parts) -> Callable[..., Any]:
             state = move(load(samples, k, carry.state), wait, load(samples, k, carry.state))
             carry = Carry(state, carry.memory, carry.goal, carry.h, u, carry.disturbance, carry.lost_at)
             carry = decide(carry, k, 0, gains, craft, setup)
-        return carry
+        store(end, 0, carry)
 
     return _compile(replay, parts)

@@ -137,7 +137,7 @@ def _figure(
     # Set afterwards, for a name may start with an underscore or hold a dollar sign, which labels read as commands.
     for text, flight in zip(legend.get_texts(), flights, strict=True):
         text.set_parse_math(False)
-        text.set_text(_short(flight.name + ("" if flight.lost is None else f" (lost at {flight.lost:.4g} s)"), 40))
+        text.set_text(_short(flight.name + ("" if flight.lost is None else f" (diverged at {flight.lost:.4g} s)"), 40))
     axes = grid.ravel()
     for axis in axes:
         axis.grid(True, color="0.9", linewidth=0.6)

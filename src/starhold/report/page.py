@@ -96,7 +96,7 @@ def _lost(flights: Sequence[Flight]) -> str:
     lost = [f"{flight.name} (at {flight.lost:.6g} s)" for flight in flights if flight.lost is not None]
     if not lost:
         return ""
-    return f'<p class="alarm">The motion was lost, and has no final values: {escape(", ".join(lost))}.</p>'
+    return f'<p class="alarm">Diverged, and so without final values: {escape(", ".join(lost))}.</p>'
 
 
 def _ranking(flights: Sequence[Flight]) -> str:
@@ -117,7 +117,7 @@ def _ranking(flights: Sequence[Flight]) -> str:
             f"{BEST if name in best[metric] else '<td>'}{shown(metric, flight.metrics.get(metric))}</td>"
             for metric in columns
         )
-        fate = f"lost at {flight.lost:.6g} s" if lost else flight.law if flight.law != name else ""
+        fate = f"diverged at {flight.lost:.6g} s" if lost else flight.law if flight.law != name else ""
         rows.append(
             f"{LOST if lost else '<tr>'}<td>{place}</td>"
             f'<th scope="row" style="text-align:left">{_swatch(numbers[name])}{escape(name)}'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -9,6 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra.structure import flatten, load
+from starhold.errors import InputError
 from starhold.loop.closed_loop import Carry, ClosedLoop
 from starhold.loop.kernels import Sample, make_kernels
 
@@ -53,25 +56,15 @@ def fly(
     """The samples (number, sample) of a trajectory, one row for each number of `Sample`, and what it carries at its end."""
     kernel = make_kernels(loop.parts()).one
     setup = loop.setup()
-    samples = np.full((_WIDTH, steps // record_every + 1), np.nan)
-    carry, done, chunk = loop.carry(), 0, max(1, steps // 50) if progress is None else 1
+    samples = np.full((_WIDTH, _sample_count(steps, record_every)), np.nan)
+    carry, done, chunk = loop.carry(), 0, steps if progress is None else 1
+    end = np.empty((len(flatten(carry)), 1))
     while done < steps:
         begun = time.perf_counter()
-        count = min(chunk, steps - done) if progress is not None else steps
-        carry = kernel(
-            carry,
-            done,
-            count,
-            done + count == steps,
-            record_every,
-            run,
-            loop.gains,
-            loop.craft,
-            setup,
-            loop.substeps,
-            samples,
-        )
-        carry = _as_given(carry)
+        count = min(chunk, steps - done)
+        last = done + count == steps
+        kernel(carry, done, count, last, record_every, run, loop.gains, loop.craft, setup, loop.substeps, samples, end)
+        carry = load(end, 0, carry)
         done += count
         if progress is not None:
             progress(done, steps)
@@ -112,9 +105,15 @@ def label(loop: ClosedLoop, samples: NDArray[np.float64], carry: Carry, record_e
     return xr.Dataset(data, coords, attrs)
 
 
-def _as_given(carry: Any) -> Carry:
-    """A compiled kernel returns NamedTuples of the same classes; this only states the type."""
-    return carry
+def _sample_count(steps: int, record_every: int) -> int:
+    """The number of samples of a run; refused where they would fill the memory."""
+    count = steps // record_every + 1
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 2**33
+    # Labelling, measuring and drawing hold copies.
+    most = memory // 4 // (8 * _WIDTH)
+    if count > most:
+        raise InputError("", "simulation.record_every", f"{record_every}, {count} samples", f"at least {-(-steps // most)}")
+    return count
 
 
 _WIDTH = sum(4 if COLUMNS[name][0] == "quaternion" else 3 for name in Sample._fields)

@@ -101,7 +101,7 @@ function paint(view, where) {
   pen.clearRect(0, 0, width, height);
   const q = between(frames, where);
   view.angle.textContent = `${(2 * Math.atan2(Math.hypot(q[1], q[2], q[3]), Math.abs(q[0])) * 180 / Math.PI).toPrecision(3)}°`
-    + (where > frames.length - 1 ? " lost" : "");
+    + (where > frames.length - 1 ? " diverged" : "");
 
   const away = [Math.cos(eye.above) * Math.cos(eye.around), Math.cos(eye.above) * Math.sin(eye.around), Math.sin(eye.above)];
   const right = [-Math.sin(eye.around), Math.cos(eye.around), 0];
