@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from common import EARTH, INERTIA, header, interleaved, show
+from starhold.algebra.structure import flatten
 from starhold.analysis.cost import CALLS, call_costs
 from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
@@ -67,11 +68,12 @@ def loops() -> dict[str, ClosedLoop]:
     return found | {entry.name: build(scenario, entry) for entry in scenario.laws}
 
 
-def whole(loop: ClosedLoop, samples: Any) -> Callable[[], Any]:
-    """A replay of 50 000 calls."""
-    replay, setup = make_replay(loop.parts()), loop.setup()
+def whole(loop: ClosedLoop, samples: Any, calls: int = CALLS) -> Callable[[], Any]:
+    """A replay of that many calls. With none it costs what entering compiled code does."""
+    replay, setup, carry = make_replay(loop.parts()), loop.setup(), loop.carry()
     states = np.ascontiguousarray(np.tile(samples, -(-CALLS // samples.shape[1]))[:, :CALLS])
-    return lambda: replay(states, 0, CALLS, loop.carry(), loop.gains, loop.craft, setup)
+    end = np.empty((len(flatten(carry)), 1))
+    return lambda: replay(states, 0, calls, loop.carry(), loop.gains, loop.craft, setup, end)
 
 
 def by_hand(law: Callable[[Any, Any, Any], Any], samples: Any) -> Callable[[], Any]:
@@ -94,7 +96,10 @@ def main() -> None:
 
     cheap = {name: whole(*pair) for name, pair in flown.items() if not pair[0].law.card.compiled_only}
     hand = {f"{name} in NumPy": by_hand(law, flown[name][1]) for name, law in BY_HAND.items()}
-    totals = {name: spent.work for name, spent in interleaved(cheap | hand, ROUNDS).items()}
+    entered = {f"{name}, none": whole(*flown[name], calls=0) for name in cheap}
+    times = interleaved(cheap | entered | hand, ROUNDS)
+    totals = {name: times[name].work for name in hand}
+    totals |= {name: times[name].work - times[f"{name}, none"].work for name in cheap}
     for name, (loop, samples) in flown.items():
         if name not in totals:
             begun = time.process_time()

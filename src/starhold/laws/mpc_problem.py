@@ -19,7 +19,9 @@ import numpy as np
 from starhold.algebra.scalar import equation
 from starhold.algebra.vector import apply, cross, scale, subtract
 
-compiled = numba.njit(error_model="numpy", cache=False)
+# Not inlined, said outright: what an equation calls inherits its options, and inlining all this at each of five levels
+# would multiply the time a kernel takes to compile.
+compiled = numba.njit(error_model="numpy", forceinline=False)
 
 TERMS = 30
 """Most terms of the Taylor series; fewer once they no longer count."""
