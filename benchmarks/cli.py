@@ -1,8 +1,8 @@
 """How long the commands take, from an empty compiler cache and from a full one, and what the imports cost.
 
 Each command runs in a process of its own and writes into a temporary folder. Cold is the first start on a machine: the
-compiler's cache is empty. Warm is every start after it. Commands take turns, round after round; times are by the clock on
-the wall, so on a busy machine the minimum says most. Python's own byte code is warm throughout.
+compiler's cache is empty. Warm is every start after it. Commands take turns, round after round; times are by the clock
+on the wall, so on a busy machine the minimum says most. Python's own byte code is warm throughout.
 
 Run: python benchmarks/cli.py
 """
@@ -101,9 +101,7 @@ def imports(folder: Path) -> None:
             times[name].append(seconds([sys.executable, "-c", code], cache, folder))
     bare = min(times.pop(""))
     rows = [[name, f"{(min(values) - bare) * 1e3:.0f}"] for name, values in times.items()]
-    print(
-        f"Milliseconds an import adds to bare Python ({bare * 1e3:.0f}), least of {IMPORTS}; each includes what it imports."
-    )
+    print(f"Milliseconds an import adds to bare Python ({bare * 1e3:.0f}), least of {IMPORTS}; each with its own imports.")
     show(["import", "ms"], rows)
 
 

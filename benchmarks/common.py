@@ -1,8 +1,8 @@
 """What the benchmarks share: the machine in words, fair timing, tables, and one problem stated for several engines.
 
-The problem is the published spacecraft (J = 2, 3, 4 kg m2, low orbit, gravity gradient, torque held for 0.1 s, classical
-Runge-Kutta) under Basilisk's feedback on modified Rodrigues parameters: that law is the one both programs can fly with
-compiled code alone. `tests/oracles/test_basilisk.py` holds that they agree.
+The problem is the published spacecraft (J = 2, 3, 4 kg m2, low orbit, gravity gradient, torque held for 0.1 s,
+classical Runge-Kutta) under Basilisk's feedback on modified Rodrigues parameters: that law is the one both programs can
+fly with compiled code alone. `tests/oracles/test_basilisk.py` holds that they agree.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def show(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 @equation
 def feedback(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
-    """u = -k_attitude sigma - k_rate w, sigma = q/(1 + q0); shown the quaternion with q0 >= 0, it keeps |sigma| <= 1."""
+    """u = -k_attitude sigma - k_rate w, sigma = q/(1 + q0); shown q0 >= 0, it keeps |sigma| <= 1."""
     q = seen.attitude
     return add(scale(-gains.k_attitude / (1.0 + q[0]), vector_part(q)), scale(-gains.k_rate, seen.rate)), memory
 
@@ -144,11 +144,11 @@ Control = Callable[[Quaternion, Any, Any], Any]
 
 
 def in_basilisk(control: Control | str, start: State = START) -> Callable[[int], State]:
-    """The problem in Basilisk; the result flies it for a number of steps from where it was, and gives the state reached.
+    """The problem in Basilisk; the result flies it for a number of steps from where it was and gives the state.
 
     control: "feedback" (Basilisk's own flight-software modules), "steady" (a constant torque, no flight software), or a
-    function, called from a Basilisk module in Python. The models run in such an order that the torque of a state is held
-    from that instant on.
+    function, called from a Basilisk module in Python. The models run in such an order that the torque of a state is
+    held from that instant on.
     """
     from Basilisk.simulation import GravityGradientEffector, extForceTorque, spacecraft
     from Basilisk.utilities import SimulationBaseClass, macros, simIncludeGravBody

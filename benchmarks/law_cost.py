@@ -1,14 +1,14 @@
 """What one call of each law costs, beside the published table of 50 000 calls and beside plain NumPy.
 
-The published experiment is flown once with each law. Then the states of that flight are shown to the law again, in order and
-over and over, 50 000 times. Timed is everything from the measured state to the limited torque: the attitude error, the
-gravity-gradient model where the law uses it, the double cover, the law and the torque limit; each call waits for the torque
-of the one before, so these are latencies.
+The published experiment is flown once with each law. Then the states of that flight are shown to the law again, in
+order and over and over, 50 000 times. Timed is everything from the measured state to the limited torque: the attitude
+error, the gravity-gradient model where the law uses it, the double cover, the law and the torque limit; each call waits
+for the torque of the one before, so these are latencies.
 
-Total and mean are those of one replay of 50 000 calls (of cheap laws the fastest of several). Median and worst come from
-`starhold.analysis.cost.call_costs`, which times a dear law call by call and a cheap one in chunks of some microseconds;
-shown are the median of its medians over the rounds and the worst of all, which holds what the machine did meanwhile. The
-predictive law solves harder problems at the start of a flight, so its mean lies far above its median.
+Total and mean are those of one replay of 50 000 calls (of cheap laws the fastest of several). Median and worst come
+from `starhold.analysis.cost.call_costs`, which times a dear law call by call and a cheap one in chunks of some
+microseconds; shown are the median of its medians over the rounds and the worst of all, which holds what the machine did
+meanwhile. The predictive law solves harder problems at the start of a flight, so its mean lies far above its median.
 
 The NumPy versions do the same work as a user would write it. They are checked against the compiled torque.
 

@@ -38,7 +38,7 @@ from common import INERTIA, PERIOD, PUBLISHED, header, show
 from starhold.laws import mpc
 from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import Seen
-from starhold.laws.mpc_problem import carve, hold, linearise
+from starhold.laws.predictive.problem import carve, hold, linearise
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.models.craft import Craft, make_craft
 from starhold.simulation import lane

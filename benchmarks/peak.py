@@ -1,9 +1,9 @@
 """What share of the processor's arithmetic the many-lane kernel reaches.
 
-The processor's peak on one core is measured: independent chains of multiplications and additions on numbers in the first
-cache, many chain shapes, the fastest counts. Once in strict IEEE arithmetic, as starhold's kernels compute (a product and
-a sum are two instructions), and once with the two fused, which strict arithmetic forbids. Division and square root are
-measured too: they are far slower, and have a unit of their own.
+The processor's peak on one core is measured: independent chains of multiplications and additions on numbers in the
+first cache, many chain shapes, the fastest counts. Once in strict IEEE arithmetic, as starhold's kernels compute (a
+product and a sum are two instructions), and once with the two fused, which strict arithmetic forbids. Division and
+square root are measured too: they are far slower, and have a unit of their own.
 
 The operations of a step are counted by flying it in plain Python with numbers that count: the same equations, another
 reader. What the compiler finds twice or in vain it may drop, so the count is what the equations ask for, not what runs.
@@ -211,10 +211,12 @@ def main() -> None:
         cells = [f"{costs[name] * 1e9:.2f}", f"{rate / 1e9:.1f}", f"{rate / strict:.0%}", f"{rate / fused:.0%}"]
         easy, slow = (total - hard) / strict, ops["divide"] / rates["divide"] + ops["root"] / rates["root"]
         shares.append([name, *cells, f"{easy * 1e9:.2f}", f"{slow * 1e9:.2f}"])
-    print("Operations of a lane-step: the control law and four slopes of the motion. `flop` is the sum of the first four.")
+    print("Operations of a lane-step: the control law and four slopes of the motion. `flop`: sum of the first four.")
     show(["law", *KINDS, "flop"], counts)
-    print("The kernel on one core. Last two: the time its additions and multiplications, and its divisions and roots, take")
-    print("at their measured peaks. The two units work side by side, so the larger is the least a step can take.")
+    print("The kernel on one core. Last two: the time that its additions and multiplications, and its divisions and")
+    print(
+        "roots, take at their measured peaks. The two units work side by side, so the larger is the least a step can take."
+    )
     show(["law", "ns", "10^9 flop/s", "of strict peak", "of fused peak", "add, multiply ns", "divide, root ns"], shares)
 
 

@@ -1,15 +1,16 @@
 """Closed-loop steps a second: starhold on one lane and on many, Basilisk and SciPy.
 
-First the same problem in every engine (see common.py): rigid body, two-body orbit, gravity gradient, feedback recomputed and
-held every 0.1 s. Basilisk runs its own flight software in C, or none at all and a constant torque, which is the least it can
-be asked to do; starhold flies the same constant torque through its whole loop. SciPy's solve_ivp restarts at each control
-instant, with the right-hand side in NumPy. For each the state reached is compared with starhold's: they solve one problem.
+First the same problem in every engine (see common.py): rigid body, two-body orbit, gravity gradient, feedback
+recomputed and held every 0.1 s. Basilisk runs its own flight software in C, or none at all and a constant torque, which
+is the least it can be asked to do; starhold flies the same constant torque through its whole loop. SciPy's solve_ivp
+restarts at each control instant, with the right-hand side in NumPy. For each the state reached is compared with
+starhold's: they solve one problem.
 
 Then starhold alone, for its laws with a full inertia matrix, hysteresis and noise.
 
 The tasks take turns, round after round, and the fastest round counts; the ratios are of one run. On one thread the
-processor's time is counted, on all threads the time by the clock. A step is one control period of one spacecraft. Times of
-many lanes are those of `simulate_many` less those of the same call for no steps, which stand below the table.
+processor's time is counted, on all threads the time by the clock. A step is one control period of one spacecraft. Times
+of many lanes are those of `simulate_many` less those of the same call for no steps, which stand below the table.
 
 Run: python benchmarks/steps.py    (Basilisk is left out where `bsk` is not installed)
 """
@@ -154,7 +155,8 @@ def engines() -> None:
         print(f"Basilisk / starhold, {name}: one lane {alone:.0f} ({_verdict(alone, GOAL_ALONE)}), ", end="")
         print(f"many lanes per core {core:.0f} ({_verdict(core, GOAL_MANY)})")
     setting_up = times["feedback core, none"].work / LANES
-    print(f"Setting up a batch: {setting_up * 1e6:.1f} us a lane, once: {setting_up / cost['feedback core']:.0f} steps\n")
+    worth = setting_up / cost["feedback core"]
+    print(f"Setting up a batch: {setting_up * 1e6:.1f} us a lane, once: {worth:.0f} steps\n")
 
 
 def _ns(seconds: float) -> str:

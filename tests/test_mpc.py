@@ -18,8 +18,8 @@ from starhold.algebra.quaternion import conjugate, derivative, multiply, normali
 from starhold.laws import mpc
 from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import Seen, tracking_torque
-from starhold.laws.mpc_problem import hold, linearise
-from starhold.laws.mpc_solver import solve
+from starhold.laws.predictive.problem import hold, linearise
+from starhold.laws.predictive.solver import solve
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.models.craft import make_craft, tensor
 from starhold.models.environment import two_body_gravity_gradient

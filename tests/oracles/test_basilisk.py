@@ -1,8 +1,8 @@
 """Basilisk, an independent simulator in C++, flies the same closed loops to the same states.
 
-Both integrate with the classical Runge-Kutta method at 0.1 s under the gravity gradient and hold the torque for 0.1 s. What
-is left between them is the truncation error of the attitude, for starhold integrates the quaternion and Basilisk modified
-Rodrigues parameters: it falls with the fourth power of the step, and is some 1e-11 rad here.
+Both integrate with the classical Runge-Kutta method at 0.1 s under the gravity gradient and hold the torque for 0.1 s.
+What is left between them is the truncation error of the attitude, for starhold integrates the quaternion and Basilisk
+modified Rodrigues parameters: it falls with the fourth power of the step, and is some 1e-11 rad here.
 """
 
 from __future__ import annotations

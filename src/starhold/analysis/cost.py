@@ -19,10 +19,10 @@ CHUNK = 2e-5
 
 
 def call_costs(loop: ClosedLoop, samples: NDArray[np.float64], calls: int = CALLS, seconds: float = 1.0) -> dict[str, float]:
-    """Median and worst processor time (s) of a call, over chunks of calls that replay the samples of `simulate.fly` in order.
+    """Median and worst processor time (s) of a call, over chunks of calls that replay the samples of a flight in order.
 
-    A call goes from the measured state to the limited torque, models the law needs included, and waits for the call before
-    it, so the figures are latencies.
+    A call goes from the measured state to the limited torque, models the law needs included, and waits for the call
+    before it, so the figures are latencies.
     """
     # The noise of the simulation is no part of a call.
     quiet = loop.parts()._replace(sense=exact, disturb=no_disturbance)

@@ -3,16 +3,16 @@ applied."""
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Annotated, Any, NamedTuple, cast
 
 import numpy as np
-from scipy.linalg import solve_discrete_are  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
 
 from starhold.algebra.scalar import equation
 from starhold.algebra.vector import Vector, add, clip_axes, clip_norm, scale
 from starhold.laws.interface import Card, Gain, Seen, tracking_torque
-from starhold.laws.mpc_problem import Problem, carve, compiled, hold, linearise, make_store
-from starhold.laws.mpc_solver import advance, improve
+from starhold.laws.predictive.problem import Problem, carve, compiled, hold, linearise, make_store
+from starhold.laws.predictive.solver import advance, improve
 from starhold.models.craft import Craft, tensor
 
 CARD = Card(
@@ -91,7 +91,6 @@ def terminal_weight(gains: Gains, craft: Craft, period: float) -> tuple[Any, Any
     """
     # In periods and in a typical torque, so that the weights of any craft are of comparable size.
     inertia = tensor(craft.inertia)
-    riccati = cast(Any, solve_discrete_are)
     typical = np.trace(inertia) / 3.0
     push = typical * np.linalg.inv(inertia)
     a = np.block([[np.eye(3), 0.5 * np.eye(3)], [np.zeros((3, 3)), np.eye(3)]])
@@ -101,6 +100,8 @@ def terminal_weight(gains: Gains, craft: Craft, period: float) -> tuple[Any, Any
     name = TERMINALS[gains.terminal]
     p: Any = q if name == "stage" else np.zeros((6, 6))
     if name == "riccati":
+        # Loaded here, where alone it is needed; by name, its types being too loose for a strict checker.
+        riccati = import_module("scipy.linalg").solve_discrete_are
         try:
             with np.errstate(all="ignore"):
                 p = riccati(a, b, q, r)

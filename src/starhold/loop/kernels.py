@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numba
@@ -152,9 +154,21 @@ def _compile(function: Callable[..., Any], parts: Parts) -> Callable[..., Any]:
 
     A name of its own for each kernel also means that a law which is no longer there spoils no other law's cache entry.
     """
+    sources = fingerprint()[:16]
     mark = fingerprint(outside_modules(parts)) + "".join(f"{part.__module__}.{part.__qualname__}" for part in parts)
-    function.__qualname__ = f"{function.__name__}-{hashlib.sha256(mark.encode()).hexdigest()[:32]}"
-    return numba.njit(error_model="numpy", cache=True, nogil=True)(function)
+    function.__qualname__ = f"{function.__name__}-{sources}-{hashlib.sha256(mark.encode()).hexdigest()[:32]}"
+    kernel: Any = numba.njit(error_model="numpy", cache=True, nogil=True)(function)
+    _drop_stale(Path(kernel.stats.cache_path), sources)
+    return kernel
+
+
+@cache
+def _drop_stale(folder: Path, sources: str) -> None:
+    """Delete the cached kernels of sources that have changed since; no process will ask for them again."""
+    for file in folder.glob("kernels.*-*-*.nb[ic]"):
+        if f"-{sources}-" not in file.name:
+            with suppress(OSError):
+                file.unlink()
 
 
 def _one(parts: Parts) -> Callable[..., Any]:

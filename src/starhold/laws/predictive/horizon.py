@@ -6,9 +6,8 @@ gradient, and the Newton step by a backward Riccati sweep."""
 from __future__ import annotations
 
 from starhold.algebra.scalar import equation
-from starhold.laws.mpc_problem import (
+from starhold.laws.predictive.limits import (
     box_inverse,
-    compiled,
     held,
     inverse3,
     loose,
@@ -18,6 +17,7 @@ from starhold.laws.mpc_problem import (
     repelled,
     triple,
 )
+from starhold.laws.predictive.problem import compiled
 
 
 @equation

@@ -19,8 +19,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from starhold.laws.mpc_horizon import adjoint, form, form3, rollout, sweep, transition, unroll
-from starhold.laws.mpc_problem import Problem, carve, compiled, make_store, project, put, slack, triple
+from starhold.laws.predictive.horizon import adjoint, form, form3, rollout, sweep, transition, unroll
+from starhold.laws.predictive.limits import project, put, slack, triple
+from starhold.laws.predictive.problem import Problem, carve, compiled, make_store
 
 TOLERANCE = 1e-16
 """Relative gap of the objective at which a solution is accepted."""
