@@ -101,7 +101,7 @@ def imports(folder: Path) -> None:
             times[name].append(seconds([sys.executable, "-c", code], cache, folder))
     bare = min(times.pop(""))
     rows = [[name, f"{(min(values) - bare) * 1e3:.0f}"] for name, values in times.items()]
-    print(f"Milliseconds an import adds to bare Python ({bare * 1e3:.0f}), least of {IMPORTS}; each with its own imports.")
+    print(f"Milliseconds an import adds to bare Python ({bare * 1e3:.0f}), least of {IMPORTS} rounds")
     show(["import", "ms"], rows)
 
 

@@ -214,9 +214,7 @@ def main() -> None:
     print("Operations of a lane-step: the control law and four slopes of the motion. `flop`: sum of the first four.")
     show(["law", *KINDS, "flop"], counts)
     print("The kernel on one core. Last two: the time that its additions and multiplications, and its divisions and")
-    print(
-        "roots, take at their measured peaks. The two units work side by side, so the larger is the least a step can take."
-    )
+    print("roots, take at their measured peaks. The units work side by side: the larger is a lower bound.")
     show(["law", "ns", "10^9 flop/s", "of strict peak", "of fused peak", "add, multiply ns", "divide, root ns"], shares)
 
 

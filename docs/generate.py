@@ -26,7 +26,7 @@ def first_component(law: Law) -> str:
     for item in law.fields():
         if item.gain.shape == (3, 3):
             k = sympy.Symbol(item.name, real=True)
-            gains.append(((k, 0, 0), (0, k, 0), (0, 0, k)))
+            gains.append((k, k, k))
         else:
             gains.append(vector(item.name) if item.gain.shape else sympy.Symbol(item.name, real=True))
     moments = vector("J")

@@ -29,6 +29,7 @@ from starhold.algebra.vector import (
     scale,
     signs,
     skew,
+    solve,
     subtract,
     swing,
     times,
@@ -183,3 +184,13 @@ def test_a_matrix_is_told_from_a_diagonal_in_every_reader():
     for operation in (vector.apply, vector.swing):
         full, short = agree(operation, diagonal(moments), rate), agree(operation, moments, rate)
         assert close(full, short, 1e-16)
+
+
+@given(matrices, vectors)
+def test_solve_inverts_apply(m, a):
+    assume(abs(determinant(m)) > 1e-3)
+    agree(solve, m, a)
+    np.testing.assert_allclose(apply(m, solve(m, a)), a, atol=1e-6 * (1.0 + max(map(abs, a))))
+    d = (2.0, -3.0, 0.5)
+    agree(solve, d, a)
+    assert apply(d, solve(d, a)) == pytest.approx(a, rel=1e-15)

@@ -14,7 +14,7 @@ from starhold.laws import lyapunov, matrix_pd, pd, sliding
 from starhold.laws.catalogue import catalogue
 from starhold.laws.double_cover import as_published, hysteresis, shortest
 from starhold.laws.interface import NoMemory, Seen
-from starhold.models.craft import Craft, make_craft
+from starhold.models.craft import Craft, make_craft, tensor
 from starhold.models.rigid_body import angular_acceleration
 
 number = st.floats(-1.0, 1.0)
@@ -65,8 +65,8 @@ def test_matrix_gain_families_meet_their_conditions(form):
         a, b = random.uniform(0, 2, size=2)
         d = float(random.uniform(0.1, 1)) if form == "inertial" else tuple(random.uniform(0.1, 1, size=3))
         gains = matrix_pd.design(craft, matrix_pd.FORMS[form](a, b, d))
-        weight = np.linalg.inv(np.array(gains.k_attitude))
-        damping = weight @ np.array(gains.k_rate)
+        weight = np.linalg.inv(tensor(gains.k_attitude))
+        damping = weight @ tensor(gains.k_rate)
         assert np.linalg.eigvalsh(weight @ inertia + (weight @ inertia).T).min() > 0
         assert np.linalg.eigvalsh(damping + damping.T).min() > 0
         for rate in random.normal(size=(5, 3)):

@@ -93,6 +93,11 @@ def swing(m: Matrix | Vector, a: Vector) -> Vector:
     return _swing_diagonal(m, a) if _is_diagonal(m) else _swing_matrix(m, a)
 
 
+def solve(m: Matrix | Vector, a: Vector) -> Vector:
+    """The x with m x = a; not defined for a singular matrix. A vector in place of the matrix is a diagonal one."""
+    return _solve_diagonal(m, a) if _is_diagonal(m) else _solve_matrix(m, a)
+
+
 def _is_diagonal(m: Matrix | Vector) -> TypeGuard[Vector]:
     return not isinstance(m[0], tuple)
 
@@ -105,6 +110,16 @@ def _apply_diagonal(m: Any, a: Vector) -> Vector:
 @equation
 def _apply_matrix(m: Any, a: Vector) -> Vector:
     return (dot(m[0], a), dot(m[1], a), dot(m[2], a))
+
+
+@equation
+def _solve_diagonal(m: Any, a: Vector) -> Vector:
+    return (a[0] / m[0], a[1] / m[1], a[2] / m[2])
+
+
+@equation
+def _solve_matrix(m: Any, a: Vector) -> Vector:
+    return _apply_matrix(inverse(m), a)
 
 
 @equation
@@ -122,6 +137,13 @@ def _compiled_apply(m: Any, a: Any) -> Any:
     if isinstance(m[0], types.BaseTuple):
         return lambda m, a: _apply_matrix(m, a)  # pyright: ignore
     return lambda m, a: _apply_diagonal(m, a)  # pyright: ignore
+
+
+@compiled_as(solve)
+def _compiled_solve(m: Any, a: Any) -> Any:
+    if isinstance(m[0], types.BaseTuple):
+        return lambda m, a: _solve_matrix(m, a)  # pyright: ignore
+    return lambda m, a: _solve_diagonal(m, a)  # pyright: ignore
 
 
 @compiled_as(swing)

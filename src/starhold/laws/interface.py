@@ -16,7 +16,7 @@ import numpy as np
 from starhold.algebra.quaternion import Quaternion
 from starhold.algebra.scalar import equation
 from starhold.algebra.vector import Vector, add, apply, subtract, swing
-from starhold.models.craft import Craft, matrix
+from starhold.models.craft import Craft, compact
 
 
 class Seen(NamedTuple):
@@ -79,7 +79,8 @@ class Card:
 @dataclass(frozen=True)
 class Gain:
     """Unit and bounds of one gain, as an annotation. `shape`: () a number, (3,) a vector, (3, 3) a matrix, for which a
-    number stands for that multiple of the identity and a vector for a diagonal."""
+    number stands for that multiple of the identity and a vector for a diagonal. A law gets a diagonal matrix as the vector
+    of its diagonal; `apply` and `solve` take both forms."""
 
     unit: str = "1"
     above: float | None = None
@@ -112,7 +113,7 @@ class Gain:
             return int(array)
         if not self.shape:
             return float(array)
-        return matrix(array) if self.shape == (3, 3) else tuple(array.tolist())
+        return compact(array) if self.shape == (3, 3) else tuple(array.tolist())
 
     def _check_bounds(self, array: Any) -> None:
         if self.above is not None and not (array > self.above).all():

@@ -8,9 +8,9 @@ import numpy as np
 
 from starhold.algebra.quaternion import vector_part
 from starhold.algebra.scalar import Scalar, equation
-from starhold.algebra.vector import IDENTITY, Matrix, Vector, add, apply, dot, inverse, scale, subtract
+from starhold.algebra.vector import Matrix, Vector, add, apply, dot, solve, subtract
 from starhold.laws.interface import Card, Gain, NoMemory, Seen, tracking_torque
-from starhold.models.craft import Craft, matrix, tensor
+from starhold.models.craft import Craft, compact, tensor
 
 CARD = Card(
     title="Matrix-gain PD",
@@ -32,8 +32,8 @@ CARD = Card(
 class Gains(NamedTuple):
     """Damping and stiffness matrices."""
 
-    k_rate: Annotated[Matrix, Gain("N m s", shape=(3, 3), text="damping")]
-    k_attitude: Annotated[Matrix, Gain("N m", shape=(3, 3), text="stiffness")]
+    k_rate: Annotated[Matrix | Vector, Gain("N m s", shape=(3, 3), text="damping")]
+    k_attitude: Annotated[Matrix | Vector, Gain("N m", shape=(3, 3), text="stiffness")]
 
 
 class Inertial(NamedTuple):
@@ -63,7 +63,7 @@ def design(craft: Craft, spec: Inertial | Diagonal) -> Gains:
     if isinstance(spec, Diagonal) and np.count_nonzero(inertia - np.diag(np.diagonal(inertia))):
         raise ValueError("form 'diagonal' needs a diagonal inertia; use form 'inertial'")
     k_rate = np.diag(np.broadcast_to(np.asarray(spec.d, dtype=float), 3)) @ inertia
-    return Gains(matrix(k_rate), matrix(np.linalg.inv(spec.a * inertia + spec.b * np.eye(3))))
+    return Gains(compact(k_rate), compact(np.linalg.inv(spec.a * inertia + spec.b * np.eye(3))))
 
 
 @equation
@@ -76,12 +76,12 @@ def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Ve
 @equation
 def lyapunov(seen: Seen, gains: Gains, craft: Craft) -> Scalar:
     """V = w.K_attitude^-1 Jw/2 + 2 (1 - q0); V' = -w.K_attitude^-1 K_rate w under the law's assumptions."""
-    weighted = apply(inverse(gains.k_attitude), apply(craft.inertia, seen.rate))
+    weighted = solve(gains.k_attitude, apply(craft.inertia, seen.rate))
     return 0.5 * dot(seen.rate, weighted) + 2.0 * (1.0 - seen.attitude[0])
 
 
 def examples() -> list[Gains]:
-    """Stiffness a multiple of the identity (b alone), for any inertia."""
-    rate: Matrix = (scale(0.09, IDENTITY[0]), scale(0.12, IDENTITY[1]), scale(0.15, IDENTITY[2]))
-    stiffness: Matrix = (scale(0.009, IDENTITY[0]), scale(0.009, IDENTITY[1]), scale(0.009, IDENTITY[2]))
-    return [Gains(rate, stiffness)]
+    """Stiffness a multiple of the identity (b alone), for any inertia, with a diagonal and a full damping."""
+    stiffness = (0.009, 0.009, 0.009)
+    full = ((0.09, 0.01, 0.0), (0.01, 0.12, 0.02), (0.0, 0.02, 0.15))
+    return [Gains((0.09, 0.12, 0.15), stiffness), Gains(full, stiffness)]

@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple
 
 from starhold.algebra.quaternion import vector_part
 from starhold.algebra.scalar import Scalar, clip, equation, less, maximum, sign, where
-from starhold.algebra.vector import IDENTITY, Matrix, Vector, add, apply, combine, cross, scale, subtract, swing, times
+from starhold.algebra.vector import Matrix, Vector, add, apply, cross, scale, subtract, swing, times
 from starhold.laws.interface import Card, Gain, NoMemory, Seen
 from starhold.models.craft import Craft
 
@@ -32,7 +32,9 @@ CARD = Card(
 class Gains(NamedTuple):
     """Surface slope, reaching torque and, to trade chatter for accuracy, the thickness of a boundary layer."""
 
-    slope: Annotated[Matrix, Gain("1/s", shape=(3, 3), text="K of the surface w + K q = 0, symmetric positive definite")]
+    slope: Annotated[
+        Matrix | Vector, Gain("1/s", shape=(3, 3), text="K of the surface w + K q = 0, symmetric positive definite")
+    ]
     reach: Annotated[Vector, Gain("N m", above=0.0, shape=(3,), text="switching torque, above the disturbance")]
     layer: Annotated[float, Gain("rad/s", at_least=0.0, text="boundary layer; 0 switches by sign")] = 0.0
 
@@ -63,6 +65,7 @@ def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Ve
 
 
 def examples() -> list[Gains]:
-    """The published slope with the sign and with a boundary layer."""
-    slope = combine(0.08, IDENTITY, 0.0, IDENTITY)
-    return [Gains(slope, (5e-3, 5e-3, 5e-3), 0.0), Gains(slope, (5e-3, 5e-3, 5e-3), 2e-3)]
+    """The published slope with the sign, and a full matrix with a boundary layer."""
+    reach = (5e-3, 5e-3, 5e-3)
+    slanted = ((0.08, 0.01, 0.0), (0.01, 0.1, 0.0), (0.0, 0.0, 0.12))
+    return [Gains((0.08, 0.08, 0.08), reach, 0.0), Gains(slanted, reach, 2e-3)]

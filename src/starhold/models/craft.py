@@ -34,10 +34,7 @@ def make_craft(inertia: Any, torque_limit: float = math.inf, gravity: float = EA
     full = check_inertia(inertia)
     if not torque_limit > 0.0:
         raise ValueError(f"the torque limit must be positive, not {torque_limit:g}")
-    moments = np.diagonal(full)
-    if np.count_nonzero(full - np.diag(moments)) == 0:
-        return Craft(vector(moments), vector(1.0 / moments), float(torque_limit), float(gravity))
-    return Craft(matrix(full), matrix(np.linalg.inv(full)), float(torque_limit), float(gravity))
+    return Craft(compact(full), compact(np.linalg.inv(full)), float(torque_limit), float(gravity))
 
 
 def tensor(inertia: Matrix | Vector) -> NDArray[np.float64]:
@@ -66,6 +63,13 @@ def check_inertia(inertia: Any) -> NDArray[np.float64]:
     if moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-9):
         raise ValueError(f"no body has these principal moments ({shown}): the largest exceeds the sum of the others")
     return tensor
+
+
+def compact(array: Any) -> Matrix | Vector:
+    """A 3x3 array as a matrix, or as the vector of its diagonal where nothing stands beside it."""
+    full = np.asarray(array, dtype=float)
+    diagonal = np.diagonal(full)
+    return matrix(full) if np.count_nonzero(full - np.diag(diagonal)) else vector(diagonal)
 
 
 def vector(array: Any) -> Vector:
