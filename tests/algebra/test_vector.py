@@ -190,7 +190,8 @@ def test_a_matrix_is_told_from_a_diagonal_in_every_reader():
 def test_solve_inverts_apply(m, a):
     assume(abs(determinant(m)) > 1e-3)
     agree(solve, m, a)
-    np.testing.assert_allclose(apply(m, solve(m, a)), a, atol=1e-6 * (1.0 + max(map(abs, a))))
+    size = max(map(abs, leaves(m))) ** 2 / abs(determinant(m)) + 1.0
+    np.testing.assert_allclose(apply(m, solve(m, a)), a, atol=1e-13 * size**2 * (1.0 + max(map(abs, a))))
     d = (2.0, -3.0, 0.5)
     agree(solve, d, a)
     assert apply(d, solve(d, a)) == pytest.approx(a, rel=1e-15)

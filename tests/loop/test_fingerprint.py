@@ -62,3 +62,14 @@ def test_second_start_does_not_compile_and_an_edit_does(flown, tmp_path):
     imported = flown(law)
     assert imported[1] == "hits 0 misses 1"
     assert imported[0] != edited[0]
+
+
+def test_a_law_that_is_gone_spoils_no_other(flown, tmp_path):
+    """Kernels of outside laws once shared an index with all others, which then could not be read without them."""
+    text = Path(catalogue()["pd"].module.__file__).read_text()
+    (tmp_path / "first").mkdir()
+    law = tmp_path / "first" / "gone.py"
+    law.write_text(text)
+    flown(law)
+    law.rename(tmp_path / "other.py")
+    assert flown(tmp_path / "other.py")[1].startswith("hits")

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from starhold.algebra.structure import flatten
-from starhold.conformance.bench import sample_loop
+from starhold.conformance.bench import random_quaternions, sample_loop
 from starhold.laws.catalogue import catalogue
 from starhold.loop.kernels import make_step
 from starhold.models.sensor import Noise
 from starhold.simulation.lane import fly, simulate
-from starhold.simulation.lanes import simulate_many
+from starhold.simulation.lanes import _carries, simulate_many
 
 STEPS, LANES = 60, 300
 
@@ -30,6 +30,16 @@ def test_every_lane_equals_its_own_single_flight():
         alone = fly(replace(loop, start=starts[lane]), STEPS, run=17 + lane)[1].state
         assert batch.states[:, lane].tolist() == flatten(alone)
     assert (batch.lost_at == -1).all()
+
+
+@pytest.mark.parametrize("target", ["orbital", (0.6, 0.0, 0.8, 0.0)])
+def test_lanes_start_like_single_flights(target):
+    loop = flown(target=target)
+    starts = [loop.start._replace(attitude=q) for q in random_quaternions(40)]
+    columns = _carries(loop, np.array([flatten(s) for s in starts]).T)
+    for lane, start in enumerate(starts):
+        assert columns[:, lane].tolist() == flatten(loop.carry(start))
+    assert set(columns[16 if target != "orbital" else 20]) == {-1.0, 1.0}
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])

@@ -38,7 +38,7 @@ def call_costs(loop: ClosedLoop, samples: NDArray[np.float64], calls: int = CALL
 
     timed(0, 1)
     overhead = min(timed(0, 0) for _ in range(50))
-    single = max(timed(0, few) - overhead, 1e-9) / few
+    single = max(min(timed(0, few) for _ in range(5)) - overhead, 1e-9) / few
     chunk = max(1, min(samples.shape[1], int(CHUNK / single)))
     costs: list[float] = []
     begun, first = time.thread_time(), 0

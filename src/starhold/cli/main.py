@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import signal
 import sys
 from pathlib import Path
@@ -73,7 +74,9 @@ def _fly(file: str, law: str | None, output: Path | None, force: bool, nested: b
                 flight = fly_law(scenario, entry, notice)
                 write_run(flight.run, scenario, (folder / entry.name if nested else folder) / "run.nc")
                 flights.append(flight)
-        page = write(scenario, flights, folder, painter)
+        painter.start(flights, folder, scenario)
+        page = write(scenario, flights, folder)
+        painter.finish()
     print_outcome(flights, page)
     return flights
 
@@ -198,6 +201,8 @@ def _interrupt(number: int, frame: object) -> None:
 def main() -> None:
     """Entry point: user errors become one line and exit code 2, an interrupt 130."""
     signal.signal(signal.SIGINT, _interrupt)
+    # A command loads much and lives briefly: looking for garbage at every step of that is time lost.
+    gc.set_threshold(200_000)
     try:
         app(standalone_mode=True)
     except InputError as error:

@@ -124,4 +124,6 @@ def _as_law(module: ModuleType, name: str | None = None) -> Law:
     if missing:
         raise ValueError(f"{module.__file__}: a law needs {', '.join(missing)}")
     name = module.__name__.rpartition(".")[2] if name is None else name
+    # Numba tells NamedTuple classes apart at the speed of calls only by their names.
+    module.Gains.__name__ = f"{name}_gains"
     return Law(name.replace("_", "-"), module)

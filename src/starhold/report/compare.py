@@ -13,7 +13,6 @@ from starhold.analysis.metrics import measure
 from starhold.laws.interface import Field
 from starhold.report.files import whole
 from starhold.report.flight import Flight
-from starhold.report.painter import Painter
 from starhold.report.results import SUMMARY, write_run, write_summary
 from starhold.scenario.building import build
 from starhold.scenario.reading import LawEntry, Scenario
@@ -42,17 +41,15 @@ def compare(scenario: Scenario, notice: Notice | None = None) -> list[Flight]:
     return [fly_law(scenario, entry, notice) for entry in scenario.laws]
 
 
-def write(scenario: Scenario, flights: Sequence[Flight], folder: Path, painter: Painter) -> Path:
-    """Summary, pictures and the page into an existing folder; returns the page's path. The runs are written as they are
-    flown, by `write_run`."""
+def write(scenario: Scenario, flights: Sequence[Flight], folder: Path) -> Path:
+    """Summary and page into an existing folder; returns the page's path. The runs are written as they are flown, by
+    `write_run`, and the pictures by a `Painter`."""
     from starhold.report.page import write_page
 
-    painter.start(flights, folder, scenario)
     write_summary(scenario, {flight.name: flight.metrics for flight in flights}, folder / SUMMARY)
     page = folder / "report.html"
     with whole(page) as hidden:
         write_page(hidden, scenario, flights)
-    painter.finish()
     return page
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -45,17 +47,23 @@ def sketch(flights: Sequence[Flight], scenario: Scenario | None = None) -> Sketc
     return Sketch(plots, [replace(flight, run=None) for flight in flights], "" if scenario is None else scenario.name)
 
 
-def paint(what: Sketch, folder: Path) -> list[Path]:
-    """Write the figures into `folder`, which exists, and return their paths."""
+def paint(what: Sketch, folder: Path, part: slice = slice(None)) -> list[Path]:
+    """Write the figures, or a part of them, into `folder`, which exists, and return their paths."""
     plots, flights, name = what
-    paths: list[Path] = []
+    over_time = (plots.scalar, plots.attitude, plots.rate, plots.torque, plots.angle)
+    makers = {plot.name: partial(_over_time, plot, plots.times, flights, name) for plot in over_time}
+    makers["accuracy"] = partial(_accuracy, flights, name)
     with warnings.catch_warnings():
         # A name in a script that the font lacks is drawn as boxes; that is no news to whoever runs a simulation.
         warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
-        for plot in (plots.scalar, plots.attitude, plots.rate, plots.torque, plots.angle):
-            paths.append(_save(_over_time(plot, plots.times, flights, name), folder / f"{plot.name}.png"))
-        paths.append(_save(_accuracy(flights, name), folder / "accuracy.png"))
-    return paths
+        return [_save(make(), folder / f"{key}.png") for key, make in list(makers.items())[part]]
+
+
+def warm_up() -> None:
+    """Make the plotting library load its fonts and file formats, which it does at the first figure."""
+    figure, axes = _figure(1, 1, 1.0, "", [], "", "")
+    axes[0].set_yscale("log")
+    figure.savefig(BytesIO())
 
 
 def _over_time(plot: Plot, times: Any, flights: Sequence[Flight], name: str) -> Any:
@@ -109,7 +117,7 @@ def _figure(
     from matplotlib.lines import Line2D
 
     # As many names in a line as fit.
-    per_row = max(1, min(len(flights), 104 // (7 + max(len(_short(flight.name, 40)) for flight in flights))))
+    per_row = max(1, min(len(flights), 104 // (7 + max((len(_short(flight.name, 40)) for flight in flights), default=0))))
     lines = -(-len(flights) // per_row)
     head = 0.40 + 0.20 * lines + (0.22 if columns > 1 else 0.0)
     total = height + 0.20 * lines

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import os
 import pickle
 import signal
 import subprocess
@@ -9,8 +11,6 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-from starhold.report.figures import paint, sketch
 
 if TYPE_CHECKING:
     from starhold.report.flight import Flight
@@ -35,6 +35,8 @@ class Painter:
 
     def start(self, flights: Sequence[Flight], folder: Path, scenario: Scenario) -> None:
         """Let it draw into `folder`, which exists."""
+        from starhold.report.figures import sketch
+
         assert self._process.stdin is not None
         pickle.dump((sketch(flights, scenario), folder.absolute()), self._process.stdin)
         self._process.stdin.flush()
@@ -50,10 +52,19 @@ def main() -> None:
     """The waiting process: load what drawing needs, read what to draw, draw it."""
     # Ctrl-C goes to the parent alone, which ends this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    import matplotlib.backends.backend_agg
-    import matplotlib.figure  # noqa: F401
+    gc.disable()
+    from starhold.report.figures import paint, warm_up
 
-    paint(*pickle.load(sys.stdin.buffer))
+    warm_up()
+    what, folder = pickle.load(sys.stdin.buffer)
+    if not hasattr(os, "fork"):
+        paint(what, folder)
+        return
+    # Everything is loaded, so the other half of the figures costs a second process no start-up.
+    other = os.fork()
+    paint(what, folder, slice(0 if other else 1, None, 2))
+    if other and os.waitpid(other, 0)[1] != 0:
+        sys.exit("half of the figures are missing")
 
 
 if __name__ == "__main__":

@@ -53,7 +53,7 @@ def simulate_many(
     workers = os.cpu_count() or 1 if threads is None else threads
     if loop.law.card.compiled_only:
         return _one_by_one(loop, start, steps, gains, first_run, workers, progress)
-    carries = np.array([flatten(loop.carry(unflatten(column, _STATE))) for column in start.T]).T
+    carries = _carries(loop, start)
     blocks = pack(carries)
     gain_blocks = None if gains is None else pack(gains)
     kernel, setup, like = make_kernels(loop.parts()).many, loop.setup(), loop.carry()
@@ -66,6 +66,19 @@ def simulate_many(
     _share_out(work, len(blocks), workers, progress)
     ends = unpack(blocks, start.shape[1])
     return Batch(ends[: len(start)], ends[-1])
+
+
+def _carries(loop: ClosedLoop, start: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What each lane starts with, one column a lane."""
+    if isinstance(loop.target, str):
+        return np.array([flatten(loop.carry(unflatten(column, _STATE))) for column in start.T]).T
+    # Lanes differ in their state and in the side of the double cover they start on, and in nothing else.
+    first = loop.carry()
+    columns = np.repeat(np.array(flatten(first))[:, None], start.shape[1], axis=1)
+    columns[: len(start)] = start
+    goal = loop.target[0, :4] if isinstance(loop.target, np.ndarray) else np.array(loop.target)
+    columns[len(start) + len(flatten((first.memory, first.goal)))] = np.where(goal @ start[:4] < 0.0, -1.0, 1.0)
+    return columns
 
 
 def _one_by_one(
