@@ -217,6 +217,7 @@ def test_json_schema_accepts_what_is_read_and_refuses_a_misspelling():
     import tomllib
 
     schema = json.loads(json.dumps(json_schema()))
+    assert '"default": "riccati"' in json.dumps(schema)
     check = jsonschema.Draft202012Validator(schema)
     check.check_schema(schema)
     for text in [template_text(), *(builtin_text(name) for name in builtin_names())]:

@@ -17,7 +17,7 @@ CARD = Card(
     summary="u = -K_rate w - K_attitude q with 3x3 gains",
     sources=(
         "Quaternion feedback regulator for spacecraft eigenaxis rotations (1989)",
-        "equations A: matrix-gain family",
+        "published study of inertial stabilisation by closed-form linear-quadratic laws: the matrix-gain family",
     ),
     assumptions=(
         "rigid body",

@@ -18,10 +18,7 @@ from starhold.models.craft import Craft, tensor
 CARD = Card(
     title="Predictive",
     summary="minimises the sum of x'Qx + u'Ru over a horizon of the motion linearised anew, inside the torque limit",
-    sources=(
-        "Comparison of Lyapunov, sliding-mode and predictive attitude control",
-        "equations B: MPC; F.6",
-    ),
+    sources=("published comparison of Lyapunov, sliding-mode and predictive attitude control",),
     assumptions=(
         "rigid body",
         "inertia known",

@@ -15,7 +15,7 @@ CARD = Card(
     summary="u = -k_rate w - k_attitude q: the classical law, needs no model of the spacecraft at rest",
     sources=(
         "Quaternion feedback regulator for spacecraft eigenaxis rotations (1989)",
-        "equations A: classical PD",
+        "published study of inertial stabilisation by closed-form linear-quadratic laws: the classical PD",
     ),
     assumptions=("rigid body", "no external torque", "torque not limited"),
     claims="almost-global",

@@ -15,8 +15,7 @@ CARD = Card(
     summary="reaches the surface w + K q = 0 against any torque below `reach`, then slides to the target",
     sources=(
         "Smooth sliding-mode control for spacecraft attitude tracking maneuvers (1995)",
-        "Comparison of Lyapunov, sliding-mode and predictive attitude control, eq. (18)",
-        "equations B",
+        "published comparison of Lyapunov, sliding-mode and predictive attitude control, eq. (18)",
     ),
     assumptions=(
         "rigid body",

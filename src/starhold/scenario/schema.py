@@ -200,8 +200,9 @@ def law_model(law: Law, form: str | None = None) -> type[LawTable]:
     if form is not None:
         entries["form"] = (Literal[form], form)
     for item in law.fields(form):
-        default = ... if item.required else item.default
-        entries[item.name] = (Annotated[Any, *quantity(item.gain)], default)
+        written = item.gain.choices[item.default] if item.gain.choices and not item.required else item.default
+        kind = Annotated[Any, *quantity(item.gain), Field(validate_default=True)]
+        entries[item.name] = (kind, ... if item.required else written)
     title = law.name.replace("-", " ").title().replace(" ", "") + (form or "").title()
     return create_model(title, __base__=LawTable, __doc__=law.card.summary, **entries)
 

@@ -120,7 +120,7 @@ def linearise(seen: Any, craft: Any, a: Any, b: Any) -> None:
     """Fill a (36) and b (18) with A_c and B_c of x' = A_c x + B_c u for x = (q; w), small about the motion seen.
 
     A_c = [[-[w]x, E/2], [J^-1 G, J^-1 ([Jw]x - [w]x J)]], B_c = [0; J^-1], G = 6 (mu/R^5) ([R]x J - [JR]x) [R]x with
-    R from the centre of attraction in body axes; G = 0 where there is none (R = 0). Source: equations B.
+    R from the centre of attraction in body axes; G = 0 where there is none (R = 0).
     """
     w, position = seen.rate, seen.position
     momentum, pull = apply(craft.inertia, w), apply(craft.inertia, position)
