@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+from starhold.algebra.structure import flatten
 from starhold.analysis.cost import call_costs
 from starhold.analysis.metrics import measure, stays_within
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import fly, label
+from starhold.simulation.lanes import simulate_many
 
 
 @pytest.fixture(scope="module")
@@ -88,3 +90,19 @@ def test_published_start_breaks_the_stated_limit_in_norm():
     first = fly(loop, 1)[0][16:19, 0]
     assert np.linalg.norm(first) == pytest.approx(1.38e-2, rel=2e-3)
     assert np.abs(first).max() < 1e-2
+
+
+def test_every_law_arrives_from_the_published_random_starts():
+    """Attitudes uniform, 0.02 < |w| < 0.07 rad/s, as in the publication's Monte Carlo."""
+    scenario = load("three-laws")
+    random = np.random.default_rng(2022)
+    allowed = {"lyapunov": 5e-2, "sliding": 1e-2, "mpc": 1e-3}
+    for name, lanes in {"lyapunov": 1000, "sliding": 1000, "mpc": 20}.items():
+        loop = build(scenario, scenario.pick(name))
+        attitudes, rates = random.normal(size=(4, lanes)), random.normal(size=(3, lanes))
+        starts = np.repeat(np.array(flatten(loop.start))[:, None], lanes, axis=1)
+        starts[:4] = attitudes / np.linalg.norm(attitudes, axis=0)
+        starts[4:7] = rates / np.linalg.norm(rates, axis=0) * random.uniform(0.02, 0.07, size=lanes)
+        batch = simulate_many(loop, starts, 6000)
+        assert (batch.lost_at == -1).all()
+        assert np.linalg.norm(batch.states[1:4], axis=0).max() < allowed[name]

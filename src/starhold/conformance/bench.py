@@ -67,7 +67,7 @@ def call(law: Law, seen: Seen, gains: Any, craft: Craft = CRAFT) -> Vector:
 @cache
 def _compiled(torque: Callable[..., Any]) -> Callable[..., Any]:
     @numba.njit(error_model="numpy")
-    def compiled(seen, gains, craft, memory):  # type: ignore[no-untyped-def]
+    def compiled(seen, gains, craft, memory):
         return torque(seen, gains, craft, memory)
 
     return compiled

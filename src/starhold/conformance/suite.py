@@ -204,12 +204,13 @@ def _slope(law: Law, seen: Seen, gains: Any) -> float:
     """dV/dt along the closed loop, by a central difference."""
     rates = angular_acceleration(seen.body_rate, call(law, seen, gains), CRAFT)
     turning = derivative(seen.attitude, seen.rate)
-    assert law.lyapunov is not None
+    function = law.lyapunov
+    assert function is not None
 
     def value(h: float) -> float:
         rate = move(seen.rate, h, rates)
         moved = seen._replace(attitude=move(seen.attitude, h, turning), rate=rate, body_rate=rate)
-        return law.lyapunov(moved, gains, CRAFT)  # type: ignore[misc]
+        return function(moved, gains, CRAFT)
 
     return (value(1e-4) - value(-1e-4)) / 2e-4
 

@@ -62,7 +62,7 @@ def make_step(parts: Parts) -> Step:
     environment, target, sense, disturb, cover, law, limit, begin, response = parts
 
     @equation
-    def look(carry, step, run, craft, setup):  # type: ignore[no-untyped-def]
+    def look(carry, step, run, craft, setup):
         state = carry.state
         goal = target(setup.target, state.position, state.velocity, step, carry.goal)
         attitude, rate = sense(state.attitude, state.rate, setup.noise, setup.seed, run, step)
@@ -75,7 +75,7 @@ def make_step(parts: Parts) -> Step:
         return Seen(error, error_rate, rate, target_rate, target_acceleration, external, position, setup.period)
 
     @equation
-    def look_at_rest(carry, step, run, craft, setup):  # type: ignore[no-untyped-def]
+    def look_at_rest(carry, step, run, craft, setup):
         # The same for a target that does not turn, spared the arithmetic on zeros that a compiler may not drop.
         state = carry.state
         goal = target(setup.target, state.position, state.velocity, step, carry.goal)
@@ -85,18 +85,18 @@ def make_step(parts: Parts) -> Step:
         return Seen(relative(goal.attitude, attitude), rate, rate, ZERO, ZERO, external, position, setup.period)
 
     @equation
-    def keep(carry, step, setup):  # type: ignore[no-untyped-def]
+    def keep(carry, step, setup):
         return carry.goal
 
     @equation
-    def renew(carry, step, setup):  # type: ignore[no-untyped-def]
+    def renew(carry, step, setup):
         return target(setup.target, carry.state.position, carry.state.velocity, step, carry.goal).attitude
 
     see = look_at_rest if target is inertial else look
     follow = renew if target is orbital else keep
 
     @equation
-    def decide(carry, step, run, gains, craft, setup):  # type: ignore[no-untyped-def]
+    def decide(carry, step, run, gains, craft, setup):
         seen = see(carry, step, run, craft, setup)
         shown, h = cover(seen.attitude, carry.h, setup.width)
         command, memory = law(with_attitude(seen, shown), gains, craft, carry.memory)
@@ -106,14 +106,14 @@ def make_step(parts: Parts) -> Step:
         return Carry(state, memory, follow(carry, step, setup), h, command, disturbance, carry.lost_at)
 
     @equation
-    def slope(state, begun, carry, craft, setup):  # type: ignore[no-untyped-def]
+    def slope(state, begun, carry, craft, setup):
         acceleration, external = environment(state.position, state.attitude, craft)
         torque_rate = response(state.torque, carry.command, begun, setup.substep, setup.dynamics)
         total = add(add(state.torque, carry.disturbance), external)
         return motion(state, total, acceleration, torque_rate, craft)
 
     @equation
-    def hold(carry, craft, setup):  # type: ignore[no-untyped-def]
+    def hold(carry, craft, setup):
         """One substep: the classical Runge-Kutta method of fourth order."""
         s, h = carry.state, setup.substep
         a = slope(s, s.torque, carry, craft, setup)
@@ -124,7 +124,7 @@ def make_step(parts: Parts) -> Step:
         return Carry(tidy(end), carry.memory, carry.goal, carry.h, carry.command, carry.disturbance, carry.lost_at)
 
     @equation
-    def check(carry, step, setup):  # type: ignore[no-untyped-def]
+    def check(carry, step, setup):
         """Note the step at which the motion is not finite, or turns by more than a radian in one substep."""
         s = carry.state
         turn = setup.substep * setup.substep * dot(s.rate, s.rate)
@@ -133,7 +133,7 @@ def make_step(parts: Parts) -> Step:
         return Carry(s, carry.memory, carry.goal, carry.h, carry.command, carry.disturbance, lost)
 
     @equation
-    def sample(carry, step, setup):  # type: ignore[no-untyped-def]
+    def sample(carry, step, setup):
         s = carry.state
         goal = target(setup.target, s.position, s.velocity, step, carry.goal)
         error = relative(goal.attitude, s.attitude)
@@ -174,7 +174,7 @@ def _drop_stale(folder: Path, sources: str) -> None:
 def _one(parts: Parts) -> Callable[..., Any]:
     _, decide, hold, check, sample = make_step(parts)
 
-    def one(carry, first, count, finish, every, run, gains, craft, setup, substeps, out, end):  # type: ignore[no-untyped-def]
+    def one(carry, first, count, finish, every, run, gains, craft, setup, substeps, out, end):
         """Fly control steps first .. first+count-1; write every `every`-th into a column of `out`, and with `finish` the
         last state as well. What is carried on goes into the one column of `end`; stops where the motion is lost."""
         # Nothing is returned: a result made of Python objects would be built by code that a signal can break into.
@@ -199,7 +199,7 @@ def _one(parts: Parts) -> Callable[..., Any]:
 def _many(parts: Parts) -> Callable[..., Any]:
     _, decide, hold, check, _ = make_step(parts)
 
-    def many(x, like, first, count, run, gains, like_gains, craft, like_craft, setup, substeps):  # type: ignore[no-untyped-def]
+    def many(x, like, first, count, run, gains, like_gains, craft, like_craft, setup, substeps):
         """Fly control steps first .. first+count-1 of every lane of the block x, in place; lane 0 is
         run number `run`. Gains and craft are NamedTuples shared by all lanes, or blocks too."""
         for step in range(first, first + count):
@@ -220,7 +220,7 @@ def make_replay(parts: Parts) -> Callable[..., Any]:
     """A kernel that repeats the control calls of a run, to time them: from the state to the limited command."""
     decide = make_step(parts).decide
 
-    def replay(samples, first, last, carry, gains, craft, setup, end):  # type: ignore[no-untyped-def]
+    def replay(samples, first, last, carry, gains, craft, setup, end):
         """Decide on the states in columns first .. last-1 of recorded samples, each call after the one before."""
         for k in range(first, last):
             # The first rows of a sample are the state; every number of it waits for the torque of the call before.
