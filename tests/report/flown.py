@@ -5,13 +5,12 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-import xarray as xr
 
 from starhold.analysis.metrics import measure
 from starhold.report.flight import Flight
 from starhold.scenario.building import build
 from starhold.scenario.reading import Scenario, builtin_text, parse
-from starhold.simulation.lane import simulate
+from starhold.simulation.lane import Recording, fly, label
 
 HOSTILE = '</script><script>alert("ruse")</script><b>$x_1$ & co'
 
@@ -36,7 +35,8 @@ def flights() -> tuple[Flight, ...]:
     table = found.table
     made: list[Flight] = []
     for entry in found.laws:
-        run = simulate(build(found, entry), table.simulation.steps, table.simulation.record_every).load()
+        loop = build(found, entry)
+        run = label(loop, *fly(loop, table.simulation.steps), 1)
         metrics = measure(run, table.settling.attitude_tolerance, table.settling.rate_tolerance)
         made.append(Flight(entry.name, entry.law.name, run, metrics, {"k_rate": "0.09 N m s", "reach": "<5> mN m"}))
     return tuple(made)
@@ -45,22 +45,23 @@ def flights() -> tuple[Flight, ...]:
 def lost(name: str = "wild") -> Flight:
     """A run that ends after a third of the others' time, faster and faster."""
     first = flights()[0]
-    run: xr.Dataset = first.run.isel(time=slice(0, 67)).copy(deep=True)
-    run["rate_error"].values[:] = np.exp(np.linspace(0.0, 20.0, 67))[:, None]
-    run.attrs["diverged_at"] = 6.7
+    arrays = {name: values[:67] for name, values in first.recording.arrays.items()}
+    arrays["rate_error"] = np.repeat(np.exp(np.linspace(0.0, 20.0, 67))[:, None], 3, axis=1)
+    run = Recording(arrays, first.recording.attrs | {"diverged_at": 6.7})
     return Flight(name, "pd", run, measure(run, 2e-3, 1e-3), {})
 
 
 def still() -> Flight:
     """A run at rest on target: all errors and torques are zero."""
     first = flights()[0]
-    run: xr.Dataset = first.run.copy(deep=True)
-    run["attitude_error"].values[:] = (1.0, 0.0, 0.0, 0.0)
-    run["rate_error"].values[:] = 0.0
-    run["torque"].values[:] = 0.0
+    arrays = {name: values.copy() for name, values in first.recording.arrays.items()}
+    arrays["attitude_error"][:] = (1.0, 0.0, 0.0, 0.0)
+    arrays["rate_error"][:] = 0.0
+    arrays["torque"][:] = 0.0
+    run = Recording(arrays, first.recording.attrs)
     return Flight("still", "pd", run, measure(run, 2e-3, 1e-3), {})
 
 
 def renamed(flight: Flight, name: str) -> Flight:
     """The same flight under another name."""
-    return Flight(name, flight.law, flight.run, flight.metrics, flight.gains)
+    return Flight(name, flight.law, flight.recording, flight.metrics, flight.gains)

@@ -11,6 +11,7 @@ from PIL import Image
 from starhold.report.figures import draw
 from starhold.report.flight import COLOURS, colour
 from starhold.report.plots import collect, thin, thin_times
+from starhold.simulation.lane import Recording
 from tests.report import flown
 
 NAMES = ["scalar", "attitude", "rate", "torque", "angle", "accuracy"]
@@ -71,10 +72,9 @@ def test_a_law_keeps_its_colour_and_many_laws_have_one() -> None:
 
 
 def test_a_limit_is_shown_where_it_matters() -> None:
-    run = flown.flights()[0].run
     assert collect(flown.flights(), 2000).torque.panels[0].levels == (-10.0, 10.0)
-    far = run.assign_attrs(torque_limit=5.0)
     first = flown.flights()[0]
+    far = Recording(first.recording.arrays, first.recording.attrs | {"torque_limit": 5.0})
     plot = collect([type(first)(first.name, first.law, far, first.metrics, {})], 2000).torque
     assert plot.panels[0].levels == ()
     assert "off the scale" in plot.dashed

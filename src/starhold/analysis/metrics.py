@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from starhold.simulation.lane import Recording
 
 DECADES = range(1, 7)
 """The k of the accuracies 10^-k whose iterations are counted."""
@@ -56,11 +56,11 @@ def stays_within(values: Any, bound: float) -> int | None:
     return first if first < len(values) else None
 
 
-def measure(run: xr.Dataset, attitude_tolerance: float, rate_tolerance: float) -> dict[str, Any]:
-    """Metrics of a run as `simulate` gives it. Times that are never reached are None, as are all final values and times of
+def measure(run: Recording, attitude_tolerance: float, rate_tolerance: float) -> dict[str, Any]:
+    """Metrics of a run as `label` gives it. Times that are never reached are None, as are all final values and times of
     a run that diverged; `diverged_at` (s) is None for one that did not."""
-    times = run["time"].values
-    q, w, u = (run[name].values for name in ("attitude_error", "rate_error", "torque"))
+    times = run["time"]
+    q, w, u = (run[name] for name in ("attitude_error", "rate_error", "torque"))
     angle, speed = error_angle(q), np.linalg.norm(w, axis=1)
     lost = run.attrs.get("diverged_at")
     reached = {} if lost is not None else _reached(times, angle, speed, attitude_tolerance, rate_tolerance)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import gc
+import os
 import signal
 import sys
+import traceback
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,7 +26,7 @@ app = typer.Typer(
 )
 
 DEFAULT = "three-laws"
-USER_ERROR, DIVERGED, FAILED_CHECK, INTERRUPTED = 2, 1, 1, 130
+USER_ERROR, DIVERGED, FAILED_CHECK, INTERRUPTED, INTERNAL_ERROR = 2, 1, 1, 130, 70
 
 ScenarioFile = Annotated[str, typer.Argument(metavar="FILE", help="a scenario file or the name of a built-in scenario")]
 Output = Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="folder for results, created")]
@@ -71,10 +73,10 @@ def _fly(file: str, law: str | None, output: Path | None, force: bool, nested: b
         flights: list[Flight] = []
         with flying(entries, scenario.table.simulation.steps) as notice:
             for entry in entries:
-                flight = fly_law(scenario, entry, notice)
-                write_run(flight.run, scenario, (folder / entry.name if nested else folder) / "run.nc")
-                flights.append(flight)
-        painter.start(flights, folder, scenario)
+                flights.append(fly_law(scenario, entry, notice))
+                if entry is entries[-1]:
+                    painter.start(flights, folder, scenario)
+                write_run(flights[-1].run, scenario, (folder / entry.name if nested else folder) / "run.nc")
         page = write(scenario, flights, folder)
         painter.finish()
     print_outcome(flights, page)
@@ -200,14 +202,28 @@ def _interrupt(number: int, frame: object) -> None:
 
 def main() -> None:
     """Entry point: user errors become one line and exit code 2, an interrupt 130."""
+    code = _run_command()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    # All files are closed. Taking the compiler's and the libraries' memory apart would cost a quarter of a command's time.
+    os._exit(code)
+
+
+def _run_command() -> int:
     signal.signal(signal.SIGINT, _interrupt)
     # A command loads much and lives briefly: looking for garbage at every step of that is time lost.
     gc.set_threshold(200_000)
     try:
         app(standalone_mode=True)
+    except SystemExit as ending:
+        return ending.code if isinstance(ending.code, int) else int(ending.code is not None)
     except InputError as error:
         print(f"starhold: {error}", file=sys.stderr)
-        sys.exit(USER_ERROR)
+        return USER_ERROR
     except InterruptedByUserError:
         print("starhold: interrupted; files already written are whole", file=sys.stderr)
-        sys.exit(INTERRUPTED)
+        return INTERRUPTED
+    except Exception:
+        traceback.print_exc()
+        return INTERNAL_ERROR
+    return 0

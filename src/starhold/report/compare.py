@@ -28,12 +28,12 @@ def fly_law(scenario: Scenario, entry: LawEntry, notice: Notice | None = None) -
     loop = build(scenario, entry)
     progress = None if notice is None else lambda done, total: notice(entry.name, done, total)
     samples, carry = fly(loop, simulation.steps, simulation.record_every, progress=progress)
-    run = label(loop, samples, carry, simulation.record_every)
-    metrics = measure(run, settling.attitude_tolerance, settling.rate_tolerance)
+    recording = label(loop, samples, carry, simulation.record_every)
+    metrics = measure(recording, settling.attitude_tolerance, settling.rate_tolerance)
     metrics |= call_costs(loop, samples)
     metrics |= _law_counters(carry.memory)
     gains = {item.name: _gain_text(item, value) for item, value in zip(entry.law.fields(), entry.gains, strict=True)}
-    return Flight(entry.name, entry.law.name, run, metrics, gains)
+    return Flight(entry.name, entry.law.name, recording, metrics, gains)
 
 
 def compare(scenario: Scenario, notice: Notice | None = None) -> list[Flight]:

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
 
 DPI = 110
+NOTHING: Any = None
+"""In place of a recording that a sketch does without."""
 POINTS = 2000
 """Samples of a curve, about two for each column of pixels."""
 
@@ -43,8 +45,8 @@ def draw(flights: Sequence[Flight], folder: Path, scenario: Scenario | None = No
 
 def sketch(flights: Sequence[Flight], scenario: Scenario | None = None) -> Sketch:
     """What `paint` needs."""
-    plots = collect(flights, POINTS, scenario)
-    return Sketch(plots, [replace(flight, run=None) for flight in flights], "" if scenario is None else scenario.name)
+    light = [replace(flight, recording=NOTHING) for flight in flights]
+    return Sketch(collect(flights, POINTS, scenario), light, "" if scenario is None else scenario.name)
 
 
 def paint(what: Sketch, folder: Path, part: slice = slice(None)) -> list[Path]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,20 +11,27 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
+    from starhold.simulation.lane import Recording
+
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8A8A8A")
 """Okabe and Ito's palette, distinct to colour-blind readers, without what white or black paper swallows."""
 
 
 @dataclass(frozen=True)
 class Flight:
-    """One law's run of a scenario: the name the scenario gives the law, the law's type, the run as `simulate` gives it,
+    """One law's run of a scenario: the name the scenario gives the law, the law's type, what was recorded,
     its metrics as `measure` gives them, and its gains, field name to text with unit."""
 
     name: str
     law: str
-    run: xr.Dataset
+    recording: Recording
     metrics: dict[str, Any]
     gains: dict[str, str]
+
+    @cached_property
+    def run(self) -> xr.Dataset:
+        """The run as an xarray Dataset with units."""
+        return self.recording.dataset()
 
     @property
     def lost(self) -> float | None:

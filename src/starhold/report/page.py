@@ -263,7 +263,7 @@ def _accuracy(flights: Sequence[Flight]) -> dict[str, Any]:
     for kind, label in ACCURACIES:
         steps = [steps_within(flight, kind) for flight in flights]
         panels.append({**_panel(Panel(f"steps to {label}", []), order), "curves": steps, "widths": [2.0] * len(order)})
-    period = flights[0].run.attrs["control_period"]
+    period = flights[0].recording.attrs["control_period"]
     return {
         "name": "accuracy",
         "title": "control steps needed to stay within 10⁻ᵏ",
@@ -277,12 +277,12 @@ def _accuracy(flights: Sequence[Flight]) -> dict[str, Any]:
 
 
 def _scene(scenario: Scenario, flights: Sequence[Flight]) -> dict[str, Any]:
-    longest = max((flight.run["time"].values for flight in flights), key=len)
+    longest = max((flight.recording["time"] for flight in flights), key=len)
     # Some frames of a short run would be equal; each sample shows once.
     places = np.unique(np.rint((len(longest) - 1) * np.linspace(0.0, 1.0, FRAMES + 1) ** EARLY).astype(int))
     attitudes: list[list[list[float | None]]] = []
     for flight in flights:
-        q = flight.run["attitude_error"].values
+        q = flight.recording["attitude_error"]
         attitudes.append([_numbers(q[place], 4) for place in places if place < len(q)] or [[1.0, 0.0, 0.0, 0.0]])
     times = longest[places] if len(places) > 1 else np.array([0.0, 1.0])
     size, axes = _box(scenario.craft.inertia)

@@ -67,11 +67,11 @@ class Plots:
 
 def collect(flights: Sequence[Flight], points: int, scenario: Scenario | None = None) -> Plots:
     """The plots of a comparison, each curve thinned to about `points` samples."""
-    longest = max((flight.run["time"].values for flight in flights), key=len)
+    longest = max((flight.recording["time"] for flight in flights), key=len)
     factor = 1 if len(longest) <= points else int(np.ceil(2 * len(longest) / points))
 
     def curves(name: str, column: int, scale: float = 1.0) -> list[Curve]:
-        return [thin(flight.run[name].values[:, column] * scale, factor) for flight in flights]
+        return [thin(flight.recording[name][:, column] * scale, factor) for flight in flights]
 
     rate_scale, rate_unit = _rate_unit(flights)
     torque_scale, torque_unit = _torque_unit(flights)
@@ -131,8 +131,8 @@ def steps_within(flight: Flight, kind: str) -> list[int | None]:
 
 def _angle(flights: Sequence[Flight], factor: int, scenario: Scenario | None) -> Plot:
     degrees = 180.0 / np.pi
-    angles = [thin(error_angle(flight.run["attitude_error"].values) * degrees, factor) for flight in flights]
-    speeds = [thin(np.linalg.norm(flight.run["rate_error"].values, axis=1) * degrees, factor) for flight in flights]
+    angles = [thin(error_angle(flight.recording["attitude_error"]) * degrees, factor) for flight in flights]
+    speeds = [thin(np.linalg.norm(flight.recording["rate_error"], axis=1) * degrees, factor) for flight in flights]
     settling = None if scenario is None else scenario.table.settling
     within = () if settling is None else (settling.attitude_tolerance * degrees,)
     slow = () if settling is None else (settling.rate_tolerance * degrees,)
@@ -161,7 +161,7 @@ def _sound(panel: Panel, flights: Sequence[Flight]) -> Panel:
 
 def _peak(flights: Sequence[Flight], name: str) -> float:
     sound = [flight for flight in flights if flight.lost is None] or flights
-    return max(float(np.abs(flight.run[name].values).max(initial=0.0)) for flight in sound)
+    return max(float(np.abs(flight.recording[name]).max(initial=0.0)) for flight in sound)
 
 
 def _rate_unit(flights: Sequence[Flight]) -> tuple[float, str]:
@@ -177,7 +177,7 @@ def _torque_unit(flights: Sequence[Flight]) -> tuple[float, str]:
 
 
 def _limit(flights: Sequence[Flight], scale: float, unit: str) -> tuple[tuple[float, ...], str]:
-    attrs: dict[Any, Any] = flights[0].run.attrs
+    attrs: dict[Any, Any] = flights[0].recording.attrs
     limit, kind = float(attrs["torque_limit"]), attrs["limit"]
     if kind == "none" or not np.isfinite(limit):
         return (), "no limit"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -37,6 +38,32 @@ COLUMNS: dict[str, tuple[str, str, str]] = {
 """Recorded quantities in the order of `Sample`: dimension, unit, meaning."""
 
 
+@dataclass(frozen=True)
+class Recording:
+    """A trajectory as arrays: `time` (n,) in s, and the quantities of COLUMNS, (n, 4) or (n, 3)."""
+
+    arrays: dict[str, NDArray[np.float64]]
+    attrs: dict[str, Any]
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        return self.arrays[name]
+
+    def dataset(self) -> xr.Dataset:
+        """The same as a Dataset with units."""
+        # Loaded here, for it takes longer than most flights, and measuring and drawing do without.
+        import xarray as xr
+
+        data: dict[str, Any] = {}
+        for name, (dimension, unit, meaning) in COLUMNS.items():
+            data[name] = (("time", dimension), self[name], {"units": unit, "long_name": meaning})
+        coords = {
+            "time": ("time", self["time"], {"units": "s", "long_name": "time"}),
+            "quaternion": ("quaternion", ["q0", "q1", "q2", "q3"]),
+            "axis": ("axis", ["x", "y", "z"]),
+        }
+        return xr.Dataset(data, coords, self.attrs)
+
+
 def simulate(
     loop: ClosedLoop, steps: int, record_every: int = 1, run: int = 0, progress: Progress | None = None
 ) -> xr.Dataset:
@@ -47,7 +74,7 @@ def simulate(
     follow) ends the samples, and its time stands in `attrs["diverged_at"]` (s); else that attribute is absent.
     """
     samples, carry = fly(loop, steps, record_every, run, progress)
-    return label(loop, samples, carry, record_every)
+    return label(loop, samples, carry, record_every).dataset()
 
 
 def fly(
@@ -76,23 +103,14 @@ def fly(
     return samples, carry
 
 
-def label(loop: ClosedLoop, samples: NDArray[np.float64], carry: Carry, record_every: int) -> xr.Dataset:
-    """The samples as a Dataset with units."""
-    import xarray as xr
-
-    times = np.arange(samples.shape[1]) * (loop.period * record_every)
-    data: dict[str, Any] = {}
+def label(loop: ClosedLoop, samples: NDArray[np.float64], carry: Carry, record_every: int) -> Recording:
+    """The samples of `fly` under their names."""
+    arrays = {"time": np.arange(samples.shape[1]) * (loop.period * record_every)}
     row = 0
     for name in Sample._fields:
-        dimension, unit, meaning = COLUMNS[name]
-        size = 4 if dimension == "quaternion" else 3
-        data[name] = (("time", dimension), samples[row : row + size].T, {"units": unit, "long_name": meaning})
+        size = _size(name)
+        arrays[name] = samples[row : row + size].T
         row += size
-    coords = {
-        "time": ("time", times, {"units": "s", "long_name": "time"}),
-        "quaternion": ("quaternion", ["q0", "q1", "q2", "q3"]),
-        "axis": ("axis", ["x", "y", "z"]),
-    }
     attrs: dict[str, Any] = {
         "law": loop.law.name,
         "control_period": loop.period,
@@ -102,7 +120,11 @@ def label(loop: ClosedLoop, samples: NDArray[np.float64], carry: Carry, record_e
     }
     if carry.lost_at >= 0.0:
         attrs["diverged_at"] = carry.lost_at * loop.period
-    return xr.Dataset(data, coords, attrs)
+    return Recording(arrays, attrs)
+
+
+def _size(name: str) -> int:
+    return 4 if COLUMNS[name][0] == "quaternion" else 3
 
 
 def _sample_count(steps: int, record_every: int) -> int:
@@ -116,4 +138,4 @@ def _sample_count(steps: int, record_every: int) -> int:
     return count
 
 
-_WIDTH = sum(4 if COLUMNS[name][0] == "quaternion" else 3 for name in Sample._fields)
+_WIDTH = sum(_size(name) for name in Sample._fields)
