@@ -9,5 +9,8 @@ class InputError(Exception):
     def __init__(self, where: str, key: str, found: str, allowed: str) -> None:
         self.where, self.key, self.found, self.allowed = where, key, found, allowed
         parts = [where, key, f"found {found}" if found else ""]
-        hint = allowed if allowed.startswith("did you mean") else f"allowed: {allowed}"
-        super().__init__(": ".join(part for part in parts if part) + (f"; {hint}" if allowed else ""))
+        # Without something found, `allowed` is a sentence of its own.
+        bare = not found or allowed.startswith("did you mean")
+        hint = allowed if bare else f"allowed: {allowed}"
+        joint = "; " if found else ": "
+        super().__init__(": ".join(part for part in parts if part) + (f"{joint}{hint}" if allowed else ""))

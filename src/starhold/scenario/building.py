@@ -20,11 +20,11 @@ from starhold.scenario.schema import Pointing
 
 
 def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
-    """The closed loop of one law on the scenario's spacecraft."""
+    """The closed loop of one law on the scenario's spacecraft. InputError where the law cannot work with its gains."""
     table = scenario.table
     goal = _target(scenario)
     body = table.spacecraft
-    return ClosedLoop(
+    loop = ClosedLoop(
         craft=scenario.craft,
         law=entry.law,
         gains=entry.gains,
@@ -41,6 +41,11 @@ def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
         hysteresis_width=entry.hysteresis_width,
         seed=table.simulation.seed,
     )
+    try:
+        loop.carry()
+    except ValueError as error:
+        raise InputError(scenario.where, f"law {entry.name}", "", str(error)) from None
+    return loop
 
 
 def _attitude(pointing: Pointing) -> Quaternion:

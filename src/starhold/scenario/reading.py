@@ -115,11 +115,11 @@ def _read_law(data: Any, craft: Craft, where: str, key: str, taken: set[str]) ->
         raise InputError(where, key, _show(data), "a [[law]] table")
     table = cast(dict[str, Any], data)
     kind = table.get("type")
-    if kind not in catalogue():
+    if not isinstance(kind, str) or kind not in catalogue():
         raise InputError(where, f"{key}.type", _show(kind), nearest(str(kind), list(catalogue())))
-    law = catalogue()[str(kind)]
+    law = catalogue()[kind]
     form = table.get("form")
-    if form is not None and form not in law.forms:
+    if form is not None and (not isinstance(form, str) or form not in law.forms):
         allowed = nearest(str(form), list(law.forms)) if law.forms else f"no form; {law.name} takes its gains"
         raise InputError(where, f"{key}.form", _show(form), allowed)
     read = _validate(law_model(law, form), table, where, key, extra=["form"] if law.forms else [])
