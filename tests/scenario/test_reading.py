@@ -265,3 +265,30 @@ def test_gains_survive_toml_exactly(name):
     head = BASE[: BASE.index("[[law]]")]
     for gains in law.examples():
         assert parse(head + law_table(law, gains), "x").laws[0].gains == gains
+
+
+ODD = """true | "x" | "" | [] | [1] | [[1]] | [{}] | {a = 1} | nan | -inf | -1 | 0 | 1e308 | 1e-308 | 2020-01-01
+| 99999999999999999999999 | "1e999 m" | "m" | [nan, nan, nan] | [[], [], []] | ['a', 'b', 'c', 'd']""".split("|")
+
+
+@pytest.mark.parametrize("odd", ODD)
+def test_no_value_of_any_key_ends_in_anything_but_one_line(odd):
+    """Every value of the template and of the published experiment in turn is replaced by something odd."""
+    for text in (template_text(), BASE):
+        lines = text.splitlines()
+        for number, line in enumerate(lines):
+            key, equals, _ = line.partition(" = ")
+            if not equals or line.startswith("#"):
+                continue
+            mutant = "\n".join([*lines[:number], f"{key} = {odd}", *lines[number + 1 :]])
+            message = outcome(mutant)
+            assert "\n" not in message, (line, message)
+
+
+def outcome(text):
+    """The error of a text, or nothing where it can be read; other exceptions pass through."""
+    try:
+        build_all(text)
+    except InputError as error:
+        return str(error)
+    return ""

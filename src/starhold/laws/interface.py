@@ -90,6 +90,8 @@ class Gain:
     whole: bool = False
     choices: tuple[str, ...] = ()
     text: str = ""
+    spread: bool = True
+    """Whether a number stands for a vector of equal numbers."""
 
     def check(self, value: Any) -> Any:
         """The value as the law wants it; ValueError says what is allowed."""
@@ -98,14 +100,14 @@ class Gain:
                 raise ValueError(f"must be one of {', '.join(self.choices)}")
             return self.choices.index(value)
         array = np.asarray(value, dtype=float)
+        if not np.isfinite(array).all():
+            raise ValueError("must be finite")
         if self.shape == (3, 3) and array.ndim < 2:
             array = array * np.eye(3) if array.ndim == 0 else np.diag(array)
-        elif array.ndim == 0 and self.shape:
+        elif array.ndim == 0 and self.shape and self.spread:
             array = np.full(self.shape, float(array))
         if array.shape != self.shape:
             raise ValueError(f"must be {self.describe()}")
-        if not np.isfinite(array).all():
-            raise ValueError("must be finite")
         # Bounds of a matrix speak of its eigenvalues' sign only where the law says so; entries are free.
         if self.shape != (3, 3):
             self._check_bounds(array)
@@ -131,7 +133,7 @@ class Gain:
             (): "a whole number" if self.whole else "a number",
             (3, 3): "a number, three numbers or a 3x3 matrix",
         }
-        return kind.get(self.shape, f"a number or {'x'.join(map(str, self.shape))} numbers")
+        return kind.get(self.shape, f"{'a number or ' if self.spread else ''}{'x'.join(map(str, self.shape))} numbers")
 
 
 @dataclass(frozen=True)

@@ -80,6 +80,7 @@ def remember(gains: Gains, craft: Craft, period: float) -> Memory:
     return Memory(np.zeros(3 * gains.horizon), numbers, np.zeros(5, dtype=np.int64))
 
 
+@np.errstate(all="ignore")
 def terminal_weight(gains: Gains, craft: Craft, period: float) -> tuple[Any, Any]:
     """The weight P (6, 6) of the state after the last move, and the feedback (3, 6) that is best before it:
     u = -feedback x. For "riccati" they are those of the endless horizon at w = 0 without gravity.
@@ -100,16 +101,19 @@ def terminal_weight(gains: Gains, craft: Craft, period: float) -> tuple[Any, Any
         # Loaded here, where alone it is needed; by name, its types being too loose for a strict checker.
         riccati = import_module("scipy.linalg").solve_discrete_are
         try:
-            with np.errstate(all="ignore"):
-                p = riccati(a, b, q, r)
+            p = riccati(a, b, q, r)
         except (np.linalg.LinAlgError, ValueError) as error:
             raise ValueError(f"the weights give no terminal weight: {error}") from None
-        if not np.isfinite(p).all():
-            raise ValueError("the weights give no terminal weight: they differ too much in size")
         p = 0.5 * (p + p.T)
-    feedback = cast(Any, np.linalg.solve(r + b.T @ p @ b, b.T @ p @ a))
     units = np.array([1.0, 1.0, 1.0, period, period, period])
-    return p * np.outer(units, units), feedback * units * (typical / period**2)
+    try:
+        feedback = cast(Any, np.linalg.solve(r + b.T @ p @ b, b.T @ p @ a)) * units * (typical / period**2)
+    except np.linalg.LinAlgError:
+        feedback = np.full((3, 6), np.nan)
+    p = p * np.outer(units, units)
+    if not (np.isfinite(p).all() and np.isfinite(feedback).all()):
+        raise ValueError("the weights give no feedback: they are too large, too small, or differ too much in size")
+    return p, feedback
 
 
 @equation

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from starhold.algebra.cosines import from_angles
-from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise, to_body
+from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise, stretch, to_body
 from starhold.algebra.vector import ZERO, add
 from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop
@@ -51,7 +51,10 @@ def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
 def _attitude(pointing: Pointing) -> Quaternion:
     if pointing.angles is not None:
         return from_angles(*pointing.angles)
-    return NO_TURN if pointing.attitude is None else normalise(pointing.attitude)
+    if pointing.attitude is None:
+        return NO_TURN
+    # Scaled first, so that the squares of odd numbers neither vanish nor overflow.
+    return normalise(stretch(1.0 / max(map(abs, pointing.attitude)), pointing.attitude))
 
 
 def _target(scenario: Scenario) -> Any:

@@ -86,7 +86,7 @@ def _schema(gain: Gain) -> dict[str, Any]:
     if not gain.shape:
         return {"anyOf": single} | described
     row = {"type": "array", "items": {"anyOf": single}, "minItems": gain.shape[-1], "maxItems": gain.shape[-1]}
-    forms = [*single, row]
+    forms = [*single, row] if gain.spread else [row]
     if gain.shape == (3, 3):
         forms.append({"type": "array", "items": row, "minItems": 3, "maxItems": 3})
     return {"anyOf": forms} | described

@@ -14,8 +14,12 @@ from starhold.laws.interface import Gain
 from starhold.models.craft import EARTH, check_inertia
 from starhold.scenario.quantity import quantity, reader
 
-QUATERNION = Gain("1", shape=(4,), text="quaternion, scalar first, normalised on reading")
-ANGLES = Gain("rad", shape=(3,), text="Euler-Krylov angles yaw, pitch, roll")
+QUATERNION = Gain("1", shape=(4,), spread=False, text="quaternion, scalar first, normalised on reading")
+ANGLES = Gain("rad", shape=(3,), spread=False, text="Euler-Krylov angles yaw, pitch, roll")
+
+
+MOST_STEPS = 1e12
+"""Beyond this many control steps the count is no longer told from its neighbours, and no run would end."""
 
 
 class Table(BaseModel):
@@ -64,8 +68,8 @@ def _at(key: str, reason: str, found: Any) -> PydanticCustomError:
 class Orbit(Table):
     """Where the spacecraft starts; without this table it floats in free space."""
 
-    position: Annotated[Any, *quantity(Gain("m", shape=(3,), text="inertial position"))]
-    velocity: Annotated[Any, *quantity(Gain("m/s", shape=(3,), text="inertial velocity"))]
+    position: Annotated[Any, *quantity(Gain("m", shape=(3,), spread=False, text="inertial position"))]
+    velocity: Annotated[Any, *quantity(Gain("m/s", shape=(3,), spread=False, text="inertial velocity"))]
     gravitational_parameter: Annotated[float, *quantity(Gain("m^3/s^2", above=0.0, text="of the central body"))] = EARTH
 
     @model_validator(mode="after")
@@ -93,7 +97,11 @@ class Pointing(Table):
 class Initial(Pointing):
     """Attitude and rate at the start, in the inertial frame or relative to the target."""
 
-    rate: Annotated[Any, *quantity(Gain("rad/s", shape=(3,), text="angular velocity, body axes"))] = (0.0, 0.0, 0.0)
+    rate: Annotated[Any, *quantity(Gain("rad/s", shape=(3,), spread=False, text="angular velocity, body axes"))] = (
+        0.0,
+        0.0,
+        0.0,
+    )
     relative_to: Annotated[Literal["inertial", "target"], Field(description="what attitude and rate are relative to")] = (
         "inertial"
     )
@@ -142,6 +150,8 @@ class Simulation(Table):
         count = self.duration / self.control_period
         if self.control_period > self.duration:
             raise _at("control_period", f"at most the duration, {self.duration:g} s", self.control_period)
+        if not count <= MOST_STEPS:
+            raise _at("duration", f"at most {MOST_STEPS:.0e} control periods", self.duration)
         if abs(count - round(count)) > 1e-6:
             raise _at("duration", f"a whole number of control periods of {self.control_period:g} s", self.duration)
         return self
