@@ -267,8 +267,29 @@ def test_gains_survive_toml_exactly(name):
         assert parse(head + law_table(law, gains), "x").laws[0].gains == gains
 
 
-ODD = """true | "x" | "" | [] | [1] | [[1]] | [{}] | {a = 1} | nan | -inf | -1 | 0 | 1e308 | 1e-308 | 2020-01-01
-| 99999999999999999999999 | "1e999 m" | "m" | [nan, nan, nan] | [[], [], []] | ['a', 'b', 'c', 'd']""".split("|")
+ODD = [
+    "true ",
+    ' "x" ',
+    ' "" ',
+    " [] ",
+    " [1] ",
+    " [[1]] ",
+    " [{}] ",
+    " {a = 1} ",
+    " nan ",
+    " -inf ",
+    " -1 ",
+    " 0 ",
+    " 1e308 ",
+    " 1e-308 ",
+    " 2020-01-01\n",
+    " 99999999999999999999999 ",
+    ' "1e999 m" ',
+    ' "m" ',
+    " [nan, nan, nan] ",
+    " [[], [], []] ",
+    " ['a', 'b', 'c', 'd']",
+]
 
 
 @pytest.mark.parametrize("odd", ODD)
