@@ -102,8 +102,8 @@ class Gain:
         array = np.asarray(value, dtype=float)
         if not np.isfinite(array).all():
             raise ValueError("must be finite")
-        if self.shape == (3, 3) and array.ndim < 2:
-            array = array * np.eye(3) if array.ndim == 0 else np.diag(array)
+        if len(self.shape) == 2 and array.ndim < 2:
+            array = array * np.eye(self.shape[0]) if array.ndim == 0 else np.diag(array)
         elif array.ndim == 0 and self.shape and self.spread:
             array = np.full(self.shape, float(array))
         if array.shape != self.shape:
@@ -129,11 +129,12 @@ class Gain:
 
     def describe(self) -> str:
         """What may be written for this gain."""
-        kind: dict[tuple[int, ...], str] = {
-            (): "a whole number" if self.whole else "a number",
-            (3, 3): "a number, three numbers or a 3x3 matrix",
-        }
-        return kind.get(self.shape, f"{'a number or ' if self.spread else ''}{'x'.join(map(str, self.shape))} numbers")
+        if not self.shape:
+            return "a whole number" if self.whole else "a number"
+        size = self.shape[0]
+        if len(self.shape) == 2:
+            return f"a number, {size} numbers or a {size}x{size} matrix"
+        return f"{'a number or ' if self.spread else ''}{size} numbers"
 
 
 @dataclass(frozen=True)

@@ -87,6 +87,6 @@ def _schema(gain: Gain) -> dict[str, Any]:
         return {"anyOf": single} | described
     row = {"type": "array", "items": {"anyOf": single}, "minItems": gain.shape[-1], "maxItems": gain.shape[-1]}
     forms = [*single, row] if gain.spread else [row]
-    if gain.shape == (3, 3):
-        forms.append({"type": "array", "items": row, "minItems": 3, "maxItems": 3})
+    if len(gain.shape) == 2:
+        forms.append({"type": "array", "items": row, "minItems": gain.shape[0], "maxItems": gain.shape[0]})
     return {"anyOf": forms} | described

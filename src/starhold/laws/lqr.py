@@ -1,0 +1,160 @@
+"""Linear-quadratic regulators with closed-form gains."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.quaternion import vector_part
+from starhold.algebra.scalar import Scalar, equation
+from starhold.algebra.vector import Matrix, Vector, add, apply, dot, scale, solve, subtract, swing
+from starhold.laws.interface import Card, Gain, NoMemory, Seen, tracking_torque
+from starhold.models.craft import Craft, compact, tensor
+
+CARD = Card(
+    title="Closed-form LQR",
+    summary="u = -K_rate w - K_attitude q (+ w x Jw), optimal for the linearised motion; gains from formulas by `form`",
+    sources=("published study of inertial stabilisation by closed-form linear-quadratic laws",),
+    assumptions=(
+        "rigid body",
+        "inertia known",
+        "no external torque",
+        "torque not limited",
+        "K_attitude^-1 J > 0, K_attitude^-1 K_rate > 0",
+        "w.K_attitude^-1(w x Jw) = 0 for all w, or the gyroscopic torque cancelled",
+    ),
+    claims="almost-global",
+)
+
+Array = NDArray[np.float64]
+
+
+class Gains(NamedTuple):
+    """Damping and stiffness matrices, and how much of the gyroscopic torque is cancelled."""
+
+    k_rate: Annotated[Matrix | Vector, Gain("N m s", shape=(3, 3), text="damping")]
+    k_attitude: Annotated[Matrix | Vector, Gain("N m", shape=(3, 3), text="stiffness")]
+    gyroscopic: Annotated[float, Gain("1", at_least=0.0, at_most=1.0, text="share of w x Jw cancelled")] = 0.0
+
+
+class FormI(NamedTuple):
+    """Q = blkdiag(a, b^2) Z^-1 with Z = J^-1 R^-1 J^-1: u = -sqrt(a + b) J w - b J q, for any inertia and any R."""
+
+    a: Annotated[float, Gain("1/s^2", at_least=0.0, text="weight of the rate")]
+    b: Annotated[float, Gain("1/s^2", above=0.0, text="weight of the attitude, K_attitude = b J")]
+    gyroscopic: Annotated[float, Gain("1", at_least=0.0, at_most=1.0, text="share of w x Jw cancelled")] = 0.0
+
+
+class FormII(NamedTuple):
+    """Diagonal Q and R for a diagonal inertia, in closed form."""
+
+    q: Annotated[Any, Gain("1", above=0.0, shape=(6,), text="weights of the rate (s^2) and of the quaternion's vector part")]
+    r: Annotated[Vector, Gain("1/(N m)^2", above=0.0, shape=(3,), text="weights of the torque")]
+
+
+class FormIII(NamedTuple):
+    """Form II about the principal axes of any inertia, which are taken in the order of rising moments."""
+
+    q: Annotated[Any, Gain("1", above=0.0, shape=(6,), text="weights of the rate (s^2) and of the quaternion's vector part")]
+    r: Annotated[Vector, Gain("1/(N m)^2", above=0.0, shape=(3,), text="weights of the torque")]
+
+
+class Numeric(NamedTuple):
+    """Any symmetric weights, by a numerical Riccati solver."""
+
+    q: Annotated[Any, Gain("1", shape=(6, 6), text="weight of the rate (s^2) and of the quaternion's vector part")]
+    r: Annotated[Any, Gain("1/(N m)^2", shape=(3, 3), text="weight of the torque")]
+
+
+FORMS: dict[str, Any] = {"I": FormI, "II": FormII, "III": FormIII, "numeric": Numeric}
+
+
+@equation
+def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
+    """Control torque (N m, body)."""
+    feedback = add(apply(gains.k_rate, seen.rate), apply(gains.k_attitude, vector_part(seen.attitude)))
+    gyroscopic = scale(gains.gyroscopic, swing(craft.inertia, seen.rate))
+    return subtract(add(tracking_torque(seen, craft), gyroscopic), feedback), memory
+
+
+@equation
+def lyapunov(seen: Seen, gains: Gains, craft: Craft) -> Scalar:
+    """V = w.K_attitude^-1 Jw/2 + 2 (1 - q0); V' = -w.K_attitude^-1 K_rate w under the law's assumptions."""
+    weighted = solve(gains.k_attitude, apply(craft.inertia, seen.rate))
+    return 0.5 * dot(seen.rate, weighted) + 2.0 * (1.0 - seen.attitude[0])
+
+
+def design(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> Gains:
+    """Gains of a form; ValueError where the weights or the inertia do not allow it."""
+    inertia = tensor(craft.inertia)
+    if isinstance(spec, FormI):
+        return Gains(compact(np.sqrt(spec.a + spec.b) * inertia), compact(spec.b * inertia), spec.gyroscopic)
+    if isinstance(spec, Numeric):
+        q, r = _symmetric(spec.q, 6, "q"), _symmetric(spec.r, 3, "r")
+        p = solve_riccati(inertia, q, r)
+        feedback = np.linalg.solve(r, np.linalg.solve(inertia, p[:3]))
+        return Gains(compact(feedback[:, :3]), compact(feedback[:, 3:]))
+    if isinstance(spec, FormIII):
+        moments, axes = np.linalg.eigh(inertia)
+        k_rate, k_attitude = closed_form(moments, np.array(spec.q), np.array(spec.r))
+        return Gains(compact(axes * k_rate @ axes.T), compact(axes * k_attitude @ axes.T))
+    if np.count_nonzero(inertia - np.diag(np.diagonal(inertia))):
+        raise ValueError("form 'II' needs a diagonal inertia; use form 'III'")
+    k_rate, k_attitude = closed_form(np.diagonal(inertia), np.array(spec.q), np.array(spec.r))
+    return Gains(compact(np.diag(k_rate)), compact(np.diag(k_attitude)))
+
+
+def closed_form(moments: Array, q: Array, r: Array) -> tuple[Array, Array]:
+    """Diagonal gains for principal moments (3,), weights q (6,), rate first, and r (3,):
+    K_attitude = y = sqrt(q_attitude / r), K_rate = sqrt(J y + q_rate / r)."""
+    y = np.sqrt(q[3:] / r)
+    return np.sqrt(moments * y + q[:3] / r), y
+
+
+def linear_model(inertia: Array) -> tuple[Array, Array]:
+    """A (6, 6) and B (6, 3) of the motion near rest on target, state (w; q): w' = J^-1 u, q' = w/2."""
+    a, b = np.zeros((6, 6)), np.zeros((6, 3))
+    a[3:, :3] = 0.5 * np.eye(3)
+    b[:3] = np.linalg.inv(inertia)
+    return a, b
+
+
+def solve_riccati(inertia: Array, q: Array, r: Array) -> Array:
+    """P (6, 6) of the algebraic Riccati equation, by SciPy; ValueError where it finds none."""
+    # By name, for the types of the library are too loose for a strict checker.
+    library: Any = import_module("scipy.linalg")
+    try:
+        return library.solve_continuous_are(*linear_model(inertia), q, r)
+    except (np.linalg.LinAlgError, ValueError) as error:
+        raise ValueError(f"the Riccati equation of these weights has no solution: {error}") from None
+
+
+def riccati_residual(p: Array, inertia: Array, q: Array, r: Array) -> float:
+    """The largest entry of A'P + PA - P B R^-1 B'P + Q, of the largest of its terms."""
+    a, b = linear_model(inertia)
+    quadratic = p @ b @ np.linalg.solve(r, b.T @ p)
+    size = max(np.abs(part).max() for part in (a.T @ p, quadratic, q))
+    return float(np.abs(a.T @ p + p @ a - quadratic + q).max() / size)
+
+
+def _symmetric(given: Any, size: int, name: str) -> Array:
+    array = np.array(given, dtype=float).reshape(size, size)
+    if not np.allclose(array, array.T, rtol=1e-9, atol=0.0):
+        raise ValueError(f"{name} must be symmetric")
+    array = 0.5 * (array + array.T)
+    moments = np.linalg.eigvalsh(array)
+    if moments[0] <= 0.0:
+        raise ValueError(f"{name} must be positive definite; its least eigenvalue is {moments[0]:g}")
+    return array
+
+
+def examples() -> list[Gains]:
+    """Form I with the gyroscopic torque cancelled and forms II for a body of 2, 3, 4 kg m2."""
+    root = float(np.sqrt(0.02))
+    first = Gains((2.0 * root, 3.0 * root, 4.0 * root), (0.02, 0.03, 0.04), 1.0)
+    moments, y = np.array([2.0, 3.0, 4.0]), 0.02
+    rate = np.sqrt(moments * y + 0.01).tolist()
+    return [first, Gains((rate[0], rate[1], rate[2]), (y, y, y))]
