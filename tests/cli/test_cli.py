@@ -120,6 +120,19 @@ def test_new_writes_a_file_that_runs(tmp_path):
 
 
 @pytest.mark.xdist_group("cli")
+def test_design_prints_gains_and_what_they_are_judged_by(short):
+    text = SHORT.split("[[law]]")[0] + '[[law]]\ntype = "lqr"\nform = "II"\nq = [1, 1, 1, 0.2, 0.2, 0.2]\nr = 50\n'
+    (short / "lqr.toml").write_text(text)
+    done = starhold("design", "lqr.toml", cwd=short)
+    assert done.returncode == 0, done.stderr
+    for word in ("k_rate", "k_attitude", "Riccati residual", "P against SciPy", "degree of stability"):
+        assert word in done.stdout
+    none = starhold("design", "short.toml", cwd=short)
+    assert none.returncode == 2
+    assert "form" in none.stderr
+
+
+@pytest.mark.xdist_group("cli")
 def test_lists(tmp_path):
     listed = starhold("laws", cwd=tmp_path).stdout
     for name in catalogue():

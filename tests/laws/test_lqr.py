@@ -97,6 +97,38 @@ def test_the_gain_that_balances_the_middle_axis():
         assert abs(rate @ np.diag(1 / np.array(gains.k_attitude)) @ np.cross(rate, j * rate)) < 1e-12
 
 
+@pytest.mark.parametrize(
+    "spec",
+    [
+        lqr.FormI(0.1, 0.02),
+        lqr.FormII((0.1, 0.2, 0.3, 0.4, 0.5, 0.6), (50.0, 40.0, 30.0)),
+        lqr.FormIII((0.1, 0.2, 0.3, 0.4, 0.5, 0.6), (50.0, 40.0, 30.0)),
+        lqr.Numeric(np.eye(6), np.eye(3)),
+    ],
+    ids=lambda spec: type(spec).__name__,
+)
+def test_explanation_judges_the_design(spec):
+    craft = make_craft([2.0, 3.0, 4.0])
+    told = dict(lqr.explain(craft, spec))
+    assert told["Riccati residual, relative"] < 1e-12
+    assert told.get("P against SciPy, relative", 0.0) < 1e-9
+    assert told["degree of stability (1/s)"] > 0.0
+    _, r, closed = lqr.riccati_problem(craft, spec)
+    if closed is not None:
+        gains = lqr.design(craft, spec)
+        assert close(gains, np.linalg.solve(r, np.linalg.solve(tensor(craft.inertia), closed[:3])))
+
+
+def test_gyroscopic_residual_is_the_largest_power():
+    for _ in range(20):
+        inertia = random_inertia(full=False)
+        stiffness = np.diag(RANDOM.uniform(0.1, 1.0, size=3))
+        rates = RANDOM.normal(size=(200_000, 3))
+        rates /= np.linalg.norm(rates, axis=1, keepdims=True)
+        power = np.einsum("ki,ij,kj->k", rates, np.linalg.inv(stiffness), np.cross(rates, rates @ inertia))
+        assert lqr.gyroscopic_residual(inertia, stiffness) == pytest.approx(np.abs(power).max(), rel=1e-3)
+
+
 LAW = builtin_text("three-laws").split("[[law]]")[0] + '[[law]]\ntype = "lqr"\n'
 
 

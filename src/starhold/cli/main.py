@@ -84,6 +84,21 @@ def _fly(file: str, law: str | None, output: Path | None, force: bool, nested: b
 
 
 @app.command()
+def design(file: ScenarioFile) -> None:
+    """Print the gains that formulas give: every law of a file that has a `form`."""
+    from starhold.cli.show import print_design
+    from starhold.scenario.reading import load
+
+    scenario = load(file)
+    designed = [entry for entry in scenario.laws if entry.form is not None]
+    if not designed:
+        allowed = 'at least one [[law]] with a form, such as type = "lqr", form = "II"'
+        raise InputError(scenario.where, "law", "no form", allowed)
+    for entry in designed:
+        print_design(entry, scenario.craft)
+
+
+@app.command()
 def laws(name: Annotated[str | None, typer.Argument(help="show this law's card and gains")] = None) -> None:
     """List the control laws, or describe one."""
     from starhold.cli.show import print_law, print_laws

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from starhold.laws.catalogue import Law
+    from starhold.models.craft import Craft
     from starhold.report.flight import Flight
     from starhold.scenario.reading import LawEntry
 
@@ -89,6 +90,29 @@ def print_table(flights: Sequence[Flight]) -> None:
 
 def _cell(text: str, best: bool) -> str:
     return f"[bold green]{text}*[/bold green]" if best else text
+
+
+def print_design(entry: LawEntry, craft: Craft) -> None:
+    """The inputs of a design, its gains, and what it can be judged by."""
+    import numpy as np
+
+    from starhold.report.flight import number_text
+
+    console.print(f'[bold]{entry.name}[/bold]: {entry.law.card.title}, form "{entry.form}"', highlight=False)
+    for title, items, values in (
+        ("from", entry.law.fields(entry.form), entry.spec),
+        ("gains", entry.law.fields(), entry.gains),
+    ):
+        table = Table(show_edge=False, pad_edge=False)
+        for head in (title, "value", "unit", "meaning"):
+            table.add_column(head, overflow="fold")
+        for item, value in zip(items, values, strict=True):
+            table.add_row(item.name, number_text(value), item.gain.unit, item.gain.text)
+        console.print(table)
+    for name, value in entry.law.explain(craft, entry.spec):
+        shown = f"{value:.3g}" if isinstance(value, float) else np.array2string(value, precision=6, suppress_small=True)
+        console.print(f"{name}: " + ("\n" if "\n" in shown else "") + shown, highlight=False, markup=False)
+    console.print()
 
 
 def print_laws(known: Mapping[str, Law]) -> None:

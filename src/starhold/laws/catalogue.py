@@ -64,6 +64,11 @@ class Law:
         """Gains from the inputs of a design form."""
         return self.module.design(craft, spec)
 
+    def explain(self, craft: Craft, spec: Any) -> list[tuple[str, Any]]:
+        """What a design can be judged by, name and value; empty for a law that has nothing to add."""
+        teller = getattr(self.module, "explain", None)
+        return [] if teller is None else teller(craft, spec)
+
     def remember(self, gains: Any, craft: Craft, period: float) -> Any:
         """The memory at the start of a run, made anew for each trajectory."""
         maker = getattr(self.module, "remember", None)

@@ -114,6 +114,64 @@ def closed_form(moments: Array, q: Array, r: Array) -> tuple[Array, Array]:
     return np.sqrt(moments * y + q[:3] / r), y
 
 
+def riccati_problem(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> tuple[Array, Array, Array | None]:
+    """Weights Q (6, 6), rate first, and R (3, 3) of a form, and in closed form P (6, 6); None for numeric weights.
+
+    Form I is the regulator for any R; the identity stands for it here.
+    """
+    inertia = tensor(craft.inertia)
+    if isinstance(spec, Numeric):
+        return _symmetric(spec.q, 6, "q"), _symmetric(spec.r, 3, "r"), None
+    if isinstance(spec, FormI):
+        a, b, root = spec.a, spec.b, float(np.sqrt(spec.a + spec.b))
+        squared = inertia @ inertia
+        q = np.asarray(np.kron(np.diag([a, b * b]), squared), dtype=np.float64)
+        p = np.asarray(np.kron(np.array([[root, b], [b, 2.0 * b * root]]), squared), dtype=np.float64)
+        return q, np.eye(3), p
+    q, r = np.array(spec.q), np.array(spec.r)
+    moments, axes = np.linalg.eigh(inertia) if isinstance(spec, FormIII) else (np.diagonal(inertia), np.eye(3))
+    p12 = moments * np.sqrt(r * q[3:])
+    p11 = moments * np.sqrt(r * (q[:3] + p12))
+    p22 = 2.0 * np.sqrt(q[3:] * (q[:3] + p12))
+    p = np.block([[np.diag(p11), np.diag(p12)], [np.diag(p12), np.diag(p22)]])
+    both = np.kron(np.eye(2), axes)
+    return both @ np.diag(q) @ both.T, axes @ np.diag(r) @ axes.T, both @ p @ both.T
+
+
+def explain(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> list[tuple[str, Any]]:
+    """What a design can be judged by: P, its residual, how far it is from the numerical solution, the closed loop's
+    eigenvalues, and whether the gyroscopic torque leaves V alone."""
+    inertia, gains = tensor(craft.inertia), design(craft, spec)
+    q, r, closed = riccati_problem(craft, spec)
+    numerical = solve_riccati(inertia, q, r)
+    p = numerical if closed is None else closed
+    a, b = linear_model(inertia)
+    feedback = np.hstack([tensor(gains.k_rate), tensor(gains.k_attitude)])
+    modes = np.linalg.eigvals(a - b @ feedback)
+    found: list[tuple[str, Any]] = [("P", p), ("Riccati residual, relative", riccati_residual(p, inertia, q, r))]
+    if closed is not None:
+        found.append(("P against SciPy, relative", float(np.abs(closed - numerical).max() / np.abs(numerical).max())))
+    found.append(("eigenvalues of the linear loop (1/s)", modes[np.argsort(-modes.real)]))
+    found.append(("degree of stability (1/s)", float(-modes.real.max())))
+    found.append(("gyroscopic residual (s^2)", gyroscopic_residual(inertia, tensor(gains.k_attitude))))
+    return found
+
+
+def gyroscopic_residual(inertia: Array, k_attitude: Array) -> float:
+    """The largest |w.K_attitude^-1(w x Jw)| over |w| = 1 rad/s, from its cubic form; zero means that the law is almost
+    globally stable without cancelling the gyroscopic torque. For diagonal matrices it is |kappa| / (3 sqrt 3) with
+    kappa = (J3 - J2)/y1 + (J1 - J3)/y2 + (J2 - J1)/y3."""
+    moments, axes = np.linalg.eigh(inertia)
+    weight = axes.T @ np.linalg.inv(k_attitude) @ axes
+    if np.abs(weight - np.diag(np.diagonal(weight))).max() <= 1e-12 * np.abs(weight).max():
+        kappa = (np.roll(moments, -2) - np.roll(moments, -1)) @ np.diagonal(weight)
+        return float(abs(kappa) / (3.0 * np.sqrt(3.0)))
+    # Not diagonal together: the maximum over a fine grid of directions, a figure for reading and no bound.
+    random = np.random.default_rng(0).normal(size=(20_000, 3))
+    rates = random / np.linalg.norm(random, axis=1, keepdims=True)
+    return float(np.abs(np.einsum("ki,ij,kj->k", rates, weight, np.cross(rates, rates * moments))).max())
+
+
 def linear_model(inertia: Array) -> tuple[Array, Array]:
     """A (6, 6) and B (6, 3) of the motion near rest on target, state (w; q): w' = J^-1 u, q' = w/2."""
     a, b = np.zeros((6, 6)), np.zeros((6, 3))

@@ -29,6 +29,9 @@ class LawEntry:
     gains: Any
     double_cover: Any = "as_published"
     hysteresis_width: float = 0.5
+    form: str | None = None
+    spec: Any = None
+    """The design form that gave the gains, and its inputs; None where the file gives the gains themselves."""
 
 
 @dataclass(frozen=True)
@@ -124,12 +127,13 @@ def _read_law(data: Any, craft: Craft, where: str, key: str, taken: set[str]) ->
         raise InputError(where, f"{key}.form", _show(form), allowed)
     read = _validate(law_model(law, form), table, where, key, extra=["form"] if law.forms else [])
     values = [getattr(read, item.name) for item in law.fields(form)]
+    spec = None if form is None else law.forms[form](*values)
     try:
-        gains = law.gains(*values) if form is None else law.design(craft, law.forms[form](*values))
+        gains = law.gains(*values) if form is None else law.design(craft, spec)
     except ValueError as error:
         raise InputError(where, key, "", str(error)) from None
     name = _free_name(read, law.name, taken, where, key)
-    return LawEntry(name, law, gains, read.double_cover, read.hysteresis_width)
+    return LawEntry(name, law, gains, read.double_cover, read.hysteresis_width, form, spec)
 
 
 def _free_name(read: LawTable, kind: str, taken: set[str], where: str, key: str) -> str:
