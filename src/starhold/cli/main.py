@@ -59,8 +59,8 @@ def _fly(file: str, law: str | None, output: Path | None, force: bool, nested: b
     # First of all, for it takes as long to get ready as the flight takes.
     with Painter() as painter:
         from starhold.cli.show import flying, print_outcome
-        from starhold.report.compare import fly_law, write, write_run
-        from starhold.report.results import open_folder
+        from starhold.report.compare import fly_law, write
+        from starhold.report.results import open_folder, write_run
         from starhold.scenario.building import build
         from starhold.scenario.reading import load
 

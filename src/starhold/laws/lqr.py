@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import vector_part
-from starhold.algebra.scalar import Scalar, equation
-from starhold.algebra.vector import Matrix, Vector, add, apply, dot, scale, solve, subtract, swing
+from starhold.algebra.scalar import equation
+from starhold.algebra.vector import Matrix, Vector, add, apply, scale, subtract, swing
+from starhold.laws import matrix_pd
 from starhold.laws.interface import Card, Gain, NoMemory, Seen, tracking_torque
 from starhold.models.craft import Craft, compact, tensor
 
@@ -80,11 +81,7 @@ def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Ve
     return subtract(add(tracking_torque(seen, craft), gyroscopic), feedback), memory
 
 
-@equation
-def lyapunov(seen: Seen, gains: Gains, craft: Craft) -> Scalar:
-    """V = w.K_attitude^-1 Jw/2 + 2 (1 - q0); V' = -w.K_attitude^-1 K_rate w under the law's assumptions."""
-    weighted = solve(gains.k_attitude, apply(craft.inertia, seen.rate))
-    return 0.5 * dot(seen.rate, weighted) + 2.0 * (1.0 - seen.attitude[0])
+lyapunov = matrix_pd.lyapunov
 
 
 def design(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> Gains:

@@ -12,8 +12,8 @@ from starhold.analysis.cost import call_costs
 from starhold.analysis.metrics import measure
 from starhold.laws.interface import Field
 from starhold.report.files import whole
-from starhold.report.flight import Flight
-from starhold.report.results import SUMMARY, write_run, write_summary
+from starhold.report.flight import Flight, number_text
+from starhold.report.results import SUMMARY, write_summary
 from starhold.scenario.building import build
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.simulation.lane import fly, label
@@ -71,16 +71,4 @@ def _gain_text(item: Field, value: Any) -> str:
     if item.gain.choices:
         return item.gain.choices[value]
     unit = "" if item.gain.unit == "1" else f" {item.gain.unit}"
-    return f"{_compact(value)}{unit}"
-
-
-def _compact(value: Any) -> str:
-    array = np.asarray(value, dtype=float)
-    if array.ndim == 2 and np.array_equal(array, np.diag(np.diagonal(array))):
-        array = np.diagonal(array)
-    if array.ndim == 1 and (array == array[0]).all():
-        array = array[0]
-    return np.array2string(array, separator=", ", precision=6) if array.ndim else f"{float(array):.6g}"
-
-
-__all__ = ["compare", "fly_law", "write", "write_run"]
+    return f"{number_text(value)}{unit}"

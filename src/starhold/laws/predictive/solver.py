@@ -80,6 +80,20 @@ def change(problem, plan, space):
 
 
 @compiled
+def shorten(problem, plan, space, halvings):
+    """Armijo's search along the projection arc of `space.step`, the step halved until the cost falls enough. Returns the
+    change of half the cost, zero where it never did."""
+    length = 1.0
+    for _ in range(halvings):
+        along(problem, plan, space, length)
+        slope, curvature = change(problem, plan, space)
+        if slope < 0.0 and slope + 0.5 * curvature <= SUFFICIENT * slope:
+            return slope + 0.5 * curvature
+        length *= 0.5
+    return 0.0
+
+
+@compiled
 def search(problem, plan, space, decrement):
     """A trial plan along the Newton step that brings the cost down; returns the change of half the cost, zero where
     none was found."""
@@ -87,14 +101,7 @@ def search(problem, plan, space, decrement):
     if slope + 0.5 * curvature <= -0.25 * decrement:
         return slope + 0.5 * curvature
     unroll(plan, problem, space)
-    length = 1.0
-    for _ in range(HALVINGS):
-        along(problem, plan, space, length)
-        slope, curvature = change(problem, plan, space)
-        if slope < 0.0 and slope + 0.5 * curvature <= SUFFICIENT * slope:
-            return slope + 0.5 * curvature
-        length *= 0.5
-    return 0.0
+    return shorten(problem, plan, space, HALVINGS)
 
 
 @compiled
@@ -105,14 +112,7 @@ def descend(problem, plan, space):
         s = -1.0 / space.stiffness[k]
         g = triple(space.gradient, k)
         put(space.step, k, (s * g[0], s * g[1], s * g[2]))
-    length = 1.0
-    for _ in range(60):
-        along(problem, plan, space, length)
-        slope, curvature = change(problem, plan, space)
-        if slope < 0.0 and slope + 0.5 * curvature <= SUFFICIENT * slope:
-            return slope + 0.5 * curvature
-        length *= 0.5
-    return 0.0
+    return shorten(problem, plan, space, 60)
 
 
 @compiled
