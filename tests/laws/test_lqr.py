@@ -129,6 +129,49 @@ def test_gyroscopic_residual_is_the_largest_power():
         assert lqr.gyroscopic_residual(inertia, stiffness) == pytest.approx(np.abs(power).max(), rel=1e-3)
 
 
+@pytest.mark.parametrize("order", [(2.0, 3.0, 4.0), (4.0, 2.0, 3.0), (3.0, 4.0, 2.0), (3.0, 2.0, 4.0)])
+def test_balance_moves_the_named_weight_or_all_of_them_least(order):
+    moments, craft = np.array(order), make_craft(order)
+    middle = order.index(3.0)
+    for _ in range(15):
+        q, r = 10.0 ** RANDOM.uniform(-2, 2, size=6), 10.0 ** RANDOM.uniform(-2, 2, size=3)
+        for name in ("least", f"q{middle + 4}", f"r{middle + 1}"):
+            spec = lqr.FormII(tuple(q), tuple(r), lqr.BALANCES.index(name))
+            q2, r2 = lqr.balanced(moments, spec)
+            gains = lqr.design(craft, spec)
+            size = np.abs(1.0 / np.array(gains.k_attitude)).max()
+            assert lqr.gyroscopic_residual(np.diag(moments), np.diag(gains.k_attitude)) < 1e-14 * size
+            moved = np.log(np.r_[q2 / q, r2 / r])
+            if name == "least":
+                least = np.abs(moved @ moved)
+                assert np.abs(moved[:3]).max() == 0.0
+            else:
+                assert np.count_nonzero(moved) == 1
+                assert least <= moved @ moved * (1 + 1e-9)
+
+
+def test_least_balance_cannot_be_improved():
+    """No small step along the surface of balanced weights is shorter."""
+    moments = np.array([2.0, 3.0, 4.0])
+    y = np.array([0.3, 0.05, 0.1])
+    spec = lqr.FormII((1.0, 1.0, 1.0, *(y**2)), (1.0, 1.0, 1.0), 1)
+    q, r = lqr.balanced(moments, spec)
+    shift = np.log(np.sqrt(q[3:] / r) / y)
+    share = np.array([1.0, -2.0, 1.0]) / y * np.exp(-shift)
+    # At the least change it is parallel to the condition's gradient.
+    assert np.linalg.norm(np.cross(shift, share)) < 1e-6 * np.linalg.norm(shift) * np.linalg.norm(share)
+
+
+def test_balance_that_cannot_be_is_refused():
+    spec = lqr.FormII((1.0, 1.0, 1.0, 1e-4, 1.0, 1.0), (1.0, 1.0, 1.0), lqr.BALANCES.index("q6"))
+    with pytest.raises(ValueError, match="q5 or r2 can"):
+        lqr.design(make_craft([2.0, 3.0, 4.0]), spec)
+    equal = lqr.FormII((1.0,) * 6, (1.0, 2.0, 3.0), lqr.BALANCES.index("least"))
+    assert lqr.design(make_craft([2.0, 2.0, 2.0]), equal) == lqr.design(
+        make_craft([2.0, 2.0, 2.0]), equal._replace(balance=0)
+    )
+
+
 LAW = builtin_text("three-laws").split("[[law]]")[0] + '[[law]]\ntype = "lqr"\n'
 
 

@@ -107,7 +107,8 @@ def print_design(entry: LawEntry, craft: Craft) -> None:
         for head in (title, "value", "unit", "meaning"):
             table.add_column(head, overflow="fold")
         for item, value in zip(items, values, strict=True):
-            table.add_row(item.name, number_text(value), item.gain.unit, item.gain.text)
+            shown = item.gain.choices[value] if item.gain.choices else number_text(value)
+            table.add_row(item.name, shown, item.gain.unit, item.gain.text)
         console.print(table)
     for name, value in entry.law.explain(craft, entry.spec):
         shown = f"{value:.3g}" if isinstance(value, float) else np.array2string(value, precision=6, suppress_small=True)

@@ -30,7 +30,11 @@ CARD = Card(
     claims="almost-global",
 )
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
+
+
+BALANCES = ("none", "least", "q4", "q5", "q6", "r1", "r2", "r3")
+"""Weights that `balanced` may move: none, all of them least in logarithm, or the one named."""
 
 
 class Gains(NamedTuple):
@@ -54,6 +58,7 @@ class FormII(NamedTuple):
 
     q: Annotated[Any, Gain("1", above=0.0, shape=(6,), text="weights of the rate (s^2) and of the quaternion's vector part")]
     r: Annotated[Vector, Gain("1/(N m)^2", above=0.0, shape=(3,), text="weights of the torque")]
+    balance: Annotated[int, Gain(choices=BALANCES, text="which weights move to make the law globally stable")] = 0
 
 
 class FormIII(NamedTuple):
@@ -61,6 +66,7 @@ class FormIII(NamedTuple):
 
     q: Annotated[Any, Gain("1", above=0.0, shape=(6,), text="weights of the rate (s^2) and of the quaternion's vector part")]
     r: Annotated[Vector, Gain("1/(N m)^2", above=0.0, shape=(3,), text="weights of the torque")]
+    balance: Annotated[int, Gain(choices=BALANCES, text="which weights move to make the law globally stable")] = 0
 
 
 class Numeric(NamedTuple):
@@ -96,11 +102,11 @@ def design(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> Gains:
         return Gains(compact(feedback[:, :3]), compact(feedback[:, 3:]))
     if isinstance(spec, FormIII):
         moments, axes = np.linalg.eigh(inertia)
-        k_rate, k_attitude = closed_form(moments, np.array(spec.q), np.array(spec.r))
+        k_rate, k_attitude = closed_form(moments, *balanced(moments, spec))
         return Gains(compact(axes * k_rate @ axes.T), compact(axes * k_attitude @ axes.T))
     if np.count_nonzero(inertia - np.diag(np.diagonal(inertia))):
         raise ValueError("form 'II' needs a diagonal inertia; use form 'III'")
-    k_rate, k_attitude = closed_form(np.diagonal(inertia), np.array(spec.q), np.array(spec.r))
+    k_rate, k_attitude = closed_form(np.diagonal(inertia), *balanced(np.diagonal(inertia), spec))
     return Gains(compact(np.diag(k_rate)), compact(np.diag(k_attitude)))
 
 
@@ -125,8 +131,8 @@ def riccati_problem(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> t
         q = np.asarray(np.kron(np.diag([a, b * b]), squared), dtype=np.float64)
         p = np.asarray(np.kron(np.array([[root, b], [b, 2.0 * b * root]]), squared), dtype=np.float64)
         return q, np.eye(3), p
-    q, r = np.array(spec.q), np.array(spec.r)
     moments, axes = np.linalg.eigh(inertia) if isinstance(spec, FormIII) else (np.diagonal(inertia), np.eye(3))
+    q, r = balanced(moments, spec)
     p12 = moments * np.sqrt(r * q[3:])
     p11 = moments * np.sqrt(r * (q[:3] + p12))
     p22 = 2.0 * np.sqrt(q[3:] * (q[:3] + p12))
@@ -148,6 +154,11 @@ def explain(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> list[tupl
     found: list[tuple[str, Any]] = [("P", p), ("Riccati residual, relative", riccati_residual(p, inertia, q, r))]
     if closed is not None:
         found.append(("P against SciPy, relative", float(np.abs(closed - numerical).max() / np.abs(numerical).max())))
+    if isinstance(spec, (FormII, FormIII)) and spec.balance:
+        moments = np.linalg.eigvalsh(inertia) if isinstance(spec, FormIII) else np.diagonal(inertia)
+        for name, given, moved in zip("qr", (spec.q, spec.r), balanced(moments, spec), strict=True):
+            found.append((f"weights {name}, balanced", moved))
+            found.append((f"of the weights {name} given", moved / np.array(given)))
     found.append(("eigenvalues of the linear loop (1/s)", modes[np.argsort(-modes.real)]))
     found.append(("degree of stability (1/s)", float(-modes.real.max())))
     found.append(("gyroscopic residual (s^2)", gyroscopic_residual(inertia, tensor(gains.k_attitude))))
@@ -161,12 +172,65 @@ def gyroscopic_residual(inertia: Array, k_attitude: Array) -> float:
     moments, axes = np.linalg.eigh(inertia)
     weight = axes.T @ np.linalg.inv(k_attitude) @ axes
     if np.abs(weight - np.diag(np.diagonal(weight))).max() <= 1e-12 * np.abs(weight).max():
-        kappa = (np.roll(moments, -2) - np.roll(moments, -1)) @ np.diagonal(weight)
-        return float(abs(kappa) / (3.0 * np.sqrt(3.0)))
+        return abs(kappa(moments, 1.0 / np.diagonal(weight))) / (3.0 * np.sqrt(3.0))
     # Not diagonal together: the maximum over a fine grid of directions, a figure for reading and no bound.
     random = np.random.default_rng(0).normal(size=(20_000, 3))
     rates = random / np.linalg.norm(random, axis=1, keepdims=True)
     return float(np.abs(np.einsum("ki,ij,kj->k", rates, weight, np.cross(rates, rates * moments))).max())
+
+
+def kappa(moments: Array, y: Array) -> float:
+    """(J3 - J2)/y1 + (J1 - J3)/y2 + (J2 - J1)/y3 (s2): zero exactly where the gyroscopic torque does no work on V."""
+    return float(((np.roll(moments, -2) - np.roll(moments, -1)) / y).sum())
+
+
+def balanced(moments: Array, spec: FormII | FormIII) -> tuple[Array, Array]:
+    """Weights q (6,) and r (3,) moved, as `spec.balance` says, to where kappa vanishes.
+
+    ValueError where no value of the weight that is named does it; that of the middle moment's axis always can.
+    """
+    q, r = np.array(spec.q, dtype=float), np.array(spec.r, dtype=float)
+    how = BALANCES[spec.balance]
+    share = np.roll(moments, -2) - np.roll(moments, -1)
+    if how == "none" or not share.any():
+        return q, r
+    y = np.sqrt(q[3:] / r)
+    # The share of the middle moment's axis has the other sign than both others, so a positive y there always balances.
+    axis = int(np.argmax(np.abs(share))) if how == "least" else (int(how[1]) - 1) % 3
+    if how == "least":
+        shift = _least_shift(share / y, axis)
+        q[3:], r = q[3:] * np.exp(shift), r * np.exp(-shift)
+        y = np.sqrt(q[3:] / r)
+    rest = float((share / y).sum() - share[axis] / y[axis])
+    wanted = -share[axis] / rest if rest else np.nan
+    if not (np.isfinite(wanted) and wanted > 0.0):
+        middle = int(np.argmax(np.abs(share)))
+        raise ValueError(f"no value of {how} balances the weights; q{middle + 4} or r{middle + 1} can")
+    if how.startswith("r"):
+        r[axis] = q[3 + axis] / wanted**2
+    else:
+        q[3 + axis] = r[axis] * wanted**2
+    return q, r
+
+
+def _least_shift(parts: Array, axis: int) -> Array:
+    """The least change of log y (3,) that makes the sum of `parts` exp(-change) vanish."""
+    library: Any = import_module("scipy.optimize")
+    start = np.zeros(3)
+    start[axis] = np.log(-parts[axis] / (parts.sum() - parts[axis]))
+    size = np.abs(parts).max()
+
+    def length(shift: Array) -> float:
+        return float(shift @ shift)
+
+    def slope(shift: Array) -> Array:
+        return 2.0 * shift
+
+    def condition(shift: Array) -> float:
+        return float((parts * np.exp(-shift)).sum() / size)
+
+    found: Any = library.minimize(length, start, jac=slope, constraints={"type": "eq", "fun": condition}, tol=1e-14)
+    return found.x if length(found.x) <= length(start) else start
 
 
 def linear_model(inertia: Array) -> tuple[Array, Array]:
