@@ -73,3 +73,16 @@ def test_a_law_that_is_gone_spoils_no_other(flown, tmp_path):
     flown(law)
     law.rename(tmp_path / "other.py")
     assert flown(tmp_path / "other.py")[1].startswith("hits")
+
+
+def test_a_law_installed_as_a_library_is_watched_too(flown, tmp_path):
+    folder = tmp_path / "site-packages"
+    folder.mkdir()
+    law = folder / "installed.py"
+    law.write_text(Path(catalogue()["pd"].module.__file__).read_text())
+    first = flown(law)
+    assert flown(law)[1] == "hits 1 misses 0"
+    law.write_text(law.read_text().replace("scale(-gains.k_rate,", "scale(-2.0 * gains.k_rate,"))
+    edited = flown(law)
+    assert edited[1] == "hits 0 misses 1"
+    assert edited[0] != first[0]

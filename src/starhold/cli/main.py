@@ -8,6 +8,7 @@ import signal
 import sys
 import traceback
 from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -66,14 +67,19 @@ def _fly(file: str, law: str | None, output: Path | None, force: bool, nested: b
 
         scenario = load(file)
         entries = list(scenario.laws) if nested else [scenario.laws[0] if law is None else scenario.pick(law)]
-        for entry in entries:
-            build(scenario, entry)
+        # All of them before the first flight, so that what is wrong with the last is said at once.
+        loops = [build(scenario, entry) for entry in entries]
         name = scenario.name if nested else f"{scenario.name}-{entries[0].name}"
         folder = open_folder(output or Path("results") / name, force)
         flights: list[Flight] = []
-        with flying(entries, scenario.table.simulation.steps) as notice:
-            for entry in entries:
-                flights.append(fly_law(scenario, entry, notice))
+        with flying(entries, scenario.table.simulation.steps) as show:
+
+            def notice(name: str, done: int, total: int) -> None:
+                _heed_interrupt()
+                show(name, done, total)
+
+            for entry, loop in zip(entries, loops, strict=True):
+                flights.append(fly_law(scenario, entry, loop, notice))
                 if entry is entries[-1]:
                     painter.start(flights, folder, scenario)
                 write_run(flights[-1].run, scenario, (folder / entry.name if nested else folder) / "run.nc")
@@ -211,8 +217,18 @@ class InterruptedByUserError(BaseException):
     """Ctrl-C, under a name that the command-line library does not turn into an exit code of its own."""
 
 
+_interrupted = Event()
+
+
 def _interrupt(number: int, frame: object) -> None:
+    # Noted as well as raised: in a callback of the compiler or of the garbage collector an exception is swallowed.
+    _interrupted.set()
     raise InterruptedByUserError
+
+
+def _heed_interrupt() -> None:
+    if _interrupted.is_set():
+        raise InterruptedByUserError
 
 
 def main() -> None:

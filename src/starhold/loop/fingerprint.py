@@ -11,6 +11,7 @@ import hashlib
 import sys
 from collections.abc import Iterable
 from functools import cache
+from importlib.util import resolve_name
 from pathlib import Path
 from types import ModuleType
 
@@ -41,12 +42,15 @@ def outside_modules(functions: Iterable[object]) -> tuple[str, ...]:
 
 
 def _files_of(modules: tuple[str, ...]) -> list[Path]:
-    """Source files of the modules and, transitively, of those they import, but not of installed libraries."""
+    """Source files of the modules and, transitively, of those they import, but not of installed libraries other than the
+    packages that the modules themselves belong to."""
+    own = {name.partition(".")[0] for name in modules}
     todo, seen = [sys.modules[name] for name in modules if name in sys.modules], dict[str, Path]()
     while todo:
         module = todo.pop()
         file = getattr(module, "__file__", None)
-        if file is None or module.__name__ in seen or _is_installed(module, file):
+        root = module.__name__.partition(".")[0]
+        if file is None or module.__name__ in seen or (root not in own and _is_installed(module, file)):
             continue
         seen[module.__name__] = Path(file)
         todo += _imports(module, Path(file))
@@ -65,15 +69,11 @@ def _imports(module: ModuleType, file: Path) -> list[ModuleType]:
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             package = "." * node.level + (node.module or "")
-            base = importlib_resolve(package, module)
+            base = _absolute(package, module)
             names |= {base, *(f"{base}.{alias.name}" for alias in node.names)}
     return [sys.modules[name] for name in sorted(names) if name in sys.modules]
 
 
-def importlib_resolve(name: str, module: ModuleType) -> str:
+def _absolute(name: str, module: ModuleType) -> str:
     """The absolute name of a possibly relative import."""
-    if not name.startswith("."):
-        return name
-    from importlib.util import resolve_name
-
-    return resolve_name(name, module.__package__)
+    return resolve_name(name, module.__package__) if name.startswith(".") else name

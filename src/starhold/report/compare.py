@@ -11,6 +11,7 @@ import numpy as np
 from starhold.analysis.cost import call_costs
 from starhold.analysis.metrics import measure
 from starhold.laws.interface import Field
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.report.files import whole
 from starhold.report.flight import Flight, number_text
 from starhold.report.results import SUMMARY, write_summary
@@ -22,10 +23,9 @@ Notice: TypeAlias = Callable[[str, int, int], None]
 """Called with a law's name, the control steps done and those in all."""
 
 
-def fly_law(scenario: Scenario, entry: LawEntry, notice: Notice | None = None) -> Flight:
-    """One law of the scenario flown, measured and timed."""
+def fly_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, notice: Notice | None = None) -> Flight:
+    """One law of the scenario, with the loop that `build` gives for it, flown, measured and timed."""
     simulation, settling = scenario.table.simulation, scenario.table.settling
-    loop = build(scenario, entry)
     progress = None if notice is None else lambda done, total: notice(entry.name, done, total)
     samples, carry = fly(loop, simulation.steps, simulation.record_every, progress=progress)
     recording = label(loop, samples, carry, simulation.record_every)
@@ -38,7 +38,7 @@ def fly_law(scenario: Scenario, entry: LawEntry, notice: Notice | None = None) -
 
 def compare(scenario: Scenario, notice: Notice | None = None) -> list[Flight]:
     """Every law of the scenario flown on it, in the order of the file."""
-    return [fly_law(scenario, entry, notice) for entry in scenario.laws]
+    return [fly_law(scenario, entry, build(scenario, entry), notice) for entry in scenario.laws]
 
 
 def write(scenario: Scenario, flights: Sequence[Flight], folder: Path) -> Path:
