@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -13,6 +12,17 @@ from starhold.algebra.scalar import equation
 from starhold.algebra.vector import Matrix, Vector, add, apply, scale, subtract, swing
 from starhold.laws import matrix_pd
 from starhold.laws.interface import Card, Gain, NoMemory, Seen, tracking_torque
+from starhold.laws.riccati import (
+    OUT_OF_RANGE,
+    closed_form,
+    is_full,
+    linear_modes,
+    principal,
+    riccati_residual,
+    scipy_axes,
+    solve_riccati,
+)
+from starhold.laws.weights import BALANCES, balance, check_axes, check_spreads, kappa, positive, positive_definite
 from starhold.models.craft import Craft, compact, tensor
 
 CARD = Card(
@@ -33,10 +43,6 @@ CARD = Card(
 Array = NDArray[np.floating[Any]]
 
 
-BALANCES = ("none", "least", "q4", "q5", "q6", "r1", "r2", "r3")
-"""Weights that `balanced` may move: none, all of them least in logarithm, or the one named."""
-
-
 class Gains(NamedTuple):
     """Damping and stiffness matrices, and how much of the gyroscopic torque is cancelled."""
 
@@ -54,7 +60,7 @@ class FormI(NamedTuple):
 
 
 class FormII(NamedTuple):
-    """Diagonal Q and R for a diagonal inertia, in closed form."""
+    """Diagonal Q and R for a diagonal inertia, in closed form. Weights of one unit differ by at most 1e12."""
 
     q: Annotated[Any, Gain("1", above=0.0, shape=(6,), text="weights of the rate (s^2) and of the quaternion's vector part")]
     r: Annotated[Vector, Gain("1/(N m)^2", above=0.0, shape=(3,), text="weights of the torque")]
@@ -62,7 +68,8 @@ class FormII(NamedTuple):
 
 
 class FormIII(NamedTuple):
-    """Form II about the principal axes of any inertia, which are taken in the order of rising moments."""
+    """Form II about the principal axes of any inertia, which are taken in the order of rising moments; axes of equal
+    moments need equal weights unless the inertia is diagonal."""
 
     q: Annotated[Any, Gain("1", above=0.0, shape=(6,), text="weights of the rate (s^2) and of the quaternion's vector part")]
     r: Annotated[Vector, Gain("1/(N m)^2", above=0.0, shape=(3,), text="weights of the torque")]
@@ -70,7 +77,8 @@ class FormIII(NamedTuple):
 
 
 class Numeric(NamedTuple):
-    """Any symmetric weights, by a numerical Riccati solver."""
+    """Any symmetric positive definite weights, by a numerical solution that is right to the last digit. Eigenvalues of
+    weights of one unit differ by at most 1e12."""
 
     q: Annotated[Any, Gain("1", shape=(6, 6), text="weight of the rate (s^2) and of the quaternion's vector part")]
     r: Annotated[Any, Gain("1/(N m)^2", shape=(3, 3), text="weight of the torque")]
@@ -91,78 +99,124 @@ lyapunov = matrix_pd.lyapunov
 
 
 def design(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> Gains:
-    """Gains of a form; ValueError where the weights or the inertia do not allow it."""
-    inertia = tensor(craft.inertia)
-    if isinstance(spec, FormI):
-        return Gains(compact(np.sqrt(spec.a + spec.b) * inertia), compact(spec.b * inertia), spec.gyroscopic)
-    if isinstance(spec, Numeric):
-        q, r = _symmetric(spec.q, 6, "q"), _symmetric(spec.r, 3, "r")
-        p = solve_riccati(inertia, q, r)
-        feedback = np.linalg.solve(r, np.linalg.solve(inertia, p[:3]))
-        return Gains(compact(feedback[:, :3]), compact(feedback[:, 3:]))
-    if isinstance(spec, FormIII):
-        moments, axes = np.linalg.eigh(inertia)
-        k_rate, k_attitude = closed_form(moments, *balanced(moments, spec))
-        return Gains(compact(axes * k_rate @ axes.T), compact(axes * k_attitude @ axes.T))
-    if np.count_nonzero(inertia - np.diag(np.diagonal(inertia))):
-        raise ValueError("form 'II' needs a diagonal inertia; use form 'III'")
-    k_rate, k_attitude = closed_form(np.diagonal(inertia), *balanced(np.diagonal(inertia), spec))
-    return Gains(compact(np.diag(k_rate)), compact(np.diag(k_attitude)))
+    """Gains of a form; ValueError where the weights or the inertia do not allow it.
 
-
-def closed_form(moments: Array, q: Array, r: Array) -> tuple[Array, Array]:
-    """Diagonal gains for principal moments (3,), weights q (6,), rate first, and r (3,):
-    K_attitude = y = sqrt(q_attitude / r), K_rate = sqrt(J y + q_rate / r)."""
-    y = np.sqrt(q[3:] / r)
-    return np.sqrt(moments * y + q[:3] / r), y
-
-
-def riccati_problem(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> tuple[Array, Array, Array | None]:
-    """Weights Q (6, 6), rate first, and R (3, 3) of a form, and in closed form P (6, 6); None for numeric weights.
-
-    Form I is the regulator for any R; the identity stands for it here.
+    The gains of forms I, II and III are exactly symmetric, and so are those of numeric weights that make them so.
     """
+    inertia, share = tensor(craft.inertia), 0.0
+    with np.errstate(all="ignore"):
+        if isinstance(spec, FormI):
+            if not (spec.a >= 0.0 and spec.b > 0.0):
+                raise ValueError(f"a must be at least 0 and b above 0, not {spec.a:g} and {spec.b:g}")
+            k_rate, k_attitude, share = np.sqrt(spec.a + spec.b) * inertia, spec.b * inertia, spec.gyroscopic
+        elif isinstance(spec, Numeric):
+            feedback = solve_riccati(inertia, *_numeric_weights(spec)).feedback
+            k_rate, k_attitude = _without_rounding(feedback[:, :3]), _without_rounding(feedback[:, 3:])
+        else:
+            moments, axes, q, r = _by_axes(inertia, spec)
+            k_rate, k_attitude = (_turned(axes, k) for k in closed_form(moments, q, r))
+    for gain in (k_rate, k_attitude):
+        # Weights that couple the axes may well give a negative entry; nothing else does, unless numbers ran out.
+        if not np.isfinite(gain).all() or not (isinstance(spec, Numeric) or (np.diagonal(gain) > 0.0).all()):
+            raise ValueError(OUT_OF_RANGE)
+    return Gains(compact(k_rate), compact(k_attitude), share)
+
+
+class Solution(NamedTuple):
+    """A closed form's Riccati equation and its solution about the principal axes (the columns of `axes`), where all is
+    diagonal: moments (3,), weights q (6,), rate first, and r (3,), and P's blocks, each (3,)."""
+
+    moments: Array
+    axes: Array
+    q: Array
+    r: Array
+    p11: Array
+    p12: Array
+    p22: Array
+
+    @property
+    def p(self) -> Array:
+        """P (6, 6) about the principal axes."""
+        return np.block([[np.diag(self.p11), np.diag(self.p12)], [np.diag(self.p12), np.diag(self.p22)]])
+
+
+def solution(craft: Craft, spec: FormI | FormII | FormIII) -> Solution:
+    """The closed form's solution. Form I is the regulator for any R; the identity stands for it here."""
     inertia = tensor(craft.inertia)
-    if isinstance(spec, Numeric):
-        return _symmetric(spec.q, 6, "q"), _symmetric(spec.r, 3, "r"), None
     if isinstance(spec, FormI):
-        a, b, root = spec.a, spec.b, float(np.sqrt(spec.a + spec.b))
-        squared = inertia @ inertia
-        q = np.asarray(np.kron(np.diag([a, b * b]), squared), dtype=np.float64)
-        p = np.asarray(np.kron(np.array([[root, b], [b, 2.0 * b * root]]), squared), dtype=np.float64)
-        return q, np.eye(3), p
-    moments, axes = np.linalg.eigh(inertia) if isinstance(spec, FormIII) else (np.diagonal(inertia), np.eye(3))
-    q, r = balanced(moments, spec)
+        moments, axes = principal(inertia)
+        a, b, root, squared = spec.a, spec.b, np.sqrt(spec.a + spec.b), moments**2
+        q = np.r_[a * squared, b * b * squared]
+        return Solution(moments, axes, q, np.ones(3), root * squared, b * squared, 2.0 * b * root * squared)
+    moments, axes, q, r = _by_axes(inertia, spec)
     p12 = moments * np.sqrt(r * q[3:])
     p11 = moments * np.sqrt(r * (q[:3] + p12))
     p22 = 2.0 * np.sqrt(q[3:] * (q[:3] + p12))
-    p = np.block([[np.diag(p11), np.diag(p12)], [np.diag(p12), np.diag(p22)]])
-    both = np.kron(np.eye(2), axes)
-    return both @ np.diag(q) @ both.T, axes @ np.diag(r) @ axes.T, both @ p @ both.T
+    return Solution(moments, axes, q, r, p11, p12, p22)
+
+
+def riccati_problem(craft: Craft, spec: FormI | FormII | FormIII) -> tuple[Array, Array, Array]:
+    """Weights Q (6, 6), rate first, and R (3, 3) of a form and its P (6, 6), in body axes; of form I for R the identity."""
+    found = solution(craft, spec)
+    both = np.kron(np.eye(2), found.axes)
+    return both * found.q @ both.T, found.axes * found.r @ found.axes.T, both @ found.p @ both.T
 
 
 def explain(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> list[tuple[str, Any]]:
     """What a design can be judged by: P, its residual, how far it is from the numerical solution, the closed loop's
     eigenvalues, and whether the gyroscopic torque leaves V alone."""
     inertia, gains = tensor(craft.inertia), design(craft, spec)
-    q, r, closed = riccati_problem(craft, spec)
-    numerical = solve_riccati(inertia, q, r)
-    p = numerical if closed is None else closed
-    a, b = linear_model(inertia)
-    feedback = np.hstack([tensor(gains.k_rate), tensor(gains.k_attitude)])
-    modes = np.linalg.eigvals(a - b @ feedback)
-    found: list[tuple[str, Any]] = [("P", p), ("Riccati residual, relative", riccati_residual(p, inertia, q, r))]
-    if closed is not None:
-        found.append(("P against SciPy, relative", float(np.abs(closed - numerical).max() / np.abs(numerical).max())))
-    if isinstance(spec, (FormII, FormIII)) and spec.balance:
-        moments = np.linalg.eigvalsh(inertia) if isinstance(spec, FormIII) else np.diagonal(inertia)
-        for name, given, moved in zip("qr", (spec.q, spec.r), balanced(moments, spec), strict=True):
-            found.append((f"weights {name}, balanced", moved))
-            found.append((f"of the weights {name} given", moved / np.array(given)))
-    found.append(("eigenvalues of the linear loop (1/s)", modes[np.argsort(-modes.real)]))
+    k_rate, k_attitude = tensor(gains.k_rate), tensor(gains.k_attitude)
+    found: list[tuple[str, Any]] = []
+    if isinstance(spec, Numeric):
+        q, r = _numeric_weights(spec)
+        p = solve_riccati(inertia, q, r).p
+        found += [("P", p), ("Riccati residual, relative", riccati_residual(p, inertia, q, r))]
+        power = gyroscopic_residual(inertia, k_attitude)
+    else:
+        closed = solution(craft, spec)
+        # About the principal axes: turned into the body's, small entries drown in the rounding of large ones.
+        about = (closed.p, np.diag(closed.moments), np.diag(closed.q), np.diag(closed.r))
+        others = zip(closed[4:], scipy_axes(closed.moments, closed.q, closed.r), strict=True)
+        found.append(("P", riccati_problem(craft, spec)[2]))
+        found.append(("Riccati residual, relative", riccati_residual(*about)))
+        found.append(("P against SciPy, relative", max(float(np.abs(own / other - 1.0).max()) for own, other in others)))
+        y = spec.b * closed.moments if isinstance(spec, FormI) else np.sqrt(closed.q[3:] / closed.r)
+        power = abs(kappa(closed.moments, y)) / (3.0 * np.sqrt(3.0))
+        if not isinstance(spec, FormI) and spec.balance:
+            for name, given, moved in (("q", spec.q, closed.q), ("r", spec.r, closed.r)):
+                found.append((f"weights {name}, balanced", moved))
+                found.append((f"of the weights {name} given", moved / np.array(given)))
+    modes = linear_modes(inertia, np.hstack([k_rate, k_attitude]))
+    found.append(("eigenvalues of the linear loop (1/s)", modes))
     found.append(("degree of stability (1/s)", float(-modes.real.max())))
-    found.append(("gyroscopic residual (s^2)", gyroscopic_residual(inertia, tensor(gains.k_attitude))))
+    found.append(("gyroscopic residual (s^2)", float(power)))
     return found
+
+
+def _by_axes(inertia: Array, spec: FormII | FormIII) -> tuple[Array, Array, Array, Array]:
+    """Moments (3,), axes (3, 3) as columns, and the weights q (6,) and r (3,) about them."""
+    if isinstance(spec, FormIII):
+        moments, axes = principal(inertia)
+        if is_full(inertia):
+            check_axes(moments, positive(spec.q, 6, "q"), positive(spec.r, 3, "r"))
+    elif is_full(inertia):
+        raise ValueError("form 'II' needs a diagonal inertia; use form 'III'")
+    else:
+        moments, axes = np.diagonal(inertia), np.eye(3)
+    return moments, axes, *balanced(moments, spec)
+
+
+def _turned(axes: Array, diagonal: Array) -> Array:
+    turned = axes * diagonal @ axes.T
+    return 0.5 * (turned + turned.T)
+
+
+def _without_rounding(gain: Array) -> Array:
+    """Symmetric where it is but for the rounding of the weights."""
+    if np.abs(gain - gain.T).max() <= 1e-14 * np.abs(gain).max():
+        return 0.5 * (gain + gain.T)
+    return gain
 
 
 def gyroscopic_residual(inertia: Array, k_attitude: Array) -> float:
@@ -179,95 +233,24 @@ def gyroscopic_residual(inertia: Array, k_attitude: Array) -> float:
     return float(np.abs(np.einsum("ki,ij,kj->k", rates, weight, np.cross(rates, rates * moments))).max())
 
 
-def kappa(moments: Array, y: Array) -> float:
-    """(J3 - J2)/y1 + (J1 - J3)/y2 + (J2 - J1)/y3 (s2): zero exactly where the gyroscopic torque does no work on V."""
-    return float(((np.roll(moments, -2) - np.roll(moments, -1)) / y).sum())
-
-
 def balanced(moments: Array, spec: FormII | FormIII) -> tuple[Array, Array]:
-    """Weights q (6,) and r (3,) moved, as `spec.balance` says, to where kappa vanishes.
+    """Weights q (6,) and r (3,) for moments (3,), moved to where kappa vanishes if `spec.balance` says so.
 
-    ValueError where no value of the weight that is named does it; that of the middle moment's axis always can.
+    ValueError where no value of the weight that is named does it (that of the middle moment's axis always can), and where
+    weights, given or moved, are not positive or differ by more than MOST_SPREAD.
     """
-    q, r = np.array(spec.q, dtype=float), np.array(spec.r, dtype=float)
-    how = BALANCES[spec.balance]
-    share = np.roll(moments, -2) - np.roll(moments, -1)
-    if how == "none" or not share.any():
-        return q, r
-    y = np.sqrt(q[3:] / r)
-    # The share of the middle moment's axis has the other sign than both others, so a positive y there always balances.
-    axis = int(np.argmax(np.abs(share))) if how == "least" else (int(how[1]) - 1) % 3
-    if how == "least":
-        shift = _least_shift(share / y, axis)
-        q[3:], r = q[3:] * np.exp(shift), r * np.exp(-shift)
-        y = np.sqrt(q[3:] / r)
-    rest = float((share / y).sum() - share[axis] / y[axis])
-    wanted = -share[axis] / rest if rest else np.nan
-    if not (np.isfinite(wanted) and wanted > 0.0):
-        middle = int(np.argmax(np.abs(share)))
-        raise ValueError(f"no value of {how} balances the weights; q{middle + 4} or r{middle + 1} can")
-    if how.startswith("r"):
-        r[axis] = q[3 + axis] / wanted**2
-    else:
-        q[3 + axis] = r[axis] * wanted**2
+    q, r = positive(spec.q, 6, "q"), positive(spec.r, 3, "r")
+    check_spreads(q[:3], q[3:], r)
+    if BALANCES[spec.balance] != "none":
+        q, r = balance(moments, q, r, BALANCES[spec.balance])
+        check_spreads(q[:3], q[3:], r, kind="balanced ")
     return q, r
 
 
-def _least_shift(parts: Array, axis: int) -> Array:
-    """The least change of log y (3,) that makes the sum of `parts` exp(-change) vanish."""
-    library: Any = import_module("scipy.optimize")
-    start = np.zeros(3)
-    start[axis] = np.log(-parts[axis] / (parts.sum() - parts[axis]))
-    size = np.abs(parts).max()
-
-    def length(shift: Array) -> float:
-        return float(shift @ shift)
-
-    def slope(shift: Array) -> Array:
-        return 2.0 * shift
-
-    def condition(shift: Array) -> float:
-        return float((parts * np.exp(-shift)).sum() / size)
-
-    found: Any = library.minimize(length, start, jac=slope, constraints={"type": "eq", "fun": condition}, tol=1e-14)
-    return found.x if length(found.x) <= length(start) else start
-
-
-def linear_model(inertia: Array) -> tuple[Array, Array]:
-    """A (6, 6) and B (6, 3) of the motion near rest on target, state (w; q): w' = J^-1 u, q' = w/2."""
-    a, b = np.zeros((6, 6)), np.zeros((6, 3))
-    a[3:, :3] = 0.5 * np.eye(3)
-    b[:3] = np.linalg.inv(inertia)
-    return a, b
-
-
-def solve_riccati(inertia: Array, q: Array, r: Array) -> Array:
-    """P (6, 6) of the algebraic Riccati equation, by SciPy; ValueError where it finds none."""
-    # By name, for the types of the library are too loose for a strict checker.
-    library: Any = import_module("scipy.linalg")
-    try:
-        return library.solve_continuous_are(*linear_model(inertia), q, r)
-    except (np.linalg.LinAlgError, ValueError) as error:
-        raise ValueError(f"the Riccati equation of these weights has no solution: {error}") from None
-
-
-def riccati_residual(p: Array, inertia: Array, q: Array, r: Array) -> float:
-    """The largest entry of A'P + PA - P B R^-1 B'P + Q, of the largest of its terms."""
-    a, b = linear_model(inertia)
-    quadratic = p @ b @ np.linalg.solve(r, b.T @ p)
-    size = max(np.abs(part).max() for part in (a.T @ p, quadratic, q))
-    return float(np.abs(a.T @ p + p @ a - quadratic + q).max() / size)
-
-
-def _symmetric(given: Any, size: int, name: str) -> Array:
-    array = np.array(given, dtype=float).reshape(size, size)
-    if not np.allclose(array, array.T, rtol=1e-9, atol=0.0):
-        raise ValueError(f"{name} must be symmetric")
-    array = 0.5 * (array + array.T)
-    moments = np.linalg.eigvalsh(array)
-    if moments[0] <= 0.0:
-        raise ValueError(f"{name} must be positive definite; its least eigenvalue is {moments[0]:g}")
-    return array
+def _numeric_weights(spec: Numeric) -> tuple[Array, Array]:
+    q, r = positive_definite(spec.q, 6, "q"), positive_definite(spec.r, 3, "r")
+    check_spreads(*(np.linalg.eigvalsh(part / np.abs(part).max()) for part in (q[:3, :3], q[3:, 3:], r)))
+    return q, r
 
 
 def examples() -> list[Gains]:
