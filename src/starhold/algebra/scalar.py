@@ -1,11 +1,11 @@
 """Scalar operations that every reader of an equation understands, and `equation` itself.
 
 An equation is a plain function over numbers and tuples of numbers. Python floats, Numba (one lane or many),
-SymPy symbols and balls (python-flint `arb`) all read the same text, so it may use only `+ - * /`, other equations and
-the operations of this module: no `math`, no `if` on a number, no NumPy array.
+SymPy symbols, balls (python-flint `arb`) and exact polynomials all read the same text, so it may use only `+ - * /`,
+other equations and the operations of this module: no `math`, no `if` on a number, no NumPy array.
 
-A comparison yields a `Truth` (a bool, a SymPy relation, or for balls True, False or None when undecided); only `where`,
-`both`, `either` and `opposite` consume it.
+A comparison yields a `Truth` (a bool, a SymPy relation, a condition on a polynomial, or for balls True, False or None when
+undecided); only `where`, `both`, `either` and `opposite` consume it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,11 @@ Truth: TypeAlias = Any
 STRICT: dict[str, Any] = {"forceinline": True, "error_model": "numpy"}
 """Compiler options of an equation: inlined into kernels, IEEE arithmetic, division by zero gives inf as in C."""
 
-_READERS = {"sympy": "starhold.algebra.symbolic", "flint": "starhold.algebra.balls"}
+_READERS = {
+    "sympy": "starhold.algebra.symbolic",
+    "flint": "starhold.algebra.balls",
+    "starhold": "starhold.algebra.polynomial",
+}
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -99,8 +103,8 @@ def opposite(a: Truth) -> Truth:
 
 
 def _truth_reader(*truths: Any) -> ModuleType:
-    symbolic = any(type(t).__module__.startswith("sympy") for t in truths)
-    return import_module(_READERS["sympy" if symbolic else "flint"])
+    roots = {type(t).__module__.partition(".")[0] for t in truths}
+    return import_module(_READERS[next((root for root in ("sympy", "starhold") if root in roots), "flint")])
 
 
 # The compiled meanings. Each returns a lambda because Numba asks an overload for the function to compile.

@@ -13,6 +13,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from starhold.cli import certifying
+from starhold.cli.arguments import (
+    DIVERGED,
+    FAILED_CHECK,
+    INTERNAL_ERROR,
+    INTERRUPTED,
+    USER_ERROR,
+    Force,
+    Output,
+    ScenarioFile,
+)
 from starhold.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,11 +38,6 @@ app = typer.Typer(
 )
 
 DEFAULT = "three-laws"
-USER_ERROR, DIVERGED, FAILED_CHECK, INTERRUPTED, INTERNAL_ERROR = 2, 1, 1, 130, 70
-
-ScenarioFile = Annotated[str, typer.Argument(metavar="FILE", help="a scenario file or the name of a built-in scenario")]
-Output = Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="folder for results, created")]
-Force = Annotated[bool, typer.Option("--force", help="replace results that are already there")]
 
 
 @app.command()
@@ -90,18 +96,21 @@ def _fly(file: str, law: str | None, output: Path | None, force: bool, nested: b
 
 
 @app.command()
-def design(file: ScenarioFile) -> None:
+def design(
+    file: ScenarioFile,
+    law: Annotated[str | None, typer.Option(help="which law of the file; every one that has a form if not given")] = None,
+) -> None:
     """Print the gains that formulas give: every law of a file that has a `form`."""
     from starhold.cli.show import print_design
+    from starhold.scenario import designing
     from starhold.scenario.reading import load
 
-    scenario = load(file)
-    designed = [entry for entry in scenario.laws if entry.form is not None]
-    if not designed:
-        allowed = 'at least one [[law]] with a form, such as type = "lqr", form = "II"'
-        raise InputError(scenario.where, "law", "no form", allowed)
-    for entry in designed:
-        print_design(entry, scenario.craft)
+    for found in designing.design(load(file), law):
+        print_design(found)
+
+
+app.command()(certifying.certify)
+app.command()(certifying.check)
 
 
 @app.command()

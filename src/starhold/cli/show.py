@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from starhold.laws.catalogue import Law
-    from starhold.models.craft import Craft
     from starhold.report.flight import Flight
+    from starhold.scenario.designing import Design
     from starhold.scenario.reading import LawEntry
 
 WIDE = 132
@@ -56,6 +56,11 @@ def print_outcome(flights: Sequence[Flight], page: Path) -> None:
         if flight.metrics.get("solver_budget_hits"):
             hits, calls = flight.metrics["solver_budget_hits"], flight.metrics["solver_calls"]
             console.print(f"{flight.name}: the solver used up its budget in {hits} of {calls} calls", style="yellow")
+    certificates = [flight.certificate for flight in flights if flight.certificate is not None]
+    if certificates:
+        from starhold.cli.show_certificates import print_proved
+
+        print_proved(certificates)
     console.print(f"Report: {page}", soft_wrap=True)
 
 
@@ -92,26 +97,30 @@ def _cell(text: str, best: bool) -> str:
     return f"[bold green]{text}*[/bold green]" if best else text
 
 
-def print_design(entry: LawEntry, craft: Craft) -> None:
+def print_design(design: Design) -> None:
     """The inputs of a design, its gains, and what it can be judged by."""
     import numpy as np
 
+    from starhold.laws.catalogue import catalogue
     from starhold.report.flight import number_text
 
-    console.print(f'[bold]{entry.name}[/bold]: {entry.law.card.title}, form "{entry.form}"', highlight=False)
+    law = catalogue()[design.law]
+    console.print(f'[bold]{design.name}[/bold]: {law.card.title}, form "{design.form}"', highlight=False)
     for title, items, values in (
-        ("from", entry.law.fields(entry.form), entry.spec),
-        ("gains", entry.law.fields(), entry.gains),
+        ("from", law.fields(design.form), design.inputs),
+        ("gains", law.fields(), design.gains),
     ):
         table = Table(show_edge=False, pad_edge=False)
         for head in (title, "value", "unit", "meaning"):
             table.add_column(head, overflow="fold")
-        for item, value in zip(items, values, strict=True):
-            shown = item.gain.choices[value] if item.gain.choices else number_text(value)
-            table.add_row(item.name, shown, item.gain.unit, item.gain.text)
+        for item in items:
+            value = values[item.name]
+            table.add_row(item.name, value if isinstance(value, str) else number_text(value), item.gain.unit, item.gain.text)
         console.print(table)
-    for name, value in entry.law.explain(craft, entry.spec):
-        shown = f"{value:.3g}" if isinstance(value, float) else np.array2string(value, precision=6, suppress_small=True)
+    # Digits, not decimals: entries of P may be far apart in size.
+    digits: Any = {"float_kind": lambda number: f"{number:12.6g}", "complex_kind": lambda number: f"{number:.6g}"}
+    for name, value in design.figures.items():
+        shown = f"{value:.3g}" if isinstance(value, float) else np.array2string(value, max_line_width=WIDE, formatter=digits)
         console.print(f"{name}: " + ("\n" if "\n" in shown else "") + shown, highlight=False, markup=False)
     console.print()
 

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, NamedTuple
 
 from starhold.algebra.quaternion import vector_part
-from starhold.algebra.scalar import Scalar, equation
-from starhold.algebra.vector import Vector, add, apply, dot, scale
+from starhold.algebra.scalar import Scalar, equation, less, where
+from starhold.algebra.vector import Vector, add, apply, clip_axes, dot, scale, subtract
 from starhold.laws.interface import Card, Gain, NoMemory, Seen, tracking_torque
 from starhold.models.craft import Craft
 
 CARD = Card(
     title="Quaternion PD",
-    summary="u = -k_rate w - k_attitude q: the classical law, needs no model of the spacecraft at rest",
+    summary="u = -k_rate w - k_attitude q: the classical law, without a model at rest; may clip its damping",
     sources=(
         "Quaternion feedback regulator for spacecraft eigenaxis rotations (1989)",
         "published study of inertial stabilisation by closed-form linear-quadratic laws: the classical PD",
@@ -27,22 +28,39 @@ class Gains(NamedTuple):
 
     k_rate: Annotated[float, Gain("N m s", above=0.0, text="damping")]
     k_attitude: Annotated[float, Gain("N m", above=0.0, text="stiffness against the quaternion's vector part")]
+    limit: Annotated[int, Gain(choices=("none", "axis"), text="axis: damping clipped to what k_attitude leaves")] = 0
+
+
+def remember(gains: Gains, craft: Craft, period: float) -> NoMemory:
+    """Nothing; ValueError where stiffness leaves no torque for the damping."""
+    if gains.limit and not gains.k_attitude < craft.torque_limit < math.inf:
+        shown = f"the torque limit of {craft.torque_limit:g} N m"
+        raise ValueError(f'limit = "axis" needs k_attitude below {shown}, not {gains.k_attitude:g} N m')
+    return NoMemory()
 
 
 @equation
 def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Control torque (N m, body)."""
-    feedback = add(scale(-gains.k_rate, seen.rate), scale(-gains.k_attitude, vector_part(seen.attitude)))
-    return add(feedback, tracking_torque(seen, craft)), memory
+    damping = scale(gains.k_rate, seen.rate)
+    within = clip_axes(damping, craft.torque_limit - gains.k_attitude)
+    clipped = less(0.5, gains.limit)
+    damping = (
+        where(clipped, within[0], damping[0]),
+        where(clipped, within[1], damping[1]),
+        where(clipped, within[2], damping[2]),
+    )
+    feedback = add(damping, scale(gains.k_attitude, vector_part(seen.attitude)))
+    return subtract(tracking_torque(seen, craft), feedback), memory
 
 
 @equation
 def lyapunov(seen: Seen, gains: Gains, craft: Craft) -> Scalar:
-    """V = w.Jw/2 + 2 k_attitude (1 - q0) (J); V' = -k_rate |w|2."""
+    """V = w.Jw/2 + 2 k_attitude (1 - q0) (J); V' = -w.damping."""
     energy = 0.5 * dot(seen.rate, apply(craft.inertia, seen.rate))
     return energy + 2.0 * gains.k_attitude * (1.0 - seen.attitude[0])
 
 
 def examples() -> list[Gains]:
     """Gains for a body of a few kg m2."""
-    return [Gains(0.09, 0.009), Gains(0.5, 0.05)]
+    return [Gains(0.09, 0.009), Gains(0.5, 0.05), Gains(0.09, 0.009, 1)]

@@ -10,8 +10,11 @@ import numpy as np
 
 from starhold.analysis.cost import call_costs
 from starhold.analysis.metrics import measure
+from starhold.certification.certificate import FILE
+from starhold.certification.certificate import write as write_certificates
 from starhold.laws.interface import Field
 from starhold.loop.closed_loop import ClosedLoop
+from starhold.report.certificates import certify_law
 from starhold.report.files import whole
 from starhold.report.flight import Flight, number_text
 from starhold.report.results import SUMMARY, write_summary
@@ -33,7 +36,7 @@ def fly_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, notice: Notic
     metrics |= call_costs(loop, samples)
     metrics |= _law_counters(carry.memory)
     gains = {item.name: _gain_text(item, value) for item, value in zip(entry.law.fields(), entry.gains, strict=True)}
-    return Flight(entry.name, entry.law.name, recording, metrics, gains)
+    return Flight(entry.name, entry.law.name, recording, metrics, gains, certify_law(scenario, entry, loop))
 
 
 def compare(scenario: Scenario, notice: Notice | None = None) -> list[Flight]:
@@ -42,11 +45,14 @@ def compare(scenario: Scenario, notice: Notice | None = None) -> list[Flight]:
 
 
 def write(scenario: Scenario, flights: Sequence[Flight], folder: Path) -> Path:
-    """Summary and page into an existing folder; returns the page's path. The runs are written as they are flown, by
-    `write_run`, and the pictures by a `Painter`."""
+    """Summary, certificates and page into an existing folder; returns the page's path. The runs are written as they are
+    flown, by `write_run`, and the pictures by a `Painter`."""
     from starhold.report.page import write_page
 
     write_summary(scenario, {flight.name: flight.metrics for flight in flights}, folder / SUMMARY)
+    certificates = [flight.certificate for flight in flights if flight.certificate is not None]
+    with whole(folder / FILE) as hidden:
+        write_certificates(certificates, scenario.name, hidden)
     page = folder / "report.html"
     with whole(page) as hidden:
         write_page(hidden, scenario, flights)

@@ -11,6 +11,7 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
+    from starhold.certification.certificate import Certificate
     from starhold.simulation.lane import Recording
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8A8A8A")
@@ -20,13 +21,15 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8
 @dataclass(frozen=True)
 class Flight:
     """One law's run of a scenario: the name the scenario gives the law, the law's type, what was recorded,
-    its metrics as `measure` gives them, and its gains, field name to text with unit."""
+    its metrics as `measure` gives them, its gains, field name to text with unit, and its certificate."""
 
     name: str
     law: str
     recording: Recording
     metrics: dict[str, Any]
     gains: dict[str, str]
+    certificate: Certificate | None = None
+    """What is proved of the law on this spacecraft."""
 
     @cached_property
     def run(self) -> xr.Dataset:

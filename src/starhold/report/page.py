@@ -16,6 +16,8 @@ from starhold.analysis.metrics import DECADES, MEASURES
 from starhold.analysis.ranking import ORDER, ranked, shown, winners
 from starhold.report.flight import Flight, colour, number_text
 from starhold.report.plots import ACCURACIES, Panel, Plot, collect, steps_within
+from starhold.report.proved import section as proved
+from starhold.report.proved import swatch
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -49,6 +51,7 @@ def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
         f'<p class="lead">{escape(scenario.table.description)}</p>' if scenario.table.description else "",
         _lost(flights),
         _ranking(flights),
+        proved(flights),
         "<h2>The turning body</h2>",
         _views(flights, data["scene"]),
         "<h2>Over time</h2>",
@@ -88,10 +91,6 @@ def _asset(name: str) -> str:
 # --- text -------------------------------------------------------------------------------------------------------------
 
 
-def _swatch(number: int) -> str:
-    return f'<span class="swatch" style="background:{colour(number)}"></span>'
-
-
 def _lost(flights: Sequence[Flight]) -> str:
     lost = [f"{flight.name} (at {flight.lost:.6g} s)" for flight in flights if flight.lost is not None]
     if not lost:
@@ -120,7 +119,7 @@ def _ranking(flights: Sequence[Flight]) -> str:
         fate = f"diverged at {flight.lost:.6g} s" if lost else flight.law if flight.law != name else ""
         rows.append(
             f"{LOST if lost else '<tr>'}<td>{place}</td>"
-            f'<th scope="row" style="text-align:left">{_swatch(numbers[name])}{escape(name)}'
+            f'<th scope="row" style="text-align:left">{swatch(numbers[name])}{escape(name)}'
             f"{f'<small>{escape(fate)}</small>' if fate else ''}</th>{cells}</tr>"
         )
     order = ", then ".join(MEASURES[metric].heading for metric in ORDER)
@@ -135,7 +134,7 @@ def _ranking(flights: Sequence[Flight]) -> str:
 
 def _views(flights: Sequence[Flight], scene: Mapping[str, Any]) -> str:
     views = "".join(
-        f'<div class="view"><div><span>{_swatch(number)}{escape(flight.name)}</span><output></output></div>'
+        f'<div class="view"><div><span>{swatch(number)}{escape(flight.name)}</span><output></output></div>'
         f'<canvas role="img" aria-label="Attitude under {escape(flight.name)}"></canvas></div>'
         for number, flight in enumerate(flights)
     )
@@ -157,7 +156,7 @@ def _plot(plot: Mapping[str, Any]) -> str:
 
 def _laws(flights: Sequence[Flight]) -> str:
     rows = "".join(
-        f'<tr><th scope="row">{_swatch(number)}{escape(flight.name)}</th><td>{escape(flight.law)}</td>'
+        f'<tr><th scope="row">{swatch(number)}{escape(flight.name)}</th><td>{escape(flight.law)}</td>'
         f"<td>{', '.join(f'{escape(key)} = {escape(text)}' for key, text in flight.gains.items()) or '—'}</td></tr>"
         for number, flight in enumerate(flights)
     )

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import starhold
+from starhold.certification.certificate import FILE as CERTIFICATES
 from starhold.errors import InputError
 from starhold.report.files import whole
 from starhold.scenario.reading import Scenario
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 SUMMARY = "summary.json"
-MARKS = (SUMMARY, "run.nc", "report.html")
+MARKS = (SUMMARY, "run.nc", "report.html", CERTIFICATES)
 """A folder with one of these holds results."""
 
 

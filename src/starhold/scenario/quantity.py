@@ -18,6 +18,13 @@ def quantity(gain: Gain) -> tuple[BeforeValidator, WithJsonSchema]:
     return BeforeValidator(reader(gain)), WithJsonSchema(_schema(gain))
 
 
+def quantity_or(word: str, meaning: float, gain: Gain) -> tuple[BeforeValidator, WithJsonSchema]:
+    """The same for a quantity in whose place a word may stand."""
+    read, schema = reader(gain), _schema(gain)
+    described = {"anyOf": [{"const": word}, *schema["anyOf"]], "description": schema["description"]}
+    return BeforeValidator(lambda value: meaning if value == word else read(value)), WithJsonSchema(described)
+
+
 def reader(gain: Gain) -> Callable[[Any], Any]:
     """A function from what the file holds to SI numbers of the declared shape and bounds."""
 

@@ -12,7 +12,7 @@ from pydantic_core import PydanticCustomError
 from starhold.laws.catalogue import Law, catalogue
 from starhold.laws.interface import Gain
 from starhold.models.craft import EARTH, check_inertia
-from starhold.scenario.quantity import quantity, reader
+from starhold.scenario.quantity import quantity, quantity_or, reader
 
 QUATERNION = Gain("1", shape=(4,), spread=False, text="quaternion, scalar first, normalised on reading")
 ANGLES = Gain("rad", shape=(3,), spread=False, text="Euler-Krylov angles yaw, pitch, roll")
@@ -169,6 +169,22 @@ class Tolerances(Table):
     rate_tolerance: Annotated[float, *quantity(Gain("rad/s", above=0.0, text="rate relative to the target"))] = 1e-3
 
 
+class CertifyTable(Table):
+    """What certificates are to claim; whatever is left out, the most that can be proved."""
+
+    rate: Annotated[
+        float | None,
+        *quantity_or("any", math.inf, Gain("rad/s", above=0.0, text="convergence from every attitude at up to this rate")),
+    ] = None
+    turn: Annotated[
+        float | None, *quantity(Gain("rad", above=0.0, at_most=math.pi, text="turns from rest within the torque limit"))
+    ] = None
+    inertia_tolerance: Annotated[
+        float | None, *quantity(Gain("1", above=0.0, at_most=1.0, text="error of J_ij as a share of sqrt(J_ii J_jj)"))
+    ] = None
+    disturbance: Annotated[float, *quantity(Gain("N m", at_least=0.0, text="norm of a torque nobody models"))] = 0.0
+
+
 class LawTable(Table):
     """What every law table may say beside the law's own gains."""
 
@@ -193,6 +209,7 @@ class ScenarioTable(Table):
     sensor: Sensor = Sensor()
     simulation: Simulation
     settling: Tolerances = Tolerances()
+    certify: CertifyTable = CertifyTable()
 
     @model_validator(mode="after")
     def _has_orbit(self) -> ScenarioTable:

@@ -1,0 +1,277 @@
+"""How exact polynomials read the equations: coefficients are rationals (or balls), floats are taken at their exact value.
+
+A comparison that depends on a variable splits the result into cases, so that an equation with `clip` or `sign` reads as a
+piecewise polynomial. Nothing is rounded: what two readings have in common holds for all values of the variables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, TypeAlias
+
+from flint import arb, fmpq
+
+Coefficient: TypeAlias = Any
+"""A rational (`fmpq`), or a ball (`arb`) where a coefficient is known to lie in it."""
+Monomial: TypeAlias = tuple[str, ...]
+"""Variables in alphabetic order, one repeated as often as its power says; () is the constant."""
+
+
+def exact(number: Any) -> Coefficient:
+    """A number as a rational of the same value; balls stay. ValueError for what is not finite."""
+    if isinstance(number, (fmpq, arb)):
+        return number
+    try:
+        return fmpq(*Fraction(number).as_integer_ratio())
+    except (OverflowError, ValueError):
+        raise ValueError(f"{number} has no exact value") from None
+
+
+def constants(value: Any) -> Any:
+    """A number, tuple or NamedTuple with every number in it made a constant polynomial."""
+    if isinstance(value, tuple):
+        parts: list[Any] = [constants(part) for part in value]  # pyright: ignore[reportUnknownVariableType]
+        return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)  # pyright: ignore
+    return value if isinstance(value, Polynomial) else Polynomial.constant(value)
+
+
+class Polynomial:
+    """A polynomial; `terms` maps monomials to coefficients, none of them an exact zero."""
+
+    __slots__ = ("terms",)
+
+    def __init__(self, terms: Mapping[Monomial, Coefficient]) -> None:
+        self.terms = {m: c for m, c in terms.items() if not (isinstance(c, fmpq) and c == 0)}
+
+    @classmethod
+    def constant(cls, value: Any) -> Polynomial:
+        """The polynomial without variables."""
+        return cls({(): exact(value)})
+
+    @classmethod
+    def variable(cls, name: str) -> Polynomial:
+        """The polynomial `name`."""
+        return cls({(name,): fmpq(1)})
+
+    @property
+    def value(self) -> Coefficient | None:
+        """The coefficient of a polynomial without variables, else None."""
+        if not self.terms:
+            return fmpq(0)
+        return self.terms.get(()) if len(self.terms) == 1 else None
+
+    def variables(self) -> set[str]:
+        """The names it depends on."""
+        return {name for monomial in self.terms for name in monomial}
+
+    def slope(self, name: str) -> Polynomial:
+        """The partial derivative."""
+        found: dict[Monomial, Coefficient] = {}
+        for monomial, c in self.terms.items():
+            power = monomial.count(name)
+            if power:
+                place = monomial.index(name)
+                found[monomial[:place] + monomial[place + 1 :]] = c * power
+        return Polynomial(found)
+
+    def at(self, values: Mapping[str, Any]) -> Coefficient:
+        """Its value where every variable has one."""
+        total: Coefficient = fmpq(0)
+        for monomial, c in self.terms.items():
+            for name in monomial:
+                c = c * values[name]
+            total = total + c
+        return total
+
+    def given(self, values: Mapping[str, Any]) -> Polynomial:
+        """The polynomial of the other variables where these have values."""
+        found = Polynomial({})
+        for monomial, c in self.terms.items():
+            for name in monomial:
+                c = c * values[name] if name in values else c
+            found = found + Polynomial({tuple(name for name in monomial if name not in values): c})
+        return found
+
+    def only(self, keep: Callable[[Monomial], bool]) -> Polynomial:
+        """The terms whose monomials are kept."""
+        return Polynomial({m: c for m, c in self.terms.items() if keep(m)})
+
+    def __add__(self, other: Any) -> Any:
+        if isinstance(other, Cases):
+            return NotImplemented
+        found = dict(self.terms)
+        for monomial, c in _polynomial(other).terms.items():
+            found[monomial] = found[monomial] + c if monomial in found else c
+        return Polynomial(found)
+
+    __radd__ = __add__
+
+    def __neg__(self) -> Polynomial:
+        return Polynomial({m: -c for m, c in self.terms.items()})
+
+    def __sub__(self, other: Any) -> Any:
+        return self + (-other)
+
+    def __rsub__(self, other: Any) -> Any:
+        return (-self) + other
+
+    def __mul__(self, other: Any) -> Any:
+        if isinstance(other, Cases):
+            return NotImplemented
+        found: dict[Monomial, Coefficient] = {}
+        for n, d in _polynomial(other).terms.items():
+            for m, c in self.terms.items():
+                both = tuple(sorted(m + n)) if m and n else m or n
+                found[both] = found[both] + c * d if both in found else c * d
+        return Polynomial(found)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Polynomial:
+        value = _polynomial(other).value
+        if value is None:
+            raise TypeError("a polynomial is divided by constants only")
+        return Polynomial({m: c / value for m, c in self.terms.items()})
+
+    def __rtruediv__(self, other: Any) -> Polynomial:
+        return _polynomial(other) / self
+
+    def __repr__(self) -> str:
+        return " + ".join(f"({c}) {' '.join(m)}".strip() for m, c in sorted(self.terms.items())) or "0"
+
+
+@dataclass(frozen=True)
+class Condition:
+    """`positive` > 0; as a comparison reads it, a < b is b - a > 0."""
+
+    positive: Polynomial
+
+    def key(self) -> tuple[Any, ...]:
+        """Equal for equal polynomials."""
+        return tuple(sorted((m, str(c)) for m, c in self.positive.terms.items()))
+
+
+@dataclass(frozen=True)
+class Case:
+    """One piece of a piecewise polynomial: the conditions that hold there or not, and its polynomial."""
+
+    truths: tuple[tuple[Condition, bool], ...]
+    value: Polynomial
+
+
+class Cases:
+    """A piecewise polynomial: cases that exclude one another and leave nothing out."""
+
+    __slots__ = ("pieces",)
+
+    def __init__(self, pieces: Iterable[Case]) -> None:
+        self.pieces = tuple(pieces)
+
+    def _with(self, other: Any, operation: Callable[[Polynomial, Polynomial], Polynomial]) -> Cases:
+        return Cases(
+            Case(truths, operation(mine.value, yours.value))
+            for mine in self.pieces
+            for yours in pieces(other)
+            if (truths := _merged(mine.truths, yours.truths)) is not None
+        )
+
+    def __add__(self, other: Any) -> Cases:
+        return self._with(other, lambda a, b: a + b)
+
+    __radd__ = __add__
+
+    def __neg__(self) -> Cases:
+        return Cases(Case(piece.truths, -piece.value) for piece in self.pieces)
+
+    def __sub__(self, other: Any) -> Cases:
+        return self._with(other, lambda a, b: a - b)
+
+    def __rsub__(self, other: Any) -> Cases:
+        return (-self) + other
+
+    def __mul__(self, other: Any) -> Cases:
+        return self._with(other, lambda a, b: a * b)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Cases:
+        return self._with(other, lambda a, b: a / b)
+
+
+def pieces(value: Any) -> tuple[Case, ...]:
+    """The cases of a piecewise polynomial; of a polynomial or a number the only one."""
+    return value.pieces if isinstance(value, Cases) else (Case((), _polynomial(value)),)
+
+
+def jointly(values: Iterable[Any]) -> list[tuple[tuple[tuple[Condition, bool], ...], list[Polynomial]]]:
+    """The cases of several piecewise polynomials at once: conditions and one polynomial for each value."""
+    found: list[tuple[tuple[tuple[Condition, bool], ...], list[Polynomial]]] = [((), [])]
+    for value in values:
+        found = [
+            (truths, [*before, piece.value])
+            for held, before in found
+            for piece in pieces(value)
+            if (truths := _merged(held, piece.truths)) is not None
+        ]
+    return found
+
+
+def _polynomial(value: Any) -> Polynomial:
+    return value if isinstance(value, Polynomial) else Polynomial.constant(value)
+
+
+def _merged(
+    a: tuple[tuple[Condition, bool], ...], b: tuple[tuple[Condition, bool], ...]
+) -> tuple[tuple[Condition, bool], ...] | None:
+    """Both sets of conditions, None where they contradict one another."""
+    held = {condition.key(): (condition, truth) for condition, truth in a}
+    for condition, truth in b:
+        if held.setdefault(condition.key(), (condition, truth))[1] != truth:
+            return None
+    positive = [condition.positive for condition, truth in held.values() if truth]
+    for place, one in enumerate(positive):
+        for other in positive[place + 1 :]:
+            total = (one + other).value
+            # Two quantities whose sum is not positive cannot both be.
+            if total is not None and total <= 0:
+                return None
+    return tuple(held.values())
+
+
+# --- what `algebra.scalar` asks of a reader ----------------------------------------------------------------------------
+
+
+def sqrt(x: Any) -> Any:
+    raise TypeError("a polynomial has no square root")
+
+
+def less(a: Any, b: Any) -> bool | Condition:
+    if isinstance(a, Cases) or isinstance(b, Cases):
+        raise TypeError("a piecewise polynomial cannot be compared")
+    difference = _polynomial(b) - a
+    value = difference.value
+    if isinstance(value, arb) and not (value > 0 or value <= 0):
+        raise ValueError(f"undecided: whether {value} is positive")
+    return Condition(difference) if value is None else bool(value > 0)
+
+
+def where(condition: Any, a: Any, b: Any) -> Any:
+    chosen = [(case, True) for case in pieces(a)] + [(case, False) for case in pieces(b)]
+    return Cases(
+        Case(truths, case.value)
+        for case, truth in chosen
+        if (truths := _merged(((condition, truth),), case.truths)) is not None
+    )
+
+
+def both(a: Any, b: Any) -> Any:
+    raise TypeError("conditions on polynomials are not joined")
+
+
+either = both
+
+
+def opposite(a: Any) -> Any:
+    raise TypeError("conditions on polynomials are not turned round")

@@ -1,0 +1,100 @@
+"""What a certificate holds: the loop it speaks of, claims as numbers, and for each claim what had to be shown and how.
+
+Sentences are made from the numbers when they are shown (`wording`), so that nothing in the file can say more than what
+the independent checker verifies.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Literal
+
+import starhold
+
+FORMAT = "starhold certificate 1"
+FILE = "certificate.json"
+Outcome = Literal["proved", "refuted", "undecided"]
+EXACT, BALLS, LASALLE = "exact identity", "ball arithmetic", "LaSalle"
+EXACT_SIGN = "exact inequality"
+
+
+@dataclass(frozen=True)
+class Obligation:
+    """One thing that had to be shown. `how`: by exact identity or inequality in rationals, by ball arithmetic, or by a
+    LaSalle argument; `evidence`: where it is refuted, the state (or inertia, or eigenvalue) that refutes it, else why it
+    is undecided."""
+
+    name: str
+    how: str
+    outcome: Outcome
+    evidence: dict[str, Any] = field(default_factory=dict[str, Any])
+
+
+@dataclass(frozen=True)
+class Claim:
+    """`kind` says what is claimed, `numbers` how much, in SI units; None among them means without bound. `witness`:
+    numbers that make the proof, and that a checker needs."""
+
+    kind: str
+    numbers: dict[str, Any]
+    witness: dict[str, Any]
+    assumptions: tuple[str, ...]
+    obligations: tuple[Obligation, ...]
+
+    @property
+    def outcome(self) -> Outcome:
+        """Refuted if an obligation is, else undecided if one is."""
+        found = {obligation.outcome for obligation in self.obligations}
+        if "refuted" in found:
+            return "refuted"
+        return "proved" if found == {"proved"} else "undecided"
+
+    def refutation(self) -> Obligation | None:
+        """The first obligation that is refuted."""
+        return next((o for o in self.obligations if o.outcome == "refuted"), None)
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Claims about one closed loop; `subject` holds all that the claims speak of, as plain numbers and names."""
+
+    name: str
+    subject: dict[str, Any]
+    claims: tuple[Claim, ...]
+
+    @property
+    def outcome(self) -> Outcome:
+        """Refuted if a claim is, undecided if one is or none is made."""
+        found = {claim.outcome for claim in self.claims}
+        if "refuted" in found:
+            return "refuted"
+        return "proved" if found == {"proved"} else "undecided"
+
+    def claim(self, kind: str) -> Claim | None:
+        """The claim of a kind, where one is made."""
+        return next((claim for claim in self.claims if claim.kind == kind), None)
+
+
+def write(certificates: Sequence[Certificate], scenario: str, path: Path) -> None:
+    """The certificates of a scenario's laws as one JSON file; every number reads back as the same float."""
+    versions = {"starhold": starhold.__version__, "python": platform.python_version()}
+    versions |= {name: metadata.version(name) for name in ("python-flint", "numpy", "scipy")}
+    content = {
+        "format": FORMAT,
+        "scenario": scenario,
+        "versions": versions,
+        "certificates": [_plain(c) for c in certificates],
+    }
+    path.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _plain(certificate: Certificate) -> dict[str, Any]:
+    claims: list[dict[str, Any]] = []
+    for claim in certificate.claims:
+        claims.append({"kind": claim.kind, "outcome": claim.outcome, **asdict(claim)})
+    return {"name": certificate.name, "outcome": certificate.outcome, "subject": certificate.subject, "claims": claims}

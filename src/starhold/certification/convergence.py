@@ -1,0 +1,287 @@
+"""The claim that every motion from {V <= start} comes to rest on target, and which part the double cover plays in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from flint import fmpq, fmpq_mat
+
+from starhold.algebra.polynomial import Polynomial, exact, pieces
+from starhold.certification.certificate import EXACT, EXACT_SIGN, LASALLE, Claim, Obligation
+from starhold.certification.frame import Cross, Frame, contents, decrease, margin, take_apart, take_cross
+from starhold.certification.matrices import (
+    Rows,
+    characteristic_roots,
+    definite,
+    floats,
+    identity,
+    inverse,
+    least,
+    number,
+    product,
+    scaled,
+    symmetric,
+)
+from starhold.certification.motion import AXES, RATE, Motion, ShapeError, at_rest, cases
+from starhold.certification.refutation import rising_state, state_evidence, unlike_positive
+from starhold.certification.subject import Subject, below
+
+ASSUMPTIONS = (
+    "rigid body",
+    "inertia exactly as given",
+    "exact measurement and ideal actuators",
+    "torque applied continuously",
+    "torque not limited",
+    "no torque from outside but what the law cancels",
+)
+ALMOST = fmpq(2**20 - 1, 2**20)
+"""How much of a bound that must not be reached is used."""
+
+
+@dataclass(frozen=True)
+class Basin:
+    """{V <= start} stays in {V <= stay} (None: everything), where rates are below `bound`, and converges; what later claims
+    build on."""
+
+    motion: Motion
+    frame: Frame
+    cross: Cross | None
+    epsilon: Any
+    rho: Any
+    bound: Any | None
+    stay: Any | None
+
+    @property
+    def start(self) -> Any | None:
+        """The level from which motions stay below `stay`."""
+        return self.start_of(self.stay)
+
+    def start_of(self, stay: Any | None) -> Any | None:
+        """The level, exactly a float, from which motions stay below another one."""
+        return None if stay is None else exact(below(stay * (1 - self.rho) / (1 + self.rho)))
+
+
+def converge(subject: Subject, rate: Any = "best") -> tuple[Claim, Basin | None]:
+    """The strongest claim, by the law's own V or by the kinetic energy in its place; see `convergence`."""
+    own, basin = convergence(Motion(subject), rate)
+    if own.outcome == "proved" and own.numbers["everything"]:
+        return own, basin
+    for stiffness in stiffnesses(Motion(subject)):
+        other, found = convergence(Motion(subject, stiffness), rate)
+        if other.outcome == "proved" and (own.outcome != "proved" or other.numbers["everything"]):
+            return other, found
+    return own, basin
+
+
+def stiffnesses(motion: Motion) -> list[Any]:
+    """Stiffnesses for which the attitude's part of V' nearly cancels: between the law's smallest and its largest."""
+    try:
+        K = symmetric(motion.linear()[1])
+    except ShapeError:
+        return []
+    values = np.linalg.eigvalsh(floats(K))
+    if values[0] <= 0.0:
+        return []
+    if values[-1] <= values[0] * (1.0 + 1e-9):
+        return [exact(number(K[0][0]))]
+    between: list[float] = np.geomspace(values[0], values[-1], 7)[[3, 4, 2, 5, 1, 6, 0]].tolist()
+    return [exact(float(f"{k:.4g}")) for k in between]
+
+
+def convergence(motion: Motion, rate: Any = "best") -> tuple[Claim, Basin | None]:
+    """The claim by one V, with the largest level or, with `rate`, for every attitude and rates up to it (None: any)."""
+    found = Obligations()
+    numbers: dict[str, Any] = {} if rate == "best" else {"rate_everywhere": rate, "everything": rate is None}
+    witness: dict[str, Any] = {}
+
+    def finish(basin: Basin | None = None) -> tuple[Claim, Basin | None]:
+        return Claim("convergence", numbers, witness, ASSUMPTIONS, tuple(found)), basin
+
+    try:
+        frame = take_apart(motion)
+    except ShapeError as reason:
+        found.add("form", EXACT, None, {"reason": str(reason)})
+        return finish()
+    found.add("form", EXACT, True)
+    positive = definite(frame.P) and frame.s > 0
+    found.add("positive", EXACT_SIGN, positive, {} if positive else unlike_positive(motion, frame))
+    if not positive:
+        return finish()
+    slopes = cases(motion.along(motion.lyapunov or Polynomial.constant(0)))
+
+    def rising(limit: Any | None, reason: str) -> None:
+        evidence = rising_state(motion, slopes[0][1], limit)
+        found.add("descent", EXACT_SIGN, False if evidence else None, evidence or {"reason": reason})
+
+    if not (definite(symmetric(frame.D)) if frame.whole else all(_falls(*piece) for piece in slopes)):
+        rising(None, "V' may be positive")
+        return finish()
+    cross, epsilon, rho, bound = None, fmpq(0), fmpq(0), None
+    if frame.exact:
+        if frame.K.terms:
+            bound = exact(below(least(symmetric(frame.D)) * ALMOST / frame.cubic))
+    else:
+        strict = _strict(motion, frame)
+        if strict is None:
+            rising(None, "no weight of the cross term was found for which V falls")
+            return finish()
+        cross, epsilon, rho, bound = strict
+    level = _capped(None if bound is None else least(frame.P) * bound * bound / 2, motion, frame, rho)
+    level = None if level is None else exact(below(level))
+    basin = Basin(motion, frame, cross, epsilon, rho, bound, level)
+    start = basin.start
+    reached_set = {"level": None if level is None else number(level), "start": None if start is None else number(start)}
+    reached_set |= contents(start, frame.P, frame.s)
+    if rate != "best" and not _covers(reached_set, rate):
+        rising(None if rate is None else exact(rate), "not shown up to this rate")
+        return finish()
+    numbers |= reached_set
+    obligations, proof = reached(basin, level)
+    found.extend(obligations[2:])
+    witness |= proof
+    return finish(basin if found.proved else None)
+
+
+def reached(basin: Basin, level: Any | None) -> tuple[list[Obligation], dict[str, Any]]:
+    """The obligations of convergence from a level that the basin holds, and their witness."""
+    motion, found = basin.motion, Obligations()
+    for name, how in (("form", EXACT), ("positive", EXACT_SIGN), ("descent", EXACT_SIGN)):
+        found.add(name, how, True)
+    still = _autonomous(motion)
+    reason = {} if still else {"reason": "how the target moves does not drop out"}
+    found.add("target", EXACT, True if still else None, reason)
+    if basin.cross is None:
+        found.add("only rest", LASALLE, *_rests_only_there(motion))
+    else:
+        found.add("strict", EXACT_SIGN, True)
+    found.add(*_double_cover(motion, basin.frame, level))
+    witness = {
+        "stiffness": None if motion.stiffness is None else number(motion.stiffness),
+        "epsilon": number(basin.epsilon),
+        "rho": number(basin.rho),
+        "rate_bound": None if basin.bound is None else number(basin.bound),
+    }
+    return found, witness
+
+
+class Obligations(list[Obligation]):
+    """Obligations as they are met: True is proved, False refuted, None undecided."""
+
+    def add(self, name: str, how: str, holds: bool | None, evidence: dict[str, Any] | None = None) -> None:
+        outcome = "proved" if holds else "undecided" if holds is None else "refuted"
+        self.append(Obligation(name, how, outcome, evidence or {}))
+
+    @property
+    def proved(self) -> bool:
+        """Whether all are."""
+        return all(obligation.outcome == "proved" for obligation in self)
+
+
+def _falls(truths: Any, slope: Polynomial) -> bool:
+    """Whether a piece of V' that is a sum of polynomials of single rates is negative wherever its conditions hold and
+    the rate is not zero. Torques from outside are left aside."""
+    own = slope.only(lambda m: set(m) <= set(RATE))
+    if any(len(set(m)) != 1 or len(m) > 2 for m in own.terms) or any(
+        not (len(m) == 2 and m[0][0] in "em" and m[1] in RATE) for m in slope.terms if m not in own.terms
+    ):
+        return False
+    for name in RATE:
+        linear, quadratic = (own.terms.get((name,) * power, fmpq(0)) for power in (1, 2))
+        if quadratic > 0 or (quadratic == 0 and linear == 0):
+            return False
+        if linear != 0 and not _one_sided(truths, name, linear < 0):
+            return False
+    return True
+
+
+def _one_sided(truths: Any, name: str, positive: bool) -> bool:
+    """Whether the conditions keep a rate on one side of zero."""
+    for condition, truth in truths:
+        terms = condition.positive.terms
+        slope, offset = terms.get((name,), fmpq(0)), terms.get((), fmpq(0))
+        if truth and set(terms) <= {(), (name,)} and offset <= 0 and slope != 0 and (slope > 0) == positive:
+            return True
+    return False
+
+
+def _strict(motion: Motion, frame: Frame) -> tuple[Cross, Any, Any, Any | None] | None:
+    """Cross term, epsilon, rho and rate bound that make V + epsilon C fall strictly."""
+    try:
+        cross = take_cross(motion)
+    except ShapeError:
+        return None
+    most = np.linalg.norm(np.linalg.solve(np.linalg.cholesky(floats(frame.P)), floats(cross.J)), 2)
+    bound = exact(below(least(symmetric(frame.D)) / 2 / frame.cubic)) if frame.K.terms else None
+    for rho in (*(fmpq(1, 2**power) for power in range(20, 0, -1)), fmpq(3, 4), fmpq(9, 10)):
+        for share in (0.5, 0.99):
+            epsilon = exact(float(f"{share * number(rho) * number(frame.s) ** 0.5 / most:.6g}"))
+            if definite(margin(frame, cross, epsilon, rho)) and definite(decrease(frame, cross, epsilon, bound)):
+                return cross, epsilon, rho, bound
+    return None
+
+
+def _capped(stay: Any | None, motion: Motion, frame: Frame, rho: Any) -> Any | None:
+    """The level, no higher than the treatment of the double cover allows."""
+    loop = motion.subject.loop
+    if loop.cover == "shortest":
+        # At q0 = 0, where the feedback switches, V is at least s.
+        cap = frame.s * ALMOST
+    elif loop.cover == "hysteresis" and rho != 0:
+        cap = (1 + rho) * frame.s * exact(loop.hysteresis_width) / rho * ALMOST
+    else:
+        return stay
+    return cap if stay is None else min(stay, cap)
+
+
+def _covers(numbers: dict[str, Any], rate: Any) -> bool:
+    if numbers["everything"]:
+        return True
+    found = numbers["rate_everywhere"]
+    return rate is not None and found is not None and found >= rate
+
+
+def _double_cover(motion: Motion, frame: Frame, stay: Any | None) -> tuple[str, str, bool | None, dict[str, Any]]:
+    loop = motion.subject.loop
+    if stay is not None and stay < 2 * frame.s and loop.cover != "hysteresis":
+        # The other equilibrium has V = 2 s.
+        return "single rest in the set", EXACT_SIGN, True, {}
+    if loop.cover == "hysteresis":
+        return "jumps lower V", EXACT_SIGN, 0.0 < loop.hysteresis_width < 1.0, {}
+    return ("other rest repels", "certified roots", *_repels(motion))
+
+
+def _repels(motion: Motion) -> tuple[bool | None, dict[str, Any]]:
+    """Whether the linear loop around q0 = -1 has roots on the right of the imaginary axis and none on it."""
+    rate, attitude = motion.linear(-1)
+    turn = inverse(motion.subject.inertia)
+    zero, half = scaled(identity(3), 0), identity(3, fmpq(-1, 2))
+    upper = [[*a, *b] for a, b in zip(product(turn, rate), product(turn, attitude), strict=True)]
+    lower = [[*a, *b] for a, b in zip(half, zero, strict=True)]
+    roots = characteristic_roots([*scaled(upper, -1), *lower])
+    if any(root.real.contains(0) for root, _ in roots):
+        return None, {"reason": "a root on the imaginary axis is not excluded"}
+    return any(root.real > 0 for root, _ in roots), {}
+
+
+def _determinant(K: Rows) -> Any:
+    return fmpq_mat(3, 3, [x for row in K for x in row]).det()
+
+
+def _autonomous(motion: Motion) -> bool:
+    """Whether the error's motion does not depend on how the target moves."""
+    return not any(name[0] in "ra" for c in motion.acceleration for case in pieces(c) for name in case.value.variables())
+
+
+def _rests_only_there(motion: Motion) -> tuple[bool | None, dict[str, Any]]:
+    """Whether a body without rate stays so only where q = 0: there the acceleration must be -J^-1 K q with a regular K."""
+    K = motion.linear()[1]
+    for component in motion.acceleration:
+        own = at_rest(component)[1].only(lambda m: not any(name[0] in "wem" for name in m))
+        if any(len(m) != 1 or m[0] not in AXES for m in own.terms):
+            return None, {"reason": f"the acceleration at rest is {own}"}
+    if _determinant(K) != 0:
+        return True, {}
+    axis = np.linalg.svd(floats(K))[2][-1]
+    return False, state_evidence((0.0, *axis.tolist()), (0.0, 0.0, 0.0), "torque at rest", 0.0)

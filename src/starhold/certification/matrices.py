@@ -1,0 +1,156 @@
+"""Definite matrices and square roots without rounding: floats only guess, rationals and balls decide.
+
+A matrix is a list of rows of rationals (`fmpq`) or balls (`arb`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+from flint import arb, fmpq, fmpq_mat
+from numpy.typing import NDArray
+
+from starhold.algebra.polynomial import exact
+
+Rows: TypeAlias = list[list[Any]]
+
+
+def rows(array: Any) -> Rows:
+    """A matrix of floats at their exact values."""
+    return [[exact(x) for x in row] for row in array]
+
+
+def floats(matrix: Sequence[Sequence[Any]]) -> NDArray[np.float64]:
+    """The nearest array of floats (of balls, their middles)."""
+    return np.array([[number(x) for x in row] for row in matrix], dtype=float)
+
+
+def number(x: Any) -> float:
+    """The nearest float of a rational or of a ball's middle."""
+    if isinstance(x, fmpq):
+        return int(x.p) / int(x.q)
+    return float(x.mid()) if isinstance(x, arb) else float(x)
+
+
+def identity(size: int, c: Any = 1) -> Rows:
+    """c times the unit matrix."""
+    return [
+        [exact(c) if i == j and not isinstance(c, arb) else c if i == j else fmpq(0) for j in range(size)]
+        for i in range(size)
+    ]
+
+
+def plus(a: Rows, b: Rows, c: Any = 1) -> Rows:
+    """a + c b."""
+    return [[x + y * c for x, y in zip(s, t, strict=True)] for s, t in zip(a, b, strict=True)]
+
+
+def scaled(a: Rows, c: Any) -> Rows:
+    """c a."""
+    return [[x * c for x in row] for row in a]
+
+
+def transposed(a: Rows) -> Rows:
+    """The transposed matrix."""
+    return [list(column) for column in zip(*a, strict=True)]
+
+
+def product(a: Rows, b: Rows) -> Rows:
+    """a b."""
+    columns = transposed(b)
+    return [[_dot(row, column) for column in columns] for row in a]
+
+
+def symmetric(a: Rows) -> Rows:
+    """(a + a')/2."""
+    return scaled(plus(a, transposed(a)), fmpq(1, 2))
+
+
+def blocks(a: Rows, b: Rows, d: Rows) -> Rows:
+    """[[a, b], [b', d]]."""
+    return [[*s, *t] for s, t in zip(a, b, strict=True)] + [[*s, *t] for s, t in zip(transposed(b), d, strict=True)]
+
+
+def inverse(a: Rows) -> Rows:
+    """The exact inverse; ZeroDivisionError for a singular matrix."""
+    found = fmpq_mat(len(a), len(a), [x for row in a for x in row]).inv()
+    return [[found[i, j] for j in range(len(a))] for i in range(len(a))]
+
+
+def definite(a: Rows) -> bool:
+    """Whether a symmetric matrix is positive definite for certain, by its pivots: exact for rationals; for balls, whether
+    every matrix in them is (False: it was not decided so)."""
+    rest = [list(row) for row in a]
+    for k in range(len(rest)):
+        pivot = rest[k][k]
+        if not pivot > 0:
+            return False
+        for i in range(k + 1, len(rest)):
+            factor = rest[i][k] / pivot
+            for j in range(k + 1, len(rest)):
+                rest[i][j] = rest[i][j] - factor * rest[k][j]
+    return True
+
+
+def least(a: Rows) -> Any:
+    """A rational just below the smallest eigenvalue of a symmetric matrix."""
+    values = np.linalg.eigvalsh(floats(a))
+    return _just_below(float(values[0]), float(np.abs(values).max()), a)
+
+
+def greatest(a: Rows) -> Any:
+    """A rational just above the largest eigenvalue of a symmetric matrix."""
+    values = np.linalg.eigvalsh(floats(a))
+    return -_just_below(-float(values[-1]), float(np.abs(values).max()), scaled(a, -1))
+
+
+def _just_below(guess: float, size: float, a: Rows) -> Any:
+    if size == 0.0:
+        return fmpq(0)
+    step = 1e-13
+    while step < 1e6:
+        bound = exact(guess - step * size)
+        if definite(plus(a, identity(len(a), bound), -1)):
+            return bound
+        step *= 4.0
+    raise ArithmeticError("no bound of an eigenvalue was found")
+
+
+def root_above(x: Any) -> Any:
+    """A rational just above the square root of a rational that is not negative."""
+    return _root(x, 1.0 + 1e-15)
+
+
+def root_below(x: Any) -> Any:
+    """A rational just below the square root of a rational that is not negative."""
+    return _root(x, 1.0 - 1e-15)
+
+
+def _root(x: Any, nudge: float) -> Any:
+    if x == 0:
+        return fmpq(0)
+    found = exact(math.sqrt(number(x)))
+    while (found * found < x) if nudge > 1.0 else (found * found > x):
+        found *= exact(nudge)
+    return found
+
+
+def characteristic_roots(a: Rows) -> list[tuple[Any, int]]:
+    """Enclosures of the eigenvalues of a rational matrix, with multiplicities."""
+    polynomial: Any = fmpq_mat(len(a), len(a), [x for row in a for x in row]).charpoly()
+    return polynomial.complex_roots()
+
+
+def _dot(a: list[Any], b: list[Any]) -> Any:
+    total: Any = fmpq(0)
+    for x, y in zip(a, b, strict=True):
+        total = total + x * y
+    return total
+
+
+def spectral_norm_above(a: Rows) -> Any:
+    """A rational above the largest singular value."""
+    return root_above(greatest(product(transposed(a), a)))

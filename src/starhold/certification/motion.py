@@ -1,0 +1,179 @@
+"""The closed loop as exact polynomials: V and its derivative, read from the law's and the models' own equations.
+
+Variables: q0..q3 error attitude, w1..w3 rate relative to the target, r1..r3 the target's rate and a1..a3 its acceleration
+(body axes), e1..e3 the torque the models know, m1..m3 a torque nobody knows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from flint import fmpq
+
+from starhold.algebra.polynomial import Condition, Polynomial, constants, jointly, pieces
+from starhold.algebra.quaternion import derivative, vector_part
+from starhold.algebra.vector import add, apply, cross, dot, scale, subtract
+from starhold.certification.matrices import Rows
+from starhold.certification.subject import Subject, direction, exact_craft
+from starhold.laws.interface import Seen
+from starhold.models.craft import Craft
+from starhold.models.rigid_body import angular_acceleration, kinetic_energy
+
+ATTITUDE, RATE = ("q0", "q1", "q2", "q3"), ("w1", "w2", "w3")
+AXES = ATTITUDE[1:]
+ENTRIES = (("j11", "j12", "j13"), ("j12", "j22", "j23"), ("j13", "j23", "j33"))
+Truths = tuple[tuple[Condition, bool], ...]
+
+
+class ShapeError(ArithmeticError):
+    """An equation is not of the form that these proofs are about; the text says which term is in the way."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The closed loop of a subject. `stiffness`: V is the kinetic energy and 2 stiffness (1 - q0), in place of the law's
+    own; `unknown_inertia`: the plant's inertia is made of the variables `ENTRIES` while the law keeps the nominal one,
+    derivatives are multiplied by its determinant, and the target is at rest."""
+
+    subject: Subject
+    stiffness: Any | None = None
+    unknown_inertia: bool = False
+
+    @cached_property
+    def nominal(self) -> Craft:
+        """The craft the law knows."""
+        craft = self.subject.loop.craft
+        return exact_craft(craft.inertia, craft.torque_limit, craft.gravity)
+
+    @cached_property
+    def factor(self) -> Polynomial:
+        """What derivatives are multiplied by: 1, or the determinant of the unknown inertia."""
+        if not self.unknown_inertia:
+            return Polynomial.constant(1)
+        j = _entries()
+        return dot(j[0], cross(j[1], j[2]))  # pyright: ignore
+
+    @cached_property
+    def plant(self) -> Craft:
+        """The craft that moves; its inverse inertia is multiplied by `factor`."""
+        if not self.unknown_inertia:
+            return self.nominal
+        j = _entries()
+        # The adjugate of a symmetric matrix is the inverse without the division.
+        adjugate = (cross(j[1], j[2]), cross(j[2], j[0]), cross(j[0], j[1]))
+        return Craft(j, adjugate, self.nominal.torque_limit, self.nominal.gravity)  # pyright: ignore
+
+    @cached_property
+    def gains(self) -> Any:
+        """The law's gains as constants."""
+        return constants(self.subject.loop.gains)
+
+    @cached_property
+    def seen(self) -> Seen:
+        """What the law is told, in variables."""
+        zero: Any = (Polynomial.constant(0),) * 3
+        still = not self.subject.moving or self.unknown_inertia
+        rate, known = direction("w"), direction("e")
+        turning = zero if still else direction("r")
+        spinning = zero if still else direction("a")
+        acceleration = subtract(spinning, cross(rate, turning))
+        period = Polynomial.constant(self.subject.loop.period)
+        return Seen(
+            direction("q", 0, 4),
+            rate,
+            add(rate, turning),
+            turning,
+            acceleration,
+            known,
+            direction("p"),
+            period,  # type: ignore
+        )
+
+    @cached_property
+    def torque(self) -> Any:
+        """The law's torque, piecewise."""
+        memory = self.subject.law.remember(self.subject.loop.gains, self.subject.loop.craft, self.subject.loop.period)
+        return self.subject.law.torque(self.seen, self.gains, self.nominal, memory)[0]
+
+    @cached_property
+    def acceleration(self) -> Any:
+        """The derivative of the rate relative to the target, times `factor`."""
+        outside = add(self.torque, add(self.seen.external_torque, direction("m")))
+        absolute = angular_acceleration(self.seen.body_rate, outside, self.plant)
+        return subtract(absolute, scale(self.factor, self.seen.target_acceleration))  # type: ignore
+
+    @cached_property
+    def turning(self) -> Any:
+        """The derivative of the error attitude."""
+        return derivative(self.seen.attitude, self.seen.rate)
+
+    def along(self, function: Polynomial) -> Any:
+        """The derivative of a polynomial of the state along the motion, times `factor`."""
+        total: Any = Polynomial.constant(0)
+        for name, rate in zip(ATTITUDE, self.turning, strict=True):
+            total = total + self.factor * function.slope(name) * rate
+        for name, rate in zip(RATE, self.acceleration, strict=True):
+            slope = function.slope(name)
+            if slope.terms:
+                total = total + rate * slope
+        return total
+
+    @cached_property
+    def lyapunov(self) -> Polynomial | None:
+        """V for the plant that moves; None where the law has none of its own and no other is asked for."""
+        if self.stiffness is not None:
+            energy: Any = kinetic_energy(self.seen.rate, self.plant)
+            return energy + 2 * self.stiffness * (1 - Polynomial.variable("q0"))
+        function = self.subject.law.lyapunov
+        return None if function is None else function(self.seen, self.gains, self.plant)
+
+    @cached_property
+    def cross_term(self) -> Polynomial:
+        """q.J w, which makes a strict Lyapunov function of V."""
+        return dot(vector_part(self.seen.attitude), apply(self.plant.inertia, self.seen.rate))  # type: ignore
+
+    def linear(self, sign: int = 1) -> tuple[Rows, Rows]:
+        """K_rate and K_attitude of the law near attitude (sign, 0, 0, 0) at rest, u = -K_rate w - K_attitude q."""
+        found = [at_rest(component)[1] for component in self.torque]
+        still = {name: fmpq(0) for case in found for name in case.variables()} | {"q0": fmpq(sign)}
+        rate = [[-component.slope(name).at(still) for name in RATE] for component in found]
+        attitude = [[-component.slope(name).at(still) for name in ATTITUDE[1:]] for component in found]
+        return rate, attitude
+
+
+def _entries() -> Any:
+    return tuple(tuple(Polynomial.variable(name) for name in row) for row in ENTRIES)
+
+
+def near_rest(truths: Truths) -> bool:
+    """Whether a piece of a law holds around rest on target: none of its conditions is on its border there."""
+    for condition, truth in truths:
+        value = condition.positive.only(lambda monomial: all(name == "q0" for name in monomial))
+        at_rest = value.at({"q0": fmpq(1)})
+        if at_rest == 0 or (at_rest > 0) != truth:
+            return False
+    return True
+
+
+def at_rest(value: Any) -> tuple[Truths, Polynomial]:
+    """The piece that holds around rest on target, with its conditions; ShapeError where several meet there."""
+    found = [(case.truths, case.value) for case in pieces(value) if near_rest(case.truths)]
+    if len(found) != 1:
+        raise ShapeError("the law switches at rest on target")
+    return found[0]
+
+
+def cases(value: Any) -> list[tuple[Truths, Polynomial]]:
+    """The pieces of a piecewise polynomial."""
+    return [(truths, parts[0]) for truths, parts in jointly([value])]
+
+
+def matrix_of(polynomial: Polynomial, first: Sequence[str], second: Sequence[str]) -> Rows:
+    """The coefficients of first_i second_j; of a quadratic form (first is second) the symmetric matrix."""
+    if tuple(first) == tuple(second):
+        form = [[polynomial.terms.get(tuple(sorted((a, b))), fmpq(0)) for b in second] for a in first]
+        return [[c if i == j else c / 2 for j, c in enumerate(row)] for i, row in enumerate(form)]
+    return [[polynomial.terms.get(tuple(sorted((a, b))), fmpq(0)) for b in second] for a in first]

@@ -1,0 +1,94 @@
+"""States that refute: guessed in floats, verified in exact rationals on the loop's own equations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from flint import fmpq
+
+from starhold.algebra.polynomial import Polynomial, exact
+from starhold.certification.matrices import floats, number, symmetric
+from starhold.certification.motion import ATTITUDE, RATE, Motion
+
+if TYPE_CHECKING:
+    from starhold.certification.frame import Frame
+
+
+def state_evidence(attitude: Sequence[Any], rate: Sequence[Any], what: str, value: Any) -> dict[str, Any]:
+    """A state and what is found there."""
+    return {
+        "state": {"attitude": [number(x) for x in attitude], "rate": [number(x) for x in rate]},
+        what: number(value),
+    }
+
+
+def rational_turn(attitude: Sequence[float]) -> list[Any]:
+    """A rational quaternion of exactly unit length near a float one, by stereographic projection."""
+    q = np.asarray(attitude, dtype=float)
+    sign = 1 if q[0] >= 0 else -1
+    t = [exact(float(f"{x:.6g}")) for x in sign * q[1:] / (1.0 + sign * q[0])]
+    square = sum((x * x for x in t), fmpq(0))
+    return [sign * (1 - square) / (1 + square), *(sign * 2 * x / (1 + square) for x in t)]
+
+
+def rising_state(motion: Motion, slope: Polynomial, rate: Any | None, tries: int = 200) -> dict[str, Any] | None:
+    """A state with |w| <= rate (None: any) at which V' > 0 without torque from outside, verified; None if none is found."""
+    own = slope.only(lambda m: not any(name[0] in "emra" for name in m))
+    names = [*ATTITUDE, *RATE]
+    compiled = [([names.index(n) for n in m], number(c)) for m, c in own.terms.items()]
+
+    def value(x: Any) -> Any:
+        return sum(c * np.prod(x[..., places], axis=-1) for places, c in compiled)
+
+    random = np.random.default_rng(0)
+    w = random.normal(size=(tries * 50, 3))
+    w /= np.linalg.norm(w, axis=1, keepdims=True)
+    on_target = np.tile((1.0, 0.0, 0.0, 0.0), (len(w), 1))
+    turned = random.normal(size=(len(w), 4))
+    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+    # On target and at everyday rates first, where a reader sees most.
+    lengths = (
+        10.0 ** np.array(sorted(range(-6, 19), key=abs))
+        if rate is None
+        else number(rate) * np.append(np.linspace(0.99999, 0.1, 10), np.logspace(-2, -6, 5))
+    )
+    for q in (on_target, turned):
+        for length in lengths:
+            found = value(np.hstack([q, length * w]))
+            place = int(np.argmax(found))
+            if found[place] > 0.0:
+                verified = _verified(own, q[place], length * w[place], rate)
+                if verified is not None:
+                    return verified
+    return None
+
+
+def _verified(slope: Polynomial, attitude: Any, rate: Any, limit: Any | None) -> dict[str, Any] | None:
+    turn = rational_turn(attitude)
+    w = [exact(float(f"{x:.6g}")) for x in rate]
+    if limit is not None and sum((x * x for x in w), fmpq(0)) > limit * limit:
+        return None
+    value = slope.at(dict(zip([*ATTITUDE, *RATE], [*turn, *w], strict=True)))
+    return state_evidence(turn, w, "V'", value) if value > 0 else None
+
+
+def unlike_positive(motion: Motion, frame: Frame) -> dict[str, Any]:
+    """A state at which V is not positive."""
+    if frame.s <= 0:
+        return state_evidence((0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 0.0), "V", frame.s)
+    values, axes = np.linalg.eigh(floats(symmetric(frame.P)))
+    w = [exact(float(f"{x:.9g}")) for x in axes[:, 0]]
+    value = sum((w[i] * frame.P[i][j] * w[j] for i in range(3) for j in range(3)), fmpq(0)) / 2
+    return (
+        state_evidence((1.0, 0.0, 0.0, 0.0), w, "V", value)
+        if value <= 0
+        else {"reason": f"P has the eigenvalue {values[0]:g}"}
+    )
+
+
+def exact_state(evidence: Mapping[str, Any]) -> dict[str, Any]:
+    """The variables of a state in evidence."""
+    state = evidence["state"]
+    return {name: exact(x) for name, x in zip([*ATTITUDE, *RATE], [*state["attitude"], *state["rate"]], strict=True)}

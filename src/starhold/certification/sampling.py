@@ -1,0 +1,130 @@
+"""The claim that the linear loop stays stable when the torque is held for a control period."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from flint import arb
+
+from starhold.algebra.polynomial import exact
+from starhold.certification.certificate import EXACT_SIGN, Claim, Obligation
+from starhold.certification.matrices import (
+    Rows,
+    characteristic_roots,
+    definite,
+    floats,
+    identity,
+    inverse,
+    number,
+    plus,
+    product,
+    scaled,
+    transposed,
+)
+from starhold.certification.motion import Motion
+from starhold.certification.subject import above
+
+ASSUMPTIONS = (
+    "rigid body",
+    "inertia exactly as given",
+    "exact measurement and ideal actuators",
+    "linear motion near rest on a target at rest",
+    "torque not limited",
+    "no torque from outside",
+)
+ROOTS = "certified roots"
+
+
+def sampling(motion: Motion) -> Claim | None:
+    """The claim for the loop's own period, and the longest period; None for a law that is not linear around rest."""
+    try:
+        rate, attitude = motion.linear()
+    except ArithmeticError:
+        return None
+    J, period = motion.subject.inertia, exact(motion.subject.loop.period)
+    roots = sampled_roots(J, rate, attitude, period)
+    values = sorted(
+        (complex(number(r.real), number(r.imag)) for r, n in roots for _ in range(n)), key=lambda z: (-abs(z), z.imag)
+    )
+    radius, stable = _radius(roots)
+    numbers: dict[str, Any] = {
+        "period": number(period),
+        "radius": radius,
+        "eigenvalues": [[z.real, z.imag] for z in values],
+    }
+    if not stable:
+        worst = (
+            {"eigenvalue": [values[0].real, values[0].imag]}
+            if abs(values[0]) >= 1.0
+            else {"reason": "a root on the unit circle"}
+        )
+        outcome = "refuted" if "eigenvalue" in worst else "undecided"
+        refused = Obligation("stable at the period", ROOTS, outcome, worst)
+        return Claim("sampling", numbers | {"longest": None, "every_shorter": False}, {}, ASSUMPTIONS, (refused,))
+    longest = _longest(J, rate, attitude, period)
+    between = dissipative(J, rate, attitude, longest)
+    obligations = [Obligation("stable at the period", ROOTS, "proved"), Obligation("stable at the longest", ROOTS, "proved")]
+    if between:
+        obligations.append(Obligation("stable in between", EXACT_SIGN, "proved"))
+    numbers |= {"longest": number(longest), "every_shorter": between}
+    return Claim("sampling", numbers, {}, ASSUMPTIONS, tuple(obligations))
+
+
+def sampled_roots(J: Rows, rate: Rows, attitude: Rows, period: Any) -> list[tuple[Any, int]]:
+    """Enclosures of the eigenvalues, with multiplicities, of w+ = w + h J^-1 u, q+ = q + h w/2 + h2 J^-1 u/4 with
+    u = -rate w - attitude q."""
+    turn = inverse(J)
+    pull = [[*a, *b] for a, b in zip(product(turn, rate), product(turn, attitude), strict=True)]
+    still = [[*a, *b] for a, b in zip(identity(3, period / 2), identity(3), strict=True)]
+    turning = [[*a, *b] for a, b in zip(identity(3), scaled(identity(3), 0), strict=True)]
+    return characteristic_roots([*plus(turning, pull, -period), *plus(still, pull, -period * period / 4)])
+
+
+def _radius(roots: list[tuple[Any, int]]) -> tuple[float, bool]:
+    """An upper bound of the spectral radius, and whether it is surely below 1."""
+    sizes = [arb(abs(root)) for root, _ in roots]
+    bound = max(above(exact(float(size.upper().mid()))) * (1.0 + 1e-14) for size in sizes)
+    return bound, bound < 1.0
+
+
+def _longest(J: Rows, rate: Rows, attitude: Rows, period: Any) -> Any:
+    """The longest period, to nine digits, that is shown to keep the loop stable; every shorter one where the loop is
+    dissipative, else only between the given period and the first that is not."""
+
+    def good(h: float) -> bool:
+        return _float_radius(J, rate, attitude, h) < 1.0
+
+    low, high = number(period), 2.0 * number(period)
+    while good(high):
+        low, high = high, 2.0 * high
+        if high > 1e12 * number(period):
+            break
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if good(middle) else (low, middle)
+    for less in (1e-9, 1e-7, 1e-5, 1e-3):
+        found = exact(float(low * (1.0 - less)))
+        if found > period and _radius(sampled_roots(J, rate, attitude, found))[1]:
+            return found
+    return period
+
+
+def _float_radius(J: Rows, rate: Rows, attitude: Rows, h: float) -> float:
+    turn = np.linalg.inv(floats(J))
+    pull = np.hstack([turn @ floats(rate), turn @ floats(attitude)])
+    step = np.block([[np.eye(3), np.zeros((3, 3))], [0.5 * h * np.eye(3), np.eye(3)]])
+    step -= np.vstack([h * pull, 0.25 * h * h * pull])
+    return float(np.abs(np.linalg.eigvals(step)).max())
+
+
+def dissipative(J: Rows, rate: Rows, attitude: Rows, period: Any) -> bool:
+    """Whether the loop is surely stable for every period up to this one: with z = (1 + x)/(1 - x) up to a factor it is
+    (J - h rate/2) x2 + (rate - h attitude/4) x + attitude/2 = 0, whose coefficients are then symmetric and definite."""
+    return (
+        rate == transposed(rate)
+        and attitude == transposed(attitude)
+        and definite(attitude)
+        and definite(plus(J, rate, -period / 2))
+        and definite(plus(rate, attitude, -period / 4))
+    )

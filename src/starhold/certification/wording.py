@@ -1,0 +1,181 @@
+"""Certificates in sentences. Every number in them comes from the claim."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+from typing import Any, cast
+
+from starhold.certification.certificate import Certificate, Claim, Obligation
+
+HEADINGS = {
+    "convergence": "converges",
+    "torque-limit": "within the torque limit",
+    "inertia": "uncertain inertia",
+    "disturbance": "torque from outside",
+    "sampling": "torque held between samples",
+    "sliding": "reaches its surface",
+}
+
+OBLIGATIONS = {
+    "form": "V and its derivative along the loop's own equations have exactly the terms the proof is about",
+    "positive": "V is zero on target at rest and positive elsewhere",
+    "descent": "V falls wherever the body turns, on the whole set",
+    "target": "how the target moves drops out of the error's motion",
+    "only rest": "the body can stay at rest on target only, or on the other quaternion of the same attitude",
+    "strict": "a second function falls strictly and stays within a known share of V",
+    "single rest in the set": "the set does not hold the other quaternion's rest",
+    "other rest repels": "rest on the other quaternion is unstable, so that only a set of measure zero ends there",
+    "jumps lower V": "every switch of the hysteresis lowers V",
+    "convergence": "the set lies in the region of convergence",
+    "torque": "the torque is within the limit on the whole set",
+    "end": "outside a small ball V falls in spite of the torque",
+    "start": "the set that is started from does not reach where the bound fails",
+    "stable at the period": "all eigenvalues of the exactly discretised loop lie within the unit circle",
+    "stable at the longest": "so they do at the longest period",
+    "stable in between": "and at every shorter one",
+    "reach exceeds torque": "the switching torque exceeds the torque from outside on every axis, over the whole orbit",
+    "surface holds the target": "on the surface the angle to the target falls",
+    "layer": "the boundary layer lets the motion end no farther away than told",
+    "no switch of the double cover": "the quaternion that is fed back does not switch on the way",
+}
+
+
+def shown(value: float, unit: str = "", up: bool = False) -> str:
+    """A number with four digits, rounded down, or up where it bounds from above, so as not to say more than is proved;
+    a part in 1e9 is forgiven, else 60 would show as 59.99 for its last bit."""
+    rounding, nudge = (ROUND_CEILING, 1.0 - 1e-9) if up else (ROUND_FLOOR, 1.0 + 1e-9)
+    return f"{float(Context(prec=4, rounding=rounding).create_decimal(Decimal(value * nudge))):g}{unit}"
+
+
+def angle(radians: float, up: bool = False) -> str:
+    """An angle in degrees."""
+    return shown(math.degrees(radians), "°", up)
+
+
+def speed(rate: float, up: bool = False) -> str:
+    """A rate in degrees a second."""
+    return shown(math.degrees(rate), "°/s", up)
+
+
+def sentence(claim: Claim, subject: Mapping[str, Any]) -> str:
+    """What a claim says, whether or not it is proved."""
+    return _SENTENCES[claim.kind](claim.numbers, subject)
+
+
+def place(numbers: Mapping[str, Any]) -> str:
+    """The set that a motion starts from."""
+    if numbers.get("everything"):
+        return "from every attitude and rate"
+    rate = numbers.get("rate_everywhere")
+    if rate is not None:
+        return "from every attitude and rate" if math.isinf(rate) else f"from every attitude at up to {speed(rate)}"
+    turn, on_target = numbers.get("turn"), numbers.get("rate_start", numbers.get("rate"))
+    if turn is None:
+        return ""
+    at_rest = "from rest at every attitude" if turn >= math.pi else f"from rest at up to {angle(turn)}"
+    return at_rest + (f", or on target at up to {speed(on_target)}" if on_target else "")
+
+
+def _cover(numbers: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
+    if subject["double_cover"] == "hysteresis":
+        return ", whichever quaternion it starts with (global on rotations, robust by hysteresis)"
+    if subject["double_cover"] == "shortest":
+        return " by the shorter way (a switch at half a turn, which noise may hold there)"
+    if numbers.get("everything") or numbers.get("rate_everywhere") is not None:
+        return " from almost everywhere there; q and -q differ, so it may unwind"
+    return ""
+
+
+def _convergence(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
+    if n.get("rate_everywhere", 0) is None and "turn" not in n:
+        return "from every attitude and rate the body comes to rest on target"
+    return f"{place(n)} the body comes to rest on target{_cover(n, subject)}".strip()
+
+
+def _torque_limit(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
+    kind = "on every axis" if n["kind"] == "axis" else "in norm"
+    return f"{place(n)} the torque never exceeds {n['limit']:.4g} N m {kind}"
+
+
+def _inertia(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
+    if n["tolerance"] is None:
+        return f"{place(n)} it converges whatever the inertia is"
+    share = shown(100.0 * n["tolerance"], " %")
+    if "start" not in n:
+        return f"it converges with every entry of the inertia off by up to {share} of sqrt(J_ii J_jj)"
+    return f"{place(n)} it converges with every entry of the inertia off by up to {share} of sqrt(J_ii J_jj)"
+
+
+def _disturbance(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
+    if "angle" not in n:
+        return f"a torque of up to {n['torque']:.3g} N m leaves the body near the target"
+    return (
+        f"against any torque of up to {n['torque']:.3g} N m, {place(n)}, it ends within {angle(n['angle'], up=True)} "
+        f"and {speed(n['rate'], up=True)}"
+    )
+
+
+def _sampling(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
+    text = f"the linear loop is stable with the torque held for {n['period']:g} s"
+    if n["longest"] is None:
+        return text
+    longest = shown(n["longest"], " s")
+    return f"{text} and for every period up to {longest}" if n["every_shorter"] else f"{text} and for {longest}"
+
+
+def _sliding(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
+    most = max(n["torque"])
+    against = f"against {most:.3g} N m on an axis" if most else "without torque from outside"
+    if "angle" not in n:
+        return f"the surface is reached {against}"
+    where = place(n) if n["everything"] else place({**n, "rate_everywhere": None})
+    end = (
+        f"ends within {angle(n['angle'], True)} and {speed(n['rate'], True)}" if n["surface"] else "slides to rest on target"
+    )
+    return f"{where} the motion reaches the surface {against} and {end}"
+
+
+_SENTENCES = {
+    "convergence": _convergence,
+    "torque-limit": _torque_limit,
+    "inertia": _inertia,
+    "disturbance": _disturbance,
+    "sampling": _sampling,
+    "sliding": _sliding,
+}
+
+
+def evidence(obligation: Obligation) -> str:
+    """Why an obligation is refuted or undecided."""
+    found = obligation.evidence
+    if "reason" in found:
+        return str(found["reason"])
+    parts: list[str] = []
+    for key, value in found.items():
+        if key == "state":
+            q, w = (", ".join(f"{x:.4g}" for x in value[name]) for name in ("attitude", "rate"))
+            parts.append(f"q = ({q}), w = ({w}) rad/s")
+        elif isinstance(value, list):
+            parts.append(f"{key} = {_numbers(cast(Any, value))}")
+        else:
+            parts.append(f"{key} = {value:.4g}" if isinstance(value, float) else f"{key} = {value}")
+    return "; ".join(parts)
+
+
+def _numbers(value: Any) -> str:
+    if isinstance(value, list):
+        return f"[{', '.join(_numbers(x) for x in cast(list[Any], value))}]"
+    return f"{value:.5g}"
+
+
+def brief(certificate: Certificate) -> str:
+    """What is proved in one line."""
+    proved = [sentence(c, certificate.subject) for c in certificate.claims if c.outcome == "proved"]
+    return "; ".join(proved) or "nothing is proved"
+
+
+def methods(claim: Claim) -> str:
+    """How a claim was shown."""
+    return ", ".join(dict.fromkeys(obligation.how for obligation in claim.obligations))

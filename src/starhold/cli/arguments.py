@@ -1,0 +1,15 @@
+"""Arguments and exit codes that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+USER_ERROR, DIVERGED, FAILED_CHECK, REFUTED, UNDECIDED, INTERRUPTED, INTERNAL_ERROR = 2, 1, 1, 3, 4, 130, 70
+
+ScenarioFile = Annotated[str, typer.Argument(metavar="FILE", help="a scenario file or the name of a built-in scenario")]
+Output = Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="folder for results, created")]
+Force = Annotated[bool, typer.Option("--force", help="replace results that are already there")]
+OneLaw = Annotated[str | None, typer.Option(help="which law of the file; all if not given")]

@@ -1,0 +1,49 @@
+"""The commands `certify` and `check`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from starhold.cli.arguments import FAILED_CHECK, REFUTED, UNDECIDED, Force, OneLaw, Output, ScenarioFile
+
+
+def certify(file: ScenarioFile, law: OneLaw = None, output: Output = None, force: Force = False) -> None:
+    """Prove what each law guarantees on this spacecraft: a table and certificate.json.
+
+    Exit code 0: all that is claimed is proved; 3: something is refuted, with the state that does; 4: not decided.
+    """
+    from starhold.certification.certificate import FILE, write
+    from starhold.cli.show import console
+    from starhold.cli.show_certificates import print_certificate
+    from starhold.report.certificates import certify_scenario
+    from starhold.report.files import whole
+    from starhold.report.results import open_folder
+    from starhold.scenario.reading import load
+
+    scenario = load(file)
+    folder = open_folder(output or Path("results") / f"{scenario.name}-certificate", force)
+    tried = certify_scenario(scenario, law)
+    for found in tried:
+        print_certificate(found)
+    certificates = [found.certificate for found in tried]
+    path = folder / FILE
+    with whole(path) as hidden:
+        write(certificates, scenario.name, hidden)
+    console.print(f"Certificate: {path}. Re-check it: starhold check {path}", soft_wrap=True)
+    outcomes = {certificate.outcome for certificate in certificates}
+    if outcomes != {"proved"}:
+        raise typer.Exit(REFUTED if "refuted" in outcomes else UNDECIDED)
+
+
+def check(path: Annotated[Path, typer.Argument(metavar="CERT", help="a certificate.json")]) -> None:
+    """Check a certificate independently of the program that made it: trusts nothing in the file but what it claims."""
+    from starhold.certification.checker import check_file, passed
+    from starhold.cli.show_certificates import print_findings
+
+    findings = check_file(path)
+    print_findings(findings)
+    if not passed(findings):
+        raise typer.Exit(FAILED_CHECK)

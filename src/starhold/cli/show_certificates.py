@@ -1,0 +1,114 @@
+"""What `certify`, `check` and `compare` print of certificates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from rich.table import Table
+
+from starhold.certification.certificate import Certificate, Claim
+from starhold.certification.wording import HEADINGS, OBLIGATIONS, evidence, methods, sentence
+from starhold.cli.show import console
+
+if TYPE_CHECKING:
+    from starhold.certification.checker import Finding
+    from starhold.report.certificates import Tried
+
+COLOURS = {
+    "proved": "green",
+    "refuted": "red",
+    "undecided": "yellow",
+    "holds": "green",
+    "fails": "red",
+    "not claimed": "dim",
+}
+
+
+def print_certificate(tried: Tried) -> None:
+    """Claims with their outcomes, why those that are not proved are not, the assumptions, and the flights."""
+    certificate, trial, inside = tried
+    console.print(f"[bold]{certificate.name}[/bold]: {_coloured(certificate.outcome)}", highlight=False)
+    if not certificate.claims:
+        console.print("  no claim: the law declares neither a Lyapunov function nor a sliding surface", highlight=False)
+    table = Table(show_edge=False, pad_edge=False, box=None, show_header=False)
+    for _ in range(3):
+        table.add_column(overflow="fold")
+    for claim in certificate.claims:
+        told = sentence(claim, certificate.subject)
+        table.add_row(f"  {_coloured(claim.outcome)}", HEADINGS[claim.kind], f"{told} [dim]({methods(claim)})[/dim]")
+        for line in reasons(claim):
+            table.add_row("", "", line)
+    if certificate.claims:
+        console.print(table, highlight=False)
+        console.print(f"  [dim]assuming: {assumptions(certificate)}[/dim]", highlight=False)
+    outside = [HEADINGS[kind] for kind, held in inside.items() if not held]
+    if outside:
+        console.print(f"  this scenario starts outside the sets of: {', '.join(outside)}", highlight=False)
+    if trial is not None:
+        console.print(
+            f"  [dim]flown: {trial.flights} states of the certified set, none against the claim[/dim]", highlight=False
+        )
+    console.print()
+
+
+def print_proved(certificates: Sequence[Certificate]) -> None:
+    """One line for each claim of several laws."""
+    console.print("\nCertified on this spacecraft (starhold certify tells how):", highlight=False)
+    table = Table(show_edge=False, pad_edge=False, box=None, show_header=False)
+    for _ in range(3):
+        table.add_column(overflow="fold")
+    for certificate in certificates:
+        name = certificate.name
+        for claim in certificate.claims:
+            table.add_row(f"  {name}", _coloured(claim.outcome), sentence(claim, certificate.subject))
+            name = ""
+        if not certificate.claims:
+            table.add_row(f"  {name}", _coloured("undecided"), "no claim")
+    console.print(table, highlight=False)
+
+
+def reasons(claim: Claim) -> list[str]:
+    """Why a claim is not proved, one line an obligation."""
+    return [f"{o.outcome}: {OBLIGATIONS[o.name]}: {evidence(o)}" for o in claim.obligations if o.outcome != "proved"]
+
+
+def assumptions(certificate: Certificate) -> str:
+    """Every assumption once, with the claims that do without it."""
+    kinds = {claim.kind: claim.assumptions for claim in certificate.claims}
+    told: list[str] = []
+    for assumption in dict.fromkeys(a for own in kinds.values() for a in own):
+        holders = [HEADINGS[kind] for kind, own in kinds.items() if assumption in own]
+        others = [HEADINGS[kind] for kind, own in kinds.items() if assumption not in own]
+        if not others:
+            told.append(assumption)
+        elif len(others) < len(holders):
+            told.append(f"{assumption} (not for: {', '.join(others)})")
+        else:
+            told.append(f"{assumption} (for: {', '.join(holders)})")
+    return "; ".join(told)
+
+
+def print_findings(findings: Sequence[Finding]) -> None:
+    """What an independent check found, claim by claim; every obligation that fails."""
+    table = Table(show_edge=False, pad_edge=False)
+    for head in ("certificate", "claim", "obligations", "verdict"):
+        table.add_column(head, overflow="fold")
+    groups: dict[tuple[str, str], list[Finding]] = {}
+    for finding in findings:
+        groups.setdefault((finding.certificate, finding.claim), []).append(finding)
+    for (name, claim), group in groups.items():
+        verdicts = {finding.verdict for finding in group}
+        worst = next(v for v in ("fails", "not claimed", "holds") if v in verdicts)
+        table.add_row(name, claim, ", ".join(f.obligation for f in group if f.obligation), _coloured(worst))
+    console.print(table)
+    failed = [finding for finding in findings if finding.verdict == "fails"]
+    for f in failed:
+        where = " / ".join(part for part in (f.certificate, f.claim, f.obligation) if part)
+        console.print(f"[red]fails[/red]  {where}: {f.reason}", highlight=False)
+    claimed = sum(finding.verdict == "holds" for finding in findings)
+    console.print(f"{claimed} obligations hold, {len(failed)} fail.", highlight=False)
+
+
+def _coloured(outcome: str) -> str:
+    return f"[{COLOURS[outcome]}]{outcome}[/{COLOURS[outcome]}]"

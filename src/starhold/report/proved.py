@@ -1,0 +1,114 @@
+"""The part of the page that tells what is proved of each law, what is not, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Any
+
+from starhold.certification.certificate import FILE, Certificate, Claim, Obligation
+from starhold.certification.wording import HEADINGS, OBLIGATIONS, evidence, methods, sentence
+from starhold.report.flight import Flight, colour, number_text
+
+NOTE = (
+    "Proved means shown by a computation without rounding: identities and inequalities in exact rational numbers, the rest "
+    "in ball arithmetic, which carries a bound of its own error. No claim rests on samples or on flights. Refuted: "
+    "something that the proof needs is false at the state shown; the argument then fails, and the law itself may or may "
+    "not. Undecided: neither was shown. A claim speaks of motions that meet its assumptions, listed inside, which a "
+    "flight with limits, lag, noise or held torque need not. "
+)
+RECHECK = f"The proofs are in {FILE} beside this page; <code>starhold check {FILE}</code> goes through them again."
+
+SYMBOLS = {
+    "start": ("V at the start, at most", ""),
+    "level": ("V from then on, at most", ""),
+    "stiffness": ("k of V = ω·Jω/2 + 2k(1 − q₀), in place of the law's own V", "N m"),
+    "epsilon": ("ε in V + ε q·Jω", ""),
+    "rho": ("share of V that the added term stays within", ""),
+    "rate_bound": ("rate up to which V is shown to fall", "rad/s"),
+    "q_rate": ("decrease per |ω|²", ""),
+    "q_attitude": ("decrease per |q|²", ""),
+    "margin": ("torque in hand on the weakest axis", "N m"),
+    "surface": ("|s| in the end, at most", "rad/s"),
+    "radius": ("spectral radius at the control period, at most", ""),
+    "eigenvalues": ("eigenvalues at the control period", ""),
+    "longest": ("longest period shown", "s"),
+}
+"""Numbers that make a proof and stand in no sentence: what each means, and its unit, which for V depends on the law."""
+
+
+def swatch(number: int) -> str:
+    """A law's colour as a little square."""
+    return f'<span class="swatch" style="background:{colour(number)}"></span>'
+
+
+def section(flights: Sequence[Flight]) -> str:
+    """The section as HTML; nothing where no flight has a certificate."""
+    told = [_law(flight.certificate, number) for number, flight in enumerate(flights) if flight.certificate is not None]
+    if not told:
+        return ""
+    return f'<h2>What is proved</h2>\n<p class="note">{NOTE}{RECHECK}</p>\n<div class="laws">{"".join(told)}</div>'
+
+
+def _law(certificate: Certificate, number: int) -> str:
+    head = f"<h3>{swatch(number)}{escape(certificate.name)}</h3>"
+    claims = "".join(_claim(claim, certificate.subject) for claim in certificate.claims)
+    if not claims:
+        claims = (
+            '<p class="note">Nothing is claimed, so nothing is proved: this law comes without a Lyapunov function or a '
+            "sliding surface to build a proof on.</p>"
+        )
+    return f'<section class="law">{head}{claims}</section>\n'
+
+
+def _claim(claim: Claim, subject: Mapping[str, Any]) -> str:
+    told = sentence(claim, subject)
+    why = "".join(
+        f'<span class="why">{escape(f"Needed, but {o.outcome}: {OBLIGATIONS[o.name]}.")} <b>{escape(evidence(o))}</b></span>'
+        for o in claim.obligations
+        if o.outcome != "proved"
+    )
+    rows = "".join(_obligation(o) for o in claim.obligations)
+    return (
+        f'<details class="claim"><summary>{_outcome(claim.outcome)}<span class="what">'
+        f"<b>{escape(_sentence_case(HEADINGS[claim.kind]))}</b> {escape(_sentence_case(told))}. "
+        f"<small>By {escape(methods(claim))}.</small>{why}</span></summary>\n"
+        f'<div class="wide"><table class="text"><tbody>{rows}</tbody></table></div>{_numbers(claim)}'
+        f"<p><b>Assuming</b> {escape('; '.join(claim.assumptions))}.</p></details>\n"
+    )
+
+
+def _obligation(obligation: Obligation) -> str:
+    text = OBLIGATIONS[obligation.name]
+    found = f"<br><b>{escape(evidence(obligation))}</b>" if obligation.evidence else ""
+    return (
+        f"<tr><td>{_outcome(obligation.outcome)}</td><td>{escape(_sentence_case(text))}{found}</td>"
+        f"<td>{escape(obligation.how)}</td></tr>"
+    )
+
+
+def _outcome(outcome: str) -> str:
+    return f'<span class="outcome {escape(outcome)}">{escape(outcome)}</span>'
+
+
+def _numbers(claim: Claim) -> str:
+    """The numbers behind the sentence; those without bound, and a cross term that is not needed, are left out."""
+    values = claim.numbers | {name: value for name, value in claim.witness.items() if value}
+    items = [
+        f"<dt>{escape(meaning)}</dt><dd>{escape(_text(name, values[name]))}{f' {escape(unit)}' if unit else ''}</dd>"
+        for name, (meaning, unit) in SYMBOLS.items()
+        if values.get(name) is not None
+    ]
+    return f'<dl class="proof">{"".join(items)}</dl>' if items else ""
+
+
+def _sentence_case(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _text(name: str, value: Any) -> str:
+    if name != "eigenvalues":
+        return number_text(value)
+    pairs = (f"{real:.6g}{f' {chr(0xB1)} {imaginary:.3g} i' if imaginary else ''}" for real, imaginary in value)
+    # Conjugates come in pairs, which read as one.
+    return ", ".join(dict.fromkeys(pair.replace("± -", "± ") for pair in pairs))

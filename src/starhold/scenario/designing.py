@@ -1,0 +1,56 @@
+"""Gains that formulas give the laws of a scenario, with what they can be judged by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from starhold.errors import InputError
+from starhold.laws.interface import Field
+from starhold.scenario.reading import LawEntry, Scenario
+
+
+@dataclass(frozen=True)
+class Design:
+    """One designed law: the name the scenario gives it, its type, its form, the form's inputs and the gains it gives (SI, by
+    the names that files and `starhold laws` use; a diagonal matrix as the three numbers on its diagonal), and figures by
+    the names that `starhold design` prints: numbers, or arrays such as P (6, 6), rate first."""
+
+    name: str
+    law: str
+    form: str
+    inputs: dict[str, Any]
+    gains: dict[str, Any]
+    figures: dict[str, Any]
+
+
+def design(scenario: Scenario, law: str | None = None) -> list[Design]:
+    """Every law of a scenario that has a `form`, or the one of this name. InputError where there is none, or where its
+    figures cannot be computed."""
+    entries = scenario.laws if law is None else (scenario.pick(law),)
+    designed = [_design(scenario, entry, entry.form) for entry in entries if entry.form is not None]
+    if not designed:
+        allowed = 'at least one [[law]] with a form, such as type = "lqr", form = "II"'
+        raise InputError(scenario.where, "law" if law is None else f"law {law}", "no form", allowed)
+    return designed
+
+
+def _design(scenario: Scenario, entry: LawEntry, form: str) -> Design:
+    try:
+        with np.errstate(all="ignore"):
+            figures = dict(entry.law.explain(scenario.craft, entry.spec))
+    except ValueError as error:
+        raise InputError(scenario.where, f"law {entry.name}", "", f"figures cannot be computed: {error}") from None
+    inputs, gains = _named(entry.law.fields(form), entry.spec), _named(entry.law.fields(), entry.gains)
+    return Design(entry.name, entry.law.name, form, inputs, gains, figures)
+
+
+def _named(items: Iterable[Field], values: Iterable[Any]) -> dict[str, Any]:
+    """Values by name, as a file would hold them."""
+    return {
+        item.name: item.gain.choices[value] if item.gain.choices else value
+        for item, value in zip(items, values, strict=True)
+    }

@@ -1,0 +1,68 @@
+"""Closed loops that certificates are made of in these tests."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from starhold.algebra.quaternion import NO_TURN
+from starhold.algebra.vector import ZERO
+from starhold.conformance.bench import sample_loop
+from starhold.laws import lqr, matrix_pd
+from starhold.laws.catalogue import catalogue
+from starhold.laws.interface import fields
+from starhold.models.craft import make_craft, tensor
+
+FULL = make_craft([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]], torque_limit=0.05)
+PRINCIPAL = make_craft([2.0, 3.0, 4.0], torque_limit=0.05)
+UNEVEN = lqr.FormII((1.0, 1.0, 1.0, 1.0, 2.0, 3.0), (1e3, 1e3, 1e3))
+LOPSIDED = lqr.FormII((1e-4, 1e-4, 1e-4, 1.0, 4e4, 1.0), (1e3, 1e3, 1e3))
+"""Weights far from (2.24): of stiffnesses 1 to 200 no function in use here proves convergence from every rate."""
+
+
+def loop_of(law, gains, craft=FULL, **changes):
+    """A law in orbit under the gravity gradient, at an inertial target, feeding back q as it is."""
+    given = {"cover": "as_published", "target": NO_TURN, **changes}
+    return replace(sample_loop(catalogue()[law], gains), craft=craft, **given)
+
+
+def free(loop):
+    """The loop without torque from outside."""
+    still = loop.start._replace(position=ZERO, velocity=ZERO)
+    return replace(loop, orbit=False, gravity_gradient=False, start=still)
+
+
+def textbook():
+    """A loop of every law that can be certified, under the assumptions of its textbook: name to loop."""
+    formed = {
+        "lqr-I": (lqr.FormI(0.01, 0.01, 1.0), FULL),
+        "lqr-I-gyroscopic-left": (lqr.FormI(0.01, 0.01, 0.0), FULL),
+        "lqr-II": (lqr.FormII(UNEVEN.q, UNEVEN.r, 1), PRINCIPAL),
+        "lqr-II-uneven": (UNEVEN, PRINCIPAL),
+        "lqr-III": (lqr.FormIII(UNEVEN.q, UNEVEN.r, 1), FULL),
+        "lqr-numeric": (lqr.Numeric(np.diag(UNEVEN.q).tolist(), np.diag(UNEVEN.r).tolist()), FULL),
+        "matrix-pd-inertial": (matrix_pd.Inertial(10.0, 50.0, 0.05), FULL),
+        "matrix-pd-diagonal": (matrix_pd.Diagonal(10.0, 50.0, (0.05, 0.06, 0.07)), PRINCIPAL),
+    }
+    found = {}
+    for name, (spec, craft) in formed.items():
+        law = catalogue()[next(known for known in ("matrix-pd", "lqr") if name.startswith(known))]
+        found[name] = loop_of(law.name, law.design(craft, spec), craft)
+    for name in ("pd", "lyapunov", "sliding"):
+        for number, gains in enumerate(catalogue()[name].examples()):
+            found[f"{name}-{number}"] = loop_of(name, gains)
+    return found
+
+
+def random_craft(random):
+    """A body of random masses, with a full tensor."""
+    points = random.normal(size=(6, 3)) * random.uniform(0.5, 2.0, size=3)
+    inertia = np.trace(points.T @ points) * np.eye(3) - points.T @ points
+    return make_craft(inertia, torque_limit=0.05)
+
+
+def gain_names(law):
+    """The names of a law's gains."""
+    return [item.name for item in fields(catalogue()[law].gains)]
+
+
+__all__ = ["FULL", "LOPSIDED", "PRINCIPAL", "UNEVEN", "free", "gain_names", "loop_of", "random_craft", "tensor", "textbook"]

@@ -1,0 +1,197 @@
+"""An attempt to break what is proved: ten million random states, then the worst of them optimised."""
+
+from dataclasses import replace
+from functools import cache
+
+import numba
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from starhold.algebra.polynomial import exact
+from starhold.algebra.quaternion import derivative
+from starhold.algebra.vector import ZERO, add
+from starhold.analysis.trial import draw
+from starhold.certification.certify import Wanted, certify
+from starhold.certification.frame import take_apart, take_cross
+from starhold.certification.matrices import floats, number
+from starhold.certification.motion import Motion
+from starhold.certification.subject import make_subject
+from starhold.laws.interface import NoMemory, Seen
+from starhold.models.rigid_body import angular_acceleration
+from tests.certification.loops import textbook
+
+LOOPS = textbook()
+NAMES = sorted(name for name in LOOPS if not name.startswith("sliding"))
+STATES = -(-10_000_000 // len(LOOPS))
+
+
+@cache
+def motion_of(law):
+    """Compiled, over columns of states: torque and the derivative of the state, from the law's and the models' equations."""
+    torque = law.torque
+
+    @numba.njit(error_model="numpy")
+    def move(states, push, gains, craft, out):
+        for k in range(states.shape[1]):
+            q = (states[0, k], states[1, k], states[2, k], states[3, k])
+            w = (states[4, k], states[5, k], states[6, k])
+            seen = Seen(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.1)
+            u, _ = torque(seen, gains, craft, NoMemory())
+            d = derivative(q, w)
+            a = angular_acceleration(w, add(u, (push[0, k], push[1, k], push[2, k])), craft)
+            for i in range(4):
+                out[i, k] = d[i]
+            for i in range(3):
+                out[4 + i, k] = a[i]
+                out[7 + i, k] = u[i]
+
+    return move
+
+
+def moved(loop, states, push=None):
+    out = np.empty((10, states.shape[1]))
+    push = np.zeros((3, states.shape[1])) if push is None else push
+    motion_of(loop.law)(np.ascontiguousarray(states[:7]), np.ascontiguousarray(push), loop.gains, loop.craft, out)
+    return out
+
+
+class Function:
+    """V + epsilon q.Jw of a claim, its derivative and what sizes the derivative, in floats."""
+
+    def __init__(self, loop, witness):
+        stiffness = witness["stiffness"]
+        motion = Motion(make_subject(loop), None if stiffness is None else exact(stiffness))
+        frame = take_apart(motion)
+        self.P, self.s, self.epsilon = floats(frame.P), number(frame.s), witness["epsilon"]
+        self.J = floats(take_cross(motion).J) if self.epsilon else np.zeros((3, 3))
+        self.frame = frame
+
+    def value(self, states):
+        q, w = states[:4], states[4:7]
+        return 0.5 * np.einsum("ik,ij,jk->k", w, self.P, w) + self.s * (1.0 - q[0])
+
+    def slope(self, states, rates):
+        """(V + epsilon C)' and the sum of the sizes of its parts, of which rounding takes a share."""
+        w, q = states[4:7], states[1:4]
+        parts = (
+            np.einsum("ik,ij,jk->k", w, self.P, rates[4:7]),
+            -self.s * rates[0],
+            self.epsilon * np.einsum("ik,ij,jk->k", rates[1:4], self.J, w),
+            self.epsilon * np.einsum("ik,ij,jk->k", q, self.J, rates[4:7]),
+        )
+        lengths = np.linalg.norm(w, axis=0) * np.linalg.norm(self.P, 2) * np.linalg.norm(rates[4:7], axis=0)
+        return sum(parts), lengths + sum(abs(part) for part in parts)
+
+
+def worst_first(loop, score, states):
+    """The states with the highest score, improved by an optimiser that leaves the attitude of unit length."""
+    best = states[:, np.argsort(score(states))[-6:]]
+    size = np.abs(best[4:7]).max() + 1e-12
+    found = [states]
+    for start in best.T:
+
+        def climb(x):
+            q = x[:4] / np.linalg.norm(x[:4])
+            return -float(score(np.concatenate([q, x[4:7] * size])[:, None])[0])
+
+        x0 = np.concatenate([start[:4], start[4:7] / size])
+        end = minimize(climb, x0, method="Nelder-Mead", options={"maxiter": 600}).x
+        found.append(np.concatenate([end[:4] / np.linalg.norm(end[:4]), end[4:7] * size, np.zeros(9)])[:, None])
+    return np.concatenate(found, axis=1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_no_proved_obligation_breaks(name):
+    loop = LOOPS[name]
+    certificate = certify(loop, name, Wanted(disturbance=1e-4))
+    random = np.random.default_rng(11)
+    for claim in certificate.claims:
+        assert claim.outcome == "proved"
+        if claim.kind in ("convergence", "torque-limit", "disturbance"):
+            function = Function(loop, claim.witness)
+            level = claim.numbers["level"]
+            reach = 50.0 * function.s if level is None else min(level, 1e6 * function.s)
+            states = draw(STATES // 3, function.P, function.s, reach, random)
+            # Some near rest, where the derivative is smallest.
+            states[4:7, ::3] *= 10.0 ** random.uniform(-9, 0, size=states[4:7, ::3].shape[1])
+            attack(loop, claim, function, states)
+
+
+def attack(loop, claim, function, states):
+    if claim.kind == "disturbance":
+
+        def rising(x):
+            # Along the gradient, where a torque does most.
+            p = np.linalg.solve(function.J.T, function.P @ x[4:7]) + function.epsilon * x[1:4]
+            p = claim.numbers["torque"] * p / np.maximum(np.linalg.norm(p, axis=0), 1e-300)
+            slope, size = function.slope(x, moved(loop, x, p))
+            n, w = claim.numbers, claim.witness
+            # Only outside the ball that the proof leaves out.
+            a, b = np.linalg.norm(x[4:7], axis=0), np.linalg.norm(x[1:4], axis=0)
+            W = np.linalg.norm(floats(function.frame.W), 2)
+            inside = w["q_rate"] * a**2 + w["q_attitude"] * b**2 <= n["torque"] * (W * a + w["epsilon"] * b) * (1 + 1e-9)
+            return np.where(inside, -1.0, slope / size)
+    else:
+
+        def rising(x):
+            slope, size = function.slope(x, moved(loop, x))
+            return slope / np.maximum(size, 1e-300)
+
+    states = worst_first(loop, rising, states)
+    assert rising(states).max() <= 1e-13
+    if claim.kind == "torque-limit":
+        inside = states[:, function.value(states) <= (claim.numbers["level"] or np.inf)]
+        assert np.abs(moved(loop, inside)[7:]).max() <= loop.craft.torque_limit * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize(
+    ("kind", "numbers", "witness"),
+    [
+        ("torque-limit", {"level": 10.0}, {}),
+        ("convergence", {}, {"stiffness": 3.0}),
+        ("convergence", {}, {"epsilon": 300.0}),
+        ("disturbance", {}, {"q_rate": 1e3, "q_attitude": 1e3}),
+    ],
+)
+def test_the_attack_breaks_what_is_false(kind, numbers, witness):
+    """Claims made too strong by these factors, with the same states as the proved ones."""
+    loop = LOOPS["lqr-III"]
+    claim = certify(loop, "", Wanted(disturbance=1e-4)).claim(kind)
+    strong = replace(
+        claim,
+        numbers={k: v * numbers[k] if k in numbers else v for k, v in claim.numbers.items()},
+        witness={k: v * witness[k] if k in witness else v for k, v in claim.witness.items()},
+    )
+    function = Function(loop, strong.witness)
+    level = strong.numbers["level"]
+    states = draw(20_000, function.P, function.s, 50.0 * function.s if level is None else level, np.random.default_rng(1))
+    with pytest.raises(AssertionError):
+        attack(loop, strong, function, states)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(set(LOOPS) - set(NAMES)))
+def test_no_proved_surface_breaks(name):
+    """s.Js' <= sum of |s_i| (torque_i - reach_i) outside the layer, for any torque within the bounds."""
+    loop = LOOPS[name]
+    certificate = certify(loop, name, Wanted(disturbance=1e-3))
+    claim = certificate.claim("sliding")
+    assert claim.outcome == "proved"
+    random = np.random.default_rng(12)
+    J = np.array(loop.craft.inertia)
+    K = np.diag(loop.gains.slope) if np.ndim(loop.gains.slope) == 1 else np.array(loop.gains.slope)
+    states = draw(STATES, J, 0.05, 0.5, random)
+    states[4:7] *= 10.0 ** random.uniform(-6, 0, size=states.shape[1])
+    s = states[4:7] + K @ states[1:4]
+    push = np.array(claim.numbers["torque"])[:, None] * np.sign(s)
+    rates = moved(loop, states, push)
+    slope = np.einsum("ik,ij,jk->k", s, J, rates[4:7] + K @ rates[1:4])
+    outside = (np.abs(s) > loop.gains.layer).all(axis=0)
+    assert outside.sum() > STATES // 4
+    promised = -np.abs(s).sum(axis=0) * claim.numbers["margin"]
+    assert (slope[outside] <= promised[outside] + 1e-12).all()
+    # On the surface the angle falls.
+    on_it = np.einsum("ik,ij,jk->k", -states[1:4], K, states[1:4])
+    assert (on_it[np.linalg.norm(states[1:4], axis=0) > 1e-8] < 0.0).all()
