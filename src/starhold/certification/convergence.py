@@ -86,7 +86,8 @@ def stiffnesses(motion: Motion) -> list[Any]:
         return []
     if values[-1] <= values[0] * (1.0 + 1e-9):
         return [exact(number(K[0][0]))]
-    between: list[float] = np.geomspace(values[0], values[-1], 7)[[3, 4, 2, 5, 1, 6, 0]].tolist()
+    ratio = float(values[-1] / values[0])
+    between = [float(values[0]) * ratio ** (step / 6.0) for step in (3, 4, 2, 5, 1, 6, 0)]
     return [exact(float(f"{k:.4g}")) for k in between]
 
 

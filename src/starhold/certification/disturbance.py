@@ -11,7 +11,17 @@ from flint import fmpq
 from starhold.algebra.polynomial import exact
 from starhold.certification.certificate import EXACT_SIGN, Claim, Obligation
 from starhold.certification.convergence import ALMOST, ASSUMPTIONS, Basin
-from starhold.certification.frame import Cross, Frame, ShapeError, contents, decrease, known_torque_felt, margin, take_cross
+from starhold.certification.frame import (
+    Cross,
+    Frame,
+    ShapeError,
+    contents,
+    decrease,
+    known_torque_felt,
+    margin,
+    take_cross,
+    turn_of,
+)
 from starhold.certification.matrices import (
     Rows,
     blocks,
@@ -102,7 +112,7 @@ def _claim(
     start = exact(below(level * (1 - rho) / (1 + rho)))
     if end >= start or end >= frame.s:
         return None
-    angle = 2.0 * math.acos(1.0 - number(end / frame.s)) * (1.0 + 1e-9) + 1e-15
+    angle = float(turn_of(end / frame.s).upper().mid()) * (1.0 + 1e-15)
     held = contents(start, frame.P, frame.s)
     told = {
         "level": number(level),

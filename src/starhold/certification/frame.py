@@ -9,15 +9,14 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from flint import fmpq
+from flint import arb, fmpq
 
-from starhold.algebra.polynomial import Polynomial, pieces
+from starhold.algebra.polynomial import Polynomial, exact, pieces
 from starhold.certification.matrices import (
     Rows,
     blocks,
     greatest,
     identity,
-    number,
     plus,
     root_above,
     root_below,
@@ -192,6 +191,11 @@ def margin(frame: Frame, cross: Cross, epsilon: Any, rho: Any) -> Rows:
     return blocks(scaled(frame.P, rho), scaled(transposed(cross.J), epsilon), identity(3, rho * frame.s))
 
 
+def turn_of(share: Any) -> arb:
+    """The angle whose V at rest is this share of s, 1 - cos(angle/2); without cancellation for small ones."""
+    return 4 * (arb(share) / 2).sqrt().asin()
+
+
 def contents(start: Any | None, P: Rows, s: Any) -> dict[str, Any]:
     """What {V <= start} holds: the largest turn from rest (rad), the largest rate on target, and the largest rate at
     every attitude (rad/s; None: not every attitude is in it); all from below. For start None everything."""
@@ -201,7 +205,6 @@ def contents(start: Any | None, P: Rows, s: Any) -> dict[str, Any]:
     everywhere = None
     if start >= 2 * s:
         everywhere = below(root_below(2 * (start - 2 * s) / inertia))
-    share = number(start / s)
-    turn = 2.0 * math.pi if start >= 2 * s else 2.0 * math.acos(1.0 - share) * (1.0 - 1e-12)
+    turn = 2.0 * math.pi if start >= 2 * s else below(exact(float(turn_of(start / s).lower().mid())))
     rate = below(root_below(2 * start / inertia))
     return {"turn": turn, "rate": rate, "rate_everywhere": everywhere, "everything": False}

@@ -22,9 +22,12 @@ from starhold.certification.refutation import rational_turn, state_evidence
 from starhold.certification.subject import Subject, below
 from starhold.models.craft import check_inertia
 
-TOLD = tuple(
-    "inertia within the tolerance" if a == "inertia exactly as given" else a for a in (*ASSUMPTIONS, "target at rest")
-)
+_OTHER = {
+    "inertia exactly as given": "inertia within the tolerance",
+    "no torque from outside but what the law cancels": "no torque from outside",
+}
+TOLD = (*(_OTHER.get(a, a) for a in ASSUMPTIONS), "target at rest")
+ANY = tuple(a for a in TOLD if a != "inertia within the tolerance")
 NAMES = ("j11", "j22", "j33", "j12", "j13", "j23")
 
 
@@ -225,7 +228,10 @@ class Family:
 
 
 def _proved(numbers: dict[str, Any], witness: dict[str, Any], obligations: list[tuple[str, str]]) -> Claim:
-    return Claim("inertia", numbers, witness, TOLD, tuple(Obligation(name, how, "proved") for name, how in obligations))
+    assumptions = ANY if numbers["tolerance"] is None else TOLD
+    return Claim(
+        "inertia", numbers, witness, assumptions, tuple(Obligation(name, how, "proved") for name, how in obligations)
+    )
 
 
 def _cover(cover: str) -> tuple[str, str]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
-from flint import fmpq
+from flint import arb, fmpq
 
 from starhold.algebra.polynomial import Polynomial, exact, jointly
 from starhold.certification.certificate import EXACT, EXACT_SIGN, Claim, Obligation
@@ -96,16 +96,16 @@ def surface_claim(subject: Subject) -> Claim | None:
     steep, cover = spectral_norm_above(found.K), subject.loop.cover
     add("other rest repels" if cover == "as_published" else "no switch of the double cover", EXACT_SIGN, "proved")
     numbers["surface"] = above(size)
-    numbers["angle"] = 2.0 * math.asin(min(1.0, number(turn))) * (1.0 + 1e-9)
+    numbers["angle"] = float((2 * arb(min(turn, fmpq(1))).asin()).upper().mid()) * (1.0 + 1e-15)
     numbers["rate"] = above(size + steep * turn)
     numbers |= {"everything": True, "start": None, "turn": 2.0 * math.pi, "rate_start": None}
     if cover != "as_published":
         # While |s| < K_min the half of the double cover that is fed back is not left: there (q0)' > 0 at q0 = 0.
         start = exact(below(least(subject.inertia) * stiff * stiff / 2 * ALMOST))
         fastest = root_below(2 * start / greatest(subject.inertia))
-        widest = min(1.0, number(fastest / steep))
+        widest = arb(min(fastest / steep, fmpq(1)))
         numbers |= {"everything": False, "start": number(start), "rate_start": below(fastest)}
-        numbers["turn"] = 2.0 * math.asin(widest) * (1.0 - 1e-12)
+        numbers["turn"] = float((2 * widest.asin()).lower().mid()) * (1.0 - 1e-15)
     return finish()
 
 

@@ -74,23 +74,22 @@ def place(numbers: Mapping[str, Any]) -> str:
     turn, on_target = numbers.get("turn"), numbers.get("rate_start", numbers.get("rate"))
     if turn is None:
         return ""
-    at_rest = "from rest at every attitude" if turn >= math.pi else f"from rest at up to {angle(turn)}"
-    return at_rest + (f", or on target at up to {speed(on_target)}" if on_target else "")
+    held = "rest at every attitude" if turn >= math.pi else f"rest at up to {angle(turn)}"
+    held += f" and, on target, {speed(on_target)} about any axis" if on_target else ""
+    return f"from the level set of V that holds {held},"
 
 
 def _cover(numbers: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if subject["double_cover"] == "hysteresis":
-        return ", whichever quaternion it starts with (global on rotations, robust by hysteresis)"
+        return ", whichever quaternion it starts with: global on rotations, and robust by its hysteresis"
     if subject["double_cover"] == "shortest":
-        return " by the shorter way (a switch at half a turn, which noise may hold there)"
+        return " by the shorter way; at half a turn the feedback switches, and noise may hold it there"
     if numbers.get("everything") or numbers.get("rate_everywhere") is not None:
-        return " from almost everywhere there; q and -q differ, so it may unwind"
+        return ", almost always at q0 = 1; it may turn the long way to get there (unwinding)"
     return ""
 
 
 def _convergence(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
-    if n.get("rate_everywhere", 0) is None and "turn" not in n:
-        return "from every attitude and rate the body comes to rest on target"
     return f"{place(n)} the body comes to rest on target{_cover(n, subject)}".strip()
 
 
@@ -101,19 +100,17 @@ def _torque_limit(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 
 def _inertia(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if n["tolerance"] is None:
-        return f"{place(n)} it converges whatever the inertia is"
+        return f"{place(n)} it converges whatever the inertia of the body really is"
     share = shown(100.0 * n["tolerance"], " %")
-    if "start" not in n:
-        return f"it converges with every entry of the inertia off by up to {share} of sqrt(J_ii J_jj)"
-    return f"{place(n)} it converges with every entry of the inertia off by up to {share} of sqrt(J_ii J_jj)"
+    return f"{place(n)} it converges with every entry of the inertia off by up to {share} of sqrt(J_ii J_jj)".strip()
 
 
 def _disturbance(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if "angle" not in n:
-        return f"a torque of up to {n['torque']:.3g} N m leaves the body near the target"
+        return f"a torque from outside of up to {n['torque']:.3g} N m leaves the body near the target"
     return (
-        f"against any torque of up to {n['torque']:.3g} N m, {place(n)}, it ends within {angle(n['angle'], up=True)} "
-        f"and {speed(n['rate'], up=True)}"
+        f"{place(n)} against any torque from outside of up to {shown(n['torque'], ' N m')}, it ends within "
+        f"{angle(n['angle'], up=True)} and {speed(n['rate'], up=True)}"
     )
 
 
@@ -122,18 +119,24 @@ def _sampling(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if n["longest"] is None:
         return text
     longest = shown(n["longest"], " s")
-    return f"{text} and for every period up to {longest}" if n["every_shorter"] else f"{text} and for {longest}"
+    if n["every_shorter"]:
+        return f"{text} and for every period up to {longest}"
+    return f"{text} and for {longest} (periods between these are not shown)"
 
 
 def _sliding(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     most = max(n["torque"])
-    against = f"against {most:.3g} N m on an axis" if most else "without torque from outside"
+    against = (
+        f"against any torque from outside of up to {most:.3g} N m on an axis" if most else "without torque from outside"
+    )
     if "angle" not in n:
         return f"the surface is reached {against}"
-    where = place(n) if n["everything"] else place({**n, "rate_everywhere": None})
-    end = (
-        f"ends within {angle(n['angle'], True)} and {speed(n['rate'], True)}" if n["surface"] else "slides to rest on target"
-    )
+    where = place(n)
+    if not n["everything"]:
+        where = place({**n, "rate_everywhere": None}).replace("level set of V", "level set of s.Js")
+    end = "slides to rest on target"
+    if n["surface"]:
+        end = f"ends within {angle(n['angle'], True)} and {speed(n['rate'], True)} of the target, at either quaternion of it"
     return f"{where} the motion reaches the surface {against} and {end}"
 
 

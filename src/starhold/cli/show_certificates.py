@@ -70,7 +70,9 @@ def print_proved(certificates: Sequence[Certificate]) -> None:
 
 def reasons(claim: Claim) -> list[str]:
     """Why a claim is not proved, one line an obligation."""
-    return [f"{o.outcome}: {OBLIGATIONS[o.name]}: {evidence(o)}" for o in claim.obligations if o.outcome != "proved"]
+    return [
+        f"needed, but {o.outcome}: {OBLIGATIONS[o.name]}; {evidence(o)}" for o in claim.obligations if o.outcome != "proved"
+    ]
 
 
 def assumptions(certificate: Certificate) -> str:

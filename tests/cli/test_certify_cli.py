@@ -1,0 +1,138 @@
+"""Certificates as a user meets them: what is printed, what is written, the exit codes."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+CRAFT = """
+name = "small"
+[spacecraft]
+inertia = [2.0, 3.0, 4.0]
+torque_limit = "0.05 N m"
+[initial]
+attitude = [1, 0, 0, 0.1]
+rate = [0, 0, 0]
+[simulation]
+duration = 5.0
+control_period = 0.1
+"""
+PD = '[[law]]\ntype = "pd"\nk_rate = 0.09\nk_attitude = 0.009\n'
+WEAK = '[certify]\ndisturbance = "1e-5 N m"\n[[law]]\ntype = "sliding"\nslope = 0.08\nreach = 1e-6\n'
+"""A switching torque below what it must stand."""
+MPC = '[[law]]\ntype = "mpc"\nq_attitude = 0.2\nq_rate = 0.2\nr = 50\n'
+
+pytestmark = pytest.mark.xdist_group("cli")
+
+
+def starhold(*words, cwd):
+    return subprocess.run([sys.executable, "-m", "starhold", *words], cwd=cwd, capture_output=True, text=True)
+
+
+@pytest.fixture(scope="module")
+def proved(tmp_path_factory):
+    """A folder with a scenario and its certificate, and what was printed."""
+    folder = tmp_path_factory.mktemp("proved")
+    (folder / "small.toml").write_text(CRAFT + PD)
+    return folder, starhold("certify", "small.toml", "-o", "out", cwd=folder)
+
+
+def outcomes(path):
+    content = json.loads(path.read_text())
+    assert content["format"] == "starhold certificate 1"
+    return {c["name"]: {claim["kind"]: claim["outcome"] for claim in c["claims"]} for c in content["certificates"]}
+
+
+def test_certify_writes_a_certificate(proved):
+    folder, done = proved
+    assert done.returncode == 0, done.stderr
+    found = outcomes(folder / "out" / "certificate.json")
+    assert set(found) == {"pd"}
+    assert set(found["pd"].values()) == {"proved"}
+    assert {"convergence", "torque-limit", "inertia", "sampling"} <= set(found["pd"])
+    for word in ("proved", "converges", "within the torque limit", "rigid body", "flown", "starhold check"):
+        assert word in done.stdout
+    assert sorted(path.name for path in (folder / "out").iterdir()) == ["certificate.json"]
+
+
+def test_existing_results_are_refused(proved):
+    folder, _ = proved
+    again = starhold("certify", "small.toml", "-o", "out", cwd=folder)
+    assert again.returncode == 2
+    assert again.stderr.count("\n") == 1
+    assert "--force" in again.stderr
+    before = (folder / "out" / "certificate.json").read_bytes()
+    assert starhold("certify", "small.toml", "-o", "out", "--force", cwd=folder).returncode == 0
+    assert (folder / "out" / "certificate.json").read_bytes() == before
+
+
+def test_check_passes_what_certify_wrote_and_fails_what_was_changed(proved):
+    folder, _ = proved
+    good = starhold("check", "out/certificate.json", cwd=folder)
+    assert good.returncode == 0, good.stdout + good.stderr
+    assert " 0 fail" in good.stdout
+    content = json.loads((folder / "out" / "certificate.json").read_text())
+    limit = next(claim for claim in content["certificates"][0]["claims"] if claim["kind"] == "torque-limit")
+    limit["numbers"]["limit"] *= 0.5
+    (folder / "changed.json").write_text(json.dumps(content))
+    bad = starhold("check", "changed.json", cwd=folder)
+    assert bad.returncode == 1
+    assert "fails" in bad.stdout
+    none = starhold("check", "absent.json", cwd=folder)
+    assert none.returncode == 2
+    assert none.stderr.count("\n") == 1
+
+
+def test_a_refuted_claim_prints_its_state(tmp_path):
+    (tmp_path / "weak.toml").write_text(CRAFT + WEAK)
+    done = starhold("certify", "weak.toml", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 3, done.stderr
+    assert "refuted" in done.stdout
+    assert outcomes(tmp_path / "out" / "certificate.json")["sliding"]["sliding"] == "refuted"
+    content = json.loads((tmp_path / "out" / "certificate.json").read_text())
+    obligations = content["certificates"][0]["claims"][0]["obligations"]
+    state = next(o["evidence"]["state"] for o in obligations if o["outcome"] == "refuted")
+    assert f"{state['rate'][0]:.4g}" in done.stdout
+
+
+def test_what_nobody_can_prove_is_undecided(tmp_path):
+    (tmp_path / "mpc.toml").write_text(CRAFT + MPC)
+    done = starhold("certify", "mpc.toml", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 4, done.stderr
+    assert "no claim" in done.stdout
+    assert outcomes(tmp_path / "out" / "certificate.json") == {"mpc": {}}
+
+
+@pytest.mark.parametrize(
+    ("line", "key"),
+    [
+        ('rate = "-1 deg/s"', "certify.rate"),
+        ('rate = "anything"', "certify.rate"),
+        ('turn = "181 deg"', "certify.turn"),
+        ("inertia_tolerance = 1.5", "certify.inertia_tolerance"),
+        ("disturbance = -1e-5", "certify.disturbance"),
+        ("speed = 1.0", "certify.speed"),
+    ],
+)
+def test_bad_wishes_are_one_line_and_exit_code_2(line, key, tmp_path):
+    (tmp_path / "bad.toml").write_text(CRAFT + f"[certify]\n{line}\n" + PD)
+    done = starhold("certify", "bad.toml", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert key in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_compare_writes_the_certificates_beside_the_report(tmp_path):
+    (tmp_path / "two.toml").write_text(CRAFT + PD + MPC)
+    done = starhold("compare", "two.toml", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    found = outcomes(tmp_path / "out" / "certificate.json")
+    assert list(found) == ["pd", "mpc"]
+    assert found["pd"]["convergence"] == "proved"
+    assert "Certified on this spacecraft" in done.stdout
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "<h2>What is proved</h2>" in page
+    assert "Nothing is claimed" in page

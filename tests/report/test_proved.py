@@ -1,0 +1,184 @@
+"""The page says of each law what is proved, what is not and why, and nothing of a certificate is taken for markup."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from functools import cache
+
+import pytest
+
+from starhold.certification.certificate import Certificate, Claim, Obligation
+from starhold.certification.certify import Wanted, certify
+from starhold.certification.wording import HEADINGS, OBLIGATIONS, methods, sentence
+from starhold.laws.catalogue import catalogue
+from starhold.report.page import render
+from starhold.report.proved import section
+from starhold.scenario.building import build
+from starhold.scenario.reading import parse
+from tests.report import flown
+from tests.report.test_page import Reader
+
+LAWS = """
+name = "small"
+[spacecraft]
+inertia = [2.0, 3.0, 4.0]
+torque_limit = "0.05 N m"
+[initial]
+attitude = [1, 0, 0, 0.1]
+rate = [0, 0, 0]
+[simulation]
+duration = 10.0
+control_period = 0.1
+[[law]]
+type = "pd"
+k_rate = 0.09
+k_attitude = 0.009
+[[law]]
+type = "sliding"
+name = "weak"
+slope = 0.08
+reach = 1e-6
+[[law]]
+type = "mpc"
+q_attitude = 0.2
+q_rate = 0.2
+r = 50
+"""
+
+
+@cache
+def certificates() -> tuple[Certificate, ...]:
+    """Everything proved, one claim refuted, no claim."""
+    scenario = parse(LAWS, "test")
+    return tuple(certify(build(scenario, entry), entry.name, Wanted(disturbance=1e-5)) for entry in scenario.laws)
+
+
+def told(*given: Certificate) -> Reader:
+    """The section about certificates."""
+    first = flown.flights()[0]
+    return Reader(section([replace(first, name=c.name, certificate=c) for c in given]))
+
+
+def plain(text: str) -> str:
+    return re.sub(r"\s+", " ", text)
+
+
+def outcomes(reader: Reader) -> list[str]:
+    return [str(attrs["class"]).split()[1] for _, attrs in reader.tags if str(attrs.get("class")).startswith("outcome ")]
+
+
+def test_every_claim_is_told_with_its_obligations_and_assumptions() -> None:
+    certificate = certificates()[0]
+    assert {claim.kind for claim in certificate.claims} == {
+        "convergence",
+        "torque-limit",
+        "disturbance",
+        "inertia",
+        "sampling",
+    }
+    found = told(certificate)
+    text = plain(found.text).lower()
+    for claim in certificate.claims:
+        assert HEADINGS[claim.kind].lower() in text
+        assert sentence(claim, certificate.subject).lower() in text
+        assert methods(claim).lower() in text
+        for obligation in claim.obligations:
+            assert OBLIGATIONS[obligation.name].lower() in text
+        for assumption in claim.assumptions:
+            assert assumption.lower() in text
+    assert sum(tag == "details" for tag, _ in found.tags) == len(certificate.claims)
+    assert set(outcomes(found)) == {"proved"}
+    assert "starhold check certificate.json" in text
+
+
+def test_numbers_of_the_proof_are_shown() -> None:
+    certificate = certificates()[0]
+    text = plain(told(certificate).text)
+    limit, sampling = certificate.claim("torque-limit"), certificate.claim("sampling")
+    assert limit is not None
+    assert sampling is not None
+    assert f"V at the start, at most {limit.numbers['start']:.6g}" in text
+    assert f"{sampling.numbers['longest']:.6g} s" in text
+    real, imaginary = sampling.numbers["eigenvalues"][0]
+    assert f"{real:.6g} ± {abs(imaginary):.3g} i" in text
+    assert "None" not in text
+
+
+def test_a_refuted_claim_shows_the_state_that_refutes_it() -> None:
+    certificate = certificates()[1]
+    claim = certificate.claim("sliding")
+    assert claim is not None
+    assert claim.outcome == "refuted"
+    refuted = claim.refutation()
+    assert refuted is not None
+    found = told(certificate)
+    # One for the claim and one for the obligation.
+    assert outcomes(found).count("refuted") == 2
+    rate = ", ".join(f"{x:.4g}" for x in refuted.evidence["state"]["rate"])
+    assert f"w = ({rate}) rad/s" in plain(found.text)
+    # Seen without opening anything.
+    page = section([replace(flown.flights()[0], certificate=certificate)])
+    summaries = re.findall(r"<summary>.*?</summary>", page, flags=re.DOTALL)
+    assert any(rate in summary for summary in summaries)
+
+
+def test_a_law_without_claims_says_so() -> None:
+    found = told(certificates()[2])
+    assert outcomes(found) == []
+    assert "Nothing is claimed" in found.text
+
+
+def test_flights_without_certificates_have_no_section() -> None:
+    assert section(flown.flights()) == ""
+    assert "What is proved" not in render(flown.scenario(), flown.flights())
+
+
+def test_what_certificates_hold_is_no_markup() -> None:
+    obligation = Obligation("form", flown.HOSTILE, "undecided", {"reason": flown.HOSTILE})
+    claim = Claim("convergence", {"everything": True}, {}, (flown.HOSTILE,), (obligation,))
+    subject = {"double_cover": "as_published"}
+    found = told(Certificate(flown.HOSTILE, subject, (claim,)))
+    assert not any(tag == "script" for tag, _ in found.tags)
+    assert found.text.count(flown.HOSTILE) >= 5
+    assert outcomes(found) == ["undecided", "undecided"]
+
+
+def test_the_whole_page_with_certificates_is_deterministic_and_loads_nothing() -> None:
+    flights = [replace(f, certificate=c) for f, c in zip(flown.flights(), certificates()[:2], strict=True)]
+    page = render(flown.scenario(), flights)
+    assert page == render(flown.scenario(), flights)
+    found = Reader(page)
+    assert sum(tag == "script" for tag, _ in found.tags) == 4
+    assert not any({"src", "href"} & set(attrs) for _, attrs in found.tags)
+    assert page.index("<h2>Ranking</h2>") < page.index("<h2>What is proved</h2>") < page.index("<h2>The turning body</h2>")
+
+
+@pytest.mark.parametrize("kind", sorted(HEADINGS))
+def test_every_kind_of_claim_can_be_told_where_it_is_undecided(kind: str) -> None:
+    numbers = {
+        "convergence": {"rate_everywhere": 0.1, "everything": False},
+        "torque-limit": {"limit": 0.1, "kind": "axis", "level": 0.0, "start": 0.0, "turn": 0.0, "rate": 0.0},
+        "inertia": {"tolerance": 0.4},
+        "disturbance": {"torque": 1e-3},
+        "sampling": {"period": 1.0, "radius": 1.2, "eigenvalues": [[1.2, 0.0]], "longest": None, "every_shorter": False},
+        "sliding": {"torque": [0.0, 0.0, 0.0], "margin": 1e-3},
+    }[kind]
+    claim = Claim(kind, numbers, {}, (), (Obligation("form", "exact identity", "undecided", {"reason": "why not"}),))
+    found = told(Certificate("law", {"double_cover": "shortest"}, (claim,)))
+    assert outcomes(found) == ["undecided"] * 2
+    assert "why not" in found.text
+
+
+def test_every_law_that_comes_with_starhold_is_told() -> None:
+    """Whatever certificates the examples of all laws give can be shown."""
+    scenario = parse(LAWS, "test")
+    base = build(scenario, scenario.laws[0])
+    made = [
+        certify(replace(base, law=law, gains=gains), law.name)
+        for law in catalogue().values()
+        for gains in law.examples()[:1]
+    ]
+    found = told(*made)
+    assert sum(tag == "section" for tag, _ in found.tags) == len(made)
+    assert set(outcomes(found)) <= {"proved", "refuted", "undecided"}
