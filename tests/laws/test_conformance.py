@@ -25,13 +25,13 @@ GOOD = Path(catalogue()["pd"].module.__file__).read_text()
 
 BROKEN = {
     "wrong unit": ('Gain("N m s", above', 'Gain("N m", above', "keeps_units"),
-    "torque at rest": ("return add(feedback,", "return add(add(feedback, (1e-9, 0.0, 0.0)),", "rests_on_target"),
-    "anti-damping": ("scale(-gains.k_rate, seen.rate)", "scale(gains.k_rate, seen.rate)", "decreases_lyapunov"),
-    "wrong sign of stiffness": ("scale(-gains.k_attitude", "scale(gains.k_attitude", "decreases_lyapunov"),
+    "torque at rest": ("craft), feedback)", "craft), add(feedback, (1e-9, 0.0, 0.0)))", "rests_on_target"),
+    "anti-damping": ("scale(gains.k_rate, seen.rate)", "scale(-gains.k_rate, seen.rate)", "decreases_lyapunov"),
+    "wrong sign of stiffness": ("scale(gains.k_attitude", "scale(-gains.k_attitude", "decreases_lyapunov"),
     "even in q": ("vector_part(seen.attitude)", "scale(seen.attitude[0], vector_part(seen.attitude))", "double_cover"),
     "not finite": (
-        "tracking_torque(seen, craft)), memory",
-        "scale(0.0 / (1.0 - seen.attitude[0] * seen.attitude[0]), seen.rate)), memory",
+        "subtract(tracking_torque(seen, craft), feedback)",
+        "subtract(scale(0.0 / (1.0 - seen.attitude[0] * seen.attitude[0]), seen.rate), feedback)",
         "stays_finite",
     ),
     "example out of bounds": ("Gains(0.5, 0.05)", "Gains(-0.5, 0.05)", "declares_itself"),

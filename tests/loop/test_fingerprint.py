@@ -39,10 +39,10 @@ def flown(tmp_path):
 def test_second_start_does_not_compile_and_an_edit_does(flown, tmp_path):
     text = Path(catalogue()["pd"].module.__file__).read_text()
     constants = tmp_path / "my_constants.py"
-    constants.write_text("FACTOR = -1.0\n")
+    constants.write_text("FACTOR = 1.0\n")
     law = tmp_path / "edited.py"
     law.write_text(
-        text.replace("scale(-gains.k_rate,", "scale(FACTOR * gains.k_rate,").replace(
+        text.replace("scale(gains.k_rate,", "scale(FACTOR * gains.k_rate,").replace(
             "from starhold.models.craft import Craft",
             "from starhold.models.craft import Craft\nfrom my_constants import FACTOR",
         )
@@ -82,7 +82,7 @@ def test_a_law_installed_as_a_library_is_watched_too(flown, tmp_path):
     law.write_text(Path(catalogue()["pd"].module.__file__).read_text())
     first = flown(law)
     assert flown(law)[1] == "hits 1 misses 0"
-    law.write_text(law.read_text().replace("scale(-gains.k_rate,", "scale(-2.0 * gains.k_rate,"))
+    law.write_text(law.read_text().replace("scale(gains.k_rate,", "scale(2.0 * gains.k_rate,"))
     edited = flown(law)
     assert edited[1] == "hits 0 misses 1"
     assert edited[0] != first[0]

@@ -1,0 +1,373 @@
+"""The closed loop a certificate speaks of, as its checker reads it: from the law's and the models' own equations, in exact
+polynomials, for the inertia that is given or for every one near it. Nothing here is shared with the certifier.
+
+Variables: q0..q3 error attitude, w1..w3 rate relative to the target, r and a the target's rate and acceleration, e the
+torque the models know, m one that nobody knows, t what the actuators give, d11..d33 how far the inertia is from the one
+given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations, product
+from typing import Any
+
+from flint import fmpq
+
+from starhold.algebra.polynomial import Monomial, Polynomial, constants, jointly
+from starhold.algebra.quaternion import derivative, vector_part
+from starhold.algebra.vector import add, apply, cross, dot, scale, subtract
+from starhold.certification.checker.exact import (
+    ZERO,
+    CheckError,
+    Dual,
+    Interval,
+    Rows,
+    Truths,
+    demand,
+    dual,
+    falls,
+    intervals,
+    inverted,
+    radius_of,
+    replaced,
+    root_up,
+    sorted_by,
+    times,
+    turned,
+    unit,
+)
+from starhold.certification.checker.subject import Subject, mixed, named, quadratic, variables
+from starhold.laws.interface import Seen
+from starhold.models.craft import Craft
+from starhold.models.rigid_body import angular_acceleration, kinetic_energy
+
+TURN, RATE, ATTITUDE = named("q"), named("w"), named("q", 0)
+W = variables(RATE)
+SHIFTS = (("d11", "d12", "d13"), ("d12", "d22", "d23"), ("d13", "d23", "d33"))
+
+
+@dataclass(frozen=True)
+class Frame:
+    """V = w.Pw/2 + s (1 - q0), V' = -w.Dw + (at most kappa |w|3) + w.Eq + w.Wm; felt: the modelled torque acts as m does;
+    tops: P is nowhere larger than the largest of these, for any inertia the loop may have."""
+
+    P: Rows
+    tops: list[Rows]
+    s: Any
+    D: Rows
+    kappa: Any
+    E: Rows
+    W: Rows
+    felt: bool
+
+
+@dataclass(frozen=True)
+class Crossed:
+    """C = q.Jw, C' = -q.Aq - q.Bw + (at most sigma |w|2) + q.m."""
+
+    J: Rows
+    A: Rows
+    B: Rows
+    sigma: Any
+
+
+class Loop:
+    """The loop of a subject, for its inertia, for another plant of `inertia` that the law does not know, or, with `shifted`,
+    for every inertia at once. The last two have a target at rest. `tolerance`: how far entries of the inertia may be from
+    those given, of the roots of the moments; None in a shifted loop lets them be anything. `stiffness`: V is the kinetic
+    energy and 2 stiffness (1 - q0); None: the law's own."""
+
+    def __init__(
+        self,
+        subject: Subject,
+        stiffness: Any | None = None,
+        inertia: Rows | None = None,
+        shifted: bool = False,
+        tolerance: Any | None = None,
+    ) -> None:
+        self.subject, self.stiffness, self.shifted = subject, stiffness, shifted
+        self.inertia = subject.inertia if inertia is None else inertia
+        self.still = shifted or inertia is not None or not subject.moving
+        self.reaches: Rows | None = None
+        if tolerance is not None:
+            J = subject.inertia
+            self.reaches = [[tolerance * root_up(J[i][i] * J[j][j]) for j in range(3)] for i in range(3)]
+
+    @cached_property
+    def plant(self) -> tuple[Craft, Polynomial]:
+        """The craft that moves, with its inverse inertia times a factor, and that factor."""
+        if not self.shifted:
+            return self._craft(self.inertia, inverted(self.inertia)), Polynomial.constant(1)
+        J: Any = [
+            [c + Polynomial.variable(d) for c, d in zip(*rows, strict=True)]
+            for rows in zip(self.inertia, SHIFTS, strict=True)
+        ]
+        adjugate = [cross(tuple(J[1]), tuple(J[2])), cross(tuple(J[2]), tuple(J[0])), cross(tuple(J[0]), tuple(J[1]))]
+        return self._craft(J, turned([list(row) for row in adjugate])), dot(tuple(J[0]), adjugate[0])  # pyright: ignore
+
+    def _craft(self, inertia: Rows, inverse: Rows) -> Craft:
+        limit: Any = self.subject.torque_limit
+        return Craft(
+            constants(tuple(map(tuple, inertia))),
+            constants(tuple(map(tuple, inverse))),
+            variables(("limit",))[0] if limit is None else constants(limit),
+            constants(self.subject.gravity),
+        )
+
+    @cached_property
+    def seen(self) -> Seen:
+        """What the law is told."""
+        still = constants((0, 0, 0))
+        turning, spinning = (still, still) if self.still else (variables(named("r")), variables(named("a")))
+        rate, relative = add(W, turning), subtract(spinning, cross(W, turning))
+        outside, position, period = variables(named("e")), variables(named("p")), Polynomial.variable("period")
+        return Seen(variables(ATTITUDE), W, rate, turning, relative, outside, position, period)  # pyright: ignore
+
+    @cached_property
+    def moving(self) -> Seen:
+        """The same with derivatives under a torque t, times the plant's factor."""
+        craft, factor = self.plant
+        seen = self.seen
+        torque = add(variables(named("t")), add(seen.external_torque, variables(named("m"))))
+        absolute = angular_acceleration(seen.body_rate, torque, craft)
+        swing = subtract(absolute, scale(factor, seen.target_acceleration))  # pyright: ignore
+        spin = derivative(seen.attitude, seen.rate)
+        told = dual(seen)
+        attitude = tuple(Dual(q, factor * change) for q, change in zip(seen.attitude, spin, strict=True))
+        rate = tuple(Dual(w, change) for w, change in zip(seen.rate, swing, strict=True))
+        return told._replace(attitude=attitude, rate=rate, body_rate=add(rate, told.target_rate))  # pyright: ignore
+
+    @cached_property
+    def pieces(self) -> list[tuple[Truths, dict[str, Polynomial]]]:
+        """The law's torque on each of its pieces."""
+        subject = self.subject
+        demand(not subject.law.card.compiled_only, "the law is no equation")
+        craft = self._craft(subject.inertia, inverted(subject.inertia))
+        found = jointly(subject.law.torque(self.seen, subject.gains, craft, subject.memory)[0])
+        read = {
+            name for truths, parts in found for p in (*parts, *(c.positive for c, _ in truths)) for name in p.variables()
+        }
+        demand(
+            all(name[0] in "qwraem" for name in read), "the torque depends on more than attitude, rate, target and torque"
+        )
+        return [(truths, dict(zip(named("t"), parts, strict=True))) for truths, parts in found]
+
+    def resting(self, sign: int = 1) -> tuple[Truths, dict[str, Polynomial]]:
+        """The piece around rest at attitude (sign, 0, 0, 0)."""
+        around = [
+            (truths, torque)
+            for truths, torque in self.pieces
+            if all((value := at_rest(c.positive, sign)) != 0 and (value > 0) == truth for c, truth in truths)
+        ]
+        demand(len(around) == 1, "the law switches at rest on target")
+        return around[0]
+
+    @cached_property
+    def reach(self) -> Any | None:
+        """The rate up to which the piece around rest holds; None for any."""
+        found = intervals(self.resting()[0], W) or []
+        return min((abs(end) for ends in found for end in ends if end is not None), default=None)
+
+    def linear(self, sign: int = 1) -> tuple[Rows, Rows]:
+        """K_rate and K_attitude of the torque -K_rate w - K_attitude q near rest at (sign, 0, 0, 0), target at rest."""
+        gains: list[Rows] = [[], []]
+        for component in self.resting(sign)[1].values():
+            own = component.only(lambda m: all(name in ATTITUDE or name in RATE for name in m))
+            demand(at_rest(own, sign) == 0, "the torque at rest on target is not zero")
+            for gain, names in zip(gains, (RATE, TURN), strict=True):
+                gain.append([-at_rest(_factor(own, name), sign) for name in names])
+        return gains[0], gains[1]
+
+    @cached_property
+    def lyapunov(self) -> Dual:
+        """V, and its derivative under a torque t, times the plant's factor."""
+        seen, craft = self.moving, dual(self.plant[0])
+        if self.stiffness is not None:
+            return kinetic_energy(seen.rate, craft) + 2 * dual(self.stiffness) * (1 - seen.attitude[0])  # pyright: ignore
+        function = self.subject.law.lyapunov
+        if function is None:
+            raise CheckError("the law declares no V")
+        return function(seen, dual(self.subject.gains), craft)
+
+    def slope(self, torque: Mapping[str, Polynomial]) -> Polynomial:
+        """V' on a piece of the law, times the plant's factor; of a target's motion nothing may be left in it."""
+        return replaced(self.lyapunov.slope, torque)
+
+    def accelerations(self, torque: Mapping[str, Polynomial]) -> list[Polynomial]:
+        """The derivative of the rate on a piece of the law, times the plant's factor."""
+        return [replaced(w.slope, torque) for w in self.moving.rate]  # pyright: ignore
+
+    def over(self, polynomial: Polynomial) -> dict[Monomial, Polynomial]:
+        """The coefficients, over the plant's factor, of a polynomial's monomials in the state: constant, or linear in how
+        far the inertia is from the one given."""
+        factor = self.plant[1]
+        found: dict[Monomial, Polynomial] = {}
+        for monomial, inner in sorted_by(polynomial, lambda name: name[0] == "d").items():
+            whole = factor.terms[()]
+            share: Any = Polynomial({(): inner.terms.get((), ZERO) / whole})
+            rest = inner - share * factor
+            share = share + Polynomial({m: c / whole for m, c in rest.terms.items() if len(m) == 1})
+            demand(not (inner - share * factor).terms, f"{' '.join(monomial)} depends on the inertia in another way")
+            found[monomial] = share
+        return {monomial: share for monomial, share in found.items() if share.terms}
+
+    def plain(self, polynomial: Polynomial) -> dict[Monomial, Any]:
+        """The same where no coefficient may depend on the inertia."""
+        found = self.over(polynomial)
+        strange = [" ".join(monomial) for monomial, share in found.items() if share.value is None]
+        demand(not strange, f"the terms {', '.join(strange)} depend on the inertia")
+        return {monomial: share.value for monomial, share in found.items()}
+
+    @cached_property
+    def frame(self) -> Frame:
+        """The parts of V, and of V' around rest; a CheckError where they have others."""
+        V = self.lyapunov.value
+        kinds = _by_kind(V)
+        demand(set(kinds) <= {"", "o", "ww"}, "V has terms it must not have")
+        s = V.terms.get((), ZERO)
+        demand(
+            not (kinds.get("", ZERO) + kinds.get("o", ZERO) - s * (1 - Polynomial.variable("q0"))).terms,
+            "V is not s (1 - q0)",
+        )
+        P, tops = self._kinetic(kinds.get("ww", Polynomial({})))
+        slope = self.slope(self.resting()[1]).only(lambda m: not set(letters(m)) & set("ra"))
+        kinds = _by_kind(slope)
+        strange = set(kinds) - {"ww", "www", "qw", "mw", "ew"}
+        demand(not strange, f"V' has the terms {', '.join(sorted(strange))}")
+        terms = self.plain(slope)
+        kappa = ZERO
+        for monomial, c in terms.items():
+            if letters(monomial) == "www":
+                share = fmpq(1, 27)
+                for name in set(monomial):
+                    share *= monomial.count(name) ** monomial.count(name)
+                kappa += abs(c) * root_up(share)
+        D = times(-1, quadratic(terms, RATE))
+        W = mixed(terms, RATE, named("m"))
+        return Frame(P, tops, s, D, kappa, mixed(terms, RATE, TURN), W, _felt(kinds, "w"))
+
+    def _kinetic(self, own: Polynomial) -> tuple[Rows, list[Rows]]:
+        """P, and what it is nowhere larger than the largest of."""
+        if not self.shifted:
+            P = times(2, quadratic(own.terms, RATE))
+            return P, [P]
+        g = own.terms.get(("d11", "w1", "w1"), ZERO) * 2
+        kinetic: Any = dot(W, apply(self.plant[0].inertia, W))
+        rest: Any = own - kinetic * (g / 2)
+        demand(not rest.terms, "P is not a multiple of the inertia")
+        # x.Jx is largest in a box where each entry deviates with the sign of x_i x_j.
+        signs = [(1, a, b) for a in (1, -1) for b in (1, -1)]
+        reaches = self.reaches or unit(3, ZERO)
+        tops = [
+            [[g * (c + e[i] * e[j] * reaches[i][j]) for j, c in enumerate(row)] for i, row in enumerate(self.inertia)]
+            for e in signs
+        ]
+        return times(g, self.inertia), tops
+
+    @cached_property
+    def crossed(self) -> Crossed:
+        """The parts of C = q.Jw, and of C' around rest; a CheckError where they have others."""
+        seen = self.moving
+        C: Any = dot(vector_part(seen.attitude), apply(dual(self.plant[0].inertia), seen.rate))
+        slope = replaced(C.slope, self.resting()[1])
+        demand(not any(set(letters(m)) & set("ra") for m in slope.terms), "C' depends on the target's motion")
+        kinds = _by_kind(slope)
+        strange = set(kinds) - {"qq", "qw", "qww", "oww", "mq", "eq"}
+        demand(not strange, f"C' has the terms {', '.join(sorted(strange))}")
+        terms = self.plain(slope.only(lambda m: len(letters(m)) == 2))
+        demand(mixed(terms, TURN, named("m")) == unit(3), "torque from outside acts on C in another way")
+        _felt(kinds, "q")
+        forms = self.over(slope.only(lambda m: len(letters(m)) == 3))
+        total = ZERO
+        for name in ATTITUDE:
+            # |(q0, q)| = 1, so that the sum of q_k w.F_k w is at most the root of the sum of squares.
+            total += self._largest({_without(m, name): share for m, share in forms.items() if name in m}) ** 2
+        return Crossed(self.inertia, times(-1, quadratic(terms, TURN)), times(-1, mixed(terms, TURN, RATE)), root_up(total))
+
+    def _largest(self, form: Mapping[Monomial, Polynomial]) -> Any:
+        """The largest eigenvalue in modulus of a quadratic form over the box, which is at a corner: it is convex."""
+        names = sorted({name for share in form.values() for name in share.variables()})
+        if names and self.reaches is None:
+            raise CheckError("a form depends on the inertia, which may be any")
+        reaches = [] if self.reaches is None else [self.reaches[int(n[1]) - 1][int(n[2]) - 1] for n in names]
+        largest = ZERO
+        for corner in product(*[(-reach, reach) for reach in reaches]):
+            shift = dict(zip(names, corner, strict=True))
+            largest = max(largest, radius_of(quadratic({m: share.at(shift) for m, share in form.items()}, RATE)))
+        return largest
+
+    @cached_property
+    def falls(self) -> bool:
+        """Whether, on every piece of a law of several, V' is a sum of polynomials of one rate each that are negative except
+        at rest, the torque having no jumps; torque from outside is left aside."""
+        boxes = [(found, torque) for t, torque in self.pieces if (found := intervals(t, W)) is not None]
+        for (first, one), (second, other) in combinations(boxes, 2):
+            border = _border(first, second)
+            jumps = border is not None and any(replaced(one[name] - other[name], border).terms for name in one)
+            if jumps:
+                return False
+        return all(self._falls(truths, torque) for truths, torque in self.pieces)
+
+    def _falls(self, truths: Truths, torque: Mapping[str, Polynomial]) -> bool:
+        found = intervals(truths, W)
+        slope = self.slope(torque).only(lambda m: letters(m) not in ("ew", "mw"))
+        terms = self.plain(slope)
+        allowed = {(name,) * power for name in RATE for power in (1, 2)}
+        return found is None or (
+            set(terms) <= allowed
+            and all(
+                falls(terms.get((name,), ZERO), terms.get((name, name), ZERO), ends)
+                for name, ends in zip(RATE, found, strict=True)
+            )
+        )
+
+
+def _border(first: Sequence[Interval], second: Sequence[Interval]) -> dict[str, Polynomial] | None:
+    """The rates that are fixed where two boxes have points in common; None where they have none."""
+    fixed: dict[str, Polynomial] = {}
+    for name, one, other in zip(RATE, first, second, strict=True):
+        low = max((end for end in (one[0], other[0]) if end is not None), default=None)
+        high = min((end for end in (one[1], other[1]) if end is not None), default=None)
+        if low is not None and high is not None:
+            if low > high:
+                return None
+            if low == high:
+                fixed[name] = constants(low)
+    return fixed
+
+
+def at_rest(polynomial: Polynomial, sign: int) -> Any:
+    """The value at rest at attitude (sign, 0, 0, 0)."""
+    terms = polynomial.terms.items()
+    return sum((c * sign ** len(m) for m, c in terms if all(name == "q0" for name in m)), ZERO)
+
+
+def _factor(polynomial: Polynomial, name: str) -> Polynomial:
+    """What multiplies a variable that occurs once in a term."""
+    return Polynomial({_without(m, name): c for m, c in polynomial.terms.items() if m.count(name) == 1})
+
+
+def _without(monomial: Monomial, name: str) -> Monomial:
+    return tuple(other for other in monomial if other != name)
+
+
+def letters(monomial: Monomial) -> str:
+    """The kinds of variables in a monomial in the state; o is q0."""
+    return "".join(sorted("o" if name == "q0" else name[0] for name in monomial if name[0] != "d"))
+
+
+def _by_kind(polynomial: Polynomial) -> dict[str, Polynomial]:
+    return {kind: polynomial.only(lambda m, k=kind: letters(m) == k) for kind in {letters(m) for m in polynomial.terms}}
+
+
+def _felt(kinds: Mapping[str, Polynomial], state: str) -> bool:
+    """Whether the modelled torque acts where the unknown one does; a CheckError where it is neither that nor cancelled."""
+    known, unknown = kinds.get(f"e{state}"), kinds.get(f"m{state}", Polynomial({}))
+    if known is None:
+        return False
+    as_unknown = replaced(known, dict(zip(named("e"), variables(named("m")), strict=True)))
+    demand(not (as_unknown - unknown).terms, "the modelled torque is cancelled in part")
+    return True

@@ -1,0 +1,152 @@
+"""The subject of a certificate, as its checker reads it: numbers at their exact values, and bounds that must hold over the
+whole orbit. Nothing here is shared with the certifier.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from flint import arb
+
+from starhold.algebra.polynomial import Monomial, Polynomial, constants
+from starhold.algebra.vector import cross, dot, scale, subtract
+from starhold.certification.checker.exact import (
+    ONE,
+    ZERO,
+    CheckError,
+    Rows,
+    demand,
+    down,
+    plus,
+    radius_of,
+    rational,
+    root_up,
+    unit,
+    up,
+)
+from starhold.laws.catalogue import Law, catalogue
+from starhold.models.craft import EARTH, Craft, check_inertia, make_craft
+from starhold.models.environment import gravity_gradient
+
+
+def named(letter: str, first: int = 1) -> tuple[str, ...]:
+    """The three variables of a vector, or the four of a quaternion."""
+    return tuple(f"{letter}{k}" for k in range(first, 4))
+
+
+def variables(names: Sequence[str]) -> Any:
+    """Polynomials of these names."""
+    return tuple(Polynomial.variable(name) for name in names)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """The subject of a certificate, its numbers exact; `memory` is what the law starts with."""
+
+    law: Law
+    gains: Any
+    memory: Any
+    cover: str
+    width: Any
+    inertia: Rows
+    limit: str
+    torque_limit: Any | None
+    gravity: Any
+    moving: bool
+    target_rate: Any
+    target_acceleration: Any
+    modelled: list[Any]
+    modelled_norm: Any
+    disturbance: Any
+    period: Any
+
+
+def read_subject(given: Mapping[str, Any]) -> Subject:
+    """The subject in a certificate whose keys and types are in order; a CheckError where it says what cannot be."""
+    law = catalogue().get(given["law"])
+    if law is None:
+        raise CheckError(f"there is no law {given['law']}")
+    fields = {item.name: item.gain for item in law.fields()}
+    demand(set(given["gains"]) == set(fields), "the gains are not those of the law")
+    gains = law.gains(**{name: gain.check(given["gains"][name]) for name, gain in fields.items()})
+    tensor = check_inertia(given["inertia"])
+    demand(tensor.tolist() == np.array(given["inertia"], dtype=float).tolist(), "the inertia is not symmetric")
+    limit, orbit = given["torque_limit"], given["orbit"]
+    gravity = orbit["gravitational_parameter"] if orbit else EARTH
+    demand(gravity > 0, "the gravitational parameter is not positive")
+    craft = make_craft(tensor, math.inf if limit is None else limit, gravity)
+    demand(given["control_period"] > 0, "the control period is not positive")
+    for name in ("target_rate", "target_acceleration", "modelled_torque_norm", "disturbance", "hysteresis_width"):
+        demand(given[name] >= 0, f"{name} is negative")
+    # A law that plans ahead makes a costly memory, which no claim needs.
+    memory = None if law.card.compiled_only else law.remember(gains, craft, given["control_period"])
+    inertia = [[rational(x) for x in row] for row in given["inertia"]]
+    _check_bounds(given, inertia)
+    exact = {name: rational(given[name]) for name in ("target_rate", "target_acceleration", "disturbance")}
+    return Subject(
+        law=law,
+        gains=constants(gains),
+        memory=memory,
+        cover=given["double_cover"],
+        width=rational(given["hysteresis_width"]),
+        inertia=inertia,
+        limit=given["limit"],
+        torque_limit=None if limit is None else rational(limit),
+        gravity=rational(gravity),
+        moving=given["target"] != "inertial",
+        modelled=[rational(x) for x in given["modelled_torque"]],
+        modelled_norm=rational(given["modelled_torque_norm"]),
+        period=rational(given["control_period"]),
+        **exact,
+    )
+
+
+def _check_bounds(given: Mapping[str, Any], inertia: Rows) -> None:
+    """That the bounds of the target's motion and of the modelled torque hold over the whole orbit."""
+    demand(min(given["modelled_torque"]) >= 0, "a bound of the modelled torque is negative")
+    demand(
+        given["orbit"] is not None or not (given["gravity_gradient"] or given["target"] == "orbital"), "there is no orbit"
+    )
+    if given["orbit"] is None:
+        return
+    r, v = ([arb(rational(x)) for x in given["orbit"][key]] for key in ("position", "velocity"))
+    mu = arb(rational(given["orbit"]["gravitational_parameter"]))
+    h = cross(tuple(r), tuple(v))  # pyright: ignore
+    distance, momentum = arb(dot(r, r)).sqrt(), arb(dot(h, h))  # pyright: ignore
+    # The eccentricity vector, v x h/mu - r/|r|; the perigee is at p/(1 + e) also of a parabola or hyperbola.
+    apse = subtract(scale(1 / mu, cross(tuple(v), h)), scale(1 / distance, tuple(r)))  # pyright: ignore
+    eccentricity = arb(root_up(up(arb(dot(apse, apse)))))
+    perigee = arb(down(momentum / mu / (1 + eccentricity)))
+    demand(bool(perigee > 0), "the orbit falls into the centre")
+    if given["target"] == "orbital":
+        turning, swinging = momentum.sqrt() / perigee**2, 2 * mu * eccentricity / perigee**3
+        demand(rational(given["target_rate"]) >= up(turning), "the target turns faster")
+        demand(rational(given["target_acceleration"]) >= up(swinging), "the target's rate changes faster")
+    if given["gravity_gradient"]:
+        strength = up(3 * mu / perigee**3)
+        position = variables(named("p"))
+        craft = Craft(constants(tuple(map(tuple, inertia))), constants(tuple(map(tuple, inertia))), 0.0, 0.0)  # pyright: ignore
+        torque: Any = gravity_gradient(position, Polynomial.constant(1), craft)  # pyright: ignore
+        for component, bound in zip(torque, given["modelled_torque"], strict=True):
+            largest = radius_of(quadratic(component.terms, named("p")))
+            demand(rational(bound) >= strength * largest, "the modelled torque is larger")
+        # |n x Jn| is how far the moments deviate from their mean in direction n: at most half their range.
+        half = rational(given["modelled_torque_norm"]) / strength
+        moments = np.linalg.eigvalsh([[float(x) for x in row] for row in given["inertia"]])
+        mean = rational(float(moments[0] + moments[2]) / 2)
+        demand(radius_of(plus(inertia, unit(3, mean), -ONE)) <= half, "the norm of the modelled torque is larger")
+
+
+def quadratic(terms: Mapping[Monomial, Any], names: Sequence[str]) -> Rows:
+    """The symmetric matrix of a quadratic form."""
+    table = mixed(terms, names, names)
+    return [[c if i == j else c / 2 for j, c in enumerate(row)] for i, row in enumerate(table)]
+
+
+def mixed(terms: Mapping[Monomial, Any], rows: Sequence[str], columns: Sequence[str]) -> Rows:
+    """The coefficients of the products of two variables."""
+    return [[terms.get(tuple(sorted((a, b))), ZERO) for b in columns] for a in rows]
