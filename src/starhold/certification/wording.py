@@ -150,6 +150,15 @@ _SENTENCES = {
 }
 
 
+def eigenvalues(claim: Claim) -> str:
+    """The eigenvalues of a sampled loop, one of each conjugate pair; empty for other claims."""
+    shown_once: list[str] = []
+    for real, imaginary in claim.numbers.get("eigenvalues", []):
+        if imaginary >= 0.0:
+            shown_once.append(f"{real:.6g}" + (f" ± {imaginary:.6g} i" if imaginary else ""))
+    return ", ".join(dict.fromkeys(shown_once))
+
+
 def evidence(obligation: Obligation) -> str:
     """Why an obligation is refuted or undecided."""
     found = obligation.evidence

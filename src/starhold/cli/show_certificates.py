@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 
 from starhold.certification.certificate import Certificate, Claim
-from starhold.certification.wording import HEADINGS, OBLIGATIONS, evidence, methods, sentence
+from starhold.certification.wording import HEADINGS, OBLIGATIONS, eigenvalues, evidence, methods, sentence
 from starhold.cli.show import console
 
 if TYPE_CHECKING:
@@ -37,6 +37,8 @@ def print_certificate(tried: Tried) -> None:
     for claim in certificate.claims:
         told = sentence(claim, certificate.subject)
         table.add_row(f"  {_coloured(claim.outcome)}", HEADINGS[claim.kind], f"{told} [dim]({methods(claim)})[/dim]")
+        if "eigenvalues" in claim.numbers:
+            table.add_row("", "", f"[dim]eigenvalues {eigenvalues(claim)}[/dim]")
         for line in reasons(claim):
             table.add_row("", "", line)
     if certificate.claims:
