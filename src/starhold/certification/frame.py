@@ -17,6 +17,7 @@ from starhold.certification.matrices import (
     blocks,
     greatest,
     identity,
+    matrix_of,
     plus,
     root_above,
     root_below,
@@ -24,7 +25,7 @@ from starhold.certification.matrices import (
     symmetric,
     transposed,
 )
-from starhold.certification.motion import ATTITUDE, AXES, RATE, Motion, ShapeError, Truths, at_rest, matrix_of
+from starhold.certification.motion import ATTITUDE, AXES, RATE, Motion, ShapeError, Truths, at_rest
 from starhold.certification.subject import below
 
 OUTSIDE = ("e", "m")

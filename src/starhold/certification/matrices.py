@@ -13,7 +13,7 @@ import numpy as np
 from flint import arb, fmpq, fmpq_mat
 from numpy.typing import NDArray
 
-from starhold.algebra.polynomial import exact
+from starhold.algebra.polynomial import Polynomial, exact
 
 Rows: TypeAlias = list[list[Any]]
 
@@ -136,6 +136,14 @@ def _root(x: Any, nudge: float) -> Any:
     while (found * found < x) if nudge > 1.0 else (found * found > x):
         found *= exact(nudge)
     return found
+
+
+def matrix_of(polynomial: Polynomial, first: Sequence[str], second: Sequence[str]) -> Rows:
+    """The coefficients of first_i second_j; of a quadratic form (first is second) the symmetric matrix."""
+    if tuple(first) == tuple(second):
+        form = [[polynomial.terms.get(tuple(sorted((a, b))), fmpq(0)) for b in second] for a in first]
+        return [[c if i == j else c / 2 for j, c in enumerate(row)] for i, row in enumerate(form)]
+    return [[polynomial.terms.get(tuple(sorted((a, b))), fmpq(0)) for b in second] for a in first]
 
 
 def characteristic_roots(a: Rows) -> list[tuple[Any, int]]:

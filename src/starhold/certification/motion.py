@@ -6,7 +6,6 @@ Variables: q0..q3 error attitude, w1..w3 rate relative to the target, r1..r3 the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -169,11 +168,3 @@ def at_rest(value: Any) -> tuple[Truths, Polynomial]:
 def cases(value: Any) -> list[tuple[Truths, Polynomial]]:
     """The pieces of a piecewise polynomial."""
     return [(truths, parts[0]) for truths, parts in jointly([value])]
-
-
-def matrix_of(polynomial: Polynomial, first: Sequence[str], second: Sequence[str]) -> Rows:
-    """The coefficients of first_i second_j; of a quadratic form (first is second) the symmetric matrix."""
-    if tuple(first) == tuple(second):
-        form = [[polynomial.terms.get(tuple(sorted((a, b))), fmpq(0)) for b in second] for a in first]
-        return [[c if i == j else c / 2 for j, c in enumerate(row)] for i, row in enumerate(form)]
-    return [[polynomial.terms.get(tuple(sorted((a, b))), fmpq(0)) for b in second] for a in first]

@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 from flint import arb, fmpq
 
-from starhold.algebra.polynomial import Polynomial, exact, jointly
+from starhold.algebra.polynomial import Polynomial, exact, jointly, pieces
 from starhold.certification.certificate import EXACT, EXACT_SIGN, Claim, Obligation
 from starhold.certification.convergence import ALMOST
 from starhold.certification.matrices import (
@@ -112,7 +112,7 @@ def surface_claim(subject: Subject) -> Claim | None:
 def take_surface(motion: Motion) -> Surface:
     """The surface and the switching torque; ArithmeticError where they are not of that form."""
     plain: list[Polynomial] = list(motion.subject.law.module.surface(motion.seen, motion.gains))
-    K = [matrix_of_linear(component, AXES) for component in plain]
+    K = [[component.terms.get((name,), fmpq(0)) for name in AXES] for component in plain]
     for component, axis in zip(plain, RATE, strict=True):
         if (component.only(lambda m: not (len(m) == 1 and m[0] in AXES)) - Polynomial.variable(axis)).terms:
             raise ArithmeticError(f"the surface is not w + Kq: {component}")
@@ -141,35 +141,34 @@ def take_surface(motion: Motion) -> Surface:
     return Surface(K, reach, max(layers))
 
 
-def matrix_of_linear(component: Polynomial, names: Any) -> list[Any]:
-    """The coefficients of single variables."""
-    return [component.terms.get((name,), fmpq(0)) for name in names]
-
-
 def _side(truths: Truths, s: Polynomial, positive: bool) -> bool:
     """Whether the conditions say that s > c or s < -c for a c that is not negative."""
     for condition, truth in truths:
         if not truth:
             continue
-        factor = condition.positive.terms.get(next(iter(s.terms)), fmpq(0)) / next(iter(s.terms.values()))
-        offset = (condition.positive - factor * s).value
+        factor, offset = _along(condition.positive, s)
         if offset is not None and offset <= 0 and factor != 0 and (factor > 0) == positive:
             return True
     return False
 
 
+def _along(polynomial: Polynomial, s: Polynomial) -> tuple[Any, Any | None]:
+    """The factor and offset with which a polynomial is factor s + offset; None for an offset that is not constant."""
+    first, c = next(iter(s.terms.items()))
+    factor = polynomial.terms.get(first, fmpq(0)) / c
+    return factor, (polynomial - factor * s).value
+
+
 def _layer(motion: Motion, axis: int, slope: Any, reach: Any, s: Polynomial) -> Any:
     """The thickness at which the torque within the layer meets that outside; zero where it switches by sign."""
     thickness = reach / slope
-    for truths, parts in jointly([motion.torque[axis]]):
-        for condition, _ in truths:
-            factor = condition.positive.terms.get(next(iter(s.terms)), fmpq(0)) / next(iter(s.terms.values()))
-            offset = (condition.positive - factor * s).value
+    for case in pieces(motion.torque[axis]):
+        for condition, _ in case.truths:
+            factor, offset = _along(condition.positive, s)
             if offset == 0:
                 return fmpq(0)
             if factor != 0 and offset is not None and abs(offset / factor) == thickness:
                 return thickness
-        del parts
     raise ArithmeticError("the boundary layer is not where its torque meets the switching torque")
 
 

@@ -10,7 +10,8 @@ from flint import arb, fmpq
 
 from starhold.algebra.polynomial import Polynomial, constants, exact
 from starhold.algebra.vector import Matrix, Vector
-from starhold.certification.matrices import Rows, greatest, inverse, least, number, rows, scaled
+from starhold.certification.matrices import Rows, greatest, inverse, least, matrix_of, number, rows, scaled
+from starhold.errors import InputError
 from starhold.laws.catalogue import Law
 from starhold.laws.interface import fields
 from starhold.loop.closed_loop import ClosedLoop
@@ -104,7 +105,7 @@ def below(x: Any) -> float:
 
 def exact_craft(inertia: Any, torque_limit: Any, gravity: Any) -> Craft:
     """A craft of constant polynomials with the exact inverse of its inertia; a limit that is infinite stays a variable."""
-    full = rows(tensor(inertia) if not isinstance(inertia, list) else inertia)
+    full = rows(tensor(inertia))
     limit = Polynomial.constant(torque_limit) if np.isfinite(torque_limit) else Polynomial.variable("limit")
     return Craft(as_tuple(full), as_tuple(inverse(full)), limit, Polynomial.constant(gravity))  # pyright: ignore
 
@@ -129,6 +130,8 @@ def perigee(loop: ClosedLoop) -> tuple[arb, arb, arb, arb]:
     h2 = sum(((r[i] * v[j] - r[j] * v[i]) ** 2 for i, j in ((0, 1), (1, 2), (2, 0))), arb(0))
     distance = sum((x * x for x in r), arb(0)).sqrt()
     energy = sum((x * x for x in v), arb(0)) / 2 - gravity / distance
+    if not h2 > 0:
+        raise InputError("orbit", "", "a path through the centre of attraction", "an orbit that passes beside it")
     squared = 1 + 2 * energy * h2 / gravity**2
     # Of a circle the ball of e2 may reach below zero, which e2 itself does not.
     eccentricity = squared.nonnegative_part().sqrt()
@@ -149,19 +152,9 @@ def _gravity_gradient_bounds(loop: ClosedLoop) -> tuple[Any, Any]:
 
 def _largest_form(quadratic: Polynomial) -> Any:
     """A bound of |quadratic form| over the unit sphere."""
-    form = form_of(quadratic, "p")
+    names = ("p1", "p2", "p3")
+    form = matrix_of(quadratic, names, names)
     return max(greatest(form), greatest(scaled(form, -1)), fmpq(0))
-
-
-def form_of(quadratic: Polynomial, name: str) -> Rows:
-    """The symmetric matrix of a quadratic form in three variables."""
-    names = [f"{name}{i}" for i in (1, 2, 3)]
-    form: Rows = [[fmpq(0)] * 3 for _ in names]
-    for monomial, c in quadratic.terms.items():
-        i, j = (names.index(variable) for variable in monomial)
-        form[i][j] = form[i][j] + c / 2
-        form[j][i] = form[j][i] + c / 2
-    return form
 
 
 def direction(name: str, first: int = 1, count: int = 3) -> Any:
