@@ -34,11 +34,12 @@ BEST = Wanted()
 
 
 def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certificate:
-    """The certificate of a closed loop. A law that is compiled-only, or declares neither V nor a surface, gets one without
-    claims, which is undecided."""
+    """The certificate of a closed loop. A law that is compiled-only or declares neither V nor a surface, and a loop with
+    wheels, get one without claims, which is undecided."""
     subject = make_subject(loop, wanted.disturbance)
     claims: list[Claim] = []
-    if not loop.law.card.compiled_only:
+    # The momentum that wheels store acts on the body too, which these proofs do not know of.
+    if not loop.law.card.compiled_only and loop.wheels is None:
         motion = Motion(subject)
         if loop.law.lyapunov is not None:
             rate = "best" if wanted.rate is None else None if wanted.rate == float("inf") else wanted.rate

@@ -99,14 +99,23 @@ def _fly(file: str, law: str | None, output: Path | None, force: bool, nested: b
 def design(
     file: ScenarioFile,
     law: Annotated[str | None, typer.Option(help="which law of the file; every one that has a form if not given")] = None,
+    map_to: Annotated[
+        Path | None, typer.Option("--map", metavar="FILE.png", help="draw the degree of stability over all gains")
+    ] = None,
 ) -> None:
     """Print the gains that formulas give: every law of a file that has a `form`."""
-    from starhold.cli.show import print_design
+    from starhold.cli.show import console, print_design
     from starhold.scenario import designing
     from starhold.scenario.reading import load
 
-    for found in designing.design(load(file), law):
+    scenario = load(file)
+    for found in designing.design(scenario, law):
         print_design(found)
+    if map_to is not None:
+        from starhold.report.stability_map import draw_map
+
+        draw_map(map_to, *designing.map_inputs(scenario, law))
+        console.print(f"Map: {map_to}", soft_wrap=True)
 
 
 app.command()(certifying.certify)
@@ -147,6 +156,7 @@ def scenarios(name: Annotated[str | None, typer.Argument(help="print this scenar
 def new(
     path: Annotated[Path, typer.Argument(metavar="FILE.toml", help="the file to write")],
     start: Annotated[str | None, typer.Option("--from", help="copy this built-in scenario instead of the template")] = None,
+    wheels: Annotated[bool, typer.Option("--wheels", help="a spacecraft with reaction wheels")] = False,
     schema: Annotated[bool, typer.Option("--schema", help="write a JSON Schema beside it, for editors")] = False,
     force: Force = False,
 ) -> None:
@@ -156,6 +166,9 @@ def new(
     from starhold.scenario.reading import builtin_names, builtin_text, nearest
     from starhold.scenario.template import template_text
 
+    if wheels and start is not None:
+        raise InputError("new", "--wheels", f"--from {start}", "one of the two")
+    start = "wheels-orbital" if wheels else start
     if start is not None and start not in builtin_names():
         raise InputError("new", "--from", start, nearest(start, builtin_names()))
     text = template_text() if start is None else builtin_text(start)

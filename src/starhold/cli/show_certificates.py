@@ -30,7 +30,10 @@ def print_certificate(tried: Tried) -> None:
     certificate, trial, inside = tried
     console.print(f"[bold]{certificate.name}[/bold]: {_coloured(certificate.outcome)}", highlight=False)
     if not certificate.claims:
-        console.print("  no claim: the law declares neither a Lyapunov function nor a sliding surface", highlight=False)
+        console.print(
+            "  no claim: proofs are for laws with a Lyapunov function or a surface, without wheels",
+            highlight=False,
+        )
     table = Table(show_edge=False, pad_edge=False, box=None, show_header=False)
     for _ in range(3):
         table.add_column(overflow="fold")

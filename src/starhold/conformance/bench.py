@@ -35,7 +35,8 @@ def random_seen(count: int, external: bool = True, seed: int = 11) -> Iterator[S
         rate: Vector = unflatten(random.normal(scale=0.05, size=3), ZERO)
         torque: Vector = unflatten(random.normal(scale=1e-5, size=3), ZERO) if external else ZERO
         position: Vector = unflatten(random.normal(scale=4e6, size=3), ZERO) if external else ZERO
-        yield Seen(attitude, rate, rate, ZERO, ZERO, torque, position, PERIOD)
+        stored: Vector = unflatten(random.normal(scale=0.1, size=3), ZERO) if external else ZERO
+        yield Seen(attitude, rate, rate, ZERO, ZERO, torque, position, PERIOD, stored)
 
 
 def sample_loop(law: Law, gains: Any) -> ClosedLoop:

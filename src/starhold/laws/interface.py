@@ -15,7 +15,7 @@ import numpy as np
 
 from starhold.algebra.quaternion import Quaternion
 from starhold.algebra.scalar import equation
-from starhold.algebra.vector import Vector, add, apply, subtract, swing
+from starhold.algebra.vector import ZERO, Vector, add, apply, subtract, swing
 from starhold.models.craft import Craft, compact
 
 
@@ -25,7 +25,8 @@ class Seen(NamedTuple):
     attitude: turn from the target axes to the body axes (scalar first); rate: angular velocity relative to the target
     (rad/s); body_rate: absolute angular velocity; target_rate: the target's (rad/s); target_acceleration: the derivative
     of target_rate as the turning body sees it (rad/s2); external_torque: the modelled torque at this attitude (N m);
-    position: from the centre of attraction (m); period: for which the torque will be held (s). Vectors are in body axes.
+    position: from the centre of attraction (m); period: for which the torque will be held (s); stored: the angular momentum
+    of the body's wheels (N m s). Vectors are in body axes.
     """
 
     attitude: Quaternion
@@ -36,6 +37,7 @@ class Seen(NamedTuple):
     external_torque: Vector
     position: Vector
     period: float
+    stored: Vector = ZERO
 
 
 @equation
@@ -50,6 +52,7 @@ def with_attitude(seen: Seen, attitude: Quaternion) -> Seen:
         seen.external_torque,
         seen.position,
         seen.period,
+        seen.stored,
     )
 
 

@@ -17,12 +17,16 @@ from starhold.algebra.vector import ZERO, Vector
 from starhold.laws.catalogue import Law
 from starhold.laws.double_cover import COVERS
 from starhold.laws.interface import NoMemory
-from starhold.models import actuator, environment, sensor, target
+from starhold.models import actuator, environment, rigid_body, sensor, target, wheeled_body
 from starhold.models.craft import Craft
 from starhold.models.rigid_body import State
+from starhold.models.wheeled_body import WheeledState
+from starhold.models.wheels import Wheels, allocate, allocate_peak
 
 Cover = Literal["as_published", "shortest", "hysteresis"]
 Limit = Literal["axis", "norm", "none"]
+Allocation = Literal["least-squares", "least-peak"]
+ALLOCATIONS = {"least-squares": allocate, "least-peak": allocate_peak}
 LIMITS = {"axis": actuator.limit_axis, "norm": actuator.limit_norm, "none": actuator.limit_none}
 
 
@@ -36,6 +40,7 @@ class Setup(NamedTuple):
     seed: int
     width: float
     dynamics: actuator.Dynamics
+    wheels: Any
 
 
 class Parts(NamedTuple):
@@ -50,6 +55,12 @@ class Parts(NamedTuple):
     limit: Callable[..., Any]
     begin: Callable[..., Any]
     response: Callable[..., Any]
+    tidy: Callable[..., Any]
+    with_torque: Callable[..., Any]
+    rates: Callable[..., Any]
+    stored: Callable[..., Any]
+    record: Callable[..., Any]
+    share: Callable[..., Any]
 
 
 class Carry(NamedTuple):
@@ -57,13 +68,32 @@ class Carry(NamedTuple):
     the target has to be continued from it), the side h = +-1 of the double cover, the command and the random torque held,
     and the control step at which the motion was lost (-1: not lost)."""
 
-    state: State
+    state: State | WheeledState
     memory: Any
     goal: Any
     h: float
     command: Vector
     disturbance: Vector
     lost_at: float
+
+
+class Event(NamedTuple):
+    """From a control step on: other wheels, gains or craft than before."""
+
+    step: int
+    wheels: Any
+    gains: Any
+    craft: Craft
+
+
+class Phase(NamedTuple):
+    """Control steps first .. last-1 of a run, and the numbers they are flown with."""
+
+    first: int
+    last: int
+    gains: Any
+    craft: Craft
+    setup: Setup
 
 
 @dataclass(frozen=True)
@@ -77,7 +107,7 @@ class ClosedLoop:
     craft: Craft
     law: Law
     gains: Any
-    start: State
+    start: State | WheeledState
     period: float
     substeps: int = 1
     orbit: bool = False
@@ -89,6 +119,12 @@ class ClosedLoop:
     cover: Cover = "as_published"
     hysteresis_width: float = 0.5
     seed: int = 1
+    wheels: Wheels | None = None
+    """Wheels that give the torque; `start` then is a `WheeledState`, and the craft's inertia that without their rotors'
+    moments about their spin axes."""
+    allocation: Allocation = "least-squares"
+    events: tuple[Event, ...] = ()
+    """What changes during a run, in order of time."""
 
     def parts(self) -> Parts:
         """The equations this loop is made of."""
@@ -101,6 +137,7 @@ class ClosedLoop:
         seen_noise = self.noise.attitude > 0.0 or self.noise.rate > 0.0
         ideal = self.dynamics.lag == 0.0 and math.isinf(self.dynamics.rate_limit)
         response = actuator.lagging if self.dynamics.lag > 0.0 else actuator.ramping
+        body = rigid_body if self.wheels is None else wheeled_body
         return Parts(
             around,
             goal,
@@ -111,15 +148,33 @@ class ClosedLoop:
             LIMITS[self.limit],
             actuator.start_ideal if ideal else actuator.start_lagging,
             actuator.ideal if ideal else response,
+            body.tidy,
+            body.with_torque,
+            body.rates,
+            body.stored,
+            body.record,
+            ALLOCATIONS[self.allocation],
         )
 
     def setup(self) -> Setup:
         """The numbers of this loop."""
         goal = NO_TURN if isinstance(self.target, str) else self.target
         substep = self.period / self.substeps
-        return Setup(self.period, substep, goal, self.noise, self.seed, self.hysteresis_width, self.dynamics)
+        wheels = NoMemory() if self.wheels is None else self.wheels
+        return Setup(self.period, substep, goal, self.noise, self.seed, self.hysteresis_width, self.dynamics, wheels)
 
-    def carry(self, start: State | None = None) -> Carry:
+    def phases(self, steps: int) -> list[Phase]:
+        """A run of so many control steps, cut where something changes."""
+        found: list[Phase] = []
+        now = Event(0, self.setup().wheels, self.gains, self.craft)
+        for event in (*self.events, Event(steps, now.wheels, now.gains, now.craft)):
+            last = min(event.step, steps)
+            if last > now.step:
+                found.append(Phase(now.step, last, now.gains, now.craft, self.setup()._replace(wheels=now.wheels)))
+            now = event
+        return found
+
+    def carry(self, start: State | WheeledState | None = None) -> Carry:
         """What a trajectory starts with."""
         start = self.start if start is None else start
         memory = self.law.remember(self.gains, self.craft, self.period)

@@ -22,7 +22,6 @@ from starhold.algebra.vector import ZERO, Vector, add, cross, dot, subtract
 from starhold.laws.interface import Seen, with_attitude
 from starhold.loop.closed_loop import Carry, Parts
 from starhold.loop.fingerprint import fingerprint, outside_modules
-from starhold.models.rigid_body import motion, tidy, with_torque
 from starhold.models.target import inertial, orbital
 
 
@@ -59,7 +58,23 @@ class Kernels(NamedTuple):
 @cache
 def make_step(parts: Parts) -> Step:
     """The equations of a control step made of these parts."""
-    environment, target, sense, disturb, cover, law, limit, begin, response = parts
+    (
+        environment,
+        target,
+        sense,
+        disturb,
+        cover,
+        law,
+        limit,
+        begin,
+        response,
+        tidy,
+        with_torque,
+        rates,
+        stored,
+        record,
+        share,
+    ) = parts
 
     @equation
     def look(carry, step, run, craft, setup):
@@ -72,7 +87,8 @@ def make_step(parts: Parts) -> Step:
         target_rate, target_acceleration = to_body(error, goal.rate), to_body(error, goal.acceleration)
         error_rate = subtract(rate, target_rate)
         target_acceleration = subtract(target_acceleration, cross(error_rate, target_rate))
-        return Seen(error, error_rate, rate, target_rate, target_acceleration, external, position, setup.period)
+        held = stored(state, setup.wheels)
+        return Seen(error, error_rate, rate, target_rate, target_acceleration, external, position, setup.period, held)
 
     @equation
     def look_at_rest(carry, step, run, craft, setup):
@@ -82,7 +98,8 @@ def make_step(parts: Parts) -> Step:
         attitude, rate = sense(state.attitude, state.rate, setup.noise, setup.seed, run, step)
         external = environment(state.position, attitude, craft)[1]
         position = to_body(attitude, state.position)
-        return Seen(relative(goal.attitude, attitude), rate, rate, ZERO, ZERO, external, position, setup.period)
+        held = stored(state, setup.wheels)
+        return Seen(relative(goal.attitude, attitude), rate, rate, ZERO, ZERO, external, position, setup.period, held)
 
     @equation
     def keep(carry, step, setup):
@@ -109,8 +126,8 @@ def make_step(parts: Parts) -> Step:
     def slope(state, begun, carry, craft, setup):
         acceleration, external = environment(state.position, state.attitude, craft)
         torque_rate = response(state.torque, carry.command, begun, setup.substep, setup.dynamics)
-        total = add(add(state.torque, carry.disturbance), external)
-        return motion(state, total, acceleration, torque_rate, craft)
+        outside = add(carry.disturbance, external)
+        return rates(state, outside, acceleration, torque_rate, craft, setup.wheels, share)
 
     @equation
     def hold(carry, craft, setup):
@@ -138,7 +155,8 @@ def make_step(parts: Parts) -> Step:
         goal = target(setup.target, s.position, s.velocity, step, carry.goal)
         error = relative(goal.attitude, s.attitude)
         rate = subtract(s.rate, to_body(error, goal.rate))
-        return Sample(s.attitude, s.rate, s.position, s.velocity, s.torque, carry.command, error, rate)
+        body = Sample(s.attitude, s.rate, s.position, s.velocity, s.torque, carry.command, error, rate)
+        return record(body, s, setup.wheels, share)
 
     return Step(see, decide, hold, check, sample)
 

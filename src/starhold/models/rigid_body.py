@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from starhold.algebra.quaternion import Quaternion, derivative, renormalise, to_reference
 from starhold.algebra.scalar import Scalar, equation
-from starhold.algebra.vector import Vector, apply, dot, subtract, swing
+from starhold.algebra.vector import ZERO, Vector, add, apply, dot, subtract, swing
 from starhold.models.craft import Craft
 
 
@@ -47,6 +47,32 @@ def tidy(state: State) -> State:
 def with_torque(state: State, torque: Vector) -> State:
     """The state with another actuator torque."""
     return State(state.attitude, state.rate, state.position, state.velocity, torque)
+
+
+@equation
+def rates(
+    state: State,
+    outside: Vector,
+    acceleration: Vector,
+    torque_rate: Vector | None,
+    craft: Craft,
+    wheels: Any,
+    share: Any,
+) -> tuple[Quaternion, Vector, Vector, Vector, Vector | None]:
+    """d(state)/dt under the actuators' torque and one from outside (body, N m); a body without wheels has none to share."""
+    return motion(state, add(state.torque, outside), acceleration, torque_rate, craft)
+
+
+@equation
+def stored(state: State, wheels: Any) -> Vector:
+    """The angular momentum of parts that spin (N m s): none."""
+    return ZERO
+
+
+@equation
+def record(body: Any, state: State, wheels: Any, share: Any) -> Any:
+    """What is recorded: the body's sample."""
+    return body
 
 
 @equation

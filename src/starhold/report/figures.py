@@ -52,7 +52,7 @@ def sketch(flights: Sequence[Flight], scenario: Scenario | None = None) -> Sketc
 def paint(what: Sketch, folder: Path, part: slice = slice(None)) -> list[Path]:
     """Write the figures, or a part of them, into `folder`, which exists, and return their paths."""
     plots, flights, name = what
-    over_time = (plots.scalar, plots.attitude, plots.rate, plots.torque, plots.angle)
+    over_time = (plots.scalar, plots.attitude, plots.rate, plots.torque, plots.angle, *plots.wheels)
     makers = {plot.name: partial(_over_time, plot, plots.times, flights, name) for plot in over_time}
     makers["accuracy"] = partial(_accuracy, flights, name)
     with warnings.catch_warnings():
@@ -70,7 +70,8 @@ def warm_up() -> None:
 
 def _over_time(plot: Plot, times: Any, flights: Sequence[Flight], name: str) -> Any:
     count = len(plot.panels)
-    figure, axes = _figure(count, 1, {1: 3.6, 2: 5.2, 3: 6.4}[count], f"{plot.title}", flights, name, plot.dashed)
+    height = {1: 3.6, 2: 5.2}.get(count, 1.6 * (count + 1))
+    figure, axes = _figure(count, 1, height, f"{plot.title}", flights, name, plot.dashed)
     for axis, panel in zip(axes, plot.panels, strict=True):
         for number in _back_to_front(flights, plot.name):
             curve = panel.curves[number]

@@ -222,7 +222,7 @@ def _data(scenario: Scenario, flights: Sequence[Flight]) -> dict[str, Any]:
     """What the scripts of the page read."""
     plots = collect(flights, POINTS, scenario)
     quaternion = Plot("quaternion", "error quaternion", [*plots.scalar.panels, *plots.attitude.panels])
-    drawn = (plots.angle, quaternion, plots.rate, plots.torque)
+    drawn = (plots.angle, quaternion, plots.rate, plots.torque, *plots.wheels)
     return {
         "laws": [{"name": flight.name, "colour": colour(number)} for number, flight in enumerate(flights)],
         "times": _numbers(plots.times),

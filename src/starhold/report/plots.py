@@ -63,6 +63,8 @@ class Plots:
     rate: Plot
     torque: Plot
     angle: Plot
+    wheels: tuple[Plot, ...] = ()
+    """Momenta and torques of the reaction wheels, where there are any."""
 
 
 def collect(flights: Sequence[Flight], points: int, scenario: Scenario | None = None) -> Plots:
@@ -89,6 +91,7 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario | None = 
         Plot("rate", "angular velocity relative to the target", [_sound(panel, flights) for panel in rates]),
         Plot("torque", "torque applied", torques, dashed),
         _angle(flights, factor, scenario),
+        _wheels(flights, factor, scenario),
     )
 
 
@@ -138,6 +141,24 @@ def _angle(flights: Sequence[Flight], factor: int, scenario: Scenario | None) ->
     slow = () if settling is None else (settling.rate_tolerance * degrees,)
     panels = [_positive("angle, deg", angles, within), _sound(_positive("rate, deg/s", speeds, slow), flights)]
     return Plot("angle", "error angle and relative rate", panels, "tolerance" if settling else "")
+
+
+def _wheels(flights: Sequence[Flight], factor: int, scenario: Scenario | None) -> tuple[Plot, ...]:
+    if not all("wheel_momentum" in flight.recording.arrays for flight in flights):
+        return ()
+    wheels = None if scenario is None else scenario.wheels
+    plots: list[Plot] = []
+    for name, title, unit, limits in (
+        ("wheel_momentum", "angular momentum of the wheels", "N m s", None if wheels is None else wheels.momentum_limit),
+        ("wheel_torque", "torque on the wheels", "N m", None if wheels is None else wheels.torque_limit),
+    ):
+        panels: list[Panel] = []
+        for wheel in range(flights[0].recording[name].shape[1]):
+            curves = [thin(flight.recording[name][:, wheel], factor) for flight in flights]
+            levels = () if limits is None else (-limits[wheel], limits[wheel])
+            panels.append(Panel(f"wheel {wheel + 1}, {unit}", curves, False, levels))
+        plots.append(Plot(name.replace("_", "-"), title, panels, "limit" if limits else ""))
+    return tuple(plots)
 
 
 def _positive(label: str, curves: list[Curve], levels: tuple[float, ...]) -> Panel:

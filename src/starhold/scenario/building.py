@@ -15,7 +15,10 @@ from starhold.models.actuator import Dynamics
 from starhold.models.rigid_body import State
 from starhold.models.sensor import Noise
 from starhold.models.target import Target, inertial, orbital, tabulate
+from starhold.models.wheeled_body import WheeledState
+from starhold.scenario.faults import make_events
 from starhold.scenario.reading import LawEntry, Scenario
+from starhold.scenario.rotors import start_momenta
 from starhold.scenario.schema import Pointing
 
 
@@ -40,6 +43,9 @@ def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
         cover=entry.double_cover,
         hysteresis_width=entry.hysteresis_width,
         seed=table.simulation.seed,
+        wheels=scenario.wheels,
+        allocation="least-squares" if table.wheels is None else table.wheels.allocation,
+        events=make_events(scenario, entry) if table.fault else (),
     )
     try:
         loop.carry()
@@ -97,7 +103,7 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _start(scenario: Scenario, goal: Any) -> State:
+def _start(scenario: Scenario, goal: Any) -> State | WheeledState:
     table = scenario.table
     orbit = table.orbit
     position, velocity = (ZERO, ZERO) if orbit is None else (orbit.position, orbit.velocity)
@@ -106,7 +112,11 @@ def _start(scenario: Scenario, goal: Any) -> State:
         held = _target_at_start(goal, position, velocity)
         rate = add(rate, to_body(attitude, held.rate))
         attitude = multiply(held.attitude, attitude)
-    return State(attitude, rate, position, velocity, ZERO)
+    wheels = scenario.wheels
+    if wheels is None:
+        return State(attitude, rate, position, velocity, ZERO)
+    momentum = start_momenta(table.wheels, table.wheel, len(wheels.axes))
+    return WheeledState(attitude, rate, position, velocity, ZERO, momentum)
 
 
 def _target_at_start(goal: Any, position: Any, velocity: Any) -> Target:

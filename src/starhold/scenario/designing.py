@@ -54,3 +54,14 @@ def _named(items: Iterable[Field], values: Iterable[Any]) -> dict[str, Any]:
         item.name: item.gain.choices[value] if item.gain.choices else value
         for item, value in zip(items, values, strict=True)
     }
+
+
+def map_inputs(scenario: Scenario, law: str | None = None) -> tuple[Any, float, float, float]:
+    """What a map of the degree of stability is drawn from: inertia ratios, scaled angle and rate, budget; of the first law
+    that is designed for it. InputError where there is none."""
+    entries = scenario.laws if law is None else (scenario.pick(law),)
+    for entry in entries:
+        teller = getattr(entry.law.module, "map_inputs", None)
+        if teller is not None and entry.form is not None:
+            return teller(scenario.craft, entry.spec)
+    raise InputError(scenario.where, "law", "no degree of stability", 'type = "wheel", form = "degree-of-stability"')

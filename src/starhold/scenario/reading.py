@@ -10,11 +10,14 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law, catalogue
-from starhold.models.craft import Craft, make_craft
+from starhold.models.craft import Craft, compact, make_craft
+from starhold.models.wheels import Wheels, body_inertia
+from starhold.scenario.rotors import make_rotors
 from starhold.scenario.schema import LawTable, ScenarioTable, law_model
 
 _Model = TypeVar("_Model", bound=BaseModel)
@@ -52,10 +55,19 @@ class Scenario:
 
     @property
     def craft(self) -> Craft:
-        """The spacecraft."""
-        body = self.table.spacecraft
+        """The spacecraft; with wheels, its inertia is without the rotors' moments about their own axes."""
+        body, wheels = self.table.spacecraft, self.wheels
         gravity = {} if self.table.orbit is None else {"gravity": self.table.orbit.gravitational_parameter}
-        return make_craft(body.inertia, body.torque_limit, **gravity)
+        craft = make_craft(body.inertia, body.torque_limit, **gravity)
+        if wheels is None:
+            return craft
+        rest = body_inertia(body.inertia, wheels)
+        return craft._replace(inertia=compact(rest), inverse_inertia=compact(np.linalg.inv(rest)))
+
+    @property
+    def wheels(self) -> Wheels | None:
+        """The reaction wheels, None for a craft without."""
+        return make_rotors(self.table.wheels, self.table.wheel)
 
     def pick(self, name: str) -> LawEntry:
         """The law of this name; InputError names the nearest when there is none."""
@@ -106,7 +118,7 @@ def parse(text: str, where: str, folder: Path = Path()) -> Scenario:
     try:
         craft = scenario.craft
     except ValueError as error:
-        raise InputError(where, "spacecraft", "", str(error)) from None
+        raise InputError(where, "wheel" if table.wheels or table.wheel else "spacecraft", "", str(error)) from None
     entries: list[LawEntry] = []
     for number, item in enumerate(cast(list[Any], laws), 1):
         entries.append(_read_law(item, craft, where, f"law[{number}]", {entry.name for entry in entries}))
@@ -160,11 +172,11 @@ def _translate(
     """The first fault pydantic found, in starhold's words."""
     # Unknown keys first: a misspelt key is the reason that the right one is missing.
     fault = min(error.errors(include_url=False), key=lambda e: e["type"] != "extra_forbidden")
-    place = [str(part) for part in fault["loc"]]
+    place = [f"[{part + 1}]" if isinstance(part, int) else part for part in fault["loc"]]
     context: dict[str, Any] = fault.get("ctx", {})
     if fault["type"] == "quantity_at":
         place.append(context["key"])
-    key = ".".join(part for part in [prefix, *place] if part)
+    key = ".".join(part for part in [prefix, *place] if part).replace(".[", "[")
     found = _show(context.get("found", fault.get("input")))
     if fault["type"] == "extra_forbidden":
         known = list(_model_at(model, place[:-1]).model_fields) + (extra if len(place) == 1 else [])
@@ -178,6 +190,8 @@ def _translate(
 
 def _model_at(model: Any, place: list[str]) -> Any:
     for part in place:
+        if part.startswith("["):
+            continue
         annotation = model.model_fields[part].annotation
         options = [annotation, *getattr(annotation, "__args__", ())]
         model = next(o for o in options if isinstance(o, type) and issubclass(o, BaseModel))

@@ -169,6 +169,61 @@ class Tolerances(Table):
     rate_tolerance: Annotated[float, *quantity(Gain("rad/s", above=0.0, text="rate relative to the target"))] = 1e-3
 
 
+class Rotor(Table):
+    """What a reaction wheel is: a unit of the catalogue, or its numbers; numbers given override the unit's."""
+
+    unit: Annotated[str | None, Field(description="a unit of the catalogue, see `starhold wheels`")] = None
+    inertia: Annotated[float | None, *quantity(Gain("kg m^2", above=0.0, text="of the rotor about its axis"))] = None
+    torque_limit: Annotated[float | None, *quantity(Gain("N m", above=0.0, text="largest motor torque"))] = None
+    momentum_limit: Annotated[float | None, *quantity(Gain("N m s", above=0.0, text="largest angular momentum"))] = None
+    viscous: Annotated[float | None, *quantity(Gain("N m s", at_least=0.0, text="friction per rad/s"))] = None
+    coulomb: Annotated[float | None, *quantity(Gain("N m", at_least=0.0, text="friction at any speed"))] = None
+    momentum: Annotated[float, *quantity(Gain("N m s", text="at the start"))] = 0.0
+
+
+class WheelTable(Rotor):
+    """One reaction wheel."""
+
+    axis: Annotated[Any, *quantity(Gain("1", shape=(3,), spread=False, text="spin axis in body axes"))]
+
+
+class WheelsTable(Rotor):
+    """All reaction wheels: what they share, and their layout unless [[wheel]] tables give the axes."""
+
+    layout: Annotated[
+        Literal["orthogonal", "pyramid", "nasa-standard"] | None, Field(description="three or four wheels of one kind")
+    ] = None
+    allocation: Annotated[
+        Literal["least-squares", "least-peak"], Field(description="how a torque is shared out among more than three")
+    ] = "least-squares"
+
+
+class FaultTable(Table):
+    """What happens to a wheel or the body during the run, and what is done about it."""
+
+    time: Annotated[float, *quantity(Gain("s", at_least=0.0, text="when it happens"))]
+    wheel: Annotated[int | None, *quantity(Gain("1", at_least=1, whole=True, text="which wheel, counted from 1"))] = None
+    lost: Annotated[bool, Field(description="the motor gives no more torque")] = False
+    torque_limit: Annotated[float | None, *quantity(Gain("N m", at_least=0.0, text="what the motor still gives"))] = None
+    momentum_limit: Annotated[float | None, *quantity(Gain("N m s", above=0.0, text="what the wheel still stores"))] = None
+    viscous: Annotated[float | None, *quantity(Gain("N m s", at_least=0.0, text="friction per rad/s"))] = None
+    coulomb: Annotated[float | None, *quantity(Gain("N m", at_least=0.0, text="friction at any speed"))] = None
+    delay: Annotated[float, *quantity(Gain("s", at_least=0.0, text="until it is diagnosed and acted on"))] = 0.0
+    action: Annotated[
+        Literal["none", "reallocate", "retune", "both"],
+        Field(description="torque shared out among the other wheels, gains designed anew for the torque left, or both"),
+    ] = "both"
+
+    @model_validator(mode="after")
+    def _does_something(self) -> FaultTable:
+        changed = [self.torque_limit, self.momentum_limit, self.viscous, self.coulomb]
+        if not self.lost and all(value is None for value in changed):
+            raise _at("lost", "true, or a new torque_limit, momentum_limit, viscous or coulomb", False)
+        if self.wheel is None:
+            raise _at("wheel", "the number of a wheel, from 1", None)
+        return self
+
+
 class CertifyTable(Table):
     """What certificates are to claim; whatever is left out, the most that can be proved."""
 
@@ -210,6 +265,16 @@ class ScenarioTable(Table):
     simulation: Simulation
     settling: Tolerances = Tolerances()
     certify: CertifyTable = CertifyTable()
+    wheels: WheelsTable | None = None
+    wheel: list[WheelTable] = []
+    fault: list[FaultTable] = []
+
+    @model_validator(mode="after")
+    def _wheels_have_axes(self) -> ScenarioTable:
+        layout = None if self.wheels is None else self.wheels.layout
+        if (layout is None) == (not self.wheel) and (self.wheels is not None or self.wheel):
+            raise _at("wheels.layout", "either a layout or [[wheel]] tables", layout)
+        return self
 
     @model_validator(mode="after")
     def _has_orbit(self) -> ScenarioTable:

@@ -37,10 +37,16 @@ COLUMNS: dict[str, tuple[str, str, str]] = {
 }
 """Recorded quantities in the order of `Sample`: dimension, unit, meaning."""
 
+WHEELS: dict[str, tuple[str, str, str]] = {
+    "wheel_momentum": ("wheel", "N m s", "angular momentum of each rotor about its spin axis"),
+    "wheel_torque": ("wheel", "N m", "rate of that momentum: the motor's torque and friction"),
+}
+"""What is recorded of wheels, after the quantities of COLUMNS."""
+
 
 @dataclass(frozen=True)
 class Recording:
-    """A trajectory as arrays: `time` (n,) in s, and the quantities of COLUMNS, (n, 4) or (n, 3)."""
+    """A trajectory as arrays: `time` (n,) in s, the quantities of COLUMNS, (n, 4) or (n, 3), and those of WHEELS."""
 
     arrays: dict[str, NDArray[np.float64]]
     attrs: dict[str, Any]
@@ -54,7 +60,8 @@ class Recording:
         import xarray as xr
 
         data: dict[str, Any] = {}
-        for name, (dimension, unit, meaning) in COLUMNS.items():
+        columns = COLUMNS | {name: told for name, told in WHEELS.items() if name in self.arrays}
+        for name, (dimension, unit, meaning) in columns.items():
             data[name] = (("time", dimension), self[name], {"units": unit, "long_name": meaning})
         coords = {
             "time": ("time", self["time"], {"units": "s", "long_name": "time"}),
@@ -82,15 +89,17 @@ def fly(
 ) -> tuple[NDArray[np.float64], Carry]:
     """The samples (number, sample) of a trajectory, one row for each number of `Sample`, and what it carries at its end."""
     kernel = make_kernels(loop.parts()).one
-    setup = loop.setup()
-    samples = np.full((_WIDTH, _sample_count(steps, record_every)), np.nan)
+    phases = loop.phases(steps)
+    width = _WIDTH + (0 if loop.wheels is None else 2 * len(loop.wheels.axes))
+    samples = np.full((width, _sample_count(steps, record_every, width)), np.nan)
     carry, done, chunk = loop.carry(), 0, steps if progress is None else 1
     end = np.empty((len(flatten(carry)), 1))
     while done < steps:
         begun = time.perf_counter()
-        count = min(chunk, steps - done)
+        now = next(phase for phase in phases if done < phase.last)
+        count = min(chunk, now.last - done)
         last = done + count == steps
-        kernel(carry, done, count, last, record_every, run, loop.gains, loop.craft, setup, loop.substeps, samples, end)
+        kernel(carry, done, count, last, record_every, run, now.gains, now.craft, now.setup, loop.substeps, samples, end)
         carry = load(end, 0, carry)
         done += count
         if progress is not None:
@@ -111,6 +120,10 @@ def label(loop: ClosedLoop, samples: NDArray[np.float64], carry: Carry, record_e
         size = _size(name)
         arrays[name] = samples[row : row + size].T
         row += size
+    if loop.wheels is not None:
+        count = len(loop.wheels.axes)
+        arrays["wheel_momentum"] = samples[row : row + count].T
+        arrays["wheel_torque"] = samples[row + count : row + 2 * count].T
     attrs: dict[str, Any] = {
         "law": loop.law.name,
         "control_period": loop.period,
@@ -127,12 +140,12 @@ def _size(name: str) -> int:
     return 4 if COLUMNS[name][0] == "quaternion" else 3
 
 
-def _sample_count(steps: int, record_every: int) -> int:
+def _sample_count(steps: int, record_every: int, width: int) -> int:
     """The number of samples of a run; refused where they would fill the memory."""
     count = steps // record_every + 1
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 2**33
     # Labelling, measuring and drawing hold copies.
-    most = memory // 4 // (8 * _WIDTH)
+    most = memory // 4 // (8 * width)
     if count > most:
         raise InputError("", "simulation.record_every", f"{record_every}, {count} samples", f"at least {-(-steps // most)}")
     return count

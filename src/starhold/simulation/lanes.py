@@ -11,9 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.quaternion import NO_TURN
 from starhold.algebra.structure import LANES, flatten, pack, unflatten, unpack
-from starhold.algebra.vector import ZERO
 from starhold.loop.closed_loop import Carry, ClosedLoop
 from starhold.loop.kernels import make_kernels
 from starhold.models.rigid_body import State
@@ -22,15 +20,16 @@ from starhold.simulation.lane import Progress, fly
 
 @dataclass(frozen=True)
 class Batch:
-    """Where many trajectories ended. states: (16, lanes), rows in the order of `State`; lost_at: (lanes,) control step at
-    which the motion was lost, -1 where it was not."""
+    """Where many trajectories ended. states: (numbers of a state, lanes), rows in the order of the loop's `start`; lost_at:
+    (lanes,) control step at which the motion was lost, -1 where it was not."""
 
     states: NDArray[np.float64]
     lost_at: NDArray[np.float64]
+    like: Any
 
-    def state(self, lane: int) -> State:
-        """The state of a lane."""
-        return unflatten(self.states[:, lane], _STATE)
+    def state(self, lane: int) -> Any:
+        """The state of a lane, a `State` or `WheeledState`."""
+        return unflatten(self.states[:, lane], self.like)
 
 
 def simulate_many(
@@ -44,9 +43,9 @@ def simulate_many(
 ) -> Batch:
     """Fly `loop` from each of many states for `steps` control periods.
 
-    starts: states, or an array (16, lanes); gains: (numbers of the law's gains, lanes) where they differ between lanes;
-    first_run: the run number of lane 0, which with the seed fixes its random numbers. The result is the same, bit for bit,
-    for any number of threads, and equals that of `simulate` lane by lane.
+    starts: states, or an array (numbers of a state, lanes); gains: (numbers of the law's gains, lanes) where they differ
+    between lanes; first_run: the run number of lane 0, which with the seed fixes its random numbers. The result is the same,
+    bit for bit, for any number of threads, and equals that of `simulate` lane by lane.
     """
     start = np.asarray(starts if isinstance(starts, np.ndarray) else [flatten(s) for s in starts], dtype=float)
     start = start if isinstance(starts, np.ndarray) else start.T
@@ -56,22 +55,27 @@ def simulate_many(
     carries = _carries(loop, start)
     blocks = pack(carries)
     gain_blocks = None if gains is None else pack(gains)
-    kernel, setup, like = make_kernels(loop.parts()).many, loop.setup(), loop.carry()
+    kernel, like, phases = make_kernels(loop.parts()).many, loop.carry(), loop.phases(steps)
+    if gains is not None and loop.events:
+        raise ValueError("gains of their own for each lane do not go with events that change gains")
 
     def work(block: int) -> None:
-        own = loop.gains if gain_blocks is None else gain_blocks[block]
         run = first_run + block * LANES
-        kernel(blocks[block], like, 0, steps, run, own, loop.gains, loop.craft, loop.craft, setup, loop.substeps)
+        for now in phases:
+            own = now.gains if gain_blocks is None else gain_blocks[block]
+            count = now.last - now.first
+            numbers = own, now.gains, now.craft, now.craft, now.setup, loop.substeps
+            kernel(blocks[block], like, now.first, count, run, *numbers)
 
     _share_out(work, len(blocks), workers, progress)
     ends = unpack(blocks, start.shape[1])
-    return Batch(ends[: len(start)], ends[-1])
+    return Batch(ends[: len(start)], ends[-1], loop.start)
 
 
 def _carries(loop: ClosedLoop, start: NDArray[np.float64]) -> NDArray[np.float64]:
     """What each lane starts with, one column a lane."""
     if isinstance(loop.target, str):
-        return np.array([flatten(loop.carry(unflatten(column, _STATE))) for column in start.T]).T
+        return np.array([flatten(loop.carry(unflatten(column, loop.start))) for column in start.T]).T
     # Lanes differ in their state and in the side of the double cover they start on, and in nothing else.
     first = loop.carry()
     columns = np.repeat(np.array(flatten(first))[:, None], start.shape[1], axis=1)
@@ -91,12 +95,12 @@ def _one_by_one(
 
     def work(lane: int) -> None:
         own = loop.gains if gains is None else unflatten(gains[:, lane], loop.gains)
-        flown = replace(loop, start=unflatten(start[:, lane], _STATE), gains=own)
+        flown = replace(loop, start=unflatten(start[:, lane], loop.start), gains=own)
         carries[lane] = fly(flown, steps, max(steps, 1), first_run + lane)[1]
 
     _share_out(work, len(carries), workers, progress)
     ends = [carry for carry in carries if carry is not None]
-    return Batch(np.array([flatten(c.state) for c in ends]).T, np.array([c.lost_at for c in ends]))
+    return Batch(np.array([flatten(c.state) for c in ends]).T, np.array([c.lost_at for c in ends]), loop.start)
 
 
 def _share_out(work: Any, count: int, workers: int, progress: Progress | None) -> None:
@@ -114,6 +118,3 @@ def _share_out(work: Any, count: int, workers: int, progress: Progress | None) -
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
-
-
-_STATE = State(NO_TURN, ZERO, ZERO, ZERO, ZERO)

@@ -1,0 +1,107 @@
+"""Feedback on the direction cosines, with the momentum of the wheels and the modelled torque compensated."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+
+from starhold.algebra.quaternion import vector_part
+from starhold.algebra.scalar import Scalar, equation
+from starhold.algebra.vector import Vector, add, apply, cross, dot, scale, subtract
+from starhold.laws.interface import Card, Gain, NoMemory, Seen
+from starhold.laws.stability_degree import Designed, brute_force, design_gains
+from starhold.models.craft import Craft, tensor
+
+CARD = Card(
+    title="Reaction-wheel law",
+    summary="u = -k_rate w - k_attitude S + w_abs x (J w_abs + H) + J w_target' - M_ext, S = 4 q0 q from direction cosines",
+    sources=("published study of reaction-wheel attitude control with a given degree of stability",),
+    assumptions=("rigid body", "inertia and wheel momentum known", "external torque known", "torque not limited"),
+    claims="almost-global",
+    double_cover="even",
+)
+
+
+class Gains(NamedTuple):
+    """Damping, stiffness, and how much of what the model knows is compensated."""
+
+    k_rate: Annotated[float, Gain("N m s", above=0.0, text="damping")]
+    k_attitude: Annotated[float, Gain("N m", above=0.0, text="stiffness against S")]
+    compensation: Annotated[
+        float, Gain("1", at_least=0.0, at_most=1.0, text="share of the gyroscopic, target and external torque compensated")
+    ] = 1.0
+
+
+class Stability(NamedTuple):
+    """The largest degree of stability within the torque of the wheels, in closed form."""
+
+    torque: Annotated[float, Gain("N m", above=0.0, text="largest torque about an axis")]
+    momentum: Annotated[float, Gain("N m s", above=0.0, text="largest stored momentum about an axis; sets the unit of time")]
+    angle: Annotated[float, Gain("rad", at_least=0.0, at_most=math.pi, text="largest error angle at the start")]
+    rate: Annotated[float, Gain("rad/s", at_least=0.0, text="largest rate at the start")]
+    compensation: Annotated[
+        float, Gain("1", at_least=0.0, at_most=1.0, text="share of the gyroscopic, target and external torque compensated")
+    ] = 1.0
+
+
+FORMS: dict[str, Any] = {"degree-of-stability": Stability}
+
+
+def design(craft: Craft, spec: Stability) -> Gains:
+    """Gains of the largest degree of stability; ValueError where angle and rate are zero, so that nothing bounds them."""
+    found = _optimum(craft, spec)
+    return Gains(found.k_rate, found.k_attitude, spec.compensation)
+
+
+def explain(craft: Craft, spec: Stability) -> list[tuple[str, Any]]:
+    """The scaled problem, its optimum, and what a search over all gains within the budget finds."""
+    found = _optimum(craft, spec)
+    budget = (spec.angle, spec.rate * found.t0, found.L)
+    searched = brute_force(found.ratios, *budget)
+    return [
+        ("time scale t0 (s)", found.t0),
+        ("budget L", found.L),
+        ("inertia ratios", np.array(found.ratios)),
+        ("scaled stiffness K_a", found.K_a),
+        ("scaled damping K_w", found.K_w),
+        ("degree of stability, scaled", found.eta),
+        ("degree of stability (1/s)", found.eta_per_second),
+        ("of what a search over all gains finds", found.eta / searched.eta),
+    ]
+
+
+def map_inputs(craft: Craft, spec: Stability) -> tuple[Any, float, float, float]:
+    """Ratios, scaled angle and rate, and budget: what a map of the degree of stability is drawn from."""
+    found = _optimum(craft, spec)
+    return found.ratios, spec.angle, spec.rate * found.t0, found.L
+
+
+def _optimum(craft: Craft, spec: Stability) -> Designed:
+    # Scalar gains act alike in any axes, so the principal ones serve.
+    moments = np.linalg.eigvalsh(tensor(craft.inertia))
+    return design_gains(moments, spec.torque, spec.momentum, spec.angle, spec.rate)
+
+
+@equation
+def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
+    """Torque asked of the wheels (N m, body)."""
+    sine = scale(4.0 * seen.attitude[0], vector_part(seen.attitude))
+    feedback = add(scale(gains.k_rate, seen.rate), scale(gains.k_attitude, sine))
+    momentum = add(apply(craft.inertia, seen.body_rate), seen.stored)
+    model = add(cross(seen.body_rate, momentum), apply(craft.inertia, seen.target_acceleration))
+    model = subtract(model, seen.external_torque)
+    return subtract(scale(gains.compensation, model), feedback), memory
+
+
+@equation
+def lyapunov(seen: Seen, gains: Gains, craft: Craft) -> Scalar:
+    """V = w.Jw/2 + k_attitude sum(1 - a_ii) = w.Jw/2 + 4 k_attitude |q|2 (J); V' = -k_rate |w|2 with full compensation."""
+    q = vector_part(seen.attitude)
+    return 0.5 * dot(seen.rate, apply(craft.inertia, seen.rate)) + 4.0 * gains.k_attitude * dot(q, q)
+
+
+def examples() -> list[Gains]:
+    """Gains for a body of a few kg m2."""
+    return [Gains(0.09, 0.0045), Gains(0.5, 0.025)]

@@ -1,0 +1,79 @@
+"""A rigid body turned by reaction wheels: its state holds the momenta of the rotors, exchanged exactly with the body.
+
+Each function stands for that of a body without wheels in `rigid_body`, and takes the same arguments.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from starhold.algebra.quaternion import Quaternion, renormalise
+from starhold.algebra.scalar import equation
+from starhold.algebra.vector import Vector, add
+from starhold.models.craft import Craft
+from starhold.models.rigid_body import motion
+from starhold.models.wheels import Wheels, on_body
+from starhold.models.wheels import motor as turn_rotors
+from starhold.models.wheels import stored as stored_momentum
+
+
+class WheeledState(NamedTuple):
+    """Attitude q_BN, rate omega_BN_B (rad/s), position and velocity (inertial; m, m/s), the torque asked of the wheels
+    (body, N m), and the absolute angular momentum of each rotor about its spin axis (N m s)."""
+
+    attitude: Quaternion
+    rate: Vector
+    position: Vector
+    velocity: Vector
+    torque: Vector
+    momentum: tuple[float, ...]
+
+
+class WheelSample(NamedTuple):
+    """What is recorded of the wheels beside the body: momenta (N m s), and their rates, the torques (N m)."""
+
+    momentum: tuple[float, ...]
+    torque: tuple[float, ...]
+
+
+@equation
+def tidy(state: WheeledState) -> WheeledState:
+    """The state with its quaternion brought back to unit length."""
+    attitude = renormalise(state.attitude)
+    return WheeledState(attitude, state.rate, state.position, state.velocity, state.torque, state.momentum)
+
+
+@equation
+def with_torque(state: WheeledState, torque: Vector) -> WheeledState:
+    """The state with another torque asked of the wheels."""
+    return WheeledState(state.attitude, state.rate, state.position, state.velocity, torque, state.momentum)
+
+
+@equation
+def rates(
+    state: WheeledState,
+    outside: Vector,
+    acceleration: Vector,
+    torque_rate: Vector | None,
+    craft: Craft,
+    wheels: Wheels,
+    share: Any,
+) -> Any:
+    """d(state)/dt, in the order of WheeledState, under a torque from outside (body, N m). `share` is the allocation."""
+    rotors = turn_rotors(share(state.torque, wheels), state.momentum, state.rate, wheels)
+    total = add(on_body(rotors, state.momentum, state.rate, wheels), outside)
+    body = motion(state, total, acceleration, torque_rate, craft)  # type: ignore[arg-type]
+    return (body[0], body[1], body[2], body[3], body[4], rotors)
+
+
+@equation
+def stored(state: WheeledState, wheels: Wheels) -> Vector:
+    """The rotors' momentum in body axes (N m s)."""
+    return stored_momentum(state.momentum, wheels)
+
+
+@equation
+def record(body: Any, state: WheeledState, wheels: Wheels, share: Any) -> Any:
+    """What is recorded: the body's sample and the wheels'."""
+    rotors = turn_rotors(share(state.torque, wheels), state.momentum, state.rate, wheels)
+    return (body, WheelSample(state.momentum, rotors))

@@ -1,0 +1,209 @@
+"""The degree of stability over the gains, with what decides it, the torque budget and the optimum, as a PNG file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from starhold.laws.stability_degree import Optimum, boundary, degree, optimum
+from starhold.report.files import whole
+
+DPI = 110
+POINTS = 400
+"""Gains each way at which the map is computed, about two pixels apart."""
+DASHES = ((1, 1.2), (5, 2), (7, 2, 1, 2))
+"""One for each axis."""
+LINE = "#D55E00"
+"""The budget's colour, which stands out from the map's blues and yellows for every reader."""
+SAME = 1e-9
+"""Moments that differ by less than this share count as equal."""
+
+
+class Sketch(NamedTuple):
+    """All that the map shows.
+
+    K_a: (POINTS,); K_w: (POINTS,); eta: (POINTS, POINTS), by K_w, then K_a; ask: torque asked for over the budget, of the
+    same shape; best: the optimum; ratios: (3,); alpha (rad), omega (1/t0) and budget as given.
+    """
+
+    K_a: Any
+    K_w: Any
+    eta: Any
+    ask: Any
+    best: Optimum
+    ratios: tuple[float, ...]
+    alpha: float
+    omega: float
+    budget: float
+
+
+def draw_map(path: Path, ratios: ArrayLike, alpha: float, omega: float, budget: float) -> Path:
+    """Write the map of eta(K_a, K_w) to `path`, a PNG file in a folder that exists, and return the path.
+
+    ratios: (3,), J_axis / J_x in any order; alpha: largest initial error (rad); omega: largest initial rate (1/t0); budget:
+    L. ValueError as `optimum` raises it, before anything is written. Equal arguments give equal files.
+    """
+    return paint(sketch(ratios, alpha, omega, budget), path)
+
+
+def sketch(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> Sketch:
+    """What `paint` needs: the map around the optimum. Arguments and errors as of `draw_map`."""
+    best = optimum(ratios, alpha, omega, budget)
+    # The optimum at fixed shares of both sides, so that the words around it never meet the lines.
+    K_a = np.linspace(0.0, 2.0 * best.K_a, POINTS)
+    K_w = np.linspace(0.0, 1.6 * best.K_w, POINTS)
+    eta = degree(K_a, K_w[:, None], ratios)
+    ask = (2.0 * K_a * alpha + K_w[:, None] * omega) / budget
+    three = tuple(np.asarray(ratios, dtype=float).tolist())
+    return Sketch(K_a, K_w, eta, ask, best, three, float(alpha), float(omega), float(budget))
+
+
+def paint(what: Sketch, path: Path) -> Path:
+    """Write the figure to `path`, in a folder that exists, and return the path."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8.0, 6.2), dpi=DPI)
+    axis: Any = figure.add_axes((0.085, 0.17, 0.745, 0.70))
+    scale: Any = figure.add_axes((0.855, 0.17, 0.022, 0.70))
+    drawn = axis.contourf(what.K_a, what.K_w, what.eta, levels=16, cmap="cividis")
+    axis.contour(what.K_a, what.K_w, what.eta, levels=drawn.levels, colors="white", linewidths=0.35, alpha=0.6)
+    bar = figure.colorbar(drawn, cax=scale)
+    bar.set_label("degree of stability η, 1/t₀", fontsize=9)
+    bar.ax.tick_params(labelsize=8.5)
+    _budget(axis, what)
+    handles = _curves(axis, what)
+    _words(axis, what)
+    axis.set_xlim(0.0, what.K_a[-1])
+    axis.set_ylim(0.0, what.K_w[-1])
+    axis.set_xlabel("stiffness K_a = t₀² k_attitude / Jx", fontsize=9.5)
+    axis.set_ylabel("damping K_w = t₀ k_rate / Jx", fontsize=9.5)
+    axis.tick_params(labelsize=8.5)
+    x, y, z = (f"{ratio:.4g}" for ratio in what.ratios)
+    figure.text(0.085, 0.96, "degree of stability over the gains", fontsize=11, fontweight="bold")
+    given = f"moments {x} : {y} : {z},  α = {what.alpha:.4g} rad,  ω = {what.omega:.4g} / t₀,  L = {what.budget:.4g}"
+    figure.text(0.085, 0.922, given, fontsize=8.5, color="0.3")
+    figure.legend(
+        handles=handles,
+        loc="lower left",
+        bbox_to_anchor=(0.075, 0.005),
+        ncols=3,
+        fontsize=8.5,
+        frameon=False,
+        handlelength=2.6,
+        columnspacing=1.6,
+    )
+    return _save(figure, path)
+
+
+def _budget(axis: Any, what: Sketch) -> None:
+    """The budget line, and the side beyond it veiled and hatched."""
+    beyond = [1.0, max(float(what.ask.max()), 1.0) * 2.0]
+    axis.contourf(what.K_a, what.K_w, what.ask, levels=beyond, colors=["white"], alpha=0.42)
+    hatched = axis.contourf(what.K_a, what.K_w, what.ask, levels=beyond, colors="none", hatches=["//"])
+    hatched.set_edgecolor("0.25")
+    hatched.set_linewidth(0.0)
+    axis.contour(what.K_a, what.K_w, what.ask, levels=[1.0], colors=LINE, linewidths=2.4)
+
+
+def _curves(axis: Any, what: Sketch) -> list[Any]:
+    """The border between what decides, and each axis' critical damping; what the legend says of these lines."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+    from matplotlib.patheffects import withStroke
+
+    cased = [withStroke(linewidth=3.8, foreground="0.2")]
+    edge: dict[str, Any] = {"color": "white", "linewidth": 2.2, "path_effects": cased}
+    axis.plot(boundary(what.ratios) * what.K_w**2, what.K_w, **edge)
+    handles = [
+        Line2D([], [], color=LINE, linewidth=2.4, label="torque budget, 2 K_a α + K_w ω = L"),
+        Patch(facecolor="white", edgecolor="0.25", hatch="////", linewidth=0.0, label="more torque than there is"),
+        Line2D([], [], label="border of the two regions", **edge),
+    ]
+    for number, (name, ratio) in enumerate(_axes(what.ratios)):
+        style: dict[str, Any] = {"color": "black", "linewidth": 1.2, "dashes": DASHES[number]}
+        axis.plot(what.K_w**2 / (8.0 * ratio), what.K_w, **style)
+        handles.append(Line2D([], [], label=f"{name} critically damped", **style))
+    return handles
+
+
+def _words(axis: Any, what: Sketch) -> None:
+    """What decides on each side of the border, and the optimum with its numbers."""
+    named, best = sorted(_axes(what.ratios), key=lambda pair: pair[1]), what.best
+    numbers = f"optimum\nK_a = {best.K_a:.4g}\nK_w = {best.K_w:.4g}\nη = {best.eta:.4g}"
+    texts = (
+        (f"slow aperiodic root\nof {named[0][0]} decides", (0.17, 0.88), 1),
+        (f"oscillation\nof {named[-1][0]} decides", (0.83, 0.12), -1),
+        (numbers, (0.68, 0.5), 0),
+    )
+    box = {"boxstyle": "round,pad=0.3", "facecolor": "white", "edgecolor": "none", "alpha": 0.9}
+    for text, place in zip((text for text, _, _ in texts), _places(what, texts), strict=True):
+        line = {"arrowstyle": "-", "color": "0.15", "linewidth": 0.9, "shrinkB": 7.0} if text == numbers else None
+        axis.annotate(
+            text,
+            (best.K_a, best.K_w),
+            xytext=place,
+            textcoords="axes fraction",
+            ha="center",
+            va="center",
+            fontsize=9,
+            bbox=box,
+            arrowprops=line,
+            zorder=6,
+        )
+    axis.plot([best.K_a], [best.K_w], "*", markersize=18, color=LINE, markeredgecolor="white", markeredgewidth=1.2, zorder=7)
+
+
+def _places(what: Sketch, texts: Any) -> list[tuple[float, float]]:
+    """Centres, as shares of the axes, of words that hide as little as can be of the lines and of each other: each as near
+    as it can be to where it is wanted, above the border (1), below it (-1) or anywhere (0)."""
+    u = np.linspace(0.0, 1.0, 600)
+    K_a, K_w, c = u * what.K_a[-1], u * what.K_w[-1], boundary(what.ratios)
+    curves = [(factor * K_w**2 / what.K_a[-1], u) for factor in (c, *(1.0 / (8.0 * i) for i in what.ratios))]
+    if what.omega > 0.0:
+        curves.append((u, (what.budget - 2.0 * what.alpha * K_a) / what.omega / what.K_w[-1]))
+    if what.alpha > 0.0:
+        curves.append(((what.budget - what.omega * K_w) / (2.0 * what.alpha) / what.K_a[-1], u))
+    star = np.array([[what.best.K_a / what.K_a[-1]], [what.best.K_w / what.K_w[-1]]])
+    taken = np.hstack([np.array(curve) for curve in curves] + [star])
+    # A corner of the box lies above the border where K_a < c K_w^2.
+    bend = c * what.K_w[-1] ** 2 / what.K_a[-1]
+    steps = np.linspace(0.0, 1.0, 61)
+    found: list[tuple[float, float]] = []
+    for text, wanted, side in texts:
+        lines = text.split("\n")
+        half = np.array([0.012 + 0.0058 * max(map(len, lines)), 0.014 + 0.0182 * len(lines)])
+        choices: list[tuple[int, float, tuple[float, float]]] = []
+        for x in steps[(steps > half[0] + 0.01) & (steps < 0.99 - half[0])]:
+            for y in steps[(steps > half[1] + 0.01) & (steps < 0.99 - half[1])]:
+                if side and side * (bend * (y - side * half[1]) ** 2 - (x + side * half[0])) < 0.0:
+                    continue
+                hidden = (np.abs(taken - [[x], [y]]) < half[:, None] + 0.008).all(axis=0).sum()
+                choices.append((int(hidden), float(np.hypot(x - wanted[0], y - wanted[1])), (float(x), float(y))))
+        place = min(choices, default=(0, 0.0, wanted))[2]
+        found.append(place)
+        inside = (np.mgrid[-1:1:21j, -1:1:21j].reshape(2, -1) * half[:, None]) + np.array(place)[:, None]
+        taken = np.hstack([taken, inside])
+    return found
+
+
+def _axes(ratios: tuple[float, ...]) -> list[tuple[str, float]]:
+    """The axes by name, those of equal moments together, each with its ratio."""
+    groups: list[tuple[str, float]] = []
+    for name, ratio in zip("xyz", ratios, strict=True):
+        for number, (names, other) in enumerate(groups):
+            if abs(ratio - other) <= SAME * max(ratio, other):
+                groups[number] = (f"{names}, {name}", other)
+                break
+        else:
+            groups.append((name, ratio))
+    return [(f"{'axes' if ',' in names else 'axis'} {names}", ratio) for names, ratio in groups]
+
+
+def _save(figure: Any, path: Path) -> Path:
+    # No software entry, lest equal figures differ between releases.
+    with whole(path) as hidden:
+        figure.savefig(hidden, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
+    return path

@@ -1,0 +1,112 @@
+"""Operations on tuples of any length: what they give, and that compiled code gives the same."""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import pytest
+import sympy
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from starhold.algebra.scalar import equation
+from starhold.algebra.several import choose, each, weighted
+from starhold.algebra.vector import add, dot, scale
+from tests.algebra.readers import agree, numbers, same
+
+LENGTHS = (1, 2, 3, 5)
+
+
+def vectors(count: int):
+    return st.tuples(*[st.tuples(numbers, numbers, numbers)] * count)
+
+
+def row(count: int):
+    return st.tuples(*[numbers] * count)
+
+
+@equation
+def _affine(a, v, slope, offset):
+    return add(scale(slope * a, v), offset)
+
+
+@equation
+def affine(a, v, slope, offset):
+    return each(_affine, (a, v), slope, offset)
+
+
+@equation
+def _products(rows, v):
+    return each(dot, (rows,), v)
+
+
+@equation
+def nested(matrices, v):
+    """A map within a map, over elements of different lengths."""
+    return each(_products, (matrices,), v)
+
+
+@pytest.mark.parametrize("count", LENGTHS)
+def test_each_applies_the_equation_to_every_element(count):
+    @settings(max_examples=20)
+    @given(row(count), vectors(count), numbers, st.tuples(numbers, numbers, numbers))
+    def check(a, v, slope, offset):
+        assert agree(affine, a, v, slope, offset) == tuple(_affine(x, y, slope, offset) for x, y in zip(a, v, strict=True))
+
+    check()
+
+
+@settings(max_examples=20)
+@given(vectors(2), vectors(3), st.tuples(numbers, numbers, numbers))
+def test_elements_may_differ_in_length(a, b, v):
+    assert same(nested, (a, b), v) == ((dot(a[0], v), dot(a[1], v)), tuple(dot(x, v) for x in b))
+
+
+def test_nothing_to_apply_to():
+    assert nested((), (1.0, 2.0, 3.0)) == ()
+
+
+@pytest.mark.parametrize("count", LENGTHS)
+def test_weighted_sums(count):
+    @settings(max_examples=20)
+    @given(row(count), vectors(count))
+    def check(w, v):
+        found = agree(weighted, w, v)
+        for axis in range(3):
+            terms = [x * y[axis] for x, y in zip(w, v, strict=True)]
+            assert found[axis] == pytest.approx(math.fsum(terms), abs=1e-14 * sum(map(abs, terms)) + 1e-300)
+
+    check()
+
+
+@pytest.mark.parametrize("count", LENGTHS)
+def test_choose_takes_the_option_of_the_largest_score(count):
+    @settings(max_examples=30)
+    @given(row(count), vectors(count))
+    def check(scores, options):
+        assert same(choose, scores, options) == options[scores.index(max(scores))]
+
+    check()
+
+
+def test_choose_reads_symbols():
+    x, y = sympy.symbols("x y", real=True)
+    larger = choose((x, y), ((x,), (y,)))[0]
+    assert larger.subs({x: 2, y: 3}) == 3
+    assert larger.subs({x: 3, y: 2}) == 3
+
+
+@pytest.mark.parametrize(
+    ("function", "arguments"),
+    [
+        (affine, ((1.0, 2.0), ((1.0, 2.0, 3.0),), 1.0, (0.0, 0.0, 0.0))),
+        (weighted, ((1.0, 2.0), ((1.0, 2.0, 3.0),))),
+        (choose, ((1.0, 2.0), ((1.0,),))),
+    ],
+)
+def test_tuples_of_different_lengths_are_refused(function, arguments):
+    with pytest.raises(ValueError, match="zip"):
+        function(*arguments)
+    with pytest.raises(ValueError, match="one length"):
+        numba.njit(lambda *a: function(*a))(*arguments)
