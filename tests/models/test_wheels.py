@@ -399,9 +399,9 @@ def test_a_lost_wheel_takes_no_part():
 
 
 def test_a_loss_that_leaves_a_direction_without_authority():
-    with pytest.raises(ValueError, match=r"without wheel 2 the others give no torque about the body direction \(0, 0, 1\)"):
+    with pytest.raises(ValueError, match=r"without wheel 3 the others give no torque about the body direction \(0, 0, 1\)"):
         lose(simple(three_orthogonal()), 2)
-    with pytest.raises(ValueError, match=r"without wheel 3 the others give .* \(0, 1, 0\): three"):
+    with pytest.raises(ValueError, match=r"without wheel 4 the others give .* \(0, 1, 0\): three"):
         lose(simple(nasa_standard(), torque_limit=(1.0, 0.0, 1.0, 1.0)), 3)
     for index in (-1, 4):
         with pytest.raises(ValueError, match="there is no wheel"):
@@ -416,8 +416,8 @@ FLAT = ((1.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 1.0, 1.0), (1.0, -3.0, 1.0))
 @pytest.mark.parametrize(
     ("axes", "message"),
     [
-        (((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), "axis of wheel 1 .* not 0"),
-        (((1.0, 0.0, 0.0), (0.0, math.nan, 0.0), (0.0, 0.0, 1.0)), "axis of wheel 1 .* not nan"),
+        (((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), "axis of wheel 2 .* not 0"),
+        (((1.0, 0.0, 0.0), (0.0, math.nan, 0.0), (0.0, 0.0, 1.0)), "axis of wheel 2 .* not nan"),
         (((1.0, 0.0), (0.0, 1.0)), r"shape \(2, 2\)"),
         ((), "shape"),
         (FLAT, r"the wheels give no torque about the body direction \(0.707, 0, -0.707\): three independent"),
@@ -434,14 +434,14 @@ def test_axes_that_are_refused(axes, message):
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        ({"inertia": 0.0}, "rotor inertia of wheel 0 must be positive and finite, not 0"),
-        ({"inertia": math.inf}, "rotor inertia of wheel 0"),
-        ({"torque_limit": (0.1, -0.1, 0.1)}, "torque limit of wheel 1 must be zero or more, not -0.1"),
-        ({"torque_limit": math.nan}, "torque limit of wheel 0 .* not nan"),
+        ({"inertia": 0.0}, "rotor inertia of wheel 1 must be positive and finite, not 0"),
+        ({"inertia": math.inf}, "rotor inertia of wheel 1"),
+        ({"torque_limit": (0.1, -0.1, 0.1)}, "torque limit of wheel 2 must be zero or more, not -0.1"),
+        ({"torque_limit": math.nan}, "torque limit of wheel 1 .* not nan"),
         ({"torque_limit": 0.0}, "the working wheels give no torque at all"),
-        ({"momentum_limit": 0.0}, "momentum limit of wheel 0 must be positive, not 0"),
-        ({"viscous": -1.0}, "viscous friction of wheel 0 must be zero or more and finite, not -1"),
-        ({"coulomb": (0.0, 0.0, math.inf)}, "Coulomb friction of wheel 2"),
+        ({"momentum_limit": 0.0}, "momentum limit of wheel 1 must be positive, not 0"),
+        ({"viscous": -1.0}, "viscous friction of wheel 1 must be zero or more and finite, not -1"),
+        ({"coulomb": (0.0, 0.0, math.inf)}, "Coulomb friction of wheel 3"),
         ({"coulomb": (0.0, 0.0)}, r"Coulomb friction: one number or 3 are needed, not an array of shape \(2,\)"),
     ],
 )

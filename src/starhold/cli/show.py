@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from starhold.laws.catalogue import Law
+    from starhold.models.wheel_units import WheelUnit
     from starhold.report.flight import Flight
     from starhold.scenario.designing import Design
     from starhold.scenario.reading import LawEntry
@@ -132,6 +133,17 @@ def print_laws(known: Mapping[str, Law]) -> None:
         table.add_column(head)
     for law in known.values():
         table.add_row(law.name, law.card.claims, law.card.summary)
+    console.print(table)
+
+
+def print_wheels(units: Mapping[str, WheelUnit]) -> None:
+    """What is known of each wheel; a dash where the maker does not say."""
+    table = Table(show_edge=False, pad_edge=False)
+    for head in ("unit", "maker", "torque, N m", "momentum, N m s", "rotor inertia, kg m²", "mass, kg", "source"):
+        table.add_column(head, justify="left" if head in ("unit", "maker", "source") else "right")
+    for unit in units.values():
+        numbers = (unit.torque_limit, unit.momentum_limit, unit.inertia, unit.mass)
+        table.add_row(unit.name, unit.maker, *("—" if x is None else f"{x:.4g}" for x in numbers), unit.source)
     console.print(table)
 
 

@@ -59,6 +59,7 @@ class Parts(NamedTuple):
     with_torque: Callable[..., Any]
     rates: Callable[..., Any]
     stored: Callable[..., Any]
+    given: Callable[..., Any]
     record: Callable[..., Any]
     share: Callable[..., Any]
 
@@ -152,6 +153,7 @@ class ClosedLoop:
             body.with_torque,
             body.rates,
             body.stored,
+            body.given,
             body.record,
             ALLOCATIONS[self.allocation],
         )

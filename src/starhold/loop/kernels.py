@@ -58,23 +58,8 @@ class Kernels(NamedTuple):
 @cache
 def make_step(parts: Parts) -> Step:
     """The equations of a control step made of these parts."""
-    (
-        environment,
-        target,
-        sense,
-        disturb,
-        cover,
-        law,
-        limit,
-        begin,
-        response,
-        tidy,
-        with_torque,
-        rates,
-        stored,
-        record,
-        share,
-    ) = parts
+    environment, target, sense, disturb, cover, law, limit, begin, response, *body = parts
+    tidy, with_torque, rates, stored, given, record, share = body
 
     @equation
     def look(carry, step, run, craft, setup):
@@ -155,7 +140,8 @@ def make_step(parts: Parts) -> Step:
         goal = target(setup.target, s.position, s.velocity, step, carry.goal)
         error = relative(goal.attitude, s.attitude)
         rate = subtract(s.rate, to_body(error, goal.rate))
-        body = Sample(s.attitude, s.rate, s.position, s.velocity, s.torque, carry.command, error, rate)
+        torque = given(s, setup.wheels, share)
+        body = Sample(s.attitude, s.rate, s.position, s.velocity, torque, carry.command, error, rate)
         return record(body, s, setup.wheels, share)
 
     return Step(see, decide, hold, check, sample)

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 
 from starhold.algebra.quaternion import Quaternion, renormalise
 from starhold.algebra.scalar import equation
-from starhold.algebra.vector import Vector, add
+from starhold.algebra.several import weighted
+from starhold.algebra.vector import Vector, add, scale
 from starhold.models.craft import Craft
 from starhold.models.rigid_body import motion
 from starhold.models.wheels import Wheels, on_body
@@ -70,6 +71,14 @@ def rates(
 def stored(state: WheeledState, wheels: Wheels) -> Vector:
     """The rotors' momentum in body axes (N m s)."""
     return stored_momentum(state.momentum, wheels)
+
+
+@equation
+def given(state: WheeledState, wheels: Wheels, share: Any) -> Vector:
+    """The torque that motors and friction of the wheels give the body (N m), less than what is asked where they are at
+    their limits or lost."""
+    rotors = turn_rotors(share(state.torque, wheels), state.momentum, state.rate, wheels)
+    return scale(-1.0, weighted(rotors, wheels.axes))
 
 
 @equation

@@ -132,10 +132,12 @@ def _motor(
     coulomb: Scalar,
     rate: Vector,
 ) -> Scalar:
-    filled = momentum / momentum_limit
-    room = where(less(0.0, command), _fraction((1.0 - filled) / BAND), _fraction((1.0 + filled) / BAND))
-    speed = momentum / inertia - dot(axis, rate)
-    return room * clip(command, torque_limit) - viscous * speed - coulomb * clip(speed / CREEP, 1.0)
+    # Reciprocals of what does not change, which a compiler takes out of the loop over the lanes.
+    filled = momentum * (1.0 / momentum_limit)
+    above, below = _fraction((1.0 - filled) * (1.0 / BAND)), _fraction((1.0 + filled) * (1.0 / BAND))
+    room = where(less(0.0, command), above, below)
+    speed = momentum * (1.0 / inertia) - dot(axis, rate)
+    return room * clip(command, torque_limit) - viscous * speed - coulomb * clip(speed * (1.0 / CREEP), 1.0)
 
 
 @equation
@@ -188,19 +190,19 @@ def make_wheels(
 
 
 def lose(wheels: Wheels, index: int) -> Wheels:
-    """The wheels after one of them (counted from 0) has lost its motor: it takes no part in allocation any more, its torque
-    limit is 0, and its rotor only coasts down by friction.
+    """The wheels after one of them (`index` counts from 0, messages from 1) has lost its motor: it takes no part in
+    allocation any more, its torque limit is 0, and its rotor only coasts down by friction.
 
     Raises ValueError where there is no such wheel, or the others no longer act about three axes (it names the body direction
     without authority).
     """
     count = len(wheels.axes)
     if not 0 <= index < count:
-        raise ValueError(f"there is no wheel {index}; the wheels are 0 to {count - 1}")
+        raise ValueError(f"there is no wheel {index + 1}; the wheels are 1 to {count}")
     limits = tuple(0.0 if i == index else limit for i, limit in enumerate(wheels.torque_limit))
     working = [i for i in range(count) if limits[i] > 0.0]
     matrix = np.array(wheels.axes)
-    _check_authority(matrix[working], f"without wheel {index} the others give")
+    _check_authority(matrix[working], f"without wheel {index + 1} the others give")
     return wheels._replace(torque_limit=limits, least=_least_squares(matrix, working), facets=_facets(matrix, working))
 
 
@@ -225,6 +227,8 @@ def body_inertia(inertia_total: Any, wheels: Wheels) -> NDArray[np.float64]:
     if moments[0] <= 0.0:
         shown = ", ".join(f"{m:g}" for m in moments)
         raise ValueError(f"the rotors have more inertia than the craft: without them its principal moments are {shown}")
+    # What symmetric layouts leave of the products is rounding, and would cost the loop its diagonal inertia.
+    rest[np.abs(rest) < 1e-15 * moments[-1]] = 0.0
     return rest
 
 
@@ -255,7 +259,7 @@ def _unit_axes(axes: Sequence[Sequence[float]]) -> NDArray[np.float64]:
     lengths = np.linalg.norm(matrix, axis=1)
     for i, length in enumerate(lengths.tolist()):
         if not 0.0 < length < math.inf:
-            raise ValueError(f"the axis of wheel {i} must have a finite length above zero, not {length:g}")
+            raise ValueError(f"the axis of wheel {i + 1} must have a finite length above zero, not {length:g}")
     return matrix / lengths[:, None]
 
 
@@ -269,7 +273,9 @@ def _column(name: str, value: Any, count: int, least: float | None, infinite: bo
         sound = number > 0.0 if least is None else number >= least
         if not sound or (math.isinf(number) and not infinite):
             range_ = "positive" if least is None else "zero or more"
-            raise ValueError(f"the {name} of wheel {i} must be {range_}{'' if infinite else ' and finite'}, not {number:g}")
+            raise ValueError(
+                f"the {name} of wheel {i + 1} must be {range_}{'' if infinite else ' and finite'}, not {number:g}"
+            )
     return tuple(column)
 
 

@@ -53,7 +53,7 @@ def paint(what: Sketch, folder: Path, part: slice = slice(None)) -> list[Path]:
     """Write the figures, or a part of them, into `folder`, which exists, and return their paths."""
     plots, flights, name = what
     over_time = (plots.scalar, plots.attitude, plots.rate, plots.torque, plots.angle, *plots.wheels)
-    makers = {plot.name: partial(_over_time, plot, plots.times, flights, name) for plot in over_time}
+    makers = {plot.name: partial(_over_time, plot, plots, flights, name) for plot in over_time}
     makers["accuracy"] = partial(_accuracy, flights, name)
     with warnings.catch_warnings():
         # A name in a script that the font lacks is drawn as boxes; that is no news to whoever runs a simulation.
@@ -68,8 +68,8 @@ def warm_up() -> None:
     figure.savefig(BytesIO())
 
 
-def _over_time(plot: Plot, times: Any, flights: Sequence[Flight], name: str) -> Any:
-    count = len(plot.panels)
+def _over_time(plot: Plot, plots: Plots, flights: Sequence[Flight], name: str) -> Any:
+    count, times = len(plot.panels), plots.times
     height = {1: 3.6, 2: 5.2}.get(count, 1.6 * (count + 1))
     figure, axes = _figure(count, 1, height, f"{plot.title}", flights, name, plot.dashed)
     for axis, panel in zip(axes, plot.panels, strict=True):
@@ -84,6 +84,8 @@ def _over_time(plot: Plot, times: Any, flights: Sequence[Flight], name: str) -> 
                 axis.minorticks_off()
         for level in panel.levels:
             axis.axhline(level, color="0.35", linewidth=0.9, dashes=(5, 3))
+        for mark in plots.marks:
+            axis.axvline(mark, color="0.2", linewidth=0.9, linestyle=":")
         if panel.span is not None:
             axis.set_ylim(*panel.span)
         axis.set_ylabel(panel.label)

@@ -226,7 +226,7 @@ def _data(scenario: Scenario, flights: Sequence[Flight]) -> dict[str, Any]:
     return {
         "laws": [{"name": flight.name, "colour": colour(number)} for number, flight in enumerate(flights)],
         "times": _numbers(plots.times),
-        "plots": [*(_over_time(plot, flights) for plot in drawn), _accuracy(flights)],
+        "plots": [*({**_over_time(plot, flights), "marks": plots.marks} for plot in drawn), _accuracy(flights)],
         "scene": _scene(scenario, flights),
     }
 

@@ -65,6 +65,8 @@ class Plots:
     angle: Plot
     wheels: tuple[Plot, ...] = ()
     """Momenta and torques of the reaction wheels, where there are any."""
+    marks: tuple[float, ...] = ()
+    """When faults happen and are acted on (s)."""
 
 
 def collect(flights: Sequence[Flight], points: int, scenario: Scenario | None = None) -> Plots:
@@ -92,6 +94,7 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario | None = 
         Plot("torque", "torque applied", torques, dashed),
         _angle(flights, factor, scenario),
         _wheels(flights, factor, scenario),
+        () if scenario is None else scenario.fault_times,
     )
 
 

@@ -35,13 +35,12 @@ def make_events(scenario: Scenario, entry: LawEntry) -> tuple[Event, ...]:
             wheels = _struck(wheels, fault)
         else:
             try:
-                if fault.action in ("reallocate", "both") and fault.lost:
-                    wheels = lose(wheels, _index(fault))
+                left = lose(wheels, _index(fault)) if fault.lost else wheels
             except ValueError as error:
-                reason = f"without wheel {fault.wheel} the others{str(error).partition('the others')[2]}"
-                raise InputError(scenario.where, f"fault[{place}]", "", f'{reason}; action = "none" flies on') from None
+                raise InputError(scenario.where, f"fault[{place}]", "", f'{error}; action = "none" flies on') from None
             if fault.action in ("retune", "both"):
-                gains = _retuned(scenario, entry, authority(wheels) / begun, place)
+                gains = _retuned(scenario, entry, authority(left) / begun, place)
+            wheels = wheels if fault.action == "retune" else left
         events.append(Event(round(time / period), wheels, gains, craft))
     return tuple(events)
 

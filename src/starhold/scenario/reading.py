@@ -69,6 +69,12 @@ class Scenario:
         """The reaction wheels, None for a craft without."""
         return make_rotors(self.table.wheels, self.table.wheel)
 
+    @property
+    def fault_times(self) -> tuple[float, ...]:
+        """When faults happen and are acted on (s)."""
+        acted = [fault.time + fault.delay for fault in self.table.fault if fault.action != "none"]
+        return tuple(sorted({*(fault.time for fault in self.table.fault), *acted}))
+
     def pick(self, name: str) -> LawEntry:
         """The law of this name; InputError names the nearest when there is none."""
         for entry in self.laws:

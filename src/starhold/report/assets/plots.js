@@ -57,6 +57,12 @@ function draw(plot) {
       ...(panel.span ? { range: panel.log ? panel.span.map(Math.log10) : panel.span } : {}),
       ...(plot.split ? { rangemode: "tozero" } : {}),
     };
+    for (const mark of plot.marks || []) {
+      layout.shapes.push({
+        type: "line", xref: "x", x0: mark, x1: mark, yref: `y${id} domain`, y0: 0, y1: 1,
+        line: { color: css("--soft"), width: 1.2, dash: "dot" },
+      });
+    }
     for (const level of panel.levels) {
       layout.shapes.push({
         type: "line", xref: "paper", x0: 0, x1: 1, yref: `y${id}`, y0: level, y1: level,

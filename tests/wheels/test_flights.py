@@ -1,0 +1,206 @@
+"""A spacecraft on reaction wheels, from the scenario file to the flight."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from starhold.algebra.quaternion import to_reference
+from starhold.errors import InputError
+from starhold.models.craft import tensor
+from starhold.models.wheels import authority, make_wheels, pyramid, stored
+from starhold.scenario.building import build
+from starhold.scenario.reading import builtin_text, load, parse
+from starhold.simulation.lane import fly, label
+from starhold.simulation.lanes import simulate_many
+
+BUILTIN = builtin_text("wheels-orbital")
+STRUCK = "\n[[fault]]\ntime = 20\nwheel = 2\nlost = true\ndelay = 5\n"
+
+
+def flight(text, law=0, steps=None):
+    scenario = parse(text, "here")
+    loop = build(scenario, scenario.laws[law])
+    samples, carry = fly(loop, scenario.table.simulation.steps if steps is None else steps)
+    return scenario, loop, label(loop, samples, carry, 1)
+
+
+def angle(recording):
+    return 2.0 * np.degrees(np.arcsin(np.linalg.norm(recording["attitude_error"][:, 1:], axis=1)))
+
+
+def test_the_builtin_scenario_holds_the_orbital_frame_on_its_first_run():
+    scenario, loop, run = flight(BUILTIN)
+    assert angle(run)[0] > 20.0
+    # Held for good, by what is compensated: the frame turns and gravity pulls.
+    assert angle(run)[3000:].max() < 0.01
+    _, _, plain = flight(BUILTIN, law=1)
+    assert 0.01 < angle(plain)[3000:].max() < 1.0
+    limits = np.array(loop.wheels.torque_limit)
+    assert (np.abs(run["wheel_torque"]) <= limits * (1.0 + 1e-12)).all()
+    assert (np.abs(run["wheel_momentum"]) <= np.array(loop.wheels.momentum_limit)).all()
+    assert scenario.wheels is not None
+
+
+@pytest.mark.parametrize("layout", ["orthogonal", "pyramid", "nasa-standard"])
+@pytest.mark.parametrize("allocation", ["least-squares", "least-peak"])
+def test_total_angular_momentum_is_kept_without_torque_from_outside(layout, allocation):
+    """Body and wheels together, in inertial axes, over an orbit, in the kernel itself."""
+    text = BUILTIN.replace('"pyramid"', f'"{layout}"').replace('"least-squares"', f'"{allocation}"')
+    text = text.replace("gravity_gradient = true", "gravity_gradient = false").replace('"10 min"', '"94 min"')
+    text = text.replace("inertia = [6.0, 8.0, 5.0]", "inertia = [60.0, 80.0, 50.0]")
+    text = text.replace("# viscous", "viscous").replace("# coulomb", "coulomb")
+    text = text.replace('# momentum = "0.1 N m s"', 'momentum = "0.1 N m s"')
+    _, loop, run = flight(text)
+    J = tensor(loop.craft.inertia)
+    total = []
+    for q, w, h in zip(run["attitude"], run["rate"], run["wheel_momentum"], strict=True):
+        body = J @ w + np.array(stored(tuple(h), loop.wheels))
+        total.append(to_reference(tuple(q), tuple(body)))
+    total = np.array(total)
+    size = np.linalg.norm(total[0])
+    assert np.abs(total - total[0]).max() <= 1e-12 * size
+    # The wheels did something meanwhile.
+    assert np.ptp(run["wheel_momentum"], axis=0).max() > 0.01 * size
+
+
+def test_a_saturated_wheel_gives_no_more_torque_outwards():
+    text = BUILTIN.replace('momentum_limit = "0.4 N m s"', 'momentum_limit = "0.1 N m s"')
+    text = text.replace('# momentum = "0.1 N m s"', 'momentum = "0.07 N m s"')
+    _, loop, run = flight(text, steps=3000)
+    h, turn = run["wheel_momentum"], run["wheel_torque"]
+    limit = loop.wheels.momentum_limit[0]
+    assert np.abs(h).max() > 0.99 * limit
+    assert np.abs(h).max() <= limit * (1.0 + 1e-9)
+    outward = turn * np.sign(h)
+    assert outward[np.abs(h) > 0.999999 * limit].max(initial=0.0) <= 1e-6
+
+
+def test_a_pyramid_that_loses_a_wheel_goes_on():
+    _, _, whole = flight(BUILTIN)
+    settled = {}
+    for action in ("none", "reallocate", "retune", "both"):
+        _, loop, run = flight(BUILTIN + STRUCK + f'action = "{action}"\n')
+        assert len(loop.events) == (1 if action == "none" else 2)
+        body = -run["wheel_torque"] @ np.array(loop.wheels.axes)
+        assert np.abs(run["torque"] - body).max() < 1e-15
+        lost = run["wheel_torque"][201:, 1]
+        assert np.abs(lost).max() == 0.0
+        left = np.flatnonzero(angle(run) > 0.1)
+        settled[action] = (left[-1] + 1) * 0.1
+    left = (np.flatnonzero(angle(whole) > 0.1)[-1] + 1) * 0.1
+    assert 0.95 * left < settled["both"] < 1.6 * left
+    assert 0.95 * left < settled["reallocate"] < settled["none"]
+    assert settled["none"] > 2.0 * settled["both"]
+
+
+def test_retuned_gains_are_those_designed_for_the_torque_left():
+    scenario, loop, _ = flight(BUILTIN + STRUCK, steps=1)
+    entry = scenario.laws[0]
+    struck, acted = loop.events
+    assert (struck.step, acted.step) == (200, 250)
+    assert struck.gains == entry.gains
+    share = authority(acted.wheels) / authority(scenario.wheels)
+    assert 0.0 < share < 1.0
+    expected = entry.law.design(scenario.craft, entry.spec._replace(torque=entry.spec.torque * share))
+    assert acted.gains == expected
+    assert expected.k_rate < entry.gains.k_rate
+
+
+def test_authority_is_the_torque_that_every_direction_can_have():
+    wheels = make_wheels(pyramid(), 1e-3, 0.02, 0.4)
+    from starhold.models.wheels import allocate
+
+    random = np.random.default_rng(0)
+    directions = random.normal(size=(500, 3))
+    directions *= authority(wheels) / np.linalg.norm(directions, axis=1, keepdims=True)
+    peaks = [max(map(abs, allocate(tuple(d), wheels))) for d in directions.tolist()]
+    assert 0.98 * 0.02 < max(peaks) <= 0.02 * (1.0 + 1e-12)
+
+
+def test_lanes_agree_with_single_flights_through_a_fault():
+    scenario = parse(BUILTIN + STRUCK, "here")
+    loop = build(scenario, scenario.laws[0])
+    start = loop.start
+    starts = [start._replace(rate=tuple(f * w for w in start.rate)) for f in (1.0, 0.5, -1.0)]
+    batch = simulate_many(loop, starts, 400, threads=2)
+    for lane, own in enumerate(starts):
+        end = fly(replace(loop, start=own), 400)[1].state
+        assert batch.state(lane) == end
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('layout = "pyramid"', 'layout = "ring"', "wheels.layout"),
+        ('layout = "pyramid"', "", "wheels.layout"),
+        ('torque_limit = "20 mN m"', "torque_limit = -1", "wheels.torque_limit: found -1; allowed: above 0"),
+        ("inertia = 1.0e-3", "", "wheel 1 has no inertia: give it, or a unit"),
+        ("inertia = 1.0e-3", 'unit = "RW-7"', "no wheel unit 'RW-7'"),
+        ("inertia = 1.0e-3", "inertia = 9.0", "more inertia than the craft"),
+    ],
+)
+def test_wheels_that_cannot_be(old, new, said):
+    assert old in BUILTIN
+    with pytest.raises(InputError, match="here: ") as refused:
+        flight(BUILTIN.replace(old, new, 1), steps=1)
+    assert said in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("axes", "said"),
+    [
+        ("[1,0,0] [0,1,0] [1,1,0]", "no torque about the body direction (0, 0, 1)"),
+        ("[0,0,0] [0,1,0] [1,1,0]", "the axis of wheel 1"),
+        ("[1,0,0] [0,1,0] [1,1,1e-5]", "condition number"),
+        ("[1,0] [0,1,0] [1,1,1]", "wheel[1].axis"),
+    ],
+)
+def test_axes_that_cannot_be(axes, said):
+    tables = "".join(f"\n[[wheel]]\naxis = {axis}\n" for axis in axes.split())
+    with pytest.raises(InputError) as refused:
+        flight(BUILTIN.replace('layout = "pyramid"', "", 1) + tables, steps=1)
+    assert said in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("wheel = 7\nlost = true", "fault[1].wheel: found 7; allowed: 1 to 4"),
+        ("wheel = 0\nlost = true", "fault[1].wheel: found 0"),
+        ("lost = true", "fault[1].wheel"),
+        ("wheel = 1", "fault[1].lost"),
+        ("wheel = 1\ntorque_limit = -1", "fault[1].torque_limit"),
+        ("wheel = 1\nlost = true\nmood = 3", "fault[1].mood: found an unknown key"),
+        ('wheel = 1\nlost = true\naction = "pray"', "fault[1].action"),
+    ],
+)
+def test_faults_that_cannot_be(change, said):
+    with pytest.raises(InputError) as refused:
+        flight(BUILTIN + f"\n[[fault]]\ntime = 20\n{change}\n", steps=1)
+    assert said in str(refused.value)
+
+
+def test_faults_out_of_time_and_out_of_wheels():
+    with pytest.raises(InputError, match=r"fault\[1\].time: found 2000 s; allowed: at most 600 s"):
+        flight(BUILTIN + "\n[[fault]]\ntime = 2000\nwheel = 1\nlost = true\n", steps=1)
+    with pytest.raises(InputError, match=r"fault\[1\]: without wheel 2 the others give no torque about .*\(0, 1, 0\)"):
+        flight(BUILTIN.replace('"pyramid"', '"orthogonal"') + STRUCK, steps=1)
+    plain = load("three-laws").text
+    with pytest.raises(InputError, match=r"fault\[1\]: found no wheels"):
+        flight(plain + STRUCK, steps=1)
+    text = BUILTIN + '\n[[law]]\ntype = "lyapunov"\nk_rate = 0.6\nk_attitude = 0.06\n' + STRUCK
+    with pytest.raises(InputError, match="retune for law lyapunov"):
+        flight(text, law=2, steps=1)
+
+
+def test_single_wheels_take_what_they_share_and_their_own():
+    text = BUILTIN.replace('layout = "pyramid"', "", 1).replace('# momentum = "0.1 N m s"', "momentum = 0.1")
+    axes = "".join(f"\n[[wheel]]\naxis = {axis}\n" for axis in ("[1,0,0]", "[0,1,0]"))
+    text += axes + '\n[[wheel]]\naxis = [0,0,2]\ntorque_limit = 0.05\nmomentum = -0.2\nunit = "RW0"\n'
+    scenario, loop, _ = flight(text, steps=1)
+    assert scenario.wheels.axes[2] == (0.0, 0.0, 1.0)
+    assert scenario.wheels.torque_limit == (0.02, 0.02, 0.05)
+    assert scenario.wheels.momentum_limit == (0.4, 0.4, 0.02)
+    assert loop.start.momentum == (0.1, 0.1, -0.2)
