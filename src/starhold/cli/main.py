@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from starhold.cli import certifying
+from starhold.cli import certifying, failing
 from starhold.cli.arguments import (
     DIVERGED,
     FAILED_CHECK,
@@ -120,6 +120,7 @@ def design(
 
 app.command()(certifying.certify)
 app.command()(certifying.check)
+app.command()(failing.failures)
 
 
 @app.command()
@@ -135,6 +136,15 @@ def laws(name: Annotated[str | None, typer.Argument(help="show this law's card a
         raise InputError("laws", "", name, nearest(name, list(catalogue())))
     else:
         print_law(catalogue()[name])
+
+
+@app.command()
+def wheels() -> None:
+    """List the reaction wheels of the catalogue, for `unit` in a scenario."""
+    from starhold.cli.show import print_wheels
+    from starhold.models.wheel_units import WHEEL_UNITS
+
+    print_wheels(WHEEL_UNITS)
 
 
 @app.command()

@@ -1,0 +1,384 @@
+"""What a spacecraft can still do after the loss of one or two of its wheels: numbers, a CSV file and a picture."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.analysis.metrics import measure
+from starhold.errors import InputError
+from starhold.laws.stability_degree import degree, scale
+from starhold.models.craft import tensor
+from starhold.models.wheels import Wheels, authority, lose
+from starhold.report.files import whole
+from starhold.report.flight import COLOURS
+from starhold.report.results import open_folder
+from starhold.scenario.building import build
+from starhold.scenario.schema import FaultTable
+from starhold.simulation.lane import Recording, fly, label
+
+if TYPE_CHECKING:
+    from starhold.loop.closed_loop import ClosedLoop
+    from starhold.scenario.reading import LawEntry, Scenario
+
+Array: TypeAlias = NDArray[np.float64]
+
+TABLE, PICTURE = "failures.csv", "failures.png"
+FULL = 0.99
+"""Share of its momentum limit at which a wheel counts as saturated: beyond it the motor loses its outward torque."""
+HORIZON = 1000
+"""So many orbits ahead, growth is extrapolated; a slower one counts as none."""
+WEAK = 1e-3
+"""Singular values of the axes below this share of the largest belong to directions without authority."""
+SINGULAR = 1e-9
+MOST_STEPS = 2_000_000
+"""Flights are not continued beyond the scenario's duration where that takes more control steps."""
+DPI = 110
+
+
+@dataclass(frozen=True)
+class Saturation:
+    """When the first wheel reaches its momentum limit: the time (s) and which wheel (from 1), both None where none does; how
+    that is known ("flown", "extrapolated", "none"); and over what time (s) its growth was taken (None where flown)."""
+
+    time: float | None
+    wheel: int | None
+    known: str
+    window: float | None
+
+
+@dataclass(frozen=True)
+class Failure:
+    """What is left after a loss. What needs three axes is None where they are not left.
+
+    lost: wheels, counted from 1, none for the intact set. lacking: body directions without authority, orthonormal (n, 3).
+    condition: condition number of the working axes. authority: N m. share: of the intact authority. gains: what the law is
+    flown with, by field. eta: degree of stability (1/s), intact and after; None for a law not designed for one. settling:
+    s, None where it does not settle within the scenario's duration. diverged_at: s, None where the motion was not lost.
+    momentum_share: largest |h| over its limit among working wheels during the flight. flown: length of the flight (s).
+    orbit: its period (s), None without one.
+    """
+
+    lost: tuple[int, ...]
+    lacking: tuple[tuple[float, ...], ...]
+    condition: float
+    authority: float
+    share: float
+    gains: dict[str, Any] | None = None
+    eta_intact: float | None = None
+    eta: float | None = None
+    settling: float | None = None
+    diverged_at: float | None = None
+    saturation: Saturation | None = None
+    momentum_share: float | None = None
+    flown: float | None = None
+    orbit: float | None = None
+
+    @property
+    def name(self) -> str:
+        """The lost wheels in words."""
+        return " and ".join(map(str, self.lost)) or "none"
+
+    @property
+    def controllable(self) -> bool:
+        """Whether three axes are left."""
+        return not self.lacking
+
+
+def study(
+    scenario: Scenario, entry: LawEntry, notice: Callable[[int, int, str], None] = lambda done, total, name: None
+) -> list[Failure]:
+    """The intact set, then every single and every double loss, flown with a law of the scenario in place of its own faults.
+
+    The loss comes at time 0 and is known at once: the torque is shared out among the wheels left and, where the law was
+    designed for a degree of stability, its gains are designed for the torque left. `notice` hears the number done, that of
+    all, and the loss that comes next. InputError where the scenario has no wheels.
+    """
+    wheels = require_wheels(scenario)
+    count = len(wheels.axes)
+    losses = [lost for size in range(3) for lost in combinations(range(1, count + 1), size)]
+    intact = authority(wheels)
+    eta = _degree(scenario, entry, entry.gains)
+    found: list[Failure] = []
+    for done, lost in enumerate(losses):
+        failure = _left(wheels, lost, intact)
+        notice(done, len(losses), failure.name)
+        failure = replace(failure, eta_intact=eta)
+        found.append(_flown(scenario, entry, failure) if failure.controllable else failure)
+    notice(len(losses), len(losses), "")
+    return found
+
+
+def directions_lacking(axes: Array) -> Array:
+    """Orthonormal body directions (n, 3) about which wheels with these axes (k, 3) give no torque, or hardly any."""
+    if len(axes) == 0:
+        return np.eye(3)
+    directions, sizes, _ = np.linalg.svd(axes.T)
+    sizes = np.append(sizes, np.zeros(3 - len(sizes)))
+    lacking = directions[:, sizes <= WEAK * sizes[0]].T
+    leading = np.take_along_axis(lacking, np.abs(lacking.round(9)).argmax(axis=1)[:, None], axis=1)
+    return np.sign(leading) * lacking
+
+
+def open_results(folder: Path, force: bool) -> Path:
+    """The folder for results; one that holds them is refused, or cleared of them, as `open_folder` does."""
+    held = [name for name in (TABLE, PICTURE) if (folder / name).exists()]
+    if held and not force:
+        raise InputError(str(folder), "", f"results already there ({held[0]})", "another folder with -o, or --force")
+    open_folder(folder, force)
+    for name in held:
+        (folder / name).unlink()
+    return folder
+
+
+def write_table(found: Sequence[Failure], entry: LawEntry, path: Path) -> None:
+    """All numbers as CSV, SI units in the header; what does not exist is an empty cell, vectors are separated by blanks."""
+    gains = {f"{item.name} ({item.gain.unit})": item.name for item in entry.law.fields()}
+    with whole(path) as hidden, hidden.open("w", encoding="utf-8", newline="") as file:
+        rows = csv.writer(file, lineterminator="\n")
+        rows.writerow([*_cells(found[0]), *gains])
+        for failure in found:
+            chosen = failure.gains or {}
+            rows.writerow([*_cells(failure).values(), *(_numbers(chosen.get(name)) for name in gains.values())])
+
+
+def _cells(failure: Failure) -> dict[str, str]:
+    known = failure.saturation or Saturation(None, None, "", None)
+    return {
+        "lost wheels": _numbers(failure.lost),
+        "controllable axes": str(3 - len(failure.lacking)),
+        "directions without authority": "; ".join(map(_numbers, failure.lacking)),
+        "condition number": _numbers(failure.condition),
+        "torque authority (N m)": _numbers(failure.authority),
+        "share of intact authority": _numbers(failure.share),
+        "degree of stability intact (1/s)": _numbers(failure.eta_intact),
+        "degree of stability after (1/s)": _numbers(failure.eta),
+        "settling time (s)": _numbers(failure.settling),
+        "diverged at (s)": _numbers(failure.diverged_at),
+        "saturation time (s)": _numbers(known.time),
+        "saturating wheel": _numbers(known.wheel),
+        "saturation known from": known.known,
+        "window of momentum growth (s)": _numbers(known.window),
+        "largest share of momentum limit": _numbers(failure.momentum_share),
+        "time flown (s)": _numbers(failure.flown),
+    }
+
+
+def _numbers(value: Any) -> str:
+    if value is None:
+        return ""
+    return " ".join(repr(number) for number in np.asarray(value).ravel().tolist())
+
+
+def require_wheels(scenario: Scenario) -> Wheels:
+    """The wheels of a scenario; InputError where it has none."""
+    wheels = scenario.wheels
+    if wheels is None:
+        raise InputError(scenario.where, "wheels", "no wheels", "a scenario with [wheels] or [[wheel]] tables")
+    return wheels
+
+
+def _left(wheels: Wheels, lost: tuple[int, ...], intact: float) -> Failure:
+    """The wheels that are left, judged as when a fault is diagnosed."""
+    limits = tuple(0.0 if i in lost else limit for i, limit in enumerate(wheels.torque_limit, 1))
+    axes = np.array([axis for i, axis in enumerate(wheels.axes, 1) if i not in lost])
+    try:
+        left = lose(wheels._replace(torque_limit=limits), lost[0] - 1) if lost else wheels
+    except ValueError:
+        lacking = tuple(tuple(map(float, direction.round(12) + 0.0)) for direction in directions_lacking(axes))
+        return Failure(lost, lacking, _condition(axes), 0.0, 0.0)
+    able = authority(left)
+    share = able / intact if math.isfinite(intact) else 1.0
+    return Failure(lost, (), _condition(axes), able, share)
+
+
+def _condition(axes: Array) -> float:
+    sizes = np.linalg.svd(axes, compute_uv=False) if len(axes) >= 3 else np.zeros(3)
+    return float(sizes[0] / sizes[2]) if sizes[2] > SINGULAR * sizes[0] else math.inf
+
+
+def _designed(entry: LawEntry) -> bool:
+    return entry.form == "degree-of-stability" and {"torque", "momentum"} <= set(entry.spec._fields)
+
+
+def _degree(scenario: Scenario, entry: LawEntry, gains: Any) -> float | None:
+    """Degree of stability (1/s) that these gains give; None for a law that is not designed for one."""
+    if not _designed(entry):
+        return None
+    moments = np.linalg.eigvalsh(tensor(scenario.craft.inertia))
+    units = scale(moments, entry.spec.torque, entry.spec.momentum)
+    return float(degree(*units.scaled(gains.k_attitude, gains.k_rate), units.ratios)) / units.t0
+
+
+def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
+    table = scenario.table
+    retune = _designed(entry) and 0.0 < failure.authority < math.inf
+    faults = [
+        FaultTable(time=0.0, wheel=wheel, lost=True, action="both" if retune else "reallocate") for wheel in failure.lost
+    ]
+    loop = build(replace(scenario, table=table.model_copy(update={"fault": faults})), entry)
+    gains = loop.events[-1].gains if loop.events else loop.gains
+    period = _orbit_period(scenario)
+    every, steps = table.simulation.record_every, _steps(scenario, loop, period)
+    samples, carry = fly(loop, steps, every)
+    recording = label(loop, samples, carry, every)
+    metrics = measure(_until(recording, table.simulation.duration), *_tolerances(scenario))
+    working = [i for i in range(len(require_wheels(scenario).axes)) if i + 1 not in failure.lost]
+    filled = recording["wheel_momentum"][:, working] / np.array(require_wheels(scenario).momentum_limit)[working]
+    lost_at = metrics["diverged_at"]
+    known = None if lost_at is not None else saturation(recording["time"], filled, period)
+    if known is not None and known.wheel is not None:
+        known = replace(known, wheel=working[known.wheel - 1] + 1)
+    return replace(
+        failure,
+        gains={
+            item.name: item.gain.choices[value] if item.gain.choices else value
+            for item, value in zip(entry.law.fields(), gains, strict=True)
+        },
+        eta=_degree(scenario, entry, gains),
+        settling=metrics["settling_time"],
+        diverged_at=lost_at,
+        saturation=known,
+        momentum_share=float(np.abs(filled).max()),
+        flown=float(recording["time"][-1]),
+        orbit=period,
+    )
+
+
+def _tolerances(scenario: Scenario) -> tuple[float, float]:
+    return scenario.table.settling.attitude_tolerance, scenario.table.settling.rate_tolerance
+
+
+def _orbit_period(scenario: Scenario) -> float | None:
+    """Of the orbit that the spacecraft starts in (s); None without one, or where it is not closed."""
+    orbit = scenario.table.orbit
+    if orbit is None:
+        return None
+    inverse = 2.0 / math.hypot(*orbit.position) - math.hypot(*orbit.velocity) ** 2 / orbit.gravitational_parameter
+    return 2.0 * math.pi / math.sqrt(orbit.gravitational_parameter * inverse**3) if inverse > 0.0 else None
+
+
+def _steps(scenario: Scenario, loop: ClosedLoop, period: float | None) -> int:
+    """Control steps to fly: an orbit more than the scenario's where that can be, for what the wheels store swings with the
+    orbit, and over less than one orbit nobody tells that from growth."""
+    steps = scenario.table.simulation.steps
+    if period is None or isinstance(loop.target, np.ndarray) or loop.law.card.compiled_only:
+        return steps
+    every = scenario.table.simulation.record_every
+    more = math.ceil(period / loop.period / every + 1.0) * every
+    return steps + more if steps + more <= MOST_STEPS else steps
+
+
+def _until(recording: Recording, time: float) -> Recording:
+    """The recording up to a time (s); a motion lost later is lost all the same."""
+    kept = int(np.searchsorted(recording["time"], time * (1.0 + 1e-9), side="right"))
+    return Recording({name: values[:kept] for name, values in recording.arrays.items()}, recording.attrs)
+
+
+def saturation(times: Array, filled: Array, period: float | None) -> Saturation:
+    """When the first of some wheels is full: times (n,) (s), momenta over their limits (n, wheels), orbit period (s).
+
+    Growth is taken over the last orbit, or the last half of the flight where that is shorter or there is no orbit; the
+    largest momentum on its side within that time is carried on with it. Wheels in the answer count from 1.
+    """
+    beyond = np.argwhere(np.abs(filled) > FULL)
+    if len(beyond):
+        row, wheel = beyond[0].tolist()
+        return Saturation(float(times[row]), wheel + 1, "flown", None)
+    end, half = float(times[-1]), 0.5 * float(times[-1])
+    window = half if period is None or period > end else period
+    last = times >= end - window
+    best = Saturation(None, None, "none", window)
+    if window <= 0.0:
+        return best
+    reach = end + HORIZON * (window if period is None else period)
+    for wheel, share in enumerate(filled.T):
+        growth = (share[-1] - np.interp(end - window, times, share)) / window
+        if growth == 0.0:
+            continue
+        outward = np.sign(growth) * share[last]
+        top = int(outward.argmax())
+        full = float(times[last][top] + (FULL - outward[top]) / abs(growth))
+        if full < (reach if best.time is None else best.time):
+            best = Saturation(full, wheel + 1, "extrapolated", window)
+    return best
+
+
+def draw(found: Sequence[Failure], path: Path, title: str) -> Path:
+    """Write a picture to `path`, in a folder that exists, and return the path: one row a loss, one panel a quantity."""
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    panels: list[tuple[str, list[float | None]]] = [
+        ("authority left, % of intact", [100.0 * failure.share for failure in found])
+    ]
+    if any(failure.eta is not None for failure in found):
+        panels.append(("degree of stability, 1/s", [failure.eta for failure in found]))
+    panels.append(("settling time, s", [failure.settling for failure in found]))
+    height = 1.45 + 0.27 * len(found)
+    figure = Figure(figsize=(8.0, height), dpi=DPI)
+    grid: Any = figure.subplots(1, len(panels), sharey=True, squeeze=False)
+    figure.subplots_adjust(left=0.118, right=0.978, bottom=0.55 / height, top=1.0 - 0.72 / height, wspace=0.09)
+    heading = title if len(title) <= 80 else f"{title[:79]}…"
+    figure.text(0.02, 1.0 - 0.28 / height, heading, fontsize=11, fontweight="bold", parse_math=False)
+    places = np.arange(len(found))
+    for number, (axis, (name, values)) in enumerate(zip(grid[0], panels, strict=True)):
+        sizes = [value or 0.0 for value in values]
+        colours = [COLOURS[2] if not failure.lost else COLOURS[0] for failure in found]
+        axis.barh(places, sizes, height=0.62, color=colours)
+        if sizes[0] > 0.0:
+            axis.axvline(sizes[0], color="0.35", linewidth=0.9, dashes=(5, 3))
+        axis.set_xlim(0.0, 1.25 * max(max(sizes), 1e-9))
+        for place, failure in enumerate(found):
+            _mark(axis, place, failure, values[place], number)
+        axis.set_xlabel(name, fontsize=9)
+        axis.grid(True, axis="x", color="0.9", linewidth=0.6)
+        axis.set_axisbelow(True)
+        axis.tick_params(labelsize=8.5)
+        axis.tick_params(axis="y", length=0.0)
+        for side in ("top", "right"):
+            axis.spines[side].set_visible(False)
+    grid[0][0].set_yticks(places, [failure.name for failure in found])
+    grid[0][0].set_ylim(len(found) - 0.5, -0.5)
+    grid[0][0].set_ylabel("lost wheels", fontsize=9)
+    handles = [
+        Line2D([], [], color=COLOURS[2], linewidth=6.0, label="intact"),
+        Line2D([], [], color=COLOURS[0], linewidth=6.0, label="three axes left"),
+        Line2D([], [], color=COLOURS[1], marker="X", linestyle="", markersize=7.0, label="an axis without torque"),
+        Line2D([], [], color="0.35", linewidth=0.9, dashes=(5, 3), label="as intact"),
+    ]
+    at = (0.012, 1.0 - 0.30 / height)
+    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=at, ncols=4, fontsize=8.5, frameon=False)
+    # No software entry, lest equal figures differ between releases.
+    with whole(path) as hidden:
+        figure.savefig(hidden, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
+    return path
+
+
+def _mark(axis: Any, place: int, failure: Failure, value: float | None, panel: int) -> None:
+    """The number at the end of a bar, or why there is none."""
+    across = axis.get_yaxis_transform()
+    if failure.controllable:
+        text = f"{value:.3g}" if value is not None else "not settled" if failure.diverged_at is None else "diverged"
+        axis.text(value or 0.0, place, f" {text}", va="center", fontsize=7.5, color="0.2")
+        return
+    axis.axhspan(place - 0.5, place + 0.5, color="0.94", linewidth=0.0, zorder=0)
+    if panel == 0:
+        axis.plot(0.03, place, marker="X", color=COLOURS[1], markersize=6.5, transform=across, clip_on=False)
+        shown = f"no torque about {direction_text(failure)}"
+        axis.text(0.075, place, shown, va="center", fontsize=7.5, color="0.2", transform=across, zorder=5)
+
+
+def direction_text(failure: Failure) -> str:
+    """The body directions without authority, for reading."""
+    if len(failure.lacking) == 3:
+        return "any axis"
+    return " and ".join(f"({', '.join(f'{x:.3g}' for x in direction)})" for direction in failure.lacking)
