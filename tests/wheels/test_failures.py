@@ -1,113 +1,274 @@
-"""What is left after wheels are lost."""
+"""What is left after the loss of one or two wheels."""
 
 import csv
+import re
 import subprocess
 import sys
+from itertools import combinations
 
-import matplotlib.image
 import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+from starhold.analysis.metrics import measure
 from starhold.errors import InputError
-from starhold.models.wheels import authority
-from starhold.report.failures import directions_lacking, draw, require_wheels, study, write_table
+from starhold.models.wheels import lose, make_wheels, pyramid
+from starhold.report.failures import (
+    FULL,
+    Failure,
+    _flown,
+    directions_lacking,
+    draw,
+    open_results,
+    saturation,
+    study,
+    write_table,
+)
+from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
+from starhold.simulation.lane import fly, label
 
 BUILTIN = builtin_text("wheels-orbital")
 
 
 @pytest.fixture(scope="module")
-def pyramid():
-    scenario = parse(BUILTIN, "here")
-    return scenario, study(scenario, scenario.laws[0])
+def scenario():
+    return load("wheels-orbital")
 
 
-def test_a_pyramid_stands_any_single_loss_and_no_double_one(pyramid):
-    scenario, found = pyramid
-    assert [f.lost for f in found] == [(), (1,), (2,), (3,), (4,), (1, 2), (1, 3), (1, 4), (2, 3), (2, 4), (3, 4)]
-    intact, singles, doubles = found[0], found[1:5], found[5:]
-    assert intact.share == 1.0
-    assert intact.condition == pytest.approx(1.0)
-    for failure in singles:
-        # By symmetry alike.
-        assert failure.authority == pytest.approx(singles[0].authority, rel=1e-12)
-        assert not failure.lacking
-        assert failure.eta < failure.eta_intact == pytest.approx(intact.eta)
-        assert failure.settling > intact.settling
-        assert failure.gains["k_rate"] < intact.gains["k_rate"]
-    axes = np.array(scenario.wheels.axes)
+@pytest.fixture(scope="module")
+def found(scenario):
+    return study(scenario, scenario.laws[0])
+
+
+def changed(*pairs):
+    text = BUILTIN
+    for old, new in pairs:
+        assert old in text
+        text = text.replace(old, new)
+    return parse(text, "here")
+
+
+def starhold(*words, cwd):
+    return subprocess.run([sys.executable, "-m", "starhold", *words], cwd=cwd, capture_output=True, text=True)
+
+
+@pytest.mark.xdist_group("failures")
+def test_a_pyramid_bears_every_single_loss_and_no_double_one(found):
+    assert [failure.lost for failure in found] == [(), (1,), (2,), (3,), (4,), *combinations((1, 2, 3, 4), 2)]
+    singles, doubles = found[1:5], found[5:]
+    assert all(failure.controllable for failure in found[:5])
+    assert [failure.authority for failure in singles] == pytest.approx([singles[0].authority] * 4, rel=1e-12)
+    assert found[0].share == 1.0
+    assert 0.0 < singles[0].share < 1.0
+    axes = np.array(pyramid())
     for failure in doubles:
-        left = [i for i in range(4) if i + 1 not in failure.lost]
-        assert np.abs(axes[left] @ np.array(failure.lacking).T).max() < 1e-12
-        assert failure.authority == 0.0
-        assert failure.settling is None
+        assert not failure.controllable
+        assert (failure.authority, failure.share, failure.condition) == (0.0, 0.0, np.inf)
+        assert (failure.gains, failure.eta, failure.settling, failure.saturation) == (None, None, None, None)
+        left = [k for k in range(4) if k + 1 not in failure.lost]
+        assert len(failure.lacking) == 1
+        assert np.abs(axes[left] @ failure.lacking[0]).max() < 1e-10
+        assert np.linalg.norm(failure.lacking[0]) == pytest.approx(1.0, abs=1e-10)
 
 
-def test_authority_is_below_what_any_allocation_could_give(pyramid):
-    """The least over directions of the largest torque within the limits, by linear programming."""
-    scenario, found = pyramid
-    axes = np.array(scenario.wheels.axes)
-    random = np.random.default_rng(0)
-    for failure in found[:5]:
-        limits = [0.0 if i + 1 in failure.lost else scenario.wheels.torque_limit[i] for i in range(4)]
-        best = np.inf
-        for direction in random.normal(size=(200, 3)):
-            direction /= np.linalg.norm(direction)
-            # Maximise t with sum a_i tau_i = t direction.
-            solved = linprog(
-                [0, 0, 0, 0, -1], A_eq=np.column_stack([axes.T, -direction]), b_eq=np.zeros(3),
-                bounds=[*((-x, x) for x in limits), (0, None)],
-            )  # fmt: skip
-            best = min(best, -solved.fun)
-        assert 0.6 * best < failure.authority <= best * (1.0 + 1e-9)
-    assert found[0].authority == pytest.approx(authority(scenario.wheels))
+@pytest.mark.xdist_group("failures")
+def test_less_torque_gives_a_smaller_degree_of_stability_and_a_later_settling(found):
+    for failure in found[1:5]:
+        assert failure.eta_intact == found[0].eta
+        assert 0.0 < failure.eta < failure.eta_intact
+        assert failure.gains["k_attitude"] < found[0].gains["k_attitude"]
+        assert failure.settling > found[0].settling
+        assert failure.diverged_at is None
+        assert 0.0 < failure.momentum_share < FULL
 
 
-def test_three_orthogonal_wheels_name_the_axis_that_is_lost():
-    scenario = parse(BUILTIN.replace('"pyramid"', '"orthogonal"'), "here")
-    found = study(scenario, scenario.laws[0])
-    for axis, failure in enumerate(found[1:4]):
-        assert np.abs(np.array(failure.lacking)) == pytest.approx(np.eye(3)[[axis]])
-    assert len(found[4].lacking) == 2
+@pytest.mark.xdist_group("failures")
+def test_degree_of_stability_and_gains_are_those_of_a_design_for_the_torque_left(scenario, found):
+    entry = scenario.laws[0]
+    left = entry.spec._replace(torque=entry.spec.torque * found[1].share)
+    told = dict(entry.law.explain(scenario.craft, left))
+    assert found[1].eta == pytest.approx(told["degree of stability (1/s)"], rel=1e-9)
+    designed = entry.law.design(scenario.craft, left)
+    assert found[1].gains["k_rate"] == pytest.approx(designed.k_rate, rel=1e-12)
+
+
+@pytest.mark.xdist_group("failures")
+def test_the_directions_are_those_that_the_wheels_name(found):
+    wheels = make_wheels(pyramid(), 1e-3, 0.02, 0.4)
+    for failure in found[5:]:
+        one, two = (number - 1 for number in failure.lost)
+        with pytest.raises(ValueError, match="no torque about the body direction") as caught:
+            lose(wheels._replace(torque_limit=tuple(0.02 * (k != one) for k in range(4))), two)
+        named = re.search(r"\(([^)]*)\)", str(caught.value))
+        assert [float(x) for x in named[1].split(",")] == pytest.approx(failure.lacking[0], abs=1e-3)
+
+
+@pytest.mark.parametrize("lost", [1, 2, 3, 4])
+def test_authority_is_what_a_linear_programme_finds_about_the_weakest_axis(found, lost):
+    """Three wheels leave no choice of torques, so the most that they can give about an axis is what allocation gives."""
+    wheels = make_wheels(pyramid(), 1e-3, 0.02, 0.4)
+    axes = np.array([axis for k, axis in enumerate(wheels.axes, 1) if k != lost])
+    rng = np.random.default_rng(lost)
+    ways = rng.normal(size=(300, 3))
+    ways = np.vstack([ways, np.array(lose(wheels, lost - 1).least)[[k for k in range(4) if k + 1 != lost]]])
+    most = []
+    for way in ways / np.linalg.norm(ways, axis=1)[:, None]:
+        equations = np.column_stack([axes.T, -way])
+        best = linprog([0, 0, 0, -1], A_eq=equations, b_eq=np.zeros(3), bounds=[(-0.02, 0.02)] * 3 + [(0, None)])
+        most.append(-best.fun)
+    assert min(most) == pytest.approx(found[lost].authority, rel=1e-9)
+
+
+@pytest.mark.xdist_group("failures")
+def test_three_orthogonal_wheels_name_the_axis_of_each_loss():
+    found = study(*with_first_law(changed(('"pyramid"', '"orthogonal"'))))
+    assert len(found) == 1 + 3 + 3
+    for failure in found[1:4]:
+        assert np.abs(failure.lacking) == pytest.approx(np.eye(3)[[failure.lost[0] - 1]], abs=1e-12)
+    for failure in found[4:]:
+        gone = np.eye(3)[[k - 1 for k in failure.lost]]
+        assert np.array(failure.lacking).T @ np.array(failure.lacking) == pytest.approx(gone.T @ gone, abs=1e-12)
+
+
+def with_first_law(scenario):
+    return scenario, scenario.laws[0]
+
+
+@pytest.mark.xdist_group("failures")
+def test_six_wheels_bear_double_losses_and_a_law_with_given_gains_keeps_them():
+    wheels = "".join(
+        f"\n[[wheel]]\naxis = {axis}\n" for axis in ([1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1])
+    )
+    given = '\n[[law]]\ntype = "wheel"\nname = "given"\nk_rate = 0.3\nk_attitude = 0.003\n'
+    scenario = changed(('layout = "pyramid"', "#"), ('allocation = "least-squares"', wheels.strip()))
+    scenario = parse(scenario.text.replace("[settling]", f"{given}\n[settling]", 1), "here")
+    entry = scenario.pick("given")
+    heard = []
+    found = study(scenario, entry, lambda done, total, name: heard.append((done, total, name)))
+    assert heard[0] == (0, 22, "none")
+    assert heard[-1][:2] == (22, 22)
+    assert all(failure.controllable for failure in found)
+    for failure in found:
+        assert failure.eta is None
+        assert (failure.gains["k_rate"], failure.gains["k_attitude"]) == (0.3, 0.003)
+        assert failure.settling is not None
+
+
+@pytest.mark.xdist_group("failures")
+def test_the_intact_set_settles_as_in_a_run(scenario, found):
+    loop = build(scenario, scenario.laws[0])
+    recording = label(loop, *fly(loop, scenario.table.simulation.steps), 1)
+    limits = scenario.table.settling
+    assert found[0].settling == measure(recording, limits.attitude_tolerance, limits.rate_tolerance)["settling_time"]
+
+
+@pytest.mark.xdist_group("failures")
+def test_losses_replace_the_faults_of_the_file(found):
+    scenario = parse(BUILTIN + "\n[[fault]]\ntime = 20\nwheel = 2\nlost = true\n", "here")
+    assert study(scenario, scenario.laws[0])[0] == found[0]
+
+
+@pytest.mark.xdist_group("failures")
+def test_an_extrapolated_time_is_met_in_a_longer_flight():
+    """A craft held against gravity gathers momentum; the first orbit foretells, to within one, when a wheel is full."""
+    small = (
+        ('mode = "orbital"', 'mode = "inertial"'),
+        ('momentum_limit = "0.4 N m s"', 'momentum_limit = "0.09 N m s"'),
+        ("control_period = 0.1", "control_period = 1.0"),
+    )
+    known = []
+    for duration in ("10 min", "4000 min"):
+        scenario = changed(*small, ('"10 min"', f'"{duration}"'))
+        intact = Failure((), (), 1.0, 0.02, 1.0)
+        known.append(_flown(scenario, scenario.laws[0], intact).saturation)
+    told, met = known
+    assert (told.known, met.known) == ("extrapolated", "flown")
+    assert told.window == pytest.approx(5675.8, abs=1.0)
+    assert met.time > 3.0 * told.window
+    assert told.time == pytest.approx(met.time, abs=told.window)
+    assert told.wheel == met.wheel
+
+
+def test_the_growth_of_a_made_up_momentum_is_carried_on_to_within_an_orbit():
+    times = np.linspace(0.0, 1000.0, 1001)
+    swing = 0.1 * np.sin(2.0 * np.pi * times / 500.0)
+    filled = np.column_stack([swing, 0.2 - 1e-4 * times + swing, 0.5 + 0.0 * times])
+    known = saturation(times, filled, 500.0)
+    assert (known.known, known.wheel, known.window) == ("extrapolated", 2, 500.0)
+    further = np.linspace(0.0, 20000.0, 20001)
+    true = further[np.argmax(np.abs(0.2 - 1e-4 * further + 0.1 * np.sin(2.0 * np.pi * further / 500.0)) > FULL)]
+    assert known.time == pytest.approx(true, abs=500.0)
+    assert saturation(times, filled[:, [0, 2]], 500.0).known == "none"
+    flown = saturation(times, np.column_stack([swing, 1e-3 * times]), 500.0)
+    assert (flown.known, flown.wheel, flown.time) == ("flown", 2, pytest.approx(991.0))
 
 
 def test_directions_lacking():
-    assert directions_lacking(np.eye(3)).shape == (0, 3)
-    assert np.abs(directions_lacking(np.eye(3)[:2])) == pytest.approx(np.array([[0.0, 0.0, 1.0]]))
+    assert directions_lacking(np.empty((0, 3))).tolist() == np.eye(3).tolist()
+    assert directions_lacking(np.array(pyramid())).shape == (0, 3)
+    assert directions_lacking(np.eye(3)[:2]) == pytest.approx(np.array([[0.0, 0.0, 1.0]]))
 
 
-def test_table_and_picture(pyramid, tmp_path):
-    scenario, found = pyramid
+@pytest.mark.xdist_group("failures")
+def test_the_table_reads_back(scenario, found, tmp_path):
     write_table(found, scenario.laws[0], tmp_path / "failures.csv")
-    with (tmp_path / "failures.csv").open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = list(csv.DictReader((tmp_path / "failures.csv").read_text(encoding="utf-8").splitlines()))
     assert len(rows) == len(found)
-    key = next(name for name in rows[0] if name.startswith("torque authority"))
-    assert [float(row[key]) for row in rows] == [failure.authority for failure in found]
-    draw(found, tmp_path / "a.png", "title")
-    draw(found, tmp_path / "b.png", "title")
-    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-    picture = matplotlib.image.imread(tmp_path / "a.png")
-    assert len(np.unique(picture.reshape(-1, picture.shape[2]), axis=0)) > 10
+    for row, failure in zip(rows, found, strict=True):
+        assert tuple(map(int, row["lost wheels"].split())) == failure.lost
+        assert float(row["torque authority (N m)"]) == failure.authority
+        assert float(row["condition number"]) == failure.condition
+        if failure.controllable:
+            assert float(row["degree of stability after (1/s)"]) == failure.eta
+            assert float(row["settling time (s)"]) == failure.settling
+            assert float(row["k_attitude (N m)"]) == failure.gains["k_attitude"]
+        else:
+            directions = [tuple(map(float, text.split())) for text in row["directions without authority"].split(";")]
+            assert directions == list(failure.lacking)
+            assert row["degree of stability after (1/s)"] == row["k_rate (N m s)"] == row["settling time (s)"] == ""
 
 
-def test_a_craft_without_wheels_is_refused():
-    with pytest.raises(InputError, match="three-laws"):
-        require_wheels(load("three-laws"))
+@pytest.mark.xdist_group("failures")
+def test_the_picture_shows_something_and_is_the_same_again(found, tmp_path):
+    from matplotlib.image import imread
+
+    first = draw(found, tmp_path / "a.png", "a $title").read_bytes()
+    assert first == draw(found, tmp_path / "b.png", "a $title").read_bytes()
+    pixels = imread(tmp_path / "a.png")[..., :3]
+    assert pixels.shape[0] > 300
+    assert 0.05 < (pixels.std(axis=2) > 0.05).mean() < 0.9
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.png", "b.png"]
 
 
+def test_a_folder_that_holds_results_is_kept_unless_forced(tmp_path):
+    (tmp_path / "failures.csv").write_text("kept")
+    (tmp_path / "other.csv").write_text("kept")
+    with pytest.raises(InputError, match="results already there"):
+        open_results(tmp_path, force=False)
+    assert (tmp_path / "failures.csv").read_text() == "kept"
+    open_results(tmp_path, force=True)
+    assert [path.name for path in tmp_path.iterdir()] == ["other.csv"]
+
+
+@pytest.mark.xdist_group("failures")
 def test_the_command(tmp_path):
-    def run(*arguments):
-        command = [sys.executable, "-m", "starhold", "failures", *arguments]
-        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = starhold("failures", "wheels-orbital", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "1 and 2" in done.stdout
+    assert "0.707" in done.stdout
+    folder = tmp_path / "results" / "wheels-orbital-failures"
+    assert sorted(path.name for path in folder.iterdir()) == ["failures.csv", "failures.png"]
+    again = starhold("failures", "wheels-orbital", cwd=tmp_path)
+    assert again.returncode == 2
+    assert again.stderr.count("\n") == 1
+    assert starhold("failures", "wheels-orbital", "--law", "uncompensated", "--force", cwd=tmp_path).returncode == 0
 
-    first = run("wheels-orbital", "-o", "out")
-    assert first.returncode == 0, first.stderr
-    assert "3 and 4" in first.stdout
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"failures.csv", "failures.png"}
-    again = run("wheels-orbital", "-o", "out")
-    assert (again.returncode, again.stderr.count("\n")) == (2, 1)
-    assert run("wheels-orbital", "-o", "out", "--force").returncode == 0
-    none = run("three-laws", "-o", "other")
-    assert (none.returncode, none.stderr.count("\n")) == (2, 1)
+
+@pytest.mark.parametrize("words", [("three-laws",), ("wheels-orbital", "--law", "nobody")])
+def test_what_cannot_be_is_said_in_one_line(words, tmp_path):
+    done = starhold("failures", *words, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith("starhold: ")
+    assert done.stderr.count("\n") == 1
+    assert not list(tmp_path.iterdir())

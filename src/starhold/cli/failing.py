@@ -55,15 +55,17 @@ def print_failures(found: Sequence[Failure]) -> None:
     retuned = [name for name in flown[0] if any(number_text(g[name]) != number_text(flown[0][name]) for g in flown)]
     designed = found[0].eta is not None
     table = Table(show_edge=False, pad_edge=False)
-    heads = ["axes", "condition", "authority\n[dim]mN m[/dim]", "share\n[dim]%[/dim]", *retuned]
-    heads += ["degree of stability\n[dim]1/s, intact → after[/dim]"] * designed
-    heads += ["settling\n[dim]s[/dim]", "first wheel full\n[dim]min[/dim]"]
+    heads = ["axes", "cond.", "authority\n[dim]mN m[/dim]", "share\n[dim]%[/dim]", *retuned]
+    heads += ["stability\n[dim]1/s, before → after[/dim]"] * designed
+    heads += ["settling\n[dim]s[/dim]", "wheel full\n[dim]min[/dim]"]
     for head in ("lost", *heads):
         table.add_column(head, justify="left" if head in ("lost", "axes") else "right")
     for failure in found:
         table.add_row(failure.name, *_row(failure, retuned, designed))
     console.print()
     console.print(table)
+    if any(not failure.controllable for failure in found):
+        console.print("not (x, y, z): no torque is left about this body direction.", highlight=False)
     if not retuned:
         console.print("The gains are the same in all of them.", highlight=False)
     if any(failure.saturation is not None and failure.saturation.known == "extrapolated" for failure in found):
@@ -72,9 +74,8 @@ def print_failures(found: Sequence[Failure]) -> None:
 
 def _row(failure: Failure, retuned: Sequence[str], designed: bool) -> list[str]:
     from starhold.report.failures import direction_text
-    from starhold.report.flight import number_text
 
-    axes = "three" if failure.controllable else f"[red]none about {direction_text(failure)}[/red]"
+    axes = "three" if failure.controllable else f"[red]not {direction_text(failure)}[/red]"
     begun = [axes, f"{failure.condition:.3g}", f"{1e3 * failure.authority:.4g}", f"{100.0 * failure.share:.1f}"]
     if failure.gains is None:
         return [*begun, *["—"] * (len(retuned) + designed + 2)]
@@ -82,7 +83,13 @@ def _row(failure: Failure, retuned: Sequence[str], designed: bool) -> list[str]:
     settling = "not settled" if failure.settling is None else f"{failure.settling:.4g}"
     if failure.diverged_at is not None:
         settling = f"[red]diverged at {failure.diverged_at:.4g}[/red]"
-    return [*begun, *(number_text(failure.gains[name]) for name in retuned), *eta, settling, _full(failure)]
+    return [*begun, *(_gain_text(failure.gains[name]) for name in retuned), *eta, settling, _full(failure)]
+
+
+def _gain_text(value: Any) -> str:
+    from starhold.report.flight import number_text
+
+    return f"{value:.4g}" if isinstance(value, float) else number_text(value)
 
 
 def _full(failure: Failure) -> str:
@@ -92,5 +99,5 @@ def _full(failure: Failure) -> str:
     if known is None:
         return "—"
     if known.time is None:
-        return f"not in {HORIZON} orbits" if failure.orbit else f"not in {HORIZON * known.window / 60.0:.4g}"
+        return f"> {HORIZON} orbits" if failure.orbit else f"> {HORIZON * known.window / 60.0:.4g}"
     return f"{'~' if known.known == 'extrapolated' else ''}{known.time / 60.0:.4g} (wheel {known.wheel})"

@@ -287,7 +287,8 @@ def saturation(times: Array, filled: Array, period: float | None) -> Saturation:
     """When the first of some wheels is full: times (n,) (s), momenta over their limits (n, wheels), orbit period (s).
 
     Growth is taken over the last orbit, or the last half of the flight where that is shorter or there is no orbit; the
-    largest momentum on its side within that time is carried on with it. Wheels in the answer count from 1.
+    largest momentum on its side within that time is carried on with it, which is right to within an orbit. Wheels in the
+    answer count from 1.
     """
     beyond = np.argwhere(np.abs(filled) > FULL)
     if len(beyond):
@@ -325,6 +326,7 @@ def draw(found: Sequence[Failure], path: Path, title: str) -> Path:
     panels.append(("settling time, s", [failure.settling for failure in found]))
     height = 1.45 + 0.27 * len(found)
     figure = Figure(figsize=(8.0, height), dpi=DPI)
+    figure.set_layout_engine("none")
     grid: Any = figure.subplots(1, len(panels), sharey=True, squeeze=False)
     figure.subplots_adjust(left=0.118, right=0.978, bottom=0.55 / height, top=1.0 - 0.72 / height, wspace=0.09)
     heading = title if len(title) <= 80 else f"{title[:79]}…"
@@ -335,8 +337,9 @@ def draw(found: Sequence[Failure], path: Path, title: str) -> Path:
         colours = [COLOURS[2] if not failure.lost else COLOURS[0] for failure in found]
         axis.barh(places, sizes, height=0.62, color=colours)
         if sizes[0] > 0.0:
-            axis.axvline(sizes[0], color="0.35", linewidth=0.9, dashes=(5, 3))
-        axis.set_xlim(0.0, 1.25 * max(max(sizes), 1e-9))
+            axis.axvline(sizes[0], color="0.35", linewidth=0.9, dashes=(5, 3), zorder=2.5)
+        axis.set_xlim(0.0, 1.28 * max(max(sizes), 1e-9))
+        axis.locator_params(axis="x", nbins=4, prune="upper")
         for place, failure in enumerate(found):
             _mark(axis, place, failure, values[place], number)
         axis.set_xlabel(name, fontsize=9)
@@ -346,6 +349,8 @@ def draw(found: Sequence[Failure], path: Path, title: str) -> Path:
         axis.tick_params(axis="y", length=0.0)
         for side in ("top", "right"):
             axis.spines[side].set_visible(False)
+    # Two directions take more room than the first panel has; the others have nothing to show beside them.
+    grid[0][0].set_zorder(1)
     grid[0][0].set_yticks(places, [failure.name for failure in found])
     grid[0][0].set_ylim(len(found) - 0.5, -0.5)
     grid[0][0].set_ylabel("lost wheels", fontsize=9)
@@ -368,13 +373,24 @@ def _mark(axis: Any, place: int, failure: Failure, value: float | None, panel: i
     across = axis.get_yaxis_transform()
     if failure.controllable:
         text = f"{value:.3g}" if value is not None else "not settled" if failure.diverged_at is None else "diverged"
-        axis.text(value or 0.0, place, f" {text}", va="center", fontsize=7.5, color="0.2")
+        behind = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
+        axis.annotate(
+            text,
+            (value or 0.0, place),
+            (4, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=7.5,
+            color="0.2",
+            bbox=behind,
+        )
         return
     axis.axhspan(place - 0.5, place + 0.5, color="0.94", linewidth=0.0, zorder=0)
     if panel == 0:
         axis.plot(0.03, place, marker="X", color=COLOURS[1], markersize=6.5, transform=across, clip_on=False)
         shown = f"no torque about {direction_text(failure)}"
-        axis.text(0.075, place, shown, va="center", fontsize=7.5, color="0.2", transform=across, zorder=5)
+        behind = {"facecolor": "0.94", "edgecolor": "none", "pad": 0.8}
+        axis.text(0.075, place, shown, va="center", fontsize=7.5, color="0.2", transform=across, zorder=5, bbox=behind)
 
 
 def direction_text(failure: Failure) -> str:

@@ -127,6 +127,7 @@ def _figure(
     head = 0.40 + 0.20 * lines + (0.22 if columns > 1 else 0.0)
     total = height + 0.20 * lines
     figure = Figure(figsize=(8.0, total), dpi=DPI)
+    figure.set_layout_engine("none")
     grid: Any = figure.subplots(rows, columns, sharex=True, squeeze=False)
     figure.subplots_adjust(
         left=0.098, right=0.978, bottom=0.48 / total, top=1.0 - (head + 0.06) / total, hspace=0.09, wspace=0.14

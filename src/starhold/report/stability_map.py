@@ -66,6 +66,7 @@ def paint(what: Sketch, path: Path) -> Path:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8.0, 6.2), dpi=DPI)
+    figure.set_layout_engine("none")
     axis: Any = figure.add_axes((0.085, 0.17, 0.745, 0.70))
     scale: Any = figure.add_axes((0.855, 0.17, 0.022, 0.70))
     drawn = axis.contourf(what.K_a, what.K_w, what.eta, levels=16, cmap="cividis")
