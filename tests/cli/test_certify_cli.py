@@ -6,22 +6,7 @@ import sys
 
 import pytest
 
-CRAFT = """
-name = "small"
-[spacecraft]
-inertia = [2.0, 3.0, 4.0]
-torque_limit = "0.05 N m"
-[initial]
-attitude = [1, 0, 0, 0.1]
-rate = [0, 0, 0]
-[simulation]
-duration = 5.0
-control_period = 0.1
-"""
-PD = '[[law]]\ntype = "pd"\nk_rate = 0.09\nk_attitude = 0.009\n'
-WEAK = '[certify]\ndisturbance = "1e-5 N m"\n[[law]]\ntype = "sliding"\nslope = 0.08\nreach = 1e-6\n'
-"""A switching torque below what it must stand."""
-MPC = '[[law]]\ntype = "mpc"\nq_attitude = 0.2\nq_rate = 0.2\nr = 50\n'
+from tests.small import CRAFT, MPC, PD, WEAK
 
 pytestmark = pytest.mark.xdist_group("cli")
 
@@ -85,11 +70,11 @@ def test_check_passes_what_certify_wrote_and_fails_what_was_changed(proved):
 
 
 def test_a_refuted_claim_prints_its_state(tmp_path):
-    (tmp_path / "weak.toml").write_text(CRAFT + WEAK)
+    (tmp_path / "weak.toml").write_text(CRAFT + '[certify]\ndisturbance = "1e-5 N m"\n' + WEAK)
     done = starhold("certify", "weak.toml", "-o", "out", cwd=tmp_path)
     assert done.returncode == 3, done.stderr
     assert "refuted" in done.stdout
-    assert outcomes(tmp_path / "out" / "certificate.json")["sliding"]["sliding"] == "refuted"
+    assert outcomes(tmp_path / "out" / "certificate.json")["weak"]["sliding"] == "refuted"
     content = json.loads((tmp_path / "out" / "certificate.json").read_text())
     obligations = content["certificates"][0]["claims"][0]["obligations"]
     state = next(o["evidence"]["state"] for o in obligations if o["outcome"] == "refuted")

@@ -18,46 +18,20 @@ from starhold.scenario.building import build
 from starhold.scenario.reading import parse
 from tests.report import flown
 from tests.report.test_page import Reader
-
-LAWS = """
-name = "small"
-[spacecraft]
-inertia = [2.0, 3.0, 4.0]
-torque_limit = "0.05 N m"
-[initial]
-attitude = [1, 0, 0, 0.1]
-rate = [0, 0, 0]
-[simulation]
-duration = 10.0
-control_period = 0.1
-[[law]]
-type = "pd"
-k_rate = 0.09
-k_attitude = 0.009
-[[law]]
-type = "sliding"
-name = "weak"
-slope = 0.08
-reach = 1e-6
-[[law]]
-type = "mpc"
-q_attitude = 0.2
-q_rate = 0.2
-r = 50
-"""
+from tests.small import CRAFT, MPC, PD, WEAK
 
 
 @cache
 def certificates() -> tuple[Certificate, ...]:
     """Everything proved, one claim refuted, no claim."""
-    scenario = parse(LAWS, "test")
+    scenario = parse(CRAFT + PD + WEAK + MPC, "test")
     return tuple(certify(build(scenario, entry), entry.name, Wanted(disturbance=1e-5)) for entry in scenario.laws)
 
 
 def told(*given: Certificate) -> Reader:
     """The section about certificates."""
     first = flown.flights()[0]
-    return Reader(section([replace(first, name=c.name, certificate=c) for c in given]))
+    return Reader(section([replace(first, name=c.name, certificates=(c,)) for c in given]))
 
 
 def plain(text: str) -> str:
@@ -118,7 +92,7 @@ def test_a_refuted_claim_shows_the_state_that_refutes_it() -> None:
     rate = ", ".join(f"{x:.4g}" for x in refuted.evidence["state"]["rate"])
     assert f"w = ({rate}) rad/s" in plain(found.text)
     # Seen without opening anything.
-    page = section([replace(flown.flights()[0], certificate=certificate)])
+    page = section([replace(flown.flights()[0], certificates=(certificate,))])
     summaries = re.findall(r"<summary>.*?</summary>", page, flags=re.DOTALL)
     assert any(rate in summary for summary in summaries)
 
@@ -145,7 +119,7 @@ def test_what_certificates_hold_is_no_markup() -> None:
 
 
 def test_the_whole_page_with_certificates_is_deterministic_and_loads_nothing() -> None:
-    flights = [replace(f, certificate=c) for f, c in zip(flown.flights(), certificates()[:2], strict=True)]
+    flights = [replace(f, certificates=(c,)) for f, c in zip(flown.flights(), certificates()[:2], strict=True)]
     page = render(flown.scenario(), flights)
     assert page == render(flown.scenario(), flights)
     found = Reader(page)
@@ -162,6 +136,7 @@ def test_every_kind_of_claim_can_be_told_where_it_is_undecided(kind: str) -> Non
         "inertia": {"tolerance": 0.4},
         "disturbance": {"torque": 1e-3},
         "sampling": {"period": 1.0, "radius": 1.2, "eigenvalues": [[1.2, 0.0]], "longest": None, "every_shorter": False},
+        "wheels": {"momentum": 0.1},
         "sliding": {"torque": [0.0, 0.0, 0.0], "margin": 1e-3},
     }[kind]
     claim = Claim(kind, numbers, {}, (), (Obligation("form", "exact identity", "undecided", {"reason": "why not"}),))
@@ -172,7 +147,7 @@ def test_every_kind_of_claim_can_be_told_where_it_is_undecided(kind: str) -> Non
 
 def test_every_law_that_comes_with_starhold_is_told() -> None:
     """Whatever certificates the examples of all laws give can be shown."""
-    scenario = parse(LAWS, "test")
+    scenario = parse(CRAFT + PD + WEAK + MPC, "test")
     base = build(scenario, scenario.laws[0])
     made = [
         certify(replace(base, law=law, gains=gains), law.name)
