@@ -11,6 +11,8 @@ from starhold.laws import lqr, matrix_pd
 from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import fields
 from starhold.models.craft import make_craft, tensor
+from starhold.models.wheeled_body import WheeledState
+from starhold.models.wheels import body_inertia, make_wheels, pyramid
 
 FULL = make_craft([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]], torque_limit=0.05)
 PRINCIPAL = make_craft([2.0, 3.0, 4.0], torque_limit=0.05)
@@ -47,10 +49,21 @@ def textbook():
     for name, (spec, craft) in formed.items():
         law = catalogue()[next(known for known in ("matrix-pd", "lqr") if name.startswith(known))]
         found[name] = loop_of(law.name, law.design(craft, spec), craft)
-    for name in ("pd", "lyapunov", "sliding"):
+    for name in ("pd", "lyapunov", "sliding", "wheel"):
         for number, gains in enumerate(catalogue()[name].examples()):
             found[f"{name}-{number}"] = loop_of(name, gains)
     return found
+
+
+def rotors(law, gains, target=NO_TURN, layout=pyramid, **changes):
+    """A law on reaction wheels that hold some momentum at the start; in orbit, under the gravity gradient, if the target is
+    there."""
+    axes = layout()
+    wheels = make_wheels(axes, 1e-3, changes.pop("torque_limit", 0.05), changes.pop("momentum_limit", 1.0))
+    body = body_inertia(tensor(FULL.inertia), wheels)
+    loop = loop_of(law, gains, make_craft(body), target=target, limit="none", wheels=wheels, **changes)
+    loop = replace(loop, start=WheeledState(*loop.start, tuple(0.01 * (-1.0) ** i for i in range(len(axes)))))
+    return loop if target == "orbital" else free(loop)
 
 
 def random_craft(random):
@@ -65,4 +78,5 @@ def gain_names(law):
     return [item.name for item in fields(catalogue()[law].gains)]
 
 
-__all__ = ["FULL", "LOPSIDED", "PRINCIPAL", "UNEVEN", "free", "gain_names", "loop_of", "random_craft", "tensor", "textbook"]
+__all__ = ["FULL", "LOPSIDED", "PRINCIPAL", "UNEVEN", "free", "gain_names", "loop_of", "random_craft", "rotors", "tensor"]
+__all__ += ["textbook"]

@@ -20,6 +20,7 @@ from tests.algebra.readers import agree, close, components, quaternions, reduced
 MU = 3.986e14
 DIAGONAL = make_craft([2.0, 3.0, 4.0])
 FULL = make_craft([[2.0, 0.1, -0.3], [0.1, 3.0, 0.2], [-0.3, 0.2, 4.0]])
+WHEELED = (DIAGONAL._replace(with_rotors=(2.1, 3.2, 4.1)), DIAGONAL._replace(with_rotors=FULL.inertia))
 MODELS = (free_space, two_body, two_body_gravity_gradient)
 
 seeds = st.integers(0, 2**32 - 1)
@@ -30,7 +31,7 @@ positions = places.map(lambda v: scale(7.0e6 / math.hypot(*v), v))
 @settings(max_examples=20)
 @given(positions, quaternions)
 def test_every_reader_gives_the_same(position, attitude):
-    for craft in (DIAGONAL, FULL):
+    for craft in (DIAGONAL, FULL, *WHEELED):
         craft = craft._replace(torque_limit=1.0)
         for model in MODELS:
             agree(model, position, attitude, craft)
@@ -95,6 +96,13 @@ def test_torque_is_that_of_a_small_cloud_of_masses(seed, place, attitude):
     largest = np.linalg.norm(points, axis=1).max()
     assert errors[0] < 30.0 * (2e-2 * largest) ** 2
     assert errors[1] < 0.3 * errors[0] + 1e-10
+
+
+def test_gravity_acts_on_the_rotors_too():
+    place, attitude = (7.0e6, -1.0e6, 2.0e6), (0.5, 0.5, -0.1, 0.7)
+    for craft in WHEELED:
+        rigid = make_craft(craft.with_rotors)
+        assert two_body_gravity_gradient(place, attitude, craft) == two_body_gravity_gradient(place, attitude, rigid)
 
 
 def test_torque_on_a_dumbbell():

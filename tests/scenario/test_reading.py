@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import jsonschema
 import numpy as np
@@ -125,6 +126,19 @@ def test_file_without_laws():
     text = BASE[: BASE.index("[[law]]")]
     with pytest.raises(InputError, match=r"law: found no law"):
         parse(text, "my.toml")
+
+
+def test_wheels_and_craft_are_made_once_and_anew_for_a_changed_scenario():
+    scenario = load("wheels-orbital")
+    assert scenario.wheels is scenario.wheels
+    assert scenario.craft is scenario.craft
+    table = scenario.table
+    heavier = table.spacecraft.model_copy(update={"inertia": np.diag([7.0, 8.0, 6.0])})
+    fewer = table.wheels.model_copy(update={"layout": "orthogonal"})
+    changed = replace(scenario, table=table.model_copy(update={"spacecraft": heavier, "wheels": fewer}))
+    assert len(changed.wheels.axes) == 3
+    assert changed.craft.inertia == pytest.approx((6.999, 7.999, 5.999), rel=1e-12)
+    assert scenario.craft.with_rotors == (6.0, 8.0, 5.0)
 
 
 def test_names_must_differ():

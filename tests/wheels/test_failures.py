@@ -18,12 +18,12 @@ from starhold.report.failures import (
     Failure,
     _flown,
     directions_lacking,
-    draw,
-    open_results,
     saturation,
     study,
     write_table,
 )
+from starhold.report.failures_picture import draw
+from starhold.report.results import open_folder
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import fly, label
@@ -151,7 +151,7 @@ def test_six_wheels_bear_double_losses_and_a_law_with_given_gains_keeps_them():
     assert all(failure.controllable for failure in found)
     for failure in found:
         assert failure.eta is None
-        assert (failure.gains["k_rate"], failure.gains["k_attitude"]) == (0.3, 0.003)
+        assert (failure.gains["k_rate"], failure.gains["k_attitude"]) == (0.3, (0.003,) * 3)
         assert failure.settling is not None
 
 
@@ -222,7 +222,7 @@ def test_the_table_reads_back(scenario, found, tmp_path):
         if failure.controllable:
             assert float(row["degree of stability after (1/s)"]) == failure.eta
             assert float(row["settling time (s)"]) == failure.settling
-            assert float(row["k_attitude (N m)"]) == failure.gains["k_attitude"]
+            assert tuple(map(float, row["k_attitude (N m)"].split())) == failure.gains["k_attitude"]
         else:
             directions = [tuple(map(float, text.split())) for text in row["directions without authority"].split(";")]
             assert directions == list(failure.lacking)
@@ -245,9 +245,9 @@ def test_a_folder_that_holds_results_is_kept_unless_forced(tmp_path):
     (tmp_path / "failures.csv").write_text("kept")
     (tmp_path / "other.csv").write_text("kept")
     with pytest.raises(InputError, match="results already there"):
-        open_results(tmp_path, force=False)
+        open_folder(tmp_path, force=False)
     assert (tmp_path / "failures.csv").read_text() == "kept"
-    open_results(tmp_path, force=True)
+    open_folder(tmp_path, force=True)
     assert [path.name for path in tmp_path.iterdir()] == ["other.csv"]
 
 

@@ -7,7 +7,8 @@ import pytest
 
 from starhold.algebra.quaternion import to_reference
 from starhold.errors import InputError
-from starhold.models.craft import tensor
+from starhold.models.craft import make_craft, tensor
+from starhold.models.rigid_body import State
 from starhold.models.wheels import authority, make_wheels, pyramid, stored
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
@@ -62,6 +63,24 @@ def test_total_angular_momentum_is_kept_without_torque_from_outside(layout, allo
     assert np.abs(total - total[0]).max() <= 1e-12 * size
     # The wheels did something meanwhile.
     assert np.ptp(run["wheel_momentum"], axis=0).max() > 0.01 * size
+
+
+def test_locked_rotors_fall_through_gravity_like_one_body():
+    """Friction holds the rotors fast in a body that no law turns: it moves as the rigid body of the whole inertia."""
+    text = BUILTIN.replace("inertia = 1.0e-3 ", "inertia = 1.0 ").replace('"10 min"', '"20 min"')
+    text = text.replace("# viscous = 1e-6", "viscous = 10.0").replace('"pyramid"', '"nasa-standard"')
+    scenario = parse(text, "here")
+    loop = build(scenario, scenario.laws[0])
+    # So small a limit leaves no torque of the law.
+    idle = replace(loop, craft=loop.craft._replace(torque_limit=5e-324), limit="axis")
+    speeds = np.array(loop.wheels.axes) @ loop.start.rate
+    carried = replace(idle, start=loop.start._replace(momentum=tuple(speeds.tolist())))
+    rigid = make_craft([6.0, 8.0, 5.0], 5e-324, loop.craft.gravity)
+    start = State(*loop.start[:5])
+    bare = replace(idle, craft=rigid, wheels=None, start=start)
+    with_wheels, without = (label(each, *fly(each, 12_000), 1) for each in (carried, bare))
+    apart = np.abs(with_wheels["rate"] - without["rate"]).max()
+    assert apart < 1e-3 * np.ptp(without["rate"], axis=0).max()
 
 
 def test_a_saturated_wheel_gives_no_more_torque_outwards():

@@ -6,7 +6,8 @@ In plain Python they walk the structure; compiled, they are written out for its 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from functools import reduce
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -14,6 +15,7 @@ from numba import types  # pyright: ignore
 from numpy.typing import NDArray
 
 from starhold.algebra.scalar import compiled_as
+from starhold.algebra.vector import diagonal
 
 _State = TypeVar("_State")
 
@@ -85,6 +87,20 @@ def _fill(source: Iterator[float], like: Any) -> Any:
 
 def _rebuild(like: Any, parts: list[Any]) -> Any:
     return type(like)(*parts) if hasattr(like, "_fields") else tuple(parts)
+
+
+def alike(values: Sequence[_State]) -> list[_State]:
+    """The same values, with diagonals written as vectors turned into matrices where another value has a matrix."""
+    return [reduce(_widened, values, value) for value in values]
+
+
+def _widened(value: Any, other: Any) -> Any:
+    if not isinstance(value, tuple) or not isinstance(other, tuple):
+        return cast(Any, value)
+    parts, others = cast(tuple[Any, ...], value), cast(tuple[Any, ...], other)
+    if len(parts) == 3 and isinstance(others[0], tuple) and not isinstance(parts[0], tuple):
+        return diagonal(cast(Any, parts))
+    return _rebuild(value, [_widened(*pair) for pair in zip(parts, others, strict=True)])
 
 
 class _Writer:

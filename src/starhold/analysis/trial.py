@@ -5,17 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra.polynomial import exact
 from starhold.algebra.quaternion import NO_TURN
 from starhold.algebra.vector import ZERO
 from starhold.certification.certificate import Certificate, Claim
-from starhold.certification.frame import take_apart
+from starhold.certification.frame import Frame, take_apart
 from starhold.certification.matrices import floats, number
 from starhold.certification.motion import Motion
+from starhold.certification.potential import Potential, Spring
 from starhold.certification.sliding import take_surface
 from starhold.certification.subject import make_subject
 from starhold.laws.interface import Seen
@@ -23,6 +25,7 @@ from starhold.loop.closed_loop import ClosedLoop
 from starhold.models.actuator import IDEAL
 from starhold.models.craft import tensor
 from starhold.models.sensor import SILENT
+from starhold.models.wheels import Wheels
 from starhold.simulation.lanes import simulate_many
 
 FLIGHTS = 10_000
@@ -41,7 +44,7 @@ class BrokenClaimError(Exception):
 @dataclass(frozen=True)
 class Trial:
     """flights flown from {V <= level}; the largest V at a look as a share of that at the look before, and the largest
-    torque as a share of the limit (None: no limit is claimed)."""
+    torque, of a motor where the claim is about wheels, as a share of the limit (None: no limit is claimed)."""
 
     flights: int
     level: float
@@ -55,18 +58,24 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
     sliding = certificate.claim("sliding")
     if sliding is not None and sliding.outcome == "proved":
         return _fly_to_surface(loop, certificate, sliding, flights, seed)
-    claims = [c for c in (certificate.claim("torque-limit"), certificate.claim("convergence")) if c is not None]
-    claim = next((c for c in claims if c.outcome == "proved"), None)
+    claims = [certificate.claim(kind) for kind in ("wheels", "torque-limit", "convergence")]
+    claim = next((c for c in claims if c is not None and c.outcome == "proved"), None)
     if claim is None:
         return None
     free = _undisturbed(loop, certificate)
-    frame = take_apart(Motion(make_subject(free)))
-    P, s = floats(frame.P), number(frame.s)
+    if loop.wheels is not None and claim.kind == "wheels":
+        free = replace(free, wheels=_without_friction(loop.wheels))
+    # The claim's own V, which need not be the law's.
+    stiffness = claim.witness["stiffness"]
+    frame = take_apart(Motion(make_subject(free), None if stiffness is None else exact(stiffness)))
     level = claim.numbers["start"]
     # Where every rate is allowed, up to what a body spun as fast as three half turns' worth of V has.
-    level = min(8.0 * s, math.inf if level is None else level)
-    states = draw(flights, P, s, level, np.random.default_rng(seed))
-    value = _value(free, claim.witness["epsilon"])
+    level = min(4.0 * number(frame.potential.top), math.inf if level is None else level)
+    random = np.random.default_rng(seed)
+    states = draw(flights, floats(frame.P), frame.potential, level, random)
+    if free.wheels is not None:
+        states = np.vstack([states, _rotors(free, certificate, states, random)])
+    value, s = _value(free, frame, claim.witness["epsilon"]), number(frame.potential.top)
     highest, before, torque = 0.0, value(states), 0.0
     for steps in LEGS:
         batch = simulate_many(free, states, steps)
@@ -80,10 +89,11 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
                 _where(certificate, claim, states, lane, f"has V = {after[lane]:g} after {before[lane]:g}")
             )
         highest, before = max(highest, float((after / np.maximum(before, 1e-300)).max())), after
-        torque = max(torque, _size(batch.states[13:16], loop.limit))
-    share = torque / loop.craft.torque_limit if claim.kind == "torque-limit" else None
+        if claim.kind != "convergence":
+            torque = max(torque, _need(batch.states, loop, claim))
+    share = None if claim.kind == "convergence" else torque
     if share is not None and share > 1.0 + 1e-12:
-        raise BrokenClaimError(f"{certificate.name}: a flight from the certified set needs {share:.3g} of the torque limit")
+        raise BrokenClaimError(f"{certificate.name}: a flight from the certified set needs {share:.3g} of a limit")
     return Trial(flights, level, highest, share)
 
 
@@ -97,7 +107,7 @@ def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, fl
     # |s| falls by at least reach/J a second; held torque makes it cross by one step's worth.
     level = 0.5 * least * (0.5 * sum(LEGS) * free.period * float(reach.min()) / greatest) ** 2
     level = min(level, math.inf if claim.numbers["start"] is None else claim.numbers["start"])
-    states = draw(flights, J, 1.0, 2.0 + level, np.random.default_rng(seed))
+    states = draw(flights, J, Spring(1), 2.0 + level, np.random.default_rng(seed))
     if not claim.numbers["everything"]:
         states[:4] *= np.where(states[0] < 0.0, -1.0, 1.0)
     surface = loop.law.module.surface
@@ -125,13 +135,13 @@ def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, fl
     return Trial(flights, level, highest, None)
 
 
-def draw(count: int, P: Array, s: float, level: float, random: np.random.Generator) -> Array:
+def draw(count: int, P: Array, potential: Potential, level: float, random: np.random.Generator) -> Array:
     """States (16, count) of {V <= level}, half of them on its surface."""
-    reach = min(level, 2.0 * s)
-    t = reach * random.uniform(size=count) ** 0.5
-    q0 = 1.0 - t / s
+    share = random.uniform(size=count) ** 0.5
     axes = random.normal(size=(count, 3))
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    t = share * np.minimum(level, potential.tops(axes))
+    q0 = potential.cosine(t, axes)
     left = np.maximum(level - t, 0.0) * np.where(np.arange(count) % 2 == 0, 1.0 - 1e-9, random.uniform(size=count))
     turned = np.linalg.inv(np.linalg.cholesky(P)).T
     directions = random.normal(size=(count, 3))
@@ -152,6 +162,8 @@ def _undisturbed(loop: ClosedLoop, certificate: Certificate) -> ClosedLoop:
     return replace(
         loop,
         start=loop.start._replace(position=ZERO, velocity=ZERO, torque=ZERO),
+        wheels=None if loop.wheels is None else _boundless(loop.wheels),
+        events=(),
         period=period,
         substeps=1,
         orbit=False,
@@ -164,24 +176,48 @@ def _undisturbed(loop: ClosedLoop, certificate: Certificate) -> ClosedLoop:
     )
 
 
-def _value(loop: ClosedLoop, epsilon: float) -> Callable[[Array], Array]:
+def _without_friction(wheels: Wheels) -> Wheels:
+    none = (0.0,) * len(wheels.axes)
+    return wheels._replace(viscous=none, coulomb=none)
+
+
+def _boundless(wheels: Wheels) -> Wheels:
+    """The same wheels without limits and friction; lost ones stay lost."""
+    limits = tuple(math.inf if limit > 0.0 else 0.0 for limit in wheels.torque_limit)
+    return _without_friction(wheels)._replace(torque_limit=limits, momentum_limit=(math.inf,) * len(limits))
+
+
+def _rotors(loop: ClosedLoop, certificate: Certificate, states: Array, random: np.random.Generator) -> Array:
+    """Rotor momenta (wheels, count) for a total momentum of any direction up to the one that is certified."""
+    told = certificate.subject["wheels"]
+    axes, shares, begun = (np.array(told[name]) for name in ("axes", "least", "momentum"))
+    total = random.normal(size=(3, states.shape[1]))
+    total *= told["total_momentum"] * random.uniform(size=states.shape[1]) ** (1.0 / 3.0) / np.linalg.norm(total, axis=0)
+    kept = begun + shares @ (begun @ axes)
+    return kept[:, None] - shares @ (total - tensor(loop.craft.inertia) @ states[4:7])
+
+
+def _value(loop: ClosedLoop, frame: Frame, epsilon: float) -> Callable[[Array], Array]:
     """V + epsilon q.Jw of the states in the columns of an array, of the quaternion that is fed back."""
-    function = loop.law.lyapunov
-    if function is None:
-        raise TypeError(f"{loop.law.name} has no V")
+    P, J, potential = floats(frame.P), tensor(loop.craft.inertia), frame.potential
 
     def value(states: Array) -> Array:
-        shown = states[:4] * (np.where(states[0] < 0.0, -1.0, 1.0) if loop.cover == "shortest" else 1.0)
-        w: Any = tuple(states[4:7])
-        seen = Seen(tuple(shown), w, w, ZERO, ZERO, ZERO, ZERO, loop.period)  # type: ignore[arg-type]
-        cross = np.einsum("ik,ij,jk->k", shown[1:], tensor(loop.craft.inertia), states[4:7])
-        return np.asarray(function(seen, loop.gains, loop.craft)) + epsilon * cross
+        q, w = states[:4] * (np.where(states[0] < 0.0, -1.0, 1.0) if loop.cover == "shortest" else 1.0), states[4:7]
+        return np.einsum("ik,ij,jk->k", w, P, w) / 2.0 + potential.of(q) + epsilon * np.einsum("ik,ij,jk->k", q[1:], J, w)
 
     return value
 
 
-def _size(torque: Array, kind: str) -> float:
-    return float(np.linalg.norm(torque, axis=0).max() if kind == "norm" else np.abs(torque).max())
+def _need(states: Array, loop: ClosedLoop, claim: Claim) -> float:
+    """The largest torque, or of wheels torque and momentum, as a share of what is claimed."""
+    torque = states[13:16]
+    if claim.kind == "wheels":
+        wheels = cast(Wheels, loop.wheels)
+        needs = (np.array(wheels.least) @ torque, claim.numbers["motors"]), (states[16:], claim.numbers["stored"])
+        # What a lost wheel is claimed to need is zero, and it needs that.
+        return max(float((np.abs(found).max(axis=1) / np.maximum(limits, 1e-300)).max()) for found, limits in needs)
+    size = np.linalg.norm(torque, axis=0) if loop.limit == "norm" else np.abs(torque)
+    return float(size.max()) / loop.craft.torque_limit
 
 
 def _where(certificate: Certificate, claim: Claim, states: Array, lane: int, what: str) -> str:

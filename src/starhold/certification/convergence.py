@@ -10,7 +10,16 @@ from flint import fmpq, fmpq_mat
 
 from starhold.algebra.polynomial import Polynomial, exact, pieces
 from starhold.certification.certificate import EXACT, EXACT_SIGN, LASALLE, Claim, Obligation
-from starhold.certification.frame import Cross, Frame, contents, decrease, margin, take_apart, take_cross
+from starhold.certification.frame import (
+    Cross,
+    Frame,
+    contents,
+    decrease,
+    known_torque_felt,
+    margin,
+    take_apart,
+    take_cross,
+)
 from starhold.certification.matrices import (
     Rows,
     characteristic_roots,
@@ -23,6 +32,7 @@ from starhold.certification.matrices import (
     product,
     scaled,
     symmetric,
+    transposed,
 )
 from starhold.certification.motion import AXES, RATE, Motion, ShapeError, at_rest, cases
 from starhold.certification.refutation import rising_state, state_evidence, unlike_positive
@@ -36,8 +46,17 @@ ASSUMPTIONS = (
     "torque not limited",
     "no torque from outside but what the law cancels",
 )
+WHEELS = "neither torque nor wheels limited, wheels without friction"
 ALMOST = fmpq(2**20 - 1, 2**20)
 """How much of a bound that must not be reached is used."""
+
+
+def assumed(subject: Subject, **instead: tuple[str, ...]) -> tuple[str, ...]:
+    """What claims of convergence about a subject assume, with other texts in place of `limits` and `outside`."""
+    limits, outside = ASSUMPTIONS[4:]
+    if subject.loop.wheels is not None:
+        limits = WHEELS
+    return (*ASSUMPTIONS[:4], *instead.get("limits", (limits,)), *instead.get("outside", (outside,)))
 
 
 @dataclass(frozen=True)
@@ -63,16 +82,19 @@ class Basin:
         return None if stay is None else exact(below(stay * (1 - self.rho) / (1 + self.rho)))
 
 
-def converge(subject: Subject, rate: Any = "best") -> tuple[Claim, Basin | None]:
-    """The strongest claim, by the law's own V or by the kinetic energy in its place; see `convergence`."""
-    own, basin = convergence(Motion(subject), rate)
+def converge(subject: Subject, rate: Any = "best") -> tuple[Claim, Basin | None, Basin | None]:
+    """The strongest claim and its basin, by the law's own V or by the kinetic energy in its place, see `convergence`; and
+    the basin that the law's own V has for whatever rates it can."""
+    motion = Motion(subject)
+    own, basin = convergence(motion, rate)
+    best = basin if basin is not None or rate == "best" else convergence(motion)[1]
     if own.outcome == "proved" and own.numbers["everything"]:
-        return own, basin
-    for stiffness in stiffnesses(Motion(subject)):
+        return own, basin, best
+    for stiffness in stiffnesses(motion):
         other, found = convergence(Motion(subject, stiffness), rate)
         if other.outcome == "proved" and (own.outcome != "proved" or other.numbers["everything"]):
-            return other, found
-    return own, basin
+            return other, found, best
+    return own, basin, best
 
 
 def stiffnesses(motion: Motion) -> list[Any]:
@@ -98,7 +120,7 @@ def convergence(motion: Motion, rate: Any = "best") -> tuple[Claim, Basin | None
     witness: dict[str, Any] = {}
 
     def finish(basin: Basin | None = None) -> tuple[Claim, Basin | None]:
-        return Claim("convergence", numbers, witness, ASSUMPTIONS, tuple(found)), basin
+        return Claim("convergence", numbers, witness, assumed(motion.subject), tuple(found)), basin
 
     try:
         frame = take_apart(motion)
@@ -106,7 +128,7 @@ def convergence(motion: Motion, rate: Any = "best") -> tuple[Claim, Basin | None
         found.add("form", EXACT, None, {"reason": str(reason)})
         return finish()
     found.add("form", EXACT, True)
-    positive = definite(frame.P) and frame.s > 0
+    positive = definite(frame.P) and frame.potential.positive
     found.add("positive", EXACT_SIGN, positive, {} if positive else unlike_positive(motion, frame))
     if not positive:
         return finish()
@@ -134,7 +156,7 @@ def convergence(motion: Motion, rate: Any = "best") -> tuple[Claim, Basin | None
     basin = Basin(motion, frame, cross, epsilon, rho, bound, level)
     start = basin.start
     reached_set = {"level": None if level is None else number(level), "start": None if start is None else number(start)}
-    reached_set |= contents(start, frame.P, frame.s)
+    reached_set |= contents(start, frame.P, frame.potential)
     if rate != "best" and not _covers(reached_set, rate):
         rising(None if rate is None else exact(rate), "not shown up to this rate")
         return finish()
@@ -145,16 +167,17 @@ def convergence(motion: Motion, rate: Any = "best") -> tuple[Claim, Basin | None
     return finish(basin if found.proved else None)
 
 
-def reached(basin: Basin, level: Any | None) -> tuple[list[Obligation], dict[str, Any]]:
-    """The obligations of convergence from a level that the basin holds, and their witness."""
+def reached(basin: Basin, level: Any | None, bounded: bool = False) -> tuple[list[Obligation], dict[str, Any]]:
+    """The obligations of convergence from a level that the basin holds, and their witness. `bounded`: the momentum that
+    wheels store is assumed to be."""
     motion, found = basin.motion, Obligations()
     for name, how in (("form", EXACT), ("positive", EXACT_SIGN), ("descent", EXACT_SIGN)):
         found.add(name, how, True)
-    still = _autonomous(motion)
-    reason = {} if still else {"reason": "how the target moves does not drop out"}
-    found.add("target", EXACT, True if still else None, reason)
+    reason = _depends_on(motion, bounded)
+    found.add("target", EXACT, None if reason else True, {"reason": reason} if reason else {})
     if basin.cross is None:
-        found.add("only rest", LASALLE, *_rests_only_there(motion))
+        # Without terms of V' that are linear in the rate, the torque at rest is the slope of the potential.
+        found.add("only rest", LASALLE, *((True, None) if basin.frame.potential.even else _rests_only_there(motion)))
     else:
         found.add("strict", EXACT_SIGN, True)
     found.add(*_double_cover(motion, basin.frame, level))
@@ -226,6 +249,8 @@ def _strict(motion: Motion, frame: Frame) -> tuple[Cross, Any, Any, Any | None] 
 def _capped(stay: Any | None, motion: Motion, frame: Frame, rho: Any) -> Any | None:
     """The level, no higher than the treatment of the double cover allows."""
     loop = motion.subject.loop
+    if frame.potential.even:
+        return stay
     if loop.cover == "shortest":
         # At q0 = 0, where the feedback switches, V is at least s.
         cap = frame.s * ALMOST
@@ -245,11 +270,19 @@ def _covers(numbers: dict[str, Any], rate: Any) -> bool:
 
 def _double_cover(motion: Motion, frame: Frame, stay: Any | None) -> tuple[str, str, bool | None, dict[str, Any]]:
     loop = motion.subject.loop
-    if stay is not None and stay < 2 * frame.s and loop.cover != "hysteresis":
-        # The other equilibrium has V = 2 s.
+    even = frame.potential.even
+    if stay is not None and stay < frame.potential.barrier and (even or loop.cover != "hysteresis"):
         return "single rest in the set", EXACT_SIGN, True, {}
+    if even:
+        # V has no minimum there, and falls wherever the body turns.
+        return "half turns repel", EXACT_SIGN, True, {}
     if loop.cover == "hysteresis":
         return "jumps lower V", EXACT_SIGN, 0.0 < loop.hysteresis_width < 1.0, {}
+    if loop.wheels is not None and frame.exact:
+        # Whatever momentum the wheels store, by the same argument as for any inertia.
+        stiffness = motion.linear(-1)[1]
+        held = stiffness == transposed(stiffness) and definite(stiffness)
+        return "other rest repels", EXACT_SIGN, held or None, {} if held else {"reason": "the stiffness is not symmetric"}
     return ("other rest repels", "certified roots", *_repels(motion))
 
 
@@ -270,9 +303,18 @@ def _determinant(K: Rows) -> Any:
     return fmpq_mat(3, 3, [x for row in K for x in row]).det()
 
 
-def _autonomous(motion: Motion) -> bool:
-    """Whether the error's motion does not depend on how the target moves."""
-    return not any(name[0] in "ra" for c in motion.acceleration for case in pieces(c) for name in case.value.variables())
+def _depends_on(motion: Motion, bounded: bool) -> str:
+    """What does not drop out of the error's motion, and would have to: how the target moves, or momentum of the wheels that
+    may grow without end, for then the motion may slow down for good before it is on target."""
+    letters = {name[0] for c in motion.acceleration for case in pieces(c) for name in case.value.variables()}
+    if letters & set("ra"):
+        return "how the target moves does not drop out"
+    if "h" not in letters or bounded or not any(motion.subject.modelled):
+        return ""
+    slopes = cases(motion.along(motion.lyapunov or Polynomial.constant(0)))
+    if not any(known_torque_felt(slope) for _, slope in slopes):
+        return "a torque that the law cancels may fill the wheels without end, and their momentum does not drop out"
+    return ""
 
 
 def _rests_only_there(motion: Motion) -> tuple[bool | None, dict[str, Any]]:

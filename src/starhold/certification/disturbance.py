@@ -10,7 +10,7 @@ from flint import fmpq
 
 from starhold.algebra.polynomial import exact
 from starhold.certification.certificate import EXACT_SIGN, Claim, Obligation
-from starhold.certification.convergence import ALMOST, ASSUMPTIONS, Basin
+from starhold.certification.convergence import ALMOST, Basin, assumed
 from starhold.certification.frame import (
     Cross,
     Frame,
@@ -20,7 +20,6 @@ from starhold.certification.frame import (
     known_torque_felt,
     margin,
     take_cross,
-    turn_of,
 )
 from starhold.certification.matrices import (
     Rows,
@@ -38,9 +37,8 @@ from starhold.certification.matrices import (
     symmetric,
 )
 from starhold.certification.motion import cases
+from starhold.certification.potential import turn_of
 from starhold.certification.subject import above, below
-
-OLD, NEW = "no torque from outside but what the law cancels", "torque from outside bounded in norm"
 
 
 def disturbance(basin: Basin) -> Claim | None:
@@ -53,9 +51,11 @@ def disturbance(basin: Basin) -> Claim | None:
     if torque == 0:
         return None
     torque = exact(above(torque))
-    assumptions = tuple(NEW if a == OLD else a for a in ASSUMPTIONS)
+    assumptions = assumed(motion.subject, outside=("torque from outside bounded in norm",))
     numbers: dict[str, Any] = {"torque": number(torque)}
     try:
+        if frame.potential.even:
+            raise ShapeError("V is even in q, for which no bound against torque is built")
         cross = take_cross(motion)
     except ShapeError as reason:
         refused = Obligation("descent", EXACT_SIGN, "undecided", {"reason": str(reason)})
@@ -113,7 +113,7 @@ def _claim(
     if end >= start or end >= frame.s:
         return None
     angle = float(turn_of(end / frame.s).upper().mid()) * (1.0 + 1e-15)
-    held = contents(start, frame.P, frame.s)
+    held = contents(start, frame.P, frame.potential)
     told = {
         "level": number(level),
         "start": number(start),

@@ -1,6 +1,8 @@
-"""V and its derivative taken apart: V = w.Pw/2 + s (1 - q0), V' = -w.Dw + K(w) + w.Eq + (torques from outside).
+"""V and its derivative taken apart: V = w.Pw/2 + (potential of the attitude), V' = -w.Dw + K(w) + w.Eq + (torques from
+outside).
 
-K is cubic. Where E vanishes V itself falls; else V + epsilon q.Jw does, if the damping outweighs what epsilon brings in.
+K is cubic. Where E vanishes V itself falls; else V + epsilon q.Jw does, if the damping outweighs what epsilon brings in. Of
+a V that is even in q, E must vanish.
 """
 
 from __future__ import annotations
@@ -9,9 +11,9 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from flint import arb, fmpq
+from flint import fmpq
 
-from starhold.algebra.polynomial import Polynomial, exact, pieces
+from starhold.algebra.polynomial import Polynomial, pieces
 from starhold.certification.matrices import (
     Rows,
     blocks,
@@ -26,6 +28,7 @@ from starhold.certification.matrices import (
     transposed,
 )
 from starhold.certification.motion import ATTITUDE, AXES, RATE, Motion, ShapeError, Truths, at_rest
+from starhold.certification.potential import Potential, potential_of
 from starhold.certification.subject import below
 
 OUTSIDE = ("e", "m")
@@ -37,13 +40,18 @@ class Frame:
     V' is made of one piece."""
 
     P: Rows
-    s: Any
+    potential: Potential
     D: Rows
     K: Polynomial
     E: Rows
     W: Rows
     reach: Any | None
     whole: bool
+
+    @property
+    def s(self) -> Any:
+        """What the potential is at a half turn (J)."""
+        return self.potential.s
 
     @property
     def exact(self) -> bool:
@@ -76,19 +84,17 @@ def take_apart(motion: Motion) -> Frame:
         raise ShapeError("the law's V does not exist for these gains, of which a matrix is singular") from None
     if function is None:
         raise ShapeError("the law declares no Lyapunov function")
-    P, s = _parts_of_lyapunov(function)
+    potential = potential_of(function)
+    if potential is None:
+        raise ShapeError(f"V is {function}, in the attitude neither s (1 - q0) nor a form of q")
     falling = motion.along(function)
     truths, slope = at_rest(falling)
     damping, cubic, mixed, work = parts_of_slope(slope)
-    return Frame(P, s, scaled(damping, -1), cubic, mixed, work, _reach(truths), len(pieces(falling)) == 1)
-
-
-def _parts_of_lyapunov(function: Polynomial) -> tuple[Rows, Any]:
-    s = function.terms.get((), fmpq(0))
-    rest = function.only(lambda m: not (m in ((), ("q0",)) or (len(m) == 2 and set(m) <= set(RATE))))
-    if rest.terms or s + function.terms.get(("q0",), fmpq(0)) != 0:
-        raise ShapeError(f"V has the terms {rest}" if rest.terms else "V is not zero at rest on target")
-    return scaled(matrix_of(function, RATE, RATE), 2), s
+    P = scaled(matrix_of(function, RATE, RATE), 2)
+    found = Frame(P, potential, scaled(damping, -1), cubic, mixed, work, _reach(truths), len(pieces(falling)) == 1)
+    if potential.even and not (found.exact and found.whole):
+        raise ShapeError("V is even in q, but V' mixes rate and attitude, or the law switches")
+    return found
 
 
 def parts_of_slope(slope: Polynomial) -> tuple[Rows, Polynomial, Rows, Rows]:
@@ -192,20 +198,15 @@ def margin(frame: Frame, cross: Cross, epsilon: Any, rho: Any) -> Rows:
     return blocks(scaled(frame.P, rho), scaled(transposed(cross.J), epsilon), identity(3, rho * frame.s))
 
 
-def turn_of(share: Any) -> arb:
-    """The angle whose V at rest is this share of s, 1 - cos(angle/2); without cancellation for small ones."""
-    return 4 * (arb(share) / 2).sqrt().asin()
-
-
-def contents(start: Any | None, P: Rows, s: Any) -> dict[str, Any]:
+def contents(start: Any | None, P: Rows, potential: Potential) -> dict[str, Any]:
     """What {V <= start} holds: the largest turn from rest (rad), the largest rate on target, and the largest rate at
     every attitude (rad/s; None: not every attitude is in it); all from below. For start None everything."""
     if start is None:
-        return {"turn": math.pi * 2, "rate": None, "rate_everywhere": None, "everything": True}
+        turn = math.pi if potential.even else 2.0 * math.pi
+        return {"turn": turn, "rate": None, "rate_everywhere": None, "everything": True}
     inertia = greatest(P)
     everywhere = None
-    if start >= 2 * s:
-        everywhere = below(root_below(2 * (start - 2 * s) / inertia))
-    turn = 2.0 * math.pi if start >= 2 * s else below(exact(float(turn_of(start / s).lower().mid())))
+    if start >= potential.top:
+        everywhere = below(root_below(2 * (start - potential.top) / inertia))
     rate = below(root_below(2 * start / inertia))
-    return {"turn": turn, "rate": rate, "rate_everywhere": everywhere, "everything": False}
+    return {"turn": potential.turn(start), "rate": rate, "rate_everywhere": everywhere, "everything": False}

@@ -1,7 +1,7 @@
 """The claim that convergence holds for every inertia near the one the law was designed for, or for every inertia.
 
 V is the true kinetic energy and 2 stiffness (1 - q0): its derivative does not depend on the inertia, and the cross term's
-does so linearly, so that a box of inertias is decided by its size alone.
+does so linearly, so that a box of inertias is decided by its size alone. A law whose own V is even in q keeps its potential.
 """
 
 from __future__ import annotations
@@ -14,30 +14,24 @@ from flint import fmpq
 
 from starhold.algebra.polynomial import Polynomial, exact
 from starhold.certification.certificate import EXACT, EXACT_SIGN, LASALLE, Claim, Obligation
-from starhold.certification.convergence import ALMOST, ASSUMPTIONS, converge, stiffnesses
+from starhold.certification.convergence import ALMOST, Basin, assumed, stiffnesses
 from starhold.certification.frame import Cross, contents, cross_parts, decrease, quadratic_sizes, take_apart
 from starhold.certification.matrices import definite, floats, greatest, identity, number, root_above, symmetric
 from starhold.certification.motion import ATTITUDE, RATE, Motion, ShapeError, at_rest, cases
 from starhold.certification.refutation import rational_turn, state_evidence
 from starhold.certification.subject import Subject, below
 from starhold.models.craft import check_inertia
+from starhold.models.rigid_body import kinetic_energy
 
-_OTHER = {
-    "inertia exactly as given": "inertia within the tolerance",
-    "no torque from outside but what the law cancels": "no torque from outside",
-}
-TOLD = (*(_OTHER.get(a, a) for a in ASSUMPTIONS), "target at rest")
-ANY = tuple(a for a in TOLD if a != "inertia within the tolerance")
 NAMES = ("j11", "j22", "j33", "j12", "j13", "j23")
 
 
-def inertia_box(subject: Subject, tolerance: float | None = None) -> Claim | None:
-    """The claim for the largest box |J*_ij - J_ij| <= tolerance sqrt(J_ii J_jj), at most 1, or for the one given; None
-    where the law does not even converge for the inertia it knows."""
-    if converge(subject)[0].outcome != "proved":
-        return None
+def inertia_box(basin: Basin, tolerance: float | None = None) -> Claim:
+    """The claim for the largest box |J*_ij - J_ij| <= tolerance sqrt(J_ii J_jj), at most 1, or for the one given, of a law
+    that converges for the inertia it knows."""
+    subject = basin.motion.subject
     families: list[Family] = []
-    for stiffness in stiffnesses(Motion(subject)):
+    for stiffness in (None,) if basin.frame.potential.even else stiffnesses(Motion(subject)):
         try:
             family = Family(subject, stiffness)
         except ShapeError:
@@ -47,14 +41,15 @@ def inertia_box(subject: Subject, tolerance: float | None = None) -> Claim | Non
         families.append(family)
     if tolerance is not None:
         found = next((claim for family in families if (claim := family.claim(tolerance)) is not None), None)
-        return found or _refused(families, tolerance)
+        return found or _refused(subject, families, tolerance)
     best = max(((family.largest, place) for place, family in enumerate(families)), default=(0.0, 0))
     claim = families[best[1]].claim(best[0]) if best[0] > 0.0 else None
-    return claim or _refused(families, 1e-6)
+    return claim or _refused(subject, families, 1e-6)
 
 
 class Family:
-    """The loop with the inertia it was designed for and with any other, and V = kinetic energy + 2 stiffness (1 - q0).
+    """The loop with the inertia it was designed for and with any other, and V = kinetic energy + 2 stiffness (1 - q0) or,
+    for None, the law's own.
 
     Raises ShapeError where V' depends on the inertia, or the cross term's derivative does other than linearly.
     """
@@ -63,7 +58,7 @@ class Family:
         self.nominal = Motion(subject, stiffness)
         self.other = Motion(subject, stiffness, unknown_inertia=True)
         self.frame = take_apart(self.nominal)
-        if self.frame.K.terms or not self._same_slope():
+        if self.frame.K.terms or not (self._same_potential() and self._same_slope()):
             raise ShapeError("V' depends on the inertia")
         self.crosses: list[Cross] = []
         """The cross term's parts at the nominal inertia, then what each entry of `NAMES` adds to them."""
@@ -74,7 +69,12 @@ class Family:
 
     def any_inertia(self) -> bool:
         """Whether V' has only damping, in which no inertia occurs."""
-        return self.frame.exact and definite(symmetric(self.nominal.linear()[1]))
+        return self.frame.exact and (self.frame.potential.even or definite(symmetric(self.nominal.linear()[1])))
+
+    def _same_potential(self) -> bool:
+        """Whether V is the kinetic energy of whatever inertia and a function of the attitude."""
+        parts: list[Any] = [_function(m) - kinetic_energy(m.seen.rate, m.plant) for m in (self.nominal, self.other)]
+        return not (parts[0] - parts[1]).terms
 
     def _same_slope(self) -> bool:
         known = {_key(t): v for t, v in cases(self.nominal.along(_function(self.nominal)))}
@@ -104,21 +104,26 @@ class Family:
     def claim_for_any(self) -> Claim:
         """The claim for every inertia; V is then strictly what the law's own V is, up to a factor."""
         cover = self.nominal.subject.loop.cover
-        start = self.frame.s * ALMOST if cover == "shortest" else None
+        even, stiffness = self.frame.potential.even, self.nominal.stiffness
+        start = self.frame.s * ALMOST if cover == "shortest" and not even else None
         obligations = [
             ("form", EXACT),
             ("positive", EXACT_SIGN),
             ("descent", EXACT_SIGN),
             ("only rest", LASALLE),
-            _cover(cover),
+            ("half turns repel", EXACT_SIGN) if even else _cover(cover),
         ]
-        held = contents(start, self.frame.P, self.frame.s)
+        held = contents(start, self.frame.P, self.frame.potential)
         if start is not None:
             # How fast a body on target may turn depends on its inertia.
             held |= {"rate": 0.0, "rate_everywhere": None}
         numbers = {"tolerance": None, "start": None if start is None else number(start), **held}
-        witness = {"stiffness": number(self.nominal.stiffness), "epsilon": 0.0, "rho": 0.0, "level": numbers["start"]}
-        return _proved(numbers, witness, obligations)
+        witness = {"stiffness": None if stiffness is None else number(stiffness), "epsilon": 0.0, "rho": 0.0}
+        return self._proved(numbers, witness | {"level": numbers["start"]}, obligations)
+
+    def _proved(self, numbers: dict[str, Any], witness: dict[str, Any], obligations: list[tuple[str, str]]) -> Claim:
+        proved = tuple(Obligation(name, how, "proved") for name, how in obligations)
+        return Claim("inertia", numbers, witness, told(self.nominal.subject, numbers["tolerance"]), proved)
 
     def sizes(self, tolerance: Any) -> tuple[Any, Any]:
         """Bounds over the box: of sigma, and of the largest moment."""
@@ -139,14 +144,14 @@ class Family:
         if found is None:
             return None
         epsilon, rho = found
-        loop, s = self.nominal.subject.loop, self.frame.s
+        loop = self.nominal.subject.loop
         level, start = self._levels(rho)
         most = self.sizes(exact(tolerance))[1]
-        held = contents(start, identity(3, most), s)
+        held = contents(start, identity(3, most), self.frame.potential)
         obligations = [("form", EXACT), *((n, EXACT_SIGN) for n in ("positive", "descent", "strict")), _cover(loop.cover)]
         numbers = {"tolerance": tolerance, "start": None if start is None else number(start), **held}
         witness = {"stiffness": number(self.nominal.stiffness), "epsilon": number(epsilon), "rho": number(rho)}
-        return _proved(numbers, witness | {"level": None if level is None else number(level)}, obligations)
+        return self._proved(numbers, witness | {"level": None if level is None else number(level)}, obligations)
 
     def _levels(self, rho: Any) -> tuple[Any | None, Any | None]:
         """The level that the double cover allows, and that from which motions stay below it."""
@@ -227,13 +232,6 @@ class Family:
         return None
 
 
-def _proved(numbers: dict[str, Any], witness: dict[str, Any], obligations: list[tuple[str, str]]) -> Claim:
-    assumptions = ANY if numbers["tolerance"] is None else TOLD
-    return Claim(
-        "inertia", numbers, witness, assumptions, tuple(Obligation(name, how, "proved") for name, how in obligations)
-    )
-
-
 def _cover(cover: str) -> tuple[str, str]:
     """Near q0 = -1 the function falls as it does near the target but is no minimum there, hence by the inertia theorem
     for Lyapunov's equation that rest has unstable directions and none that is neutral."""
@@ -241,7 +239,7 @@ def _cover(cover: str) -> tuple[str, str]:
     return names[cover], EXACT_SIGN
 
 
-def _refused(families: list[Family], tolerance: float) -> Claim:
+def _refused(subject: Subject, families: list[Family], tolerance: float) -> Claim:
     """The claim that could not be shown: up to where it could, and where the function of that proof rises."""
     largest = max((family.largest for family in families), default=0.0)
     evidence: dict[str, Any] = {"reason": f"shown up to {100.0 * largest:.3g} %" if largest else "not shown for any box"}
@@ -250,7 +248,14 @@ def _refused(families: list[Family], tolerance: float) -> Claim:
         if found is not None:
             evidence |= found
             break
-    return Claim("inertia", {"tolerance": tolerance}, {}, TOLD, (Obligation("descent", EXACT_SIGN, "undecided", evidence),))
+    refused = (Obligation("descent", EXACT_SIGN, "undecided", evidence),)
+    return Claim("inertia", {"tolerance": tolerance}, {}, told(subject, tolerance), refused)
+
+
+def told(subject: Subject, tolerance: float | None) -> tuple[str, ...]:
+    """What the claim assumes; for a tolerance of None any inertia."""
+    body, _, *others = assumed(subject, outside=("no torque from outside", "target at rest"))
+    return (body, *(() if tolerance is None else ("inertia within the tolerance",)), *others)
 
 
 def _function(motion: Motion) -> Polynomial:

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 from flint import arb, fmpq
+from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import Polynomial, exact, jointly
 from starhold.certification.certificate import BALLS, Claim, Obligation
-from starhold.certification.convergence import ASSUMPTIONS, Basin, reached
-from starhold.certification.frame import AXES, contents
+from starhold.certification.convergence import Basin, assumed, reached
+from starhold.certification.frame import contents
 from starhold.certification.matrices import (
     Rows,
     definite,
@@ -25,20 +26,24 @@ from starhold.certification.matrices import (
     scaled,
     transposed,
 )
-from starhold.certification.motion import ATTITUDE, RATE, Motion, Truths
+from starhold.certification.motion import ATTITUDE, AXES, RATE, Truths
 from starhold.certification.refutation import rational_turn, state_evidence
 
 DEPTH = 40
+TRIES = (1e-6, 1e-5, 1e-4, 1e-3)
+UNEQUAL = "the weights of the direction cosines differ, for which no bound of the torque is built"
 
 
 @dataclass(frozen=True)
 class Load:
-    """What bounds one axis of the torque (or its norm): squares of the greatest linear part of the rate for w.Pw = 1 and
-    of the attitude for |q| = 1, and the other monomials as (powers of |w_j|, power of |q|, size)."""
+    """What bounds one axis of the torque (or its norm, or a motor's): squares of the greatest linear part of the rate for
+    w.Pw = 1 and of the attitude, and the other monomials as (powers of |w_j|, power of |q|, size). `limit`: what it has
+    to keep below."""
 
     rate: Any
     attitude: Any
     rest: tuple[tuple[tuple[int, int, int], int, Any], ...]
+    limit: Any
 
 
 def torque_limit(basin: Basin, turn: float | None = None) -> Claim | None:
@@ -47,37 +52,48 @@ def torque_limit(basin: Basin, turn: float | None = None) -> Claim | None:
     limit, kind = subject.loop.craft.torque_limit, subject.loop.limit
     if kind == "none" or not np.isfinite(limit):
         return None
-    assumptions = tuple(a for a in ASSUMPTIONS if a != "torque not limited")
     pieces = jointly(basin.motion.torque)
     numbers: dict[str, Any] = {"limit": limit, "kind": kind}
 
     def claim(level: Any | None, holds: bool, evidence: dict[str, Any] | None = None) -> Claim:
-        start = basin.start_of(level)
-        told = {"level": None if level is None else number(level), "start": None if start is None else number(start)}
-        told |= contents(start, basin.frame.P, basin.frame.s)
-        if turn is not None:
-            told["turn"] = turn
+        told = told_set(basin, level, turn)
         outcome = "proved" if holds else "refuted" if evidence and "state" in evidence else "undecided"
         torque = Obligation("torque", BALLS, outcome, {} if holds or evidence is None else evidence)
         before, witness = reached(basin, level)
-        return Claim("torque-limit", numbers | told, witness, assumptions, (*before, torque))
+        return Claim("torque-limit", numbers | told, witness, assumed(subject, limits=()), (*before, torque))
 
     if len(pieces) > 1:
         reason = {"reason": "a clipped torque is bounded for a target at rest and limits of each axis only"}
         return claim(basin.stay, _everywhere(pieces, exact(limit), kind), reason)
+    if basin.frame.s is None:
+        return claim(fmpq(0), False, {"reason": UNEQUAL})
     parts = pieces[0][1]
-    carried = loads(basin, parts, kind)
+    carried = loads(basin, parts, kind, exact(limit))
     if turn is None:
-        level = _largest_level(basin, carried, exact(limit))
+        level = largest_level(basin, carried)
         return claim(fmpq(0), False, {"reason": "no level is small enough"}) if level is None else claim(level, True)
-    start = exact(number(basin.frame.s) * (1.0 - np.cos(0.5 * turn)) * (1.0 + 1e-12))
-    level = start * (1 + basin.rho) / (1 - basin.rho)
+    start, level = level_of_turn(basin, turn)
     if basin.stay is not None and level > basin.stay:
         return claim(level, False, {"reason": "the region of convergence does not reach that far"})
-    level = exact(number(level))
-    if _within(basin, carried, level, exact(limit)):
+    if within(basin, carried, level):
         return claim(level, True)
     return claim(level, False, _overload(basin, parts, start, exact(limit), kind) or {"reason": "not shown"})
+
+
+def told_set(basin: Basin, level: Any | None, turn: float | None) -> dict[str, Any]:
+    """The numbers of {V <= level}, and of the set that motions start from; of its turn what was asked for."""
+    start = basin.start_of(level)
+    told = {"level": None if level is None else number(level), "start": None if start is None else number(start)}
+    told |= contents(start, basin.frame.P, basin.frame.potential)
+    return told if turn is None else told | {"turn": turn}
+
+
+def level_of_turn(basin: Basin, turn: float) -> tuple[Any, Any]:
+    """V at rest after a turn (rad), and the level that motions from there stay below, both from above."""
+    potential = basin.frame.potential
+    half = np.sin(0.5 * turn) ** 2 if potential.even else 1.0 - np.cos(0.5 * turn)
+    start = exact(number(potential.s) * float(half) * (1.0 + 1e-12))
+    return start, exact(number(start * (1 + basin.rho) / (1 - basin.rho)))
 
 
 def _everywhere(pieces: list[tuple[Truths, list[Polynomial]]], limit: Any, kind: str) -> bool:
@@ -116,21 +132,27 @@ def _root_above_sum(linear: Polynomial) -> Any:
     return root_above(sum((c * c for c in values), fmpq(0)))
 
 
-def loads(basin: Basin, parts: list[Polynomial], kind: str) -> list[Load]:
-    """The loads of each axis, or of the norm."""
-    turned = inverse(basin.frame.P)
-    linear_rate = [[p.terms.get((name,), fmpq(0)) for name in RATE] for p in parts]
-    linear_attitude = [[p.terms.get((name,), fmpq(0)) for name in AXES] for p in parts]
-    rests = [_rest(basin.motion, p) for p in parts]
+def loads(basin: Basin, parts: list[Polynomial], kind: str, limit: Any) -> list[Load]:
+    """The loads of each axis, or of the norm, with their common limit."""
     if kind == "axis":
-        return [
-            Load(_square(row, turned), sum((c * c for c in stiff), fmpq(0)), rest)
-            for row, stiff, rest in zip(linear_rate, linear_attitude, rests, strict=True)
-        ]
-    gram = product(transposed(linear_rate), linear_rate)
-    rate = _relative_greatest(gram, basin.frame.P)
-    attitude = _relative_greatest(product(transposed(linear_attitude), linear_attitude), _unit())
-    return [Load(rate, attitude, tuple(item for rest in rests for item in rest))]
+        return [axis_load(basin, part, limit) for part in parts]
+    rows = [_linear(basin, part) for part in parts]
+    rates, attitudes = [row[0] for row in rows], [row[1] for row in rows]
+    rate = _relative_greatest(product(transposed(rates), rates), basin.frame.P)
+    attitude = _relative_greatest(product(transposed(attitudes), attitudes), _unit())
+    return [Load(rate, attitude, tuple(item for part in parts for item in _rest(basin, part)), limit)]
+
+
+def axis_load(basin: Basin, part: Polynomial, limit: Any) -> Load:
+    """The load of one component."""
+    rate, attitude = _linear(basin, part)
+    square = sum((c * c for c in attitude), fmpq(0))
+    return Load(_square(rate, inverse(basin.frame.P)), square, _rest(basin, part), limit)
+
+
+def _linear(basin: Basin, part: Polynomial) -> tuple[list[Any], list[Any]]:
+    rate = [part.terms.get((name,), fmpq(0)) for name in RATE]
+    return rate, [part.terms.get(monomial, fmpq(0)) for monomial in basin.frame.potential.linear]
 
 
 def _unit() -> Rows:
@@ -152,12 +174,17 @@ def _relative_greatest(a: Rows, b: Rows) -> Any:
     raise ArithmeticError("no bound of the damping was found")
 
 
-def _rest(motion: Motion, component: Polynomial) -> tuple[tuple[tuple[int, int, int], int, Any], ...]:
-    subject = motion.subject
-    sizes = {"r": subject.target_rate, "a": subject.target_acceleration, "m": subject.disturbance}
+def _rest(basin: Basin, component: Polynomial) -> tuple[tuple[tuple[int, int, int], int, Any], ...]:
+    subject = basin.motion.subject
+    sizes = {
+        "r": subject.target_rate,
+        "a": subject.target_acceleration,
+        "m": subject.disturbance,
+        "h": subject.total_momentum,
+    }
     found: list[tuple[tuple[int, int, int], int, Any]] = []
     for monomial, c in component.terms.items():
-        if len(monomial) == 1 and (monomial[0] in RATE or monomial[0] in AXES):
+        if monomial in basin.frame.potential.linear or (len(monomial) == 1 and monomial[0] in RATE):
             continue
         size, attitude = abs(c), 0
         for name in monomial:
@@ -173,22 +200,19 @@ def _rest(motion: Motion, component: Polynomial) -> tuple[tuple[tuple[int, int, 
 
 
 class Bound:
-    """The bound of a load on {V = level, s (1 - q0) = t}, as balls."""
+    """The bound of a load on {V = level, potential = t}, as balls."""
 
     def __init__(self, load: Load, basin: Basin, level: Any) -> None:
         turned = inverse(basin.frame.P)
-        self.load, self.s, self.level = load, arb(basin.frame.s), arb(level)
+        self.load, self.potential, self.level = load, basin.frame.potential, arb(level)
         self.rate, self.attitude = arb(load.rate).sqrt(), arb(load.attitude).sqrt()
         self.axes = [arb(turned[j][j]).sqrt() for j in range(3)]
 
     def between(self, first: Any, last: Any) -> arb:
         """An enclosure of an upper bound for t between two rationals."""
         energy = (2 * (self.level - arb(first))).nonnegative_part().sqrt()
-        share, other = arb(first) / self.s, arb(last) / self.s
-        # |q|2 = x (2 - x) with x = t/s rises up to x = 1 and falls after.
-        widest = other if other <= 1 else share if share >= 1 else arb(1)
-        turned = (widest * (2 - widest)).nonnegative_part().sqrt()
-        total = self.rate * energy + self.attitude * turned
+        linear, turned = self.potential.sizes(first, last)
+        total = self.rate * energy + self.attitude * linear
         for powers, attitude, size in self.load.rest:
             term = arb(size) * turned**attitude
             for axis, power in zip(self.axes, powers, strict=True):
@@ -196,27 +220,34 @@ class Bound:
             total = total + term
         return total
 
-
-def _within(basin: Basin, carried: list[Load], level: Any, limit: Any) -> bool:
-    """Whether the torque is within its limit on {V <= level}, by branch and bound in balls."""
-    last = min(level, 2 * basin.frame.s)
-    return all(_below_limit(Bound(load, basin, level), fmpq(0), last, arb(limit), 0) for load in carried)
-
-
-def _below_limit(bound: Bound, first: Any, last: Any, limit: arb, depth: int) -> bool:
-    if bound.between(first, last) <= limit:
-        return True
-    if depth == DEPTH or bound.between(first, first) > limit:
-        return False
-    middle = (first + last) / 2
-    return _below_limit(bound, first, middle, limit, depth + 1) and _below_limit(bound, middle, last, limit, depth + 1)
+    def below(self, limit: Any, first: Any, last: Any, depth: int = 0) -> bool:
+        """Whether it is at most a rational for t between two others, by branch and bound."""
+        if self.between(first, last) <= limit:
+            return True
+        if depth == DEPTH or self.between(first, first) > limit:
+            return False
+        middle = (first + last) / 2
+        return self.below(limit, first, middle, depth + 1) and self.below(limit, middle, last, depth + 1)
 
 
-def _largest_level(basin: Basin, carried: list[Load], limit: Any) -> Any | None:
-    """The largest level, to six digits, that is shown to keep the torque within its limit."""
-    guess = _guesser(basin, carried, number(limit))
+def within(basin: Basin, carried: list[Load], level: Any) -> bool:
+    """Whether every load is within its limit on {V <= level}."""
+    last = min(level, basin.frame.potential.top)
+    return all(Bound(load, basin, level).below(load.limit, fmpq(0), last) for load in carried)
+
+
+def largest_level(basin: Basin, carried: list[Load], cap: Any | None = None, tries: tuple[float, ...] = TRIES) -> Any | None:
+    """The largest level, no more than `cap`, that is shown to keep every load within its limit; `tries`: what share of the
+    largest by floats is given away for that, the first that will do."""
+    size = guesser(basin, carried)
+    limits = np.array([number(load.limit) for load in carried])
+
+    def guess(level: float) -> bool:
+        return bool((size(level) <= limits).all())
+
     low, high = 0.0, number(basin.frame.s) * 1e-6
-    top = np.inf if basin.stay is None else number(basin.stay) * (1.0 - 1e-12)
+    caps = [number(bound) * (1.0 - 1e-12) for bound in (basin.stay, cap) if bound is not None]
+    top = min(caps, default=np.inf)
     while high < top and guess(high):
         low, high = high, 2.0 * high
     if high >= top and guess(top):
@@ -224,16 +255,17 @@ def _largest_level(basin: Basin, carried: list[Load], limit: Any) -> Any | None:
     for _ in range(60):
         middle = 0.5 * (low + min(high, top))
         low, high = (middle, high) if guess(middle) else (low, middle)
-    for less in (1e-6, 1e-5, 1e-4, 1e-3):
+    for less in tries:
         level = exact(float(low * (1.0 - less)))
-        if level > 0 and _within(basin, carried, level, limit):
+        if level > 0 and within(basin, carried, level):
             return level
     return None
 
 
-def _guesser(basin: Basin, carried: list[Load], limit: float) -> Callable[[float], bool]:
-    """A test in floats, on a grid, of what `_within` proves."""
-    s = number(basin.frame.s)
+def guesser(basin: Basin, carried: list[Load]) -> Callable[[float], NDArray[np.float64]]:
+    """The bounds of the loads on {V <= level} in floats, on a grid."""
+    potential = basin.frame.potential
+    top = number(potential.top)
     grid = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, 801)))
     axes = np.sqrt(np.diagonal(floats(inverse(basin.frame.P))))
     plain = [
@@ -241,35 +273,36 @@ def _guesser(basin: Basin, carried: list[Load], limit: float) -> Callable[[float
         for c in carried
     ]
 
-    def guess(level: float) -> bool:
-        t = min(level, 2.0 * s) * grid
-        energy, turned = np.sqrt(2.0 * np.maximum(level - t, 0.0)), np.sqrt(np.maximum(t / s * (2.0 - t / s), 0.0))
+    def sizes(level: float) -> NDArray[np.float64]:
+        t = min(level, top) * grid
+        energy = np.sqrt(2.0 * np.maximum(level - t, 0.0))
+        linear, turned = potential.grid(t)
+        found: list[float] = []
         for rate, attitude, rest in plain:
-            total = rate * energy + attitude * turned
+            total = rate * energy + attitude * linear
             for powers, degree, size in rest:
                 total = total + size * turned**degree * float(np.prod(axes ** np.array(powers))) * energy ** sum(powers)
-            if total.max() > limit:
-                return False
-        return True
+            found.append(float(total.max()))
+        return np.array(found)
 
-    return guess
+    return sizes
 
 
 def _overload(basin: Basin, parts: list[Polynomial], level: Any, limit: Any, kind: str) -> dict[str, Any] | None:
     """A state in {V <= level} at which the torque exceeds its limit, verified."""
-    P, s = basin.frame.P, basin.frame.s
+    P, potential = basin.frame.P, basin.frame.potential
     turned = floats(inverse(P))
     random = np.random.default_rng(0)
     for i, part in enumerate(parts):
-        stiff = np.array([number(part.terms.get((name,), fmpq(0))) for name in AXES])
-        damp = turned @ np.array([number(part.terms.get((name,), fmpq(0))) for name in RATE])
+        rate, attitude = _linear(basin, part)
+        stiff, damp = np.array([number(c) for c in attitude]), turned @ np.array([number(c) for c in rate])
         damp /= max(np.sqrt(damp @ floats(P) @ damp), 1e-300)
         for share in np.concatenate([np.linspace(0.0, 1.0, 101), random.uniform(size=100)]):
-            t = share * min(number(level), 2.0 * number(s)) * (1.0 - 1e-9)
-            q0 = 1.0 - t / number(s)
             axis = stiff / max(np.linalg.norm(stiff), 1e-300)
+            t = share * min(number(level), number(potential.top)) * (1.0 - 1e-9)
+            q0 = float(np.ravel(potential.cosine(t, axis[None]))[0])
             q = rational_turn([q0, *(np.sqrt(max(1.0 - q0 * q0, 0.0)) * axis)])
-            left = number(level - s * (1 - q[0]))
+            left = number(level - potential.at(q))
             if left < 0.0:
                 continue
             w = [exact(float(x)) for x in np.sqrt(2.0 * left) * (1.0 - 1e-9) * damp]
@@ -279,7 +312,7 @@ def _overload(basin: Basin, parts: list[Polynomial], level: Any, limit: Any, kin
             found = [p.at(values) for p in parts]
             energy = sum((w[j] * P[j][k] * w[k] for j in range(3) for k in range(3)), fmpq(0)) / 2
             over = abs(found[i]) > limit if kind == "axis" else sum((x * x for x in found), fmpq(0)) > limit * limit
-            if over and energy + s * (1 - q[0]) <= level:
+            if over and energy + potential.at(q) <= level:
                 size = abs(found[i]) if kind == "axis" else exact(float(np.linalg.norm([number(x) for x in found])))
                 return state_evidence(q, w, "torque", size)
     return None

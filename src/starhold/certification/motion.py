@@ -1,7 +1,7 @@
 """The closed loop as exact polynomials: V and its derivative, read from the law's and the models' own equations.
 
 Variables: q0..q3 error attitude, w1..w3 rate relative to the target, r1..r3 the target's rate and a1..a3 its acceleration
-(body axes), e1..e3 the torque the models know, m1..m3 a torque nobody knows.
+(body axes), e1..e3 the torque the models know, m1..m3 a torque nobody knows, and with wheels h1..h3 the total momentum.
 """
 
 from __future__ import annotations
@@ -79,17 +79,11 @@ class Motion:
         turning = zero if still else direction("r")
         spinning = zero if still else direction("a")
         acceleration = subtract(spinning, cross(rate, turning))
-        period = Polynomial.constant(self.subject.loop.period)
-        return Seen(
-            direction("q", 0, 4),
-            rate,
-            add(rate, turning),
-            turning,
-            acceleration,
-            known,
-            direction("p"),
-            period,  # type: ignore
-        )
+        period: Any = Polynomial.constant(self.subject.loop.period)
+        absolute, stored = add(rate, turning), zero
+        if self.subject.loop.wheels is not None:
+            stored = subtract(direction("h"), apply(self.plant.inertia, absolute))
+        return Seen(direction("q", 0, 4), rate, absolute, turning, acceleration, known, direction("p"), period, stored)
 
     @cached_property
     def torque(self) -> Any:
@@ -101,6 +95,8 @@ class Motion:
     def acceleration(self) -> Any:
         """The derivative of the rate relative to the target, times `factor`."""
         outside = add(self.torque, add(self.seen.external_torque, direction("m")))
+        # Of the wheels' action on the body the torque is what is asked of them.
+        outside = subtract(outside, cross(self.seen.body_rate, self.seen.stored))
         absolute = angular_acceleration(self.seen.body_rate, outside, self.plant)
         return subtract(absolute, scale(self.factor, self.seen.target_acceleration))  # type: ignore
 

@@ -11,6 +11,7 @@ from flint import fmpq
 from starhold.algebra.polynomial import Polynomial, exact
 from starhold.certification.matrices import floats, number, symmetric
 from starhold.certification.motion import ATTITUDE, RATE, Motion
+from starhold.certification.potential import Cosines
 
 if TYPE_CHECKING:
     from starhold.certification.frame import Frame
@@ -76,7 +77,11 @@ def _verified(slope: Polynomial, attitude: Any, rate: Any, limit: Any | None) ->
 
 def unlike_positive(motion: Motion, frame: Frame) -> dict[str, Any]:
     """A state at which V is not positive."""
-    if frame.s <= 0:
+    if isinstance(frame.potential, Cosines) and not frame.potential.positive:
+        axis = np.linalg.eigh(floats(frame.potential.N))[1][:, 0]
+        q = rational_turn([0.0, *axis.tolist()])
+        return state_evidence(q, (0.0, 0.0, 0.0), "V", frame.potential.at(q))
+    if not frame.potential.positive:
         return state_evidence((0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 0.0), "V", frame.s)
     values, axes = np.linalg.eigh(floats(symmetric(frame.P)))
     w = [exact(float(f"{x:.9g}")) for x in axes[:, 0]]

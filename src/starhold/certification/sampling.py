@@ -9,6 +9,7 @@ from flint import arb
 
 from starhold.algebra.polynomial import exact
 from starhold.certification.certificate import EXACT_SIGN, Claim, Obligation
+from starhold.certification.convergence import WHEELS
 from starhold.certification.matrices import (
     Rows,
     characteristic_roots,
@@ -33,6 +34,7 @@ ASSUMPTIONS = (
     "torque not limited",
     "no torque from outside",
 )
+STILL_WHEELS = "no stored momentum"
 ROOTS = "certified roots"
 
 
@@ -42,7 +44,11 @@ def sampling(motion: Motion) -> Claim | None:
         rate, attitude = motion.linear()
     except ArithmeticError:
         return None
-    J, period = motion.subject.inertia, exact(motion.subject.loop.period)
+    loop = motion.subject.loop
+    assumptions = ASSUMPTIONS
+    if loop.wheels is not None:
+        assumptions = (*(WHEELS if a == "torque not limited" else a for a in ASSUMPTIONS), STILL_WHEELS)
+    J, period = motion.subject.inertia, exact(loop.period)
     roots = sampled_roots(J, rate, attitude, period)
     values = sorted(
         (complex(number(r.real), number(r.imag)) for r, n in roots for _ in range(n)), key=lambda z: (-abs(z), z.imag)
@@ -61,14 +67,14 @@ def sampling(motion: Motion) -> Claim | None:
         )
         outcome = "refuted" if "eigenvalue" in worst else "undecided"
         refused = Obligation("stable at the period", ROOTS, outcome, worst)
-        return Claim("sampling", numbers | {"longest": None, "every_shorter": False}, {}, ASSUMPTIONS, (refused,))
+        return Claim("sampling", numbers | {"longest": None, "every_shorter": False}, {}, assumptions, (refused,))
     longest = _longest(J, rate, attitude, period)
     between = dissipative(J, rate, attitude, longest)
     obligations = [Obligation("stable at the period", ROOTS, "proved"), Obligation("stable at the longest", ROOTS, "proved")]
     if between:
         obligations.append(Obligation("stable in between", EXACT_SIGN, "proved"))
     numbers |= {"longest": number(longest), "every_shorter": between}
-    return Claim("sampling", numbers, {}, ASSUMPTIONS, tuple(obligations))
+    return Claim("sampling", numbers, {}, assumptions, tuple(obligations))
 
 
 def sampled_roots(J: Rows, rate: Rows, attitude: Rows, period: Any) -> list[tuple[Any, int]]:

@@ -10,13 +10,15 @@ from flint import arb, fmpq
 
 from starhold.algebra.polynomial import Polynomial, constants, exact
 from starhold.algebra.vector import Matrix, Vector
-from starhold.certification.matrices import Rows, greatest, inverse, least, matrix_of, number, rows, scaled
+from starhold.certification.matrices import Rows, greatest, inverse, least, matrix_of, number, plus, rows, scaled
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law
 from starhold.laws.interface import fields
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.models.craft import Craft, tensor
 from starhold.models.environment import gravity_gradient
+from starhold.models.wheeled_body import WheeledState
+from starhold.models.wheels import Wheels
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,8 @@ class Subject:
     """One law on one spacecraft, exact: floats stand for their exact values.
 
     modelled: bound on each axis of the torque the models know (N m); target_rate, target_acceleration: bounds on the
-    target's motion (rad/s, rad/s2), zero for one at rest; disturbance: bound on the norm of any further torque (N m).
+    target's motion (rad/s, rad/s2), zero for one at rest; disturbance: bound on the norm of any further torque (N m);
+    total_momentum: bound on the norm of the body's and the wheels' angular momentum (N m s) in claims about wheels.
     """
 
     loop: ClosedLoop
@@ -33,6 +36,7 @@ class Subject:
     modelled_norm: Any
     target_rate: Any
     target_acceleration: Any
+    total_momentum: Any
 
     @property
     def law(self) -> Law:
@@ -50,13 +54,17 @@ class Subject:
         return self.target_rate != 0 or self.target_acceleration != 0
 
 
-def make_subject(loop: ClosedLoop, disturbance: float = 0.0) -> Subject:
-    """The subject of a closed loop, with bounds over the whole orbit."""
+def make_subject(loop: ClosedLoop, disturbance: float = 0.0, momentum: float | None = None) -> Subject:
+    """The subject of a closed loop, with bounds over the whole orbit. `momentum`: in claims about wheels the total angular
+    momentum (N m s); if absent what the loop starts with, or what it has at rest on target if that is more."""
     rate, acceleration = _target_bounds(loop)
     axes, norm = (fmpq(0), fmpq(0), fmpq(0)), fmpq(0)
     if loop.gravity_gradient:
         axes, norm = _gravity_gradient_bounds(loop)
-    return Subject(loop, exact(disturbance), axes, norm, rate, acceleration)
+    total = fmpq(0)
+    if loop.wheels is not None:
+        total = exact(_momentum(loop, rate) if momentum is None else momentum)
+    return Subject(loop, exact(disturbance), axes, norm, rate, acceleration, total)
 
 
 def described(subject: Subject) -> dict[str, Any]:
@@ -79,7 +87,7 @@ def described(subject: Subject) -> dict[str, Any]:
         "hysteresis_width": loop.hysteresis_width,
         "inertia": tensor(loop.craft.inertia).tolist(),
         "limit": loop.limit,
-        "torque_limit": limit if np.isfinite(limit) else None,
+        "torque_limit": _finite(limit),
         "orbit": orbit if loop.orbit else None,
         "gravity_gradient": loop.gravity_gradient,
         "target": kind,
@@ -89,7 +97,26 @@ def described(subject: Subject) -> dict[str, Any]:
         "modelled_torque_norm": above(subject.modelled_norm),
         "disturbance": number(subject.disturbance),
         "control_period": loop.period,
+        "wheels": None if loop.wheels is None else _described_wheels(subject, loop.wheels),
     }
+
+
+def _described_wheels(subject: Subject, wheels: Wheels) -> dict[str, Any]:
+    start = cast(WheeledState, subject.loop.start)
+    return {
+        "axes": [list(axis) for axis in wheels.axes],
+        "torque_limit": [_finite(limit) for limit in wheels.torque_limit],
+        "momentum_limit": [_finite(limit) for limit in wheels.momentum_limit],
+        "inertia": list(wheels.inertia),
+        "least": [list(row) for row in wheels.least],
+        "momentum": list(start.momentum),
+        "allocation": subject.loop.allocation,
+        "total_momentum": number(subject.total_momentum),
+    }
+
+
+def _finite(x: float) -> float | None:
+    return x if np.isfinite(x) else None
 
 
 def above(x: Any) -> float:
@@ -119,6 +146,14 @@ def _plain(value: Any) -> Any:
     return np.asarray(cast(Any, value)).tolist() if isinstance(value, tuple) else value
 
 
+def _momentum(loop: ClosedLoop, target_rate: Any) -> float:
+    """Norm of the total angular momentum at the start or at rest on target, whichever is more, rounded up (N m s)."""
+    start, inertia = cast(WheeledState, loop.start), tensor(loop.craft.inertia)
+    begun = inertia @ start.rate + np.array(start.momentum) @ np.array(cast(Wheels, loop.wheels).axes)
+    still = float(np.linalg.eigvalsh(inertia)[-1]) * above(target_rate)
+    return max(float(np.linalg.norm(begun)), still) * (1.0 + 1e-12)
+
+
 # --- bounds on the outside --------------------------------------------------------------------------------------------
 
 
@@ -141,13 +176,24 @@ def perigee(loop: ClosedLoop) -> tuple[arb, arb, arb, arb]:
 def _gravity_gradient_bounds(loop: ClosedLoop) -> tuple[Any, Any]:
     """Bounds on the axes and on the norm of the gravity-gradient torque over the whole orbit (N m)."""
     nearest, _, _, gravity = perigee(loop)
-    strength = upper(3 * gravity / nearest**3)
-    craft = exact_craft(loop.craft.inertia, np.inf, loop.craft.gravity)
-    torque: Any = gravity_gradient(direction("p"), cast(Any, Polynomial.constant(1)), craft)
+    # A part more, for the inertia with the rotors is what is flown up to rounding.
+    strength = upper(3 * gravity / nearest**3) * exact(1.0 + 1e-12)
+    full = _with_rotors(loop)
+    whole = Craft(as_tuple(full), as_tuple(full), Polynomial.constant(0), Polynomial.constant(0))  # pyright: ignore
+    torque: Any = gravity_gradient(direction("p"), cast(Any, Polynomial.constant(1)), whole)
     axes = [strength * _largest_form(component) for component in torque]
-    full = rows(tensor(loop.craft.inertia))
     # |n x Jn| is the deviation of the moments about their mean in direction n, so at most half their range.
     return tuple(axes), strength * (greatest(full) - least(full)) / 2
+
+
+def _with_rotors(loop: ClosedLoop) -> Rows:
+    """The inertia with the rotors' moments about their axes."""
+    full = rows(tensor(loop.craft.inertia))
+    if loop.wheels is not None:
+        for axis, inertia in zip(loop.wheels.axes, loop.wheels.inertia, strict=True):
+            a = [exact(x) for x in axis]
+            full = plus(full, [[x * y for y in a] for x in a], exact(inertia))
+    return full
 
 
 def _largest_form(quadratic: Polynomial) -> Any:

@@ -8,11 +8,13 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from typing import Any, cast
 
 from starhold.certification.certificate import Certificate, Claim, Obligation
+from starhold.laws.catalogue import catalogue
 
 HEADINGS = {
     "convergence": "converges",
     "torque-limit": "within the torque limit",
     "inertia": "uncertain inertia",
+    "wheels": "within the wheels' limits",
     "disturbance": "torque from outside",
     "sampling": "torque held between samples",
     "sliding": "reaches its surface",
@@ -27,9 +29,12 @@ OBLIGATIONS = {
     "strict": "a second function falls strictly and stays within a known share of V",
     "single rest in the set": "the set does not hold the other quaternion's rest",
     "other rest repels": "rest on the other quaternion is unstable, so that only a set of measure zero ends there",
+    "half turns repel": "half turns, about every axis where weights are equal and about three where they differ, are rests "
+    "too, but unstable, so that only a set of measure zero ends there",
     "jumps lower V": "every switch of the hysteresis lowers V",
     "convergence": "the set lies in the region of convergence",
     "torque": "the torque is within the limit on the whole set",
+    "momentum": "no wheel stores more than it can on the whole set",
     "end": "outside a small ball V falls in spite of the torque",
     "start": "the set that is started from does not reach where the bound fails",
     "stable at the period": "all eigenvalues of the exactly discretised loop lie within the unit circle",
@@ -80,6 +85,10 @@ def place(numbers: Mapping[str, Any]) -> str:
 
 
 def _cover(numbers: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
+    law = catalogue().get(subject.get("law", ""))
+    if law is not None and law.card.double_cover == "even":
+        everywhere = numbers.get("everything") or numbers.get("rate_everywhere") is not None
+        return ", almost always: it could also rest at half turns, which are unstable" if everywhere else ""
     if subject["double_cover"] == "hysteresis":
         return ", whichever quaternion it starts with: global on rotations, and robust by its hysteresis"
     if subject["double_cover"] == "shortest":
@@ -96,6 +105,14 @@ def _convergence(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 def _torque_limit(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     kind = "on every axis" if n["kind"] == "axis" else "in norm"
     return f"{place(n)} the torque never exceeds {n['limit']:.4g} N m {kind}"
+
+
+def _wheels(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
+    if "motors" not in n:
+        return "no motor of a wheel reaches its limit"
+    torque, stored = (shown(max(n[name]), unit, up=True) for name, unit in (("motors", " N m"), ("stored", " N m s")))
+    while_ = f"while the total momentum is at most {shown(n['momentum'], ' N m s')}"
+    return f"{place(n)} {while_}, no motor gives more than {torque} and no wheel stores more than {stored}"
 
 
 def _inertia(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
@@ -143,6 +160,7 @@ def _sliding(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 _SENTENCES = {
     "convergence": _convergence,
     "torque-limit": _torque_limit,
+    "wheels": _wheels,
     "inertia": _inertia,
     "disturbance": _disturbance,
     "sampling": _sampling,

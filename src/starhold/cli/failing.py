@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -24,13 +25,16 @@ def failures(
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
     from starhold.cli.show import console
-    from starhold.report.failures import PICTURE, TABLE, draw, open_results, require_wheels, study, write_table
+    from starhold.report.failures import require_wheels, study, write_table
+    from starhold.report.failures_picture import draw
+    from starhold.report.results import FAILURES, open_folder
     from starhold.scenario.reading import load
 
     scenario = load(file)
     entry = scenario.laws[0] if law is None else scenario.pick(law)
     require_wheels(scenario)
-    folder = open_results(output or Path("results") / f"{scenario.name}-failures", force)
+    folder = open_folder(output or Path("results") / f"{scenario.name}-failures", force)
+    table, picture = (folder / name for name in FAILURES)
     with Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), console=console) as bars:
         task = bars.add_task("compiling", total=None)
 
@@ -38,10 +42,10 @@ def failures(
             bars.update(task, completed=done, total=total, description=f"lost: {name}" if name else "flown")
 
         found = study(scenario, entry, notice)
-    write_table(found, entry, folder / TABLE)
-    draw(found, folder / PICTURE, f"{scenario.name}, {entry.name}: loss of wheels")
+    write_table(found, entry, table)
+    draw(found, picture, f"{scenario.name}, {entry.name}: loss of wheels")
     print_failures(found)
-    console.print(f"Table: {folder / TABLE}. Picture: {folder / PICTURE}", soft_wrap=True)
+    console.print(f"Table: {table}. Picture: {picture}", soft_wrap=True)
 
 
 def print_failures(found: Sequence[Failure]) -> None:
@@ -57,7 +61,7 @@ def print_failures(found: Sequence[Failure]) -> None:
     table = Table(show_edge=False, pad_edge=False)
     heads = ["axes", "cond.", "authority\n[dim]mN m[/dim]", "share\n[dim]%[/dim]", *retuned]
     heads += ["stability\n[dim]1/s, before → after[/dim]"] * designed
-    heads += ["settling\n[dim]s[/dim]", "wheel full\n[dim]min[/dim]"]
+    heads += ["certified\n[dim]turn, °[/dim]", "settling\n[dim]s[/dim]", "wheel full\n[dim]min[/dim]"]
     for head in ("lost", *heads):
         table.add_column(head, justify="left" if head in ("lost", "axes") else "right")
     for failure in found:
@@ -66,6 +70,8 @@ def print_failures(found: Sequence[Failure]) -> None:
     console.print(table)
     if any(not failure.controllable for failure in found):
         console.print("not (x, y, z): no torque is left about this body direction.", highlight=False)
+    if any(failure.certified is not None for failure in found):
+        console.print("certified: turns from rest on which no motor or wheel is proved to meet its limit.", highlight=False)
     if not retuned:
         console.print("The gains are the same in all of them.", highlight=False)
     if any(failure.saturation is not None and failure.saturation.known == "extrapolated" for failure in found):
@@ -73,23 +79,20 @@ def print_failures(found: Sequence[Failure]) -> None:
 
 
 def _row(failure: Failure, retuned: Sequence[str], designed: bool) -> list[str]:
-    from starhold.report.failures import direction_text
+    from starhold.certification.wording import shown
+    from starhold.report.failures_picture import direction_text
+    from starhold.report.flight import number_text
 
     axes = "three" if failure.controllable else f"[red]not {direction_text(failure)}[/red]"
     begun = [axes, f"{failure.condition:.3g}", f"{1e3 * failure.authority:.4g}", f"{100.0 * failure.share:.1f}"]
     if failure.gains is None:
-        return [*begun, *["—"] * (len(retuned) + designed + 2)]
+        return [*begun, *["—"] * (len(retuned) + designed + 3)]
     eta = [f"{failure.eta_intact:.4g} → {failure.eta:.4g}"] if designed else []
+    certified = "—" if failure.certified is None else shown(math.degrees(failure.certified[0]))
     settling = "not settled" if failure.settling is None else f"{failure.settling:.4g}"
     if failure.diverged_at is not None:
         settling = f"[red]diverged at {failure.diverged_at:.4g}[/red]"
-    return [*begun, *(_gain_text(failure.gains[name]) for name in retuned), *eta, settling, _full(failure)]
-
-
-def _gain_text(value: Any) -> str:
-    from starhold.report.flight import number_text
-
-    return f"{value:.4g}" if isinstance(value, float) else number_text(value)
+    return [*begun, *(number_text(failure.gains[name], 4) for name in retuned), *eta, certified, settling, _full(failure)]
 
 
 def _full(failure: Failure) -> str:

@@ -57,7 +57,7 @@ def print_outcome(flights: Sequence[Flight], page: Path) -> None:
         if flight.metrics.get("solver_budget_hits"):
             hits, calls = flight.metrics["solver_budget_hits"], flight.metrics["solver_calls"]
             console.print(f"{flight.name}: the solver used up its budget in {hits} of {calls} calls", style="yellow")
-    certificates = [flight.certificate for flight in flights if flight.certificate is not None]
+    certificates = [certificate for flight in flights for certificate in flight.certificates]
     if certificates:
         from starhold.cli.show_certificates import print_proved
 

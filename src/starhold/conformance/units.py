@@ -10,7 +10,7 @@ from starhold.laws.interface import Seen
 from starhold.models.craft import Craft
 
 SEEN_UNITS = ("1", "1/s", "1/s", "1/s", "1/s^2", "N m", "m", "s", "N m s")
-CRAFT_UNITS = ("kg m^2", "1/(kg m^2)", "N m", "m^3/s^2")
+CRAFT_UNITS = ("kg m^2", "1/(kg m^2)", "N m", "m^3/s^2", "kg m^2")
 
 
 def rescaled(

@@ -16,7 +16,7 @@ from starhold.models.craft import Craft, tensor
 
 CARD = Card(
     title="Reaction-wheel law",
-    summary="u = -k_rate w - k_attitude S + w_abs x (J w_abs + H) + J w_target' - M_ext, S = 4 q0 q from direction cosines",
+    summary="u = -k_rate w - S + w_abs x (J w_abs + H) + J w_target' - M_ext, S = 4 k q0 q from direction cosines",
     sources=("published study of reaction-wheel attitude control with a given degree of stability",),
     assumptions=("rigid body", "inertia and wheel momentum known", "external torque known", "torque not limited"),
     claims="almost-global",
@@ -28,7 +28,7 @@ class Gains(NamedTuple):
     """Damping, stiffness, and how much of what the model knows is compensated."""
 
     k_rate: Annotated[float, Gain("N m s", above=0.0, text="damping")]
-    k_attitude: Annotated[float, Gain("N m", above=0.0, text="stiffness against S")]
+    k_attitude: Annotated[Vector, Gain("N m", above=0.0, shape=(3,), text="weights of 1 - a_ii, one for all or one each")]
     compensation: Annotated[
         float, Gain("1", at_least=0.0, at_most=1.0, text="share of the gyroscopic, target and external torque compensated")
     ] = 1.0
@@ -52,7 +52,8 @@ FORMS: dict[str, Any] = {"degree-of-stability": Stability}
 def design(craft: Craft, spec: Stability) -> Gains:
     """Gains of the largest degree of stability; ValueError where angle and rate are zero, so that nothing bounds them."""
     found = _optimum(craft, spec)
-    return Gains(found.k_rate, found.k_attitude, spec.compensation)
+    k = found.k_attitude
+    return Gains(found.k_rate, (k, k, k), spec.compensation)
 
 
 def explain(craft: Craft, spec: Stability) -> list[tuple[str, Any]]:
@@ -85,10 +86,19 @@ def _optimum(craft: Craft, spec: Stability) -> Designed:
 
 
 @equation
+def _twist(k: Vector, q: Vector) -> Vector:
+    """M q with M = tr(k) - diag(k): sum k_i (1 - a_ii) = 2 q.Mq."""
+    return ((k[1] + k[2]) * q[0], (k[2] + k[0]) * q[1], (k[0] + k[1]) * q[2])
+
+
+@equation
 def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Torque asked of the wheels (N m, body)."""
-    sine = scale(4.0 * seen.attitude[0], vector_part(seen.attitude))
-    feedback = add(scale(gains.k_rate, seen.rate), scale(gains.k_attitude, sine))
+    q = vector_part(seen.attitude)
+    twist = _twist(gains.k_attitude, q)
+    # S = 2 (q0 Mq + Mq x q), of which equal weights leave 4 k q0 q.
+    cosines = scale(2.0, add(scale(seen.attitude[0], twist), cross(twist, q)))
+    feedback = add(scale(gains.k_rate, seen.rate), cosines)
     momentum = add(apply(craft.inertia, seen.body_rate), seen.stored)
     model = add(cross(seen.body_rate, momentum), apply(craft.inertia, seen.target_acceleration))
     model = subtract(model, seen.external_torque)
@@ -97,11 +107,15 @@ def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Ve
 
 @equation
 def lyapunov(seen: Seen, gains: Gains, craft: Craft) -> Scalar:
-    """V = w.Jw/2 + k_attitude sum(1 - a_ii) = w.Jw/2 + 4 k_attitude |q|2 (J); V' = -k_rate |w|2 with full compensation."""
+    """V = w.Jw/2 + sum k_i (1 - a_ii) = w.Jw/2 + 2 q.Mq (J); V' = -k_rate |w|2 with full compensation.
+
+    At rest S = 0 also at half turns: about the three axes, or, where weights are equal, about any axis in their plane. V
+    falls from each of them in some direction, so that they are unstable.
+    """
     q = vector_part(seen.attitude)
-    return 0.5 * dot(seen.rate, apply(craft.inertia, seen.rate)) + 4.0 * gains.k_attitude * dot(q, q)
+    return 0.5 * dot(seen.rate, apply(craft.inertia, seen.rate)) + 2.0 * dot(q, _twist(gains.k_attitude, q))
 
 
 def examples() -> list[Gains]:
     """Gains for a body of a few kg m2."""
-    return [Gains(0.09, 0.0045), Gains(0.5, 0.025)]
+    return [Gains(0.09, (0.0045, 0.0045, 0.0045)), Gains(0.5, (0.02, 0.025, 0.03))]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import NO_TURN, Quaternion, relative
 from starhold.algebra.scalar import side
-from starhold.algebra.structure import unflatten
-from starhold.algebra.vector import ZERO, Vector
+from starhold.algebra.structure import alike, unflatten
+from starhold.algebra.vector import ZERO, Vector, apply
 from starhold.laws.catalogue import Law
 from starhold.laws.double_cover import COVERS
 from starhold.laws.interface import NoMemory
@@ -79,12 +79,14 @@ class Carry(NamedTuple):
 
 
 class Event(NamedTuple):
-    """From a control step on: other wheels, gains or craft than before."""
+    """From a control step on: other wheels (None for a craft without), gains or craft than before, and what the law then
+    takes the craft for."""
 
     step: int
-    wheels: Any
+    wheels: Wheels | None
     gains: Any
     craft: Craft
+    known: Craft
 
 
 class Phase(NamedTuple):
@@ -94,7 +96,17 @@ class Phase(NamedTuple):
     last: int
     gains: Any
     craft: Craft
+    known: Craft
     setup: Setup
+    before: Craft
+    """What the craft was until this phase."""
+
+    def rate_from(self, rate: Vector) -> Vector:
+        """The body's rate (rad/s) as the phase begins, from that at the end of the one before: what moves inside the craft
+        leaves its angular momentum."""
+        if self.craft.inertia == self.before.inertia:
+            return rate
+        return apply(self.craft.inverse_inertia, apply(self.before.inertia, rate))
 
 
 @dataclass(frozen=True)
@@ -167,13 +179,18 @@ class ClosedLoop:
 
     def phases(self, steps: int) -> list[Phase]:
         """A run of so many control steps, cut where something changes."""
+        events = (Event(0, self.wheels, self.gains, self.craft, self.craft), *self.events)
+        # Of one form in all phases, so that one kernel flies them.
+        gains = alike([event.gains for event in events])
+        crafts = alike([event.craft for event in events] + [event.known for event in events])
+        lasts = [*(min(event.step, steps) for event in self.events), steps]
         found: list[Phase] = []
-        now = Event(0, self.setup().wheels, self.gains, self.craft)
-        for event in (*self.events, Event(steps, now.wheels, now.gains, now.craft)):
-            last = min(event.step, steps)
-            if last > now.step:
-                found.append(Phase(now.step, last, now.gains, now.craft, self.setup()._replace(wheels=now.wheels)))
-            now = event
+        before = crafts[0]
+        for event, last, own, craft, known in zip(events, lasts, gains, crafts, crafts[len(events) :], strict=False):
+            if last > event.step:
+                setup = replace(self, wheels=event.wheels).setup()
+                found.append(Phase(event.step, last, own, craft, known, setup, before))
+                before = craft
         return found
 
     def carry(self, start: State | WheeledState | None = None) -> Carry:

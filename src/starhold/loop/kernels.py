@@ -178,15 +178,16 @@ def _drop_stale(folder: Path, sources: str) -> None:
 def _one(parts: Parts) -> Callable[..., Any]:
     _, decide, hold, check, sample = make_step(parts)
 
-    def one(carry, first, count, finish, every, run, gains, craft, setup, substeps, out, end):
+    def one(carry, first, count, finish, every, run, gains, known, craft, setup, substeps, out, end):
         """Fly control steps first .. first+count-1; write every `every`-th into a column of `out`, and with `finish` the
-        last state as well. What is carried on goes into the one column of `end`; stops where the motion is lost."""
+        last state as well. What is carried on goes into the one column of `end`; stops where the motion is lost. `known` is
+        the craft that the law takes it for."""
         # Nothing is returned: a result made of Python objects would be built by code that a signal can break into.
         for step in range(first, first + count):
             carry = check(carry, step, setup)
             if carry.lost_at >= 0.0:
                 break
-            carry = decide(carry, step, run, gains, craft, setup)
+            carry = decide(carry, step, run, gains, known, setup)
             if step % every == 0:
                 store(out, step // every, sample(carry, step, setup))
             for _ in range(substeps):
@@ -194,7 +195,7 @@ def _one(parts: Parts) -> Callable[..., Any]:
         last = first + count
         carry = check(carry, last, setup)
         if finish and carry.lost_at < 0.0 and last % every == 0:
-            store(out, last // every, sample(decide(carry, last, run, gains, craft, setup), last, setup))
+            store(out, last // every, sample(decide(carry, last, run, gains, known, setup), last, setup))
         store(end, 0, carry)
 
     return _compile(one, parts)
@@ -203,16 +204,16 @@ def _one(parts: Parts) -> Callable[..., Any]:
 def _many(parts: Parts) -> Callable[..., Any]:
     _, decide, hold, check, _ = make_step(parts)
 
-    def many(x, like, first, count, run, gains, like_gains, craft, like_craft, setup, substeps):
+    def many(x, like, first, count, run, gains, like_gains, known, craft, setup, substeps):
         """Fly control steps first .. first+count-1 of every lane of the block x, in place; lane 0 is
-        run number `run`. Gains and craft are NamedTuples shared by all lanes, or blocks too."""
+        run number `run`. Gains are a NamedTuple shared by all lanes, or a block too."""
         for step in range(first, first + count):
             for k in range(LANES):
                 c = check(load(x, k, like), step, setup)
-                store(x, k, decide(c, step, run + k, load(gains, k, like_gains), load(craft, k, like_craft), setup))
+                store(x, k, decide(c, step, run + k, load(gains, k, like_gains), known, setup))
             for _ in range(substeps):
                 for k in range(LANES):
-                    store(x, k, hold(load(x, k, like), load(craft, k, like_craft), setup))
+                    store(x, k, hold(load(x, k, like), craft, setup))
         for k in range(LANES):
             store(x, k, check(load(x, k, like), first + count, setup))
 

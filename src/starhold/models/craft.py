@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra.scalar import compiled_as
 from starhold.algebra.vector import Matrix, Vector
 
 EARTH = 3.986e14
@@ -17,12 +18,26 @@ EARTH = 3.986e14
 class Craft(NamedTuple):
     """A rigid spacecraft: inertia about the centre of mass in body axes (kg m2; three moments when these are principal
     axes, else a matrix: `apply` and `swing` take both), its inverse, the torque limit (N m, per axis or in norm; infinite
-    for none) and the gravitational parameter of the body it orbits (m3/s2)."""
+    for none), the gravitational parameter of the body it orbits (m3/s2), and, for a craft with wheels, whose inertia is
+    without the rotors' moments about their axes, the inertia with them (kg m2; () for one without wheels)."""
 
     inertia: Matrix | Vector
     inverse_inertia: Matrix | Vector
     torque_limit: float
     gravity: float
+    with_rotors: Matrix | Vector | tuple[()] = ()
+
+
+def whole(craft: Craft) -> Matrix | Vector:
+    """The inertia with all that is in the craft, which gravity acts on (kg m2)."""
+    return craft.with_rotors or craft.inertia
+
+
+@compiled_as(whole)
+def _compiled_whole(craft: Any) -> Any:
+    if len(craft.types[Craft._fields.index("with_rotors")]):
+        return lambda craft: craft.with_rotors  # pyright: ignore
+    return lambda craft: craft.inertia  # pyright: ignore
 
 
 def make_craft(inertia: Any, torque_limit: float = math.inf, gravity: float = EARTH) -> Craft:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from starhold.algebra.quaternion import Quaternion, to_body
 from starhold.algebra.scalar import Scalar, equation, sqrt
 from starhold.algebra.vector import ZERO, Vector, dot, scale, swing
-from starhold.models.craft import Craft
+from starhold.models.craft import Craft, whole
 
 
 @equation
@@ -31,7 +31,7 @@ def two_body_gravity_gradient(position: Vector, attitude: Quaternion, craft: Cra
 @equation
 def gravity_gradient(position: Vector, strength: Scalar, craft: Craft) -> Vector:
     """Gravity-gradient torque (N m) for the position in body axes (m) and strength 3 mu/r5 (1/(m2 s2))."""
-    return scale(strength, swing(craft.inertia, position))
+    return scale(strength, swing(whole(craft), position))
 
 
 @equation

@@ -214,6 +214,16 @@ def authority(wheels: Wheels) -> float:
     return min(used)
 
 
+def gives_what_is_asked(wheels: Wheels) -> bool:
+    """Whether, within the limits of the wheels, the torque on the body is the one that is shared out: not so while a lost
+    wheel is still counted on."""
+    working = [(axis, row) for axis, row, limit in zip(wheels.axes, wheels.least, wheels.torque_limit, strict=True) if limit]
+    axes, rows = (
+        (np.array(part).reshape(-1, 3) for part in zip(*working, strict=True)) if working else (np.zeros((1, 3)),) * 2
+    )
+    return bool(np.abs(axes.T @ rows + np.eye(3)).max() < 1e-9)
+
+
 def body_inertia(inertia_total: Any, wheels: Wheels) -> NDArray[np.float64]:
     """J' = J - sum inertia_i a_i a_i^T (3, 3; kg m2) of a craft whose total inertia, wheels at rest in it included, is J
     (three principal moments or 3x3).

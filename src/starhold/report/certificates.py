@@ -1,8 +1,11 @@
-"""The certificates of a scenario's laws, each tried by flights."""
+"""The certificates of a scenario's laws, each tried by flights; issued anew after faults that are known of."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from starhold.analysis.trial import Trial, fly_claims
 from starhold.certification.certificate import Certificate
@@ -10,7 +13,11 @@ from starhold.certification.certify import Wanted, certify
 from starhold.laws.double_cover import COVERS
 from starhold.laws.interface import with_attitude
 from starhold.loop.kernels import make_step
+from starhold.models.craft import tensor
+from starhold.models.rigid_body import kinetic_energy
+from starhold.models.wheels import gives_what_is_asked
 from starhold.scenario.building import build
+from starhold.simulation.lane import fly
 
 if TYPE_CHECKING:
     from starhold.loop.closed_loop import ClosedLoop
@@ -26,11 +33,46 @@ class Tried(NamedTuple):
     start_inside: dict[str, bool]
 
 
-def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> Certificate:
-    """The certificate of one law of the scenario, with the claims that its [certify] table asks for."""
+class Issued(NamedTuple):
+    """A certificate and the loop, without faults to come, that it speaks of."""
+
+    certificate: Certificate
+    loop: ClosedLoop
+
+
+def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[Issued]:
+    """The certificates of one law of the scenario, with the claims that its [certify] table asks for: as it starts, and from
+    each time on at which wheels, gains or craft are others and the law knows of it."""
     table = scenario.table.certify
-    wanted = Wanted(table.rate, table.turn, table.inertia_tolerance, table.disturbance)
-    return certify(loop, entry.name, wanted)
+    wanted = Wanted(table.rate, table.turn, table.inertia_tolerance, table.disturbance, table.momentum)
+    found: list[Issued] = []
+    for step, now in _known(loop, scenario.table.simulation.steps):
+        name = f"{entry.name} from {step * loop.period:g} s" if step else entry.name
+        found.append(Issued(certify(now, name, wanted), now))
+    return found
+
+
+def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:
+    """The loop as it starts, and at each control step of a run from which on it is another that the law knows."""
+    found = [(0, replace(loop, events=()))]
+    if loop.law.card.compiled_only:
+        return found
+    latest = {event.step: event for event in loop.events if event.step < steps}
+    for step, event in latest.items():
+        sound = event.wheels is None or gives_what_is_asked(event.wheels)
+        if not sound or event.known.inertia != event.craft.inertia:
+            continue
+        now = replace(loop, events=(), craft=event.craft, gains=event.gains, wheels=event.wheels)
+        if step:
+            # A step more, for what the event changes at once.
+            carry = fly(loop, step)[1]
+            phase = next(phase for phase in loop.phases(steps) if phase.first == step)
+            state = carry.state._replace(rate=phase.rate_from(carry.state.rate))
+            now = replace(now, start=state)
+            if isinstance(loop.target, np.ndarray):
+                now = replace(now, target=loop.target[step:])
+        found = [(step, now)] if step == 0 else [*found, (step, now)]
+    return found
 
 
 def certify_scenario(scenario: Scenario, law: str | None = None) -> list[Tried]:
@@ -38,24 +80,25 @@ def certify_scenario(scenario: Scenario, law: str | None = None) -> list[Tried]:
     entries = scenario.laws if law is None else (scenario.pick(law),)
     # All of them before the first proof, so that what is wrong with the last is said at once.
     loops = [build(scenario, entry) for entry in entries]
-    found: list[Tried] = []
-    for entry, loop in zip(entries, loops, strict=True):
-        certificate = certify_law(scenario, entry, loop)
-        found.append(Tried(certificate, fly_claims(loop, certificate), start_inside(loop, certificate)))
-    return found
+    issued = [found for entry, loop in zip(entries, loops, strict=True) for found in certify_law(scenario, entry, loop)]
+    return [Tried(found.certificate, fly_claims(found.loop, found.certificate), start_inside(*found)) for found in issued]
 
 
-def start_inside(loop: ClosedLoop, certificate: Certificate) -> dict[str, bool]:
-    """Whether the scenario's start lies in the sets of the proved claims that are about a level of V."""
+def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
+    """Whether the loop's start lies in the sets of the proved claims that are about a level of V."""
     function = loop.law.lyapunov
     if function is None or loop.law.card.compiled_only:
         return {}
     seen = make_step(loop.parts()).look(loop.carry(), 0, 0, loop.craft, loop.setup())
-    shown, _ = COVERS[loop.cover](seen.attitude, loop.carry().h, loop.hysteresis_width)
-    value = function(with_attitude(seen, shown), loop.gains, loop.craft)
+    shown = with_attitude(seen, COVERS[loop.cover](seen.attitude, loop.carry().h, loop.hysteresis_width)[0])
+    total = tensor(loop.craft.inertia) @ seen.body_rate + np.array(seen.stored)
     found: dict[str, bool] = {}
     for claim in certificate.claims:
         if claim.outcome == "proved" and "start" in claim.numbers:
-            level = claim.numbers["start"]
-            found[claim.kind] = level is None or value <= level
+            level, stiffness = claim.numbers["start"], claim.witness.get("stiffness")
+            value = function(shown, loop.gains, loop.craft)
+            if stiffness is not None:
+                value = kinetic_energy(shown.rate, loop.craft) + 2.0 * stiffness * (1.0 - shown.attitude[0])
+            held = float(np.linalg.norm(total)) <= claim.numbers.get("momentum", np.inf)
+            found[claim.kind] = held and (level is None or value <= level)
     return found

@@ -36,7 +36,8 @@ def fly_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, notice: Notic
     metrics |= call_costs(loop, samples)
     metrics |= _law_counters(carry.memory)
     gains = {item.name: _gain_text(item, value) for item, value in zip(entry.law.fields(), entry.gains, strict=True)}
-    return Flight(entry.name, entry.law.name, recording, metrics, gains, certify_law(scenario, entry, loop))
+    proved = tuple(issued.certificate for issued in certify_law(scenario, entry, loop))
+    return Flight(entry.name, entry.law.name, recording, metrics, gains, proved)
 
 
 def compare(scenario: Scenario, notice: Notice | None = None) -> list[Flight]:
@@ -50,7 +51,7 @@ def write(scenario: Scenario, flights: Sequence[Flight], folder: Path) -> Path:
     from starhold.report.page import write_page
 
     write_summary(scenario, {flight.name: flight.metrics for flight in flights}, folder / SUMMARY)
-    certificates = [flight.certificate for flight in flights if flight.certificate is not None]
+    certificates = [certificate for flight in flights for certificate in flight.certificates]
     with whole(folder / FILE) as hidden:
         write_certificates(certificates, scenario.name, hidden)
     page = folder / "report.html"

@@ -18,9 +18,8 @@ from starhold.errors import InputError
 from starhold.laws.stability_degree import degree, scale
 from starhold.models.craft import tensor
 from starhold.models.wheels import Wheels, authority, lose
+from starhold.report.certificates import certify_law
 from starhold.report.files import whole
-from starhold.report.flight import COLOURS
-from starhold.report.results import open_folder
 from starhold.scenario.building import build
 from starhold.scenario.schema import FaultTable
 from starhold.simulation.lane import Recording, fly, label
@@ -31,7 +30,6 @@ if TYPE_CHECKING:
 
 Array: TypeAlias = NDArray[np.float64]
 
-TABLE, PICTURE = "failures.csv", "failures.png"
 FULL = 0.99
 """Share of its momentum limit at which a wheel counts as saturated: beyond it the motor loses its outward torque."""
 HORIZON = 1000
@@ -41,7 +39,6 @@ WEAK = 1e-3
 SINGULAR = 1e-9
 MOST_STEPS = 2_000_000
 """Flights are not continued beyond the scenario's duration where that takes more control steps."""
-DPI = 110
 
 
 @dataclass(frozen=True)
@@ -63,6 +60,8 @@ class Failure:
     condition: condition number of the working axes. authority: N m. share: of the intact authority. gains: what the law is
     flown with, by field. eta: degree of stability (1/s), intact and after; None for a law not designed for one. settling:
     s, None where it does not settle within the scenario's duration. diverged_at: s, None where the motion was not lost.
+    certified: the largest turn from rest (rad), and the largest rate on target (rad/s), from which no motor and no wheel is
+    proved to meet its limit on the way to the target; None where that is not proved.
     momentum_share: largest |h| over its limit among working wheels during the flight. flown: length of the flight (s).
     orbit: its period (s), None without one.
     """
@@ -77,6 +76,7 @@ class Failure:
     eta: float | None = None
     settling: float | None = None
     diverged_at: float | None = None
+    certified: tuple[float, float] | None = None
     saturation: Saturation | None = None
     momentum_share: float | None = None
     flown: float | None = None
@@ -128,17 +128,6 @@ def directions_lacking(axes: Array) -> Array:
     return np.sign(leading) * lacking
 
 
-def open_results(folder: Path, force: bool) -> Path:
-    """The folder for results; one that holds them is refused, or cleared of them, as `open_folder` does."""
-    held = [name for name in (TABLE, PICTURE) if (folder / name).exists()]
-    if held and not force:
-        raise InputError(str(folder), "", f"results already there ({held[0]})", "another folder with -o, or --force")
-    open_folder(folder, force)
-    for name in held:
-        (folder / name).unlink()
-    return folder
-
-
 def write_table(found: Sequence[Failure], entry: LawEntry, path: Path) -> None:
     """All numbers as CSV, SI units in the header; what does not exist is an empty cell, vectors are separated by blanks."""
     gains = {f"{item.name} ({item.gain.unit})": item.name for item in entry.law.fields()}
@@ -152,6 +141,7 @@ def write_table(found: Sequence[Failure], entry: LawEntry, path: Path) -> None:
 
 def _cells(failure: Failure) -> dict[str, str]:
     known = failure.saturation or Saturation(None, None, "", None)
+    certified = failure.certified or (None, None)
     return {
         "lost wheels": _numbers(failure.lost),
         "controllable axes": str(3 - len(failure.lacking)),
@@ -163,6 +153,8 @@ def _cells(failure: Failure) -> dict[str, str]:
         "degree of stability after (1/s)": _numbers(failure.eta),
         "settling time (s)": _numbers(failure.settling),
         "diverged at (s)": _numbers(failure.diverged_at),
+        "certified turn (rad)": _numbers(certified[0]),
+        "certified rate (rad/s)": _numbers(certified[1]),
         "saturation time (s)": _numbers(known.time),
         "saturating wheel": _numbers(known.wheel),
         "saturation known from": known.known,
@@ -215,7 +207,7 @@ def _degree(scenario: Scenario, entry: LawEntry, gains: Any) -> float | None:
         return None
     moments = np.linalg.eigvalsh(tensor(scenario.craft.inertia))
     units = scale(moments, entry.spec.torque, entry.spec.momentum)
-    return float(degree(*units.scaled(gains.k_attitude, gains.k_rate), units.ratios)) / units.t0
+    return float(degree(*units.scaled(gains.k_attitude[0], gains.k_rate), units.ratios)) / units.t0
 
 
 def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
@@ -246,11 +238,20 @@ def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
         eta=_degree(scenario, entry, gains),
         settling=metrics["settling_time"],
         diverged_at=lost_at,
+        certified=_certified(scenario, entry, loop),
         saturation=known,
         momentum_share=float(np.abs(filled).max()),
         flown=float(recording["time"][-1]),
         orbit=period,
     )
+
+
+def _certified(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> tuple[float, float] | None:
+    claim = certify_law(scenario, entry, loop)[0].certificate.claim("wheels")
+    if claim is None or claim.outcome != "proved":
+        return None
+    # Where nothing limits the wheels no claim is made, so that the set is bounded.
+    return claim.numbers["turn"], claim.numbers["rate"]
 
 
 def _tolerances(scenario: Scenario) -> tuple[float, float]:
@@ -311,90 +312,3 @@ def saturation(times: Array, filled: Array, period: float | None) -> Saturation:
         if full < (reach if best.time is None else best.time):
             best = Saturation(full, wheel + 1, "extrapolated", window)
     return best
-
-
-def draw(found: Sequence[Failure], path: Path, title: str) -> Path:
-    """Write a picture to `path`, in a folder that exists, and return the path: one row a loss, one panel a quantity."""
-    from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
-
-    panels: list[tuple[str, list[float | None]]] = [
-        ("authority left, % of intact", [100.0 * failure.share for failure in found])
-    ]
-    if any(failure.eta is not None for failure in found):
-        panels.append(("degree of stability, 1/s", [failure.eta for failure in found]))
-    panels.append(("settling time, s", [failure.settling for failure in found]))
-    height = 1.45 + 0.27 * len(found)
-    figure = Figure(figsize=(8.0, height), dpi=DPI)
-    figure.set_layout_engine("none")
-    grid: Any = figure.subplots(1, len(panels), sharey=True, squeeze=False)
-    figure.subplots_adjust(left=0.118, right=0.978, bottom=0.55 / height, top=1.0 - 0.72 / height, wspace=0.09)
-    heading = title if len(title) <= 80 else f"{title[:79]}…"
-    figure.text(0.02, 1.0 - 0.28 / height, heading, fontsize=11, fontweight="bold", parse_math=False)
-    places = np.arange(len(found))
-    for number, (axis, (name, values)) in enumerate(zip(grid[0], panels, strict=True)):
-        sizes = [value or 0.0 for value in values]
-        colours = [COLOURS[2] if not failure.lost else COLOURS[0] for failure in found]
-        axis.barh(places, sizes, height=0.62, color=colours)
-        if sizes[0] > 0.0:
-            axis.axvline(sizes[0], color="0.35", linewidth=0.9, dashes=(5, 3), zorder=2.5)
-        axis.set_xlim(0.0, 1.28 * max(max(sizes), 1e-9))
-        axis.locator_params(axis="x", nbins=4, prune="upper")
-        for place, failure in enumerate(found):
-            _mark(axis, place, failure, values[place], number)
-        axis.set_xlabel(name, fontsize=9)
-        axis.grid(True, axis="x", color="0.9", linewidth=0.6)
-        axis.set_axisbelow(True)
-        axis.tick_params(labelsize=8.5)
-        axis.tick_params(axis="y", length=0.0)
-        for side in ("top", "right"):
-            axis.spines[side].set_visible(False)
-    # Two directions take more room than the first panel has; the others have nothing to show beside them.
-    grid[0][0].set_zorder(1)
-    grid[0][0].set_yticks(places, [failure.name for failure in found])
-    grid[0][0].set_ylim(len(found) - 0.5, -0.5)
-    grid[0][0].set_ylabel("lost wheels", fontsize=9)
-    handles = [
-        Line2D([], [], color=COLOURS[2], linewidth=6.0, label="intact"),
-        Line2D([], [], color=COLOURS[0], linewidth=6.0, label="three axes left"),
-        Line2D([], [], color=COLOURS[1], marker="X", linestyle="", markersize=7.0, label="an axis without torque"),
-        Line2D([], [], color="0.35", linewidth=0.9, dashes=(5, 3), label="as intact"),
-    ]
-    at = (0.012, 1.0 - 0.30 / height)
-    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=at, ncols=4, fontsize=8.5, frameon=False)
-    # No software entry, lest equal figures differ between releases.
-    with whole(path) as hidden:
-        figure.savefig(hidden, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
-    return path
-
-
-def _mark(axis: Any, place: int, failure: Failure, value: float | None, panel: int) -> None:
-    """The number at the end of a bar, or why there is none."""
-    across = axis.get_yaxis_transform()
-    if failure.controllable:
-        text = f"{value:.3g}" if value is not None else "not settled" if failure.diverged_at is None else "diverged"
-        behind = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
-        axis.annotate(
-            text,
-            (value or 0.0, place),
-            (4, 0),
-            textcoords="offset points",
-            va="center",
-            fontsize=7.5,
-            color="0.2",
-            bbox=behind,
-        )
-        return
-    axis.axhspan(place - 0.5, place + 0.5, color="0.94", linewidth=0.0, zorder=0)
-    if panel == 0:
-        axis.plot(0.03, place, marker="X", color=COLOURS[1], markersize=6.5, transform=across, clip_on=False)
-        shown = f"no torque about {direction_text(failure)}"
-        behind = {"facecolor": "0.94", "edgecolor": "none", "pad": 0.8}
-        axis.text(0.075, place, shown, va="center", fontsize=7.5, color="0.2", transform=across, zorder=5, bbox=behind)
-
-
-def direction_text(failure: Failure) -> str:
-    """The body directions without authority, for reading."""
-    if len(failure.lacking) == 3:
-        return "any axis"
-    return " and ".join(f"({', '.join(f'{x:.3g}' for x in direction)})" for direction in failure.lacking)

@@ -21,15 +21,15 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8
 @dataclass(frozen=True)
 class Flight:
     """One law's run of a scenario: the name the scenario gives the law, the law's type, what was recorded,
-    its metrics as `measure` gives them, its gains, field name to text with unit, and its certificate."""
+    its metrics as `measure` gives them, its gains, field name to text with unit, and its certificates."""
 
     name: str
     law: str
     recording: Recording
     metrics: dict[str, Any]
     gains: dict[str, str]
-    certificate: Certificate | None = None
-    """What is proved of the law on this spacecraft."""
+    certificates: tuple[Certificate, ...] = ()
+    """What is proved of the law on this spacecraft: as it starts, and after faults."""
 
     @cached_property
     def run(self) -> xr.Dataset:
@@ -47,13 +47,19 @@ def colour(number: int) -> str:
     return COLOURS[number % len(COLOURS)]
 
 
-def number_text(value: Any) -> str:
-    """A number, vector or matrix for reading; of a diagonal matrix the diagonal."""
+def number_text(value: Any, digits: int = 6) -> str:
+    """A number, vector or matrix for reading; of a diagonal matrix the diagonal, of equal numbers one."""
     array = np.asarray(value, dtype=float)
     if array.ndim == 0:
-        return f"{array:.6g}"
+        return f"{array:.{digits}g}"
+    if array.ndim == 1 and len(array) == 3 and array[0] and (array == array[0]).all():
+        return f"{array[0]:.{digits}g} each"
     if array.ndim == 2 and array.shape[0] == array.shape[1]:
         diagonal = np.diagonal(array)
         if np.count_nonzero(array - np.diag(diagonal)) == 0:
-            return f"diag({', '.join(f'{v:.6g}' for v in diagonal)})"
-    return f"[{', '.join(number_text(row) for row in array)}]"
+            return f"diag({', '.join(f'{v:.{digits}g}' for v in diagonal)})"
+    return f"[{', '.join(_row_text(row, digits) for row in array)}]"
+
+
+def _row_text(row: Any, digits: int) -> str:
+    return f"[{', '.join(f'{v:.{digits}g}' for v in row)}]" if np.ndim(row) else f"{row:.{digits}g}"

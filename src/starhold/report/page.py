@@ -14,6 +14,7 @@ import numpy as np
 
 from starhold.analysis.metrics import DECADES, MEASURES
 from starhold.analysis.ranking import ORDER, ranked, shown, winners
+from starhold.models.craft import whole
 from starhold.report.flight import Flight, colour, number_text
 from starhold.report.plots import ACCURACIES, Panel, Plot, collect, steps_within
 from starhold.report.proved import section as proved
@@ -284,7 +285,7 @@ def _scene(scenario: Scenario, flights: Sequence[Flight]) -> dict[str, Any]:
         q = flight.recording["attitude_error"]
         attitudes.append([_numbers(q[place], 4) for place in places if place < len(q)] or [[1.0, 0.0, 0.0, 0.0]])
     times = longest[places] if len(places) > 1 else np.array([0.0, 1.0])
-    size, axes = _box(scenario.craft.inertia)
+    size, axes = _box(whole(scenario.craft))
     return {
         "times": _numbers(times),
         "digits": max(0, min(3, 3 - math.floor(math.log10(max(float(times[-1]), 1e-3))))),

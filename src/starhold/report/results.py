@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 SUMMARY = "summary.json"
-MARKS = (SUMMARY, "run.nc", "report.html", CERTIFICATES)
+FAILURES = ("failures.csv", "failures.png")
+MARKS = (SUMMARY, "run.nc", "report.html", CERTIFICATES, *FAILURES)
 """A folder with one of these holds results."""
 
 

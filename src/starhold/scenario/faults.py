@@ -8,6 +8,7 @@ import numpy as np
 
 from starhold.errors import InputError
 from starhold.loop.closed_loop import Event
+from starhold.models.craft import Craft
 from starhold.models.wheels import Wheels, authority, lose
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.scenario.schema import FaultTable
@@ -16,48 +17,62 @@ from starhold.scenario.schema import FaultTable
 def make_events(scenario: Scenario, entry: LawEntry) -> tuple[Event, ...]:
     """The events of a law's run: each fault when it happens, and what is done about it when it is diagnosed.
 
-    InputError where a fault names a wheel that is not there, or comes after the end, or where fewer than three axes are
-    left to a law that should go on.
+    InputError where a fault names a wheel that is not there, or comes after the end, or leaves less body than the rotors
+    have, or fewer than three axes to a law that should go on, or where new gains are asked of a law that cannot have them.
     """
-    table, wheels, craft = scenario.table, scenario.wheels, scenario.craft
-    period, gains = table.simulation.control_period, entry.gains
-    begun = 0.0 if wheels is None else authority(wheels)
-    moments: list[tuple[float, int, FaultTable, bool]] = []
+    table, period = scenario.table, scenario.table.simulation.control_period
+    moments: list[tuple[float, bool, int]] = []
     for place, fault in enumerate(table.fault, 1):
-        _check(scenario, wheels, place, fault)
-        moments.append((fault.time, place, fault, False))
+        _check(scenario, place, fault)
+        moments.append((fault.time, False, place))
         if fault.action != "none":
-            moments.append((fault.time + fault.delay, place, fault, True))
+            moments.append((fault.time + fault.delay, True, place))
+    now = Event(0, scenario.wheels, entry.gains, scenario.craft, scenario.craft)
+    begun = 0.0 if now.wheels is None else authority(now.wheels)
+    share, learnt = 1.0, (0.0, 0)
     events: list[Event] = []
-    for time, place, fault, diagnosed in sorted(moments, key=lambda moment: (moment[0], moment[3], moment[1])):
-        assert wheels is not None
+    for time, diagnosed, place in sorted(moments):
+        fault = table.fault[place - 1]
+        body = _body(scenario, place, fault)
         if not diagnosed:
-            wheels = _struck(wheels, fault)
+            wheels = None if now.wheels is None else _struck(now.wheels, fault)
+            now = now._replace(wheels=wheels, craft=body or now.craft)
         else:
-            try:
-                left = lose(wheels, _index(fault)) if fault.lost else wheels
-            except ValueError as error:
-                raise InputError(scenario.where, f"fault[{place}]", "", f'{error}; action = "none" flies on') from None
+            # Diagnosed late, an inertia that has changed again since is no news.
+            if body is not None and (fault.time, place) > learnt:
+                now, learnt = now._replace(known=body), (fault.time, place)
+            if now.wheels is not None and fault.strikes_wheel:
+                left = _left(scenario, now.wheels, place, fault)
+                share = authority(left) / begun
+                now = now._replace(wheels=now.wheels if fault.action == "retune" else left)
             if fault.action in ("retune", "both"):
-                gains = _retuned(scenario, entry, authority(left) / begun, place)
-            wheels = wheels if fault.action == "retune" else left
-        events.append(Event(round(time / period), wheels, gains, craft))
+                now = now._replace(gains=_retuned(scenario, entry, now.known, share, place))
+        events.append(now._replace(step=round(time / period)))
     return tuple(events)
 
 
-def _check(scenario: Scenario, wheels: Wheels | None, place: int, fault: FaultTable) -> None:
-    if wheels is None:
-        raise InputError(scenario.where, f"fault[{place}]", "no wheels", "a fault only with [wheels] or [[wheel]] tables")
-    if _index(fault) >= len(wheels.axes):
-        raise InputError(scenario.where, f"fault[{place}].wheel", str(fault.wheel), f"1 to {len(wheels.axes)}")
-    if fault.time > scenario.table.simulation.duration:
-        raise InputError(
-            scenario.where, f"fault[{place}].time", f"{fault.time:g} s", f"at most {scenario.table.simulation.duration:g} s"
-        )
+def _check(scenario: Scenario, place: int, fault: FaultTable) -> None:
+    where, wheels, end = scenario.where, scenario.wheels, scenario.table.simulation.duration
+    if fault.strikes_wheel and wheels is None:
+        raise InputError(where, f"fault[{place}]", "no wheels", "a wheel's fault only with [wheels] or [[wheel]] tables")
+    if wheels is not None and _index(fault) >= len(wheels.axes):
+        raise InputError(where, f"fault[{place}].wheel", str(fault.wheel), f"1 to {len(wheels.axes)}")
+    if fault.time > end:
+        raise InputError(where, f"fault[{place}].time", f"{fault.time:g} s", f"at most {end:g} s")
 
 
 def _index(fault: FaultTable) -> int:
     return (fault.wheel or 1) - 1
+
+
+def _body(scenario: Scenario, place: int, fault: FaultTable) -> Craft | None:
+    """The craft with the fault's inertia, None where that stays."""
+    if fault.inertia is None:
+        return None
+    try:
+        return scenario.craft_of(fault.inertia)
+    except ValueError as error:
+        raise InputError(scenario.where, f"fault[{place}].inertia", "", str(error)) from None
 
 
 def _struck(wheels: Wheels, fault: FaultTable) -> Wheels:
@@ -77,11 +92,26 @@ def _struck(wheels: Wheels, fault: FaultTable) -> Wheels:
     return wheels._replace(**changes)
 
 
-def _retuned(scenario: Scenario, entry: LawEntry, share: float, place: int) -> Any:
-    """The gains designed for the torque that is left."""
-    if entry.form is None or "torque" not in entry.spec._fields:
+def _left(scenario: Scenario, wheels: Wheels, place: int, fault: FaultTable) -> Wheels:
+    """The wheels that a diagnosed fault leaves."""
+    try:
+        return lose(wheels, _index(fault)) if fault.lost else wheels
+    except ValueError as error:
+        raise InputError(scenario.where, f"fault[{place}]", "", f'{error}; action = "none" flies on') from None
+
+
+def _retuned(scenario: Scenario, entry: LawEntry, known: Craft, share: float, place: int) -> Any:
+    """The gains designed for the inertia that is known, and for the share of the torque that is left."""
+    key, changed = f"fault[{place}].action", scenario.table.fault[place - 1].inertia is not None
+    follows = entry.form is not None and "torque" in entry.spec._fields
+    if not follows and (entry.form is None or not changed):
         allowed = 'a law with form = "degree-of-stability", whose gains follow the torque'
-        raise InputError(scenario.where, f"fault[{place}].action", f"retune for law {entry.name}", allowed)
-    if not np.isfinite(share) or share <= 0.0:
-        raise InputError(scenario.where, f"fault[{place}].action", "no torque left about some axis", 'action = "none"')
-    return entry.law.design(scenario.craft, entry.spec._replace(torque=entry.spec.torque * min(1.0, share)))
+        allowed = "a law with a form, whose gains follow the inertia" if changed else allowed
+        raise InputError(scenario.where, key, f"retune for law {entry.name}", allowed)
+    if follows and (not np.isfinite(share) or share <= 0.0):
+        raise InputError(scenario.where, key, "no torque left about some axis", 'action = "none"')
+    spec = entry.spec._replace(torque=entry.spec.torque * min(1.0, share)) if follows else entry.spec
+    try:
+        return entry.law.design(known, spec)
+    except ValueError as error:
+        raise InputError(scenario.where, f"fault[{place}]", "", f"no gains for law {entry.name}: {error}") from None

@@ -6,6 +6,7 @@ import difflib
 import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -53,18 +54,21 @@ class Scenario:
         """The scenario's name."""
         return self.table.name
 
-    @property
+    @cached_property
     def craft(self) -> Craft:
         """The spacecraft; with wheels, its inertia is without the rotors' moments about their own axes."""
-        body, wheels = self.table.spacecraft, self.wheels
-        gravity = {} if self.table.orbit is None else {"gravity": self.table.orbit.gravitational_parameter}
-        craft = make_craft(body.inertia, body.torque_limit, **gravity)
-        if wheels is None:
-            return craft
-        rest = body_inertia(body.inertia, wheels)
-        return craft._replace(inertia=compact(rest), inverse_inertia=compact(np.linalg.inv(rest)))
+        return self.craft_of(self.table.spacecraft.inertia)
 
-    @property
+    def craft_of(self, inertia: Any) -> Craft:
+        """The same spacecraft with another inertia (3, 3; kg m2), its wheels included; ValueError where it cannot be."""
+        gravity = {} if self.table.orbit is None else {"gravity": self.table.orbit.gravitational_parameter}
+        craft = make_craft(inertia, self.table.spacecraft.torque_limit, **gravity)
+        if self.wheels is None:
+            return craft
+        rest = body_inertia(inertia, self.wheels)
+        return craft._replace(inertia=compact(rest), inverse_inertia=compact(np.linalg.inv(rest)), with_rotors=craft.inertia)
+
+    @cached_property
     def wheels(self) -> Wheels | None:
         """The reaction wheels, None for a craft without."""
         return make_rotors(self.table.wheels, self.table.wheel)

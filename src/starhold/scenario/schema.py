@@ -6,7 +6,7 @@ import math
 from functools import cache
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model, model_validator
 from pydantic_core import PydanticCustomError
 
 from starhold.laws.catalogue import Law, catalogue
@@ -33,10 +33,26 @@ def refuse(reason: str) -> PydanticCustomError:
     return PydanticCustomError("quantity", "{reason}", {"reason": reason})
 
 
+def _read_inertia(given: Any) -> Any:
+    if not isinstance(given, list) or len(given) != 3:
+        raise refuse("three principal moments or a 3x3 matrix, in kg m^2")
+    shape = (3, 3) if any(isinstance(row, list) for row in given) else (3,)
+    try:
+        return check_inertia(reader(Gain("kg m^2", shape=shape))(given))
+    except ValueError as error:
+        raise refuse(str(error)) from None
+
+
+INERTIA = (
+    BeforeValidator(_read_inertia),
+    Field(description="three principal moments or a 3x3 matrix, with the wheels (kg m^2)"),
+)
+
+
 class Spacecraft(Table):
     """The body and its actuators."""
 
-    inertia: Annotated[Any, Field(description="three principal moments or a 3x3 matrix (kg m^2)")]
+    inertia: Annotated[Any, *INERTIA]
     torque_limit: Annotated[float, *quantity(Gain("N m", above=0.0, text="largest torque"))] = math.inf
     limit: Annotated[
         Literal["axis", "norm", "none"],
@@ -44,21 +60,6 @@ class Spacecraft(Table):
     ] = "axis"
     actuator_lag: Annotated[float, *quantity(Gain("s", at_least=0.0, text="time constant of the actuators"))] = 0.0
     torque_rate_limit: Annotated[float, *quantity(Gain("N m/s", above=0.0, text="fastest change of each torque"))] = math.inf
-
-    @model_validator(mode="before")
-    @classmethod
-    def _read_inertia(cls, data: Any) -> Any:
-        if not isinstance(data, dict) or "inertia" not in data:
-            return data
-        given: Any = data["inertia"]
-        if not isinstance(given, list) or len(given) != 3:
-            raise _at("inertia", "three principal moments or a 3x3 matrix, in kg m^2", given)
-        try:
-            shape = (3, 3) if any(isinstance(row, list) for row in given) else (3,)
-            tensor = check_inertia(reader(Gain("kg m^2", shape=shape))(given))
-        except (ValueError, PydanticCustomError) as error:
-            raise _at("inertia", str(error), given) from None
-        return {**data, "inertia": tensor}
 
 
 def _at(key: str, reason: str, found: Any) -> PydanticCustomError:
@@ -199,7 +200,7 @@ class WheelsTable(Rotor):
 
 
 class FaultTable(Table):
-    """What happens to a wheel or the body during the run, and what is done about it."""
+    """What happens to a wheel, to the body or to both during the run, and what is done about it."""
 
     time: Annotated[float, *quantity(Gain("s", at_least=0.0, text="when it happens"))]
     wheel: Annotated[int | None, *quantity(Gain("1", at_least=1, whole=True, text="which wheel, counted from 1"))] = None
@@ -208,18 +209,26 @@ class FaultTable(Table):
     momentum_limit: Annotated[float | None, *quantity(Gain("N m s", above=0.0, text="what the wheel still stores"))] = None
     viscous: Annotated[float | None, *quantity(Gain("N m s", at_least=0.0, text="friction per rad/s"))] = None
     coulomb: Annotated[float | None, *quantity(Gain("N m", at_least=0.0, text="friction at any speed"))] = None
+    inertia: Annotated[Any, *INERTIA] = None
     delay: Annotated[float, *quantity(Gain("s", at_least=0.0, text="until it is diagnosed and acted on"))] = 0.0
     action: Annotated[
         Literal["none", "reallocate", "retune", "both"],
-        Field(description="torque shared out among the other wheels, gains designed anew for the torque left, or both"),
+        Field(description="torque shared out among the other wheels, gains designed anew for what is left, or both"),
     ] = "both"
+    """Unless it is "none", the law knows the new inertia from the diagnosis on."""
+
+    @property
+    def strikes_wheel(self) -> bool:
+        """Whether a wheel changes."""
+        changed = (self.torque_limit, self.momentum_limit, self.viscous, self.coulomb)
+        return self.lost or any(value is not None for value in changed)
 
     @model_validator(mode="after")
     def _does_something(self) -> FaultTable:
-        changed = [self.torque_limit, self.momentum_limit, self.viscous, self.coulomb]
-        if not self.lost and all(value is None for value in changed):
-            raise _at("lost", "true, or a new torque_limit, momentum_limit, viscous or coulomb", False)
-        if self.wheel is None:
+        if not self.strikes_wheel and (self.wheel is not None or self.inertia is None):
+            body = "" if self.inertia is not None else ", or a new inertia of the body without a wheel"
+            raise _at("lost", f"true, or a new torque_limit, momentum_limit, viscous or coulomb{body}", False)
+        if self.strikes_wheel and self.wheel is None:
             raise _at("wheel", "the number of a wheel, from 1", None)
         return self
 
@@ -238,6 +247,12 @@ class CertifyTable(Table):
         float | None, *quantity(Gain("1", above=0.0, at_most=1.0, text="error of J_ij as a share of sqrt(J_ii J_jj)"))
     ] = None
     disturbance: Annotated[float, *quantity(Gain("N m", at_least=0.0, text="norm of a torque nobody models"))] = 0.0
+    momentum: Annotated[
+        float | None,
+        *quantity(
+            Gain("N m s", at_least=0.0, text="total angular momentum for claims about wheels; that at the start if absent")
+        ),
+    ] = None
 
 
 class LawTable(Table):

@@ -99,7 +99,10 @@ def fly(
         now = next(phase for phase in phases if done < phase.last)
         count = min(chunk, now.last - done)
         last = done + count == steps
-        kernel(carry, done, count, last, record_every, run, now.gains, now.craft, now.setup, loop.substeps, samples, end)
+        if done == now.first:
+            carry = carry._replace(state=carry.state._replace(rate=now.rate_from(carry.state.rate)))
+        numbers = now.gains, now.known, now.craft, now.setup, loop.substeps
+        kernel(carry, done, count, last, record_every, run, *numbers, samples, end)
         carry = load(end, 0, carry)
         done += count
         if progress is not None:

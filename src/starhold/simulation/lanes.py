@@ -17,6 +17,9 @@ from starhold.loop.kernels import make_kernels
 from starhold.models.rigid_body import State
 from starhold.simulation.lane import Progress, fly
 
+RATE = slice(4, 7)
+"""The rows of the rate among the numbers of a state."""
+
 
 @dataclass(frozen=True)
 class Batch:
@@ -50,21 +53,23 @@ def simulate_many(
     start = np.asarray(starts if isinstance(starts, np.ndarray) else [flatten(s) for s in starts], dtype=float)
     start = start if isinstance(starts, np.ndarray) else start.T
     workers = os.cpu_count() or 1 if threads is None else threads
+    if gains is not None and loop.events:
+        raise ValueError("gains of their own for each lane do not go with events that change gains")
     if loop.law.card.compiled_only:
         return _one_by_one(loop, start, steps, gains, first_run, workers, progress)
     carries = _carries(loop, start)
     blocks = pack(carries)
     gain_blocks = None if gains is None else pack(gains)
     kernel, like, phases = make_kernels(loop.parts()).many, loop.carry(), loop.phases(steps)
-    if gains is not None and loop.events:
-        raise ValueError("gains of their own for each lane do not go with events that change gains")
 
     def work(block: int) -> None:
         run = first_run + block * LANES
         for now in phases:
             own = now.gains if gain_blocks is None else gain_blocks[block]
             count = now.last - now.first
-            numbers = own, now.gains, now.craft, now.craft, now.setup, loop.substeps
+            rate = blocks[block].reshape(-1, LANES)[RATE]
+            rate[:] = now.rate_from(tuple(rate))
+            numbers = own, now.gains, now.known, now.craft, now.setup, loop.substeps
             kernel(blocks[block], like, now.first, count, run, *numbers)
 
     _share_out(work, len(blocks), workers, progress)

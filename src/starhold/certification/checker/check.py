@@ -125,12 +125,15 @@ def _claim(subject: Subject, claim: Any) -> list[tuple[str, Verdict, str]]:
     outcomes = [obligation["outcome"] for obligation in claim["obligations"]]
     demand(claim["outcome"] == _follows(outcomes), "the outcome does not follow from the obligations")
     kind = CLAIMS[claim["kind"]]
-    demand(claim["assumptions"] == kind.assumptions(claim["numbers"]), "the assumptions are not those of such a claim")
+    wheels = subject.wheels is not None
+    demand(kind.wheels is None or kind.wheels == wheels, f"such a claim is {'not ' if wheels else ''}for loops with wheels")
+    told = kind.assumptions(claim["numbers"], wheels)
+    demand(claim["assumptions"] == told, "the assumptions are not those of such a claim")
     if claim["outcome"] != "proved":
         return _unproved(subject, claim)
     _shaped(claim["numbers"], NUMBERS[claim["kind"]], "the numbers")
     _shaped(claim["witness"], WITNESS[claim["kind"]], "the witness")
-    proofs = kind.proofs(subject, claim["numbers"], claim["witness"])
+    proofs = kind.proofs(subject, claim)
     found = [(o["name"], o["how"]) for o in claim["obligations"]]
     needed = [(name, how) for name, how, _ in proofs if how]
     demand(found == needed, f"the obligations are not {', '.join(f'{name} ({how})' for name, how in needed)}")
@@ -249,6 +252,16 @@ OBLIGATION: dict[str, Test] = {
     "outcome": _OUTCOME,
     "evidence": lambda x: _object(x) and _plain(x),
 }
+_WHEELS: dict[str, Test] = {
+    "axes": _list(_VECTOR),
+    "torque_limit": _list(_MAYBE),
+    "momentum_limit": _list(_MAYBE),
+    "inertia": _list(_number),
+    "least": _list(_VECTOR),
+    "momentum": _list(_number),
+    "allocation": _one("least-squares", "least-peak"),
+    "total_momentum": _number,
+}
 SUBJECT: dict[str, Test] = {
     "law": _text,
     "gains": lambda x: _object(x) and all(map(_gain, x.values())),
@@ -266,6 +279,7 @@ SUBJECT: dict[str, Test] = {
     "modelled_torque_norm": _number,
     "disturbance": _number,
     "control_period": _number,
+    "wheels": _or_none(_within(_WHEELS)),
 }
 _CONTENTS: dict[str, Test] = {
     "start": _MAYBE,
@@ -277,6 +291,12 @@ _CONTENTS: dict[str, Test] = {
 NUMBERS: dict[str, dict[str, Test]] = {
     "convergence": {"level": _MAYBE, **_CONTENTS},
     "torque-limit": {"level": _MAYBE, **_CONTENTS, "limit": _number, "kind": _one("axis", "norm")},
+    "wheels": {
+        "level": _MAYBE,
+        **_CONTENTS,
+        "momentum": _number,
+        **dict.fromkeys(("motors", "stored"), _list(_number)),
+    },
     "inertia": {"tolerance": _MAYBE, **_CONTENTS},
     "disturbance": {
         **dict.fromkeys(("torque", "start", "level", "turn", "rate_start", "angle", "rate"), _number),
@@ -299,7 +319,8 @@ _PROOF: dict[str, Test] = {"stiffness": _MAYBE, "epsilon": _number, "rho": _numb
 WITNESS: dict[str, dict[str, Test]] = {
     "convergence": {**_PROOF, "rate_bound": _MAYBE},
     "torque-limit": {**_PROOF, "rate_bound": _MAYBE},
-    "inertia": {**_PROOF, "stiffness": _number, "level": _MAYBE},
+    "wheels": {**_PROOF, "rate_bound": _MAYBE},
+    "inertia": {**_PROOF, "level": _MAYBE},
     "disturbance": {**_PROOF, "rate_bound": _MAYBE, "q_rate": _number, "q_attitude": _number},
     "sampling": {},
     "sliding": {},

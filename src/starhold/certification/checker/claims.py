@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from flint import arb, fmpq, fmpq_mat
 
+from starhold.certification.checker.even import EvenRegion
 from starhold.certification.checker.exact import (
     ZERO,
+    CheckError,
     Obligation,
     definite,
     demand,
@@ -25,33 +28,49 @@ from starhold.certification.checker.exact import (
     unit,
     within_circle,
 )
+from starhold.certification.checker.frame import is_even
 from starhold.certification.checker.loop import Loop
-from starhold.certification.checker.region import BALLS, EXACT, LASALLE, ROOTS, SIGN, Numbers, Region, optional
+from starhold.certification.checker.odd import OddRegion
+from starhold.certification.checker.region import BALLS, EXACT, ROOTS, SIGN, Numbers, Region, optional
 from starhold.certification.checker.subject import Subject
 from starhold.certification.checker.surface import Sliding
-from starhold.certification.checker.torque import keeps_within
+from starhold.certification.checker.torque import bounded, keeps_within
+from starhold.certification.checker.wheels import keeps_momenta
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of claim: its assumptions, and from subject, numbers and witness what has to be shown. `untold`: what a claim
-    without a tolerance does not assume."""
+    """A kind of claim: its assumptions, and from subject and claim what has to be shown. `untold`: what a claim without a
+    tolerance does not assume; `beside`: what one about a loop with wheels assumes too; `wheels`: whether it is for such
+    loops (None: for any)."""
 
     assumed: tuple[str, ...]
-    proofs: Callable[[Subject, Numbers, Numbers], list[Obligation]]
+    proofs: Callable[[Subject, Numbers], list[Obligation]]
     untold: str = ""
+    beside: tuple[str, ...] = ()
+    wheels: bool | None = None
 
-    def assumptions(self, numbers: Numbers) -> list[str]:
-        """What a claim with these numbers assumes."""
+    def assumptions(self, numbers: Numbers, wheels: bool) -> list[str]:
+        """What a claim with these numbers, about a loop with or without wheels, assumes."""
         unlimited = numbers.get("tolerance", 0) is None
-        return [told for told in self.assumed if not (unlimited and told == self.untold)]
+        kept = [told for told in self.assumed if not (unlimited and told == self.untold)]
+        return [_FREE if told == _UNLIMITED else told for told in (*kept, *self.beside)] if wheels else kept
 
 
-def _region(subject: Subject, numbers: Numbers, witness: Numbers) -> Region:
-    return Region(Loop(subject, optional(witness.get("stiffness"))), numbers["level"], numbers["start"], witness)
+def _region(loop: Loop, level: Any | None, start: Any | None, witness: Numbers) -> OddRegion | EvenRegion:
+    return (EvenRegion if is_even(loop) else OddRegion)(loop, level, start, witness)
 
 
-def _told(region: Region, numbers: Numbers, rate: str = "rate", any_inertia: bool = False) -> Obligation:
+def _claimed(subject: Subject, claim: Numbers) -> OddRegion | EvenRegion:
+    numbers, witness = claim["numbers"], claim["witness"]
+    return _region(Loop(subject, optional(witness["stiffness"])), numbers["level"], numbers["start"], witness)
+
+
+def _names(claim: Numbers) -> list[str]:
+    return [obligation["name"] for obligation in claim["obligations"]]
+
+
+def _told(region: Region[Any], numbers: Numbers, rate: str = "rate", any_inertia: bool = False) -> Obligation:
     everything = numbers.get("everything", False)
 
     def contents() -> str:
@@ -60,57 +79,94 @@ def _told(region: Region, numbers: Numbers, rate: str = "rate", any_inertia: boo
     return "numbers", "", contents
 
 
-def _converges(region: Region) -> list[Obligation]:
+def _converges(region: Region[Any], claim: Numbers, bounded: bool = False) -> list[Obligation]:
     return [
         ("form", EXACT, region.form),
         ("positive", SIGN, region.positive),
         ("descent", SIGN, region.descent),
-        ("target", EXACT, region.target),
-        ("only rest", LASALLE, region.only_rest) if region.epsilon == 0 else ("strict", SIGN, region.strict),
-        region.cover(),
+        ("target", EXACT, partial(region.target, bounded)),
+        region.settles(),
+        region.cover(_names(claim)),
     ]
 
 
-def convergence(subject: Subject, numbers: Numbers, witness: Numbers) -> list[Obligation]:
+def convergence(subject: Subject, claim: Numbers) -> list[Obligation]:
     """Every motion from {V <= start} comes to rest on target."""
-    region = _region(subject, numbers, witness)
-    return [*_converges(region), _told(region, numbers)]
+    region = _claimed(subject, claim)
+    return [*_converges(region, claim), _told(region, claim["numbers"])]
 
 
-def torque_limit(subject: Subject, numbers: Numbers, witness: Numbers) -> list[Obligation]:
+def torque_limit(subject: Subject, claim: Numbers) -> list[Obligation]:
     """Motions from {V <= start} keep the torque within the limit, and so come to rest on target as told."""
-    region = _region(subject, numbers, witness)
+    region, numbers = _claimed(subject, claim), claim["numbers"]
 
     def torque() -> str:
         demand(numbers["kind"] == subject.limit, "the limit is of another kind than the loop's")
         limit = rational(numbers["limit"])
         demand(subject.torque_limit is not None and limit <= subject.torque_limit, "the loop's limit is lower")
-        demand(keeps_within(region.loop, region.level, limit, numbers["kind"] == "axis"), "the torque may exceed the limit")
+        demand(keeps_within(region, limit, numbers["kind"] == "axis"), "the torque may exceed the limit")
         return "bounded by tangents of a concave function, or on each piece of the law"
 
-    return [*_converges(region), ("torque", BALLS, torque), _told(region, numbers)]
+    return [*_converges(region, claim), ("torque", BALLS, torque), _told(region, numbers)]
 
 
-def inertia(subject: Subject, numbers: Numbers, witness: Numbers) -> list[Obligation]:
+def wheels_limits(subject: Subject, claim: Numbers) -> list[Obligation]:
+    """Motions from {V <= start} keep every motor's torque and every wheel's momentum within its limit, and so come to rest
+    on target as told."""
+    region, numbers, wheels = _claimed(subject, claim), claim["numbers"], subject.wheels
+    if wheels is None:
+        raise CheckError("there are no wheels")
+    told: list[list[Any]] = [[rational(x) for x in numbers[key]] for key in ("motors", "stored")]
+    demand(all(len(bounds) == len(wheels.axes) for bounds in told), "the bounds are not one for each wheel")
+    demand(rational(numbers["momentum"]) == wheels.total, "the total momentum is not that of the loop")
+    demand(wheels.allocation == "least-squares", "the torque is shared out in another way")
+    demand(subject.limit == "none" or subject.torque_limit is None, "another limit of the torque may act")
+    demand(region.level is not None, "without a level nothing bounds torque and momentum")
+
+    def torque() -> str:
+        pieces = region.loop.pieces
+        demand(len(pieces) == 1, "the law has several pieces")
+        asked = list(pieces[0][1].values())
+        for k, (row, most, limit) in enumerate(zip(wheels.least, told[0], wheels.torque_limit, strict=True), 1):
+            demand(limit is None or most <= limit, f"the limit of wheel {k} is lower")
+            demand(limit != 0 or most == 0, f"wheel {k} gives no torque")
+            part: Any = row[0] * asked[0] + row[1] * asked[1] + row[2] * asked[2]
+            demand(limit == 0 or bounded(region, [part], most), f"the torque of wheel {k} may be larger")
+        return "bounded by tangents of a concave function"
+
+    def momentum() -> str:
+        P, J = region.frame.P, region.loop.inertia
+        keeps_momenta(wheels, told[1], J, P, region.level, subject.target_rate)
+        return "what the wheels exchange among them stays, and V bounds the body's momentum"
+
+    proofs: list[Obligation] = [("torque", BALLS, torque), ("momentum", SIGN, momentum)]
+    return [*_converges(region, claim, bounded=True), *proofs, _told(region, numbers)]
+
+
+def inertia(subject: Subject, claim: Numbers) -> list[Obligation]:
     """Convergence for every inertia of a box, or for every inertia."""
-    tolerance = optional(numbers["tolerance"])
+    numbers, witness = claim["numbers"], claim["witness"]
+    tolerance, stiffness = optional(numbers["tolerance"]), optional(witness["stiffness"])
     demand(tolerance is None or 0 < tolerance <= 1, "the tolerance is not between 0 and 1")
-    loop = Loop(subject, optional(witness["stiffness"]), shifted=True, tolerance=tolerance)
-    region = Region(loop, witness["level"], numbers["start"], witness)
+    loop = Loop(subject, stiffness, shifted=True, tolerance=tolerance)
+    region = _region(loop, witness["level"], numbers["start"], witness)
+    demand(stiffness is not None or isinstance(region, EvenRegion), "there is no stiffness")
     demand((tolerance is None) == (region.epsilon == 0), "a cross term is for a tolerance, and only for one")
     return [
         ("form", EXACT, region.form),
         ("positive", SIGN, region.positive),
         ("descent", SIGN, region.descent),
-        ("only rest", LASALLE, region.only_rest) if region.epsilon == 0 else ("strict", SIGN, region.strict),
-        region.cover(SIGN),
+        region.settles(),
+        region.cover(_names(claim), SIGN),
         _told(region, numbers, any_inertia=tolerance is None),
     ]
 
 
-def disturbance(subject: Subject, numbers: Numbers, witness: Numbers) -> list[Obligation]:
+def disturbance(subject: Subject, claim: Numbers) -> list[Obligation]:
     """With any torque from outside up to a bound, motions from {V <= start} end near the target."""
-    region = _region(subject, numbers, witness)
+    region, numbers, witness = _claimed(subject, claim), claim["numbers"], claim["witness"]
+    if isinstance(region, EvenRegion):
+        raise CheckError("not for a V even in q")
     q_rate, q_attitude = rational(witness["q_rate"]), rational(witness["q_attitude"])
     torque, epsilon, rho = rational(numbers["torque"]), region.epsilon, region.rho
 
@@ -121,13 +177,13 @@ def disturbance(subject: Subject, numbers: Numbers, witness: Numbers) -> list[Ob
 
     def ball() -> tuple[Any, Any]:
         """The largest |w| and |q| where V + epsilon C may rise: within an ellipse."""
-        push = root_up(greatest((fmpq_mat(turned(region.loop.frame.W)) * fmpq_mat(region.loop.frame.W)).tolist()))
+        push = root_up(greatest((fmpq_mat(turned(region.frame.W)) * fmpq_mat(region.frame.W)).tolist()))
         square = torque**2 * (push**2 / (4 * q_rate) + epsilon**2 / (4 * q_attitude))
         x = torque * push / (2 * q_rate) + root_up(square / q_rate)
         return x, torque * epsilon / (2 * q_attitude) + root_up(square / q_attitude)
 
     def end() -> str:
-        frame = region.loop.frame
+        frame = region.frame
         felt = subject.disturbance + (subject.modelled_norm if frame.felt else ZERO)
         demand(torque >= felt, "the torque from outside may be larger")
         x, y = ball()
@@ -144,7 +200,7 @@ def disturbance(subject: Subject, numbers: Numbers, witness: Numbers) -> list[Ob
 
     def start() -> str:
         region.strict()
-        s, cover, y = region.loop.frame.s, subject.cover, ball()[1]
+        s, cover, y = region.frame.s, subject.cover, ball()[1]
         if cover == "shortest":
             region.single()
         elif cover == "hysteresis":
@@ -164,9 +220,9 @@ def disturbance(subject: Subject, numbers: Numbers, witness: Numbers) -> list[Ob
     ]
 
 
-def sampling(subject: Subject, numbers: Numbers, witness: Numbers) -> list[Obligation]:
+def sampling(subject: Subject, claim: Numbers) -> list[Obligation]:
     """The linear loop with the torque held for a period is stable."""
-    loop = Loop(subject)
+    loop, numbers = Loop(subject), claim["numbers"]
     radius, longest = rational(numbers["radius"]), rational(numbers["longest"])
 
     def at_period() -> str:
@@ -211,9 +267,9 @@ def stepped(loop: Loop, period: Any) -> list[Any]:
     return fmpq_mat(upper + lower).charpoly().coeffs()
 
 
-def sliding(subject: Subject, numbers: Numbers, witness: Numbers) -> list[Obligation]:
+def sliding(subject: Subject, claim: Numbers) -> list[Obligation]:
     """A law with a surface reaches it against torque from outside, and ends on target or near it."""
-    proof = Sliding(subject, numbers)
+    proof = Sliding(subject, claim["numbers"])
     found: list[Obligation] = [
         ("form", EXACT, proof.form),
         ("reach exceeds torque", SIGN, proof.reaches),
@@ -225,12 +281,13 @@ def sliding(subject: Subject, numbers: Numbers, witness: Numbers) -> list[Obliga
     return [*found, (last, SIGN, proof.cover), ("numbers", "", proof.ends)]
 
 
+_UNLIMITED, _FREE = "torque not limited", "neither torque nor wheels limited, wheels without friction"
 _BASE = (
     "rigid body",
     "inertia exactly as given",
     "exact measurement and ideal actuators",
     "torque applied continuously",
-    "torque not limited",
+    _UNLIMITED,
     "no torque from outside but what the law cancels",
 )
 _BOX = "inertia within the tolerance"
@@ -242,12 +299,17 @@ def _instead(old: str, *new: str) -> tuple[str, ...]:
 
 CLAIMS: dict[str, Kind] = {
     "convergence": Kind(_BASE, convergence),
-    "torque-limit": Kind(_instead("torque not limited"), torque_limit),
+    "torque-limit": Kind(_instead(_UNLIMITED), torque_limit, wheels=False),
+    "wheels": Kind(
+        _instead(_UNLIMITED, "wheels without friction", "total momentum at most as told"), wheels_limits, wheels=True
+    ),
     # What a law cancels of a torque that depends on the inertia is not what another inertia feels.
     "inertia": Kind((_BASE[0], _BOX, *_BASE[2:5], "no torque from outside", "target at rest"), inertia, _BOX),
     "disturbance": Kind(_instead(_BASE[5], "torque from outside bounded in norm"), disturbance),
     "sampling": Kind(
-        (*_BASE[:3], "linear motion near rest on a target at rest", _BASE[4], "no torque from outside"), sampling
+        (*_BASE[:3], "linear motion near rest on a target at rest", _BASE[4], "no torque from outside"),
+        sampling,
+        beside=("no stored momentum",),
     ),
     "sliding": Kind(_instead(_BASE[5], "torque from outside bounded on each axis"), sliding),
 }

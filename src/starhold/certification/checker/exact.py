@@ -27,6 +27,8 @@ Obligation: TypeAlias = tuple[str, str, Callable[[], str]]
 """Its name, how it is to be shown ("" for numbers that are no obligation of their own), and what shows it: the reason, or a
 CheckError."""
 ZERO, ONE = fmpq(0), fmpq(1)
+SHARES = (0.0, *(2.0**k for k in range(-52, 4)))
+"""By which share of the largest eigenvalue a guess of one is raised, the first that suffices."""
 
 
 class CheckError(Exception):
@@ -128,10 +130,11 @@ def definite(a: Rows, strictly: bool = True) -> bool:
 
 
 def greatest(a: Rows) -> Any:
-    """A rational that no eigenvalue of a symmetric matrix exceeds: guessed in floats, shown by minors."""
+    """A rational that no eigenvalue of a symmetric matrix exceeds: the largest diagonal entry where it is one, else guessed
+    in floats; shown by minors."""
     values = np.linalg.eigvalsh([[floating(x) for x in row] for row in a])
-    for share in (0.0, *(2.0**k for k in range(-52, 4))):
-        bound = rational(float(values[-1]) + share * float(np.abs(values).max()))
+    guesses = (rational(float(values[-1]) + share * float(np.abs(values).max())) for share in SHARES)
+    for bound in (max(row[k] for k, row in enumerate(a)), *guesses):
         if definite(plus(unit(len(a), bound), a, -ONE), strictly=False):
             return bound
     raise CheckError("no bound of an eigenvalue was found")

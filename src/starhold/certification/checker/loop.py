@@ -2,22 +2,19 @@
 polynomials, for the inertia that is given or for every one near it. Nothing here is shared with the certifier.
 
 Variables: q0..q3 error attitude, w1..w3 rate relative to the target, r and a the target's rate and acceleration, e the
-torque the models know, m one that nobody knows, t what the actuators give, d11..d33 how far the inertia is from the one
-given.
+torque the models know, m one that nobody knows, t what the actuators give, h the momentum of the whole, wheels included
+(body axes; of which J w_abs is the body's), d11..d33 how far the inertia is from the one given.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations, product
+from itertools import combinations
 from typing import Any
 
-from flint import fmpq
-
 from starhold.algebra.polynomial import Monomial, Polynomial, constants, jointly
-from starhold.algebra.quaternion import derivative, vector_part
+from starhold.algebra.quaternion import derivative
 from starhold.algebra.vector import add, apply, cross, dot, scale, subtract
 from starhold.certification.checker.exact import (
     ZERO,
@@ -31,15 +28,12 @@ from starhold.certification.checker.exact import (
     falls,
     intervals,
     inverted,
-    radius_of,
     replaced,
     root_up,
     sorted_by,
-    times,
     turned,
-    unit,
 )
-from starhold.certification.checker.subject import Subject, mixed, named, quadratic, variables
+from starhold.certification.checker.subject import Subject, named, variables
 from starhold.laws.interface import Seen
 from starhold.models.craft import Craft
 from starhold.models.rigid_body import angular_acceleration, kinetic_energy
@@ -47,31 +41,6 @@ from starhold.models.rigid_body import angular_acceleration, kinetic_energy
 TURN, RATE, ATTITUDE = named("q"), named("w"), named("q", 0)
 W = variables(RATE)
 SHIFTS = (("d11", "d12", "d13"), ("d12", "d22", "d23"), ("d13", "d23", "d33"))
-
-
-@dataclass(frozen=True)
-class Frame:
-    """V = w.Pw/2 + s (1 - q0), V' = -w.Dw + (at most kappa |w|3) + w.Eq + w.Wm; felt: the modelled torque acts as m does;
-    tops: P is nowhere larger than the largest of these, for any inertia the loop may have."""
-
-    P: Rows
-    tops: list[Rows]
-    s: Any
-    D: Rows
-    kappa: Any
-    E: Rows
-    W: Rows
-    felt: bool
-
-
-@dataclass(frozen=True)
-class Crossed:
-    """C = q.Jw, C' = -q.Aq - q.Bw + (at most sigma |w|2) + q.m."""
-
-    J: Rows
-    A: Rows
-    B: Rows
-    sigma: Any
 
 
 class Loop:
@@ -123,16 +92,21 @@ class Loop:
         still = constants((0, 0, 0))
         turning, spinning = (still, still) if self.still else (variables(named("r")), variables(named("a")))
         rate, relative = add(W, turning), subtract(spinning, cross(W, turning))
+        stored = still
+        if self.subject.wheels is not None:
+            stored = subtract(variables(named("h")), apply(self.plant[0].inertia, rate))
         outside, position, period = variables(named("e")), variables(named("p")), Polynomial.variable("period")
-        return Seen(variables(ATTITUDE), W, rate, turning, relative, outside, position, period)  # pyright: ignore
+        return Seen(variables(ATTITUDE), W, rate, turning, relative, outside, position, period, stored)  # pyright: ignore
 
     @cached_property
     def moving(self) -> Seen:
-        """The same with derivatives under a torque t, times the plant's factor."""
+        """The same with derivatives under a torque t, times the plant's factor; but that of the stored momentum, which V and
+        surfaces have no terms for."""
         craft, factor = self.plant
         seen = self.seen
         torque = add(variables(named("t")), add(seen.external_torque, variables(named("m"))))
-        absolute = angular_acceleration(seen.body_rate, torque, craft)
+        turned_by = subtract(torque, cross(seen.body_rate, seen.stored))
+        absolute = angular_acceleration(seen.body_rate, turned_by, craft)
         swing = subtract(absolute, scale(factor, seen.target_acceleration))  # pyright: ignore
         spin = derivative(seen.attitude, seen.rate)
         told = dual(seen)
@@ -151,7 +125,8 @@ class Loop:
             name for truths, parts in found for p in (*parts, *(c.positive for c, _ in truths)) for name in p.variables()
         }
         demand(
-            all(name[0] in "qwraem" for name in read), "the torque depends on more than attitude, rate, target and torque"
+            all(name[0] in "qwraemhd" for name in read),
+            "the torque depends on more than attitude, rate, target, torque and stored momentum",
         )
         return [(truths, dict(zip(named("t"), parts, strict=True))) for truths, parts in found]
 
@@ -200,6 +175,12 @@ class Loop:
         """The derivative of the rate on a piece of the law, times the plant's factor."""
         return [replaced(w.slope, torque) for w in self.moving.rate]  # pyright: ignore
 
+    @cached_property
+    def swayed(self) -> bool:
+        """Whether the motion relative to the target depends on the momentum of wheels."""
+        found = (w for _, torque in self.pieces for w in self.accelerations(torque))
+        return any("h" in letters(m) for w in found for m in w.terms)
+
     def over(self, polynomial: Polynomial) -> dict[Monomial, Polynomial]:
         """The coefficients, over the plant's factor, of a polynomial's monomials in the state: constant, or linear in how
         far the inertia is from the one given."""
@@ -220,84 +201,6 @@ class Loop:
         strange = [" ".join(monomial) for monomial, share in found.items() if share.value is None]
         demand(not strange, f"the terms {', '.join(strange)} depend on the inertia")
         return {monomial: share.value for monomial, share in found.items()}
-
-    @cached_property
-    def frame(self) -> Frame:
-        """The parts of V, and of V' around rest; a CheckError where they have others."""
-        V = self.lyapunov.value
-        kinds = _by_kind(V)
-        demand(set(kinds) <= {"", "o", "ww"}, "V has terms it must not have")
-        s = V.terms.get((), ZERO)
-        demand(
-            not (kinds.get("", ZERO) + kinds.get("o", ZERO) - s * (1 - Polynomial.variable("q0"))).terms,
-            "V is not s (1 - q0)",
-        )
-        P, tops = self._kinetic(kinds.get("ww", Polynomial({})))
-        slope = self.slope(self.resting()[1]).only(lambda m: not set(letters(m)) & set("ra"))
-        kinds = _by_kind(slope)
-        strange = set(kinds) - {"ww", "www", "qw", "mw", "ew"}
-        demand(not strange, f"V' has the terms {', '.join(sorted(strange))}")
-        terms = self.plain(slope)
-        kappa = ZERO
-        for monomial, c in terms.items():
-            if letters(monomial) == "www":
-                share = fmpq(1, 27)
-                for name in set(monomial):
-                    share *= monomial.count(name) ** monomial.count(name)
-                kappa += abs(c) * root_up(share)
-        D = times(-1, quadratic(terms, RATE))
-        W = mixed(terms, RATE, named("m"))
-        return Frame(P, tops, s, D, kappa, mixed(terms, RATE, TURN), W, _felt(kinds, "w"))
-
-    def _kinetic(self, own: Polynomial) -> tuple[Rows, list[Rows]]:
-        """P, and what it is nowhere larger than the largest of."""
-        if not self.shifted:
-            P = times(2, quadratic(own.terms, RATE))
-            return P, [P]
-        g = own.terms.get(("d11", "w1", "w1"), ZERO) * 2
-        kinetic: Any = dot(W, apply(self.plant[0].inertia, W))
-        rest: Any = own - kinetic * (g / 2)
-        demand(not rest.terms, "P is not a multiple of the inertia")
-        # x.Jx is largest in a box where each entry deviates with the sign of x_i x_j.
-        signs = [(1, a, b) for a in (1, -1) for b in (1, -1)]
-        reaches = self.reaches or unit(3, ZERO)
-        tops = [
-            [[g * (c + e[i] * e[j] * reaches[i][j]) for j, c in enumerate(row)] for i, row in enumerate(self.inertia)]
-            for e in signs
-        ]
-        return times(g, self.inertia), tops
-
-    @cached_property
-    def crossed(self) -> Crossed:
-        """The parts of C = q.Jw, and of C' around rest; a CheckError where they have others."""
-        seen = self.moving
-        C: Any = dot(vector_part(seen.attitude), apply(dual(self.plant[0].inertia), seen.rate))
-        slope = replaced(C.slope, self.resting()[1])
-        demand(not any(set(letters(m)) & set("ra") for m in slope.terms), "C' depends on the target's motion")
-        kinds = _by_kind(slope)
-        strange = set(kinds) - {"qq", "qw", "qww", "oww", "mq", "eq"}
-        demand(not strange, f"C' has the terms {', '.join(sorted(strange))}")
-        terms = self.plain(slope.only(lambda m: len(letters(m)) == 2))
-        demand(mixed(terms, TURN, named("m")) == unit(3), "torque from outside acts on C in another way")
-        _felt(kinds, "q")
-        forms = self.over(slope.only(lambda m: len(letters(m)) == 3))
-        total = ZERO
-        for name in ATTITUDE:
-            # |(q0, q)| = 1, so that the sum of q_k w.F_k w is at most the root of the sum of squares.
-            total += self._largest({_without(m, name): share for m, share in forms.items() if name in m}) ** 2
-        return Crossed(self.inertia, times(-1, quadratic(terms, TURN)), times(-1, mixed(terms, TURN, RATE)), root_up(total))
-
-    def _largest(self, form: Mapping[Monomial, Polynomial]) -> Any:
-        """The largest eigenvalue in modulus of a quadratic form over the box, which is at a corner: it is convex."""
-        names = sorted({name for share in form.values() for name in share.variables()})
-        if names and self.reaches is None:
-            raise CheckError("a form depends on the inertia, which may be any")
-        reaches = [] if self.reaches is None else [self.reaches[int(n[1]) - 1][int(n[2]) - 1] for n in names]
-        largest = ZERO
-        for corner in product(*[(-reach, reach) for reach in reaches]):
-            shift = dict(zip(names, corner, strict=True))
-            largest = max(largest, radius_of(quadratic({m: share.at(shift) for m, share in form.items()}, RATE)))
-        return largest
 
     @cached_property
     def falls(self) -> bool:
@@ -347,10 +250,11 @@ def at_rest(polynomial: Polynomial, sign: int) -> Any:
 
 def _factor(polynomial: Polynomial, name: str) -> Polynomial:
     """What multiplies a variable that occurs once in a term."""
-    return Polynomial({_without(m, name): c for m, c in polynomial.terms.items() if m.count(name) == 1})
+    return Polynomial({without(m, name): c for m, c in polynomial.terms.items() if m.count(name) == 1})
 
 
-def _without(monomial: Monomial, name: str) -> Monomial:
+def without(monomial: Monomial, name: str) -> Monomial:
+    """A monomial with a variable left out."""
     return tuple(other for other in monomial if other != name)
 
 
@@ -359,15 +263,6 @@ def letters(monomial: Monomial) -> str:
     return "".join(sorted("o" if name == "q0" else name[0] for name in monomial if name[0] != "d"))
 
 
-def _by_kind(polynomial: Polynomial) -> dict[str, Polynomial]:
+def by_kind(polynomial: Polynomial) -> dict[str, Polynomial]:
+    """The terms by the kinds of their variables."""
     return {kind: polynomial.only(lambda m, k=kind: letters(m) == k) for kind in {letters(m) for m in polynomial.terms}}
-
-
-def _felt(kinds: Mapping[str, Polynomial], state: str) -> bool:
-    """Whether the modelled torque acts where the unknown one does; a CheckError where it is neither that nor cancelled."""
-    known, unknown = kinds.get(f"e{state}"), kinds.get(f"m{state}", Polynomial({}))
-    if known is None:
-        return False
-    as_unknown = replaced(known, dict(zip(named("e"), variables(named("m")), strict=True)))
-    demand(not (as_unknown - unknown).terms, "the modelled torque is cancelled in part")
-    return True

@@ -11,6 +11,7 @@ from starhold.certification.checker.claims import stepped
 from starhold.certification.checker.exact import (
     ZERO,
     CheckError,
+    chained,
     definite,
     demand,
     determinant,
@@ -20,9 +21,8 @@ from starhold.certification.checker.exact import (
 )
 from starhold.certification.checker.loop import ATTITUDE, RATE, Loop
 from starhold.certification.checker.region import Numbers, optional
-from starhold.certification.checker.subject import Subject, variables
+from starhold.certification.checker.subject import Subject, gradient, named
 from starhold.certification.checker.surface import Sliding
-from starhold.models.environment import gravity_gradient
 
 
 def refutation(subject: Subject, claim: Mapping[str, Any], evidence: Mapping[str, Any]) -> str:
@@ -48,9 +48,8 @@ def refutation(subject: Subject, claim: Mapping[str, Any], evidence: Mapping[str
         demand(determinant(loop.linear()[1]) == 0, "no other attitude is at rest")
         return "another attitude is at rest"
     if "torque" in evidence:
-        found = [abs(part.at(values)) for part in torque.values()]
-        limit, level = rational(numbers["limit"]), numbers.get("level")
-        over = max(found) > limit if numbers["kind"] == "axis" else sum((x * x for x in found), ZERO) > limit**2
+        found, level = [part.at(values) for part in torque.values()], numbers.get("level")
+        over = _motors_exceed(subject, found) if kind == "wheels" else _exceeds(found, numbers)
         demand(over and (level is None or rational(level) >= V), "the torque is within its limit, or the state outside")
         return "the torque exceeds its limit at the state"
     demand("V" in evidence and V <= 0, "V is positive there")
@@ -58,7 +57,7 @@ def refutation(subject: Subject, claim: Mapping[str, Any], evidence: Mapping[str
 
 
 def _state(given: Any) -> dict[str, Any]:
-    """The state, its quaternion brought to exactly unit length; everything from outside is zero."""
+    """The state, its quaternion brought to exactly unit length; everything from outside and all momentum are zero."""
     q, w = ([rational(x) for x in given[key]] for key in ("attitude", "rate"))
     demand(len(q) == 4 and len(w) == 3, "the state is no state")
     demand(abs(sum((x * x for x in q), ZERO) - 1) < fmpq(1, 10**9), "the attitude is not of unit length")
@@ -66,8 +65,21 @@ def _state(given: Any) -> dict[str, Any]:
     ratio = [side * x / (1 + side * q[0]) for x in q[1:]]
     square = sum((x * x for x in ratio), ZERO)
     exact = [side * (1 - square) / (1 + square), *(2 * side * x / (1 + square) for x in ratio)]
-    outside = {f"{letter}{k}": ZERO for letter in "ream" for k in (1, 2, 3)}
+    outside = {f"{letter}{k}": ZERO for letter in "reamh" for k in (1, 2, 3)}
     return outside | dict(zip((*ATTITUDE, *RATE), (*exact, *w), strict=True))
+
+
+def _exceeds(torque: Sequence[Any], numbers: Numbers) -> bool:
+    limit = rational(numbers["limit"])
+    if numbers["kind"] == "axis":
+        return any(abs(x) > limit for x in torque)
+    return sum((x * x for x in torque), ZERO) > limit**2
+
+
+def _motors_exceed(subject: Subject, torque: Sequence[Any]) -> bool:
+    wheels: Any = subject.wheels
+    limits = zip(wheels.torque_limit, chained(wheels.least, [[x] for x in torque]), strict=True)
+    return any(limit is not None and abs(motor) > limit for limit, (motor,) in limits)
 
 
 def _torque(loop: Loop, values: Mapping[str, Any]) -> Any:
@@ -100,9 +112,7 @@ def _surface(subject: Subject, numbers: Numbers, evidence: Mapping[str, Any]) ->
     if "position" in evidence:
         position: Sequence[Any] = [rational(x) for x in evidence["position"]]
         square = sum((x * x for x in position), ZERO)
-        craft: Any = Loop(subject).plant[0]
         strength = 3 * arb(subject.gravity) / arb(square).sqrt() ** 5
-        torque: Any = gravity_gradient(variables(("p1", "p2", "p3")), 1, craft)  # pyright: ignore
-        push = strength * torque[place - 1].at(dict(zip(("p1", "p2", "p3"), position, strict=True)))
+        push = strength * gradient(subject.whole)[place - 1].at(dict(zip(named("p"), position, strict=True)))
     demand(bool(abs(push) > proof.reach[place - 1]), "the switching torque is larger, or only its bound is not")
     return "the torque from outside exceeds the switching torque"

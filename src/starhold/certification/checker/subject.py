@@ -19,17 +19,21 @@ from starhold.certification.checker.exact import (
     ZERO,
     CheckError,
     Rows,
+    definite,
     demand,
     down,
+    floating,
     plus,
     radius_of,
     rational,
     root_up,
+    turned,
     unit,
     up,
 )
+from starhold.certification.checker.wheels import Wheels, read_wheels
 from starhold.laws.catalogue import Law, catalogue
-from starhold.models.craft import EARTH, Craft, check_inertia, make_craft
+from starhold.models.craft import EARTH, Craft, check_inertia, compact
 from starhold.models.environment import gravity_gradient
 
 
@@ -45,7 +49,8 @@ def variables(names: Sequence[str]) -> Any:
 
 @dataclass(frozen=True)
 class Subject:
-    """The subject of a certificate, its numbers exact; `memory` is what the law starts with."""
+    """The subject of a certificate, its numbers exact; `memory` is what the law starts with, `whole` the inertia with that
+    of rotors about their axes."""
 
     law: Law
     gains: Any
@@ -53,6 +58,7 @@ class Subject:
     cover: str
     width: Any
     inertia: Rows
+    whole: Rows
     limit: str
     torque_limit: Any | None
     gravity: Any
@@ -63,6 +69,7 @@ class Subject:
     modelled_norm: Any
     disturbance: Any
     period: Any
+    wheels: Wheels | None
 
 
 def read_subject(given: Mapping[str, Any]) -> Subject:
@@ -73,19 +80,24 @@ def read_subject(given: Mapping[str, Any]) -> Subject:
     fields = {item.name: item.gain for item in law.fields()}
     demand(set(given["gains"]) == set(fields), "the gains are not those of the law")
     gains = law.gains(**{name: gain.check(given["gains"][name]) for name, gain in fields.items()})
-    tensor = check_inertia(given["inertia"])
-    demand(tensor.tolist() == np.array(given["inertia"], dtype=float).tolist(), "the inertia is not symmetric")
+    wheels = None if given["wheels"] is None else read_wheels(given["wheels"])
+    tensor, inertia = np.array(given["inertia"], dtype=float), [[rational(x) for x in row] for row in given["inertia"]]
+    demand(inertia == turned(inertia) and definite(inertia), "the inertia is not symmetric and positive definite")
+    # Without its rotors' moments the inertia need not be that of a body.
+    whole = inertia if wheels is None else plus(inertia, wheels.moments)
+    check_inertia([[floating(x) for x in row] for row in whole])
     limit, orbit = given["torque_limit"], given["orbit"]
     gravity = orbit["gravitational_parameter"] if orbit else EARTH
     demand(gravity > 0, "the gravitational parameter is not positive")
-    craft = make_craft(tensor, math.inf if limit is None else limit, gravity)
+    demand(limit is None or limit > 0, "the torque limit is not positive")
+    limited = math.inf if limit is None else float(limit)
+    craft = Craft(compact(tensor), compact(np.linalg.inv(tensor)), limited, float(gravity))
     demand(given["control_period"] > 0, "the control period is not positive")
     for name in ("target_rate", "target_acceleration", "modelled_torque_norm", "disturbance", "hysteresis_width"):
         demand(given[name] >= 0, f"{name} is negative")
     # A law that plans ahead makes a costly memory, which no claim needs.
     memory = None if law.card.compiled_only else law.remember(gains, craft, given["control_period"])
-    inertia = [[rational(x) for x in row] for row in given["inertia"]]
-    _check_bounds(given, inertia)
+    _check_bounds(given, whole)
     exact = {name: rational(given[name]) for name in ("target_rate", "target_acceleration", "disturbance")}
     return Subject(
         law=law,
@@ -94,6 +106,7 @@ def read_subject(given: Mapping[str, Any]) -> Subject:
         cover=given["double_cover"],
         width=rational(given["hysteresis_width"]),
         inertia=inertia,
+        whole=whole,
         limit=given["limit"],
         torque_limit=None if limit is None else rational(limit),
         gravity=rational(gravity),
@@ -101,11 +114,18 @@ def read_subject(given: Mapping[str, Any]) -> Subject:
         modelled=[rational(x) for x in given["modelled_torque"]],
         modelled_norm=rational(given["modelled_torque_norm"]),
         period=rational(given["control_period"]),
+        wheels=wheels,
         **exact,
     )
 
 
-def _check_bounds(given: Mapping[str, Any], inertia: Rows) -> None:
+def gradient(whole: Rows) -> Any:
+    """The gravity-gradient torque at a position p over its strength 3 mu/|p|5."""
+    inertia: Any = constants(tuple(map(tuple, whole)))
+    return gravity_gradient(variables(named("p")), 1, Craft(inertia, inertia, 0.0, 0.0))  # pyright: ignore
+
+
+def _check_bounds(given: Mapping[str, Any], whole: Rows) -> None:
     """That the bounds of the target's motion and of the modelled torque hold over the whole orbit."""
     demand(min(given["modelled_torque"]) >= 0, "a bound of the modelled torque is negative")
     demand(
@@ -128,17 +148,14 @@ def _check_bounds(given: Mapping[str, Any], inertia: Rows) -> None:
         demand(rational(given["target_acceleration"]) >= up(swinging), "the target's rate changes faster")
     if given["gravity_gradient"]:
         strength = up(3 * mu / perigee**3)
-        position = variables(named("p"))
-        craft = Craft(constants(tuple(map(tuple, inertia))), constants(tuple(map(tuple, inertia))), 0.0, 0.0)  # pyright: ignore
-        torque: Any = gravity_gradient(position, Polynomial.constant(1), craft)  # pyright: ignore
-        for component, bound in zip(torque, given["modelled_torque"], strict=True):
+        for component, bound in zip(gradient(whole), given["modelled_torque"], strict=True):
             largest = radius_of(quadratic(component.terms, named("p")))
             demand(rational(bound) >= strength * largest, "the modelled torque is larger")
         # |n x Jn| is how far the moments deviate from their mean in direction n: at most half their range.
         half = rational(given["modelled_torque_norm"]) / strength
-        moments = np.linalg.eigvalsh([[float(x) for x in row] for row in given["inertia"]])
+        moments = np.linalg.eigvalsh([[floating(x) for x in row] for row in whole])
         mean = rational(float(moments[0] + moments[2]) / 2)
-        demand(radius_of(plus(inertia, unit(3, mean), -ONE)) <= half, "the norm of the modelled torque is larger")
+        demand(radius_of(plus(whole, unit(3, mean), -ONE)) <= half, "the norm of the modelled torque is larger")
 
 
 def quadratic(terms: Mapping[Monomial, Any], names: Sequence[str]) -> Rows:

@@ -18,6 +18,7 @@ import numpy as np
 
 from starhold.algebra.scalar import equation
 from starhold.algebra.vector import apply, cross, scale, subtract
+from starhold.models.craft import whole
 
 # Not inlined, said outright: what an equation calls inherits its options, and inlining all this at each of five levels
 # would multiply the time a kernel takes to compile.
@@ -123,7 +124,7 @@ def linearise(seen: Any, craft: Any, a: Any, b: Any) -> None:
     R from the centre of attraction in body axes; G = 0 where there is none (R = 0).
     """
     w, position = seen.rate, seen.position
-    momentum, pull = apply(craft.inertia, w), apply(craft.inertia, position)
+    momentum, pull = apply(craft.inertia, w), apply(whole(craft), position)
     square = position[0] * position[0] + position[1] * position[1] + position[2] * position[2]
     strength = 0.0
     if square > 0.0:
@@ -132,7 +133,7 @@ def linearise(seen: Any, craft: Any, a: Any, b: Any) -> None:
         e = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
         turning = cross(e, w)
         lever = cross(position, e)
-        tilt = subtract(cross(position, apply(craft.inertia, lever)), cross(pull, lever))
+        tilt = subtract(cross(position, apply(whole(craft), lever)), cross(pull, lever))
         stiffness = scale(strength, apply(craft.inverse_inertia, tilt))
         swung = subtract(cross(momentum, e), cross(w, apply(craft.inertia, e)))
         damping = apply(craft.inverse_inertia, swung)

@@ -1,0 +1,275 @@
+"""Certificates of the wheel law and of loops with wheels: further equilibria, stored momentum, limits of the wheels."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as some
+
+from starhold.algebra.quaternion import derivative
+from starhold.algebra.vector import ZERO
+from starhold.analysis.trial import BrokenClaimError, fly_claims
+from starhold.certification.certificate import Certificate, write
+from starhold.certification.certify import Wanted, certify
+from starhold.certification.checker import check_file, passed
+from starhold.certification.wording import sentence
+from starhold.laws import pd, wheel
+from starhold.laws.catalogue import catalogue
+from starhold.laws.interface import NoMemory, Seen
+from starhold.models.craft import make_craft, tensor
+from starhold.models.rigid_body import angular_acceleration
+from starhold.models.wheels import lose, three_orthogonal
+from starhold.report.certificates import certify_law, certify_scenario
+from starhold.scenario.building import build
+from starhold.scenario.reading import load, parse
+from tests.certification.loops import FULL, free, loop_of, rotors
+
+EVEN = wheel.Gains(0.3, (0.015, 0.015, 0.015))
+UNEVEN = wheel.Gains(0.3, (0.01, 0.015, 0.025))
+weight = some.floats(0.001, 0.1)
+BUILTIN = load("wheels-orbital").text
+STRUCK = """
+[[fault]]
+time = "60 s"
+wheel = 2
+lost = true
+delay = "10 s"
+action = "{}"
+"""
+
+
+def motion(gains, craft):
+    """d(q, w)/dt of the wheel law on a target at rest, of states (7,)."""
+
+    def rates(x):
+        q, w = tuple(x[:4]), tuple(x[4:])
+        seen = Seen(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.1)
+        u, _ = wheel.torque(seen, gains, craft, NoMemory())
+        return np.array([*derivative(q, w), *angular_acceleration(w, u, craft)])
+
+    return rates
+
+
+def unstable(gains, craft, axis):
+    """Numbers of eigenvalues on the right and on the imaginary axis, of the linear motion on the unit quaternions near rest
+    at half a turn about an axis."""
+    rates, x = motion(gains, craft), np.array([0.0, *axis, 0.0, 0.0, 0.0])
+    assert np.abs(rates(x)).max() < 1e-15
+    steps = 1e-6 * np.eye(7)
+    A = np.array([(rates(x + step) - rates(x - step)) / 2e-6 for step in steps]).T
+    # Along the quaternion itself there is no motion on the sphere.
+    tangent = np.linalg.svd(x[None, :4])[2][1:]
+    basis = np.zeros((7, 6))
+    basis[:4, :3], basis[4:, 3:] = tangent.T, np.eye(3)
+    roots = np.linalg.eigvals(basis.T @ A @ basis).real
+    return int((roots > 1e-7).sum()), int((abs(roots) <= 1e-7).sum())
+
+
+@given(some.lists(weight, min_size=3, max_size=3, unique=True), some.floats(0.05, 2.0))
+def test_three_half_turns_where_weights_differ_and_each_is_unstable(k, damping):
+    """S = 0 leaves, beside the target, half turns about the three axes: V falls from them in 1, 2 or 3 directions."""
+    k = [k[0], k[0] + k[1], k[0] + k[1] + k[2]]
+    gains = wheel.Gains(damping, tuple(k))
+    found = [unstable(gains, FULL, axis) for axis in np.eye(3)]
+    # q.Mq with M = tr(k) - diag(k): the axis of the least weight is the top of V.
+    assert found == [(3, 0), (2, 0), (1, 0)]
+    random = np.random.default_rng(1)
+    for _ in range(20):
+        axis = random.normal(size=3)
+        axis /= np.linalg.norm(axis)
+        torque = wheel.torque(Seen((0.0, *axis), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.1), gains, FULL, NoMemory())[0]
+        assert np.linalg.norm(torque) > 0.0
+
+
+@given(weight, some.tuples(*[some.floats(-1.0, 1.0)] * 3))
+def test_every_half_turn_where_weights_are_equal(k, axis):
+    length = np.linalg.norm(axis)
+    if length < 1e-3:
+        axis, length = (1.0, 0.0, 0.0), 1.0
+    # A sphere of rests: two directions along it are neutral, one leads away.
+    assert unstable(wheel.Gains(0.3, (k, k, k)), FULL, np.array(axis) / length) == (1, 2)
+
+
+def test_two_equal_weights_leave_one_axis_and_a_circle():
+    gains = wheel.Gains(0.3, (0.01, 0.01, 0.02))
+    assert unstable(gains, FULL, (0.0, 0.0, 1.0)) == (1, 0)
+    for angle in (0.0, 0.4, 1.3, math.pi / 2.0):
+        assert unstable(gains, FULL, (math.cos(angle), math.sin(angle), 0.0)) == (2, 1)
+
+
+@pytest.mark.parametrize("gains", [EVEN, UNEVEN])
+@pytest.mark.parametrize("cover", ["as_published", "shortest", "hysteresis"])
+@pytest.mark.parametrize("target", ["orbital", (1.0, 0.0, 0.0, 0.0)])
+def test_the_wheel_law_converges_almost_always_whatever_the_wheels_store(gains, cover, target):
+    loop = rotors("wheel", gains, target, cover=cover)
+    certificate = certify(loop)
+    assert certificate.outcome == "proved"
+    main = certificate.claim("convergence")
+    assert main.numbers["everything"]
+    assert [o.name for o in main.obligations][-2:] == ["only rest", "half turns repel"]
+    assert certificate.claim("inertia").numbers["tolerance"] is None
+    assert "half turns" in sentence(main, certificate.subject)
+
+
+def test_without_compensation_it_holds_a_target_at_rest_only():
+    gains = EVEN._replace(compensation=0.0)
+    assert certify(rotors("wheel", gains)).claim("convergence").outcome == "proved"
+    refused = certify(rotors("wheel", gains, "orbital")).claim("convergence")
+    assert refused.outcome == "undecided"
+    assert "h" in refused.obligations[0].evidence["reason"]
+
+
+def test_another_law_on_wheels():
+    """Stored momentum does no work on V of `pd`; on a moving target it does, and the certifier names it."""
+    gains = pd.examples()[0]
+    still = certify(rotors("pd", gains))
+    assert still.outcome == "proved"
+    assert still.claim("convergence").numbers["everything"]
+    assert still.claim("wheels") is not None
+    moving = certify(rotors("pd", gains, "orbital")).claim("convergence")
+    assert moving.outcome == "undecided"
+
+
+def test_momentum_that_piles_up_is_not_passed_over():
+    """`lyapunov` cancels the gravity gradient and leaves w x H: as H grows without end the motion may stop short."""
+    loop = rotors("lyapunov", catalogue()["lyapunov"].examples()[0])
+    assert certify(loop).claim("convergence").outcome == "proved"
+    pulled = replace(rotors("wheel", EVEN, "orbital"), law=loop.law, gains=loop.gains, target=loop.target)
+    found = certify(pulled).claim("convergence")
+    assert found.outcome == "undecided"
+    assert "fill the wheels" in found.obligations[3].evidence["reason"]
+
+
+def test_claims_that_are_not_built_say_so():
+    loop = rotors("wheel", EVEN)
+    found = certify(loop, "", Wanted(disturbance=1e-4)).claim("disturbance")
+    assert found.outcome == "undecided"
+    uneven = certify(rotors("wheel", UNEVEN), "", Wanted(turn=0.1)).claim("wheels")
+    assert uneven.outcome == "undecided"
+    assert "weights" in uneven.obligations[0].evidence["reason"]
+    peak = replace(loop, allocation="least-peak")
+    assert certify(peak).claim("wheels") is None
+    assert certify(peak, "", Wanted(turn=0.1)).claim("wheels").outcome == "undecided"
+    far = certify(loop, "", Wanted(turn=3.0)).claim("wheels")
+    assert far.outcome == "undecided"
+
+
+def test_a_loop_that_counts_on_a_lost_wheel_claims_nothing():
+    loop = rotors("wheel", EVEN)
+    broken = loop.wheels._replace(torque_limit=(0.0, *loop.wheels.torque_limit[1:]))
+    assert certify(replace(loop, wheels=broken)).claims == ()
+    after = certify(replace(loop, wheels=lose(loop.wheels, 0)))
+    assert after.outcome == "proved"
+    claim = after.claim("wheels")
+    assert claim.numbers["motors"][0] == 0.0
+    assert claim.numbers["level"] < certify(loop).claim("wheels").numbers["level"]
+
+
+@pytest.mark.parametrize("law", ["wheel", "pd"])
+@pytest.mark.parametrize(("limits", "binding"), [((0.02, 10.0), "motors"), ((10.0, 0.3), "stored")])
+def test_limits_of_wheels_are_kept_and_nearly_used(law, limits, binding):
+    """An optimiser over the certified set finds nothing beyond the told numbers, and comes near what binds."""
+    gains = EVEN if law == "wheel" else pd.examples()[0]
+    loop = rotors(law, gains, torque_limit=limits[0], momentum_limit=limits[1], layout=three_orthogonal)
+    certificate = certify(loop, "", Wanted(momentum=0.05))
+    claim = certificate.claim("wheels")
+    assert claim.outcome == "proved"
+    n, J = claim.numbers, tensor(loop.craft.inertia)
+    random = np.random.default_rng(4)
+    wheels, s = loop.wheels, 4.0 * gains.k_attitude[0] if law == "wheel" else 2.0 * gains.k_attitude
+    shares = -np.array(wheels.least)
+    begun = np.array(loop.start.momentum)
+    kept = begun - shares @ (begun @ np.array(wheels.axes))
+    most = {"motors": np.zeros(3), "stored": np.zeros(3)}
+    for _ in range(20_000):
+        t = random.uniform(0.0, min(n["level"], s if law == "wheel" else 2.0 * s))
+        q0 = math.sqrt(1.0 - t / s) if law == "wheel" else 1.0 - t / s
+        axis, direction, total = random.normal(size=(3, 3))
+        if random.uniform() < 0.5:
+            # About one axis, where sums of sizes are reached.
+            axis = direction = np.eye(3)[random.integers(3)]
+        turned = np.linalg.solve(np.linalg.cholesky(J).T, direction / np.linalg.norm(direction))
+        w = math.sqrt(2.0 * (n["level"] - t)) * turned
+        q = (q0, *(math.sqrt(1.0 - q0 * q0) * axis / np.linalg.norm(axis)))
+        stored = n["momentum"] * total / np.linalg.norm(total) - J @ w
+        seen = Seen(q, tuple(w), tuple(w), ZERO, ZERO, ZERO, ZERO, 0.1, tuple(stored))
+        u = np.array(loop.law.torque(seen, loop.gains, loop.craft, NoMemory())[0])
+        most["motors"] = np.maximum(most["motors"], np.abs(shares @ u))
+        most["stored"] = np.maximum(most["stored"], np.abs(kept + shares @ stored))
+    for name in most:
+        assert (most[name] <= np.array(n[name]) * (1.0 + 1e-9)).all()
+    assert most[binding].max() > 0.8 * max(n[binding])
+    assert max(n["motors"]) <= limits[0]
+    assert max(n["stored"]) <= 0.99 * limits[1]
+
+
+def test_flights_keep_within_the_wheels_and_catch_what_does_not():
+    loop = rotors("wheel", EVEN)
+    certificate = certify(loop)
+    trial = fly_claims(loop, certificate, flights=512)
+    assert 0.5 < trial.torque_share <= 1.0
+    claim = certificate.claim("wheels")
+    strong = replace(claim, numbers={**claim.numbers, "start": 3.0 * claim.numbers["start"]})
+    with pytest.raises(BrokenClaimError, match="limit"):
+        fly_claims(loop, Certificate("too strong", certificate.subject, (strong,)), flights=512)
+
+
+def test_a_torque_limit_of_the_wheel_law_without_wheels():
+    """Where other actuators give the torque the limit is the craft's, and the claim a set of turns up to a half."""
+    loop = loop_of("wheel", wheel.Gains(0.05, (0.01, 0.01, 0.01)), make_craft(tensor(FULL.inertia), torque_limit=0.06))
+    claim = certify(free(loop)).claim("torque-limit")
+    assert claim.outcome == "proved"
+    assert math.radians(100.0) < claim.numbers["turn"] < math.pi
+    asked = certify(loop, "", Wanted(turn=math.radians(100.0)))
+    assert asked.claim("torque-limit").outcome == "proved"
+    assert fly_claims(free(loop), certify(free(loop)), flights=256).torque_share <= 1.0
+    tight = replace(loop, craft=make_craft(tensor(FULL.inertia), torque_limit=0.01))
+    refuted = certify(tight, "", Wanted(turn=math.radians(60.0))).claim("torque-limit")
+    assert refuted.outcome == "refuted"
+
+
+def struck(action):
+    at = BUILTIN.index("[simulation]")
+    return parse(BUILTIN[:at] + STRUCK.format(action) + BUILTIN[at:], "here")
+
+
+@pytest.mark.parametrize(("action", "names"), [("both", ["wheel", "wheel from 70 s"]), ("none", ["wheel"])])
+def test_the_certificate_is_issued_again_once_the_fault_is_known(action, names):
+    scenario = struck(action)
+    entry = scenario.laws[0]
+    found = certify_law(scenario, entry, build(scenario, entry))
+    assert [issued.certificate.name for issued in found] == names
+    if action == "both":
+        before, after = (issued.certificate for issued in found)
+        assert after.outcome == "proved"
+        assert after.subject["gains"]["k_rate"] < before.subject["gains"]["k_rate"]
+        assert after.subject["wheels"]["torque_limit"][1] == 0.0
+        # The state in flight at that moment, with what the lost wheel holds.
+        assert after.subject["wheels"]["momentum"][1] != 0.0
+        assert after.claim("wheels").numbers["motors"][1] == 0.0
+
+
+def test_what_is_issued_again_is_checked_and_flown(tmp_path):
+    tried = certify_scenario(struck("both"), "wheel")
+    write([found.certificate for found in tried], "struck", tmp_path / "c.json")
+    found = check_file(tmp_path / "c.json")
+    assert passed(found), [f for f in found if f.verdict == "fails"]
+    assert [found.trial is not None for found in tried] == [True, True]
+    assert tried[1].start_inside["convergence"]
+
+
+def test_every_law_with_a_function_on_wheels_is_sound(tmp_path):
+    """Whatever a law's certificate says on wheels, its checker agrees and flights do not contradict."""
+    for name, law in catalogue().items():
+        if law.lyapunov is None:
+            continue
+        # The others clip their torque to the craft's limit, and here there is none.
+        for gains in (gains for gains in law.examples() if not getattr(gains, "limit", 0)):
+            loop = rotors(name, gains)
+            certificate = certify(loop, name)
+            write([certificate], "wheels", tmp_path / "c.json")
+            found = check_file(tmp_path / "c.json")
+            assert passed(found), (name, [f for f in found if f.verdict == "fails"])
+            fly_claims(loop, certificate, flights=128)
