@@ -110,7 +110,9 @@ def parts_of_slope(slope: Polynomial) -> tuple[Rows, Polynomial, Rows, Rows]:
         elif len(rates) == 1 and len(others) == 1 and others[0][0] in OUTSIDE:
             kinds["outside"].append(monomial)
         else:
-            raise ShapeError(f"V' has the term {' '.join(monomial) or 'constant'}")
+            stored = any(name[0] == "h" for name in others)
+            why = "what the wheels store does work on V, which the law does not cancel: " if stored else ""
+            raise ShapeError(f"{why}V' has the term {' '.join(monomial) or 'constant'}")
     chosen = {kind: slope.only(set(monomials).__contains__) for kind, monomials in kinds.items()}
     quadratic = matrix_of(chosen["quadratic"], RATE, RATE)
     mixed, outside = matrix_of(chosen["mixed"], RATE, AXES), matrix_of(chosen["outside"], RATE, ("m1", "m2", "m3"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -26,11 +27,21 @@ def draw(found: Sequence[Failure], path: Path, title: str) -> Path:
     if any(failure.eta is not None for failure in found):
         panels.append(("degree of stability, 1/s", [failure.eta for failure in found]))
     panels.append(("settling time, s", [failure.settling for failure in found]))
+    if any(failure.certified is not None for failure in found):
+        # Rounded down, so as not to say more than is proved.
+        turns = [None if f.certified is None else math.floor(10.0 * math.degrees(f.certified[0])) / 10.0 for f in found]
+        panels.append(("certified turn, °", turns))
     height = 1.45 + 0.27 * len(found)
-    figure = Figure(figsize=(8.0, height), dpi=DPI)
+    figure = Figure(figsize=(2.0 + 2.0 * max(3, len(panels)), height), dpi=DPI)
     figure.set_layout_engine("none")
     grid: Any = figure.subplots(1, len(panels), sharey=True, squeeze=False)
-    figure.subplots_adjust(left=0.118, right=0.978, bottom=0.55 / height, top=1.0 - 0.72 / height, wspace=0.09)
+    figure.subplots_adjust(
+        left=0.944 / figure.get_figwidth(),
+        right=1.0 - 0.176 / figure.get_figwidth(),
+        bottom=0.55 / height,
+        top=1.0 - 0.72 / height,
+        wspace=0.09,
+    )
     heading = title if len(title) <= 80 else f"{title[:79]}…"
     figure.text(0.02, 1.0 - 0.28 / height, heading, fontsize=11, fontweight="bold", parse_math=False)
     places = np.arange(len(found))
@@ -43,7 +54,8 @@ def draw(found: Sequence[Failure], path: Path, title: str) -> Path:
         axis.set_xlim(0.0, 1.28 * max(max(sizes), 1e-9))
         axis.locator_params(axis="x", nbins=4, prune="upper")
         for place, failure in enumerate(found):
-            _mark(axis, place, failure, values[place], number)
+            missing = "not proved" if name.startswith("certified") else "not settled"
+            _mark(axis, place, failure, values[place], number, missing)
         axis.set_xlabel(name, fontsize=9)
         axis.grid(True, axis="x", color="0.9", linewidth=0.6)
         axis.set_axisbelow(True)
@@ -70,11 +82,11 @@ def draw(found: Sequence[Failure], path: Path, title: str) -> Path:
     return path
 
 
-def _mark(axis: Any, place: int, failure: Failure, value: float | None, panel: int) -> None:
+def _mark(axis: Any, place: int, failure: Failure, value: float | None, panel: int, missing: str) -> None:
     """The number at the end of a bar, or why there is none."""
     across = axis.get_yaxis_transform()
     if failure.controllable:
-        text = f"{value:.3g}" if value is not None else "not settled" if failure.diverged_at is None else "diverged"
+        text = f"{value:.3g}" if value is not None else missing if failure.diverged_at is None else "diverged"
         behind = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
         axis.annotate(
             text,
