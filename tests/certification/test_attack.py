@@ -37,7 +37,7 @@ def motion_of(law):
         for k in range(states.shape[1]):
             q = (states[0, k], states[1, k], states[2, k], states[3, k])
             w = (states[4, k], states[5, k], states[6, k])
-            seen = Seen(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.1)
+            seen = Seen(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.1, ZERO)
             u, _ = torque(seen, gains, craft, NoMemory())
             d = derivative(q, w)
             a = angular_acceleration(w, add(u, (push[0, k], push[1, k], push[2, k])), craft)
@@ -72,12 +72,18 @@ class Function:
         q, w = states[:4], states[4:7]
         return 0.5 * np.einsum("ik,ij,jk->k", w, self.P, w) + self.frame.potential.of(q)
 
+    def climb(self, q, rates):
+        """The derivative of the attitude's part of V."""
+        if not self.frame.potential.even:
+            return -self.s / 2.0 * rates[0]
+        return 2.0 * np.einsum("ik,ij,jk->k", q, floats(self.frame.potential.N), rates[1:4])
+
     def slope(self, states, rates):
         """(V + epsilon C)' and the sum of the sizes of its parts, of which rounding takes a share."""
         w, q = states[4:7], states[1:4]
         parts = (
             np.einsum("ik,ij,jk->k", w, self.P, rates[4:7]),
-            self.frame.potential.of(states[:4] + 0.5 * rates[:4]) - self.frame.potential.of(states[:4] - 0.5 * rates[:4]),
+            self.climb(q, rates),
             self.epsilon * np.einsum("ik,ij,jk->k", rates[1:4], self.J, w),
             self.epsilon * np.einsum("ik,ij,jk->k", q, self.J, rates[4:7]),
         )
