@@ -1,0 +1,399 @@
+"""Exact pole placement by multi-level decomposition: u = -K x gives A - B K any spectrum, for any controllable A, B.
+
+Level k is a pair A_k (n_k, n_k), B_k; the first is A, B. Its inputs act through r_k = rank B_k independent directions, the
+columns of R_k: Bhat_k = B_k R_k has full column rank r_k. With P_k the annihilator of B_k (full row rank, P_k B_k = 0),
+
+    A_{k+1} = P_k A_k P_k^+,    B_{k+1} = P_k A_k Bhat_k:
+
+what the inputs reach directly is the input of what is left. The last level is left with nothing. From there back up,
+
+    G_k = Bhat_k^+ + K_{k+1} P_k (last: Bhat_k^+),    K_k = R_k (G_k A_k - Phi_k G_k),    K = K_0.
+
+Why it is exact. G_k Bhat_k = E, so G_k (A_k - B_k K_k) = Phi_k G_k: the rows of G_k span a subspace with the spectrum of
+Phi_k. On the kernel of G_k, where P_k is a coordinate, A_k - B_k K_k acts as P_k A_k (P_k^+ - Bhat_k K_{k+1}) =
+A_{k+1} - B_{k+1} K_{k+1}. By induction the spectrum of A - B K is the union of those of all Phi_k.
+
+What it needs. P_k^+ is the pseudo-inverse P'(P P')^-1, which is P' for orthonormal rows only: a right inverse S of P serves
+exactly if Bhat_k^+ S = 0. Another left inverse of Bhat_k with its own S changes A_{k+1} by a multiple of B_{k+1} and
+K_{k+1} with it, and leaves G_k. So K depends on Phi_k and R_k alone, not on the annihilators, and units of the states do
+not matter but for rounding: the levels are found for a balanced A, columns of B of like size and orthonormal bases.
+
+Complex poles without a place in their level. A level with one direction left over shares a pair p, p* with the level above:
+p in its own Phi_k in direction e of Bhat_k, p* in direction R_k e of the one above. G_k is complex then, and K real still.
+
+Source: the method of exact pole placement of Zubov, Mikrin, Misrikhanov and Ryabchenko (2012), as Zubov, Lapin and Mikrin
+(2013) use it for attitude control in quaternions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from flint import acb, arb_mat
+
+Array = NDArray[np.floating[Any]]
+Complexes = NDArray[np.complexfloating[Any]]
+Choice = Callable[[int, Array], Array | None] | Sequence[Array | None]
+
+BITS = 512
+"""Binary digits with which the poles reached are measured."""
+
+NEAR = 1e-2
+"""Poles that differ by less than this share of themselves are measured together."""
+
+ALLOWED = 1e-6
+"""Largest error of the poles reached, relative, that is not refused."""
+
+GIVEN = 1e-9
+"""How exactly an annihilator must annihilate, and how independent directions must be, relative."""
+
+
+class UncontrollableError(ValueError):
+    """No feedback moves the modes s (h,) of the pair: w A = s w and w B = 0 for rows w of left (h, n), of length one."""
+
+    def __init__(self, modes: NDArray[Any], left: NDArray[Any]) -> None:
+        self.modes, self.left = modes, left
+        first, *_ = named = [_shown(mode) for mode in modes]
+        super().__init__(
+            f"the pair is not controllable: no input moves s = {', '.join(named)}; "
+            f"rank [A - sE, B] < {left.shape[1]} for s = {first} along w = ({', '.join(_shown(entry) for entry in left[0])})"
+        )
+
+
+class Placement(NamedTuple):
+    """A feedback u = -K x, K (m, n), and how it was made.
+
+    spectra: Phi_k (r_k, r_k) of each level, the inputs' first, complex only where two levels share a pair of poles;
+    directions: R_k; strength: the smallest singular value of each B_k beside the size of the balanced A (of the first:
+    beside its own largest), zero if the pair is not controllable; error: of the poles that K reaches, see `displacement`.
+    """
+
+    K: Array
+    spectra: tuple[NDArray[Any], ...]
+    directions: tuple[Array, ...]
+    strength: tuple[float, ...]
+    error: float
+
+
+class _Level(NamedTuple):
+    """One level in bases where Bhat is `rows` transposed: a (size, size), rows (r, size), p (size - r, size).
+
+    B = Bhat across and across right = E (r, r). The Bhat_k of the formulas is Bhat scale, up to a positive factor.
+    """
+
+    a: Array
+    rows: Array
+    p: Array
+    across: Array
+    right: Array
+    scale: Array
+    directions: Array
+    strength: float
+
+
+def levels(A: ArrayLike, B: ArrayLike) -> list[int]:
+    """How many poles each level takes, the inputs' first, n in all. A: (n, n), B: (n, m). Errors as those of `place`."""
+    return [len(level.rows) for level in _decomposed(*_pair(A, B), None, None)[0]]
+
+
+def is_stable(poles: ArrayLike) -> bool:
+    """Whether all poles have a negative real part."""
+    return bool((np.real(poles) < 0.0).all())
+
+
+def place(
+    A: ArrayLike,
+    B: ArrayLike,
+    poles: ArrayLike | None = None,
+    *,
+    spectra: Sequence[ArrayLike] | None = None,
+    annihilators: Choice | None = None,
+    directions: Choice | None = None,
+    allowed: float = ALLOWED,
+) -> Placement:
+    """K that gives A - B K these poles. A: (n, n), B: (n, m), real; poles in the unit of A.
+
+    Either poles: (n,), real or in conjugate pairs, in any order, each as often as wanted. The slower ones go farther from
+    the inputs; pairs are real 2x2 blocks in one level, where a distribution allows it, else shared by two. Or spectra: real
+    Phi_k, (r_k, r_k) for the r_k of `levels`, in the coordinates of Bhat_k.
+
+    annihilators: P_k of every level but the last; directions: R_k. A list, or a function of k and B_k (up to a positive
+    factor). None, for all or for one, is the usual: P_k orthonormal; R_k = E where B_k has full column rank, else an
+    orthonormal basis of the space of its rows, which is the pseudo-inverse of T_k in the skeleton B_k = Bhat_k T_k.
+
+    ValueError where something given is not as said or the error of the poles reached is more than `allowed`, which is so
+    for pairs near uncontrollable ones, long chains from few inputs and poles of many sizes; `UncontrollableError`.
+    """
+    a, b = _pair(A, B)
+    if (poles is None) == (spectra is None):
+        raise ValueError("give either poles or spectra")
+    wanted = None if poles is None else _checked_poles(poles, len(a))
+    with np.errstate(all="ignore"):
+        found, units, lengths = _decomposed(a, b, annihilators, directions)
+        for name, choice in (("annihilators", annihilators), ("directions", directions)):
+            if choice is not None and not callable(choice) and len(choice) > len(found):
+                raise ValueError(f"{name} has {len(choice)} entries, the pair has {len(found)} levels")
+        sizes = [len(level.rows) for level in found]
+        if wanted is not None:
+            blocks = _blocks(_dealt(wanted, sizes), found)
+            kept = tuple(np.linalg.solve(level.scale, phi @ level.scale) for level, phi in zip(found, blocks, strict=True))
+        else:
+            kept = _checked_spectra(() if spectra is None else spectra, sizes)
+            blocks = [level.scale @ phi @ np.linalg.inv(level.scale) for level, phi in zip(found, kept, strict=True)]
+        k: NDArray[Any] = np.zeros((0, 0))
+        for level, phi in zip(reversed(found), reversed(blocks), strict=True):
+            g = level.rows + k @ level.p if len(level.p) else level.rows
+            k = level.right @ (g @ level.a - phi @ g)
+        gain = np.real(k) / lengths[:, None] / units
+    strength = tuple(level.strength for level in found)
+    weakest = int(np.argmin(strength))
+    close = f"the weakest level, {weakest} of 0 to {len(found) - 1}, has a relative strength of {strength[weakest]:.1e}"
+    if not np.isfinite(gain).all():
+        raise ValueError(f"the gains leave the range of floating-point numbers; {close}")
+    error = _displacement(a, b, gain, _roots(kept) if wanted is None else wanted)
+    if not error <= allowed:
+        raise ValueError(f"the poles reached would be off by {error:.1e} of their size, {allowed:.1e} is allowed; {close}")
+    return Placement(gain, kept, tuple(level.directions for level in found), strength, error)
+
+
+def reached(A: ArrayLike, B: ArrayLike, K: ArrayLike) -> Complexes:
+    """Eigenvalues (n,) of A - B K for the very numbers given, A (n, n), B (n, m), K (m, n), by their real part.
+
+    Rounding of K alone spreads a pole of multiplicity k by about the k-th root of that rounding.
+    """
+    from flint import acb_mat, ctx
+
+    with ctx.workprec(BITS // 4):
+        found = acb_mat(_closed(*_pair(A, B), np.asarray(K, float))).eig(algorithm="approx")
+    return np.sort(np.array([complex(mode) for mode in found]))
+
+
+def displacement(A: ArrayLike, B: ArrayLike, K: ArrayLike, poles: ArrayLike) -> float:
+    """How far the eigenvalues of A - B K are from poles (n,), relative, to first order, without rounding but that of K.
+
+    Simple poles: the largest distance, by the pole's size. Poles closer than NEAR, equal ones above all, are no such smooth
+    functions of K, but the polynomial with these roots is: of k of them, about their mean, the change of its coefficient of
+    degree k - j, by the j-th power of their size. Where that is zero: that of the largest pole, or else of A.
+
+    These changes a are the numerators of the partial fractions of (reached - asked) / asked, characteristic polynomials of
+    exact coefficients. Of n simple poles each one reached is surely within n |a| of one asked for (Gershgorin).
+    """
+    a, b = _pair(A, B)
+    return _displacement(a, b, np.asarray(K, float), _checked_poles(poles, len(a)))
+
+
+def _displacement(a: Array, b: Array, gain: Array, poles: Sequence[complex | acb]) -> float:
+    from flint import acb, acb_mat, acb_poly, ctx
+
+    largest = max(abs(complex(pole)) for pole in poles) or float(np.linalg.norm(a)) or 1.0
+    with ctx.workprec(BITS):
+        roots = [acb(pole) for pole in poles]
+        change = acb_poly(_closed(a, b, gain).charpoly()) - acb_poly.from_roots(roots)
+        columns: list[acb_poly] = []
+        sizes: list[float] = []
+        for near in _clusters([complex(root) for root in roots]):
+            mean = sum((roots[i] for i in near), acb(0)) / len(near)
+            size = max(abs(complex(roots[i])) for i in near) or largest
+            part = acb_poly.from_roots([root for i, root in enumerate(roots) if i not in near])
+            for power in range(len(near), 0, -1):
+                columns.append(part)
+                sizes.append(size**power)
+                part = part * acb_poly([-mean, 1])
+        rows = [[column[i] for column in columns] for i in range(len(roots))]
+        try:
+            parts = acb_mat(rows).solve(acb_mat([[change[i]] for i in range(len(roots))]), algorithm="approx")
+        except ZeroDivisionError:
+            return math.inf
+        shares = [float(abs(part).mid() / size) for part, size in zip(parts.entries(), sizes, strict=True)]
+    return max(shares) if all(math.isfinite(share) for share in shares) else math.inf
+
+
+def _clusters(poles: list[complex]) -> list[list[int]]:
+    """Places of poles that are near one another, directly or by others between them."""
+    found: list[list[int]] = []
+    for i, pole in enumerate(poles):
+        near = [old for old in found if any(abs(pole - poles[j]) <= NEAR * max(abs(pole), abs(poles[j])) for j in old)]
+        found = [old for old in found if old not in near] + [[i, *(j for old in near for j in old)]]
+    return found
+
+
+def _closed(a: Array, b: Array, gain: Array) -> arb_mat:
+    """A - B K in working precision."""
+    from flint import arb_mat
+
+    if gain.shape != b.T.shape or not np.isfinite(gain).all():
+        raise ValueError(f"K must be finite and of shape {b.T.shape}, not {gain.shape}")
+    return arb_mat(a.tolist()) - arb_mat(b.tolist()) * arb_mat(gain.tolist())
+
+
+def _roots(spectra: Sequence[Array]) -> list[acb]:
+    """Eigenvalues of all the matrices, in working precision: doubles know those of Jordan blocks to few digits."""
+    from flint import acb_mat, arb_mat, ctx
+
+    with ctx.workprec(BITS):
+        return [root for phi in spectra for root in acb_mat(arb_mat(phi.tolist())).eig(algorithm="approx")]
+
+
+def _decomposed(
+    a: Array, b: Array, annihilators: Choice | None, directions: Choice | None
+) -> tuple[list[_Level], Array, Array]:
+    """The levels, and the units of the states (n,) and of the inputs (m,) in which they are written."""
+    # By name, for the types of the library are too loose for a strict checker.
+    library: Any = import_module("scipy.linalg")
+    a, (units, _) = library.matrix_balance(a, permute=False, separate=True)
+    b = b / units[:, None]
+    lengths = np.abs(b).max(axis=0)
+    lengths[lengths == 0.0] = 1.0
+    b, scale, down = b / lengths, np.diag(lengths), np.diag(1.0 / units)
+    size, noise = float(np.linalg.norm(a, 2)), 100.0 * len(a) * float(np.finfo(float).eps)
+    found, weakest, unit = list[_Level](), 1.0, units
+    while True:
+        u, s, v = np.linalg.svd(b)
+        beside = float(size if found else s[0])
+        # Weak inputs magnify the rounding that comes down with what they leave.
+        rank = int((s > noise / weakest * beside).sum())
+        if rank == 0:
+            modes, columns = np.linalg.eig(a.T)
+            left: NDArray[Any] = columns.T @ down
+            left /= np.linalg.norm(left, axis=1)[:, None]
+            raise UncontrollableError(np.round(modes / (size or 1.0), 12) * size, np.round(left, 12))
+        rows, across = u[:, :rank].T, s[:rank, None] * v[:rank]
+        at, given, reply = len(found), unit[:, None] * (b @ scale), across @ scale
+        turn = _chosen_directions(directions, at, given, reply)
+        inner = reply @ turn
+        right = scale @ turn @ np.linalg.inv(inner)
+        # So that across right = E whatever the scales of the inputs.
+        right += v[:rank].T / s[:rank] @ (np.eye(rank) - across @ right)
+        p = _chosen_annihilator(annihilators, at, given, unit, rows, u[:, rank:].T)
+        strength = float(s[rank - 1]) / beside
+        found.append(_Level(a, rows, p, across, right, inner, turn, strength))
+        if not len(p):
+            return found, units, lengths
+        # Orthonormal rows are their own pseudo-inverse, without rounding.
+        back = p.T if annihilators is None else np.linalg.pinv(p)
+        a, b, down = p @ a @ back, p @ a @ rows.T, p @ down
+        scale, weakest, unit = inner / np.abs(inner).max(), min(weakest, strength), np.ones(len(a))
+
+
+def _chosen(name: str, choice: Choice | None, at: int, given: Array, shape: tuple[int, int]) -> Array | None:
+    """What is chosen for a level whose B is `given`, if anything."""
+    found = choice(at, given) if callable(choice) else choice[at] if choice is not None and at < len(choice) else None
+    if found is not None and _real(f"{name} of level {at}", found).shape != shape:
+        raise ValueError(f"{name} of level {at} must have shape {shape}, not {np.shape(found)}")
+    return None if found is None else np.asarray(found, dtype=float)
+
+
+def _chosen_directions(choice: Choice | None, at: int, given: Array, reply: Array) -> Array:
+    """R (m, r) of a level whose B is `given` (n, m), an orthonormal basis times `reply` (r, m)."""
+    rank, inputs = reply.shape
+    turn = _chosen("directions", choice, at, given, (inputs, rank))
+    if turn is None:
+        return np.eye(inputs) if rank == inputs else np.linalg.qr(reply.T)[0]
+    s = np.linalg.svd(reply @ turn, compute_uv=False)
+    if not s[-1] > GIVEN * s[0]:
+        raise ValueError(f"directions of level {at} leave out some of what its inputs reach")
+    return turn
+
+
+def _chosen_annihilator(choice: Choice | None, at: int, given: Array, unit: Array, rows: Array, usual: Array) -> Array:
+    """P (rest, n) of a level, in units (n,), whose B, `given`, spans the orthonormal `rows` (r, n) and leaves `usual`."""
+    p = _chosen("annihilators", choice, at, given, usual.shape) if len(usual) else None
+    if p is None:
+        return usual
+    p = p * unit
+    s = np.linalg.svd(p, compute_uv=False)
+    if not s[-1] > GIVEN * s[0]:
+        raise ValueError(f"annihilators of level {at} lack full row rank")
+    over = p @ rows.T
+    if not np.linalg.norm(over, 2) <= GIVEN * s[-1]:
+        raise ValueError(f"annihilators of level {at} do not annihilate its inputs: P B is not zero")
+    return (p - over @ rows) / s[0]
+
+
+def _dealt(poles: list[complex], sizes: list[int]) -> list[list[complex]]:
+    """The poles of each level, the inputs' first: p, p* side by side, but one of a shared pair last in the level below and
+    first in the level above. Real poles are kept for the levels that have an odd place."""
+    slow = sorted(poles, key=lambda pole: (abs(pole), pole.real, pole.imag))
+    reals, pairs = ([p for p in slow if p.imag == 0.0], [p for p in slow if p.imag > 0.0])
+    dealt: list[list[complex]] = []
+    shared: list[complex] = []
+    for at in reversed(range(len(sizes))):
+        level, shared = shared, []
+        while free := sizes[at] - len(level):
+            spare = len(reals) > sum(size % 2 for size in sizes[:at]) + free % 2
+            if free > 1 and pairs and not (spare and abs(reals[0]) < abs(pairs[0])):
+                level += [pairs[0], pairs.pop(0).conjugate()]
+            elif reals:
+                level.append(reals.pop(0))
+            else:
+                level.append(pairs[0])
+                shared = [pairs.pop(0).conjugate()]
+        dealt.append(level)
+    return dealt[::-1]
+
+
+def _blocks(dealt: list[list[complex]], found: list[_Level]) -> list[NDArray[Any]]:
+    """A matrix with the poles dealt to each level, real but for shared pairs."""
+    blocks: list[NDArray[Any]] = []
+    along: tuple[Array, Array] | None = None
+    for poles, level in zip(reversed(dealt), reversed(found), strict=True):
+        basis, normal = np.eye(len(poles)), np.diag(poles)
+        if along is not None:
+            # The shared pole in the direction with which the level below replies, the others where it does not show.
+            basis = np.column_stack([along[0], np.linalg.svd(along[1][None])[2][1:].T])
+        for i, pole in enumerate(poles[:-1]):
+            if pole.imag > 0.0:
+                normal[i : i + 2, i : i + 2] = [[pole.real, pole.imag], [-pole.imag, pole.real]]
+        inverse = np.linalg.inv(basis)
+        phi = basis @ normal @ inverse
+        blocks.append(phi if phi.imag.any() else phi.real)
+        along = (level.right @ basis[:, -1], inverse[-1] @ level.across) if np.imag(normal[-1, -1]) > 0.0 else None
+    return blocks[::-1]
+
+
+def _pair(A: ArrayLike, B: ArrayLike) -> tuple[Array, Array]:
+    a, b = _real("A", A), _real("B", B)
+    if a.ndim != 2 or a.shape[0] != a.shape[1] or a.size == 0:
+        raise ValueError(f"A must be square, not of shape {a.shape}")
+    if b.ndim != 2 or len(b) != len(a) or b.size == 0:
+        raise ValueError(f"B must have {len(a)} rows and at least one column, not shape {b.shape}")
+    return a, b
+
+
+def _real(name: str, value: ArrayLike) -> Array:
+    found = np.asarray(value)
+    if found.dtype.kind not in "biuf" or not np.isfinite(found).all():
+        raise ValueError(f"{name} must be of finite real numbers")
+    return found.astype(float)
+
+
+def _checked_poles(poles: ArrayLike, size: int) -> list[complex]:
+    given = np.asarray(poles)
+    if given.shape != (size,):
+        raise ValueError(f"poles must be {size} numbers, one for each state, not of shape {given.shape}")
+    if given.dtype.kind not in "biufc" or not np.isfinite(given).all():
+        raise ValueError("poles must be finite numbers")
+    found = [complex(pole) for pole in given]
+    lone = Counter(found) - Counter(pole.conjugate() for pole in found)
+    if lone:
+        raise ValueError(f"poles must be real or in conjugate pairs: {_shown(next(iter(lone)))} lacks its conjugate")
+    return found
+
+
+def _checked_spectra(spectra: Sequence[ArrayLike], sizes: list[int]) -> tuple[Array, ...]:
+    found = tuple(_real("spectra", phi) for phi in spectra)
+    if (shapes := [phi.shape for phi in found]) != [(size, size) for size in sizes]:
+        raise ValueError(f"spectra must be square matrices of sizes {sizes}, not of shapes {shapes}")
+    return found
+
+
+def _shown(number: complex) -> str:
+    return f"{number.real + 0.0:.4g}" if number.imag == 0.0 else f"{number:.4g}"
