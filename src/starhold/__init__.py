@@ -7,6 +7,7 @@ run = sh.simulate(scenario, law="lyapunov")      # an xarray Dataset
 flights = sh.compare(scenario)                   # runs and metrics of every law
 certificates = sh.certify(scenario)              # what is proved of every law
 designs = sh.design("my.toml")                   # gains that formulas give, and figures to judge them by
+placed = sh.place(A, B, poles)                   # u = -K x that gives A - B K these poles, for any linear system
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from starhold.api import certify, compare, design, load, simulate
+    from starhold.api import certify, compare, design, load, place, simulate
     from starhold.errors import InputError
 
 __version__ = "0.1.0"
-__all__ = ["InputError", "__version__", "certify", "compare", "design", "load", "simulate"]
+__all__ = ["InputError", "__version__", "certify", "compare", "design", "load", "place", "simulate"]
 
 
 def __getattr__(name: str) -> Any:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from starhold.laws.pole_placement import place as place
 from starhold.report import certificates
 from starhold.report import compare as comparing
 from starhold.scenario import designing, reading
@@ -19,9 +20,9 @@ if TYPE_CHECKING:
     from starhold.report.flight import Flight
 
 
-def load(source: str | Path) -> reading.Scenario:
+def load(source: str | Path, allow_unstable: bool = False) -> reading.Scenario:
     """The scenario in a TOML file, or the built-in one of that name. InputError says what is wrong with it."""
-    return reading.load(source)
+    return reading.load(source, allow_unstable)
 
 
 def simulate(

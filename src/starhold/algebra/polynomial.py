@@ -6,7 +6,9 @@ piecewise polynomial. Nothing is rounded: what two readings have in common holds
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, TypeAlias
@@ -130,9 +132,13 @@ class Polynomial:
     __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> Polynomial:
-        value = _polynomial(other).value
+        divisor = _polynomial(other)
+        value = divisor.value
         if value is None:
-            raise TypeError("a polynomial is divided by constants only")
+            name = next((name for known, name in _RECIPROCALS.get() if not (divisor - known).terms), None)
+            if name is None:
+                raise TypeError("a polynomial is divided by constants only")
+            return self * Polynomial.variable(name)
         return Polynomial({m: c / value for m, c in self.terms.items()})
 
     def __rtruediv__(self, other: Any) -> Polynomial:
@@ -140,6 +146,20 @@ class Polynomial:
 
     def __repr__(self) -> str:
         return " + ".join(f"({c}) {' '.join(m)}".strip() for m, c in sorted(self.terms.items())) or "0"
+
+
+_RECIPROCALS: ContextVar[tuple[tuple[Polynomial, str], ...]] = ContextVar("reciprocals", default=())
+
+
+@contextmanager
+def reciprocal(divisor: Any, name: str) -> Generator[None]:
+    """For a while, division by this polynomial is multiplication by the variable of this name, which stands for its
+    reciprocal: what is made of it is an identity only together with divisor * name = 1."""
+    token = _RECIPROCALS.set((*_RECIPROCALS.get(), (divisor, name)))
+    try:
+        yield
+    finally:
+        _RECIPROCALS.reset(token)
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
 """The closed loop as exact polynomials: V and its derivative, read from the law's and the models' own equations.
 
 Variables: q0..q3 error attitude, w1..w3 rate relative to the target, r1..r3 the target's rate and a1..a3 its acceleration
-(body axes), e1..e3 the torque the models know, m1..m3 a torque nobody knows, and with wheels h1..h3 the total momentum.
+(body axes), e1..e3 the torque the models know, m1..m3 a torque nobody knows, with wheels h1..h3 the total momentum,
+and z = 1/(1 + |q|2).
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import Any
 
 from flint import fmpq
 
-from starhold.algebra.polynomial import Condition, Polynomial, constants, jointly, pieces
+from starhold.algebra.polynomial import Condition, Polynomial, constants, jointly, pieces, reciprocal
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.vector import add, apply, cross, dot, scale, subtract
 from starhold.certification.matrices import Rows
@@ -89,7 +90,9 @@ class Motion:
     def torque(self) -> Any:
         """The law's torque, piecewise."""
         memory = self.subject.law.remember(self.subject.loop.gains, self.subject.loop.craft, self.subject.loop.period)
-        return self.subject.law.torque(self.seen, self.gains, self.nominal, memory)[0]
+        q: Any = vector_part(self.seen.attitude)
+        with reciprocal(1 + dot(q, q), "z"):
+            return self.subject.law.torque(self.seen, self.gains, self.nominal, memory)[0]
 
     @cached_property
     def acceleration(self) -> Any:
@@ -133,7 +136,9 @@ class Motion:
     def linear(self, sign: int = 1) -> tuple[Rows, Rows]:
         """K_rate and K_attitude of the law near attitude (sign, 0, 0, 0) at rest, u = -K_rate w - K_attitude q."""
         found = [at_rest(component)[1] for component in self.torque]
-        still = {name: fmpq(0) for case in found for name in case.variables()} | {"q0": fmpq(sign)}
+        still = {name: fmpq(0) for case in found for name in case.variables()} | {"q0": fmpq(sign), "z": fmpq(1)}
+        if any(Polynomial(case.slope("z").terms).at(still) != 0 for case in found if "z" in case.variables()):
+            raise ShapeError("a quotient does not vanish at rest")
         rate = [[-component.slope(name).at(still) for name in RATE] for component in found]
         attitude = [[-component.slope(name).at(still) for name in ATTITUDE[1:]] for component in found]
         return rate, attitude

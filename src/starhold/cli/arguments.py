@@ -12,4 +12,5 @@ USER_ERROR, DIVERGED, FAILED_CHECK, REFUTED, UNDECIDED, INTERRUPTED, INTERNAL_ER
 ScenarioFile = Annotated[str, typer.Argument(metavar="FILE", help="a scenario file or the name of a built-in scenario")]
 Output = Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="folder for results, created")]
 Force = Annotated[bool, typer.Option("--force", help="replace results that are already there")]
+Unstable = Annotated[bool, typer.Option("--allow-unstable", help="take gains that are known to be unstable")]
 OneLaw = Annotated[str | None, typer.Option(help="which law of the file; all if not given")]

@@ -7,10 +7,16 @@ from typing import Annotated
 
 import typer
 
-from starhold.cli.arguments import FAILED_CHECK, REFUTED, UNDECIDED, Force, OneLaw, Output, ScenarioFile
+from starhold.cli.arguments import FAILED_CHECK, REFUTED, UNDECIDED, Force, OneLaw, Output, ScenarioFile, Unstable
 
 
-def certify(file: ScenarioFile, law: OneLaw = None, output: Output = None, force: Force = False) -> None:
+def certify(
+    file: ScenarioFile,
+    law: OneLaw = None,
+    output: Output = None,
+    force: Force = False,
+    allow_unstable: Unstable = False,
+) -> None:
     """Prove what each law guarantees on this spacecraft: a table and certificate.json.
 
     Exit code 0: all that is claimed is proved; 3: something is refuted, with the state that does; 4: not decided.
@@ -23,7 +29,7 @@ def certify(file: ScenarioFile, law: OneLaw = None, output: Output = None, force
     from starhold.report.results import open_folder
     from starhold.scenario.reading import load
 
-    scenario = load(file)
+    scenario = load(file, allow_unstable)
     folder = open_folder(output or Path("results") / f"{scenario.name}-certificate", force)
     tried = certify_scenario(scenario, law)
     for found in tried:

@@ -23,6 +23,7 @@ from starhold.cli.arguments import (
     Force,
     Output,
     ScenarioFile,
+    Unstable,
 )
 from starhold.errors import InputError
 
@@ -46,20 +47,23 @@ def run(
     law: Annotated[str | None, typer.Option(help="which law of the file; the first if not given")] = None,
     output: Output = None,
     force: Force = False,
+    allow_unstable: Unstable = False,
 ) -> None:
     """Fly one law: run.nc, summary.json, pictures and report.html."""
-    flights = _fly(file, law, output, force, nested=False)
+    flights = _fly(file, law, output, force, allow_unstable, nested=False)
     if flights[0].metrics["diverged_at"] is not None:
         raise typer.Exit(DIVERGED)
 
 
 @app.command()
-def compare(file: ScenarioFile = DEFAULT, output: Output = None, force: Force = False) -> None:
+def compare(
+    file: ScenarioFile = DEFAULT, output: Output = None, force: Force = False, allow_unstable: Unstable = False
+) -> None:
     """Fly every law of a file on the same problem: ranked table, pictures and report.html."""
-    _fly(file, None, output, force, nested=True)
+    _fly(file, None, output, force, allow_unstable, nested=True)
 
 
-def _fly(file: str, law: str | None, output: Path | None, force: bool, nested: bool) -> list[Flight]:
+def _fly(file: str, law: str | None, output: Path | None, force: bool, allow_unstable: bool, nested: bool) -> list[Flight]:
     """Fly one law of a file (the first if `law` is None) or, nested, all of them, each into a folder of its own."""
     from starhold.report.painter import Painter
 
@@ -71,7 +75,7 @@ def _fly(file: str, law: str | None, output: Path | None, force: bool, nested: b
         from starhold.scenario.building import build
         from starhold.scenario.reading import load
 
-        scenario = load(file)
+        scenario = load(file, allow_unstable)
         entries = list(scenario.laws) if nested else [scenario.laws[0] if law is None else scenario.pick(law)]
         # All of them before the first flight, so that what is wrong with the last is said at once.
         loops = [build(scenario, entry) for entry in entries]
@@ -102,13 +106,14 @@ def design(
     map_to: Annotated[
         Path | None, typer.Option("--map", metavar="FILE.png", help="draw the degree of stability over all gains")
     ] = None,
+    allow_unstable: Unstable = False,
 ) -> None:
     """Print the gains that formulas give: every law of a file that has a `form`."""
     from starhold.cli.show import console, print_design
     from starhold.scenario import designing
     from starhold.scenario.reading import load
 
-    scenario = load(file)
+    scenario = load(file, allow_unstable)
     for found in designing.design(scenario, law):
         print_design(found)
     if map_to is not None:

@@ -69,6 +69,12 @@ class Law:
         teller = getattr(self.module, "explain", None)
         return [] if teller is None else teller(craft, spec)
 
+    def check(self, gains: Any) -> None:
+        """ValueError where gains, each within its bounds, make a loop that cannot be stable; not every law can tell."""
+        teller = getattr(self.module, "check", None)
+        if teller is not None:
+            teller(gains)
+
     def remember(self, gains: Any, craft: Craft, period: float) -> Any:
         """The memory at the start of a run, made anew for each trajectory."""
         maker = getattr(self.module, "remember", None)

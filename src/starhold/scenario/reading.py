@@ -98,11 +98,12 @@ def builtin_text(name: str) -> str:
     return (resources.files("starhold.scenario") / "builtin" / f"{name}.toml").read_text(encoding="utf-8")
 
 
-def load(source: str | Path) -> Scenario:
-    """The scenario in a file, or the built-in one of that name. InputError says what is wrong with it."""
+def load(source: str | Path, allow_unstable: bool = False) -> Scenario:
+    """The scenario in a file, or the built-in one of that name. InputError says what is wrong with it; gains that a law
+    tells to be unstable are, unless allowed."""
     path = Path(source)
     if not path.exists() and str(source) in builtin_names():
-        return parse(builtin_text(str(source)), str(source))
+        return parse(builtin_text(str(source)), str(source), allow_unstable=allow_unstable)
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
@@ -110,10 +111,10 @@ def load(source: str | Path) -> Scenario:
         raise InputError(str(source), "", "no such file", f"a scenario file, or a built-in scenario: {known}") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(str(source), "", _reason(error), "a readable text file") from None
-    return parse(text, str(source), path.parent)
+    return parse(text, str(source), path.parent, allow_unstable)
 
 
-def parse(text: str, where: str, folder: Path = Path()) -> Scenario:
+def parse(text: str, where: str, folder: Path = Path(), allow_unstable: bool = False) -> Scenario:
     """The scenario of a TOML text; `where` names it in errors."""
     try:
         data: dict[str, Any] = tomllib.loads(text)
@@ -131,11 +132,11 @@ def parse(text: str, where: str, folder: Path = Path()) -> Scenario:
         raise InputError(where, "wheel" if table.wheels or table.wheel else "spacecraft", "", str(error)) from None
     entries: list[LawEntry] = []
     for number, item in enumerate(cast(list[Any], laws), 1):
-        entries.append(_read_law(item, craft, where, f"law[{number}]", {entry.name for entry in entries}))
+        entries.append(_read_law(item, craft, where, f"law[{number}]", {entry.name for entry in entries}, allow_unstable))
     return Scenario(table, tuple(entries), text, where, folder)
 
 
-def _read_law(data: Any, craft: Craft, where: str, key: str, taken: set[str]) -> LawEntry:
+def _read_law(data: Any, craft: Craft, where: str, key: str, taken: set[str], allow_unstable: bool) -> LawEntry:
     if not isinstance(data, dict):
         raise InputError(where, key, _show(data), "a [[law]] table")
     table = cast(dict[str, Any], data)
@@ -154,6 +155,11 @@ def _read_law(data: Any, craft: Craft, where: str, key: str, taken: set[str]) ->
         gains = law.gains(*values) if form is None else law.design(craft, spec)
     except ValueError as error:
         raise InputError(where, key, "", str(error)) from None
+    try:
+        if not allow_unstable:
+            law.check(gains)
+    except ValueError as error:
+        raise InputError(where, key, "", f"{error}; --allow-unstable takes it all the same") from None
     name = _free_name(read, law.name, taken, where, key)
     return LawEntry(name, law, gains, read.double_cover, read.hysteresis_width, form, spec)
 

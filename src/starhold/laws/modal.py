@@ -1,0 +1,131 @@
+"""Modal control: the poles of the motion linearised anew at every step are placed exactly, by levels."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from starhold.algebra.quaternion import derivative, vector_part
+from starhold.algebra.scalar import Scalar, equation
+from starhold.algebra.vector import Matrix, Vector, add, apply, cross, dot, scale, subtract, swing
+from starhold.laws.interface import Card, Gain, NoMemory, Seen
+from starhold.models.craft import Craft, tensor
+
+CARD = Card(
+    title="Modal",
+    summary="u = -M - K x, x = (q0 - 1, q, w): K gives the linear motion around x the spectra phi_0, phi_1 and b |w|2",
+    sources=(
+        "published work on modal control of a spacecraft's angular motion on quaternions, by multi-level decomposition",
+    ),
+    assumptions=("rigid body", "inertia known", "external torque known", "torque not limited"),
+    claims="local",
+)
+
+
+class Gains(NamedTuple):
+    """The spectra of the three levels."""
+
+    phi_0: Annotated[Matrix | Vector, Gain("1/s", shape=(3, 3), text="of the rates; a number a stands for a E")]
+    phi_1: Annotated[Matrix | Vector, Gain("1/s", shape=(3, 3), text="of the quaternion's vector part")]
+    b: Annotated[float, Gain("s", text="of its scalar part, over |w|2")]
+
+
+class Equal(NamedTuple):
+    """One real root for rates and attitude alike."""
+
+    a: Annotated[float, Gain("1/s", text="the root, on all axes")]
+    b: Annotated[float, Gain("s", text="of the quaternion's scalar part, over |w|2")] = -0.01
+
+
+class Fit(NamedTuple):
+    """The root that turns fastest within limits, from a fit over the initial angle; published is that of the default."""
+
+    angle: Annotated[float, Gain("rad", at_least=0.0, at_most=math.pi, text="error angle at the start of the run")]
+    below: Annotated[
+        Vector, Gain("1", shape=(3,), spread=False, text="c, d, e of c exp(d angle) + e, 1/s, up to the split")
+    ] = (
+        -1.018,
+        -2.071,
+        -0.849,
+    )
+    above: Annotated[Vector, Gain("1", shape=(3,), spread=False, text="the same beyond it")] = (-2.177, -0.726, -0.155)
+    split: Annotated[float, Gain("rad", at_least=0.0, at_most=math.pi, text="where the second piece begins")] = math.radians(
+        85.0
+    )
+    b: Annotated[float, Gain("s", text="of the quaternion's scalar part, over |w|2")] = -0.01
+
+
+FORMS: dict[str, Any] = {"equal": Equal, "fit": Fit}
+
+
+def design(craft: Craft, spec: Equal | Fit) -> Gains:
+    """phi_0 = phi_1 = a E."""
+    a = spec.a if isinstance(spec, Equal) else float(fitted(spec.angle, spec.below, spec.above, spec.split))
+    return Gains((a, a, a), (a, a, a), spec.b)
+
+
+def fitted(angle: ArrayLike, below: Vector, above: Vector, split: float) -> NDArray[np.float64]:
+    """c exp(d angle) + e (1/s) of an angle (rad; numbers or an array), by one triple up to the split and another beyond."""
+    first, second = (c * np.exp(d * np.asarray(angle, dtype=float)) + e for c, d, e in (below, above))
+    return np.where(np.asarray(angle) <= split, first, second)
+
+
+def explain(craft: Craft, spec: Equal | Fit) -> list[tuple[str, Any]]:
+    """The root, and how soon it forgets."""
+    a = design(craft, spec).phi_0[0]
+    return [("root a (1/s)", a), ("time constant (s)", -1.0 / a)]  # type: ignore[operator]
+
+
+def check(gains: Gains) -> None:
+    """ValueError where a spectrum is not stable."""
+    for name in ("phi_0", "phi_1"):
+        roots = np.linalg.eigvals(tensor(getattr(gains, name)))
+        worst = roots[np.argmax(roots.real)]
+        if not worst.real < 0.0:
+            shown = f"{worst.real:.4g}" if worst.imag == 0.0 else f"{worst:.4g}"
+            raise ValueError(f"{name} has the root {shown} 1/s, which is not stable")
+    if not gains.b < 0.0:
+        raise ValueError(f"b = {gains.b:g} s gives the scalar part a root that is not stable")
+
+
+@equation
+def _straighten(q: Vector, v: Vector) -> Vector:
+    """D^-1 v with D v = v + q x v."""
+    # D v = v + q x v is regular for every q, and needs no pivot.
+    return scale(1.0 / (1.0 + dot(q, q)), add(subtract(v, cross(q, v)), scale(dot(q, v), q)))
+
+
+@equation
+def _upper(q: Vector, w: Vector, gains: Gains, craft: Craft, first: Scalar, rest: Vector) -> Vector:
+    """K_1 (first, rest): what gives the quaternion the spectra phi_1 and b |w|2, if it could be steered by the momentum."""
+    half = apply(craft.inertia, _straighten(q, w))
+    own = scale(2.0, apply(craft.inertia, _straighten(q, rest)))
+    last = scale(4.0 * gains.b, half)
+    pulled = apply(gains.phi_1, add(scale(first, last), own))
+    return subtract(subtract(scale(first, half), scale(0.5 * dot(w, rest), last)), pulled)
+
+
+@equation
+def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
+    """Control torque (N m, body).
+
+    With x' = (q0', q') the level above gives K_0 x = K_1 x' - phi_0 (K_1 (q0 - 1, q) + J w) beside the known torque, whose
+    Jacobians cancel. Nothing is divided by w: where it vanishes, the scalar part has no pole of its own to place.
+    """
+    q, w = vector_part(seen.attitude), seen.rate
+    turning = derivative(seen.attitude, w)
+    held = _upper(q, w, gains, craft, seen.attitude[0] - 1.0, q)
+    moved = _upper(q, w, gains, craft, turning[0], vector_part(turning))
+    feedback = subtract(moved, apply(gains.phi_0, add(held, apply(craft.inertia, w))))
+    model = add(swing(craft.inertia, seen.body_rate), cross(seen.body_rate, seen.stored))
+    model = subtract(add(model, apply(craft.inertia, seen.target_acceleration)), seen.external_torque)
+    return subtract(model, feedback), memory
+
+
+def examples() -> list[Gains]:
+    """The published spectrum, and one that differs from axis to axis."""
+    a = (-0.428, -0.428, -0.428)
+    return [Gains(a, a, -0.01), Gains((-0.5, -0.6, -0.7), ((-0.4, 0.1, 0.0), (0.0, -0.3, 0.05), (0.0, 0.0, -0.5)), -0.01)]
