@@ -137,6 +137,7 @@ def test_every_kind_of_claim_can_be_told_where_it_is_undecided(kind: str) -> Non
         "disturbance": {"torque": 1e-3},
         "sampling": {"period": 1.0, "radius": 1.2, "eigenvalues": [[1.2, 0.0]], "longest": None, "every_shorter": False},
         "wheels": {"momentum": 0.1},
+        "region": {},
         "sliding": {"torque": [0.0, 0.0, 0.0], "margin": 1e-3},
     }[kind]
     claim = Claim(kind, numbers, {}, (), (Obligation("form", "exact identity", "undecided", {"reason": "why not"}),))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -18,6 +18,7 @@ from starhold.certification.frame import Frame, take_apart
 from starhold.certification.matrices import floats, number
 from starhold.certification.motion import Motion
 from starhold.certification.potential import Potential, Spring
+from starhold.certification.region import Shape
 from starhold.certification.sliding import take_surface
 from starhold.certification.subject import make_subject
 from starhold.laws.interface import Seen
@@ -26,7 +27,7 @@ from starhold.models.actuator import IDEAL
 from starhold.models.craft import tensor
 from starhold.models.sensor import SILENT
 from starhold.models.wheels import Wheels
-from starhold.simulation.lanes import simulate_many
+from starhold.simulation.lanes import Batch, simulate_many
 
 FLIGHTS = 10_000
 LEGS = (1, 250, 250, 500)
@@ -58,6 +59,9 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
     sliding = certificate.claim("sliding")
     if sliding is not None and sliding.outcome == "proved":
         return _fly_to_surface(loop, certificate, sliding, flights, seed)
+    attracting = certificate.claim("region")
+    if attracting is not None and attracting.outcome == "proved":
+        return _fly_region(loop, certificate, attracting, flights, seed)
     claims = [certificate.claim(kind) for kind in ("wheels", "torque-limit", "convergence")]
     claim = next((c for c in claims if c is not None and c.outcome == "proved"), None)
     if claim is None:
@@ -75,26 +79,58 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
     states = draw(flights, floats(frame.P), frame.potential, level, random)
     if free.wheels is not None:
         states = np.vstack([states, _rotors(free, certificate, states, random)])
-    value, s = _value(free, frame, claim.witness["epsilon"]), number(frame.potential.top)
-    highest, before, torque = 0.0, value(states), 0.0
-    for steps in LEGS:
-        batch = simulate_many(free, states, steps)
-        if (batch.lost_at >= 0.0).any():
-            raise BrokenClaimError(_where(certificate, claim, states, int(np.argmax(batch.lost_at >= 0.0)), "is lost"))
-        states, after = batch.states, value(batch.states)
-        rising = after > before * (1.0 + SLACK) + 1e-15 * s
-        if rising.any():
-            lane = int(np.argmax(after / np.maximum(before, 1e-300) * rising))
-            raise BrokenClaimError(
-                _where(certificate, claim, states, lane, f"has V = {after[lane]:g} after {before[lane]:g}")
-            )
-        highest, before = max(highest, float((after / np.maximum(before, 1e-300)).max())), after
+    value, floor = _value(free, frame, claim.witness["epsilon"]), 1e-15 * number(frame.potential.top)
+    highest, torque = 0.0, 0.0
+    for batch, share in _falling(free, certificate, claim, states, value, floor):
+        highest = max(highest, share)
         if claim.kind != "convergence":
             torque = max(torque, _need(batch.states, loop, claim))
     share = None if claim.kind == "convergence" else torque
     if share is not None and share > 1.0 + 1e-12:
         raise BrokenClaimError(f"{certificate.name}: a flight from the certified set needs {share:.3g} of a limit")
     return Trial(flights, level, highest, share)
+
+
+def _fly_region(loop: ClosedLoop, certificate: Certificate, claim: Claim, flights: int, seed: int) -> Trial:
+    free, shape, level = _undisturbed(loop, certificate), Shape(**claim.witness), claim.numbers["level"]
+    a = free.law.module.single_root(free.gains)[0]
+    sign: Callable[[Array], Any] = lambda q0: np.where(q0 < 0.0, -1.0, 1.0) if free.cover == "shortest" else 1.0  # noqa: E731
+
+    def value(states: Array) -> Array:
+        return shape.value(a, states[:4] * sign(states[0]), states[4:7])
+
+    states = shape.draw(a, level, flights, np.random.default_rng(seed))
+    if free.wheels is not None:
+        states = np.vstack([states, _rotors(free, certificate, states, np.random.default_rng(seed + 1))])
+    shares = [share for _, share in _falling(free, certificate, claim, states, value, 1e-15 * a * a)]
+    return Trial(flights, level, max(shares), None)
+
+
+def _falling(
+    free: ClosedLoop,
+    certificate: Certificate,
+    claim: Claim,
+    states: Array,
+    value: Callable[[Array], Array],
+    floor: float,
+) -> Generator[tuple[Batch, float]]:
+    """The flights leg by leg, with the largest V as a share of that a leg before; BrokenClaimError where one rises by more
+    than a little of it and `floor`."""
+    before = value(states)
+    for steps in LEGS:
+        batch = simulate_many(free, states, steps)
+        if (batch.lost_at >= 0.0).any():
+            raise BrokenClaimError(_where(certificate, claim, states, int(np.argmax(batch.lost_at >= 0.0)), "is lost"))
+        states, after = batch.states, value(batch.states)
+        shares = after / np.maximum(before, 1e-300)
+        rising = after > before * (1.0 + SLACK) + floor
+        if rising.any():
+            lane = int(np.argmax(shares * rising))
+            raise BrokenClaimError(
+                _where(certificate, claim, states, lane, f"has V = {after[lane]:g} after {before[lane]:g}")
+            )
+        before = after
+        yield batch, float(shares.max())
 
 
 def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, flights: int, seed: int) -> Trial:

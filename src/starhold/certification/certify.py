@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite, isinf
+from typing import Any
 
-from starhold.certification.certificate import Certificate, Claim
-from starhold.certification.convergence import converge
+from starhold.certification.certificate import EXACT, Certificate, Claim, Obligation
+from starhold.certification.convergence import assumed, converge
 from starhold.certification.disturbance import disturbance
 from starhold.certification.inertia import inertia_box
 from starhold.certification.limits import torque_limit
 from starhold.certification.motion import Motion
+from starhold.certification.region import region
 from starhold.certification.sampling import sampling
 from starhold.certification.saturation import saturation
 from starhold.certification.sliding import surface_claim
@@ -39,17 +42,18 @@ BEST = Wanted()
 
 def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certificate:
     """The certificate of a closed loop as it starts, whatever happens to it later. A law that is compiled-only or declares
-    neither V nor a surface gets one without claims, which is undecided; so does a surface with wheels, and a loop that
-    counts on a lost wheel."""
+    neither V nor a surface nor a single root gets one without claims, which is undecided; so does a surface with wheels, and
+    a loop that counts on a lost wheel."""
     subject = make_subject(loop, wanted.disturbance, wanted.momentum)
     claims: list[Claim] = []
     sound = loop.wheels is None or gives_what_is_asked(loop.wheels)
     if sound and not loop.law.card.compiled_only:
         if loop.law.lyapunov is not None:
             claims.extend(_by_lyapunov(subject, wanted))
-        elif loop.wheels is None:
-            reaching = surface_claim(subject)
-            claims.extend([] if reaching is None else [reaching])
+        else:
+            own = (region(subject), surface_claim(subject) if loop.wheels is None else None)
+            claims.extend(claim for claim in own if claim is not None)
+            claims.extend(_unshown(subject, wanted))
         sampled = sampling(Motion(subject))
         claims.extend([] if sampled is None else [sampled])
     return Certificate(name or loop.law.name, described(subject), tuple(claims))
@@ -70,3 +74,20 @@ def _by_lyapunov(subject: Subject, wanted: Wanted) -> list[Claim]:
     )
     # What nobody asked for is claimed only where it is proved.
     return [main, *(c for c, asked in more if c is not None and (asked or c.outcome == "proved"))]
+
+
+def _unshown(subject: Subject, wanted: Wanted) -> list[Claim]:
+    """What is asked of a law without a V of its own."""
+    rate, turn, tolerance = wanted.rate, wanted.turn, wanted.inertia_tolerance
+    asked: list[tuple[str, dict[str, Any]]] = []
+    if rate is not None:
+        asked.append(("convergence", {"rate_everywhere": None if isinf(rate) else rate, "everything": isinf(rate)}))
+    limit = subject.loop.craft.torque_limit
+    if turn is not None and subject.loop.wheels is not None:
+        asked.append(("wheels", {"turn": turn}))
+    elif turn is not None and subject.loop.limit != "none" and isfinite(limit):
+        asked.append(("torque-limit", {"turn": turn, "kind": subject.loop.limit, "limit": limit}))
+    if tolerance is not None:
+        asked.append(("inertia", {"tolerance": tolerance}))
+    reason = Obligation("form", EXACT, "undecided", {"reason": "the law declares no V to show it with"})
+    return [Claim(kind, numbers, {}, assumed(subject), (reason,)) for kind, numbers in asked]

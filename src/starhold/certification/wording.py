@@ -12,6 +12,7 @@ from starhold.laws.catalogue import catalogue
 
 HEADINGS = {
     "convergence": "converges",
+    "region": "region of attraction",
     "torque-limit": "within the torque limit",
     "inertia": "uncertain inertia",
     "wheels": "within the wheels' limits",
@@ -102,6 +103,12 @@ def _convergence(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     return f"{place(n)} the body comes to rest on target{_cover(n, subject)}".strip()
 
 
+def _region(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
+    where = place(n) or "from a level set of V"
+    either = ", from either quaternion of an attitude" if subject["double_cover"] == "hysteresis" else ""
+    return f"{where} the body comes to rest on target without leaving the set{either}; the set is the same for every inertia"
+
+
 def _torque_limit(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     kind = "on every axis" if n["kind"] == "axis" else "in norm"
     return f"{place(n)} the torque never exceeds {n['limit']:.4g} N m {kind}"
@@ -159,6 +166,7 @@ def _sliding(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 
 _SENTENCES = {
     "convergence": _convergence,
+    "region": _region,
     "torque-limit": _torque_limit,
     "wheels": _wheels,
     "inertia": _inertia,

@@ -31,7 +31,7 @@ def print_certificate(tried: Tried) -> None:
     console.print(f"[bold]{certificate.name}[/bold]: {_coloured(certificate.outcome)}", highlight=False)
     if not certificate.claims:
         console.print(
-            "  no claim: proofs are for laws with a Lyapunov function, or a surface and no wheels",
+            "  no claim: proofs are for laws with a Lyapunov function, one root, or a surface and no wheels",
             highlight=False,
         )
     table = Table(show_edge=False, pad_edge=False, box=None, show_header=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -43,7 +44,10 @@ class Equal(NamedTuple):
 class Fit(NamedTuple):
     """The root that turns fastest within limits, from a fit over the initial angle; published is that of the default."""
 
-    angle: Annotated[float, Gain("rad", at_least=0.0, at_most=math.pi, text="error angle at the start of the run")]
+    angle: Annotated[
+        float | None,
+        Gain("rad", at_least=0.0, at_most=math.pi, text="initial error angle; that of the scenario's start if absent"),
+    ] = None
     below: Annotated[
         Vector, Gain("1", shape=(3,), spread=False, text="c, d, e of c exp(d angle) + e, 1/s, up to the split")
     ] = (
@@ -61,9 +65,19 @@ class Fit(NamedTuple):
 FORMS: dict[str, Any] = {"equal": Equal, "fit": Fit}
 
 
+def complete(spec: Equal | Fit, angle: Callable[[], float]) -> Equal | Fit:
+    """The inputs of a form with the error angle (rad) at the start of a run where they leave it out."""
+    return spec._replace(angle=angle()) if isinstance(spec, Fit) and spec.angle is None else spec
+
+
 def design(craft: Craft, spec: Equal | Fit) -> Gains:
-    """phi_0 = phi_1 = a E."""
-    a = spec.a if isinstance(spec, Equal) else float(fitted(spec.angle, spec.below, spec.above, spec.split))
+    """phi_0 = phi_1 = a E. ValueError where a fit is told no angle."""
+    if isinstance(spec, Equal):
+        a = spec.a
+    elif spec.angle is None:
+        raise ValueError("the fit needs the error angle at the start of the run")
+    else:
+        a = float(fitted(spec.angle, spec.below, spec.above, spec.split))
     return Gains((a, a, a), (a, a, a), spec.b)
 
 
@@ -89,6 +103,13 @@ def check(gains: Gains) -> None:
             raise ValueError(f"{name} has the root {shown} 1/s, which is not stable")
     if not gains.b < 0.0:
         raise ValueError(f"b = {gains.b:g} s gives the scalar part a root that is not stable")
+
+
+def single_root(gains: Gains) -> tuple[float, float] | None:
+    """a (1/s) and b (s) where phi_0 = phi_1 = a E: the closed loop is then the same for every inertia."""
+    first, second = (tensor(phi) for phi in gains[:2])
+    a = float(first[0, 0])
+    return (a, gains.b) if (first == a * np.eye(3)).all() and (second == first).all() else None
 
 
 @equation

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
 from starhold.analysis.trial import Trial, fly_claims
 from starhold.certification.certificate import Certificate
 from starhold.certification.certify import Wanted, certify
+from starhold.certification.region import Shape
 from starhold.laws.double_cover import COVERS
 from starhold.laws.interface import with_attitude
 from starhold.loop.kernels import make_step
@@ -86,15 +87,19 @@ def certify_scenario(scenario: Scenario, law: str | None = None) -> list[Tried]:
 
 def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
     """Whether the loop's start lies in the sets of the proved claims that are about a level of V."""
-    function = loop.law.lyapunov
-    if function is None or loop.law.card.compiled_only:
+    if loop.law.card.compiled_only:
         return {}
     seen = make_step(loop.parts()).look(loop.carry(), 0, 0, loop.craft, loop.setup())
     shown = with_attitude(seen, COVERS[loop.cover](seen.attitude, loop.carry().h, loop.hysteresis_width)[0])
     total = tensor(loop.craft.inertia) @ seen.body_rate + np.array(seen.stored)
-    found: dict[str, bool] = {}
+    function, found = loop.law.lyapunov, dict[str, bool]()
     for claim in certificate.claims:
-        if claim.outcome == "proved" and "start" in claim.numbers:
+        if claim.outcome != "proved":
+            continue
+        if claim.kind == "region":
+            a = cast(float, loop.law.module.single_root(loop.gains)[0])
+            found[claim.kind] = bool(Shape(**claim.witness).value(a, shown.attitude, shown.rate) <= claim.numbers["level"])
+        elif function is not None and "start" in claim.numbers:
             level, stiffness = claim.numbers["start"], claim.witness.get("stiffness")
             value = function(shown, loop.gains, loop.craft)
             if stiffness is not None:

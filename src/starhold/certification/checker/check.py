@@ -314,6 +314,7 @@ NUMBERS: dict[str, dict[str, Test]] = {
         "start": _MAYBE,
         "rate_start": _MAYBE,
     },
+    "region": dict.fromkeys(("level", "turn", "rate"), _number),
 }
 _PROOF: dict[str, Test] = {"stiffness": _MAYBE, "epsilon": _number, "rho": _number}
 WITNESS: dict[str, dict[str, Test]] = {
@@ -324,4 +325,5 @@ WITNESS: dict[str, dict[str, Test]] = {
     "disturbance": {**_PROOF, "rate_bound": _MAYBE, "q_rate": _number, "q_attitude": _number},
     "sampling": {},
     "sliding": {},
+    "region": dict.fromkeys(("p", "c2", "g", "m"), _number),
 }

@@ -30,6 +30,7 @@ from starhold.certification.checker.exact import (
 )
 from starhold.certification.checker.frame import is_even
 from starhold.certification.checker.loop import Loop
+from starhold.certification.checker.modal import ModalRegion
 from starhold.certification.checker.odd import OddRegion
 from starhold.certification.checker.region import BALLS, EXACT, ROOTS, SIGN, Numbers, Region, optional
 from starhold.certification.checker.subject import Subject
@@ -222,7 +223,7 @@ def disturbance(subject: Subject, claim: Numbers) -> list[Obligation]:
 
 def sampling(subject: Subject, claim: Numbers) -> list[Obligation]:
     """The linear loop with the torque held for a period is stable."""
-    loop, numbers = Loop(subject), claim["numbers"]
+    loop, numbers = Loop(subject, quotient=True), claim["numbers"]
     radius, longest = rational(numbers["radius"]), rational(numbers["longest"])
 
     def at_period() -> str:
@@ -281,6 +282,11 @@ def sliding(subject: Subject, claim: Numbers) -> list[Obligation]:
     return [*found, (last, SIGN, proof.cover), ("numbers", "", proof.ends)]
 
 
+def region(subject: Subject, claim: Numbers) -> list[Obligation]:
+    """Every motion of a loop of the law `modal` from {V <= level} stays there and comes to rest on target."""
+    return ModalRegion(subject, claim["numbers"], claim["witness"]).proofs()
+
+
 _UNLIMITED, _FREE = "torque not limited", "neither torque nor wheels limited, wheels without friction"
 _BASE = (
     "rigid body",
@@ -312,4 +318,5 @@ CLAIMS: dict[str, Kind] = {
         beside=("no stored momentum",),
     ),
     "sliding": Kind(_instead(_BASE[5], "torque from outside bounded on each axis"), sliding),
+    "region": Kind(_BASE, region),
 }

@@ -3,7 +3,8 @@ polynomials, for the inertia that is given or for every one near it. Nothing her
 
 Variables: q0..q3 error attitude, w1..w3 rate relative to the target, r and a the target's rate and acceleration, e the
 torque the models know, m one that nobody knows, t what the actuators give, h the momentum of the whole, wheels included
-(body axes; of which J w_abs is the body's), d11..d33 how far the inertia is from the one given.
+(body axes; of which J w_abs is the body's), d11..d33 how far the inertia is from the one given, z the reciprocal of
+1 + |q|2, by which laws divide.
 """
 
 from __future__ import annotations
@@ -13,10 +14,11 @@ from functools import cached_property
 from itertools import combinations
 from typing import Any
 
-from starhold.algebra.polynomial import Monomial, Polynomial, constants, jointly
-from starhold.algebra.quaternion import derivative
+from starhold.algebra.polynomial import Monomial, Polynomial, constants, jointly, reciprocal
+from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.vector import add, apply, cross, dot, scale, subtract
 from starhold.certification.checker.exact import (
+    ONE,
     ZERO,
     CheckError,
     Dual,
@@ -40,6 +42,7 @@ from starhold.models.rigid_body import angular_acceleration, kinetic_energy
 
 TURN, RATE, ATTITUDE = named("q"), named("w"), named("q", 0)
 W = variables(RATE)
+QUOTIENT = "z"
 SHIFTS = (("d11", "d12", "d13"), ("d12", "d22", "d23"), ("d13", "d23", "d33"))
 
 
@@ -47,7 +50,8 @@ class Loop:
     """The loop of a subject, for its inertia, for another plant of `inertia` that the law does not know, or, with `shifted`,
     for every inertia at once. The last two have a target at rest. `tolerance`: how far entries of the inertia may be from
     those given, of the roots of the moments; None in a shifted loop lets them be anything. `stiffness`: V is the kinetic
-    energy and 2 stiffness (1 - q0); None: the law's own."""
+    energy and 2 stiffness (1 - q0); None: the law's own. `quotient`: whether a claim takes a law that divides by 1 + |q|2,
+    the reciprocal of which is a variable then."""
 
     def __init__(
         self,
@@ -56,8 +60,9 @@ class Loop:
         inertia: Rows | None = None,
         shifted: bool = False,
         tolerance: Any | None = None,
+        quotient: bool = False,
     ) -> None:
-        self.subject, self.stiffness, self.shifted = subject, stiffness, shifted
+        self.subject, self.stiffness, self.shifted, self.quotient = subject, stiffness, shifted, quotient
         self.inertia = subject.inertia if inertia is None else inertia
         self.still = shifted or inertia is not None or not subject.moving
         self.reaches: Rows | None = None
@@ -120,10 +125,14 @@ class Loop:
         subject = self.subject
         demand(not subject.law.card.compiled_only, "the law is no equation")
         craft = self._craft(subject.inertia, inverted(subject.inertia))
-        found = jointly(subject.law.torque(self.seen, subject.gains, craft, subject.memory)[0])
-        read = {
-            name for truths, parts in found for p in (*parts, *(c.positive for c, _ in truths)) for name in p.variables()
-        }
+        q: Any = vector_part(self.seen.attitude)
+        with reciprocal(1 + dot(q, q), QUOTIENT):
+            found = jointly(subject.law.torque(self.seen, subject.gains, craft, subject.memory)[0])
+        switches = {name for truths, _ in found for c, _ in truths for name in c.positive.variables()}
+        read = {name for _, parts in found for p in parts for name in p.variables()} | switches
+        demand(QUOTIENT not in switches, "the law switches on a quotient")
+        demand(self.quotient or QUOTIENT not in read, "the law divides by 1 + |q|2, which such a claim does not take")
+        read.discard(QUOTIENT)
         demand(
             all(name[0] in "qwraemhd" for name in read),
             "the torque depends on more than attitude, rate, target, torque and stored momentum",
@@ -149,7 +158,9 @@ class Loop:
     def linear(self, sign: int = 1) -> tuple[Rows, Rows]:
         """K_rate and K_attitude of the torque -K_rate w - K_attitude q near rest at (sign, 0, 0, 0), target at rest."""
         gains: list[Rows] = [[], []]
-        for component in self.resting(sign)[1].values():
+        for whole in self.resting(sign)[1].values():
+            # 1/(1 + |q|2) is 1 there, and its slope -2 q/(1 + |q|2)2 zero.
+            component = whole.given({QUOTIENT: ONE})
             own = component.only(lambda m: all(name in ATTITUDE or name in RATE for name in m))
             demand(at_rest(own, sign) == 0, "the torque at rest on target is not zero")
             for gain, names in zip(gains, (RATE, TURN), strict=True):

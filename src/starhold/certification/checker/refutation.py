@@ -20,6 +20,7 @@ from starhold.certification.checker.exact import (
     within_circle,
 )
 from starhold.certification.checker.loop import ATTITUDE, RATE, Loop
+from starhold.certification.checker.modal import ModalRegion
 from starhold.certification.checker.region import Numbers, optional
 from starhold.certification.checker.subject import Subject, gradient, named
 from starhold.certification.checker.surface import Sliding
@@ -29,11 +30,14 @@ def refutation(subject: Subject, claim: Mapping[str, Any], evidence: Mapping[str
     """What evidence shows; a CheckError where it does not refute."""
     kind, numbers, witness = (claim[key] for key in ("kind", "numbers", "witness"))
     if "eigenvalue" in evidence:
-        demand(not within_circle(stepped(Loop(subject), subject.period), fmpq(1)), "all eigenvalues are within the circle")
+        roots = stepped(Loop(subject, quotient=True), subject.period)
+        demand(not within_circle(roots, fmpq(1)), "all eigenvalues are within the circle")
         return "an eigenvalue is not within the circle"
     if kind == "sliding":
         return _surface(subject, numbers, evidence)
     demand("state" in evidence, "there is no state")
+    if kind == "region":
+        return ModalRegion(subject, numbers, witness).rises(_state(evidence["state"]))
     other = _inertia(subject, numbers, evidence) if "inertia" in evidence else None
     loop = Loop(subject, optional(witness.get("stiffness")), other)
     values = _state(evidence["state"])

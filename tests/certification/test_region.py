@@ -1,0 +1,159 @@
+"""The region of attraction of the modal law: what is claimed, attacked by states that nobody chose."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from flint import fmpq
+from scipy.optimize import minimize
+
+from starhold.algebra.quaternion import derivative
+from starhold.algebra.vector import ZERO, add
+from starhold.analysis.trial import fly_claims
+from starhold.certification import region
+from starhold.certification.certify import Wanted, certify
+from starhold.certification.motion import Motion
+from starhold.certification.region import ENERGY, SHAPES, Shape, holds
+from starhold.certification.subject import make_subject
+from starhold.laws.interface import NoMemory, Seen
+from starhold.models.rigid_body import angular_acceleration
+from starhold.report.certificates import start_inside
+from starhold.scenario.building import build
+from starhold.scenario.reading import parse
+from tests.small import CRAFT
+
+ROOT = -0.428
+
+
+def loop_of(lines=f"a = {ROOT}", craft=CRAFT):
+    form = "" if "phi_0" in lines else 'form = "equal"\n'
+    scenario = parse(f'{craft}[[law]]\ntype = "modal"\n{form}{lines}\n', "small")
+    return build(scenario, scenario.laws[0])
+
+
+def claim_of(loop):
+    return certify(loop).claim("region")
+
+
+def falling(loop, shape, states):
+    """V and V' at the columns of states, by the law's and the models' own equations."""
+    a = loop.law.module.single_root(loop.gains)[0]
+    found = np.empty((2, states.shape[1]))
+    for lane, state in enumerate(states.T):
+        q, w = tuple(state[:4].tolist()), tuple(state[4:7].tolist())
+        seen = Seen(q, w, w, ZERO, ZERO, ZERO, ZERO, loop.period)
+        torque, _ = loop.law.torque(seen, loop.gains, loop.craft, NoMemory())
+        dq, dw = np.array(derivative(q, w)), np.array(angular_acceleration(w, add(torque, ZERO), loop.craft))
+        step = 1e-3 / (1.0 + np.abs(dw).max() + np.abs(dq).max())
+        near = [shape.value(a, state[:4] + k * step * dq, state[4:7] + k * step * dw) for k in (-2, -1, 1, 2)]
+        # V is of the third degree, so that five points give its slope exactly.
+        found[:, lane] = shape.value(a, state[:4], state[4:7]), np.dot([1, -8, 8, -1], near) / (12 * step)
+    return found
+
+
+@pytest.mark.parametrize("root", [-0.2, ROOT, -1.0, -2.0])
+def test_the_energy_alone_has_the_level_that_was_found_for_it(root):
+    """Rests up to 167 to 174 degrees; levels 3.55 a^2 to 3.80 a^2."""
+    claim = claim_of(loop_of(f'a = {root}\ndouble_cover = "hysteresis"'))
+    assert claim.outcome == "proved"
+    assert claim.witness == ENERGY._asdict()
+    expected = {-0.2: 3.553, ROOT: 3.583, -1.0: 3.660, -2.0: 3.796}[root]
+    assert 0.985 * expected < claim.numbers["level"] / root**2 < expected
+    assert 166.0 < math.degrees(claim.numbers["turn"]) < 174.0
+
+
+def test_the_published_start_is_outside_the_one_and_inside_the_other():
+    start = 'attitude = [0.1414213562373095, 0.3, -0.5, 0.8]\nrate = ["-10 deg/s", "-7 deg/s", "11 deg/s"]'
+    craft = CRAFT.replace("attitude = [1, 0, 0, 0.1]\nrate = [0, 0, 0]", start)
+    for cover, inside in (("hysteresis", False), ("shortest", False), ("as_published", True)):
+        loop = loop_of(f'a = {ROOT}\ndouble_cover = "{cover}"', craft)
+        certificate = certify(loop)
+        assert start_inside(certificate, loop) == {"region": inside}
+        level = certificate.claim("region").numbers["level"]
+        value = Shape(**certificate.claim("region").witness).value(ROOT, loop.start.attitude, loop.start.rate)
+        # 0.670 against 0.653 to 0.657.
+        assert value / level == pytest.approx(0.664 if inside else 1.026, abs=0.02)
+    assert math.degrees(certificate.claim("region").numbers["rate"]) > 100.0
+
+
+@pytest.mark.parametrize(("root", "b"), [(ROOT, -0.01), (-2.0, -0.01), (-1.0, -0.1), (-0.4, -1.0), (-1.5, -0.7)])
+@pytest.mark.parametrize("cover", ["as_published", "shortest", "hysteresis"])
+def test_v_falls_at_random_states_of_the_set_and_at_the_worst(root, b, cover):
+    loop = loop_of(f'a = {root}\nb = {b}\ndouble_cover = "{cover}"')
+    claim = claim_of(loop)
+    assert claim.outcome == "proved"
+    shape, level = Shape(**claim.witness), claim.numbers["level"]
+    states = shape.draw(root, level, 1000, np.random.default_rng(7))
+    value, slope = falling(loop, shape, states)
+    assert value.max() <= level * (1.0 + 1e-9)
+    assert value.min() > 0.0
+    assert slope.max() < 0.0
+
+    def rise(x):
+        q = x[:4] / np.linalg.norm(x[:4])
+        v, s = falling(loop, shape, np.concatenate([q, x[4:]])[:, None])[:, 0]
+        scale = abs(root) ** 3 * (np.dot(x[4:], x[4:]) / root**2 + (1.0 - q[0] if shape != ENERGY else 0.0))
+        return -s / max(scale, 1e-12) + 1e3 * max(v / level - 1.0, 0.0)
+
+    for lane in np.argsort(-slope / np.sum(states[4:7] ** 2, axis=0))[:3]:
+        worst = minimize(rise, states[:7, lane], method="Nelder-Mead", options={"maxiter": 200})
+        assert worst.fun > 0.0
+
+
+def test_nothing_larger_is_shown():
+    """The level is within a few percent of where V does not fall, or of the other quaternion's rest."""
+    beta = fmpq(428, 100000)
+    assert holds(ENERGY, beta, fmpq(356, 100))
+    assert not holds(ENERGY, beta, fmpq(37, 10))
+    assert holds(SHAPES[0], beta, fmpq(99, 10))
+    assert not holds(SHAPES[0], beta, fmpq(103, 10))
+    # Beyond the other quaternion's rest, where V' = 0.
+    assert not holds(Shape(5.0, -0.2, 2.0, 0.9), beta, fmpq(93, 10))
+    # A mixed term that outweighs the damping.
+    assert not holds(Shape(5.0, 0.0, 4.1, 0.0), beta, fmpq(1, 100))
+
+
+@pytest.mark.parametrize("inertia", ["[2.0, 3.0, 4.0]", "[[12.0, 0.5, 0.1], [0.5, 14.0, 0.2], [0.1, 0.2, 9.0]]"])
+def test_the_same_for_every_inertia_and_target(inertia):
+    craft = CRAFT.replace("[2.0, 3.0, 4.0]", inertia)
+    orbit = '[orbit]\nposition = ["7000 km", 0, 0]\nvelocity = [0, 7500, 0]\n[target]\nmode = "orbital"\n'
+    claims = [claim_of(loop_of(craft=text)) for text in (CRAFT, craft, craft + orbit)]
+    assert [c.numbers for c in claims] == [claims[0].numbers] * 3
+    assert [c.outcome for c in claims] == ["proved"] * 3
+
+
+def test_other_spectra_are_left_undecided_and_say_so():
+    for lines in ("phi_0 = -0.4\nphi_1 = -0.5\nb = -0.01", "phi_0 = [-0.4, -0.4, -0.3]\nphi_1 = -0.4\nb = -0.01"):
+        claim = claim_of(loop_of(lines))
+        assert claim.outcome == "undecided"
+        assert "only for phi_0 = phi_1" in claim.obligations[0].evidence["reason"]
+
+
+def test_another_motion_is_not_taken_for_this_one(monkeypatch):
+    loop = loop_of()
+    motion, root = Motion(make_subject(loop)), (fmpq(-428, 1000), fmpq(-1, 100))
+    exact_root = tuple(fmpq(*x.as_integer_ratio()) for x in loop.law.module.single_root(loop.gains))
+    assert region._same_motion(motion, *exact_root)
+    assert not region._same_motion(motion, *root)
+    monkeypatch.setattr(loop.law.module, "single_root", lambda gains: (ROOT * (1.0 + 1e-15), -0.01))
+    claim = claim_of(loop)
+    assert claim.outcome == "undecided"
+    assert "not those" in claim.obligations[0].evidence["reason"]
+
+
+def test_what_is_asked_for_and_not_shown_is_told():
+    wanted = Wanted(rate=0.1, turn=1.0, inertia_tolerance=0.1)
+    found = certify(loop_of(), wanted=wanted)
+    assert found.outcome == "undecided"
+    assert {c.kind: c.outcome for c in found.claims}["inertia"] == "undecided"
+    assert {c.kind: c.outcome for c in found.claims}["region"] == "proved"
+
+
+@pytest.mark.parametrize("cover", ["as_published", "shortest", "hysteresis"])
+def test_flights_from_the_set_do_not_contradict_it(cover):
+    loop = loop_of(f'a = {ROOT}\ndouble_cover = "{cover}"')
+    trial = fly_claims(loop, certify(loop), flights=1000)
+    assert trial is not None
+    assert trial.highest_share <= 1.0 + 1e-9

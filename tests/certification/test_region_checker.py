@@ -1,0 +1,444 @@
+"""The checker's reading of regions of the law `modal`: what holds, what fails, and its mathematics."""
+
+import math
+
+import numpy as np
+import pytest
+from flint import fmpq
+from hypothesis import given, settings
+from hypothesis import strategies as some
+
+from starhold.algebra.quaternion import derivative
+from starhold.algebra.vector import ZERO
+from starhold.certification.checker import check, passed
+from starhold.certification.checker import modal as reading
+from starhold.certification.checker.exact import CheckError, floating, rational
+from starhold.certification.checker.modal import ModalRegion, Shares
+from starhold.certification.checker.subject import read_subject
+from starhold.certification.subject import described, make_subject
+from starhold.laws import modal
+from starhold.laws.interface import NoMemory, Seen
+from starhold.models.craft import tensor
+from starhold.models.rigid_body import angular_acceleration
+from tests.certification.loops import random_craft, rotors
+from tests.certification.test_checker import TEXTBOOK, by_hand, content_at, proved_by_hand, replaced, spots
+
+PLAIN, BETTER = (4.0, 0.0, 0.0, 0.0), (5.0, -0.2, 2.0, 0.9)
+A, B = -0.428, -0.01
+ON_WHEELS = ["neither torque nor wheels limited, wheels without friction" if a == TEXTBOOK[4] else a for a in TEXTBOOK]
+
+
+def highest_turn(level, witness):
+    """The largest turn of a witness that is in {V <= level a2}, where V grows with it."""
+    p, c2 = witness[:2]
+    u = level / p if c2 == 0.0 else (math.sqrt(max(p * p + 4.0 * c2 * level, 0.0)) - p) / (2.0 * c2)
+    return 2.0 * math.acos(1.0 - min(max(u, 0.0), 2.0))
+
+
+def region(c, witness=PLAIN, cover="as_published", a=A, assumptions=TEXTBOOK, **changes):
+    """A claim with level = c a2, and turn and rate as large as these can be up to rounding."""
+    names = [("form", "exact identity"), ("descent", "ball arithmetic")]
+    if witness[2] == witness[3] == 0.0:
+        names.append(("only rest", "LaSalle"))
+    names.append(("jumps lower V" if cover == "hysteresis" else "single rest in the set", "exact inequality"))
+    level = c * a * a
+    numbers = {"level": level, "turn": 0.999999 * highest_turn(c, witness), "rate": 0.999999 * math.sqrt(2.0 * level)}
+    return proved_by_hand(
+        "region", names, numbers | changes, dict(zip(("p", "c2", "g", "m"), witness, strict=True)), assumptions
+    )
+
+
+def file(claim, a=A, b=B, **changes):
+    return by_hand("modal", {"phi_0": a, "phi_1": a, "b": b}, [claim], **changes)
+
+
+def faults(content):
+    return {f.obligation: f.reason for f in check(content) if f.verdict == "fails"}
+
+
+def read(content):
+    given = content["certificates"][0]
+    return ModalRegion(read_subject(given["subject"]), given["claims"][0]["numbers"], given["claims"][0]["witness"])
+
+
+# --- what holds -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("a", "witness", "held", "missed"),
+    [
+        # Where V' may vanish as random states tell, 3.58298 and 9.0606, up to 1e-4.
+        (A, PLAIN, 3.5829, 3.5831),
+        (A, PLAIN, 1e-6, 3.70),
+        (A, BETTER, 9.0, 9.15),
+        (A, BETTER, 9.0605, 9.0607),
+        (A, BETTER, 1e-6, 9.21),
+        (-0.2, PLAIN, 3.5528, 3.5530),
+        (-0.2, BETTER, 8.8976, 8.8978),
+        (-1.0, PLAIN, 3.6593, 3.6595),
+        # The other rest bounds the level.
+        (-1.0, BETTER, 9.1999, 9.2001),
+        (-2.0, PLAIN, 3.7956, 3.7958),
+        (-2.0, BETTER, 9.1999, 9.2001),
+        # A cross term whose strength changes sign beyond the set.
+        (A, (5.0, -0.2, 2.0, -3.0), 3.2, 3.3),
+    ],
+)
+def test_levels_up_to_where_v_may_rise_hold(a, witness, held, missed):
+    assert faults(file(region(held, witness, a=a, turn=0.0, rate=0.0), a)) == {}
+    assert "descent" in faults(file(region(missed, witness, a=a, turn=0.0, rate=0.0), a))
+
+
+@settings(max_examples=40)
+@given(some.floats(-2.0, -0.1), some.floats(-0.03, -0.003), some.integers(0, 2**32 - 1))
+def test_v_falls_at_random_states_of_what_holds(a, b, seed):
+    random = np.random.default_rng(seed)
+    witness = (random.uniform(4.0, 6.0), random.uniform(-0.3, 0.2), random.uniform(1.0, 2.5), random.uniform(-0.2, 1.0))
+    c = random.uniform(0.3, 1.0) * (2.0 * witness[0] + 4.0 * witness[1])
+    found = faults(file(region(c, witness, a=a, turn=0.0, rate=0.0), a, b))
+    u, w, x = random.uniform(0.0, [[2.0], [12.0], [2.0]], size=(3, 20_000))
+    x = np.where(random.random(x.size) < 0.3, np.sign(x - 1.0), x - 1.0)
+    V, slope = by_formula(a, b, witness, u, w, x)
+    rises = bool((slope[c >= V] >= 0.0).any())
+    assert not rises or "descent" in found
+
+
+def by_formula(a, b, witness, u, w, x):
+    """V/alpha2 and V'/alpha3 at u = 1 - q0, |w|/alpha and the cosine between w and q."""
+    p, c2, g, m = witness
+    beta, q0, long, G = a * b, 1.0 - u, np.sqrt(u * (2.0 - u)), g + m * u
+    K = 2.0 * (1.0 - 2.0 * beta) * u + (1.0 - 8.0 * beta) / 2.0 * w * long * x - beta * q0 * w * w
+    f1 = -2.0 + K * (1.0 + long * long * x * x) / (1.0 + long * long) + G * q0 / 2.0 + m * long * long * x * x / 2.0
+    f2 = -2.0 + (p + 2.0 * c2 * u) / 2.0 + G * (K - 2.0)
+    return w * w / 2.0 + p * u + c2 * u * u + G * w * long * x, w * w * f1 + w * long * x * f2 - 2.0 * G * long * long
+
+
+@pytest.mark.parametrize("cover", ["as_published", "shortest", "hysteresis"])
+def test_the_double_cover(cover):
+    assert faults(file(region(3.58, cover=cover), double_cover=cover)) == {}
+    better = file(region(2.0, BETTER, cover), double_cover=cover)
+    assert list(faults(better)) == (
+        [] if cover == "as_published" else [better["certificates"][0]["claims"][0]["obligations"][-1]["name"]]
+    )
+    # With another root V falls beyond half a turn, where the shorter way switches.
+    wide = file(region(4.5, cover=cover, a=-2.0), -2.0, -0.05, double_cover=cover)
+    assert list(faults(wide)) == (["single rest in the set"] if cover == "shortest" else [])
+    other = "hysteresis" if cover != "hysteresis" else "as_published"
+    assert faults(file(region(3.58, cover=other), double_cover=cover))
+    for width in (0.0, 1.0, 2.0):
+        narrow = faults(file(region(3.58, cover=cover), double_cover=cover, hysteresis_width=width))
+        assert list(narrow) == (["jumps lower V"] if cover == "hysteresis" else [])
+
+
+@pytest.mark.parametrize(
+    "inertia", [[[2.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 4.0]], [[7.0, 1.0, 2.0], [1.0, 8.0, 0.5], [2.0, 0.5, 9.0]]]
+)
+def test_the_inertia_drops_out(inertia):
+    assert faults(file(region(9.0, BETTER), inertia=inertia)) == {}
+
+
+@pytest.mark.parametrize("target", ["orbital", (1.0, 0.0, 0.0, 0.0)])
+def test_so_do_the_target_torque_that_is_known_and_what_wheels_store(target):
+    loop = rotors("modal", modal.Gains((A,) * 3, (A,) * 3, B), target)
+    subject = described(make_subject(loop))
+    assert subject["wheels"] is not None
+    for told, held in ((ON_WHEELS, True), (TEXTBOOK, False)):
+        content = file(region(9.0, BETTER, assumptions=told))
+        content["certificates"][0]["subject"] = subject
+        assert passed(check(content)) == held
+
+
+# --- what fails -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("c", "witness"), [(3.5829, PLAIN), (9.0605, BETTER)])
+def test_a_number_that_says_more_fails(c, witness):
+    content = file(region(c, witness, turn=0.999999 * highest_turn(c, witness)))
+    assert faults(content) == {}
+    place = ("certificates", 0, "claims", 0, "numbers")
+    for key, where in (("level", "descent"), ("turn", ""), ("rate", "")):
+        raised = replaced(content, (*place, key), lambda spot, k: spot.__setitem__(k, spot[k] * (1.0 + 1e-4)))
+        assert list(faults(raised)) == [where], key
+        for value in (-1.0, 1e9, None, math.inf, "1"):
+            assert faults(replaced(content, (*place, key), lambda spot, k, v=value: spot.__setitem__(k, v))), (key, value)
+    assert faults(replaced(content, (*place, "level"), lambda spot, k: spot.__setitem__(k, 0.0)))
+
+
+def test_a_turn_beyond_where_v_is_largest_fails():
+    # p u + c2 u2 is largest at u = 1.25, and lower again at the other rest.
+    witness = (5.0, -2.0, 2.0, 0.9)
+    assert "" not in faults(file(region(3.13, witness, turn=2.0 * math.acos(1.0 - 1.9), rate=0.0)))
+    assert "" in faults(file(region(3.12, witness, turn=2.0 * math.acos(1.0 - 1.9), rate=0.0)))
+    assert "" in faults(file(region(3.12, witness, turn=math.tau * 1.001, rate=0.0)))
+
+
+def test_another_witness_fails():
+    for witness, others in ((PLAIN, [3.999, 0.01, 0.01, 0.01]), (BETTER, [4.8, -0.3, 1.9, 1.1])):
+        content = file(region(3.5829 if witness is PLAIN else 9.0605, witness))
+        for key, other in zip(("p", "c2", "g", "m"), others, strict=True):
+            for value in (other, -1.0, 1e300, None):
+                changed = replaced(
+                    content, ("certificates", 0, "claims", 0, "witness", key), lambda s, k, v=value: s.__setitem__(k, v)
+                )
+                assert faults(changed), (key, value)
+
+
+@pytest.mark.parametrize("witness", [PLAIN, BETTER])
+def test_nothing_can_be_taken_away_or_named_otherwise(witness):
+    content = file(region(3.0, witness))
+    claim = ("certificates", 0, "claims", 0)
+    assert faults(content) == {}
+    for path in spots(content_at(content, claim)):
+        assert faults(replaced(content, (*claim, *path), lambda spot, key: spot.pop(key))), path
+        if isinstance(content_at(content, (*claim, *path)), str):
+            assert faults(replaced(content, (*claim, *path), lambda spot, key: spot.__setitem__(key, spot[key] + "x"))), path
+    for part in ("obligations", "assumptions"):
+        for change in (list.reverse, lambda found: found.append(found[0])):
+            assert faults(replaced(content, (*claim, part), lambda spot, key, f=change: f(spot[key])))
+    for part in ("numbers", "witness"):
+        assert faults(replaced(content, (*claim, part), lambda spot, key: spot[key].__setitem__("more", 1.0)))
+
+
+def test_other_gains_fail():
+    for witness, c in ((PLAIN, 3.5829), (BETTER, 9.0605)):
+        claim = region(c, witness)
+        assert faults(file(claim)) == {}
+        # A smaller root leaves a smaller set; of a larger one the same V at rest is larger, so that the turn is not in it.
+        assert "descent" in faults(file(claim, 0.99 * A))
+        assert list(faults(file(claim, 1.01 * A))) == [""]
+        assert "descent" in faults(file(claim, A, 0.5 * B))
+
+
+@pytest.mark.parametrize(
+    ("gains", "reason"),
+    [
+        ({"phi_1": -0.429}, "phi_0 and phi_1 are not one number on every axis"),
+        ({"phi_0": [A, A, -0.429]}, "phi_0 and phi_1 are not one number on every axis"),
+        ({"phi_0": [[A, 0.0, 1e-9], [0.0, A, 0.0], [0.0, 0.0, A]]}, "phi_0 and phi_1 are not one number on every axis"),
+        ({"phi_0": -A, "phi_1": -A}, "phi_0 and phi_1 are not negative"),
+        ({"phi_0": 0.0, "phi_1": 0.0}, "phi_0 and phi_1 are not negative"),
+        ({"b": 0.0}, "b is not negative"),
+        ({"b": 0.01}, "b is not negative"),
+    ],
+)
+def test_gains_that_a_region_is_not_for_are_named(gains, reason):
+    content = file(region(1.0))
+    content["certificates"][0]["subject"]["gains"].update(gains)
+    assert list(faults(content).values()) == [reason]
+
+
+def test_another_law_is_refused():
+    content = by_hand("pd", {"k_rate": 0.09, "k_attitude": 0.009, "limit": "none"}, [region(1.0)])
+    assert list(faults(content).values()) == ["such a claim is for the law modal"]
+
+
+# --- other kinds of claims about this law -----------------------------------------------------------------------------
+
+UNREAD = "the law divides by 1 + |q|2, which such a claim does not take"
+PROOF = {"stiffness": 0.1, "epsilon": 0.0, "rho": 0.0, "rate_bound": None}
+CONTENTS = {"start": 0.01, "everything": False, "turn": 0.1, "rate": 0.01, "rate_everywhere": None}
+EASY = {"form": "exact identity", "target": "exact identity", "only rest": "LaSalle", "torque": "ball arithmetic"}
+CONVERGES = ("form", "positive", "descent", "target", "only rest", "single rest in the set")
+END = {"torque": 1e-6, "start": 0.01, "level": 0.01, "turn": 0.1, "rate_start": 0.01, "angle": 0.1, "rate": 0.01}
+SURFACE = {"torque": [0.0] * 3, "margin": 1e-3, "surface": 0.0, "angle": 0.0, "rate": 0.0, "turn": 0.1, "everything": False}
+OTHERS = {
+    "convergence": (CONVERGES, CONTENTS | {"level": 0.01}, PROOF, TEXTBOOK),
+    "torque-limit": (
+        (*CONVERGES, "torque"),
+        CONTENTS | {"level": 0.01, "limit": 0.1, "kind": "axis"},
+        PROOF,
+        [a for a in TEXTBOOK if a != TEXTBOOK[4]],
+    ),
+    "inertia": (
+        ("form", "positive", "descent", "strict", "single rest in the set"),
+        CONTENTS | {"tolerance": 0.05},
+        {"stiffness": 0.1, "epsilon": 1e-3, "rho": 0.5, "level": 0.01},
+        [TEXTBOOK[0], "inertia within the tolerance", *TEXTBOOK[2:5], "no torque from outside", "target at rest"],
+    ),
+    "disturbance": (
+        ("descent", "strict", "end", "start"),
+        END | {"rate_everywhere": None},
+        PROOF | {"epsilon": 1e-3, "rho": 0.5, "q_rate": 1e-3, "q_attitude": 1e-3},
+        [*TEXTBOOK[:5], "torque from outside bounded in norm"],
+    ),
+    "sliding": (
+        ("form",),
+        SURFACE | {"start": 0.01, "rate_start": 0.01},
+        {},
+        [*TEXTBOOK[:5], "torque from outside bounded on each axis"],
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", sorted(OTHERS))
+def test_what_needs_polynomials_fails_with_a_sentence(kind):
+    names, numbers, witness, told = OTHERS[kind]
+    obligations = [(name, EASY.get(name, "exact inequality")) for name in names]
+    found = check(file(proved_by_hand(kind, obligations, numbers, witness, told), torque_limit=0.05))
+    reasons = {f.reason for f in found if f.verdict == "fails"}
+    assert reasons
+    assert not any(reason.startswith("cannot be verified") for reason in reasons), reasons
+    assert UNREAD in reasons or kind == "sliding"
+    if "stiffness" in witness and kind != "inertia":
+        own = proved_by_hand(kind, obligations, numbers, witness | {"stiffness": None}, told)
+        assert "the law declares no V" in {f.reason for f in check(file(own, torque_limit=0.05)) if f.verdict == "fails"}
+
+
+def held(period, a=A):
+    """Eigenvalues of the linear loop with a held torque; every axis has the same two."""
+    pull = np.array([2.0 * a, -2.0 * a * a])
+    step = np.array([[1.0, 0.0], [period / 2.0, 1.0]]) + np.outer([period, period**2 / 4.0], pull)
+    return np.repeat(np.linalg.eigvals(step).astype(complex), 3)
+
+
+def test_held_between_samples():
+    roots = held(0.25)
+    numbers = {
+        "period": 0.25,
+        "radius": float(np.abs(roots).max()) + 1e-9,
+        "longest": 1.0,
+        "every_shorter": True,
+        "eigenvalues": [[float(z.real), float(z.imag)] for z in roots],
+    }
+    names = [("stable at the period", "certified roots"), ("stable at the longest", "certified roots")]
+    names.append(("stable in between", "exact inequality"))
+    told = [*TEXTBOOK[:3], "linear motion near rest on a target at rest", TEXTBOOK[4], "no torque from outside"]
+
+    def claim(**changes):
+        return proved_by_hand("sampling", names, numbers | changes, {}, told)
+
+    assert faults(file(claim())) == {}
+    # Spectra that differ have a linear loop too.
+    uneven = {"phi_0": [-0.5, -0.6, -0.7], "phi_1": A, "b": B}
+    assert "stable at the period" in faults(by_hand("modal", uneven, [claim()]))
+    assert "stable at the period" in faults(file(claim(radius=float(np.abs(roots).max()) - 1e-9)))
+    far = next(h for h in (2.0, 4.0, 8.0, 16.0) if np.abs(held(h)).max() > 1.0)
+    assert "stable at the longest" in faults(file(claim(longest=far)))
+    unstable = claim(eigenvalues=[], radius=0.5)
+    unstable["obligations"] = unstable["obligations"][:1]
+    unstable["outcome"] = unstable["obligations"][0]["outcome"] = "refuted"
+    unstable["numbers"] = {"period": far}
+    unstable["obligations"][0]["evidence"] = {"eigenvalue": 1.1}
+    content = file(unstable, control_period=far)
+    content["certificates"][0]["outcome"] = "refuted"
+    assert passed(check(content))
+    content["certificates"][0]["subject"]["control_period"] = 0.25
+    assert not passed(check(content))
+
+
+# --- refuted ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_refutation_must_be_one():
+    # V' > 0 near u = 0.43, |w| = 2.26 alpha along q, where V is 9.07 a2.
+    u, w = 0.43, 2.26 * -A
+    rising = {"attitude": [1.0 - u, 0.0, 0.0, math.sqrt(u * (2.0 - u))], "rate": [0.0, 0.0, w]}
+    falling = {"attitude": [1.0 - u, 0.0, 0.0, math.sqrt(u * (2.0 - u))], "rate": [0.0, 0.0, 0.9 * w]}
+    for c, state, held in ((9.15, rising, True), (9.0, rising, False), (9.15, falling, False)):
+        claim = region(c, BETTER)
+        claim["obligations"] = claim["obligations"][1:2]
+        claim["outcome"] = claim["obligations"][0]["outcome"] = "refuted"
+        claim["obligations"][0]["evidence"] = {"state": state, "V'": 1.0}
+        content = file(claim)
+        content["certificates"][0]["outcome"] = "refuted"
+        assert passed(check(content)) == held
+        assert {f.verdict for f in check(content)} == {"not claimed" if held else "fails"}
+
+
+# --- its mathematics --------------------------------------------------------------------------------------------------
+
+UNIT = some.floats(-1.0, 1.0)
+
+
+@given(some.integers(0, 2**32 - 1))
+def test_v_falls_as_the_law_turns_the_body(seed):
+    """The checker's V' against the derivative of V along the law's own equations, in floats."""
+    random = np.random.default_rng(seed)
+    craft = random_craft(random)
+    a, b = -random.uniform(0.1, 2.0), -random.uniform(0.001, 0.1)
+    p, c2, g, m = random.normal(size=4)
+    q = random.normal(size=4)
+    q /= np.linalg.norm(q)
+    w = random.normal(size=3) * random.uniform(0.1, 3.0)
+    q, w = tuple(q.tolist()), tuple(w.tolist())
+    gains = modal.Gains((a,) * 3, (a,) * 3, b)
+    seen = Seen(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.25, ZERO)
+    swing = angular_acceleration(w, modal.torque(seen, gains, craft, NoMemory())[0], craft)
+    turning = derivative(q, w)
+
+    def energy(step):
+        # A complex step differentiates a polynomial up to rounding.
+        x, v = np.array(q) + 1j * step * np.array(turning), np.array(w) + 1j * step * np.array(swing)
+        u = 1.0 - x[0]
+        return v @ v / 2.0 + a * a * (p * u + c2 * u * u) - a * (g + m * u) * (v @ x[1:])
+
+    expected = float(energy(1e-30).imag) / 1e-30
+    claim = region(1.0, (p, c2, g, m), a=a, turn=0.0, rate=0.0)
+    own = read(file(claim, a, b, inertia=tensor(craft.inertia).tolist()))
+    own.form()
+    alpha = floating(own.alpha)
+    u, y, s = 1.0 - q[0], float(np.dot(w, w)) / alpha**2, float(np.dot(w, q[1:])) / alpha
+    u, y, s = rational(u), rational(y), rational(s)
+    l2 = u * (2 - u)
+    found = floating(own.fall(u, y, s, Shares(y, s * s, s, l2)) / (1 + l2)) * alpha**3
+    size = alpha**3 * (1.0 + floating(y)) ** 2 * (1.0 + sum(map(abs, (p, c2, g, m))))
+    assert found == pytest.approx(expected, abs=1e-12 * size)
+    assert floating(own.height(u, y, s)) * alpha**2 == pytest.approx(float(energy(0.0).real), abs=1e-12 * size)
+
+
+def test_another_motion_or_another_slope_is_noticed():
+    for name in ("a", "b", "beta", "alpha", "m", "g", "p", "c2"):
+        own = read(file(region(1.0, BETTER)))
+        own.form()
+        setattr(own, name, getattr(own, name) + fmpq(1, 10**12))
+        if name in ("m", "g", "p", "c2"):
+            own.height = read(file(region(1.0, BETTER))).height
+        with pytest.raises(CheckError):
+            own.form()
+
+
+def test_every_state_of_the_set_is_in_a_box(monkeypatch):
+    """What is shown of boxes is shown of states: the same V and, but for a positive factor, the same V'."""
+    for witness, c in ((BETTER, 9.0), (PLAIN, 3.58), ((4.5, 0.1, 1.5, -0.3), 5.0)):
+        asked = []
+        monkeypatch.setattr(reading, "negative_where", lambda *given, to=asked: to.append(given) or True)
+        assert read(file(region(c, witness)))._falls(fmpq(8))
+        (slow, slow_room, slow_box), (fast, fast_room, fast_box) = asked
+        random = np.random.default_rng(5)
+        kinds = set()
+        for _ in range(4000):
+            u, w, x = 2.0 * random.random() ** random.choice([1, 8]), 9.0 * random.random(), 2.0 * random.random() - 1.0
+            V, slope = by_formula(A, B, witness, u, w, x)
+            if c < V:
+                continue
+            long = math.sqrt(u * (2.0 - u))
+            if w <= 8.0 * long:
+                kinds.add("slow")
+                given, fall, room, box, over = {"u": u, "r": w / long, "x": x}, slow, slow_room, slow_box, long**2
+            else:
+                kinds.add("fast")
+                given = {"y": w * w, "n": math.sqrt(u / 2.0) / w, "x": x * math.sqrt(1.0 - u / 2.0)}
+                fall, room, box, over = fast, fast_room, fast_box, w * w
+            if witness is PLAIN:
+                over = w * w
+            assert all(floating(low) <= given[name] <= floating(high) for name, (low, high) in box.items())
+            values = {name: rational(value) for name, value in given.items()}
+            assert floating(room.at(values)) == pytest.approx(c - V, rel=1e-6, abs=1e-9)
+            assert floating(fall.at(values)) == pytest.approx((1.0 + long**2) * slope / over, rel=1e-6, abs=1e-9)
+        assert kinds == {"slow", "fast"}
+
+
+def test_each_box_is_looked_at():
+    for c, witness, missed in (
+        (9.15, BETTER, "_slow"),
+        # Without attitude V' is |w|2 (g/2 - 2).
+        (1e-3, (5.0, 0.0, 4.1, 0.0), "_fast"),
+        (9.21, BETTER, "_beyond"),
+    ):
+        assert not getattr(read(file(region(c, witness))), missed)(fmpq(8))
+    own = read(file(region(9.0, BETTER)))
+    assert own._slow(fmpq(8))
+    assert own._fast(fmpq(8))
+    assert own._beyond(fmpq(8))
+    # A bound of |w| that the strength of the product exceeds is none.
+    assert not own._beyond(fmpq(3))
