@@ -15,11 +15,22 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from starhold.api import certify, compare, design, load, place, simulate
+    from starhold.api import certify, compare, design, failures, load, modal_roots, place, simulate
     from starhold.errors import InputError
 
 __version__ = "0.1.0"
-__all__ = ["InputError", "__version__", "certify", "compare", "design", "load", "place", "simulate"]
+__all__ = [
+    "InputError",
+    "__version__",
+    "certify",
+    "compare",
+    "design",
+    "failures",
+    "load",
+    "modal_roots",
+    "place",
+    "simulate",
+]
 
 
 def __getattr__(name: str) -> Any:

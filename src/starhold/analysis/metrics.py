@@ -31,6 +31,9 @@ MEASURES: dict[str, Measure] = {
     "settling_time": Measure("settling", "s", "time after which attitude and rate stay within their tolerances"),
     "iterations_1e-3": Measure("steps to 1e-3", "", "control steps after which |q| stays within 10^-3"),
     "overshoot": Measure("overshoot", "%", "largest turn beyond the target, of the initial angle", 100.0),
+    "transient_time": Measure("transient", "s", "time after which angle and rate stay within the ends of [transient]"),
+    "peak_rate": Measure("peak rate", "deg/s", "largest norm of the body's rate", 180.0 / np.pi),
+    "peak_acceleration": Measure("peak accel.", "deg/s²", "largest component of the rate's derivative", 180.0 / np.pi),
     "peak_torque": Measure("peak torque", "mN m", "largest torque component", 1e3),
     "effort": Measure("effort", "N m s", "integral of |u| over the run"),
     "limit_share": Measure("on limit", "%", "share of the time with a torque on its limit", 100.0),
@@ -54,6 +57,13 @@ def stays_within(values: Any, bound: float) -> int | None:
     outside = np.flatnonzero(~(np.asarray(values) <= bound))
     first = int(outside[-1]) + 1 if outside.size else 0
     return first if first < len(values) else None
+
+
+def acceleration(run: Recording) -> NDArray[np.float64]:
+    """Derivative of the body's rate (rad/s2), (n, 3): its mean from each sample to the next, the last repeated."""
+    rate = run["rate"]
+    mean = np.diff(rate, axis=0) / (run.attrs["control_period"] * run.attrs["record_every"])
+    return np.concatenate([mean, mean[-1:]]) if len(mean) else np.zeros_like(rate)
 
 
 def measure(run: Recording, attitude_tolerance: float, rate_tolerance: float) -> dict[str, Any]:

@@ -11,6 +11,11 @@ ORDER = ("settling_time", "final_attitude_error", "effort")
 """Laws are ranked by these in turn: settled before unsettled, then sooner, then more accurate, then more sparing."""
 
 
+def columns(results: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """The metrics that some of the laws have, in order."""
+    return [metric for metric in MEASURES if any(metric in row for row in results.values())]
+
+
 def ranked(results: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Names from best to worst."""
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from starhold.cli import certifying, failing
+from starhold.cli import certifying, failing, rooting
 from starhold.cli.arguments import (
     DIVERGED,
     FAILED_CHECK,
@@ -126,6 +126,7 @@ def design(
 app.command()(certifying.certify)
 app.command()(certifying.check)
 app.command()(failing.failures)
+app.command("modal-roots")(rooting.modal_roots)
 
 
 @app.command()

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry
 
 WIDE = 132
+COLUMN = 11
+"""Characters that a metric takes."""
 console = Console()
 if not console.is_terminal:
     # A file or a pipe has no width to keep to.
@@ -57,6 +59,11 @@ def print_outcome(flights: Sequence[Flight], page: Path) -> None:
         if flight.metrics.get("solver_budget_hits"):
             hits, calls = flight.metrics["solver_budget_hits"], flight.metrics["solver_calls"]
             console.print(f"{flight.name}: the solver used up its budget in {hits} of {calls} calls", style="yellow")
+        if "limits_kept" in flight.metrics:
+            from starhold.report.transients import told
+
+            said, kept = told(flight), flight.metrics["limits_kept"]
+            console.print(f"{flight.name}: {said}", style=None if kept else "yellow", markup=False, highlight=False)
     certificates = [certificate for flight in flights for certificate in flight.certificates]
     if certificates:
         from starhold.cli.show_certificates import print_proved
@@ -68,14 +75,15 @@ def print_outcome(flights: Sequence[Flight], page: Path) -> None:
 def print_table(flights: Sequence[Flight]) -> None:
     """The ranked comparison; a star marks the best of each metric. On a narrow screen laws become columns."""
     from starhold.analysis.metrics import MEASURES
-    from starhold.analysis.ranking import ranked, shown, winners
+    from starhold.analysis.ranking import columns, ranked, shown, winners
 
     results: Mapping[str, Mapping[str, Any]] = {flight.name: flight.metrics for flight in flights}
     won, order = winners(results), ranked(results)
-    heads = [f"{m.heading}\n[dim]{m.unit}[/dim]" for m in MEASURES.values()]
-    cells = [[_cell(shown(metric, results[name].get(metric)), name in won[metric]) for metric in MEASURES] for name in order]
+    metrics = columns(results)
+    heads = [f"{MEASURES[metric].heading}\n[dim]{MEASURES[metric].unit}[/dim]" for metric in metrics]
+    cells = [[_cell(shown(metric, results[name].get(metric)), name in won[metric]) for metric in metrics] for name in order]
     table = Table(title_justify="left", show_edge=False, pad_edge=False)
-    if console.width >= WIDE:
+    if console.width >= max(WIDE, COLUMN * (1 + len(metrics))):
         for head in ("law", *heads):
             table.add_column(head, justify="left" if head == "law" else "right")
         for name, row in zip(order, cells, strict=True):

@@ -60,6 +60,11 @@ class Law:
         """Gains that tests, docs and benchmarks run."""
         return self.module.examples()
 
+    def complete(self, spec: Any, angle: Callable[[], float]) -> Any:
+        """The inputs of a design form, with what they leave to the start of the run: `angle` gives its error angle (rad)."""
+        teller = getattr(self.module, "complete", None)
+        return spec if teller is None else teller(spec, angle)
+
     def design(self, craft: Craft, spec: Any) -> Any:
         """Gains from the inputs of a design form."""
         return self.module.design(craft, spec)

@@ -1,8 +1,9 @@
 """What a law sees, and what a law file declares.
 
 A law file holds `CARD`, `class Gains(NamedTuple)`, the equation `torque(seen, gains, craft, memory) -> (torque, memory)`
-and `examples()`. It may add `lyapunov(seen, gains, craft)`, design forms (`FORMS` with `design(craft, spec)`),
-`check(gains)` that refuses what cannot be stable, and `remember(gains, craft, period)` for a memory that is not empty.
+and `examples()`. It may add `lyapunov(seen, gains, craft)`, design forms (`FORMS` with `design(craft, spec)`,
+and `complete(spec, angle)` for inputs that the start of the run gives), `check(gains)` that refuses what cannot be stable,
+and `remember(gains, craft, period)` for a memory that is not empty.
 """
 
 from __future__ import annotations

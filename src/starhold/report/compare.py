@@ -18,6 +18,7 @@ from starhold.report.certificates import certify_law
 from starhold.report.files import whole
 from starhold.report.flight import Flight, number_text
 from starhold.report.results import SUMMARY, write_summary
+from starhold.report.transients import against_limits
 from starhold.scenario.building import build
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.simulation.lane import fly, label
@@ -33,6 +34,7 @@ def fly_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, notice: Notic
     samples, carry = fly(loop, simulation.steps, simulation.record_every, progress=progress)
     recording = label(loop, samples, carry, simulation.record_every)
     metrics = measure(recording, settling.attitude_tolerance, settling.rate_tolerance)
+    metrics |= against_limits(recording, scenario.table.transient)
     metrics |= call_costs(loop, samples)
     metrics |= _law_counters(carry.memory)
     gains = {item.name: _gain_text(item, value) for item, value in zip(entry.law.fields(), entry.gains, strict=True)}

@@ -52,7 +52,7 @@ def sketch(flights: Sequence[Flight], scenario: Scenario | None = None) -> Sketc
 def paint(what: Sketch, folder: Path, part: slice = slice(None)) -> list[Path]:
     """Write the figures, or a part of them, into `folder`, which exists, and return their paths."""
     plots, flights, name = what
-    over_time = (plots.scalar, plots.attitude, plots.rate, plots.torque, plots.angle, *plots.wheels)
+    over_time = (plots.scalar, plots.attitude, plots.rate, plots.torque, plots.angle, *plots.further)
     makers = {plot.name: partial(_over_time, plot, plots, flights, name) for plot in over_time}
     makers["accuracy"] = partial(_accuracy, flights, name)
     with warnings.catch_warnings():

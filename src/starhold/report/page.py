@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from starhold.analysis.metrics import DECADES, MEASURES
-from starhold.analysis.ranking import ORDER, ranked, shown, winners
+from starhold.analysis.ranking import ORDER, columns, ranked, shown, winners
 from starhold.models.craft import whole
 from starhold.report.flight import Flight, colour, number_text
 from starhold.report.plots import ACCURACIES, Panel, Plot, collect, steps_within
 from starhold.report.proved import section as proved
 from starhold.report.proved import swatch
+from starhold.report.transients import section as transients
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -29,6 +30,8 @@ FRAMES = 180
 """Attitudes of the turning body; the page turns it smoothly from one to the next."""
 EARLY = 1.6
 """Frame k of n shows the time T (k/n)^EARLY: most of the motion is at the start."""
+MANY = 9
+"""Numbers of a setting beyond which only the first and the last are shown."""
 SECONDS = 14.0
 """How long the animation plays."""
 
@@ -52,6 +55,7 @@ def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
         f'<p class="lead">{escape(scenario.table.description)}</p>' if scenario.table.description else "",
         _lost(flights),
         _ranking(flights),
+        transients(flights),
         proved(flights),
         "<h2>The turning body</h2>",
         _views(flights, data["scene"]),
@@ -61,7 +65,7 @@ def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
         *(_plot(plot) for plot in data["plots"]),
         _laws(flights),
         _settings(scenario),
-        _columns(),
+        _columns(flights),
         f"<details><summary>Scenario text</summary><pre>{escape(scenario.text)}</pre></details>",
         f"<footer>{escape(_versions(scenario))}</footer>",
     ]
@@ -101,13 +105,13 @@ def _lost(flights: Sequence[Flight]) -> str:
 
 def _ranking(flights: Sequence[Flight]) -> str:
     results = {flight.name: flight.metrics for flight in flights}
-    columns = [metric for metric in MEASURES if any(metric in row for row in results.values())]
+    metrics = columns(results)
     best = winners(results)
     numbers = {flight.name: number for number, flight in enumerate(flights)}
     head = "".join(
         f'<th scope="col" title="{escape(MEASURES[metric].meaning)}">{escape(MEASURES[metric].heading)}'
         f"<small>{escape(MEASURES[metric].unit) or '&nbsp;'}</small></th>"
-        for metric in columns
+        for metric in metrics
     )
     rows: list[str] = []
     for place, name in enumerate(ranked(results), 1):
@@ -115,7 +119,7 @@ def _ranking(flights: Sequence[Flight]) -> str:
         lost = flight.lost is not None
         cells = "".join(
             f"{BEST if name in best[metric] else '<td>'}{shown(metric, flight.metrics.get(metric))}</td>"
-            for metric in columns
+            for metric in metrics
         )
         fate = f"diverged at {flight.lost:.6g} s" if lost else flight.law if flight.law != name else ""
         rows.append(
@@ -197,14 +201,17 @@ def _value(value: Any) -> str:
         return "yes" if value else "no"
     if isinstance(value, float) and math.isinf(value):
         return "none"
+    if isinstance(value, tuple) and len(value) > MANY:
+        return f"{number_text(value[0])} to {number_text(value[-1])}, {len(value)} values"
     return number_text(value) if isinstance(value, (int, float, tuple, list, np.ndarray)) else str(value)
 
 
-def _columns() -> str:
+def _columns(flights: Sequence[Flight]) -> str:
+    measures = [MEASURES[metric] for metric in columns({flight.name: flight.metrics for flight in flights})]
     items = "".join(
         f"<dt>{escape(measure.heading)}{f', {escape(measure.unit)}' if measure.unit else ''}</dt>"
         f"<dd>{escape(measure.meaning)}</dd>"
-        for measure in MEASURES.values()
+        for measure in measures
     )
     return f"<h2>How to read the columns</h2>\n<dl>{items}</dl>"
 
@@ -223,7 +230,7 @@ def _data(scenario: Scenario, flights: Sequence[Flight]) -> dict[str, Any]:
     """What the scripts of the page read."""
     plots = collect(flights, POINTS, scenario)
     quaternion = Plot("quaternion", "error quaternion", [*plots.scalar.panels, *plots.attitude.panels])
-    drawn = (plots.angle, quaternion, plots.rate, plots.torque, *plots.wheels)
+    drawn = (plots.angle, quaternion, plots.rate, plots.torque, *plots.further)
     return {
         "laws": [{"name": flight.name, "colour": colour(number)} for number, flight in enumerate(flights)],
         "times": _numbers(plots.times),

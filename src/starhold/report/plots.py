@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.analysis.metrics import DECADES, error_angle
+from starhold.analysis.metrics import DECADES, acceleration, error_angle
 from starhold.report.flight import Flight
 
 if TYPE_CHECKING:
@@ -19,6 +19,10 @@ Curve: TypeAlias = NDArray[np.float64]
 
 ACCURACIES = (("", "attitude, |q| ≤ 10⁻ᵏ"), ("rate_", "rate, |ω| ≤ 10⁻ᵏ rad/s"))
 """What the steps to an accuracy are counted for: the prefix of the metric, and the heading."""
+
+
+OFF_SCALE = 5.0
+"""Limits so many times above all curves are not drawn."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +67,8 @@ class Plots:
     rate: Plot
     torque: Plot
     angle: Plot
-    wheels: tuple[Plot, ...] = ()
-    """Momenta and torques of the reaction wheels, where there are any."""
+    further: tuple[Plot, ...] = ()
+    """Rate and acceleration against their limits, momenta and torques of reaction wheels, where there are any."""
     marks: tuple[float, ...] = ()
     """When faults happen and are acted on (s)."""
 
@@ -93,7 +97,7 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario | None = 
         Plot("rate", "angular velocity relative to the target", [_sound(panel, flights) for panel in rates]),
         Plot("torque", "torque applied", torques, dashed),
         _angle(flights, factor, scenario),
-        _wheels(flights, factor, scenario),
+        (*_transient(flights, factor, scenario), *_wheels(flights, factor, scenario)),
         () if scenario is None else scenario.fault_times,
     )
 
@@ -144,6 +148,35 @@ def _angle(flights: Sequence[Flight], factor: int, scenario: Scenario | None) ->
     slow = () if settling is None else (settling.rate_tolerance * degrees,)
     panels = [_positive("angle, deg", angles, within), _sound(_positive("rate, deg/s", speeds, slow), flights)]
     return Plot("angle", "error angle and relative rate", panels, "tolerance" if settling else "")
+
+
+def _transient(flights: Sequence[Flight], factor: int, scenario: Scenario | None) -> tuple[Plot, ...]:
+    table = None if scenario is None else scenario.table.transient
+    if table is None:
+        return ()
+    degrees = 180.0 / np.pi
+    rates = [thin(np.linalg.norm(flight.recording["rate"], axis=1) * degrees, factor) for flight in flights]
+    turned = [acceleration(flight.recording) * degrees for flight in flights]
+    fastest = table.rate_limit * degrees
+    panels = [Panel("norm, deg/s", rates, False, _near((fastest,), rates))]
+    for i, axis in enumerate("xyz"):
+        curves = [thin(own[:, i], factor) for own in turned]
+        limit = table.acceleration_limit * degrees
+        panels.append(Panel(f"{axis}, deg/s²", curves, False, _near((-limit, limit), curves)))
+    return (
+        Plot(
+            "transient",
+            "norm of the body's rate, and the rate's derivative",
+            [_sound(panel, flights) for panel in panels],
+            "limit",
+        ),
+    )
+
+
+def _near(levels: tuple[float, ...], curves: list[Curve]) -> tuple[float, ...]:
+    """Levels but those that would flatten the curves."""
+    peak = max((float(np.abs(curve).max(initial=0.0)) for curve in curves), default=0.0)
+    return levels if max(levels) <= OFF_SCALE * peak else ()
 
 
 def _wheels(flights: Sequence[Flight], factor: int, scenario: Scenario | None) -> tuple[Plot, ...]:
@@ -207,6 +240,6 @@ def _limit(flights: Sequence[Flight], scale: float, unit: str) -> tuple[tuple[fl
         return (), "no limit"
     words = f"limit of {'each axis' if kind == 'axis' else 'the norm'}, {limit * scale:g} {unit}"
     # A limit far above all torques would flatten them.
-    if limit > 5.0 * _peak(flights, "torque"):
+    if limit > OFF_SCALE * _peak(flights, "torque"):
         return (), f"{words}, off the scale"
     return (-limit * scale, limit * scale), words

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 SUMMARY = "summary.json"
 FAILURES = ("failures.csv", "failures.png")
-MARKS = (SUMMARY, "run.nc", "report.html", CERTIFICATES, *FAILURES)
+ROOTS = ("modal-roots.csv", "modal-roots.png")
+MARKS = (SUMMARY, "run.nc", "report.html", CERTIFICATES, *FAILURES, *ROOTS)
 """A folder with one of these holds results."""
 
 

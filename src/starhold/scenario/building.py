@@ -2,36 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from starhold.algebra.cosines import from_angles
-from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise, stretch, to_body
-from starhold.algebra.vector import ZERO, add
 from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.models.actuator import Dynamics
-from starhold.models.rigid_body import State
 from starhold.models.sensor import Noise
-from starhold.models.target import Target, inertial, orbital, tabulate
-from starhold.models.wheeled_body import WheeledState
 from starhold.scenario.faults import make_events
 from starhold.scenario.reading import LawEntry, Scenario
-from starhold.scenario.rotors import start_momenta
-from starhold.scenario.schema import Pointing
+from starhold.scenario.start import start_of, target_of
 
 
 def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
     """The closed loop of one law on the scenario's spacecraft. InputError where the law cannot work with its gains."""
     table = scenario.table
-    goal = _target(scenario)
+    goal = target_of(scenario)
     body = table.spacecraft
     loop = ClosedLoop(
         craft=scenario.craft,
         law=entry.law,
         gains=entry.gains,
-        start=_start(scenario, goal),
+        start=start_of(scenario, goal),
         period=table.simulation.control_period,
         substeps=table.simulation.substeps,
         orbit=table.orbit is not None,
@@ -52,77 +43,3 @@ def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
     except ValueError as error:
         raise InputError(scenario.where, f"law {entry.name}", "", str(error)) from None
     return loop
-
-
-def _attitude(pointing: Pointing) -> Quaternion:
-    if pointing.angles is not None:
-        return from_angles(*pointing.angles)
-    if pointing.attitude is None:
-        return NO_TURN
-    # Scaled first, so that the squares of odd numbers neither vanish nor overflow.
-    return normalise(stretch(1.0 / max(map(abs, pointing.attitude)), pointing.attitude))
-
-
-def _target(scenario: Scenario) -> Any:
-    table = scenario.table.target
-    if table.mode == "orbital":
-        return "orbital"
-    return _attitude(table) if table.mode == "inertial" else _history(scenario)
-
-
-def _history(scenario: Scenario) -> Any:
-    simulation = scenario.table.simulation
-    path = scenario.folder / str(scenario.table.target.file)
-    allowed = "a CSV file with a line 'time,q0,q1,q2,q3' or none, then numbers, at least two rows"
-    try:
-        lines = [line for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
-        if lines and not _is_number(lines[0].split(",")[0]):
-            del lines[0]
-        if len(lines) < 2:
-            raise ValueError(f"{len(lines)} rows of numbers")
-        numbers = np.loadtxt(lines, delimiter=",", ndmin=2)
-        if numbers.shape[1] != 5 or not np.isfinite(numbers).all():
-            raise ValueError(f"a table of shape {numbers.shape}")
-        if (np.diff(numbers[:, 0]) <= 0.0).any():
-            raise ValueError("times that do not increase")
-        if (np.linalg.norm(numbers[:, 1:], axis=1) == 0.0).any():
-            raise ValueError("a zero quaternion")
-        times = np.arange(simulation.steps + 1) * simulation.control_period
-        return tabulate(numbers[:, 0], numbers[:, 1:], times)
-    except OSError as error:
-        raise InputError(scenario.where, "target.file", f"{path}: {error.strerror}", allowed) from None
-    except ValueError as error:
-        raise InputError(scenario.where, "target.file", f"{path}: {error}", allowed) from None
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _start(scenario: Scenario, goal: Any) -> State | WheeledState:
-    table = scenario.table
-    orbit = table.orbit
-    position, velocity = (ZERO, ZERO) if orbit is None else (orbit.position, orbit.velocity)
-    attitude, rate = _attitude(table.initial), table.initial.rate
-    if table.initial.relative_to == "target":
-        held = _target_at_start(goal, position, velocity)
-        rate = add(rate, to_body(attitude, held.rate))
-        attitude = multiply(held.attitude, attitude)
-    wheels = scenario.wheels
-    if wheels is None:
-        return State(attitude, rate, position, velocity, ZERO)
-    momentum = start_momenta(table.wheels, table.wheel, len(wheels.axes))
-    return WheeledState(attitude, rate, position, velocity, ZERO, momentum)
-
-
-def _target_at_start(goal: Any, position: Any, velocity: Any) -> Target:
-    if isinstance(goal, str):
-        return orbital(None, position, velocity, 0, NO_TURN)
-    if isinstance(goal, np.ndarray):
-        row = goal[0].tolist()
-        return Target(tuple(row[:4]), tuple(row[4:7]), tuple(row[7:]))
-    return inertial(goal, position, velocity, 0, None)

@@ -42,7 +42,8 @@ def _plain(error: Exception) -> str:
 
 
 def _to_si(value: Any, gain: Gain) -> Any:
-    if isinstance(value, list):
+    # Tuples are defaults.
+    if isinstance(value, (list, tuple)):
         return [_to_si(item, gain) for item in cast(list[Any], value)]
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ValueError(f"{gain.describe()} in {_shown(gain.unit)}")

@@ -20,6 +20,7 @@ from starhold.models.craft import Craft, compact, make_craft
 from starhold.models.wheels import Wheels, body_inertia
 from starhold.scenario.rotors import make_rotors
 from starhold.scenario.schema import LawTable, ScenarioTable, law_model
+from starhold.scenario.start import angle_at_start
 
 _Model = TypeVar("_Model", bound=BaseModel)
 
@@ -127,16 +128,17 @@ def parse(text: str, where: str, folder: Path = Path(), allow_unstable: bool = F
         raise InputError(where, "law", found, "at least one [[law]] table")
     scenario = Scenario(table, (), text, where, folder)
     try:
-        craft = scenario.craft
+        _ = scenario.craft
     except ValueError as error:
         raise InputError(where, "wheel" if table.wheels or table.wheel else "spacecraft", "", str(error)) from None
     entries: list[LawEntry] = []
     for number, item in enumerate(cast(list[Any], laws), 1):
-        entries.append(_read_law(item, craft, where, f"law[{number}]", {entry.name for entry in entries}, allow_unstable))
+        entries.append(_read_law(item, scenario, f"law[{number}]", {entry.name for entry in entries}, allow_unstable))
     return Scenario(table, tuple(entries), text, where, folder)
 
 
-def _read_law(data: Any, craft: Craft, where: str, key: str, taken: set[str], allow_unstable: bool) -> LawEntry:
+def _read_law(data: Any, scenario: Scenario, key: str, taken: set[str], allow_unstable: bool) -> LawEntry:
+    where = scenario.where
     if not isinstance(data, dict):
         raise InputError(where, key, _show(data), "a [[law]] table")
     table = cast(dict[str, Any], data)
@@ -150,9 +152,9 @@ def _read_law(data: Any, craft: Craft, where: str, key: str, taken: set[str], al
         raise InputError(where, f"{key}.form", _show(form), allowed)
     read = _validate(law_model(law, form), table, where, key, extra=["form"] if law.forms else [])
     values = [getattr(read, item.name) for item in law.fields(form)]
-    spec = None if form is None else law.forms[form](*values)
+    spec = None if form is None else law.complete(law.forms[form](*values), lambda: angle_at_start(scenario))
     try:
-        gains = law.gains(*values) if form is None else law.design(craft, spec)
+        gains = law.gains(*values) if form is None else law.design(scenario.craft, spec)
     except ValueError as error:
         raise InputError(where, key, "", str(error)) from None
     try:

@@ -6,13 +6,14 @@ import math
 from functools import cache
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import BeforeValidator, Field, create_model, model_validator
 
 from starhold.laws.catalogue import Law, catalogue
 from starhold.laws.interface import Gain
 from starhold.models.craft import EARTH, check_inertia
 from starhold.scenario.quantity import quantity, quantity_or, reader
+from starhold.scenario.tables import Table, at_key, refuse
+from starhold.scenario.transient import TransientTable
 
 QUATERNION = Gain("1", shape=(4,), spread=False, text="quaternion, scalar first, normalised on reading")
 ANGLES = Gain("rad", shape=(3,), spread=False, text="Euler-Krylov angles yaw, pitch, roll")
@@ -20,17 +21,6 @@ ANGLES = Gain("rad", shape=(3,), spread=False, text="Euler-Krylov angles yaw, pi
 
 MOST_STEPS = 1e12
 """Beyond this many control steps the count is no longer told from its neighbours, and no run would end."""
-
-
-class Table(BaseModel):
-    """A table that refuses keys it does not know."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-def refuse(reason: str) -> PydanticCustomError:
-    """An error whose text says what is allowed."""
-    return PydanticCustomError("quantity", "{reason}", {"reason": reason})
 
 
 def _read_inertia(given: Any) -> Any:
@@ -62,10 +52,6 @@ class Spacecraft(Table):
     torque_rate_limit: Annotated[float, *quantity(Gain("N m/s", above=0.0, text="fastest change of each torque"))] = math.inf
 
 
-def _at(key: str, reason: str, found: Any) -> PydanticCustomError:
-    return PydanticCustomError("quantity_at", "{reason}", {"reason": reason, "key": key, "found": found})
-
-
 class Orbit(Table):
     """Where the spacecraft starts; without this table it floats in free space."""
 
@@ -76,7 +62,7 @@ class Orbit(Table):
     @model_validator(mode="after")
     def _off_centre(self) -> Orbit:
         if not any(self.position):
-            raise _at("position", "a point away from the centre of attraction", list(self.position))
+            raise at_key("position", "a point away from the centre of attraction", list(self.position))
         return self
 
 
@@ -89,9 +75,9 @@ class Pointing(Table):
     @model_validator(mode="after")
     def _one_attitude(self) -> Pointing:
         if self.attitude is not None and self.angles is not None:
-            raise _at("angles", "either attitude or angles, not both", list(self.angles))
+            raise at_key("angles", "either attitude or angles, not both", list(self.angles))
         if self.attitude is not None and not any(self.attitude):
-            raise _at("attitude", "a quaternion that is not zero", list(self.attitude))
+            raise at_key("attitude", "a quaternion that is not zero", list(self.attitude))
         return self
 
 
@@ -117,9 +103,9 @@ class TargetTable(Pointing):
     @model_validator(mode="after")
     def _fits_mode(self) -> TargetTable:
         if (self.mode == "history") != (self.file is not None):
-            raise _at("file", 'a file exactly when mode = "history"', self.file)
+            raise at_key("file", 'a file exactly when mode = "history"', self.file)
         if self.mode != "inertial" and (self.attitude is not None or self.angles is not None):
-            raise _at("mode", '"inertial" where attitude or angles are given', self.mode)
+            raise at_key("mode", '"inertial" where attitude or angles are given', self.mode)
         return self
 
 
@@ -150,11 +136,11 @@ class Simulation(Table):
     def _whole_steps(self) -> Simulation:
         count = self.duration / self.control_period
         if self.control_period > self.duration:
-            raise _at("control_period", f"at most the duration, {self.duration:g} s", self.control_period)
+            raise at_key("control_period", f"at most the duration, {self.duration:g} s", self.control_period)
         if not count <= MOST_STEPS:
-            raise _at("duration", f"at most {MOST_STEPS:.0e} control periods", self.duration)
+            raise at_key("duration", f"at most {MOST_STEPS:.0e} control periods", self.duration)
         if abs(count - round(count)) > 1e-6:
-            raise _at("duration", f"a whole number of control periods of {self.control_period:g} s", self.duration)
+            raise at_key("duration", f"a whole number of control periods of {self.control_period:g} s", self.duration)
         return self
 
     @property
@@ -227,9 +213,9 @@ class FaultTable(Table):
     def _does_something(self) -> FaultTable:
         if not self.strikes_wheel and (self.wheel is not None or self.inertia is None):
             body = "" if self.inertia is not None else ", or a new inertia of the body without a wheel"
-            raise _at("lost", f"true, or a new torque_limit, momentum_limit, viscous or coulomb{body}", False)
+            raise at_key("lost", f"true, or a new torque_limit, momentum_limit, viscous or coulomb{body}", False)
         if self.strikes_wheel and self.wheel is None:
-            raise _at("wheel", "the number of a wheel, from 1", None)
+            raise at_key("wheel", "the number of a wheel, from 1", None)
         return self
 
 
@@ -280,23 +266,24 @@ class ScenarioTable(Table):
     simulation: Simulation
     settling: Tolerances = Tolerances()
     certify: CertifyTable = CertifyTable()
+    transient: TransientTable | None = None
     wheels: WheelsTable | None = None
-    wheel: list[WheelTable] = []
-    fault: list[FaultTable] = []
+    wheel: list[WheelTable] = Field(default_factory=list[WheelTable])
+    fault: list[FaultTable] = Field(default_factory=list[FaultTable])
 
     @model_validator(mode="after")
     def _wheels_have_axes(self) -> ScenarioTable:
         layout = None if self.wheels is None else self.wheels.layout
         if (layout is None) == (not self.wheel) and (self.wheels is not None or self.wheel):
-            raise _at("wheels.layout", "either a layout or [[wheel]] tables", layout)
+            raise at_key("wheels.layout", "either a layout or [[wheel]] tables", layout)
         return self
 
     @model_validator(mode="after")
     def _has_orbit(self) -> ScenarioTable:
         if self.orbit is None and self.environment.gravity_gradient:
-            raise _at("environment.gravity_gradient", "false without an [orbit] table", True)
+            raise at_key("environment.gravity_gradient", "false without an [orbit] table", True)
         if self.orbit is None and self.target.mode == "orbital":
-            raise _at("target.mode", '"orbital" only with an [orbit] table', "orbital")
+            raise at_key("target.mode", '"orbital" only with an [orbit] table', "orbital")
         return self
 
 
@@ -308,7 +295,8 @@ def law_model(law: Law, form: str | None = None) -> type[LawTable]:
         entries["form"] = (Literal[form], form)
     for item in law.fields(form):
         written = item.gain.choices[item.default] if item.gain.choices and not item.required else item.default
-        kind = Annotated[Any, *quantity(item.gain), Field(validate_default=True)]
+        # What has None for its default may be left out.
+        kind = Annotated[Any, *quantity(item.gain), Field(validate_default=written is not None)]
         entries[item.name] = (kind, ... if item.required else written)
     title = law.name.replace("-", " ").title().replace(" ", "") + (form or "").title()
     return create_model(title, __base__=LawTable, __doc__=law.card.summary, **entries)

@@ -1,0 +1,217 @@
+"""The root of the modal law that turns fastest within limits, over the initial angle, and the fit through it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+from os import cpu_count
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import minimize_scalar
+
+from starhold.algebra.quaternion import multiply
+from starhold.algebra.structure import LANES, flatten
+from starhold.analysis.transient import Flown, Limits, Transient, Transients, Watcher
+from starhold.laws import modal
+from starhold.laws.modal import fitted
+from starhold.loop.closed_loop import ClosedLoop
+
+PIECE = 3
+"""Angles that each piece of the fit has at least: it has three numbers."""
+DECAYS = np.geomspace(0.02, 30.0, 80)
+"""Decays (1/rad) among which the best of a piece is looked for first."""
+
+
+@dataclass(frozen=True)
+class Best:
+    """The root (1/s) with the shortest transient, and that transient."""
+
+    root: float
+    transient: Transient
+
+    @property
+    def time(self) -> float:
+        """How long the transient takes (s)."""
+        return math.inf if self.transient.time is None else self.transient.time
+
+
+class Found(NamedTuple):
+    """The best roots for one initial angle (rad): within the limits, and within those with their tolerances; None where no
+    root that was tried keeps to them and comes to its end."""
+
+    angle: float
+    hard: Best | None
+    eased: Best | None
+
+
+class Unmet(NamedTuple):
+    """What no root achieves from an angle: to come to its "end" at all; or, of those that do, to keep the limit of the
+    "rate" or of the "acceleration", where `least` is the least of their peaks (rad/s or rad/s2) and `root` (1/s) has it; or
+    to keep "both"."""
+
+    what: Literal["end", "rate", "acceleration", "both"]
+    least: float = math.nan
+    root: float = math.nan
+
+
+class Pieces(NamedTuple):
+    """c, d, e of c exp(d angle) + e (1/s; angle in rad) up to the split (rad) and beyond it."""
+
+    below: tuple[float, float, float]
+    above: tuple[float, float, float]
+    split: float
+
+    def at(self, angles: ArrayLike) -> NDArray[np.float64]:
+        """Roots (n,) at angles (n,)."""
+        return fitted(np.asarray(angles, dtype=float), *self)
+
+    def errors(self, angles: ArrayLike, roots: ArrayLike) -> NDArray[np.float64]:
+        """Relative errors (n,) against roots (n,) at angles (n,)."""
+        return self.at(angles) / np.asarray(roots, dtype=float) - 1.0
+
+
+PUBLISHED = Pieces(*(modal.Fit._field_defaults[name] for name in Pieces._fields))
+"""For limits of 30 deg/s and 50 deg/s2, from 20 deg/s along the axis of the turn."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """From what turns start and when they are over: the loop of the modal law, flown for `steps` control steps from an angle
+    (rad) about the axis (3,) at a rate (3,) (rad/s); the target is at rest; ends in rad and rad/s; b in s."""
+
+    loop: ClosedLoop
+    steps: int
+    axis: tuple[float, float, float]
+    rate: tuple[float, float, float]
+    angle_end: float
+    rate_end: float
+    b: float
+
+    def watcher(self) -> Watcher:
+        """What flies it."""
+        root = (-1.0, -1.0, -1.0)
+        # Its gains only say of what form those of the lanes are.
+        return Watcher(replace(self.loop, gains=modal.Gains(root, root, self.b)), self.angle_end, self.rate_end)
+
+    def start(self, angle: float) -> list[float]:
+        """The numbers of the state that turns of this angle (rad) start from."""
+        half = math.sin(0.5 * angle) / math.hypot(*self.axis)
+        x, y, z = self.axis
+        turn = (math.cos(0.5 * angle), half * x, half * y, half * z)
+        goal: Any = self.loop.target
+        return flatten(self.loop.start._replace(attitude=multiply(goal, turn), rate=self.rate))
+
+    def gains(self, roots: ArrayLike) -> NDArray[np.float64]:
+        """The numbers of the law's gains, one column a root."""
+        roots = np.asarray(roots, dtype=float)
+        return np.array([*[roots] * 6, np.full(roots.shape, self.b)])
+
+    def fly(self, angle: float, roots: ArrayLike) -> Transients:
+        """The turn of this angle (rad) with each of roots (n,), all of them to their end."""
+        gains = self.gains(roots)
+        return self.watcher().fly(np.repeat(np.array([self.start(angle)]).T, gains.shape[1], axis=1), gains, self.steps)
+
+
+def search(
+    problem: Problem,
+    angles: Sequence[float],
+    roots: ArrayLike,
+    limits: Limits,
+    eased: Limits,
+    notice: Callable[[int, int], None] = lambda done, total: None,
+    threads: int | None = None,
+) -> list[Found]:
+    """The best of all roots (n,) for each angle, within `limits` and within `eased`, which are no narrower.
+
+    Every root is flown: until it leaves the eased limits, or until it has taken longer than the best so far, or to the end.
+    `notice` hears how many angles are done, and how many there are.
+    """
+    found: list[Found] = []
+    work = partial(_best, problem, problem.watcher(), np.sort(np.asarray(roots, dtype=float)), limits, eased)
+    with ThreadPoolExecutor(max_workers=threads or cpu_count() or 1) as pool:
+        try:
+            for answer in pool.map(work, angles):
+                found.append(answer)
+                notice(len(found), len(angles))
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+    return found
+
+
+def _best(problem: Problem, watcher: Watcher, roots: Any, limits: Limits, eased: Limits, angle: float) -> Found:
+    """The search at one angle: block by block from the fastest roots on."""
+    start = np.array(problem.start(angle))[:, None]
+    best: dict[Limits, Best] = {}
+    for at in range(0, len(roots), LANES):
+        block = roots[at : at + LANES]
+        enough = partial(_settled, eased, best[limits].time if limits in best else math.inf, problem.loop.period)
+        starts = np.repeat(start, len(block), axis=1)
+        flown = watcher.block(starts, problem.gains(block), problem.steps, enough=enough)
+        for kind in {limits, eased}:
+            times = np.where(flown.within(kind) & ~np.isnan(flown.time), flown.time, np.inf)
+            lane = int(np.argmin(times))
+            if times[lane] < (best[kind].time if kind in best else math.inf):
+                best[kind] = Best(float(block[lane]), flown[lane])
+    return Found(angle, best.get(limits), best.get(eased))
+
+
+def _settled(limits: Limits, least: float, period: float, flown: Flown) -> bool:
+    """Whether no lane of a block can be the best any more: it is beyond the limits, lost, or too late."""
+    beyond = ~flown.transients(period).within(limits) | flown.lost
+    late = flown.outside & (flown.steps * period > least)
+    return bool((beyond | late).all())
+
+
+def unmet(problem: Problem, angle: float, roots: ArrayLike, limits: Limits) -> Unmet:
+    """Why `search` finds none of these roots (n,) at an angle (rad)."""
+    roots = np.asarray(roots, dtype=float)
+    flown = problem.fly(angle, roots)
+    ended = ~np.isnan(flown.time)
+    if not ended.any():
+        return Unmet("end")
+    rate, acceleration, roots = flown.peak_rate[ended], flown.peak_acceleration.max(axis=0)[ended], roots[ended]
+    if rate.min() > limits.rate:
+        return Unmet("rate", float(rate.min()), float(roots[rate.argmin()]))
+    if acceleration.min() > limits.acceleration:
+        return Unmet("acceleration", float(acceleration.min()), float(roots[acceleration.argmin()]))
+    return Unmet("both")
+
+
+def fit(angles: ArrayLike, roots: ArrayLike) -> Pieces | None:
+    """The two pieces, and the split half-way between two angles, of the least rms relative error; None for too few angles.
+
+    angles: (n,), increasing (rad); roots: (n,), below zero (1/s).
+    """
+    x, y = np.asarray(angles, dtype=float), np.asarray(roots, dtype=float)
+    if len(x) < 2 * PIECE:
+        return None
+    best, least = None, math.inf
+    for cut in range(PIECE, len(x) - PIECE + 1):
+        below, above = (_piece(x[part], y[part]) for part in (slice(None, cut), slice(cut, None)))
+        if below[1] + above[1] < least:
+            best, least = Pieces(below[0], above[0], 0.5 * float(x[cut - 1] + x[cut])), below[1] + above[1]
+    return best
+
+
+def _piece(x: Any, y: Any) -> tuple[tuple[float, float, float], float]:
+    """c, d, e of one piece and the sum of its squared relative errors. For a given d the others are linear."""
+
+    def solve(d: float) -> tuple[Any, float]:
+        # Weighed by 1/y, so that relative errors count.
+        basis = np.column_stack([np.exp(d * (x - x[0])), np.ones_like(x)]) / y[:, None]
+        found = np.linalg.lstsq(basis, np.ones_like(y), rcond=None)[0]
+        return found, float(np.sum((basis @ found - 1.0) ** 2))
+
+    tried = np.concatenate([-DECAYS[::-1], DECAYS])
+    place = int(np.argmin([solve(d)[1] for d in tried]))
+    low, high = tried[max(place - 1, 0)], tried[min(place + 1, len(tried) - 1)]
+    best: Any = minimize_scalar(lambda d: solve(d)[1], bounds=(low, high), method="bounded", options={"xatol": 1e-6})
+    d = float(best.x) if best.fun < solve(tried[place])[1] else float(tried[place])
+    (c, e), error = solve(d)
+    return (float(c * math.exp(-d * x[0])), d, float(e)), error

@@ -1,0 +1,172 @@
+"""How long a turn takes, and how fast and how sharply the body turns on the way: of one run, or of many lanes."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.quaternion import relative
+from starhold.algebra.structure import LANES, flatten, pack, unflatten
+from starhold.algebra.vector import ZERO, dot
+from starhold.analysis.metrics import acceleration
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.loop.kernels import Ends, Watched, make_watch
+from starhold.simulation.lane import Recording
+
+Array: TypeAlias = NDArray[np.float64]
+
+LEG = 0.5
+"""Seconds of motion between two looks at which lanes are still worth flying."""
+
+
+class Limits(NamedTuple):
+    """Of the body's rate, its norm (rad/s), and of each component of its derivative (rad/s2)."""
+
+    rate: float
+    acceleration: float
+
+
+@dataclass(frozen=True)
+class Transient:
+    """The time (s) from which on angle and relative rate stay within their ends, by a line between control steps, None where
+    that is never; the largest norm of the body's rate (rad/s); of each component of its derivative the largest mean over a
+    control step (rad/s2)."""
+
+    time: float | None
+    peak_rate: float
+    peak_acceleration: tuple[float, float, float]
+
+    def keeps(self, limits: Limits) -> bool:
+        """Whether the motion stays within limits."""
+        return self.peak_rate <= limits.rate and max(self.peak_acceleration) <= limits.acceleration
+
+
+@dataclass(frozen=True)
+class Transients:
+    """The same of many lanes: time (lanes,), NaN for never; peak_rate (lanes,); peak_acceleration (3, lanes)."""
+
+    time: Array
+    peak_rate: Array
+    peak_acceleration: Array
+
+    def within(self, limits: Limits) -> NDArray[np.bool_]:
+        """Which lanes stay within limits, (lanes,)."""
+        return (self.peak_rate <= limits.rate) & (self.peak_acceleration.max(axis=0) <= limits.acceleration)
+
+    def __getitem__(self, lane: int) -> Transient:
+        time, peak = float(self.time[lane]), self.peak_acceleration[:, lane].tolist()
+        return Transient(None if math.isnan(time) else time, float(self.peak_rate[lane]), tuple(peak))
+
+
+def of_run(run: Recording, angle_end: float, rate_end: float) -> Transient:
+    """The transient of a recorded run, the same bits as a `Watcher` notes where every control step is recorded; of fewer
+    samples it knows no more than they tell.
+
+    angle_end: rad; rate_end: rad/s. The time is None too for a run that was lost.
+    """
+    ends, step = _ends(angle_end, rate_end), run.attrs["control_period"]
+    squares = ends.angle * _square(run["attitude_error"][:, 1:]), ends.rate * _square(run["rate_error"])
+    over = [_last_above(values) for values in squares]
+    lost = "diverged_at" in run.attrs or None in over
+    time = None if lost else max(x for x in over if x is not None) * run.attrs["record_every"] * step
+    x, y, z = np.abs(acceleration(run)).max(axis=0, initial=0.0).tolist()
+    return Transient(time, math.sqrt(_square(run["rate"]).max(initial=0.0)), (x, y, z))
+
+
+def _square(vectors: Array) -> Array:
+    # Summed in the order of `dot`, for the same bits.
+    return vectors[:, 0] ** 2 + vectors[:, 1] ** 2 + vectors[:, 2] ** 2
+
+
+def _last_above(values: Array) -> float | None:
+    """The place, with its fraction, at which values (n,) were last above 1; None where they are at the end."""
+    above = np.flatnonzero(~(values <= 1.0))
+    if not len(above):
+        return 0.0
+    last = int(above[-1])
+    if last + 1 == len(values):
+        return None
+    return last + float((values[last] - 1.0) / (values[last] - values[last + 1]))
+
+
+def _ends(angle: float, rate: float) -> Ends:
+    return Ends(1.0 / math.sin(0.5 * angle) ** 2, 1.0 / rate**2)
+
+
+class Flown(NamedTuple):
+    """A block after some control steps: how many, what is noted of its lanes (numbers of `Watched`, LANES), and which of
+    them lost their motion (LANES,)."""
+
+    steps: int
+    seen: Array
+    lost: NDArray[np.bool_]
+
+    @property
+    def outside(self) -> NDArray[np.bool_]:
+        """Which lanes are not at their end now."""
+        return (self.seen[0] > 1.0) | (self.seen[1] > 1.0) | self.lost
+
+    def transients(self, period: float) -> Transients:
+        """What came of the lanes."""
+        time = np.where(self.outside, np.nan, self.seen[2:4].max(axis=0) * period)
+        return Transients(time, np.sqrt(self.seen[4]), self.seen[5:8])
+
+
+def _forever(flown: Flown) -> bool:
+    return False
+
+
+class Watcher:
+    """Flies a loop on many lanes and notes their transients. The loop is flown as it is, but for events."""
+
+    def __init__(self, loop: ClosedLoop, angle_end: float, rate_end: float) -> None:
+        self.loop, self.ends = loop, _ends(angle_end, rate_end)
+        self._kernel = make_watch(loop.parts())
+        self._leg = max(1, round(LEG / loop.period))
+
+    def fly(self, starts: Array, gains: Array, steps: int, threads: int | None = None) -> Transients:
+        """starts: (numbers of a state, lanes); gains: (numbers of the law's gains, lanes); steps: control steps."""
+        groups = [slice(at, at + LANES) for at in range(0, starts.shape[1], LANES)]
+        with ThreadPoolExecutor(max_workers=threads or os.cpu_count() or 1) as pool:
+            parts = list(pool.map(lambda group: self.block(starts[:, group], gains[:, group], steps, group.start), groups))
+        peaks = np.concatenate([part.peak_acceleration for part in parts], axis=1)
+        times, rates = (np.concatenate([getattr(part, name) for part in parts]) for name in ("time", "peak_rate"))
+        return Transients(times, rates, peaks)
+
+    def block(
+        self, starts: Array, gains: Array, steps: int, first_run: int = 0, enough: Callable[[Flown], bool] = _forever
+    ) -> Transients:
+        """The same of at most LANES lanes on this thread; ends early once `enough` says so. Lanes that are then still
+        outside their end have no time."""
+        loop, count = self.loop, starts.shape[1]
+        # Lanes of a search start alike; each start is made ready once.
+        unlike, which = np.unique(starts, axis=1, return_inverse=True)
+        carries = [loop.carry(unflatten(column, loop.start)) for column in unlike.T]
+        seen = [self._first(carry) for carry in carries]
+        columns = (np.array([flatten(item) for item in items]).T[:, which.ravel()] for items in (carries, seen))
+        x, noted = (pack(items)[0] for items in columns)
+        setup, like, own = loop.setup(), loop.carry(), pack(gains)[0]
+        rates, flown = np.empty(3 * LANES), Flown(0, noted.reshape(-1, LANES), np.zeros(LANES, dtype=bool))
+        while flown.steps < steps and not enough(flown):
+            leg = min(self._leg, steps - flown.steps)
+            numbers = loop.craft, loop.craft, setup, loop.substeps, self.ends
+            self._kernel(x, like, flown.steps, leg, first_run, own, loop.gains, *numbers, noted, seen[0], rates)
+            flown = Flown(flown.steps + leg, flown.seen, x.reshape(-1, LANES)[-1] >= 0.0)
+        told = flown.transients(loop.period)
+        return Transients(told.time[:count], told.peak_rate[:count], told.peak_acceleration[:, :count].copy())
+
+    def _first(self, carry: Any) -> Watched:
+        """What is noted of the start."""
+        state, goal = carry.state, self.loop.target
+        if not isinstance(goal, tuple):
+            raise ValueError("transients are watched towards a target at rest alone")
+        error = relative(goal, state.attitude)
+        angle, square = self.ends.angle * dot(error[1:], error[1:]), dot(state.rate, state.rate)
+        return Watched(angle, self.ends.rate * square, 0.0, 0.0, square, ZERO)

@@ -1,0 +1,84 @@
+"""Runs against limits on rate and acceleration: metrics, plots and the section of the page."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from starhold.report.flight import Flight
+from starhold.report.page import render
+from starhold.report.plots import collect
+from starhold.report.transients import against_limits, section, told
+from starhold.scenario.reading import Scenario, parse
+from tests.report import flown
+
+LIMITS = '[transient]\nrate_limit = 0.2\nacceleration_limit = "0.5 deg/s^2"\nangle_end = 3.0\nrate_end = 1.0\n'
+
+
+def limited(table: str = LIMITS) -> tuple[Scenario, list[Flight]]:
+    """The short scenario with such a table, and its flights with their metrics."""
+    head, rest = flown.text().split("[[law]]", 1)
+    scenario = parse(f"{head}{table}[[law]]{rest}", "test")
+    flights: list[Flight] = []
+    for flight in flown.flights():
+        metrics = flight.metrics | against_limits(flight.recording, scenario.table.transient)
+        flights.append(replace(flight, metrics=metrics))
+    return scenario, flights
+
+
+def test_metrics_are_plain_numbers() -> None:
+    _, flights = limited()
+    for flight in flights:
+        found, run = flight.metrics, flight.recording
+        assert found["peak_rate"] == pytest.approx(np.linalg.norm(run["rate"], axis=1).max(), rel=1e-15)
+        mean = np.abs(np.diff(run["rate"], axis=0)).max(axis=0) / 0.1
+        assert found["peak_accelerations"] == pytest.approx(mean, rel=1e-9)
+        assert found["peak_acceleration"] == max(found["peak_accelerations"])
+        assert found["limits_kept"] == (found["peak_acceleration"] <= math.radians(0.5))
+        assert found["transient_time"] is not None
+    assert against_limits(flown.flights()[0].recording, None) == {}
+
+
+def test_limits_that_are_not_given_are_null_and_kept() -> None:
+    _, flights = limited("[transient]\n")
+    found = flights[0].metrics
+    assert (found["rate_limit"], found["acceleration_limit"], found["limits_kept"]) == (None, None, True)
+    assert found["transient_time"] is None
+    assert told(flights[0]).startswith("transient comes to no end; peak rate")
+    assert " of " not in told(flights[0])
+
+
+def test_the_plot_shows_norm_components_and_the_limits_that_matter() -> None:
+    scenario, flights = limited()
+    (plot,) = collect(flights, 2000, scenario).further
+    assert plot.name == "transient"
+    assert [panel.label for panel in plot.panels] == ["norm, deg/s", "x, deg/s²", "y, deg/s²", "z, deg/s²"]
+    assert plot.panels[0].levels == pytest.approx((math.degrees(0.2),))
+    assert plot.panels[1].levels == pytest.approx((-0.5, 0.5))
+    assert plot.panels[0].curves[0][0] == pytest.approx(math.degrees(math.hypot(0.04, 0.03, 0.02)))
+    far = limited(LIMITS.replace("0.2", "20"))[0]
+    assert collect(flights, 2000, far).further[0].panels[0].levels == ()
+    assert collect(flights, 2000, limited("[transient]\n")[0]).further[0].panels[1].levels == ()
+
+
+def test_the_page_tells_every_law_against_the_limits() -> None:
+    scenario, flights = limited()
+    odd = [replace(flights[0], name="<b>odd</b>"), *flights[1:]]
+    page = section(odd)
+    assert "&lt;b&gt;odd&lt;/b&gt;" in page
+    assert "<b>odd" not in page
+    assert f"{math.degrees(flights[0].metrics['peak_rate']):.4g} of 11.46 deg/s" in page
+    whole = render(scenario, flights)
+    assert section(flights) in whole
+    assert "largest component of the rate&#x27;s derivative" in whole
+    assert "largest component of the rate" not in render(flown.scenario(), flown.flights())
+
+
+def test_flights_without_limits_have_no_section() -> None:
+    assert section(flown.flights()) == ""
+    plots: Any = collect(flown.flights(), 2000, flown.scenario())
+    assert plots.further == ()
