@@ -61,7 +61,7 @@ def compare(scenario: reading.Scenario | str | Path) -> list[Flight]:
 
 
 def failures(scenario: reading.Scenario | str | Path, law: str | None = None) -> list[Failure]:
-    """What is left of a scenario on wheels after the loss of any one or two of them, under one law, the first if not given."""
+    """What is left of a scenario on wheels after the loss of any one or two of them, under a law, the first if not given."""
     from starhold.report.failures import study
 
     opened = _opened(scenario)
