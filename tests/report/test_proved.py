@@ -138,6 +138,8 @@ def test_every_kind_of_claim_can_be_told_where_it_is_undecided(kind: str) -> Non
         "sampling": {"period": 1.0, "radius": 1.2, "eigenvalues": [[1.2, 0.0]], "longest": None, "every_shorter": False},
         "wheels": {"momentum": 0.1},
         "region": {},
+        "circle": {},
+        "control-limit": {"kind": "norm", "limit": 3.5},
         "sliding": {"torque": [0.0, 0.0, 0.0], "margin": 1e-3},
     }[kind]
     claim = Claim(kind, numbers, {}, (), (Obligation("form", "exact identity", "undecided", {"reason": "why not"}),))

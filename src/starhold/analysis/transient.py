@@ -17,7 +17,7 @@ from starhold.algebra.structure import LANES, flatten, pack, unflatten
 from starhold.algebra.vector import ZERO, dot
 from starhold.analysis.metrics import acceleration
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.loop.kernels import Ends, Watched, make_watch
+from starhold.loop.watch import Ends, Watched, make_watch
 from starhold.simulation.lane import Recording
 
 Array: TypeAlias = NDArray[np.float64]

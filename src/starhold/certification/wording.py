@@ -19,6 +19,8 @@ HEADINGS = {
     "disturbance": "torque from outside",
     "sampling": "torque held between samples",
     "sliding": "reaches its surface",
+    "circle": "ends on the circle",
+    "control-limit": "within the control's limit",
 }
 
 OBLIGATIONS = {
@@ -44,6 +46,10 @@ OBLIGATIONS = {
     "reach exceeds torque": "the switching torque exceeds the torque from outside on every axis, over the whole orbit",
     "surface holds the target": "on the surface the angle to the target falls",
     "layer": "the boundary layer lets the motion end no farther away than told",
+    "only the circle": "where V stays as it is the motion is on the circle, or at rest in its middle",
+    "centre outside": "rest in the middle of the circle is outside the set",
+    "x returns": "along X the motion is on its own and returns",
+    "control": "the control is within its limit on the whole set",
     "no switch of the double cover": "the quaternion that is fed back does not switch on the way",
 }
 
@@ -164,6 +170,23 @@ def _sliding(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     return f"{where} the motion reaches the surface {against} and {end}"
 
 
+def _circles(n: Mapping[str, Any]) -> str:
+    if "inner" not in n:
+        return ""
+    band = f"circles of radius {shown(n['inner'], up=True)} to {shown(n['outer'])} at the same rate"
+    off = f"on the circle, velocities off by {shown(n['velocity'])} (scaled)"
+    return f"from the level set of V that holds {band} and, {off},"
+
+
+def _circle(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
+    return f"{_circles(n)} the motion ends on the circle".strip()
+
+
+def _control_limit(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
+    kind = "on every axis" if n["kind"] == "axis" else "in norm"
+    return f"{_circles(n)} with x = 0, the control never exceeds {n['limit']:.4g} (scaled) {kind}".strip()
+
+
 _SENTENCES = {
     "convergence": _convergence,
     "region": _region,
@@ -173,6 +196,8 @@ _SENTENCES = {
     "disturbance": _disturbance,
     "sampling": _sampling,
     "sliding": _sliding,
+    "circle": _circle,
+    "control-limit": _control_limit,
 }
 
 

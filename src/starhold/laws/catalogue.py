@@ -13,7 +13,7 @@ from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar, overload
 
 import starhold.laws
 from starhold.laws.interface import Card, Craft, Field, NoMemory, fields
@@ -86,17 +86,22 @@ class Law:
         return NoMemory() if maker is None else maker(gains, craft, period)
 
 
+AnyLaw = TypeVar("AnyLaw", bound=Law)
+
+
 @cache
 def catalogue() -> dict[str, Law]:
     """All laws by name. A package whose entry point does not load is named in the error."""
-    found = [
-        _as_law(import_module(f"{starhold.laws.__name__}.{entry.name}"))
-        for entry in pkgutil.iter_modules(starhold.laws.__path__)
-        if _declares_card(entry)
-    ]
+    found = found_in(starhold.laws.__name__, Law, INTERFACE)
     for point in entry_points(group="starhold.laws"):
         found.append(_as_law(point.load()))
     return {law.name: law for law in sorted(found, key=lambda law: law.name)}
+
+
+def found_in(package: str, kind: type[AnyLaw], interface: tuple[str, ...]) -> list[AnyLaw]:
+    """The laws of a package: its modules with a `CARD`, which must have all of an interface."""
+    modules = pkgutil.iter_modules(import_module(package).__path__, f"{package}.")
+    return [_as_law(import_module(entry.name), kind, interface) for entry in modules if _declares_card(entry.name)]
 
 
 @contextmanager
@@ -126,20 +131,26 @@ def from_file(path: Path) -> Law:
     # Registered so that the equations' sources and NamedTuples can be found by their module name.
     sys.modules[name] = module
     spec.loader.exec_module(module)
-    return _as_law(module, path.stem)
+    return _as_law(module, name=path.stem)
 
 
-def _declares_card(entry: pkgutil.ModuleInfo) -> bool:
-    spec = importlib.util.find_spec(f"{starhold.laws.__name__}.{entry.name}")
+def _declares_card(name: str) -> bool:
+    spec = importlib.util.find_spec(name)
     origin = None if spec is None else spec.origin
     return origin is not None and "\nCARD = " in Path(origin).read_text(encoding="utf-8")
 
 
-def _as_law(module: ModuleType, name: str | None = None) -> Law:
-    missing = [name for name in INTERFACE if not hasattr(module, name)]
+@overload
+def _as_law(module: ModuleType, *, name: str | None = None) -> Law: ...
+@overload
+def _as_law(module: ModuleType, kind: type[AnyLaw], interface: tuple[str, ...]) -> AnyLaw: ...
+def _as_law(
+    module: ModuleType, kind: type[Law] = Law, interface: tuple[str, ...] = INTERFACE, name: str | None = None
+) -> Law:
+    missing = [name for name in interface if not hasattr(module, name)]
     if missing:
         raise ValueError(f"{module.__file__}: a law needs {', '.join(missing)}")
     name = module.__name__.rpartition(".")[2] if name is None else name
     # Numba tells NamedTuple classes apart at the speed of calls only by their names.
     module.Gains.__name__ = f"{name}_gains"
-    return Law(name.replace("_", "-"), module)
+    return kind(name.replace("_", "-"), module)

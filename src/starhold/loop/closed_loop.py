@@ -108,6 +108,10 @@ class Phase(NamedTuple):
             return rate
         return apply(self.craft.inverse_inertia, apply(self.before.inertia, rate))
 
+    def entered(self, carry: Carry) -> Carry:
+        """What is carried into the phase."""
+        return carry._replace(state=carry.state._replace(rate=self.rate_from(carry.state.rate)))
+
 
 @dataclass(frozen=True)
 class ClosedLoop:

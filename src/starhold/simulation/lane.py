@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from starhold.algebra.structure import flatten, load
 from starhold.errors import InputError
 from starhold.loop.closed_loop import Carry, ClosedLoop
-from starhold.loop.kernels import Sample, make_kernels
+from starhold.loop.kernels import make_kernels, make_step
+from starhold.loop.station import StationCarry, StationLoop
+from starhold.loop.step import Sample
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,10 +48,13 @@ WHEELS: dict[str, tuple[str, str, str]] = {
 
 @dataclass(frozen=True)
 class Recording:
-    """A trajectory as arrays: `time` (n,) in s, the quantities of COLUMNS, (n, 4) or (n, 3), and those of WHEELS."""
+    """A trajectory as arrays: `time` (n,) and the quantities of `columns`; of an attitude loop in SI those of COLUMNS,
+    (n, 4) or (n, 3), and of WHEELS."""
 
     arrays: dict[str, NDArray[np.float64]]
     attrs: dict[str, Any]
+    columns: dict[str, tuple[str, str, str]] = field(default_factory=lambda: COLUMNS | WHEELS)
+    time_unit: str = "s"
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         return self.arrays[name]
@@ -60,14 +65,15 @@ class Recording:
         import xarray as xr
 
         data: dict[str, Any] = {}
-        columns = COLUMNS | {name: told for name, told in WHEELS.items() if name in self.arrays}
+        columns = {name: told for name, told in self.columns.items() if name in self.arrays}
         for name, (dimension, unit, meaning) in columns.items():
             data[name] = (("time", dimension), self[name], {"units": unit, "long_name": meaning})
-        coords = {
-            "time": ("time", self["time"], {"units": "s", "long_name": "time"}),
-            "quaternion": ("quaternion", ["q0", "q1", "q2", "q3"]),
+        coords: dict[str, Any] = {
+            "time": ("time", self["time"], {"units": self.time_unit, "long_name": "time"}),
             "axis": ("axis", ["x", "y", "z"]),
         }
+        if any(dimension == "quaternion" for dimension, _, _ in columns.values()):
+            coords["quaternion"] = ("quaternion", ["q0", "q1", "q2", "q3"])
         return xr.Dataset(data, coords, self.attrs)
 
 
@@ -84,15 +90,24 @@ def simulate(
     return label(loop, samples, carry, record_every).dataset()
 
 
+@overload
 def fly(
     loop: ClosedLoop, steps: int, record_every: int = 1, run: int = 0, progress: Progress | None = None
-) -> tuple[NDArray[np.float64], Carry]:
-    """The samples (number, sample) of a trajectory, one row for each number of `Sample`, and what it carries at its end."""
+) -> tuple[NDArray[np.float64], Carry]: ...
+@overload
+def fly(
+    loop: StationLoop, steps: int, record_every: int = 1, run: int = 0, progress: Progress | None = None
+) -> tuple[NDArray[np.float64], StationCarry]: ...
+def fly(
+    loop: ClosedLoop | StationLoop, steps: int, record_every: int = 1, run: int = 0, progress: Progress | None = None
+) -> tuple[NDArray[np.float64], Any]:
+    """The samples (number, sample) of a trajectory, one row for each number of a sample, and what it carries at its end."""
     kernel = make_kernels(loop.parts()).one
-    phases = loop.phases(steps)
-    width = _WIDTH + (0 if loop.wheels is None else 2 * len(loop.wheels.axes))
-    samples = np.full((width, _sample_count(steps, record_every, width)), np.nan)
+    phases: Any = loop.phases(steps)
+    carry: Any
     carry, done, chunk = loop.carry(), 0, steps if progress is None else 1
+    width = len(flatten(make_step(loop.parts()).sample(carry, 0, loop.setup())))
+    samples = np.full((width, _sample_count(steps, record_every, width)), np.nan)
     end = np.empty((len(flatten(carry)), 1))
     while done < steps:
         begun = time.perf_counter()
@@ -100,7 +115,7 @@ def fly(
         count = min(chunk, now.last - done)
         last = done + count == steps
         if done == now.first:
-            carry = carry._replace(state=carry.state._replace(rate=now.rate_from(carry.state.rate)))
+            carry = now.entered(carry)
         numbers = now.gains, now.known, now.craft, now.setup, loop.substeps
         kernel(carry, done, count, last, record_every, run, *numbers, samples, end)
         carry = load(end, 0, carry)
@@ -152,6 +167,3 @@ def _sample_count(steps: int, record_every: int, width: int) -> int:
     if count > most:
         raise InputError("", "simulation.record_every", f"{record_every}, {count} samples", f"at least {-(-steps // most)}")
     return count
-
-
-_WIDTH = sum(_size(name) for name in Sample._fields)

@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.structure import LANES, flatten, pack, unflatten, unpack
-from starhold.loop.closed_loop import Carry, ClosedLoop
+from starhold.loop.closed_loop import Carry, ClosedLoop, Phase
 from starhold.loop.kernels import make_kernels
+from starhold.loop.station import StationLoop
+from starhold.models.libration import PointState
 from starhold.models.rigid_body import State
 from starhold.simulation.lane import Progress, fly
 
@@ -31,13 +33,13 @@ class Batch:
     like: Any
 
     def state(self, lane: int) -> Any:
-        """The state of a lane, a `State` or `WheeledState`."""
+        """The state of a lane, a `State`, `WheeledState` or `PointState`."""
         return unflatten(self.states[:, lane], self.like)
 
 
 def simulate_many(
-    loop: ClosedLoop,
-    starts: Sequence[State] | NDArray[np.float64],
+    loop: ClosedLoop | StationLoop,
+    starts: Sequence[State | PointState] | NDArray[np.float64],
     steps: int,
     gains: NDArray[np.float64] | None = None,
     first_run: int = 0,
@@ -53,9 +55,9 @@ def simulate_many(
     start = np.asarray(starts if isinstance(starts, np.ndarray) else [flatten(s) for s in starts], dtype=float)
     start = start if isinstance(starts, np.ndarray) else start.T
     workers = os.cpu_count() or 1 if threads is None else threads
-    if gains is not None and loop.events:
+    if gains is not None and isinstance(loop, ClosedLoop) and loop.events:
         raise ValueError("gains of their own for each lane do not go with events that change gains")
-    if loop.law.card.compiled_only:
+    if isinstance(loop, ClosedLoop) and loop.law.card.compiled_only:
         return _one_by_one(loop, start, steps, gains, first_run, workers, progress)
     carries = _carries(loop, start)
     blocks = pack(carries)
@@ -67,8 +69,9 @@ def simulate_many(
         for now in phases:
             own = now.gains if gain_blocks is None else gain_blocks[block]
             count = now.last - now.first
-            rate = blocks[block].reshape(-1, LANES)[RATE]
-            rate[:] = now.rate_from(tuple(rate))
+            if isinstance(now, Phase):
+                rate = blocks[block].reshape(-1, LANES)[RATE]
+                rate[:] = now.rate_from(tuple(rate))
             numbers = own, now.gains, now.known, now.craft, now.setup, loop.substeps
             kernel(blocks[block], like, now.first, count, run, *numbers)
 
@@ -77,8 +80,12 @@ def simulate_many(
     return Batch(ends[: len(start)], ends[-1], loop.start)
 
 
-def _carries(loop: ClosedLoop, start: NDArray[np.float64]) -> NDArray[np.float64]:
+def _carries(loop: ClosedLoop | StationLoop, start: NDArray[np.float64]) -> NDArray[np.float64]:
     """What each lane starts with, one column a lane."""
+    if isinstance(loop, StationLoop):
+        columns = np.repeat(np.array(flatten(loop.carry()))[:, None], start.shape[1], axis=1)
+        columns[: len(start)] = start
+        return columns
     if isinstance(loop.target, str):
         return np.array([flatten(loop.carry(unflatten(column, loop.start))) for column in start.T]).T
     # Lanes differ in their state and in the side of the double cover they start on, and in nothing else.

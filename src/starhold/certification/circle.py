@@ -1,0 +1,288 @@
+"""Claims about the circle that the law `l2-circle` makes attractive, read off the law's and the model's own equations.
+
+With f1 = y^2 + z^2 - radius^2, f2 = y' + rate z, f3 = z' - rate y and V = (alpha f1^2 + f2^2 + f3^2)/2 the law's neutral
+control keeps V, and what it takes off is k (f2, f3), or of a relay k (f2, f3)/max(|(f2, f3)|, layer); so V' <= 0, and
+V' = 0 only where f2 = f3 = 0. There f2' = -2 alpha f1 y and f3' = -2 alpha f1 z: a motion that stays there has f1 = 0, which
+is the circle, or y = z = 0, where V = alpha radius^4/2. Along X the motion is linear and on its own.
+
+A relay without a layer is a set of controls where f2 = f3 = 0, all of norm up to k. It holds every circle with
+2 alpha |f1| r <= k: V stays there, and the circle attracts nothing but the band around it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.intervals import Intervals
+from starhold.algebra.polynomial import Polynomial, constants, exact
+from starhold.algebra.vector import add
+from starhold.certification.boxes import Sides, holds_on
+from starhold.certification.certificate import BALLS, EXACT, EXACT_SIGN, LASALLE, Certificate, Claim
+from starhold.certification.convergence import ALMOST, Obligations
+from starhold.certification.matrices import number
+from starhold.certification.subject import above, below, direction
+from starhold.laws.interface import fields
+from starhold.laws.station import l2_circle as law
+from starhold.laws.station.interface import SeenPoint
+from starhold.loop.station import StationLoop
+from starhold.models.libration import linear
+
+COMMON = (
+    "circular motion of the two bodies",
+    "position and velocity exactly known",
+    "control applied continuously, without lag",
+)
+LINEAR, FULL = "linear motion near the point", "motion exactly as modelled"
+UNLIMITED = "control not limited"
+IN_PLANE = "starts at rest in the plane x = 0"
+MOST = 400_000
+LESS = (1e-2, 0.03, 0.1, 0.2, 0.4, 0.7)
+"""How far below the level that points of a grid suggest a proof is tried."""
+
+
+@dataclass(frozen=True)
+class Circle:
+    """The numbers of the law and the plant, exact."""
+
+    plant: Any
+    gains: Any
+
+    @property
+    def centre(self) -> Any:
+        """V at rest in the middle of the circle."""
+        return self.gains.alpha * self.gains.radius**4 / 2
+
+
+def certify_station(loop: StationLoop, name: str = "") -> Certificate:
+    """The certificate of a station-keeping loop; without claims, which is undecided, where the law is not `l2-circle`."""
+    claims: list[Claim] = []
+    if loop.law.name == "l2-circle":
+        circle = Circle(*(type(values)(*map(exact, values)) for values in (loop.plant, loop.gains)))
+        claims.append(_attracts(loop, circle))
+        if loop.limit_kind != "none" and math.isfinite(loop.limit) and claims[0].outcome == "proved":
+            claims.append(_within_limit(loop, circle))
+    return Certificate(name or loop.law.name, described_station(loop), tuple(claims))
+
+
+def described_station(loop: StationLoop) -> dict[str, Any]:
+    """The loop as plain numbers and names, all that a checker needs to build it again."""
+    gains: dict[str, Any] = {}
+    for item, value in zip(fields(loop.law.gains), loop.gains, strict=True):
+        gains[item.name] = item.gain.choices[value] if item.gain.choices else np.asarray(value).tolist()
+    return {
+        "law": loop.law.name,
+        "gains": gains,
+        "plant": loop.plant._asdict(),
+        "model": loop.model,
+        "limit": loop.limit_kind,
+        "control_limit": loop.limit if math.isfinite(loop.limit) else None,
+        "lag": loop.lag,
+        "control_period": loop.period,
+    }
+
+
+def _assumed(loop: StationLoop, *more: str) -> tuple[str, ...]:
+    return (LINEAR if loop.model == "linear" else FULL, *COMMON, *more)
+
+
+def _attracts(loop: StationLoop, circle: Circle) -> Claim:
+    """That all motions from {V <= level} end on the circle."""
+    found, told = Obligations(), dict[str, Any]()
+
+    def finish() -> Claim:
+        return Claim("circle", told, {}, _assumed(loop, UNLIMITED), tuple(found))
+
+    matching = loop.model == ("nonlinear" if loop.gains.model else "linear")
+    if not matching:
+        reason = "the law undoes the linear model, and the full problem is flown" if not loop.gains.model else ""
+        found.add("form", EXACT, None, {"reason": reason or "the law undoes what the linear model does not have"})
+        return finish()
+    if not _is_neutral(circle):
+        found.add("form", EXACT, None, {"reason": "V is not kept by the law's neutral control"})
+        return finish()
+    found.add("form", EXACT, True)
+    g = circle.gains
+    if g.feedback == 1 and g.layer == 0:
+        found.add("only the circle", LASALLE, False, _held_circle(circle))
+        return finish()
+    found.add("descent", EXACT_SIGN, g.k > 0)
+    found.add("only the circle", LASALLE, g.rate != 0 or None, {} if g.rate != 0 else {"reason": "the rate is zero"})
+    level = below(circle.centre * ALMOST)
+    found.add("centre outside", EXACT_SIGN, exact(level) < circle.centre)
+    steep = circle.plant.rate**2 + 2 * circle.plant.stiffness
+    found.add("x returns", EXACT_SIGN, g.k_x > steep and g.k_velocity > 0)
+    told.update(_told(circle, level))
+    return finish()
+
+
+def _within_limit(loop: StationLoop, circle: Circle) -> Claim:
+    """That the control stays within its limit on motions from a smaller set, in the plane x = 0."""
+    found = Obligations()
+    told: dict[str, Any] = {"limit": loop.limit, "kind": loop.limit_kind}
+
+    def finish() -> Claim:
+        return Claim("control-limit", told, {}, _assumed(loop, IN_PLANE), tuple(found))
+
+    if loop.gains.model:
+        found.add("control", BALLS, None, {"reason": "only for a law that undoes the linear model alone"})
+        return finish()
+    asked = _on_circle(circle, loop.limit_kind)
+    if asked[0] > exact(loop.limit) ** 2 * (1 + exact(1e-12)):
+        found.add("control", BALLS, False, {"control": math.sqrt(number(asked[0])), "angle": asked[1]})
+        return finish()
+    demand = _Demand(circle, loop.limit, loop.limit_kind)
+    guess = demand.guess()
+    for level in (guess * (1.0 - less) for less in LESS):
+        if level > 0.0 and demand.within(level):
+            for name, how in (("form", EXACT), ("descent", EXACT_SIGN), ("only the circle", LASALLE)):
+                found.add(name, how, True)
+            found.add("centre outside", EXACT_SIGN, True)
+            found.add("control", BALLS, True)
+            told.update(_told(circle, level))
+            return finish()
+    found.add("control", BALLS, None, {"reason": "no level is small enough"})
+    return finish()
+
+
+def _told(circle: Circle, level: float) -> dict[str, Any]:
+    """The level; the radii between which all circles at the right rate are in its set, and the largest velocity error on
+    the circle, all rounded inward."""
+    square, reach = circle.gains.radius**2, _root(2 * exact(level) / circle.gains.alpha)
+    inner, outer = square - exact(reach), square + exact(reach)
+    return {
+        "level": level,
+        "inner": _root(inner, up=True) if inner > 0 else 0.0,
+        "outer": _root(outer),
+        "velocity": _root(2 * exact(level)),
+    }
+
+
+def _root(square: Any, up: bool = False) -> float:
+    """A float not above, or not below, the square root of a rational."""
+    root, toward = math.sqrt(number(square)), math.inf if up else 0.0
+    while (exact(root) ** 2 < square) if up else (exact(root) ** 2 > square):
+        root = math.nextafter(root, toward)
+    return root
+
+
+def _seen() -> SeenPoint:
+    zero: Any = Polynomial.constant(0)
+    return SeenPoint(direction("x"), direction("v"), zero, zero)
+
+
+def _is_neutral(circle: Circle) -> bool:
+    """Whether, along the linear model under the neutral control, V' = 0, f2' = -2 alpha f1 y, f3' = -2 alpha f1 z, and x''
+    is a linear function of x and x' alone with the coefficients of the feedback."""
+    seen, plant, gains = _seen(), constants(circle.plant), constants(circle.gains)
+    acceleration: Any = add(linear(seen.position, seen.velocity, plant), law.neutral(seen, gains, plant))
+    names = [f"x{i}" for i in (1, 2, 3)], [f"v{i}" for i in (1, 2, 3)]
+    rates = dict(zip((*names[0], *names[1]), (*seen.velocity, *acceleration), strict=True))
+
+    def along(function: Any) -> Polynomial:
+        total: Any = Polynomial.constant(0)
+        for name, rate in rates.items():
+            total = total + function.slope(name) * rate
+        return total
+
+    f1, f2, f3 = law.errors(seen, gains)
+    y, z = seen.position[1], seen.position[2]
+    pulled = 2 * gains.alpha * f1
+    steep = circle.plant.rate**2 + 2 * circle.plant.stiffness
+    x = (steep - circle.gains.k_x) * seen.position[0] - circle.gains.k_velocity * seen.velocity[0]
+    parts = (along(law.lyapunov(seen, gains, plant)), along(f2) + pulled * y, along(f3) + pulled * z, acceleration[0] - x)
+    return not any(part.terms for part in parts)
+
+
+def _held_circle(circle: Circle) -> dict[str, Any]:
+    """Another circle that a relay without a layer holds, and how much of the relay that takes."""
+    g = circle.gains
+    # Half of what the relay could hold near the circle, where f1 is 2 radius (r - radius).
+    radius = number(g.radius)
+    r = radius + min(0.1 * radius, number(g.k) / (8.0 * number(g.alpha) * radius * radius))
+    held = 2.0 * number(g.alpha) * (r * r - radius * radius) * r
+    return {"radius": r, "needs": held, "of": number(g.k)}
+
+
+def _on_circle(circle: Circle, kind: str) -> tuple[Any, float]:
+    """The largest square of the control on the circle itself, of its norm or of an axis, and at which angle from Y."""
+    p, g = circle.plant, circle.gains
+    x = 2 * p.rate * g.rate * g.radius
+    y = (p.stiffness - p.rate**2 - g.rate**2) * g.radius
+    z = (p.stiffness - g.rate**2) * g.radius
+    if kind == "axis":
+        return max((x * x, 0.5 * math.pi), (y * y, 0.0), (z * z, 0.5 * math.pi), key=lambda item: item[0])
+    return max((x * x + z * z, 0.5 * math.pi), (y * y, 0.0), key=lambda item: item[0])
+
+
+@dataclass(frozen=True)
+class _Demand:
+    """The control on the plane x = 0, x' = 0 as a function of y, f1, f2, f3 and the sign of z."""
+
+    circle: Circle
+    limit: float
+    kind: str
+
+    def within(self, level: float) -> bool:
+        """Whether the control is shown to be within its limit wherever V <= level."""
+        top = math.nextafter(level, math.inf)
+        error = math.sqrt(2.0 * top) * (1.0 + 1e-12)
+        off = error / math.sqrt(below(self.circle.gains.alpha)) * (1.0 + 1e-12)
+        width = math.sqrt(above(self.circle.gains.radius) ** 2 + off) * (1.0 + 1e-12)
+
+        def shown(sides: Sides, sign: float) -> NDArray[np.bool_]:
+            v, most, nowhere = self._at(sides, sign)
+            return nowhere | (v.low > top) | (most.high <= self.limit * self.limit * (1.0 - 1e-15))
+
+        # The control only changes its sign where y, z, f2 and f3 all do, so that y >= 0 is enough.
+        box = ((0.0, width), (-off, off), (-error, error), (-error, error))
+        return all(holds_on(box, lambda sides, sign=sign: shown(sides, sign), MOST, first=6) for sign in (1.0, -1.0))
+
+    def guess(self) -> float:
+        """The largest level on whose surface points of a grid need no more than the limit, up to the centre's."""
+        s, turn, angle = np.meshgrid(np.linspace(-1.0, 1.0, 13), *(np.linspace(0.0, 2.0 * np.pi, 49)[:-1],) * 2)
+        s, turn, angle = s.ravel(), turn.ravel(), angle.ravel()
+        low, high = 0.0, below(self.circle.centre * ALMOST)
+        for step in range(24):
+            level = high if step == 0 else 0.5 * (low + high)
+            f1 = s * math.sqrt(2.0 * level / number(self.circle.gains.alpha))
+            error = np.sqrt(2.0 * level * (1.0 - s * s))
+            y = np.sqrt(np.maximum(number(self.circle.gains.radius) ** 2 + f1, 0.0)) * np.cos(turn)
+            points = tuple(Intervals(side) for side in (y, f1, error * np.cos(angle), error * np.sin(angle)))
+            within = all((self._at(points, sign)[1].low <= self.limit * self.limit).all() for sign in (1.0, -1.0))
+            if within and step == 0:
+                return level
+            low, high = (level, high) if within else (low, level)
+        return low
+
+    def _at(self, sides: Sides, sign: float) -> tuple[Intervals, Intervals, NDArray[np.bool_]]:
+        """V, the square of the control's norm or largest axis, and whether there is no such place."""
+        y, f1, f2, f3 = sides
+        p, g = (type(values)(*map(_enclosed, values)) for values in (self.circle.plant, self.circle.gains))
+        square = g.radius.square() + f1 - y.square()
+        z = sign * square.sqrt()
+        wrong = f2.square() + f3.square()
+        share = g.k
+        if self.circle.gains.feedback == 1:
+            length = wrong.sqrt()
+            share = g.k / Intervals(np.maximum(length.low, g.layer.low), np.maximum(length.high, g.layer.high))
+        across, up, pull = f2 - g.rate * z, f3 + g.rate * y, 2.0 * g.alpha * f1
+        u = (
+            -2.0 * p.rate * across,
+            (p.stiffness - p.rate.square() - pull) * y - g.rate * up - share * f2,
+            (p.stiffness - pull) * z + g.rate * across - share * f3,
+        )
+        v = 0.5 * (g.alpha * f1.square() + wrong)
+        x2, y2, z2 = (part.square() for part in u)
+        if self.kind == "norm":
+            return v, x2 + y2 + z2, square.high < 0.0
+        low, high = (np.maximum(np.maximum(a, b), c) for a, b, c in ((x2.low, y2.low, z2.low), (x2.high, y2.high, z2.high)))
+        return v, Intervals(low, high), square.high < 0.0
+
+
+def _enclosed(x: Any) -> Intervals:
+    return Intervals(below(x), above(x))

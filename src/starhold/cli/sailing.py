@@ -1,0 +1,195 @@
+"""The command `sail`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from starhold.cli.arguments import Force
+from starhold.errors import InputError
+
+if TYPE_CHECKING:
+    from starhold.models.station import Station
+
+_DAY = 86400.0
+
+
+def sail(
+    primaries: Annotated[str, typer.Option(help="the Sun and which body")] = "sun-earth",
+    point: Annotated[str, typer.Option(help="libration point: L1 or L2")] = "L2",
+    radius: Annotated[str | None, typer.Option(help='of the circle, "20000 km"; the body\'s diameter if not given')] = None,
+    mass: Annotated[str, typer.Option(help='of the craft, "300 kg"')] = "300 kg",
+    area: Annotated[str | None, typer.Option(help='sail that there is, "200 m^2", for its margin')] = None,
+    reflectivity: Annotated[str, typer.Option(help="part of the light reflected as by a mirror")] = "1",
+    diffuse: Annotated[str, typer.Option(help="part of the light reflected in all directions")] = "0",
+    pressure: Annotated[
+        str | None, typer.Option(help='of the whole Sun\'s light on black, "4.5e-6 N/m^2"; by distance if not given')
+    ] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE.csv", help="write the table")] = None,
+    force: Force = False,
+) -> None:
+    """How large a sail keeps a craft on a circle about a libration point: best rate, peak demand, area, margin, deficits."""
+    from starhold.models.libration import PRIMARIES
+    from starhold.models.sail import check_optics
+    from starhold.models.station import Station
+    from starhold.scenario.reading import nearest
+
+    if primaries not in PRIMARIES:
+        raise InputError("sail", "--primaries", primaries, nearest(primaries, _solar()))
+    if primaries not in _solar():
+        raise InputError("sail", "--primaries", primaries, f"a pair with the Sun: {', '.join(_solar())}")
+    if point not in ("L1", "L2"):
+        raise InputError("sail", "--point", point, "L1 or L2")
+    pair = PRIMARIES[primaries]
+    across = 2.0 * pair.radius_smaller if radius is None else _number("--radius", radius, "m")
+    kilograms = _number("--mass", mass, "kg")
+    there_is = None if area is None else _number("--area", area, "m^2")
+    parts = [_part(name, text) for name, text in (("--reflectivity", reflectivity), ("--diffuse", diffuse))]
+    try:
+        check_optics(*parts)
+    except ValueError as error:
+        raise InputError("sail", "--diffuse", diffuse, str(error)) from None
+    given = None if pressure is None else _number("--pressure", pressure, "N/m^2")
+    station = Station(pair, point, across, parts[0], parts[1], given)
+    if across > abs(station.plant.from_smaller) * station.units.length:
+        raise InputError("sail", "--radius", radius or "", "a circle smaller than the distance of the point from the body")
+    if station.pressure == 0.0:
+        clear = f"{1e-3 * station.clear_radius:.0f} km"
+        raise InputError("sail", "--radius", radius or "", f"a circle that the Sun reaches; the whole Sun from {clear} on")
+    if output is not None and output.exists() and not force:
+        raise InputError(str(output), "", "a file that exists", "another name, or --force")
+    print_sail(station, point, kilograms, there_is)
+    if output is not None:
+        _write(station, output)
+
+
+def _solar() -> list[str]:
+    from starhold.models.libration import PRIMARIES
+
+    return [name for name in PRIMARIES if name.startswith("sun-")]
+
+
+def _number(option: str, text: str, unit: str) -> float:
+    """A positive quantity; a plain number is SI."""
+    from starhold.laws.interface import Gain
+
+    return _read(option, text, Gain(unit, above=0.0))
+
+
+def _part(option: str, text: str) -> float:
+    from starhold.laws.interface import Gain
+
+    return _read(option, text, Gain("1", at_least=0.0, at_most=1.0))
+
+
+def _read(option: str, text: str, gain: Any) -> float:
+    from pydantic_core import PydanticCustomError
+
+    from starhold.scenario.quantity import reader
+
+    try:
+        value: float | str = float(text)
+    except ValueError:
+        value = text
+    try:
+        return reader(gain)(value)
+    except PydanticCustomError as error:
+        raise InputError("sail", option, text, error.message()) from None
+
+
+def _write(station: Station, path: Path) -> None:
+    from starhold.cli.show import console
+    from starhold.report.sail_table import write_table
+
+    try:
+        write_table(station, path)
+    except OSError as error:
+        raise InputError(str(path), "", f"cannot write there: {error.strerror}", "a file you may write") from None
+    console.print(f"Table: {path}", soft_wrap=True)
+
+
+def print_sail(station: Station, point: str, mass: float, area: float | None) -> None:
+    """The design in words, then the tables."""
+    from starhold.cli.show import console
+    from starhold.models.station import demand
+    from starhold.report.sail_table import dearer
+
+    plant, units = station.plant, station.units
+    away = 1e-3 * abs(plant.from_smaller) * units.length
+    scaled, peak, needed = demand(station.rate, plant), station.peak(), station.area_per_mass()
+    lines = [
+        f"{station.pair.name}, {point}: {away:.0f} km from the smaller body, C = {plant.stiffness:.6g} Ω², "
+        f"Ω = {units.rate:.6g} rad/s",
+        f"circle: radius {1e-3 * station.radius:.6g} km, best rate √(C − 2Ω²) = {station.rate:.5g} Ω, "
+        f"period {station.period() / _DAY:.5g} days",
+        f"peak demand: 2Ω√(C − Ω²) = {scaled:.5g} Ω² × radius = {peak:.5g} m/s² (scaled: "
+        f"{scaled * station.radius / units.length:.5g}); {100.0 * dearer(station):+.2g} % in the full three-body problem",
+        _light(station),
+        f"sail: {needed:.4g} m²/kg, {needed * mass:.4g} m² for {mass:g} kg",
+    ]
+    if area is not None:
+        lines.append(_margin(station, area, mass))
+    console.print("\n".join(lines), highlight=False, markup=False, soft_wrap=True)
+    _print_rates(station)
+    _print_deficits(station, None if area is None else 1.0 - station.margin(area, mass))
+
+
+def _light(station: Station) -> str:
+    part = f"light: {100.0 * station.light(station.radius):.4g} % of the Sun's disc, {station.pressure:.4g} N/m² on black"
+    if station.clear_radius == 0.0:
+        return part
+    return f"{part}; the whole disc from {1e-3 * station.clear_radius:.6g} km on"
+
+
+def _margin(station: Station, area: float, mass: float) -> str:
+    from starhold.models.station import demand, rates_held
+
+    margin = station.margin(area, mass)
+    held = rates_held(margin * demand(station.rate, station.plant), station.plant)
+    rates = "no rate is held" if held is None else f"rates from {held[0]:.4g} to {held[1]:.4g} Ω are held"
+    return f"margin of {area:g} m²: {margin:.4g}; {rates}"
+
+
+def _print_rates(station: Station) -> None:
+    from rich.table import Table
+
+    from starhold.cli.show import console
+    from starhold.report.sail_table import reflectivities, rows
+
+    columns = reflectivities(station)
+    table = Table(show_edge=False, pad_edge=False, title="Sail over the rate and the reflectivity", title_justify="left")
+    heads = ["rate\n[dim]Ω[/dim]", "period\n[dim]days[/dim]", "peak/radius\n[dim]Ω²[/dim]", "peak\n[dim]m/s²[/dim]"]
+    for head in (*heads, *(f"{mirror:g}\n[dim]m²/kg[/dim]" for mirror in columns)):
+        table.add_column(head, justify="right")
+    for row in rows(station, columns):
+        style = "bold" if row.rate == station.rate else None
+        begun = [f"{row.rate:.4g}", f"{row.period / _DAY:.4g}", f"{row.scaled:.4g}", f"{row.peak:.4g}"]
+        table.add_row(*begun, *(f"{area:.4g}" for area in row.areas), style=style)
+    console.print()
+    console.print(table)
+
+
+def _print_deficits(station: Station, own: float | None) -> None:
+    """What deficits leave, of what the circle asks; `own` is that of the sail there is, negative for a margin."""
+    from rich.table import Table
+
+    from starhold.cli.show import console
+    from starhold.report.sail_table import DEFICITS
+
+    table = Table(show_edge=False, pad_edge=False, title="What a deficit of control leaves", title_justify="left")
+    heads = ["deficit\n[dim]%[/dim]", "largest radius\n[dim]km[/dim]", "Sun seen there\n[dim]%[/dim]"]
+    heads += ["radius in that light\n[dim]km[/dim]", "on its limit, full circle\n[dim]% of the time[/dim]"]
+    for head in heads:
+        table.add_column(head, justify="right")
+    for missing in sorted({*DEFICITS, 0.0 if own is None else own}):
+        left = station.deficit(missing)
+        shown = [f"{100.0 * missing:.4g}", f"{1e-3 * left.radius:.6g}", f"{100.0 * left.light:.4g}"]
+        table.add_row(*shown, f"{1e-3 * left.radius_dimmed:.6g}", f"{100.0 * left.on_limit:.3g}")
+    console.print()
+    console.print(table)
+    console.print(
+        "largest radius: held at the best rate by what is left; whether the full circle then bends or is lost, flights"
+    )
+    console.print("tell. radius in that light: where the sail loses with the Sun what the body hides.")

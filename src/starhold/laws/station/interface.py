@@ -1,0 +1,80 @@
+"""What a station-keeping law sees, and what it declares: `CARD`, `Gains`, `examples()` and the equation
+`control(seen, gains, plant, memory) -> (control, memory)`; `FORMS` with `design(plant, spec)` if it likes.
+
+All in the scaled units of `models.libration`: the axes turn at rate 1, lengths count in a unit that the scenario chooses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, NamedTuple
+
+from starhold.algebra.scalar import Scalar, equation, less, maximum, sqrt, where
+from starhold.algebra.vector import Vector, dot, scale, subtract
+from starhold.laws import catalogue as laws
+from starhold.laws.interface import NoMemory
+from starhold.models.libration import Libration, linear, nonlinear
+
+MODELS = ("linear", "nonlinear")
+"""Of the motion, in the order of the numbers that gains hold for them."""
+
+
+class SeenPoint(NamedTuple):
+    """What a law is told at a control instant: position and velocity in the rotating axes from the libration point, the
+    period for which the control will be held, and the limit of its norm or axes; scaled."""
+
+    position: Vector
+    velocity: Vector
+    period: float
+    limit: float
+
+
+@dataclass(frozen=True)
+class StationLaw(laws.Law):
+    """A law file of this package as an object."""
+
+    @property
+    def torque(self) -> Callable[..., Any]:
+        """There is none; `control` is the equation."""
+        raise AttributeError("a station-keeping law gives a control, no torque")
+
+    @property
+    def control(self) -> Callable[..., Any]:
+        """The equation of the control acceleration."""
+        return self.module.control
+
+    def remember(self, gains: Any, craft: Any, period: float) -> NoMemory:
+        """Nothing."""
+        return NoMemory()
+
+
+@cache
+def station_laws() -> dict[str, StationLaw]:
+    """All station-keeping laws by name."""
+    return {
+        law.name: law for law in laws.found_in("starhold.laws.station", StationLaw, ("CARD", "Gains", "control", "examples"))
+    }
+
+
+@equation
+def bend(seen: SeenPoint, plant: Libration, model: Scalar) -> Vector:
+    """What the full problem adds to the linear acceleration here, where `model` asks for it, else zero."""
+    more = subtract(nonlinear(seen.position, seen.velocity, plant), linear(seen.position, seen.velocity, plant))
+    return (model * more[0], model * more[1], model * more[2])
+
+
+@equation
+def hold_x(seen: SeenPoint, k_position: Scalar, k_velocity: Scalar, plant: Libration) -> Scalar:
+    """Control along X that undoes the Coriolis acceleration and feeds back."""
+    coriolis = 2.0 * plant.rate * seen.velocity[1]
+    return -coriolis - k_position * seen.position[0] - k_velocity * seen.velocity[0]
+
+
+@equation
+def along(direction: Vector, size: Scalar, layer: Scalar) -> Vector:
+    """The vector of this size in a direction, shorter in proportion where the direction's length is within the layer; zero
+    for no direction at all."""
+    length = maximum(sqrt(dot(direction, direction)), layer)
+    return scale(where(less(0.0, length), size / where(less(0.0, length), length, 1.0), 0.0), direction)

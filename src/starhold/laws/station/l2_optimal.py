@@ -1,0 +1,79 @@
+"""Of all controls within the limit the one that makes a chosen V fall fastest."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, NamedTuple
+
+from starhold.algebra.scalar import Scalar, equation
+from starhold.algebra.vector import Vector
+from starhold.laws.interface import Card, Gain, NoMemory
+from starhold.laws.station.interface import SeenPoint, along
+from starhold.models.libration import Libration
+
+CARD = Card(
+    title="Steepest descent to a circle",
+    summary="u = -limit g/|g|, g = dV/dv: V of the circle and of X falls as fast as the limit lets it",
+    sources=("published study of the direct Lyapunov method for compact invariant sets: the law that is best for a V",),
+    assumptions=("linear motion near the point", "control limited in norm"),
+    claims="none",
+)
+
+
+class Gains(NamedTuple):
+    """The circle and the weights of V; all scaled."""
+
+    radius: Annotated[float, Gain(above=0.0, text="of the circle, lengths")]
+    rate: Annotated[float, Gain(text="at which it is run through, from Y to Z; negative the other way")]
+    alpha: Annotated[float, Gain(above=0.0, text="weight of the distance from the circle")]
+    beta: Annotated[float, Gain(above=0.0, text="weight of x' + slope x")]
+    slope: Annotated[float, Gain(above=0.0, text="rate at which x then falls")]
+    layer: Annotated[float, Gain(at_least=0.0, text="|g| within which the control is proportional to it")] = 0.0
+
+
+class Best(NamedTuple):
+    """The rate of the least control on the circle; along X the natural rate."""
+
+    radius: Annotated[float, Gain(above=0.0, text="of the circle, lengths")]
+    alpha: Annotated[float, Gain(above=0.0, text="weight of the distance from the circle")] = 1.0
+    beta: Annotated[float, Gain(above=0.0, text="weight of x' + slope x")] = 1.0
+    layer: Annotated[float, Gain(at_least=0.0, text="|g| within which the control is proportional to it")] = 0.05
+
+
+FORMS: dict[str, Any] = {"best": Best}
+
+
+def design(plant: Libration, spec: Best) -> Gains:
+    """rate = sqrt(C - 2 Omega^2), slope = sqrt(Omega^2 + 2 C). ValueError where C is less than 2 Omega^2."""
+    square = plant.rate**2
+    if plant.stiffness <= 2.0 * square:
+        raise ValueError(f"no rate has a least demand where C = {plant.stiffness:g} is not above 2")
+    rates = math.sqrt(plant.stiffness - 2.0 * square), math.sqrt(square + 2.0 * plant.stiffness)
+    return Gains(spec.radius, rates[0], spec.alpha, spec.beta, rates[1], spec.layer)
+
+
+@equation
+def _slopes(seen: SeenPoint, gains: Gains) -> Vector:
+    """dV/dv."""
+    p, v = seen.position, seen.velocity
+    return (gains.beta * (v[0] + gains.slope * p[0]), v[1] + gains.rate * p[2], v[2] - gains.rate * p[1])
+
+
+@equation
+def control(seen: SeenPoint, gains: Gains, plant: Libration, memory: NoMemory) -> tuple[Vector, NoMemory]:
+    """Control acceleration (scaled): V' is linear in it, so that the least is on the limit, against dV/dv."""
+    return along(_slopes(seen, gains), -seen.limit, gains.layer), memory
+
+
+@equation
+def lyapunov(seen: SeenPoint, gains: Gains, plant: Libration) -> Scalar:
+    """V = (alpha f1^2 + f2^2 + f3^2 + beta (x' + slope x)^2)/2."""
+    p = seen.position
+    g = _slopes(seen, gains)
+    f1 = p[1] * p[1] + p[2] * p[2] - gains.radius * gains.radius
+    return 0.5 * (gains.alpha * f1 * f1 + g[1] * g[1] + g[2] * g[2] + g[0] * g[0] / gains.beta)
+
+
+def examples() -> list[Gains]:
+    """A circle round L2 of the Sun and the Earth."""
+    return [Gains(1.0, 1.393, 1.0, 1.0, 2.98, 0.05)]

@@ -1,0 +1,174 @@
+"""Station keeping: plant, law and control surfaces put together, and the equations of its control step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Literal, NamedTuple
+
+from starhold.algebra.scalar import both, equation, is_finite, less, opposite, where
+from starhold.algebra.structure import move
+from starhold.algebra.vector import ZERO, Vector, dot
+from starhold.laws.interface import NoMemory
+from starhold.laws.station.interface import SeenPoint, StationLaw
+from starhold.loop.closed_loop import LIMITS
+from starhold.loop.step import Step
+from starhold.models import actuator, libration
+from starhold.models.libration import Libration, PointState
+
+MODELS = {"linear": libration.linear, "nonlinear": libration.nonlinear}
+
+
+class StationSetup(NamedTuple):
+    """The numbers of a loop that are neither the plant's nor the law's. `far`: the distance at which the motion is lost."""
+
+    period: float
+    substep: float
+    limit: float
+    far: float
+    dynamics: actuator.Dynamics
+
+
+class StationParts(NamedTuple):
+    """The equations of a loop; each combination is compiled once."""
+
+    motion: Callable[..., Any]
+    law: Callable[..., Any]
+    limit: Callable[..., Any]
+    begin: Callable[..., Any]
+    response: Callable[..., Any]
+
+
+class StationCarry(NamedTuple):
+    """What a trajectory carries from step to step; lost_at is the control step at which it was lost (-1: not lost)."""
+
+    state: PointState
+    memory: NoMemory
+    command: Vector
+    lost_at: float
+
+
+class StationSample(NamedTuple):
+    """One recorded instant: the state, the control that acts, the control commanded."""
+
+    position: Vector
+    velocity: Vector
+    control: Vector
+    command: Vector
+
+
+class StationPhase(NamedTuple):
+    """Control steps first .. last-1 of a run, which is all of it, and the numbers they are flown with."""
+
+    first: int
+    last: int
+    gains: Any
+    craft: Libration
+    known: Libration
+    setup: StationSetup
+
+    def entered(self, carry: StationCarry) -> StationCarry:
+        """What is carried into the phase."""
+        return carry
+
+
+@dataclass(frozen=True)
+class StationLoop:
+    """One law at one libration point, in the scaled units of `models.libration`.
+
+    limit: largest control (scaled), of the norm or of each axis; lag: time constant of the control surfaces; far: the
+    distance from the point at which the motion counts as lost.
+    """
+
+    plant: Libration
+    law: StationLaw
+    gains: Any
+    start: PointState
+    period: float
+    substeps: int = 1
+    model: Literal["linear", "nonlinear"] = "linear"
+    limit: float = float("inf")
+    limit_kind: Literal["norm", "axis", "none"] = "norm"
+    lag: float = 0.0
+    far: float = 1e3
+
+    def parts(self) -> StationParts:
+        """The equations this loop is made of."""
+        lags = self.lag > 0.0
+        return StationParts(
+            MODELS[self.model],
+            self.law.control,
+            LIMITS[self.limit_kind],
+            actuator.start_lagging if lags else actuator.start_ideal,
+            actuator.lagging if lags else actuator.ideal,
+        )
+
+    def setup(self) -> StationSetup:
+        """The numbers of this loop."""
+        dynamics = actuator.Dynamics(self.lag, float("inf"))
+        return StationSetup(self.period, self.period / self.substeps, self.limit, self.far, dynamics)
+
+    def phases(self, steps: int) -> list[StationPhase]:
+        """A run of so many control steps."""
+        return [StationPhase(0, steps, self.gains, self.plant, self.plant, self.setup())]
+
+    def carry(self, start: PointState | None = None) -> StationCarry:
+        """What a trajectory starts with."""
+        return StationCarry(self.start if start is None else start, NoMemory(), ZERO, -1.0)
+
+    @property
+    def craft(self) -> Libration:
+        """The plant, under the name that kernels have for what a law acts on."""
+        return self.plant
+
+    def with_limit(self, limit: float) -> StationLoop:
+        """The same with another limit."""
+        return replace(self, limit=limit)
+
+
+def station_step(parts: StationParts) -> Step:
+    """The equations of a control step made of these parts."""
+    motion, law, limit, begin, response = parts
+
+    @equation
+    def look(carry, step, run, plant, setup):
+        return SeenPoint(carry.state.position, carry.state.velocity, setup.period, setup.limit)
+
+    @equation
+    def decide(carry, step, run, gains, plant, setup):
+        command, memory = law(look(carry, step, run, plant, setup), gains, plant, carry.memory)
+        command = limit(command, setup.limit)
+        s = carry.state
+        return StationCarry(PointState(s.position, s.velocity, begin(s.control, command)), memory, command, carry.lost_at)
+
+    @equation
+    def slope(state, begun, carry, plant, setup):
+        acceleration = motion(state.position, state.velocity, plant)
+        control_rate = response(state.control, carry.command, begun, setup.substep, setup.dynamics)
+        return libration.motion(state, acceleration, control_rate)
+
+    @equation
+    def hold(carry, plant, setup):
+        """One substep: the classical Runge-Kutta method of fourth order."""
+        s, h = carry.state, setup.substep
+        a = slope(s, s.control, carry, plant, setup)
+        b = slope(move(s, 0.5 * h, a), s.control, carry, plant, setup)
+        c = slope(move(s, 0.5 * h, b), s.control, carry, plant, setup)
+        d = slope(move(s, h, c), s.control, carry, plant, setup)
+        end = move(s, h / 6.0, move(move(move(a, 2.0, b), 2.0, c), 1.0, d))
+        return StationCarry(end, carry.memory, carry.command, carry.lost_at)
+
+    @equation
+    def check(carry, step, setup):
+        """Note the step at which the motion is not finite or far away."""
+        s = carry.state
+        sound = both(is_finite(dot(s.velocity, s.velocity)), less(dot(s.position, s.position), setup.far * setup.far))
+        lost = where(both(opposite(sound), less(carry.lost_at, 0.0)), 1.0 * step, carry.lost_at)
+        return StationCarry(s, carry.memory, carry.command, lost)
+
+    @equation
+    def sample(carry, step, setup):
+        s = carry.state
+        return StationSample(s.position, s.velocity, s.control, carry.command)
+
+    return Step(look, decide, hold, check, sample)

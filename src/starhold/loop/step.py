@@ -1,0 +1,129 @@
+"""The equations of one control step of an attitude loop, which all readers share: `decide` (what the law commands at a
+control instant) and `hold` (the motion under the held command)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from starhold.algebra.quaternion import Quaternion, relative, to_body
+from starhold.algebra.scalar import both, equation, is_finite, less, opposite, where
+from starhold.algebra.structure import move
+from starhold.algebra.vector import ZERO, Vector, add, cross, dot, subtract
+from starhold.laws.interface import Seen, with_attitude
+from starhold.loop.closed_loop import Carry, Parts
+from starhold.models.target import inertial, orbital
+
+
+class Sample(NamedTuple):
+    """One recorded instant: the true state, the error relative to the target, the command."""
+
+    attitude: Quaternion
+    rate: Vector
+    position: Vector
+    velocity: Vector
+    torque: Vector
+    command: Vector
+    attitude_error: Quaternion
+    rate_error: Vector
+
+
+class Step(NamedTuple):
+    """The equations of one control step. `look` gives what the law sees before the double cover is folded."""
+
+    look: Callable[..., Any]
+    decide: Callable[..., Any]
+    hold: Callable[..., Any]
+    check: Callable[..., Any]
+    sample: Callable[..., Any]
+
+
+def attitude_step(parts: Parts) -> Step:
+    """The equations of a control step made of these parts."""
+    environment, target, sense, disturb, cover, law, limit, begin, response, *body = parts
+    tidy, with_torque, rates, stored, given, record, share = body
+
+    @equation
+    def look(carry, step, run, craft, setup):
+        state = carry.state
+        goal = target(setup.target, state.position, state.velocity, step, carry.goal)
+        attitude, rate = sense(state.attitude, state.rate, setup.noise, setup.seed, run, step)
+        error = relative(goal.attitude, attitude)
+        external = environment(state.position, attitude, craft)[1]
+        position = to_body(attitude, state.position)
+        target_rate, target_acceleration = to_body(error, goal.rate), to_body(error, goal.acceleration)
+        error_rate = subtract(rate, target_rate)
+        target_acceleration = subtract(target_acceleration, cross(error_rate, target_rate))
+        held = stored(state, setup.wheels)
+        return Seen(error, error_rate, rate, target_rate, target_acceleration, external, position, setup.period, held)
+
+    @equation
+    def look_at_rest(carry, step, run, craft, setup):
+        # The same for a target that does not turn, spared the arithmetic on zeros that a compiler may not drop.
+        state = carry.state
+        goal = target(setup.target, state.position, state.velocity, step, carry.goal)
+        attitude, rate = sense(state.attitude, state.rate, setup.noise, setup.seed, run, step)
+        external = environment(state.position, attitude, craft)[1]
+        position = to_body(attitude, state.position)
+        held = stored(state, setup.wheels)
+        return Seen(relative(goal.attitude, attitude), rate, rate, ZERO, ZERO, external, position, setup.period, held)
+
+    @equation
+    def keep(carry, step, setup):
+        return carry.goal
+
+    @equation
+    def renew(carry, step, setup):
+        return target(setup.target, carry.state.position, carry.state.velocity, step, carry.goal).attitude
+
+    see = look_at_rest if target is inertial else look
+    follow = renew if target is orbital else keep
+
+    @equation
+    def decide(carry, step, run, gains, craft, setup):
+        seen = see(carry, step, run, craft, setup)
+        shown, h = cover(seen.attitude, carry.h, setup.width)
+        command, memory = law(with_attitude(seen, shown), gains, craft, carry.memory)
+        command = limit(command, craft.torque_limit)
+        state = with_torque(carry.state, begin(carry.state.torque, command))
+        disturbance = disturb(setup.noise, setup.seed, run, step)
+        return Carry(state, memory, follow(carry, step, setup), h, command, disturbance, carry.lost_at)
+
+    @equation
+    def slope(state, begun, carry, craft, setup):
+        acceleration, external = environment(state.position, state.attitude, craft)
+        torque_rate = response(state.torque, carry.command, begun, setup.substep, setup.dynamics)
+        outside = add(carry.disturbance, external)
+        return rates(state, outside, acceleration, torque_rate, craft, setup.wheels, share)
+
+    @equation
+    def hold(carry, craft, setup):
+        """One substep: the classical Runge-Kutta method of fourth order."""
+        s, h = carry.state, setup.substep
+        a = slope(s, s.torque, carry, craft, setup)
+        b = slope(move(s, 0.5 * h, a), s.torque, carry, craft, setup)
+        c = slope(move(s, 0.5 * h, b), s.torque, carry, craft, setup)
+        d = slope(move(s, h, c), s.torque, carry, craft, setup)
+        end = move(s, h / 6.0, move(move(move(a, 2.0, b), 2.0, c), 1.0, d))
+        return Carry(tidy(end), carry.memory, carry.goal, carry.h, carry.command, carry.disturbance, carry.lost_at)
+
+    @equation
+    def check(carry, step, setup):
+        """Note the step at which the motion is not finite, or turns by more than a radian in one substep."""
+        s = carry.state
+        turn = setup.substep * setup.substep * dot(s.rate, s.rate)
+        sound = both(less(turn, 1.0), both(is_finite(s.attitude[0]), is_finite(dot(s.position, s.position))))
+        lost = where(both(opposite(sound), less(carry.lost_at, 0.0)), 1.0 * step, carry.lost_at)
+        return Carry(s, carry.memory, carry.goal, carry.h, carry.command, carry.disturbance, lost)
+
+    @equation
+    def sample(carry, step, setup):
+        s = carry.state
+        goal = target(setup.target, s.position, s.velocity, step, carry.goal)
+        error = relative(goal.attitude, s.attitude)
+        rate = subtract(s.rate, to_body(error, goal.rate))
+        torque = given(s, setup.wheels, share)
+        body = Sample(s.attitude, s.rate, s.position, s.velocity, torque, carry.command, error, rate)
+        return record(body, s, setup.wheels, share)
+
+    return Step(see, decide, hold, check, sample)

@@ -1,0 +1,231 @@
+"""Motion near a collinear libration point of two bodies on circles about each other: the state, the linear model, the full
+restricted three-body problem, and the numbers of real pairs.
+
+Axes: X from the larger body to the smaller one (at L2 away from the Sun), Y along the smaller body's motion, Z completes;
+they turn with the two bodies, and the libration point is the origin. Scaled units: the unit of time is 1/Omega, so that a
+revolution of the two bodies takes 2 pi; the unit of length is the caller's, by default the Earth's diameter (`Units`).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from starhold.algebra.halving import rising
+from starhold.algebra.scalar import Scalar, equation, sqrt
+from starhold.algebra.vector import Vector, add, dot
+
+EARTH_DIAMETER = 12_742_000.0
+"""m: the unit of length unless another is asked for."""
+POINTS = ("L1", "L2", "L3")
+"""L1 lies between the two bodies, L2 beyond the smaller one, L3 beyond the larger one."""
+
+
+class Libration(NamedTuple):
+    """The numbers of a libration point in scaled units: the rate Omega at which the axes turn (1), the stiffness C of the
+    linear model (Omega2; the c2 of the literature), where the point lies along X as seen from the larger and from the
+    smaller body (lengths, with sign), and GM/distance3 of either at the point (Omega2), whose sum is C."""
+
+    rate: float
+    stiffness: float
+    from_larger: float
+    from_smaller: float
+    pull_larger: float
+    pull_smaller: float
+
+
+class PointState(NamedTuple):
+    """Position, velocity, and the acceleration that the control gives, which has dynamics of its own where the control
+    surfaces lag; all in the rotating axes from the libration point, scaled."""
+
+    position: Vector
+    velocity: Vector
+    control: Vector
+
+
+@equation
+def linear(position: Vector, velocity: Vector, plant: Libration) -> Vector:
+    """Acceleration without control, to first order in the distance from the point (scaled)."""
+    turning, square = 2.0 * plant.rate, plant.rate * plant.rate
+    return (
+        turning * velocity[1] + (square + 2.0 * plant.stiffness) * position[0],
+        (square - plant.stiffness) * position[1] - turning * velocity[0],
+        -plant.stiffness * position[2],
+    )
+
+
+@equation
+def nonlinear(position: Vector, velocity: Vector, plant: Libration) -> Vector:
+    """Acceleration without control in the circular restricted three-body problem (scaled).
+
+    The forces at the point itself, which cancel, are left out before they are computed, so that the result is exactly zero
+    there and as accurate near it as far away.
+    """
+    turning, square = 2.0 * plant.rate, plant.rate * plant.rate
+    tide = add(
+        _tide(position, plant.from_larger, plant.pull_larger), _tide(position, plant.from_smaller, plant.pull_smaller)
+    )
+    return (
+        turning * velocity[1] + square * position[0] + tide[0],
+        square * position[1] - turning * velocity[0] + tide[1],
+        tide[2],
+    )
+
+
+@equation
+def _tide(position: Vector, distance: Scalar, pull: Scalar) -> Vector:
+    """The attraction of a body that the origin is `distance` along X away from, less that at the origin.
+
+    With D the body's distance vector to the origin and |D + r|2 = D2 (1 + q) it is pull (D ((1+q)^1.5 - 1) - r)/(1+q)^1.5;
+    the difference in it as Encke and Battin write it (An Introduction to the Mathematics and Methods of Astrodynamics, 8.6).
+    """
+    q, s = _stretch(position, distance)
+    cube = s * s * s
+    c = pull / cube
+    along = distance * (q * (3.0 + q * (3.0 + q)) / (1.0 + cube))
+    return (c * (along - position[0]), -c * position[1], -c * position[2])
+
+
+@equation
+def _stretch(position: Vector, distance: Scalar) -> tuple[Scalar, Scalar]:
+    """q and sqrt(1 + q), by which the distance to a body has grown."""
+    inverse = 1.0 / distance
+    q = inverse * (2.0 * position[0] + inverse * dot(position, position))
+    return q, sqrt(1.0 + q)
+
+
+@equation
+def jacobi(position: Vector, velocity: Vector, plant: Libration) -> Scalar:
+    """The Jacobi constant 2 U - v2 of `nonlinear`, less its value for rest at the point (scaled); likewise without
+    cancellation."""
+    flat = position[0] * position[0] + position[1] * position[1]
+    larger = _potential(position, plant.from_larger, plant.pull_larger)
+    smaller = _potential(position, plant.from_smaller, plant.pull_smaller)
+    return plant.rate * plant.rate * flat + 2.0 * (larger + smaller) - dot(velocity, velocity)
+
+
+@equation
+def _potential(position: Vector, distance: Scalar, pull: Scalar) -> Scalar:
+    """The potential of `_tide`, zero at the origin."""
+    q, s = _stretch(position, distance)
+    bent = distance * position[0] * q * (s + 2.0) / (1.0 + s)
+    return pull * (bent - dot(position, position)) / (s * (1.0 + s))
+
+
+@equation
+def motion(state: PointState, acceleration: Vector, control_rate: Vector | None) -> tuple[Vector, Vector, Vector | None]:
+    """d(state)/dt under the acceleration of `linear` or `nonlinear` and the control the state holds, which changes at the
+    given rate (None: held); `actuator.lagging` is the rate of surfaces that lag."""
+    return (state.velocity, add(acceleration, state.control), control_rate)
+
+
+class Units(NamedTuple):
+    """What one scaled unit is worth: length (m) and rate (1/s)."""
+
+    length: float
+    rate: float
+
+    @property
+    def time(self) -> float:
+        """Seconds in a unit of time."""
+        return 1.0 / self.rate
+
+    @property
+    def velocity(self) -> float:
+        """m/s in a unit of velocity."""
+        return self.length * self.rate
+
+    @property
+    def acceleration(self) -> float:
+        """m/s2 in a unit of acceleration."""
+        return self.length * self.rate**2
+
+
+class Primaries(NamedTuple):
+    """Two bodies on circles about each other: what they are called, GM of the larger and of the smaller one (m3/s2), the
+    distance between them (m) and their radii (m)."""
+
+    name: str
+    larger: float
+    smaller: float
+    separation: float
+    radius_larger: float
+    radius_smaller: float
+
+    @property
+    def rate(self) -> float:
+        """Omega (rad/s), by Kepler's third law."""
+        return math.sqrt((self.larger + self.smaller) / self.separation**3)
+
+    @property
+    def period(self) -> float:
+        """One revolution (s)."""
+        return 2.0 * math.pi / self.rate
+
+    def units(self, length_unit_m: float = EARTH_DIAMETER) -> Units:
+        """The scaled units of this pair."""
+        return Units(length_unit_m, self.rate)
+
+    def point(self, point: str = "L2", length_unit_m: float = EARTH_DIAMETER) -> Libration:
+        """A libration point of this pair; see `make_libration`."""
+        return make_libration(self.larger, self.smaller, self.separation, point, length_unit_m)
+
+
+AU = 149_597_870_700.0
+"""Astronomical unit (m)."""
+_SUN, _SUN_RADIUS = 1.32712440041e20, 6.957e8
+_EARTH, _MOON = 3.98600435507e14, 4.902800118e12
+
+PRIMARIES: dict[str, Primaries] = {
+    "sun-earth": Primaries("Sun and Earth with Moon", _SUN, _EARTH + _MOON, 1.00000261 * AU, _SUN_RADIUS, 6.371e6),
+    "sun-earth-alone": Primaries("Sun and Earth without Moon", _SUN, _EARTH, 1.00000261 * AU, _SUN_RADIUS, 6.371e6),
+    "sun-venus": Primaries("Sun and Venus", _SUN, 3.24858592e14, 0.72333566 * AU, _SUN_RADIUS, 6.0518e6),
+    "sun-mars": Primaries("Sun and Mars", _SUN, 4.2828375816e13, 1.52371034 * AU, _SUN_RADIUS, 3.3895e6),
+    "sun-jupiter": Primaries("Sun and Jupiter", _SUN, 1.267127641e17, 5.20288700 * AU, _SUN_RADIUS, 6.9911e7),
+    "earth-moon": Primaries("Earth and Moon", _EARTH, _MOON, 3.844e8, 6.371e6, 1.7374e6),
+}
+"""By name. GM from the ephemeris DE440 (Park et al. 2021; planets with their moons), mean distances from JPL's approximate
+elements of the planets (Standish), radii: IAU 2015. With the Moon or without, the Earth has C = 3.94 at L2."""
+
+
+def make_libration(
+    larger_mass: float, smaller_mass: float, separation_m: float, point: str = "L2", length_unit_m: float = EARTH_DIAMETER
+) -> Libration:
+    """A collinear libration point of two bodies with these masses (kg, or GM in m3/s2: only their ratio counts) at this
+    distance (m), in scaled units; the place is computed to the last digit.
+
+    Raises ValueError where a number is not positive and finite, the masses are the wrong way round, or there is no such
+    point.
+    """
+    given = {"larger mass": larger_mass, "smaller mass": smaller_mass, "separation": separation_m, "length": length_unit_m}
+    for name, number in given.items():
+        if not 0.0 < number < math.inf:
+            raise ValueError(f"the {name} must be positive and finite, not {number:g}")
+    if smaller_mass > larger_mass:
+        raise ValueError(f"the larger mass comes first, but {larger_mass:g} is less than {smaller_mass:g}")
+    if point not in POINTS:
+        raise ValueError(f"the collinear points are {', '.join(POINTS)}, not {point}")
+    share = smaller_mass / (larger_mass + smaller_mass)
+    rest = larger_mass / (larger_mass + smaller_mass)
+    larger, smaller = _place(share, rest, point)
+    pulls = rest / abs(larger) ** 3, share / abs(smaller) ** 3
+    scale = separation_m / length_unit_m
+    return Libration(1.0, pulls[0] + pulls[1], scale * larger, scale * smaller, *pulls)
+
+
+def _place(share: float, rest: float, point: str) -> tuple[float, float]:
+    """Where the point lies along X as seen from the larger and from the smaller body, in units of their distance; `share`
+    and `rest` are the smaller and the larger body's parts of the mass.
+
+    The balance of forces is written for the distance from the nearer body, without differences of near numbers.
+    """
+    if point == "L3":
+        distance = rising(lambda g: g * (1.0 + share / g) - rest / (g * g) - share / ((1.0 + g) * (1.0 + g)), 0.5, 1.5)
+        return -distance, -1.0 - distance
+    side = 1.0 if point == "L2" else -1.0
+
+    def balance(g: float) -> float:
+        return g**3 * (1.0 + rest * (2.0 + side * g) / (1.0 + side * g) ** 2) - share
+
+    distance = rising(balance, 0.0, 1.0 if point == "L2" else 0.75)
+    return 1.0 + side * distance, side * distance

@@ -1,0 +1,253 @@
+"""Control by sunlight: the force on a flat reflecting panel, how to set a panel to get a wanted force, the forces that can
+be had at all, and how much of the Sun a body in front of it leaves to see.
+
+Light travels along +X (at L1 and L2 the X axis of `libration`). A panel is set by its area, by the cone angle between the
+light and the panel's normal on its dark side, and by the clock angle of that normal about X, from Y towards Z.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.halving import rising
+from starhold.algebra.scalar import Scalar, equation
+from starhold.algebra.vector import Vector, add, norm, scale
+
+LAMBERT = 2.0 / 3.0
+"""Recoil of light that leaves a surface in all directions by Lambert's law, in parts of its momentum."""
+MIRROR_RADIUS = 4.0 / (3.0 * math.sqrt(3.0))
+"""Radius of the largest ball of forces of a perfect mirror, in units of pressure times area: 0.3849 of its largest force."""
+MIRROR_CENTRE = 4.0 / 3.0 * math.sqrt(2.0 / 3.0)
+"""How far that ball's centre lies from no force, away from the Sun."""
+
+
+class Sail(NamedTuple):
+    """Pressure of sunlight on a black surface facing it (N/m2), area (m2), mass of the craft (kg), and the parts of the
+    light that are reflected as by a mirror and in all directions; the rest is absorbed, and given off on both sides alike.
+    """
+
+    pressure: float
+    area: float
+    mass: float
+    specular: float
+    diffuse: float
+
+
+class Setting(NamedTuple):
+    """Area turned to the Sun (m2), cone angle (rad, 0 to pi/2) and clock angle (rad, -pi to pi)."""
+
+    area: float
+    cone: float
+    clock: float
+
+
+class Ball(NamedTuple):
+    """A ball of forces about a point on the X axis, in units of pressure times area."""
+
+    centre: float
+    radius: float
+
+
+def make_sail(pressure: float, area: float, mass: float, specular: float = 1.0, diffuse: float = 0.0) -> Sail:
+    """A validated sail; ValueError where a number is out of range or more light is reflected than comes."""
+    for name, number in {"pressure": pressure, "area": area, "mass": mass}.items():
+        if not 0.0 < number < math.inf:
+            raise ValueError(f"the {name} must be positive and finite, not {number:g}")
+    check_optics(specular, diffuse)
+    return Sail(float(pressure), float(area), float(mass), float(specular), float(diffuse))
+
+
+def check_optics(specular: float, diffuse: float) -> None:
+    """ValueError unless the two are parts of the light that leave something to control with."""
+    for name, number in {"specular": specular, "diffuse": diffuse}.items():
+        if not 0.0 <= number <= 1.0:
+            raise ValueError(f"the {name} reflectivity must be between 0 and 1, not {number:g}")
+    if not 0.0 < specular + diffuse <= 1.0:
+        raise ValueError(
+            f"specular and diffuse reflectivity must add up to more than 0 and at most 1, not {specular + diffuse:g}"
+        )
+
+
+@equation
+def force(normal: Vector, area: Scalar, sail: Sail) -> Vector:
+    """Force (N) on a flat panel of this area (m2) whose unit normal points away from the Sun, normal_x >= 0.
+
+    With c the cosine of the cone angle: pressure area c ((1 - specular) X + (2 specular c + 2/3 diffuse) normal)
+    (McInnes, Solar Sailing, 2.6; without the recoil of its heat).
+    """
+    c = normal[0]
+    strength = sail.pressure * area * c
+    along = scale(strength * (2.0 * sail.specular * c + LAMBERT * sail.diffuse), normal)
+    return add(along, (strength * (1.0 - sail.specular), 0.0, 0.0))
+
+
+@equation
+def mirror(wanted: Vector, pressure: Scalar) -> tuple[Scalar, Vector]:
+    """Area (m2) and unit normal of a perfect mirror that give this force (N) at this pressure (N/m2); the force must have a
+    part away from the Sun."""
+    size = norm(wanted)
+    return size * size * size / (2.0 * pressure * (wanted[0] * wanted[0])), scale(1.0 / size, wanted)
+
+
+def normal_of(setting: Setting) -> Vector:
+    """The unit normal of a panel."""
+    across = math.sin(setting.cone)
+    return (math.cos(setting.cone), across * math.cos(setting.clock), across * math.sin(setting.clock))
+
+
+def given(setting: Setting, sail: Sail) -> Vector:
+    """The force (N) of a panel."""
+    return force(normal_of(setting), setting.area, sail)
+
+
+def set_for(wanted: Vector, sail: Sail) -> Setting:
+    """The panel of the least area that gives this force (N). In closed form for a mirror, else by halving the cone angle.
+
+    ValueError where the force points too far from the light, or takes more area than there is.
+    """
+    across = math.hypot(wanted[1], wanted[2])
+    if across == 0.0 == wanted[0]:
+        return Setting(0.0, 0.0, 0.0)
+    lean, widest = math.atan2(across, wanted[0]), max_lean(sail.specular, sail.diffuse)
+    if lean > widest or lean >= 0.5 * math.pi:
+        shown = f"{math.degrees(widest):.4g} deg from the light; this one has {math.degrees(lean):.4g} deg"
+        raise ValueError(f"the force of this sail leans at most {shown}")
+    cone = cone_for(lean, sail.specular, sail.diffuse)
+    clock = math.atan2(wanted[2], wanted[1]) if across else 0.0
+    area = norm(wanted) / norm(given(Setting(1.0, cone, clock), sail))
+    if area > sail.area * (1.0 + 1e-12):
+        raise ValueError(f"the force needs {area:.6g} m2 of sail; there are {sail.area:g} m2")
+    return Setting(min(area, sail.area), cone, clock)
+
+
+def steer(control: Vector, sail: Sail) -> Setting:
+    """The panel for a control acceleration (m/s2) reckoned from the centre of the ball of forces: the sail gives it and the
+    steady push `push(sail)` away from the Sun together. Every control within `reach(sail)` can be had. ValueError: see
+    `set_for`."""
+    return set_for(scale(sail.mass, (control[0] + push(sail), control[1], control[2])), sail)
+
+
+def steered(setting: Setting, sail: Sail) -> Vector:
+    """The control acceleration (m/s2) that a panel gives, the reverse of `steer`."""
+    x, y, z = scale(1.0 / sail.mass, given(setting, sail))
+    return (x - push(sail), y, z)
+
+
+def push(sail: Sail) -> float:
+    """Acceleration (m/s2) at the centre of the ball of forces: by push/(Omega2 + 2 C) the origin moves towards the Sun."""
+    return ball(sail.specular, sail.diffuse).centre * sail.pressure * sail.area / sail.mass
+
+
+def reach(sail: Sail) -> float:
+    """Radius (m/s2) of the largest ball of control accelerations."""
+    return ball(sail.specular, sail.diffuse).radius * sail.pressure * sail.area / sail.mass
+
+
+def lean_of(cone: float, specular: float, diffuse: float) -> float:
+    """Angle between light and force (rad) for this cone angle."""
+    c, along = math.cos(cone), 2.0 * specular * math.cos(cone) + LAMBERT * diffuse
+    return math.atan2(along * math.sin(cone), 1.0 - specular + along * c)
+
+
+def widest_cosine(specular: float, diffuse: float) -> float:
+    """Cosine of the cone angle at which the force leans farthest from the light. Beyond it the same directions come again,
+    with less force."""
+    a, b, e = 1.0 - specular, 2.0 * specular, LAMBERT * diffuse
+    # The sign of d(lean)/d(cone) is that of (b2 + 2ab) c2 + (2be + ae) c + e2 - ab, which grows with c.
+    if e * e >= a * b:
+        return 0.0
+    half = 0.5 * (2.0 * b + a) * e
+    return (a * b - e * e) / (half + math.sqrt(half * half + b * (b + 2.0 * a) * (a * b - e * e)))
+
+
+def max_lean(specular: float, diffuse: float) -> float:
+    """The farthest that a force can lean from the light (rad)."""
+    return lean_of(math.acos(widest_cosine(specular, diffuse)), specular, diffuse)
+
+
+def cone_for(lean: float, specular: float, diffuse: float) -> float:
+    """The smallest cone angle (rad) at which the force leans this far from the light (rad, at most `max_lean`)."""
+    if specular == 1.0:
+        return lean
+    widest = math.acos(widest_cosine(specular, diffuse))
+    return rising(lambda cone: lean_of(cone, specular, diffuse) - lean, 0.0, widest)
+
+
+def outline(specular: float, diffuse: float, count: int = 181) -> NDArray[np.float64]:
+    """The outline (count, 2) of the forces with all the area, along X and across it, in units of pressure times area: from
+    no lean to the widest. The set of all forces is what lies between it and the origin, turned about X; it is convex."""
+    cone = np.linspace(0.0, math.acos(widest_cosine(specular, diffuse)), count)
+    c, along = np.cos(cone), 2.0 * specular * np.cos(cone) + LAMBERT * diffuse
+    return np.stack([c * (1.0 - specular + along * c), c * along * np.sin(cone)], axis=1)
+
+
+@cache
+def ball(specular: float, diffuse: float) -> Ball:
+    """The largest ball about a point of the X axis within the forces that a sail can give. Exact for a mirror, else to ten
+    digits: the radius is a concave function of the centre, because the set is convex. Where nothing is scattered it is
+    `specular` times that of a mirror."""
+    check_optics(specular, diffuse)
+    if specular == 1.0:
+        return Ball(MIRROR_CENTRE, MIRROR_RADIUS)
+    low, high = 0.0, 1.0 + specular + LAMBERT * diffuse
+    golden = 0.5 * (math.sqrt(5.0) - 1.0)
+    for _ in range(60):
+        left, right = high - golden * (high - low), low + golden * (high - low)
+        if room(left, specular, diffuse) < room(right, specular, diffuse):
+            low = left
+        else:
+            high = right
+    centre = 0.5 * (low + high)
+    return Ball(centre, room(centre, specular, diffuse))
+
+
+def room(centre: float, specular: float, diffuse: float) -> float:
+    """Distance from a point of the X axis to the nearest force that cannot be had (units of pressure times area)."""
+    a, b, e = 1.0 - specular, 2.0 * specular, LAMBERT * diffuse
+    # The squared distance to the outline is a polynomial in the cosine c of the cone angle. Between the bends of its slope,
+    # the slope changes its sign once at most: to try all such places finds every minimum.
+    c4, c3, c2 = b * (b + 2.0 * a), 2.0 * (a + b) * e - 2.0 * centre * b, a * a + e * e - 2.0 * centre * e
+    c1, c0 = -2.0 * centre * a, centre * centre
+    edge = widest_cosine(specular, diffuse)
+    knots = sorted([edge, *(c for c in _quadratic(6.0 * c4, 3.0 * c3, c2) if edge < c < 1.0), 1.0])
+
+    def slope(c: float) -> float:
+        return c1 + c * (2.0 * c2 + c * (3.0 * c3 + c * 4.0 * c4))
+
+    near = knots + [rising(slope, low, high) for low, high in pairwise(knots)]
+    arc = math.sqrt(max(0.0, min(c0 + c * (c1 + c * (c2 + c * (c3 + c * c4))) for c in near)))
+    # Beside the outline the set ends in the cone of the widest lean.
+    return min(arc, centre * math.sin(max_lean(specular, diffuse)))
+
+
+def _quadratic(a: float, b: float, c: float) -> list[float]:
+    """The real roots of a x2 + b x + c, also where a is next to nothing."""
+    inside = b * b - 4.0 * a * c
+    if inside < 0.0:
+        return []
+    q = -0.5 * (b + math.copysign(math.sqrt(inside), b))
+    return [part / whole for part, whole in ((q, a), (c, q)) if abs(part) < abs(whole)]
+
+
+def lit(offset: Any) -> NDArray[np.float64]:
+    """The part of the Sun's disc that can be seen at an offset from the axis in radii of the body before it (any shape),
+    where both discs look equal, as they nearly do at the Earth's L2: 1 - (2/pi)(arccos s - s sqrt(1 - s2)), s = offset/2.
+    """
+    s = np.minimum(0.5 * np.abs(np.asarray(offset, dtype=float)), 1.0)
+    return 1.0 - (2.0 / math.pi) * (np.arccos(s) - s * np.sqrt(1.0 - s * s))
+
+
+def lit_discs(separation: Any, sun: float, body: float) -> NDArray[np.float64]:
+    """The part of the Sun's disc (angular radius `sun`) that a disc of angular radius `body` leaves to see when their
+    centres are this far apart (any shape); angles in one unit, small, the Sun equally bright all over."""
+    t = np.clip(np.abs(np.asarray(separation, dtype=float)), max(abs(sun - body), 1e-300), sun + body)
+    ours = sun * sun * np.arccos(np.clip((t * t + (sun - body) * (sun + body)) / (2.0 * t * sun), -1.0, 1.0))
+    theirs = body * body * np.arccos(np.clip((t * t - (sun - body) * (sun + body)) / (2.0 * t * body), -1.0, 1.0))
+    sides = (sun + body - t) * (t + sun - body) * (t - sun + body) * (t + sun + body)
+    return 1.0 - (ours + theirs - 0.5 * np.sqrt(np.maximum(sides, 0.0))) / (math.pi * sun * sun)

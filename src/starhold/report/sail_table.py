@@ -1,0 +1,62 @@
+"""How much sail a circle about a libration point takes, over the circle's rate and the reflectivity: rows and a file."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from starhold.models.libration import nonlinear
+from starhold.models.station import Station, demand
+from starhold.report.files import whole
+
+RATES = (0.8, 1.0, 1.2, 1.6, 1.8, 2.0)
+"""Omega; the best rate comes beside them."""
+REFLECTIVITIES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5)
+DEFICITS = (0.0, 0.05, 0.1)
+
+
+class Row(NamedTuple):
+    """One rate of the circle (Omega), its period (s), the peak demand a unit of radius (scaled) and in m/s2, and the area
+    per mass (m2/kg) for each reflectivity."""
+
+    rate: float
+    period: float
+    scaled: float
+    peak: float
+    areas: tuple[float, ...]
+
+
+def rows(station: Station, reflectivities: Sequence[float]) -> list[Row]:
+    """A row a rate, in order; the best rate is one of them."""
+    found: list[Row] = []
+    for rate in sorted({*RATES, station.rate}):
+        areas = tuple(station.area_per_mass(rate, mirror) for mirror in reflectivities)
+        found.append(Row(rate, station.period(rate), demand(rate, station.plant), station.peak(rate), areas))
+    return found
+
+
+def reflectivities(station: Station) -> tuple[float, ...]:
+    """The columns of the table, the station's own among them."""
+    return tuple(sorted({*REFLECTIVITIES, station.specular} - {0.0}, reverse=True))
+
+
+def dearer(station: Station) -> float:
+    """By which part the full three-body problem asks for more than the formula."""
+    return station.peak_full(nonlinear) / station.peak() - 1.0
+
+
+def write_table(station: Station, path: Path) -> None:
+    """The table as CSV, SI units, one row a rate and reflectivity."""
+    columns = reflectivities(station)
+    with whole(path) as hidden, hidden.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(
+            ["rate", "period", "peak_scaled", "peak", "pressure", "radius", "specular", "diffuse", "area_per_mass"]
+        )
+        for row in rows(station, columns):
+            for mirror, area in zip(columns, row.areas, strict=True):
+                scattered = min(station.diffuse, 1.0 - mirror)
+                fixed = (station.pressure, station.radius)
+                writer.writerow([*row[:4], *fixed, mirror, scattered, area])
