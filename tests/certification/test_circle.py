@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from starhold.algebra.vector import ZERO
-from starhold.certification.circle import certify_station
+from starhold.certification.station import certify_station
 from starhold.laws.station import l2_circle
 from starhold.laws.station.interface import SeenPoint, station_laws
 from starhold.loop.station import StationLoop

@@ -22,23 +22,15 @@ from starhold.algebra.intervals import Intervals
 from starhold.algebra.polynomial import Polynomial, constants, exact
 from starhold.algebra.vector import add
 from starhold.certification.boxes import Sides, holds_on
-from starhold.certification.certificate import BALLS, EXACT, EXACT_SIGN, LASALLE, Certificate, Claim
+from starhold.certification.certificate import BALLS, EXACT, EXACT_SIGN, LASALLE, Claim
 from starhold.certification.convergence import ALMOST, Obligations
 from starhold.certification.matrices import number
-from starhold.certification.subject import above, below, direction
-from starhold.laws.interface import fields
+from starhold.certification.station_terms import UNLIMITED, assumed, mismatch, seen_point
+from starhold.certification.subject import above, below
 from starhold.laws.station import l2_circle as law
-from starhold.laws.station.interface import SeenPoint
 from starhold.loop.station import StationLoop
 from starhold.models.libration import linear
 
-COMMON = (
-    "circular motion of the two bodies",
-    "position and velocity exactly known",
-    "control applied continuously, without lag",
-)
-LINEAR, FULL = "linear motion near the point", "motion exactly as modelled"
-UNLIMITED = "control not limited"
 IN_PLANE = "starts at rest in the plane x = 0"
 MOST = 400_000
 LESS = (1e-2, 0.03, 0.1, 0.2, 0.4, 0.7)
@@ -58,49 +50,20 @@ class Circle:
         return self.gains.alpha * self.gains.radius**4 / 2
 
 
-def certify_station(loop: StationLoop, name: str = "") -> Certificate:
-    """The certificate of a station-keeping loop; without claims, which is undecided, where the law is not `l2-circle`."""
-    claims: list[Claim] = []
-    if loop.law.name == "l2-circle":
-        circle = Circle(*(type(values)(*map(exact, values)) for values in (loop.plant, loop.gains)))
-        claims.append(_attracts(loop, circle))
-        if loop.limit_kind != "none" and math.isfinite(loop.limit) and claims[0].outcome == "proved":
-            claims.append(_within_limit(loop, circle))
-    return Certificate(name or loop.law.name, described_station(loop), tuple(claims))
+def _circle(loop: StationLoop) -> Circle:
+    return Circle(*(type(values)(*map(exact, values)) for values in (loop.plant, loop.gains)))
 
 
-def described_station(loop: StationLoop) -> dict[str, Any]:
-    """The loop as plain numbers and names, all that a checker needs to build it again."""
-    gains: dict[str, Any] = {}
-    for item, value in zip(fields(loop.law.gains), loop.gains, strict=True):
-        gains[item.name] = item.gain.choices[value] if item.gain.choices else np.asarray(value).tolist()
-    return {
-        "law": loop.law.name,
-        "gains": gains,
-        "plant": loop.plant._asdict(),
-        "model": loop.model,
-        "limit": loop.limit_kind,
-        "control_limit": loop.limit if math.isfinite(loop.limit) else None,
-        "lag": loop.lag,
-        "control_period": loop.period,
-    }
-
-
-def _assumed(loop: StationLoop, *more: str) -> tuple[str, ...]:
-    return (LINEAR if loop.model == "linear" else FULL, *COMMON, *more)
-
-
-def _attracts(loop: StationLoop, circle: Circle) -> Claim:
+def attracts(loop: StationLoop) -> Claim:
     """That all motions from {V <= level} end on the circle."""
-    found, told = Obligations(), dict[str, Any]()
+    found, told, circle = Obligations(), dict[str, Any](), _circle(loop)
 
     def finish() -> Claim:
-        return Claim("circle", told, {}, _assumed(loop, UNLIMITED), tuple(found))
+        return Claim("circle", told, {}, assumed(loop, UNLIMITED), tuple(found))
 
-    matching = loop.model == ("nonlinear" if loop.gains.model else "linear")
-    if not matching:
-        reason = "the law undoes the linear model, and the full problem is flown" if not loop.gains.model else ""
-        found.add("form", EXACT, None, {"reason": reason or "the law undoes what the linear model does not have"})
+    reason = mismatch(loop)
+    if reason:
+        found.add("form", EXACT, None, {"reason": reason})
         return finish()
     if not _is_neutral(circle):
         found.add("form", EXACT, None, {"reason": "V is not kept by the law's neutral control"})
@@ -120,13 +83,13 @@ def _attracts(loop: StationLoop, circle: Circle) -> Claim:
     return finish()
 
 
-def _within_limit(loop: StationLoop, circle: Circle) -> Claim:
+def control_limit(loop: StationLoop) -> Claim:
     """That the control stays within its limit on motions from a smaller set, in the plane x = 0."""
-    found = Obligations()
+    found, circle = Obligations(), _circle(loop)
     told: dict[str, Any] = {"limit": loop.limit, "kind": loop.limit_kind}
 
     def finish() -> Claim:
-        return Claim("control-limit", told, {}, _assumed(loop, IN_PLANE), tuple(found))
+        return Claim("control-limit", told, {}, assumed(loop, IN_PLANE), tuple(found))
 
     if loop.gains.model:
         found.add("control", BALLS, None, {"reason": "only for a law that undoes the linear model alone"})
@@ -170,15 +133,10 @@ def _root(square: Any, up: bool = False) -> float:
     return root
 
 
-def _seen() -> SeenPoint:
-    zero: Any = Polynomial.constant(0)
-    return SeenPoint(direction("x"), direction("v"), zero, zero)
-
-
 def _is_neutral(circle: Circle) -> bool:
     """Whether, along the linear model under the neutral control, V' = 0, f2' = -2 alpha f1 y, f3' = -2 alpha f1 z, and x''
     is a linear function of x and x' alone with the coefficients of the feedback."""
-    seen, plant, gains = _seen(), constants(circle.plant), constants(circle.gains)
+    seen, plant, gains = seen_point(), constants(circle.plant), constants(circle.gains)
     acceleration: Any = add(linear(seen.position, seen.velocity, plant), law.neutral(seen, gains, plant))
     names = [f"x{i}" for i in (1, 2, 3)], [f"v{i}" for i in (1, 2, 3)]
     rates = dict(zip((*names[0], *names[1]), (*seen.velocity, *acceleration), strict=True))

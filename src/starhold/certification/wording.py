@@ -21,6 +21,8 @@ HEADINGS = {
     "sliding": "reaches its surface",
     "circle": "ends on the circle",
     "control-limit": "within the control's limit",
+    "rest": "comes to rest",
+    "saturated-axis": "X with limited control",
 }
 
 OBLIGATIONS = {
@@ -49,6 +51,9 @@ OBLIGATIONS = {
     "only the circle": "where V stays as it is the motion is on the circle, or at rest in its middle",
     "centre outside": "rest in the middle of the circle is outside the set",
     "x returns": "along X the motion is on its own and returns",
+    "each axis returns": "each axis is stiff and damped",
+    "stays": "no motion leaves the strip, although the control is limited",
+    "nothing returns from beyond": "beyond the boundary no admissible control brings the motion back",
     "control": "the control is within its limit on the whole set",
     "no switch of the double cover": "the quaternion that is fed back does not switch on the way",
 }
@@ -187,6 +192,18 @@ def _control_limit(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     return f"{_circles(n)} with x = 0, the control never exceeds {n['limit']:.4g} (scaled) {kind}".strip()
 
 
+def _rest(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
+    return "from everywhere the motion comes to rest where it is wanted"
+
+
+def _saturated_axis(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
+    share = f"{100.0 * n['width'] / n['boundary']:.4g} % of the true one"
+    return (
+        f"with the control along X within {n['limit']:.4g} (scaled), x returns from |x + x'/s| up to {shown(n['width'])}, "
+        f"{share}; from {shown(n['boundary'], up=True)} on nothing returns"
+    )
+
+
 _SENTENCES = {
     "convergence": _convergence,
     "region": _region,
@@ -198,6 +215,8 @@ _SENTENCES = {
     "sliding": _sliding,
     "circle": _circle,
     "control-limit": _control_limit,
+    "rest": _rest,
+    "saturated-axis": _saturated_axis,
 }
 
 

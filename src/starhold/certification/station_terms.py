@@ -1,0 +1,38 @@
+"""What claims about station-keeping loops have in common."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from starhold.algebra.polynomial import Polynomial
+from starhold.certification.subject import direction
+from starhold.laws.station.interface import SeenPoint
+from starhold.loop.station import StationLoop
+
+COMMON = (
+    "circular motion of the two bodies",
+    "position and velocity exactly known",
+    "control applied continuously, without lag",
+)
+LINEAR, FULL = "linear motion near the point", "motion exactly as modelled"
+UNLIMITED = "control not limited"
+
+
+def assumed(loop: StationLoop, *more: str) -> tuple[str, ...]:
+    """The assumptions of a claim about a loop."""
+    return (LINEAR if loop.model == "linear" else FULL, *COMMON, *more)
+
+
+def mismatch(loop: StationLoop) -> str:
+    """What is wrong where the law undoes another model than the one that is flown; empty where it undoes that."""
+    if loop.model == ("nonlinear" if loop.gains.model else "linear"):
+        return ""
+    if loop.gains.model:
+        return "the law undoes what the linear model does not have"
+    return "the law undoes the linear model, and the full problem is flown"
+
+
+def seen_point() -> SeenPoint:
+    """What the law sees, in variables x1..x3 and v1..v3."""
+    zero: Any = Polynomial.constant(0)
+    return SeenPoint(direction("x"), direction("v"), zero, zero)
