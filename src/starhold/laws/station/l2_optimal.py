@@ -1,4 +1,9 @@
-"""Of all controls within the limit the one that makes a chosen V fall fastest."""
+"""Of all controls within the limit the one that makes a chosen V fall fastest.
+
+V weighs the velocity against one that leads to the circle, y' = -rate z - pull f1 y and z' = rate y - pull f1 z with
+f1 = y^2 + z^2 - radius^2. With pull = 0 it would be the V of `l2-circle`, and a control of full size would hold any circle
+near the wanted one: there that V neither falls nor says where to go.
+"""
 
 from __future__ import annotations
 
@@ -28,6 +33,7 @@ class Gains(NamedTuple):
     alpha: Annotated[float, Gain(above=0.0, text="weight of the distance from the circle")]
     beta: Annotated[float, Gain(above=0.0, text="weight of x' + slope x")]
     slope: Annotated[float, Gain(above=0.0, text="rate at which x then falls")]
+    pull: Annotated[float, Gain(above=0.0, text="of the velocity that is wanted, towards the circle")]
     layer: Annotated[float, Gain(at_least=0.0, text="|g| within which the control is proportional to it")] = 0.0
 
 
@@ -37,6 +43,7 @@ class Best(NamedTuple):
     radius: Annotated[float, Gain(above=0.0, text="of the circle, lengths")]
     alpha: Annotated[float, Gain(above=0.0, text="weight of the distance from the circle")] = 1.0
     beta: Annotated[float, Gain(above=0.0, text="weight of x' + slope x")] = 1.0
+    pull: Annotated[float, Gain(above=0.0, text="of the velocity that is wanted, towards the circle")] = 1.0
     layer: Annotated[float, Gain(at_least=0.0, text="|g| within which the control is proportional to it")] = 0.05
 
 
@@ -49,14 +56,26 @@ def design(plant: Libration, spec: Best) -> Gains:
     if plant.stiffness <= 2.0 * square:
         raise ValueError(f"no rate has a least demand where C = {plant.stiffness:g} is not above 2")
     rates = math.sqrt(plant.stiffness - 2.0 * square), math.sqrt(square + 2.0 * plant.stiffness)
-    return Gains(spec.radius, rates[0], spec.alpha, spec.beta, rates[1], spec.layer)
+    return Gains(spec.radius, rates[0], spec.alpha, spec.beta, rates[1], spec.pull, spec.layer)
+
+
+@equation
+def _off(seen: SeenPoint, gains: Gains) -> Scalar:
+    """f1."""
+    p = seen.position
+    return p[1] * p[1] + p[2] * p[2] - gains.radius * gains.radius
 
 
 @equation
 def _slopes(seen: SeenPoint, gains: Gains) -> Vector:
     """dV/dv."""
     p, v = seen.position, seen.velocity
-    return (gains.beta * (v[0] + gains.slope * p[0]), v[1] + gains.rate * p[2], v[2] - gains.rate * p[1])
+    pull = gains.pull * _off(seen, gains)
+    return (
+        gains.beta * (v[0] + gains.slope * p[0]),
+        v[1] + gains.rate * p[2] + pull * p[1],
+        v[2] - gains.rate * p[1] + pull * p[2],
+    )
 
 
 @equation
@@ -67,13 +86,11 @@ def control(seen: SeenPoint, gains: Gains, plant: Libration, memory: NoMemory) -
 
 @equation
 def lyapunov(seen: SeenPoint, gains: Gains, plant: Libration) -> Scalar:
-    """V = (alpha f1^2 + f2^2 + f3^2 + beta (x' + slope x)^2)/2."""
-    p = seen.position
-    g = _slopes(seen, gains)
-    f1 = p[1] * p[1] + p[2] * p[2] - gains.radius * gains.radius
+    """V = (alpha f1^2 + f2^2 + f3^2 + beta (x' + slope x)^2)/2, f2 and f3 what the velocity is off by along Y and Z."""
+    g, f1 = _slopes(seen, gains), _off(seen, gains)
     return 0.5 * (gains.alpha * f1 * f1 + g[1] * g[1] + g[2] * g[2] + g[0] * g[0] / gains.beta)
 
 
 def examples() -> list[Gains]:
     """A circle round L2 of the Sun and the Earth."""
-    return [Gains(1.0, 1.393, 1.0, 1.0, 2.98, 0.05)]
+    return [Gains(1.0, 1.393, 1.0, 1.0, 2.98, 1.0, 0.05)]
