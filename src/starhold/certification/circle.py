@@ -31,7 +31,7 @@ from starhold.laws.station import l2_circle as law
 from starhold.loop.station import StationLoop
 from starhold.models.libration import linear
 
-IN_PLANE = "starts at rest in the plane x = 0"
+IN_PLANE = "starts in the plane x = 0 without a rate along X"
 MOST = 400_000
 LESS = (1e-2, 0.03, 0.1, 0.2, 0.4, 0.7)
 """How far below the level that points of a grid suggest a proof is tried."""

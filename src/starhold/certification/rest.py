@@ -29,6 +29,7 @@ from starhold.loop.station import StationLoop
 from starhold.models.libration import linear
 
 OTHERS_AT_REST = "starts at rest along Y and Z, where no Coriolis acceleration acts along X"
+CLEAR = "never at the centre of one of the two bodies"
 SHARE = 0.999
 """Of the bound beyond which no motion returns, the part that is certified."""
 FAR = 1e3
@@ -50,7 +51,8 @@ def rests(loop: StationLoop) -> Claim:
     found = Obligations()
 
     def finish() -> Claim:
-        return Claim("rest", {}, {}, assumed(loop, UNLIMITED), tuple(found))
+        clear = () if loop.model == "linear" else (CLEAR,)
+        return Claim("rest", {}, {}, assumed(loop, UNLIMITED, *clear), tuple(found))
 
     reason = mismatch(loop)
     if reason or not _separate(loop):

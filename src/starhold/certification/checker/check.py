@@ -5,7 +5,6 @@ number and condition anew from the law's and the models' equations, by other met
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -18,6 +17,18 @@ from flint import ctx
 from starhold.certification.checker.claims import CLAIMS
 from starhold.certification.checker.exact import CheckError, Obligation, demand
 from starhold.certification.checker.refutation import refutation
+from starhold.certification.checker.shapes import (
+    CERTIFICATE,
+    CLAIM,
+    FILE,
+    NUMBERS,
+    OBLIGATION,
+    STATION,
+    SUBJECT,
+    WITNESS,
+    shaped,
+)
+from starhold.certification.checker.station import STATION_CLAIMS, Station, read_station, station_refutation
 from starhold.certification.checker.subject import Subject, read_subject
 from starhold.errors import InputError
 
@@ -25,7 +36,6 @@ FORMAT = "starhold certificate 1"
 BITS = 192
 """Precision of balls: enough that they are far narrower than the margins of a certificate."""
 
-Test: TypeAlias = Callable[[Any], bool]
 Verdict: TypeAlias = Literal["holds", "fails", "not claimed"]
 
 
@@ -72,7 +82,7 @@ def check(content: Any) -> list[Finding]:
     # What overflows in a guess is caught where the guess is verified.
     with ctx.workprec(BITS), np.errstate(all="ignore"):
         try:
-            _shaped(content, FILE, "the file")
+            shaped(content, FILE, "the file")
             demand(content["format"] == FORMAT, f"the format is not {FORMAT!r}")
             demand(len(content["certificates"]) > 0, "there are no certificates")
         except CheckError as fault:
@@ -108,37 +118,46 @@ def _guarded(work: Callable[[], Any]) -> tuple[Any, str]:
         return None, f"cannot be verified: {error}"
 
 
-def _subject(given: Any) -> Subject:
-    _shaped(given, CERTIFICATE, "the certificate")
-    _shaped(given["subject"], SUBJECT, "the subject")
+def _subject(given: Any) -> Subject | Station:
+    shaped(given, CERTIFICATE, "the certificate")
+    station = "plant" in given["subject"]
+    shaped(given["subject"], STATION if station else SUBJECT, "the subject")
     outcomes = [claim.get("outcome") for claim in given["claims"]]
     demand(given["outcome"] == _follows(outcomes), "the outcome does not follow from the claims")
-    return read_subject(given["subject"])
+    return (read_station if station else read_subject)(given["subject"])
 
 
-def _claim(subject: Subject, claim: Any) -> list[tuple[str, Verdict, str]]:
+def _claim(subject: Subject | Station, claim: Any) -> list[tuple[str, Verdict, str]]:
     """Verdict and reason for each obligation of a claim."""
-    _shaped(claim, CLAIM, "the claim")
-    demand(claim["kind"] in CLAIMS, f"there is no kind of claim {claim['kind']}")
+    shaped(claim, CLAIM, "the claim")
+    kinds = STATION_CLAIMS if isinstance(subject, Station) else CLAIMS
+    demand(claim["kind"] in kinds, f"there is no kind of claim {claim['kind']} about such a loop")
     for obligation in claim["obligations"]:
-        _shaped(obligation, OBLIGATION, "an obligation")
+        shaped(obligation, OBLIGATION, "an obligation")
     outcomes = [obligation["outcome"] for obligation in claim["obligations"]]
     demand(claim["outcome"] == _follows(outcomes), "the outcome does not follow from the obligations")
-    kind = CLAIMS[claim["kind"]]
-    wheels = subject.wheels is not None
-    demand(kind.wheels is None or kind.wheels == wheels, f"such a claim is {'not ' if wheels else ''}for loops with wheels")
-    told = kind.assumptions(claim["numbers"], wheels)
+    told, proofs = _obliges(subject, claim)
     demand(claim["assumptions"] == told, "the assumptions are not those of such a claim")
     if claim["outcome"] != "proved":
         return _unproved(subject, claim)
-    _shaped(claim["numbers"], NUMBERS[claim["kind"]], "the numbers")
-    _shaped(claim["witness"], WITNESS[claim["kind"]], "the witness")
-    proofs = kind.proofs(subject, claim)
+    shaped(claim["numbers"], NUMBERS[claim["kind"]], "the numbers")
+    shaped(claim["witness"], WITNESS[claim["kind"]], "the witness")
+    shown = proofs()
     found = [(o["name"], o["how"]) for o in claim["obligations"]]
-    needed = [(name, how) for name, how, _ in proofs if how]
+    needed = [(name, how) for name, how, _ in shown if how]
     demand(found == needed, f"the obligations are not {', '.join(f'{name} ({how})' for name, how in needed)}")
     demand(not any(o["evidence"] for o in claim["obligations"]), "what is proved has no evidence against it")
-    return [_verdict(proof) for proof in proofs]
+    return [_verdict(proof) for proof in shown]
+
+
+def _obliges(subject: Subject | Station, claim: Any) -> tuple[list[str], Callable[[], list[Obligation]]]:
+    """The assumptions of a claim, and what makes the list of what has to be shown."""
+    if isinstance(subject, Station):
+        about = STATION_CLAIMS[claim["kind"]]
+        return about.assumptions(subject), partial(about.proofs, subject, claim)
+    kind, wheels = CLAIMS[claim["kind"]], subject.wheels is not None
+    demand(kind.wheels is None or kind.wheels == wheels, f"such a claim is {'not ' if wheels else ''}for loops with wheels")
+    return kind.assumptions(claim["numbers"], wheels), partial(kind.proofs, subject, claim)
 
 
 def _verdict(proof: Obligation) -> tuple[str, Verdict, str]:
@@ -147,7 +166,7 @@ def _verdict(proof: Obligation) -> tuple[str, Verdict, str]:
     return (name if how else "", "fails", fault) if reason is None else (name if how else "", "holds", reason)
 
 
-def _unproved(subject: Subject, claim: Mapping[str, Any]) -> list[tuple[str, Verdict, str]]:
+def _unproved(subject: Subject | Station, claim: Mapping[str, Any]) -> list[tuple[str, Verdict, str]]:
     """Nothing of such a claim counts as proved; a refutation must be one."""
     demand(set(claim["numbers"]) <= set(NUMBERS[claim["kind"]]), "the numbers are not those of such a claim")
     demand(set(claim["witness"]) <= set(WITNESS[claim["kind"]]), "the witness is not that of such a claim")
@@ -155,175 +174,19 @@ def _unproved(subject: Subject, claim: Mapping[str, Any]) -> list[tuple[str, Ver
     for obligation in claim["obligations"]:
         name, verdict, reason = obligation["name"], "not claimed", f"{obligation['outcome']}, the claim is not proved"
         if obligation["outcome"] == "refuted":
-            shown, fault = _guarded(partial(refutation, subject, claim, obligation["evidence"]))
+            shown, fault = _guarded(partial(_refutes, subject, claim, obligation))
             verdict, reason = ("fails", f"not refuted: {fault}") if shown is None else ("not claimed", f"refuted: {shown}")
         found.append((name, verdict, reason))
     return found
+
+
+def _refutes(subject: Subject | Station, claim: Mapping[str, Any], obligation: Mapping[str, Any]) -> str:
+    if isinstance(subject, Station):
+        return station_refutation(subject, claim, obligation)
+    return refutation(subject, claim, obligation["evidence"])
 
 
 def _follows(outcomes: Sequence[Any]) -> str:
     if "refuted" in outcomes:
         return "refuted"
     return "proved" if outcomes and all(outcome == "proved" for outcome in outcomes) else "undecided"
-
-
-# --- what may stand in the file ---------------------------------------------------------------------------------------
-
-
-def _shaped(given: Any, shape: Mapping[str, Test], where: str) -> None:
-    """That an object has exactly the keys of a shape, and under each what its test allows."""
-    demand(isinstance(given, Mapping), f"{where} is not an object")
-    demand(set(given) == set(shape), f"{where} has not the keys {', '.join(shape) or '(none)'}")
-    for key, test in shape.items():
-        demand(test(given[key]), f"{where} has something else than it may under {key}")
-
-
-def _number(x: Any) -> bool:
-    if isinstance(x, bool) or not isinstance(x, (int, float)):
-        return False
-    try:
-        return math.isfinite(x) and float(x) == x
-    except OverflowError:
-        return False
-
-
-def _text(x: Any) -> bool:
-    return isinstance(x, str)
-
-
-def _flag(x: Any) -> bool:
-    return isinstance(x, bool)
-
-
-def _object(x: Any) -> bool:
-    return isinstance(x, Mapping)
-
-
-def _plain(x: Any) -> bool:
-    """Numbers, texts, lists and objects without an infinity in them."""
-    if isinstance(x, Mapping):
-        return all(isinstance(key, str) and _plain(value) for key, value in x.items())  # pyright: ignore
-    return all(map(_plain, x)) if isinstance(x, list) else x is None or _flag(x) or _text(x) or _number(x)  # pyright: ignore
-
-
-def _gain(x: Any) -> bool:
-    return _text(x) or _number(x) or (isinstance(x, list) and all(map(_gain, x)))  # pyright: ignore
-
-
-def _list(test: Test, count: int | None = None) -> Test:
-    def holds(x: Any) -> bool:
-        return isinstance(x, list) and (count is None or len(x) == count) and all(map(test, x))  # pyright: ignore
-
-    return holds
-
-
-def _one(*allowed: str) -> Test:
-    return lambda x: isinstance(x, str) and x in allowed
-
-
-def _or_none(test: Test) -> Test:
-    return lambda x: x is None or test(x)
-
-
-def _within(shape: Mapping[str, Test]) -> Test:
-    return lambda x: isinstance(x, Mapping) and set(x) == set(shape) and all(shape[key](x[key]) for key in shape)  # pyright: ignore
-
-
-_OUTCOME = _one("proved", "refuted", "undecided")
-_VECTOR, _MAYBE = _list(_number, 3), _or_none(_number)
-FILE: dict[str, Test] = {
-    "format": _text,
-    "scenario": _text,
-    "versions": lambda x: _object(x) and all(map(_text, x.values())),
-    "certificates": _list(_object),
-}
-CERTIFICATE: dict[str, Test] = {"name": _text, "outcome": _OUTCOME, "subject": _object, "claims": _list(_object)}
-CLAIM: dict[str, Test] = {
-    "kind": _text,
-    "outcome": _OUTCOME,
-    "numbers": lambda x: _object(x) and _plain(x),
-    "witness": lambda x: _object(x) and _plain(x),
-    "assumptions": _list(_text),
-    "obligations": _list(_object),
-}
-OBLIGATION: dict[str, Test] = {
-    "name": _text,
-    "how": _text,
-    "outcome": _OUTCOME,
-    "evidence": lambda x: _object(x) and _plain(x),
-}
-_WHEELS: dict[str, Test] = {
-    "axes": _list(_VECTOR),
-    "torque_limit": _list(_MAYBE),
-    "momentum_limit": _list(_MAYBE),
-    "inertia": _list(_number),
-    "least": _list(_VECTOR),
-    "momentum": _list(_number),
-    "allocation": _one("least-squares", "least-peak"),
-    "total_momentum": _number,
-}
-SUBJECT: dict[str, Test] = {
-    "law": _text,
-    "gains": lambda x: _object(x) and all(map(_gain, x.values())),
-    "double_cover": _one("as_published", "shortest", "hysteresis"),
-    "hysteresis_width": _number,
-    "inertia": _list(_VECTOR, 3),
-    "limit": _one("axis", "norm", "none"),
-    "torque_limit": _MAYBE,
-    "orbit": _or_none(_within({"position": _VECTOR, "velocity": _VECTOR, "gravitational_parameter": _number})),
-    "gravity_gradient": _flag,
-    "target": _one("inertial", "orbital", "history"),
-    "target_rate": _number,
-    "target_acceleration": _number,
-    "modelled_torque": _VECTOR,
-    "modelled_torque_norm": _number,
-    "disturbance": _number,
-    "control_period": _number,
-    "wheels": _or_none(_within(_WHEELS)),
-}
-_CONTENTS: dict[str, Test] = {
-    "start": _MAYBE,
-    "everything": _flag,
-    "turn": _number,
-    "rate": _MAYBE,
-    "rate_everywhere": _MAYBE,
-}
-NUMBERS: dict[str, dict[str, Test]] = {
-    "convergence": {"level": _MAYBE, **_CONTENTS},
-    "torque-limit": {"level": _MAYBE, **_CONTENTS, "limit": _number, "kind": _one("axis", "norm")},
-    "wheels": {
-        "level": _MAYBE,
-        **_CONTENTS,
-        "momentum": _number,
-        **dict.fromkeys(("motors", "stored"), _list(_number)),
-    },
-    "inertia": {"tolerance": _MAYBE, **_CONTENTS},
-    "disturbance": {
-        **dict.fromkeys(("torque", "start", "level", "turn", "rate_start", "angle", "rate"), _number),
-        "rate_everywhere": _MAYBE,
-    },
-    "sampling": {
-        **dict.fromkeys(("period", "radius", "longest"), _number),
-        "every_shorter": _flag,
-        "eigenvalues": _list(_list(_number, 2), 6),
-    },
-    "sliding": {
-        "torque": _VECTOR,
-        **dict.fromkeys(("margin", "surface", "angle", "rate", "turn"), _number),
-        "everything": _flag,
-        "start": _MAYBE,
-        "rate_start": _MAYBE,
-    },
-    "region": dict.fromkeys(("level", "turn", "rate"), _number),
-}
-_PROOF: dict[str, Test] = {"stiffness": _MAYBE, "epsilon": _number, "rho": _number}
-WITNESS: dict[str, dict[str, Test]] = {
-    "convergence": {**_PROOF, "rate_bound": _MAYBE},
-    "torque-limit": {**_PROOF, "rate_bound": _MAYBE},
-    "wheels": {**_PROOF, "rate_bound": _MAYBE},
-    "inertia": {**_PROOF, "level": _MAYBE},
-    "disturbance": {**_PROOF, "rate_bound": _MAYBE, "q_rate": _number, "q_attitude": _number},
-    "sampling": {},
-    "sliding": {},
-    "region": dict.fromkeys(("p", "c2", "g", "m"), _number),
-}

@@ -1,0 +1,236 @@
+"""Certificates about loops that keep a craft near a libration point: their subject, their claims, and what refutes these.
+Nothing here is shared with the certifier."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from flint import fmpq
+
+from starhold.algebra.polynomial import exact
+from starhold.certification.checker.circle import Circle
+from starhold.certification.checker.exact import ZERO, CheckError, Obligation, demand, rational
+from starhold.certification.checker.polar import keeps_within
+from starhold.certification.checker.region import BALLS, EXACT, LASALLE, SIGN, Numbers
+from starhold.laws.station.interface import StationLaw, station_laws
+from starhold.models.libration import Libration
+
+CLOSE = fmpq(1, 10**9)
+"""How far the numbers of a libration point may be from what they tell of one another, as a share of their size, and those
+of a refutation from what is found."""
+
+
+@dataclass(frozen=True)
+class Station:
+    """The subject of a certificate, its numbers exact. `full`: the motion is that of the full problem."""
+
+    law: StationLaw
+    gains: Any
+    plant: Libration
+    full: bool
+    limit: str
+    control_limit: Any | None
+
+    @property
+    def circle(self) -> Circle:
+        """The loop of a law that makes a circle attractive."""
+        demand(self.law.name == "l2-circle", f"the law {self.law.name} makes no circle attractive")
+        return Circle(self.law, self.gains, self.plant, self.full)
+
+
+def read_station(given: Mapping[str, Any]) -> Station:
+    """The subject in a certificate whose keys and types are in order; a CheckError where it says what cannot be."""
+    law = station_laws().get(given["law"])
+    if law is None:
+        raise CheckError(f"there is no law {given['law']} for libration points")
+    fields = {item.name: item.gain for item in law.fields()}
+    demand(set(given["gains"]) == set(fields), "the gains are not those of the law")
+    gains = law.gains(**{name: _exactly(gain.check(given["gains"][name])) for name, gain in fields.items()})
+    demand(set(given["plant"]) == set(Libration._fields), "the plant has not the numbers of a libration point")
+    plant = Libration(**{name: rational(x) for name, x in given["plant"].items()})
+    _check_point(plant)
+    limit = given["control_limit"]
+    demand(limit is None or limit > 0, "the limit of the control is not positive")
+    demand(given["control_period"] > 0 and given["lag"] >= 0, "the period is not positive, or the lag negative")
+    return Station(
+        law=law,
+        gains=gains,
+        plant=plant,
+        full=given["model"] == "nonlinear",
+        limit=given["limit"],
+        control_limit=None if limit is None else rational(limit),
+    )
+
+
+def _exactly(value: Any) -> Any:
+    """A gain with every number at its exact value; the place of a choice stays an int."""
+    if isinstance(value, tuple):
+        return tuple(map(_exactly, value))  # pyright: ignore
+    return value if isinstance(value, int) else exact(value)
+
+
+def _check_point(plant: Libration) -> None:
+    """That two bodies, on circles about each other by Kepler's third law, have a collinear point of rest here: where the
+    pulls balance what the turning asks for, and with the stiffness that the pulls make."""
+    pulls: tuple[Any, Any] = (plant.pull_larger, plant.pull_smaller)
+    places: tuple[Any, Any] = (plant.from_larger, plant.from_smaller)
+    square: Any = plant.rate**2
+    demand(plant.rate > 0 and min(pulls) > 0, "the rate of the axes or a pull is not positive")
+    demand(all(places) and places[0] != places[1], "a body is at the point, or both are at one place")
+    masses: list[Any] = [pull * abs(place) ** 3 for pull, place in zip(pulls, places, strict=True)]
+    kepler = square * abs(places[0] - places[1]) ** 3
+    demand(_near(kepler, masses[0] + masses[1]), "the bodies do not turn at the rate of the axes")
+    turning = square * (masses[0] * places[0] + masses[1] * places[1]) / (masses[0] + masses[1])
+    larger, smaller = (pull * place for pull, place in zip(pulls, places, strict=True))
+    demand(abs(turning - larger - smaller) <= CLOSE * (abs(larger) + abs(smaller)), "the point is no point of rest")
+    demand(_near(plant.stiffness, pulls[0] + pulls[1]), "the stiffness is not that of the point")
+
+
+def _near(one: Any, other: Any) -> bool:
+    return bool(abs(one - other) <= CLOSE * abs(other))
+
+
+# --- what is claimed --------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class StationKind:
+    """A kind of claim: what it assumes beside what all do, and from subject and claim what has to be shown."""
+
+    beside: str
+    proofs: Callable[[Station, Numbers], list[Obligation]]
+
+    def assumptions(self, subject: Station) -> list[str]:
+        """What a claim about this subject assumes."""
+        motion = "motion exactly as modelled" if subject.full else "linear motion near the point"
+        return [
+            motion,
+            "circular motion of the two bodies",
+            "position and velocity exactly known",
+            "control applied continuously, without lag",
+            self.beside,
+        ]
+
+
+def _attracts(circle: Circle, numbers: Numbers) -> list[Obligation]:
+    return [
+        ("form", EXACT, circle.form),
+        ("descent", SIGN, circle.descent),
+        ("only the circle", LASALLE, circle.only),
+        ("centre outside", SIGN, partial(circle.centre_outside, rational(numbers["level"]))),
+    ]
+
+
+def attracts(subject: Station, claim: Numbers) -> list[Obligation]:
+    """All motions from {V <= level}, whatever x and x', end on the circle and run through it at the rate."""
+    circle, numbers = subject.circle, claim["numbers"]
+    return [
+        *_attracts(circle, numbers),
+        ("x returns", SIGN, circle.returns),
+        ("numbers", "", partial(_contents, circle, numbers)),
+    ]
+
+
+def control_limit(subject: Station, claim: Numbers) -> list[Obligation]:
+    """Motions from {V <= level} with x = x' = 0 keep the control within the limit, and so end on the circle."""
+    circle, numbers = subject.circle, claim["numbers"]
+
+    def control() -> str:
+        demand(not subject.full, "the control is bounded for the linear model alone")
+        # Then the control is the neutral one and the damping, which `form` shows of the whole acceleration.
+        circle.form()
+        limit, level = rational(numbers["limit"]), rational(numbers["level"])
+        _same_limit(subject, numbers)
+        circle.centre_outside(level)
+        demand(keeps_within(circle, level, limit, numbers["kind"] == "axis"), "the control may exceed the limit")
+        return "largest over the phase in closed form, over the rest by Bernstein coefficients"
+
+    return [
+        *_attracts(circle, numbers),
+        ("control", BALLS, control),
+        ("numbers", "", partial(_contents, circle, numbers)),
+    ]
+
+
+def _same_limit(subject: Station, numbers: Numbers) -> None:
+    demand(numbers["kind"] == subject.limit != "none", "the limit is of another kind than the loop's")
+    limit = rational(numbers["limit"])
+    demand(subject.control_limit is not None and 0 < limit <= subject.control_limit, "the loop's limit is lower")
+
+
+def _contents(circle: Circle, numbers: Numbers) -> str:
+    """Circles between the radii, run through at the rate, are in {V <= level}, and so are errors of the velocity on the
+    circle itself."""
+    level, inner, outer, error = (rational(numbers[key]) for key in ("level", "inner", "outer", "velocity"))
+    gains = circle.gains
+    demand(0 <= inner <= gains.radius <= outer, "the radii are not on either side of the circle")
+    for radius, name in ((inner, "inner"), (outer, "outer")):
+        demand(gains.alpha * (radius**2 - gains.radius**2) ** 2 <= 2 * level, f"the {name} circle is not in it")
+    demand(error >= 0 and error**2 <= 2 * level, "the velocity's error is not in it")
+    return "radii and velocity are in {V <= level}"
+
+
+STATION_CLAIMS: dict[str, StationKind] = {
+    "circle": StationKind("control not limited", attracts),
+    "control-limit": StationKind("starts in the plane x = 0 without a rate along X", control_limit),
+}
+
+
+# --- what refutes it --------------------------------------------------------------------------------------------------
+
+
+def station_refutation(subject: Station, claim: Numbers, obligation: Mapping[str, Any]) -> str:
+    """What the evidence of an obligation shows; a CheckError where it does not refute."""
+    circle, name, evidence = subject.circle, obligation["name"], obligation["evidence"]
+    refuting = {
+        ("circle", "only the circle"): partial(_holds_another, circle, evidence),
+        ("circle", "x returns"): partial(_leaves, circle, evidence),
+        ("control-limit", "control"): partial(_needs_more, subject, claim["numbers"], evidence),
+    }.get((claim["kind"], name))
+    if refuting is None:
+        raise CheckError(f"nothing refutes {name}")
+    return refuting()
+
+
+def _holds_another(circle: Circle, evidence: Numbers) -> str:
+    """A relay holds f2 = f3 = 0 where it has to be 2 alpha |f1| r at most its size; on the circle of evidence, and then on
+    all nearer ones: outside of the circle and down to radius/sqrt(3) this falls towards it."""
+    demand(set(evidence) == {"radius", "needs", "of"}, "the evidence is not that of another circle")
+    circle.form()
+    gains, (radius, needs, of) = circle.gains, (rational(evidence[key]) for key in ("radius", "needs", "of"))
+    demand(circle.bare, "the feedback is no relay without a layer")
+    demand(radius > 0 and radius != gains.radius and 3 * radius**2 >= gains.radius**2, "it is no other circle near this one")
+    asked = 2 * gains.alpha * abs(radius**2 - gains.radius**2) * radius
+    demand(of == gains.k and _near(needs, asked), "the evidence tells of another relay")
+    demand(asked <= gains.k, "the relay does not hold that circle")
+    return "the relay holds another circle"
+
+
+def _leaves(circle: Circle, evidence: Numbers) -> str:
+    """A negative or no coefficient lets x be anywhere and stay, or grow; this needs no state to show it."""
+    demand(not evidence, "the evidence is not that of a motion along X")
+    circle.form()
+    position, velocity = circle.across
+    demand(position <= 0 or velocity <= 0, "x returns")
+    return "x does not return"
+
+
+def _needs_more(subject: Station, numbers: Numbers, evidence: Numbers) -> str:
+    """What the law commands on the circle itself, near an angle from Y at which all is rational."""
+    demand(set(evidence) == {"control", "angle"}, "the evidence is not that of a control")
+    _same_limit(subject, numbers)
+    demand(rational(numbers["limit"]) == subject.control_limit, "a limit is refuted that is not the loop's")
+    circle = subject.circle
+    demand(not subject.full and not circle.bare, "the control is read for the linear model, and with a layer")
+    # Then the control is the neutral one where f2 = f3 = 0.
+    circle.form()
+    state = circle.on_it(rational(evidence["angle"]))
+    squares = [part.at(state) ** 2 for part in circle.neutral]
+    largest = max(squares) if numbers["kind"] == "axis" else sum(squares, ZERO)
+    demand(largest > rational(numbers["limit"]) ** 2, "the circle needs no more than the limit")
+    told = rational(evidence["control"])
+    demand(_near(largest, told**2), "the circle needs another control than told")
+    return "the circle itself needs more than the limit"
