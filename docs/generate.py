@@ -9,6 +9,7 @@ import sympy
 
 from starhold.laws.catalogue import Law, catalogue
 from starhold.laws.interface import NoMemory, Seen
+from starhold.laws.station.interface import station_laws
 from starhold.models.craft import Craft
 
 
@@ -35,28 +36,38 @@ def first_component(law: Law) -> str:
     return str(sympy.simplify(torque[0]))
 
 
+def described(law: Law) -> list[str]:
+    """A law's card, gains and forms."""
+    card = law.card
+    lines = [f"## {law.name}: {card.title}", "", card.summary, "", f"* claims: {card.claims}"]
+    lines += [f"* assumes: {'; '.join(card.assumptions)}", f"* sources: {'; '.join(card.sources)}", ""]
+    for form in (None, *law.forms):
+        lines += [
+            "Gains:" if form is None else f'Form `"{form}"`:',
+            "",
+            "| key | unit | meaning | default |",
+            "|---|---|---|---|",
+        ]
+        for item in law.fields(form):
+            default = item.gain.choices[item.default] if item.gain.choices and not item.required else item.default
+            shown = "required" if item.required else f"`{default}`"
+            lines.append(f"| `{item.name}` | {item.gain.unit} | {item.gain.text} | {shown} |")
+        lines.append("")
+    return lines
+
+
 def page() -> str:
     """The page."""
     lines = ["# Laws", "", "Written from the laws' own files by `make docs`.", ""]
     for law in catalogue().values():
         card = law.card
-        lines += [f"## {law.name}: {card.title}", "", card.summary, "", f"* claims: {card.claims}"]
-        lines += [f"* assumes: {'; '.join(card.assumptions)}", f"* sources: {'; '.join(card.sources)}", ""]
-        for form in (None, *law.forms):
-            lines += [
-                "Gains:" if form is None else f'Form `"{form}"`:',
-                "",
-                "| key | unit | meaning | default |",
-                "|---|---|---|---|",
-            ]
-            for item in law.fields(form):
-                default = item.gain.choices[item.default] if item.gain.choices and not item.required else item.default
-                shown = "required" if item.required else f"`{default}`"
-                lines.append(f"| `{item.name}` | {item.gain.unit} | {item.gain.text} | {shown} |")
-            lines.append("")
+        lines += described(law)
         if not card.compiled_only:
             text = "First component of the torque, target at rest, principal axes, matrix gains multiples of the identity:"
             lines += [text, "", f"    u_1 = {first_component(law)}", ""]
+    lines += ["# Laws of station keeping", "", "Numbers are scaled, see [station keeping](station-keeping.md).", ""]
+    for law in station_laws().values():
+        lines += described(law)
     return "\n".join(lines)
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from starhold.conformance.suite import examine
 from starhold.laws.catalogue import catalogue, from_file
+from starhold.laws.station.interface import station_laws
 
 ROOT = Path(__file__).parents[1]
 
@@ -23,7 +24,7 @@ def test_readme_example_runs(capsys):
 
 def test_readme_names_every_law():
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    for name in catalogue():
+    for name in catalogue() | station_laws():
         assert f"| `{name}` |" in text
 
 
@@ -43,6 +44,6 @@ def test_generated_page_of_laws():
     import runpy
 
     page = runpy.run_path(str(ROOT / "docs" / "generate.py"))["page"]()
-    for law in catalogue():
+    for law in catalogue() | station_laws():
         assert f"## {law}: " in page
     assert "-k_attitude*q_1 - k_rate*w_1" in page

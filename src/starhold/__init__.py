@@ -7,6 +7,7 @@ run = sh.simulate(scenario, law="lyapunov")      # an xarray Dataset
 flights = sh.compare(scenario)                   # runs and metrics of every law
 certificates = sh.certify(scenario)              # what is proved of every law
 designs = sh.design("my.toml")                   # gains that formulas give, and figures to judge them by
+certificate = sh.invariant("van-der-pol")        # what is proved of an invariant set of any small system
 placed = sh.place(A, B, poles)                   # u = -K x that gives A - B K these poles, for any linear system
 """
 
@@ -15,7 +16,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from starhold.api import certify, compare, design, failures, load, modal_roots, place, simulate
+    from starhold.api import certify, compare, design, failures, invariant, load, modal_roots, place, simulate
     from starhold.errors import InputError
 
 __version__ = "0.1.0"
@@ -26,6 +27,7 @@ __all__ = [
     "compare",
     "design",
     "failures",
+    "invariant",
     "load",
     "modal_roots",
     "place",

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from starhold.algebra.polynomial import Cases, Polynomial, constants, exact, jointly, pieces
-from starhold.algebra.scalar import both, clip, less, maximum, sign, sqrt, where
+from starhold.algebra.scalar import absolute, both, clip, less, maximum, sign, sqrt, where
 from starhold.algebra.vector import solve
 
 NAMES = ("x", "y", "z")
@@ -123,8 +123,17 @@ def test_what_a_polynomial_cannot_do_is_said():
         sqrt(x)
     with pytest.raises(TypeError, match="constants only"):
         1.0 / x
-    with pytest.raises(TypeError, match="cannot be compared"):
-        less(sign(x), 0.0)
     with pytest.raises(TypeError, match="not joined"):
         both(less(x, 0.0), less(0.0, x))
     assert (x - x).value == fmpq(0)
+
+
+def test_piecewise_polynomials_are_compared_piece_by_piece():
+    x = Polynomial.variable("x")
+    # max(|x| - 1, x - 2, 0)
+    value = maximum(maximum(absolute(x) - 1, x - 2), 0)
+    for number, wanted in ((-3, 2), (-1, 0), (0, 0), (1, 0), (5, 4)):
+        at = {"x": exact(number)}
+        found = {c.value.at(at) for c in pieces(value) if all((k.positive.at(at) > 0) == t for k, t in c.truths)}
+        assert found == {exact(wanted)}
+    assert where(less(sign(x), 2.0), 1, 0).pieces

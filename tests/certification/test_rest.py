@@ -33,7 +33,7 @@ def claims_of(*given, **changes):
 @pytest.mark.parametrize("limit", [1.0, 3.5, 20.0])
 def test_the_saturated_axis_is_certified_up_to_the_separatrix(limit):
     """|x + x'/s| < U/p, which is |x + x'| < 1 in the scaled time and twice the linear zone, within 1 %."""
-    claim = claims_of(GAINS, limit)["saturated-axis"]
+    claim = claims_of(GAINS._replace(y=0.1), limit)["saturated-axis"]
     assert claim.outcome == "proved"
     true = limit / STEEP
     assert 0.99 * true < claim.numbers["width"] < true <= claim.numbers["boundary"] < true * (1.0 + 1e-12)
@@ -70,5 +70,14 @@ def test_rest_attracts_without_a_limit():
 
 
 def test_feedback_off_the_separatrix_is_left_undecided():
-    assert claims_of(GAINS._replace(k_x=1.2 * GAINS.k_x), 1.0)["saturated-axis"].outcome == "undecided"
-    assert claims_of(GAINS._replace(k_x=GAINS.k_x * (1.0 + 1e-9)), 1.0)["saturated-axis"].outcome == "proved"
+    near = GAINS._replace(y=0.1)
+    assert claims_of(near._replace(k_x=1.2 * GAINS.k_x), 1.0)["saturated-axis"].outcome == "undecided"
+    assert claims_of(near._replace(k_x=GAINS.k_x * (1.0 + 1e-9)), 1.0)["saturated-axis"].outcome == "proved"
+
+
+def test_nothing_is_said_of_x_where_the_others_cannot_be_held_or_the_model_is_another():
+    claim = claims_of(GAINS, 2.9)["saturated-axis"]
+    assert claim.outcome == "undecided"
+    assert "cannot be held" in claim.obligations[0].evidence["reason"]
+    assert claims_of(GAINS, 3.0)["saturated-axis"].outcome == "proved"
+    assert "saturated-axis" not in claims_of(GAINS._replace(model=1), 4.0, model="nonlinear")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from starhold.analysis.metrics import MEASURES
-from starhold.analysis.ranking import shown, winners
+from starhold.analysis.ranking import ATTITUDE
 from starhold.models.craft import check_inertia
 from starhold.report.page import _box, render, write_page
 from tests.report import flown
@@ -78,12 +78,12 @@ def test_nothing_is_loaded(page: str, reader: Reader) -> None:
 
 def test_every_law_and_every_metric_is_there(reader: Reader) -> None:
     flights = flown.flights()
-    best = winners({flight.name: flight.metrics for flight in flights})
+    best = ATTITUDE.winners({flight.name: flight.metrics for flight in flights})
     for flight in flights:
         assert flight.name in reader.words
         for metric in MEASURES:
             if metric in flight.metrics:
-                assert shown(metric, flight.metrics[metric]) in reader.words, metric
+                assert ATTITUDE.shown(metric, flight.metrics[metric]) in reader.words, metric
     for metric in flights[0].metrics:
         if metric in MEASURES:
             assert ("th", {"scope": "col", "title": MEASURES[metric].meaning}) in reader.tags

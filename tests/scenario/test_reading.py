@@ -14,10 +14,11 @@ from pydantic_core import PydanticCustomError
 from starhold.errors import InputError
 from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import Gain
+from starhold.report.kinds import kind_of
 from starhold.scenario.building import build
+from starhold.scenario.opening import json_schema, open_scenario
 from starhold.scenario.quantity import reader
 from starhold.scenario.reading import builtin_names, builtin_text, load, parse
-from starhold.scenario.schema import json_schema
 from starhold.scenario.template import template_text
 from starhold.scenario.writing import law_table
 
@@ -40,9 +41,9 @@ def fault(old, new, text=BASE):
 
 @pytest.mark.parametrize("name", builtin_names())
 def test_builtin_scenarios_build(name):
-    scenario = load(name)
+    scenario = open_scenario(name)
     assert scenario.table.description
-    assert len([build(scenario, entry) for entry in scenario.laws]) >= 2
+    assert len([kind_of(scenario).build(scenario, entry) for entry in scenario.laws]) >= 2
 
 
 def test_the_published_experiment_is_as_published():
@@ -237,7 +238,7 @@ def test_json_schema_accepts_what_is_read_and_refuses_a_misspelling():
     assert '"default": "riccati"' in json.dumps(schema)
     check = jsonschema.Draft202012Validator(schema)
     check.check_schema(schema)
-    for text in [template_text(), *(builtin_text(name) for name in builtin_names())]:
+    for text in [template_text(), template_text(libration=True), *(builtin_text(name) for name in builtin_names())]:
         assert not list(check.iter_errors(tomllib.loads(text)))
     assert list(check.iter_errors(tomllib.loads(BASE.replace("k_rate", "k_ratee"))))
     assert list(check.iter_errors(tomllib.loads(BASE.replace("[orbit]", "[orbits]"))))

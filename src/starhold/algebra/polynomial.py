@@ -220,6 +220,13 @@ class Cases:
         return self._with(other, lambda a, b: a / b)
 
 
+@dataclass(frozen=True)
+class Split:
+    """A comparison of piecewise polynomials: cases as theirs, each with what the comparison is there."""
+
+    pieces: tuple[tuple[tuple[tuple[Condition, bool], ...], bool | Condition], ...]
+
+
 def pieces(value: Any) -> tuple[Case, ...]:
     """The cases of a piecewise polynomial; of a polynomial or a number the only one."""
     return value.pieces if isinstance(value, Cases) else (Case((), _polynomial(value)),)
@@ -267,9 +274,13 @@ def sqrt(x: Any) -> Any:
     raise TypeError("a polynomial has no square root")
 
 
-def less(a: Any, b: Any) -> bool | Condition:
+def less(a: Any, b: Any) -> bool | Condition | Split:
     if isinstance(a, Cases) or isinstance(b, Cases):
-        raise TypeError("a piecewise polynomial cannot be compared")
+        return Split(tuple((truths, _less(one, other)) for truths, (one, other) in jointly((a, b))))
+    return _less(a, b)
+
+
+def _less(a: Any, b: Any) -> bool | Condition:
     difference = _polynomial(b) - a
     value = difference.value
     if isinstance(value, arb) and not (value > 0 or value <= 0):
@@ -278,6 +289,13 @@ def less(a: Any, b: Any) -> bool | Condition:
 
 
 def where(condition: Any, a: Any, b: Any) -> Any:
+    if isinstance(condition, Split):
+        return Cases(
+            Case(merged, case.value)
+            for truths, here in condition.pieces
+            for case in pieces((a if here else b) if isinstance(here, bool) else where(here, a, b))
+            if (merged := _merged(truths, case.truths)) is not None
+        )
     chosen = [(case, True) for case in pieces(a)] + [(case, False) for case in pieces(b)]
     return Cases(
         Case(truths, case.value)

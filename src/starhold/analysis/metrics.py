@@ -91,7 +91,7 @@ def measure(run: Recording, attitude_tolerance: float, rate_tolerance: float) ->
         "peak_torque": float(np.abs(u).max()),
         "peak_torque_norm": float(np.linalg.norm(u, axis=1).max()),
         "effort": float(np.sum(np.linalg.norm(u[:-1], axis=1) * np.diff(times))),
-        "limit_share": _limit_share(u, run.attrs["torque_limit"], run.attrs["limit"]),
+        "limit_share": limit_share(u, run.attrs["torque_limit"], run.attrs["limit"]),
         "chatter": float(np.linalg.norm(np.diff(u[tail], axis=0), axis=1).mean()) if len(u[tail]) > 1 else 0.0,
         "final_attitude_error": None if lost is not None else float(angle[tail].max()),
         "final_rate_error": None if lost is not None else float(speed[tail].max()),
@@ -119,7 +119,8 @@ def _overshoot(q: NDArray[np.float64]) -> float:
     return max(0.0, float(-along[crossed[0] :].min())) if crossed.size else 0.0
 
 
-def _limit_share(u: NDArray[np.float64], limit: float, kind: str) -> float:
+def limit_share(u: NDArray[np.float64], limit: float, kind: str) -> float:
+    """Share of the samples (n, 3) that are on their limit."""
     if kind == "none" or not np.isfinite(limit):
         return 0.0
     size = np.linalg.norm(u, axis=1) if kind == "norm" else np.abs(u).max(axis=1)

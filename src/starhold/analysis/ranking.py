@@ -3,47 +3,61 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
-from starhold.analysis.metrics import MEASURES
-
-ORDER = ("settling_time", "final_attitude_error", "effort")
-"""Laws are ranked by these in turn: settled before unsettled, then sooner, then more accurate, then more sparing."""
+from starhold.analysis.metrics import MEASURES, Measure
 
 
-def columns(results: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """The metrics that some of the laws have, in order."""
-    return [metric for metric in MEASURES if any(metric in row for row in results.values())]
+@dataclass(frozen=True)
+class Board:
+    """How results of a kind of scenario are told: the metrics that are shown, less being better in each; those that laws are
+    ranked by in turn; and the unit of time, with its seconds."""
+
+    measures: Mapping[str, Measure]
+    order: tuple[str, ...]
+    clock: str = "s"
+    tick: float = 1.0
+
+    def columns(self, results: Mapping[str, Mapping[str, Any]]) -> list[str]:
+        """The metrics that some of the laws have, in order."""
+        return [metric for metric in self.measures if any(metric in row for row in results.values())]
+
+    def ranked(self, results: Mapping[str, Mapping[str, Any]]) -> list[str]:
+        """Names from best to worst."""
+
+        def key(name: str) -> tuple[float, ...]:
+            values = [results[name].get(metric) for metric in self.order]
+            lost = results[name].get("diverged_at") is not None
+            return (float(lost), *(float("inf") if value is None else float(value) for value in values))
+
+        return sorted(results, key=key)
+
+    def winners(self, results: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
+        """For each metric the names with the least value; nobody wins where all are equal or none has a value."""
+        won: dict[str, list[str]] = {}
+        for metric in self.measures:
+            values = {name: row[metric] for name, row in results.items() if row.get(metric) is not None}
+            values = {name: value for name, value in values.items() if results[name].get("diverged_at") is None}
+            least = min(values.values(), default=None)
+            best = [name for name, value in values.items() if value == least]
+            won[metric] = best if len(values) > 1 and len(best) < len(values) else []
+        return won
+
+    def shown(self, metric: str, value: Any) -> str:
+        """A metric's value in the unit of its heading; a dash where there is none."""
+        if value is None:
+            return "—"
+        scaled = float(value) * self.measures[metric].scale
+        if metric.startswith("iterations"):
+            return f"{int(value)}"
+        return f"{scaled:.3g}" if abs(scaled) < 1e3 else f"{scaled:.0f}"
+
+    def headings(self, results: Mapping[str, Mapping[str, Any]]) -> list[str]:
+        """What laws with these results are ranked by, as headings; the first always is."""
+        there = self.columns(results)
+        return [self.measures[metric].heading for metric in self.order if metric in there]
 
 
-def ranked(results: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Names from best to worst."""
-
-    def key(name: str) -> tuple[float, ...]:
-        values = [results[name].get(metric) for metric in ORDER]
-        lost = results[name].get("diverged_at") is not None
-        return (float(lost), *(float("inf") if value is None else float(value) for value in values))
-
-    return sorted(results, key=key)
-
-
-def winners(results: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
-    """For each metric the names with the least value; nobody wins where all are equal or none has a value."""
-    won: dict[str, list[str]] = {}
-    for metric in MEASURES:
-        values = {name: row[metric] for name, row in results.items() if row.get(metric) is not None}
-        values = {name: value for name, value in values.items() if results[name].get("diverged_at") is None}
-        least = min(values.values(), default=None)
-        best = [name for name, value in values.items() if value == least]
-        won[metric] = best if len(values) > 1 and len(best) < len(values) else []
-    return won
-
-
-def shown(metric: str, value: Any) -> str:
-    """A metric's value in the unit of its heading; a dash where there is none."""
-    if value is None:
-        return "—"
-    scaled = float(value) * MEASURES[metric].scale
-    if metric.startswith("iterations"):
-        return f"{int(value)}"
-    return f"{scaled:.3g}" if abs(scaled) < 1e3 else f"{scaled:.0f}"
+ATTITUDE = Board(MEASURES, ("settling_time", "final_attitude_error", "effort"))
+"""Settled before unsettled, then sooner, then more accurate, then more sparing."""

@@ -2,9 +2,9 @@
 
 Each axis moves on its own: x'' = (p - k) x - c x' with p = Omega^2 + 2 C, y'' = -(C - Omega^2)(y - y0) - ..., z likewise.
 
-With the control along X limited to U, the others at rest, sigma = x + x'/s with s = sqrt(p) obeys sigma' = s sigma + u/s and
-x' = s (sigma - x). From |sigma| >= U/p nothing returns, for there s |sigma| >= U/s. On |sigma| <= m < U/p, where
-u = -clip(c s sigma + e x) with e = k - s c, a number that rounding leaves,
+With the control along X limited to U and the others held at rest, which takes control too, sigma = x + x'/s with s = sqrt(p)
+obeys sigma' = s sigma + u/s and x' = s (sigma - x). From |sigma| >= U/p nothing returns, for there s |sigma| >= U/s. On
+|sigma| <= m < U/p, where u = -clip(c s sigma + e x) with e = k - s c, a number that rounding leaves,
 
     sigma u <= -f sigma^2 + |e| |sigma| |x|,   f = min(U/m, c s) > p,
 
@@ -28,7 +28,7 @@ from starhold.laws.station import l2_rest as law
 from starhold.loop.station import StationLoop
 from starhold.models.libration import linear
 
-OTHERS_AT_REST = "starts at rest along Y and Z, where no Coriolis acceleration acts along X"
+HELD = "held at rest along Y and Z, where no Coriolis acceleration acts along X"
 CLEAR = "never at the centre of one of the two bodies"
 SHARE = 0.999
 """Of the bound beyond which no motion returns, the part that is certified."""
@@ -70,6 +70,9 @@ def saturated_axis(loop: StationLoop) -> Claim:
     """From where the X axis returns although its control is limited, and that it does from nowhere else."""
     found, told, witness = Obligations(), dict[str, Any](), dict[str, Any]()
     axis = _axis(loop)
+    if _demand(loop) > exact(loop.limit):
+        found.add("stays", BALLS, None, {"reason": "the other axes cannot be held with so little control"})
+        return Claim("saturated-axis", {"limit": loop.limit}, {}, assumed(loop, HELD), tuple(found))
     bound = axis.limit / axis.p
     width = below(exact(number(bound)) * exact(SHARE))
     far = below(exact(number(bound)) * exact(FAR))
@@ -84,13 +87,19 @@ def saturated_axis(loop: StationLoop) -> Claim:
     falls = bool(holds > axis.p and mu > 0.0 and form)
     found.add("strict", BALLS, falls or None, {} if falls else {"reason": "no function of the form is shown to fall"})
     found.add("nothing returns from beyond", BALLS, bool(arb(told["boundary"]) * axis.p >= axis.limit))
-    return Claim("saturated-axis", told, witness, assumed(loop, OTHERS_AT_REST), tuple(found))
+    return Claim("saturated-axis", told, witness, assumed(loop, HELD), tuple(found))
 
 
 def _axis(loop: StationLoop) -> Axis:
     p = exact(loop.plant.rate) ** 2 + 2 * exact(loop.plant.stiffness)
     k, c = exact(loop.gains.k_x), exact(loop.gains.k_velocity[0])
     return Axis(arb(p), arb(p).sqrt(), arb(k), arb(c), arb(loop.limit))
+
+
+def _demand(loop: StationLoop) -> Any:
+    """What holding Y and Z takes at least."""
+    square, c = exact(loop.plant.rate) ** 2, exact(loop.plant.stiffness)
+    return max(abs((c - square) * exact(loop.gains.y)), abs(c * exact(loop.gains.z)))
 
 
 def _separate(loop: StationLoop) -> bool:

@@ -24,7 +24,7 @@ def certify_station(loop: StationLoop, name: str = "") -> Certificate:
             claims.append(control_limit(loop))
     elif loop.law.name == "l2-rest":
         claims.append(rests(loop))
-        if limited and loop.limit_kind == "axis" and claims[0].outcome == "proved":
+        if limited and loop.limit_kind == "axis" and loop.model == "linear" and claims[0].outcome == "proved":
             claims.append(saturated_axis(loop))
     return Certificate(name or loop.law.name, described_station(loop), tuple(claims))
 

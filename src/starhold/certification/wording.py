@@ -197,10 +197,13 @@ def _rest(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 
 
 def _saturated_axis(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
-    share = f"{100.0 * n['width'] / n['boundary']:.4g} % of the true one"
+    where = f"with Y and Z held and the control along X within {n['limit']:.4g} (scaled)"
+    if "width" not in n:
+        return f"{where}, x returns"
+    share = f"{100.0 * n['width'] / n['boundary']:.4g} % of the true bound"
     return (
-        f"with the control along X within {n['limit']:.4g} (scaled), x returns from |x + x'/s| up to {shown(n['width'])}, "
-        f"{share}; from {shown(n['boundary'], up=True)} on nothing returns"
+        f"{where}, x returns from |x + x'/s| up to {shown(n['width'])}, {share}, and |x| up to {shown(n['reach'])}; "
+        f"from |x + x'/s| = {shown(n['boundary'], up=True)} on nothing returns"
     )
 
 

@@ -24,14 +24,14 @@ def certify(
     from starhold.certification.certificate import FILE, write
     from starhold.cli.show import console
     from starhold.cli.show_certificates import print_certificate
-    from starhold.report.certificates import certify_scenario
     from starhold.report.files import whole
+    from starhold.report.kinds import kind_of
     from starhold.report.results import open_folder
-    from starhold.scenario.reading import load
+    from starhold.scenario.opening import open_scenario
 
-    scenario = load(file, allow_unstable)
+    scenario = open_scenario(file, allow_unstable)
     folder = open_folder(output or Path("results") / f"{scenario.name}-certificate", force)
-    tried = certify_scenario(scenario, law)
+    tried = kind_of(scenario).certify_scenario(scenario, law)
     for found in tried:
         print_certificate(found)
     certificates = [found.certificate for found in tried]

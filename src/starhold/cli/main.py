@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from starhold.cli import certifying, failing, rooting
+from starhold.cli import certifying, failing, rooting, sailing
+from starhold.cli import invariant as invariant_sets
 from starhold.cli.arguments import (
     DIVERGED,
     FAILED_CHECK,
@@ -70,15 +71,15 @@ def _fly(file: str, law: str | None, output: Path | None, force: bool, allow_uns
     # First of all, for it takes as long to get ready as the flight takes.
     with Painter() as painter:
         from starhold.cli.show import flying, print_outcome
-        from starhold.report.compare import fly_law, write
+        from starhold.report.kinds import kind_of
         from starhold.report.results import open_folder, write_run
-        from starhold.scenario.building import build
-        from starhold.scenario.reading import load
+        from starhold.scenario.opening import open_scenario
 
-        scenario = load(file, allow_unstable)
+        scenario = open_scenario(file, allow_unstable)
+        kind = kind_of(scenario)
         entries = list(scenario.laws) if nested else [scenario.laws[0] if law is None else scenario.pick(law)]
         # All of them before the first flight, so that what is wrong with the last is said at once.
-        loops = [build(scenario, entry) for entry in entries]
+        loops = [kind.build(scenario, entry) for entry in entries]
         name = scenario.name if nested else f"{scenario.name}-{entries[0].name}"
         folder = open_folder(output or Path("results") / name, force)
         flights: list[Flight] = []
@@ -89,11 +90,11 @@ def _fly(file: str, law: str | None, output: Path | None, force: bool, allow_uns
                 show(name, done, total)
 
             for entry, loop in zip(entries, loops, strict=True):
-                flights.append(fly_law(scenario, entry, loop, notice))
+                flights.append(kind.fly_law(scenario, entry, loop, notice))
                 if entry is entries[-1]:
-                    painter.start(flights, folder, scenario)
+                    painter.start(kind.sketch(flights, scenario), folder)
                 write_run(flights[-1].run, scenario, (folder / entry.name if nested else folder) / "run.nc")
-        page = write(scenario, flights, folder)
+        page = kind.write(scenario, flights, folder)
         painter.finish()
     print_outcome(flights, page)
     return flights
@@ -111,9 +112,9 @@ def design(
     """Print the gains that formulas give: every law of a file that has a `form`."""
     from starhold.cli.show import console, print_design
     from starhold.scenario import designing
-    from starhold.scenario.reading import load
+    from starhold.scenario.opening import open_scenario
 
-    scenario = load(file, allow_unstable)
+    scenario = open_scenario(file, allow_unstable)
     for found in designing.design(scenario, law):
         print_design(found)
     if map_to is not None:
@@ -127,6 +128,8 @@ app.command()(certifying.certify)
 app.command()(certifying.check)
 app.command()(failing.failures)
 app.command("modal-roots")(rooting.modal_roots)
+app.command("invariant")(invariant_sets.invariant)
+app.command()(sailing.sail)
 
 
 @app.command()
@@ -134,14 +137,17 @@ def laws(name: Annotated[str | None, typer.Argument(help="show this law's card a
     """List the control laws, or describe one."""
     from starhold.cli.show import print_law, print_laws
     from starhold.laws.catalogue import catalogue
-    from starhold.scenario.reading import nearest
+    from starhold.laws.station.interface import station_laws
+    from starhold.scenario.checking import nearest
 
+    known = catalogue() | station_laws()
     if name is None:
-        print_laws(catalogue())
-    elif name not in catalogue():
-        raise InputError("laws", "", name, nearest(name, list(catalogue())))
+        print_laws("attitude", catalogue())
+        print_laws("station keeping", station_laws())
+    elif name not in known:
+        raise InputError("laws", "", name, nearest(name, list(known)))
     else:
-        print_law(catalogue()[name])
+        print_law(known[name])
 
 
 @app.command()
@@ -157,11 +163,12 @@ def wheels() -> None:
 def scenarios(name: Annotated[str | None, typer.Argument(help="print this scenario's text")] = None) -> None:
     """List the built-in scenarios, or print one."""
     from starhold.cli.show import console
-    from starhold.scenario.reading import builtin_names, builtin_text, load, nearest
+    from starhold.scenario.opening import open_scenario
+    from starhold.scenario.reading import builtin_names, builtin_text, nearest
 
     if name is None:
         for known in builtin_names():
-            console.print(f"[bold]{known}[/bold]  {load(known).table.description}", soft_wrap=True)
+            console.print(f"[bold]{known}[/bold]  {open_scenario(known).table.description}", soft_wrap=True)
     elif name not in builtin_names():
         raise InputError("scenarios", "", name, nearest(name, builtin_names()))
     else:
@@ -173,6 +180,7 @@ def new(
     path: Annotated[Path, typer.Argument(metavar="FILE.toml", help="the file to write")],
     start: Annotated[str | None, typer.Option("--from", help="copy this built-in scenario instead of the template")] = None,
     wheels: Annotated[bool, typer.Option("--wheels", help="a spacecraft with reaction wheels")] = False,
+    libration: Annotated[bool, typer.Option("--libration", help="a craft near a libration point")] = False,
     schema: Annotated[bool, typer.Option("--schema", help="write a JSON Schema beside it, for editors")] = False,
     force: Force = False,
 ) -> None:
@@ -182,12 +190,14 @@ def new(
     from starhold.scenario.reading import builtin_names, builtin_text, nearest
     from starhold.scenario.template import template_text
 
-    if wheels and start is not None:
-        raise InputError("new", "--wheels", f"--from {start}", "one of the two")
+    given = {"--wheels": wheels, "--libration": libration, "--from": start is not None}
+    asked = [option for option, there in given.items() if there]
+    if len(asked) > 1:
+        raise InputError("new", asked[0], asked[1], "one of the two")
     start = "wheels-orbital" if wheels else start
     if start is not None and start not in builtin_names():
         raise InputError("new", "--from", start, nearest(start, builtin_names()))
-    text = template_text() if start is None else builtin_text(start)
+    text = template_text(libration) if start is None else builtin_text(start)
     beside = path.with_name("starhold.schema.json")
     if schema:
         text = f"#:schema ./{beside.name}\n{text}"
@@ -213,7 +223,7 @@ def schema() -> None:
 def _schema_text() -> str:
     import json
 
-    from starhold.scenario.schema import json_schema
+    from starhold.scenario.opening import json_schema
 
     return json.dumps(json_schema(), indent=1) + "\n"
 

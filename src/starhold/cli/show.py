@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from starhold.report.flight import Flight
     from starhold.scenario.designing import Design
     from starhold.scenario.reading import LawEntry
+    from starhold.scenario.station.reading import StationEntry
 
 WIDE = 132
 COLUMN = 11
@@ -29,7 +30,7 @@ if not console.is_terminal:
 
 
 @contextmanager
-def flying(entries: Sequence[LawEntry], steps: int) -> Iterator[Callable[[str, int, int], None]]:
+def flying(entries: Sequence[LawEntry | StationEntry], steps: int) -> Iterator[Callable[[str, int, int], None]]:
     """Progress bars, one a law; yields what the simulation calls."""
     columns = (
         TextColumn("{task.description}"),
@@ -53,9 +54,8 @@ def print_outcome(flights: Sequence[Flight], page: Path) -> None:
     """The table, what went wrong, and where the report is."""
     print_table(flights)
     for flight in flights:
-        lost = flight.metrics["diverged_at"]
-        if lost is not None:
-            console.print(f"{flight.name} diverged at {lost:g} s; its results end there", style="red")
+        if flight.lost is not None:
+            console.print(f"{flight.name} diverged at {flight.lost_text()}; its results end there", style="red")
         if flight.metrics.get("solver_budget_hits"):
             hits, calls = flight.metrics["solver_budget_hits"], flight.metrics["solver_calls"]
             console.print(f"{flight.name}: the solver used up its budget in {hits} of {calls} calls", style="yellow")
@@ -74,14 +74,15 @@ def print_outcome(flights: Sequence[Flight], page: Path) -> None:
 
 def print_table(flights: Sequence[Flight]) -> None:
     """The ranked comparison; a star marks the best of each metric. On a narrow screen laws become columns."""
-    from starhold.analysis.metrics import MEASURES
-    from starhold.analysis.ranking import columns, ranked, shown, winners
-
+    board = flights[0].board
     results: Mapping[str, Mapping[str, Any]] = {flight.name: flight.metrics for flight in flights}
-    won, order = winners(results), ranked(results)
-    metrics = columns(results)
-    heads = [f"{MEASURES[metric].heading}\n[dim]{MEASURES[metric].unit}[/dim]" for metric in metrics]
-    cells = [[_cell(shown(metric, results[name].get(metric)), name in won[metric]) for metric in metrics] for name in order]
+    won, order = board.winners(results), board.ranked(results)
+    metrics = board.columns(results)
+    measures = [board.measures[metric] for metric in metrics]
+    heads = [f"{measure.heading}\n[dim]{measure.unit}[/dim]" for measure in measures]
+    cells = [
+        [_cell(board.shown(metric, results[name].get(metric)), name in won[metric]) for metric in metrics] for name in order
+    ]
     table = Table(title_justify="left", show_edge=False, pad_edge=False)
     if console.width >= max(WIDE, COLUMN * (1 + len(metrics))):
         for head in ("law", *heads):
@@ -97,7 +98,7 @@ def print_table(flights: Sequence[Flight]) -> None:
     console.print(table)
     if len(flights) > 1:
         console.print(
-            "Ranked by settling, then final angle, then effort; [bold green]*[/bold green] best of its kind.",
+            f"Ranked by {', then '.join(board.headings(results))}; [bold green]*[/bold green] best of its kind.",
             highlight=False,
         )
 
@@ -111,9 +112,10 @@ def print_design(design: Design) -> None:
     import numpy as np
 
     from starhold.laws.catalogue import catalogue
+    from starhold.laws.station.interface import station_laws
     from starhold.report.flight import number_text
 
-    law = catalogue()[design.law]
+    law = (catalogue() | station_laws())[design.law]
     console.print(f'[bold]{design.name}[/bold]: {law.card.title}, form "{design.form}"', highlight=False)
     for title, items, values in (
         ("from", law.fields(design.form), design.inputs),
@@ -134,10 +136,10 @@ def print_design(design: Design) -> None:
     console.print()
 
 
-def print_laws(known: Mapping[str, Law]) -> None:
-    """Name, claim and summary of each law."""
+def print_laws(group: str, known: Mapping[str, Law]) -> None:
+    """Name, claim and summary of each law of a group."""
     table = Table(show_edge=False, pad_edge=False)
-    for head in ("law", "claims", "summary"):
+    for head in (group, "claims", "summary"):
         table.add_column(head)
     for law in known.values():
         table.add_row(law.name, law.card.claims, law.card.summary)

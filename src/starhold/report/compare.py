@@ -12,16 +12,17 @@ from starhold.analysis.cost import call_costs
 from starhold.analysis.metrics import measure
 from starhold.certification.certificate import FILE
 from starhold.certification.certificate import write as write_certificates
-from starhold.laws.interface import Field
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.report.certificates import certify_law
+from starhold.report.certificates import certify_scenario as certify_scenario
+from starhold.report.figures import sketch as sketch
 from starhold.report.files import whole
-from starhold.report.flight import Flight, number_text
+from starhold.report.flight import Flight, gain_text
 from starhold.report.results import SUMMARY, write_summary
 from starhold.report.transients import against_limits
 from starhold.scenario.building import build
 from starhold.scenario.reading import LawEntry, Scenario
-from starhold.simulation.lane import fly, label
+from starhold.simulation.lane import Progress, Recording, fly, label
 
 Notice: TypeAlias = Callable[[str, int, int], None]
 """Called with a law's name, the control steps done and those in all."""
@@ -37,9 +38,16 @@ def fly_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, notice: Notic
     metrics |= against_limits(recording, scenario.table.transient)
     metrics |= call_costs(loop, samples)
     metrics |= _law_counters(carry.memory)
-    gains = {item.name: _gain_text(item, value) for item, value in zip(entry.law.fields(), entry.gains, strict=True)}
+    gains = {item.name: gain_text(item, value) for item, value in zip(entry.law.fields(), entry.gains, strict=True)}
     proved = tuple(issued.certificate for issued in certify_law(scenario, entry, loop))
     return Flight(entry.name, entry.law.name, recording, metrics, gains, proved)
+
+
+def record(scenario: Scenario, loop: ClosedLoop, progress: Progress | None = None) -> Recording:
+    """The run of a loop."""
+    simulation = scenario.table.simulation
+    samples, carry = fly(loop, simulation.steps, simulation.record_every, progress=progress)
+    return label(loop, samples, carry, simulation.record_every)
 
 
 def compare(scenario: Scenario, notice: Notice | None = None) -> list[Flight]:
@@ -53,13 +61,17 @@ def write(scenario: Scenario, flights: Sequence[Flight], folder: Path) -> Path:
     from starhold.report.page import write_page
 
     write_summary(scenario, {flight.name: flight.metrics for flight in flights}, folder / SUMMARY)
-    certificates = [certificate for flight in flights for certificate in flight.certificates]
-    with whole(folder / FILE) as hidden:
-        write_certificates(certificates, scenario.name, hidden)
+    write_proved(scenario.name, flights, folder)
     page = folder / "report.html"
     with whole(page) as hidden:
         write_page(hidden, scenario, flights)
     return page
+
+
+def write_proved(name: str, flights: Sequence[Flight], folder: Path) -> None:
+    """The flights' certificates in one file."""
+    with whole(folder / FILE) as hidden:
+        write_certificates([certificate for flight in flights for certificate in flight.certificates], name, hidden)
 
 
 def _law_counters(memory: Any) -> dict[str, Any]:
@@ -74,10 +86,3 @@ def _law_counters(memory: Any) -> dict[str, Any]:
         "solver_iterations_worst": worst,
         "solver_budget_hits": hits,
     }
-
-
-def _gain_text(item: Field, value: Any) -> str:
-    if item.gain.choices:
-        return item.gain.choices[value]
-    unit = "" if item.gain.unit == "1" else f" {item.gain.unit}"
-    return f"{number_text(value)}{unit}"

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
 from starhold.analysis.metrics import DECADES
 from starhold.report.files import whole
 from starhold.report.flight import Flight, colour
-from starhold.report.plots import ACCURACIES, Plot, Plots, collect, steps_within
+from starhold.report.plots import ACCURACIES, Plot, Plots, back_to_front, collect, steps_within
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -27,12 +27,29 @@ POINTS = 2000
 """Samples of a curve, about two for each column of pixels."""
 
 
-class Sketch(NamedTuple):
+class Picture(Protocol):
     """All that the figures show, without the runs it was taken from: small, and quickly sent to another process."""
+
+    def makers(self) -> dict[str, Callable[[], Any]]:
+        """What draws each figure, by the names of their files."""
+        ...
+
+
+class Sketch(NamedTuple):
+    """A picture of attitude laws."""
 
     plots: Plots
     flights: list[Flight]
     name: str
+
+    def makers(self) -> dict[str, Callable[[], Any]]:
+        """The plots over time, and the steps to an accuracy."""
+        plots, flights, name = self
+        drawn = (plots.scalar, plots.attitude, plots.rate, plots.torque, plots.angle, *plots.further)
+        makers: dict[str, Callable[[], Any]] = {
+            plot.name: partial(over_time, plot, plots.times, plots.marks, flights, name) for plot in drawn
+        }
+        return makers | {"accuracy": partial(_accuracy, flights, name)}
 
 
 def draw(flights: Sequence[Flight], folder: Path, scenario: Scenario | None = None) -> list[Path]:
@@ -45,37 +62,38 @@ def draw(flights: Sequence[Flight], folder: Path, scenario: Scenario | None = No
 
 def sketch(flights: Sequence[Flight], scenario: Scenario | None = None) -> Sketch:
     """What `paint` needs."""
-    light = [replace(flight, recording=NOTHING) for flight in flights]
-    return Sketch(collect(flights, POINTS, scenario), light, "" if scenario is None else scenario.name)
+    return Sketch(collect(flights, POINTS, scenario), without_runs(flights), "" if scenario is None else scenario.name)
 
 
-def paint(what: Sketch, folder: Path, part: slice = slice(None)) -> list[Path]:
+def without_runs(flights: Sequence[Flight]) -> list[Flight]:
+    """The same flights without what was recorded."""
+    return [replace(flight, recording=NOTHING) for flight in flights]
+
+
+def paint(what: Picture, folder: Path, part: slice = slice(None)) -> list[Path]:
     """Write the figures, or a part of them, into `folder`, which exists, and return their paths."""
-    plots, flights, name = what
-    over_time = (plots.scalar, plots.attitude, plots.rate, plots.torque, plots.angle, *plots.further)
-    makers = {plot.name: partial(_over_time, plot, plots, flights, name) for plot in over_time}
-    makers["accuracy"] = partial(_accuracy, flights, name)
     with warnings.catch_warnings():
         # A name in a script that the font lacks is drawn as boxes; that is no news to whoever runs a simulation.
         warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
-        return [_save(make(), folder / f"{key}.png") for key, make in list(makers.items())[part]]
+        return [_save(make(), folder / f"{key}.png") for key, make in list(what.makers().items())[part]]
 
 
 def warm_up() -> None:
     """Make the plotting library load its fonts and file formats, which it does at the first figure."""
-    figure, axes = _figure(1, 1, 1.0, "", [], "", "")
+    figure, axes = blank(1, 1, 1.0, "", [], "", "")
     axes[0].set_yscale("log")
     figure.savefig(BytesIO())
 
 
-def _over_time(plot: Plot, plots: Plots, flights: Sequence[Flight], name: str) -> Any:
-    count, times = len(plot.panels), plots.times
+def over_time(plot: Plot, times: Any, marks: Sequence[float], flights: Sequence[Flight], name: str) -> Any:
+    """A figure of panels over one time axis."""
+    count = len(plot.panels)
     height = {1: 3.6, 2: 5.2}.get(count, 1.6 * (count + 1))
-    figure, axes = _figure(count, 1, height, f"{plot.title}", flights, name, plot.dashed)
+    figure, axes = blank(count, 1, height, f"{plot.title}", flights, name, plot.dashed)
     for axis, panel in zip(axes, plot.panels, strict=True):
-        for number in _back_to_front(flights, plot.name):
+        for number in back_to_front(flights, plot):
             curve = panel.curves[number]
-            width = _width(number, len(flights), plot.name)
+            width = width_of(number, len(flights), plot.chatters)
             axis.plot(times[: len(curve)], curve, color=colour(number), linewidth=width)
         if panel.log:
             axis.set_yscale("log")
@@ -84,22 +102,22 @@ def _over_time(plot: Plot, plots: Plots, flights: Sequence[Flight], name: str) -
                 axis.minorticks_off()
         for level in panel.levels:
             axis.axhline(level, color="0.35", linewidth=0.9, dashes=(5, 3))
-        for mark in plots.marks:
+        for mark in marks:
             axis.axvline(mark, color="0.2", linewidth=0.9, linestyle=":")
         if panel.span is not None:
             axis.set_ylim(*panel.span)
         axis.set_ylabel(panel.label)
         axis.set_xlim(0.0, max(float(times[-1]), 1e-9))
-    axes[-1].set_xlabel("time, s")
+    axes[-1].set_xlabel(f"time, {plot.clock}")
     return figure
 
 
 def _accuracy(flights: Sequence[Flight], name: str) -> Any:
-    figure, axes = _figure(1, 2, 3.9, "control steps needed to stay within 10⁻ᵏ", flights, name, "")
+    figure, axes = blank(1, 2, 3.9, "control steps needed to stay within 10⁻ᵏ", flights, name, "")
     for axis, (kind, label) in zip(axes, ACCURACIES, strict=True):
         for number, flight in enumerate(flights):
             steps = np.array([np.nan if s is None else s for s in steps_within(flight, kind)])
-            width = _width(number, len(flights), "accuracy")
+            width = width_of(number, len(flights))
             axis.plot(
                 list(DECADES), steps, color=colour(number), linewidth=width, marker="os^Dv<>"[number % 7], markersize=5
             )
@@ -111,28 +129,46 @@ def _accuracy(flights: Sequence[Flight], name: str) -> Any:
     return figure
 
 
-def _figure(
+def blank(
     rows: int, columns: int, height: float, title: str, flights: Sequence[Flight], name: str, dashed: str
 ) -> tuple[Any, Any]:
-    """A figure with its title, its legend and its axes.
+    """A figure with its title, its legend and its axes."""
+    figure, total, top = headed(height, title, flights, name, dashed, 0.28 if columns > 1 else 0.06)
+    grid: Any = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    figure.subplots_adjust(left=0.098, right=0.978, bottom=0.48 / total, top=top, hspace=0.09, wspace=0.14)
+    axes = grid.ravel()
+    for axis in axes:
+        plain(axis)
+    return figure, axes
 
-    They are placed by fixed distances, for layout engines draw everything twice.
+
+def plain(axis: Any) -> None:
+    """Axes with a light grid and no frame above and beside."""
+    axis.grid(True, color="0.9", linewidth=0.6)
+    axis.tick_params(labelsize=8.5)
+    for side in ("top", "right"):
+        axis.spines[side].set_visible(False)
+
+
+def headed(
+    height: float, title: str, flights: Sequence[Flight], name: str, dashed: str, gap: float
+) -> tuple[Any, float, float]:
+    """A figure with its title and its legend, how high it is (inches), and up to where axes may reach, a gap (inches) below.
+
+    All is placed by fixed distances, for layout engines draw everything twice.
     """
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
     # As many names in a line as fit.
-    per_row = max(1, min(len(flights), 104 // (7 + max((len(_short(flight.name, 40)) for flight in flights), default=0))))
+    names = [_told(flight) for flight in flights]
+    per_row = max(1, min(len(flights), 104 // (7 + max(map(len, names), default=0))))
     lines = -(-len(flights) // per_row)
-    head = 0.40 + 0.20 * lines + (0.22 if columns > 1 else 0.0)
+    head = 0.40 + 0.20 * lines + gap
     total = height + 0.20 * lines
     figure = Figure(figsize=(8.0, total), dpi=DPI)
     figure.set_layout_engine("none")
-    grid: Any = figure.subplots(rows, columns, sharex=True, squeeze=False)
-    figure.subplots_adjust(
-        left=0.098, right=0.978, bottom=0.48 / total, top=1.0 - (head + 0.06) / total, hspace=0.09, wspace=0.14
-    )
-    heading = _short(f"{name}: {title}" if name else title, 86 - len(dashed))
+    heading = shortened(f"{name}: {title}" if name else title, 86 - len(dashed))
     figure.text(0.098, 1.0 - 0.26 / total, heading, fontsize=11, fontweight="bold", parse_math=False)
     if dashed:
         figure.text(0.978, 1.0 - 0.26 / total, f"– –  {dashed}", fontsize=8.5, ha="right", color="0.3")
@@ -149,33 +185,24 @@ def _figure(
         columnspacing=1.6,
     )
     # Set afterwards, for a name may start with an underscore or hold a dollar sign, which labels read as commands.
-    for text, flight in zip(legend.get_texts(), flights, strict=True):
+    for text, told in zip(legend.get_texts(), names, strict=True):
         text.set_parse_math(False)
-        text.set_text(_short(flight.name + ("" if flight.lost is None else f" (diverged at {flight.lost:.4g} s)"), 40))
-    axes = grid.ravel()
-    for axis in axes:
-        axis.grid(True, color="0.9", linewidth=0.6)
-        axis.tick_params(labelsize=8.5)
-        for side in ("top", "right"):
-            axis.spines[side].set_visible(False)
-    return figure, axes
+        text.set_text(told)
+    return figure, total, 1.0 - head / total
 
 
-def _short(text: str, most: int) -> str:
+def _told(flight: Flight) -> str:
+    fate = "" if flight.lost is None else f" (diverged at {flight.lost_text(4)})"
+    return shortened(flight.name, (48 if fate else 40) - len(fate)) + fate
+
+
+def shortened(text: str, most: int) -> str:
     return text if len(text) <= most else f"{text[: most - 1]}…"
 
 
-def _back_to_front(flights: Sequence[Flight], name: str) -> list[int]:
-    """Torques that chatter go behind those that do not, which they would hide."""
-    numbers = list(range(len(flights)))
-    if name == "torque":
-        numbers.sort(key=lambda i: -float(flights[i].metrics.get("chatter") or 0.0))
-    return numbers
-
-
-def _width(number: int, count: int, name: str) -> float:
+def width_of(number: int, count: int, thin: bool = False) -> float:
     """Later laws get thinner lines, so that equal curves show as a line within a line."""
-    return (1.2 if name == "torque" else 2.4) - (0.5 if name == "torque" else 1.3) * number / max(count - 1, 1)
+    return (1.2 if thin else 2.4) - (0.5 if thin else 1.3) * number / max(count - 1, 1)
 
 
 def _save(figure: Any, path: Path) -> Path:

@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from starhold.analysis.ranking import ATTITUDE, Board
+
 if TYPE_CHECKING:
     import xarray as xr
 
     from starhold.certification.certificate import Certificate
+    from starhold.laws.interface import Field
     from starhold.simulation.lane import Recording
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8A8A8A")
@@ -30,6 +33,8 @@ class Flight:
     gains: dict[str, str]
     certificates: tuple[Certificate, ...] = ()
     """What is proved of the law on this spacecraft: as it starts, and after faults."""
+    board: Board = ATTITUDE
+    """How the metrics are told and ranked."""
 
     @cached_property
     def run(self) -> xr.Dataset:
@@ -40,6 +45,10 @@ class Flight:
     def lost(self) -> float | None:
         """When the motion was lost (s), None for a run that did not diverge."""
         return self.metrics.get("diverged_at")
+
+    def lost_text(self, digits: int = 6) -> str:
+        """The same for reading."""
+        return "" if self.lost is None else f"{self.lost / self.board.tick:.{digits}g} {self.board.clock}"
 
 
 def colour(number: int) -> str:
@@ -63,3 +72,11 @@ def number_text(value: Any, digits: int = 6) -> str:
 
 def _row_text(row: Any, digits: int) -> str:
     return f"[{', '.join(f'{v:.{digits}g}' for v in row)}]" if np.ndim(row) else f"{row:.{digits}g}"
+
+
+def gain_text(item: Field, value: Any) -> str:
+    """The value of a gain with its unit."""
+    if item.gain.choices:
+        return item.gain.choices[value]
+    unit = "" if item.gain.unit == "1" else f" {item.gain.unit}"
+    return f"{number_text(value)}{unit}"

@@ -8,13 +8,11 @@ import pickle
 import signal
 import subprocess
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from starhold.report.flight import Flight
-    from starhold.scenario.reading import Scenario
+    from starhold.report.figures import Picture
 
 
 class Painter:
@@ -33,12 +31,10 @@ class Painter:
             self._process.kill()
         self._process.communicate()
 
-    def start(self, flights: Sequence[Flight], folder: Path, scenario: Scenario) -> None:
+    def start(self, picture: Picture, folder: Path) -> None:
         """Let it draw into `folder`, which exists."""
-        from starhold.report.figures import sketch
-
         assert self._process.stdin is not None
-        pickle.dump((sketch(flights, scenario), folder.absolute()), self._process.stdin)
+        pickle.dump((picture, folder.absolute()), self._process.stdin)
         self._process.stdin.flush()
 
     def finish(self) -> None:

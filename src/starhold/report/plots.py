@@ -55,6 +55,10 @@ class Plot:
     title: str
     panels: list[Panel]
     dashed: str = ""
+    chatters: bool = False
+    """Whether curves may jump from sample to sample; their lines are thin, and the wildest behind."""
+    clock: str = "s"
+    """The unit of the times."""
 
 
 @dataclass(frozen=True)
@@ -94,8 +98,8 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario | None = 
         thin_times(longest, factor),
         Plot("scalar", "scalar part of the error quaternion", [scalar]),
         Plot("attitude", "vector part of the error quaternion", vector),
-        Plot("rate", "angular velocity relative to the target", [_sound(panel, flights) for panel in rates]),
-        Plot("torque", "torque applied", torques, dashed),
+        Plot("rate", "angular velocity relative to the target", [sound(panel, flights) for panel in rates]),
+        Plot("torque", "torque applied", torques, dashed, True),
         _angle(flights, factor, scenario),
         (*_transient(flights, factor, scenario), *_wheels(flights, factor, scenario)),
         () if scenario is None else scenario.fault_times,
@@ -139,6 +143,14 @@ def steps_within(flight: Flight, kind: str) -> list[int | None]:
     return [flight.metrics.get(f"{kind}iterations_1e-{k}") for k in DECADES]
 
 
+def back_to_front(flights: Sequence[Flight], plot: Plot) -> list[int]:
+    """Curves that chatter go behind those that do not, which they would hide."""
+    numbers = list(range(len(flights)))
+    if plot.chatters:
+        numbers.sort(key=lambda i: -float(flights[i].metrics.get("chatter") or 0.0))
+    return numbers
+
+
 def _angle(flights: Sequence[Flight], factor: int, scenario: Scenario | None) -> Plot:
     degrees = 180.0 / np.pi
     angles = [thin(error_angle(flight.recording["attitude_error"]) * degrees, factor) for flight in flights]
@@ -146,7 +158,7 @@ def _angle(flights: Sequence[Flight], factor: int, scenario: Scenario | None) ->
     settling = None if scenario is None else scenario.table.settling
     within = () if settling is None else (settling.attitude_tolerance * degrees,)
     slow = () if settling is None else (settling.rate_tolerance * degrees,)
-    panels = [_positive("angle, deg", angles, within), _sound(_positive("rate, deg/s", speeds, slow), flights)]
+    panels = [positive("angle, deg", angles, within), sound(positive("rate, deg/s", speeds, slow), flights)]
     return Plot("angle", "error angle and relative rate", panels, "tolerance" if settling else "")
 
 
@@ -158,22 +170,22 @@ def _transient(flights: Sequence[Flight], factor: int, scenario: Scenario | None
     rates = [thin(np.linalg.norm(flight.recording["rate"], axis=1) * degrees, factor) for flight in flights]
     turned = [acceleration(flight.recording) * degrees for flight in flights]
     fastest = table.rate_limit * degrees
-    panels = [Panel("norm, deg/s", rates, False, _near((fastest,), rates))]
+    panels = [Panel("norm, deg/s", rates, False, near((fastest,), rates))]
     for i, axis in enumerate("xyz"):
         curves = [thin(own[:, i], factor) for own in turned]
         limit = table.acceleration_limit * degrees
-        panels.append(Panel(f"{axis}, deg/s²", curves, False, _near((-limit, limit), curves)))
+        panels.append(Panel(f"{axis}, deg/s²", curves, False, near((-limit, limit), curves)))
     return (
         Plot(
             "transient",
             "norm of the body's rate, and the rate's derivative",
-            [_sound(panel, flights) for panel in panels],
+            [sound(panel, flights) for panel in panels],
             "limit",
         ),
     )
 
 
-def _near(levels: tuple[float, ...], curves: list[Curve]) -> tuple[float, ...]:
+def near(levels: tuple[float, ...], curves: list[Curve]) -> tuple[float, ...]:
     """Levels but those that would flatten the curves."""
     peak = max((float(np.abs(curve).max(initial=0.0)) for curve in curves), default=0.0)
     return levels if max(levels) <= OFF_SCALE * peak else ()
@@ -197,14 +209,14 @@ def _wheels(flights: Sequence[Flight], factor: int, scenario: Scenario | None) -
     return tuple(plots)
 
 
-def _positive(label: str, curves: list[Curve], levels: tuple[float, ...]) -> Panel:
+def positive(label: str, curves: list[Curve], levels: tuple[float, ...]) -> Panel:
     """A logarithmic panel; zeros have no place on it and leave gaps, and a panel of zeros is linear."""
     log = any((curve > 0.0).any() for curve in curves)
     shown = [np.where(curve > 0.0, curve, np.nan) for curve in curves] if log else curves
     return Panel(label, shown, log, levels)
 
 
-def _sound(panel: Panel, flights: Sequence[Flight]) -> Panel:
+def sound(panel: Panel, flights: Sequence[Flight]) -> Panel:
     """The panel scaled by the runs that did not diverge, lest the lost ones flatten the others."""
     kept = [c for c, flight in zip(panel.curves, flights, strict=True) if flight.lost is None and np.isfinite(c).any()]
     if not kept or all(flight.lost is None for flight in flights):

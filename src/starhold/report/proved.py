@@ -27,6 +27,8 @@ SYMBOLS = {
     "c2": ("c₂", ""),
     "g": ("g", ""),
     "m": ("m", ""),
+    "mu": ("μ in (σ² + μx²)/2, σ = x + ẋ/s", ""),
+    "reach": ("|x|, at most", ""),
     "epsilon": ("ε in V + ε q·Jω", ""),
     "rho": ("share of V that the added term stays within", ""),
     "rate_bound": ("rate up to which V is shown to fall", "rad/s"),

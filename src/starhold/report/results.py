@@ -11,6 +11,7 @@ import starhold
 from starhold.certification.certificate import FILE as CERTIFICATES
 from starhold.errors import InputError
 from starhold.report.files import whole
+from starhold.scenario.opening import AnyScenario
 from starhold.scenario.reading import Scenario
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 SUMMARY = "summary.json"
 FAILURES = ("failures.csv", "failures.png")
 ROOTS = ("modal-roots.csv", "modal-roots.png")
-MARKS = (SUMMARY, "run.nc", "report.html", CERTIFICATES, *FAILURES, *ROOTS)
+MARKS = (SUMMARY, "run.nc", "report.html", CERTIFICATES, "invariant.png", *FAILURES, *ROOTS)
 """A folder with one of these holds results."""
 
 
@@ -53,16 +54,17 @@ def _clear(folder: Path) -> None:
         (folder / mark).unlink(missing_ok=True)
 
 
-def write_run(run: xr.Dataset, scenario: Scenario, path: Path) -> None:
+def write_run(run: xr.Dataset, scenario: AnyScenario, path: Path) -> None:
     """A run as netCDF-4, with the scenario's text, the version and the seed among its attributes."""
-    seed = scenario.table.simulation.seed
-    attrs = {"scenario": scenario.text, "starhold_version": starhold.__version__, "seed": seed, **run.attrs}
+    attrs = {"scenario": scenario.text, "starhold_version": starhold.__version__, **run.attrs}
+    if isinstance(scenario, Scenario):
+        attrs["seed"] = scenario.table.simulation.seed
     path.parent.mkdir(exist_ok=True)
     with whole(path) as hidden:
         run.assign_attrs(attrs).to_netcdf(hidden, engine="h5netcdf")
 
 
-def write_summary(scenario: Scenario, results: dict[str, dict[str, Any]], path: Path) -> None:
+def write_summary(scenario: AnyScenario, results: dict[str, dict[str, Any]], path: Path) -> None:
     """The metrics of each law, SI units, as JSON; a value that does not exist is null."""
     content = {"scenario": scenario.name, "starhold_version": starhold.__version__, "laws": results}
     with whole(path) as hidden:

@@ -10,7 +10,7 @@ import numpy as np
 
 from starhold.errors import InputError
 from starhold.laws.interface import Field
-from starhold.scenario.reading import LawEntry, Scenario
+from starhold.scenario.opening import AnyScenario
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Design:
     figures: dict[str, Any]
 
 
-def design(scenario: Scenario, law: str | None = None) -> list[Design]:
+def design(scenario: AnyScenario, law: str | None = None) -> list[Design]:
     """Every law of a scenario that has a `form`, or the one of this name. InputError where there is none, or where its
     figures cannot be computed."""
     entries = scenario.laws if law is None else (scenario.pick(law),)
@@ -38,7 +38,7 @@ def design(scenario: Scenario, law: str | None = None) -> list[Design]:
     return designed
 
 
-def _design(scenario: Scenario, entry: LawEntry, form: str) -> Design:
+def _design(scenario: AnyScenario, entry: Any, form: str) -> Design:
     try:
         with np.errstate(all="ignore"):
             figures = dict(entry.law.explain(scenario.craft, entry.spec))
@@ -56,7 +56,7 @@ def _named(items: Iterable[Field], values: Iterable[Any]) -> dict[str, Any]:
     }
 
 
-def map_inputs(scenario: Scenario, law: str | None = None) -> tuple[Any, float, float, float]:
+def map_inputs(scenario: AnyScenario, law: str | None = None) -> tuple[Any, float, float, float]:
     """What a map of the degree of stability is drawn from: inertia ratios, scaled angle and rate, budget; of the first law
     that is designed for it. InputError where there is none."""
     entries = scenario.laws if law is None else (scenario.pick(law),)

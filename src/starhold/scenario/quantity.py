@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
-from typing import Any, cast
+from typing import Any, Literal, cast
 
-from pydantic import BeforeValidator, WithJsonSchema
+from pydantic import BeforeValidator, ValidationInfo, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from starhold.laws.interface import Gain
@@ -25,12 +25,27 @@ def quantity_or(word: str, meaning: float, gain: Gain) -> tuple[BeforeValidator,
     return BeforeValidator(lambda value: meaning if value == word else read(value)), WithJsonSchema(described)
 
 
-def reader(gain: Gain) -> Callable[[Any], Any]:
-    """A function from what the file holds to SI numbers of the declared shape and bounds."""
+def scaled(
+    kind: Literal["length", "velocity", "acceleration", "time"], gain: Gain
+) -> tuple[BeforeValidator, WithJsonSchema]:
+    """The same for scaled numbers: plain ones are, strings with the gain's unit become so. What one is worth in SI is told
+    by the validation's context, under the name of its kind; the bounds are of scaled numbers."""
+    read, schema = reader(gain), _schema(gain)
+    schema["description"] = f"{gain.text} (scaled, or with a unit such as {gain.unit})"
 
-    def read(value: Any) -> Any:
+    def to_scaled(value: Any, info: ValidationInfo) -> Any:
+        return read(value, getattr(info.context, kind))
+
+    return BeforeValidator(to_scaled), WithJsonSchema(schema)
+
+
+def reader(gain: Gain) -> Callable[..., Any]:
+    """A function from what the file holds, and what a unit is worth in SI if it is not one, to numbers of the declared shape
+    and bounds."""
+
+    def read(value: Any, worth: float = 1.0) -> Any:
         try:
-            return gain.check(value if gain.choices else _to_si(value, gain))
+            return gain.check(value if gain.choices else _to_numbers(value, gain, worth))
         except (ValueError, TypeError) as error:
             raise PydanticCustomError("quantity", "{reason}", {"reason": _plain(error)}) from None
 
@@ -41,13 +56,13 @@ def _plain(error: Exception) -> str:
     return " ".join(str(error).split())
 
 
-def _to_si(value: Any, gain: Gain) -> Any:
+def _to_numbers(value: Any, gain: Gain, worth: float) -> Any:
     # Tuples are defaults.
     if isinstance(value, (list, tuple)):
-        return [_to_si(item, gain) for item in cast(list[Any], value)]
+        return [_to_numbers(item, gain, worth) for item in cast(list[Any], value)]
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ValueError(f"{gain.describe()} in {_shown(gain.unit)}")
-    return _parse(value, gain.unit) if isinstance(value, str) else value
+    return _parse(value, gain.unit) / worth if isinstance(value, str) else value
 
 
 def _parse(text: str, unit: str) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from functools import cache
 from typing import Annotated, Any, Literal
 
@@ -288,8 +289,8 @@ class ScenarioTable(Table):
 
 
 @cache
-def law_model(law: Law, form: str | None = None) -> type[LawTable]:
-    """The table of a law, or of one of its design forms."""
+def law_model(law: Law, form: str | None = None, base: type[Any] = LawTable) -> type[Any]:
+    """The table of a law, or of one of its design forms; `base` has what tables of such laws share."""
     entries: dict[str, Any] = {"type": (Literal[law.name], law.name)}
     if form is not None:
         entries["form"] = (Literal[form], form)
@@ -299,18 +300,18 @@ def law_model(law: Law, form: str | None = None) -> type[LawTable]:
         kind = Annotated[Any, *quantity(item.gain), Field(validate_default=written is not None)]
         entries[item.name] = (kind, ... if item.required else written)
     title = law.name.replace("-", " ").title().replace(" ", "") + (form or "").title()
-    return create_model(title, __base__=LawTable, __doc__=law.card.summary, **entries)
+    return create_model(title, __base__=base, __doc__=law.card.summary, **entries)
 
 
-def law_models(law: Law) -> list[type[LawTable]]:
-    """All tables of a law: its gains, and each design form."""
-    return [law_model(law), *(law_model(law, form) for form in law.forms)]
+def attitude_schema() -> dict[str, Any]:
+    """A JSON Schema of scenarios in which a body turns."""
+    return file_schema(ScenarioTable, catalogue().values(), LawTable)
 
 
-def json_schema() -> dict[str, Any]:
-    """A JSON Schema of scenario files, for completion and checks in editors."""
-    models = [model for law in catalogue().values() for model in law_models(law)]
-    schema = ScenarioTable.model_json_schema()
+def file_schema(whole: type[Table], laws: Iterable[Law], base: type[Any]) -> dict[str, Any]:
+    """A JSON Schema of a kind of scenario file: its tables, and those of its laws, gains and design forms."""
+    models = [law_model(law, form, base) for law in laws for form in (None, *law.forms)]
+    schema = whole.model_json_schema()
     tables: list[dict[str, Any]] = []
     for model in models:
         table = model.model_json_schema()
@@ -320,5 +321,4 @@ def json_schema() -> dict[str, Any]:
         tables.append(table)
     schema["properties"]["law"] = {"type": "array", "minItems": 1, "items": {"anyOf": tables}}
     schema["required"].append("law")
-    schema["title"] = "starhold scenario"
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+    return schema

@@ -7,7 +7,7 @@ square root, which polynomials have not: there the equations are read in symbols
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
@@ -19,9 +19,9 @@ from starhold.algebra.symbolic import sympy
 from starhold.algebra.vector import add, subtract
 from starhold.certification.checker.exact import ZERO, Dual, demand, dual, floating, rational, up
 from starhold.certification.checker.subject import named, variables
-from starhold.laws.interface import NoMemory
+from starhold.certification.checker.symbols import expanded, in_symbols, positive
 from starhold.laws.station.interface import SeenPoint, StationLaw
-from starhold.models.libration import Libration, linear, nonlinear
+from starhold.models.libration import Libration, linear
 
 TAKEN = ("t2", "t3")
 
@@ -157,8 +157,8 @@ def _flies(law: Any, relay: bool, layered: bool, full: bool) -> bool:
         return _agrees(law, None, None, full)
     if not layered:
         # At f2 = f3 = 0 a relay has no direction.
-        return _agrees(law, _positive("n"), sympy.Integer(0), full)
-    small, more, least = _positive("m"), _positive("p"), sympy.Symbol("n", nonnegative=True)
+        return _agrees(law, positive("n"), sympy.Integer(0), full)
+    small, more, least = positive("m"), positive("p"), sympy.Symbol("n", nonnegative=True)
     # |(f2, f3)| beyond the layer, as large, and within.
     return all(_agrees(law, n, layer, full) for n, layer in ((small + more, small), (small, small), (least, least + more)))
 
@@ -167,36 +167,17 @@ def _agrees(law: Any, size: Any, layer: Any, full: bool) -> bool:
     """The same where |(f2, f3)| is `size` and the layer is `layer`, expressions in symbols of known sign; without a size
     for smooth feedback, whatever the layer."""
     relay = size is not None
-    # Gains and plant have a number of the same name.
-    numbers = {name: _real(f"gain {name}") for name in law.Gains._fields}
     told = {"feedback": int(relay), "model": int(full), **({"layer": layer} if relay else {})}
-    gains: Any = law.Gains(**numbers | told)
-    plant: Any = Libration(*(_real(f"plant {name}") for name in Libration._fields))
-    position, velocity = (tuple(map(_real, named(letter))) for letter in "xv")
-    seen: Any = SeenPoint(position, velocity, _real("period"), _real("limit"))  # pyright: ignore
-    wrong = (velocity[1] + gains.rate * position[2], velocity[2] - gains.rate * position[1])
+    loop = in_symbols(law, told)
+    gains, seen, velocity = loop.gains, loop.seen, loop.seen.velocity
+    wrong = (velocity[1] + gains.rate * seen.position[2], velocity[2] - gains.rate * seen.position[1])
     share = gains.k if not relay else gains.k / (size if layer == 0 or (size - layer).is_positive else layer)
-    model: Callable[..., Any] = nonlinear if full else linear
-    flown = add(model(position, velocity, plant), law.control(seen, gains, plant, NoMemory())[0])
-    meant = add(linear(position, velocity, plant), law.neutral(seen, gains, plant))  # pyright: ignore
+    flown, meant = loop.flown(law, full), add(loop.natural, law.neutral(seen, gains, loop.plant))
     damping: Sequence[Any] = (sympy.Integer(0), share * wrong[0], share * wrong[1])
     for have, want, taken in zip(flown, meant, damping, strict=True):
         left = have - want + taken
         if relay:
             left = left.subs(wrong[0] ** 2 + wrong[1] ** 2, size**2)
-        if _expanded(left) != 0:
+        if expanded(left) != 0:
             return False
     return True
-
-
-def _expanded(expression: Any) -> Any:
-    """The expression multiplied out, with every float of the equations at its exact value."""
-    return sympy.expand(expression.xreplace({x: sympy.Rational(x) for x in expression.atoms(sympy.Float)}))
-
-
-def _real(name: str) -> Any:
-    return sympy.Symbol(name, real=True)
-
-
-def _positive(name: str) -> Any:
-    return sympy.Symbol(name, positive=True)

@@ -171,6 +171,8 @@ NUMBERS: dict[str, dict[str, Test]] = {
     "region": dict.fromkeys(("level", "turn", "rate"), _number),
     "circle": _CIRCLE,
     "control-limit": {**_CIRCLE, "limit": _number, "kind": _one("axis", "norm")},
+    "rest": {},
+    "saturated-axis": dict.fromkeys(("limit", "width", "reach", "boundary"), _number),
 }
 _PROOF: dict[str, Test] = {"stiffness": _MAYBE, "epsilon": _number, "rho": _number}
 WITNESS: dict[str, dict[str, Test]] = {
@@ -184,4 +186,6 @@ WITNESS: dict[str, dict[str, Test]] = {
     "region": dict.fromkeys(("p", "c2", "g", "m"), _number),
     "circle": {},
     "control-limit": {},
+    "rest": {},
+    "saturated-axis": {"mu": _number},
 }

@@ -15,12 +15,18 @@ from starhold.certification.checker.circle import Circle
 from starhold.certification.checker.exact import ZERO, CheckError, Obligation, demand, rational
 from starhold.certification.checker.polar import keeps_within
 from starhold.certification.checker.region import BALLS, EXACT, LASALLE, SIGN, Numbers
+from starhold.certification.checker.rest import LimitedAxis, Rest
 from starhold.laws.station.interface import StationLaw, station_laws
 from starhold.models.libration import Libration
 
 CLOSE = fmpq(1, 10**9)
 """How far the numbers of a libration point may be from what they tell of one another, as a share of their size, and those
 of a refutation from what is found."""
+
+HELD = "held at rest along Y and Z, where no Coriolis acceleration acts along X"
+"""All the time, and not at the start alone: x' makes a Coriolis acceleration along Y that a limited control cannot always
+undo, and then y' one along X. What holds them is not asked."""
+CLEAR = "never at the centre of one of the two bodies"
 
 
 @dataclass(frozen=True)
@@ -39,6 +45,12 @@ class Station:
         """The loop of a law that makes a circle attractive."""
         demand(self.law.name == "l2-circle", f"the law {self.law.name} makes no circle attractive")
         return Circle(self.law, self.gains, self.plant, self.full)
+
+    @property
+    def rest(self) -> Rest:
+        """The loop of a law that comes to rest."""
+        demand(self.law.name == "l2-rest", f"the law {self.law.name} does not come to rest")
+        return Rest(self.law, self.gains, self.plant, self.full)
 
 
 def read_station(given: Mapping[str, Any]) -> Station:
@@ -98,10 +110,12 @@ def _near(one: Any, other: Any) -> bool:
 
 @dataclass(frozen=True)
 class StationKind:
-    """A kind of claim: what it assumes beside what all do, and from subject and claim what has to be shown."""
+    """A kind of claim: what it assumes beside what all do, and from subject and claim what has to be shown. `anywhere`: it
+    speaks of every place, so that in the full problem the bodies must be left out."""
 
     beside: str
     proofs: Callable[[Station, Numbers], list[Obligation]]
+    anywhere: bool = False
 
     def assumptions(self, subject: Station) -> list[str]:
         """What a claim about this subject assumes."""
@@ -112,6 +126,7 @@ class StationKind:
             "position and velocity exactly known",
             "control applied continuously, without lag",
             self.beside,
+            *([CLEAR] if self.anywhere and subject.full else []),
         ]
 
 
@@ -155,6 +170,28 @@ def control_limit(subject: Station, claim: Numbers) -> list[Obligation]:
     ]
 
 
+def rests(subject: Station, claim: Numbers) -> list[Obligation]:
+    """Every motion comes to rest where the law says."""
+    rest = subject.rest
+    return [("form", EXACT, rest.form), ("each axis returns", SIGN, rest.returns)]
+
+
+def saturated_axis(subject: Station, claim: Numbers) -> list[Obligation]:
+    """With S = x + x'/s, motions from {|S| <= width, |x| <= reach} stay there and end at x = x' = 0, though the control
+    along X is limited; from |S| >= boundary none does, wherever it is."""
+    limit, width, reach, boundary = (rational(claim["numbers"][key]) for key in ("limit", "width", "reach", "boundary"))
+    mu = rational(claim["witness"]["mu"])
+    demand(subject.limit == "axis", "the control along X is not limited by itself")
+    # One side needs that the loop's limit is not lower, the other that it is not higher.
+    demand(limit == subject.control_limit, "the limit is not the loop's")
+    axis = LimitedAxis.of(subject.rest, limit)
+    return [
+        ("stays", BALLS, partial(axis.stays, width, reach)),
+        ("strict", BALLS, partial(axis.strict, width, reach, mu)),
+        ("nothing returns from beyond", BALLS, partial(axis.beyond, boundary)),
+    ]
+
+
 def _same_limit(subject: Station, numbers: Numbers) -> None:
     demand(numbers["kind"] == subject.limit != "none", "the limit is of another kind than the loop's")
     limit = rational(numbers["limit"])
@@ -176,6 +213,8 @@ def _contents(circle: Circle, numbers: Numbers) -> str:
 STATION_CLAIMS: dict[str, StationKind] = {
     "circle": StationKind("control not limited", attracts),
     "control-limit": StationKind("starts in the plane x = 0 without a rate along X", control_limit),
+    "rest": StationKind("control not limited", rests, anywhere=True),
+    "saturated-axis": StationKind(HELD, saturated_axis),
 }
 
 
@@ -184,15 +223,18 @@ STATION_CLAIMS: dict[str, StationKind] = {
 
 def station_refutation(subject: Station, claim: Numbers, obligation: Mapping[str, Any]) -> str:
     """What the evidence of an obligation shows; a CheckError where it does not refute."""
-    circle, name, evidence = subject.circle, obligation["name"], obligation["evidence"]
-    refuting = {
-        ("circle", "only the circle"): partial(_holds_another, circle, evidence),
-        ("circle", "x returns"): partial(_leaves, circle, evidence),
-        ("control-limit", "control"): partial(_needs_more, subject, claim["numbers"], evidence),
-    }.get((claim["kind"], name))
-    if refuting is None:
-        raise CheckError(f"nothing refutes {name}")
-    return refuting()
+    name, evidence = obligation["name"], obligation["evidence"]
+    match claim["kind"], name:
+        case "circle", "only the circle":
+            return _holds_another(subject.circle, evidence)
+        case "circle", "x returns":
+            return _leaves(subject.circle, evidence)
+        case "control-limit", "control":
+            return _needs_more(subject, claim["numbers"], evidence)
+        case "rest", "each axis returns":
+            return _does_not_rest(subject.rest, evidence)
+        case _:
+            raise CheckError(f"nothing refutes {name}")
 
 
 def _holds_another(circle: Circle, evidence: Numbers) -> str:
@@ -234,3 +276,12 @@ def _needs_more(subject: Station, numbers: Numbers, evidence: Numbers) -> str:
     told = rational(evidence["control"])
     demand(_near(largest, told**2), "the circle needs another control than told")
     return "the circle itself needs more than the limit"
+
+
+def _does_not_rest(rest: Rest, evidence: Numbers) -> str:
+    """An axis r^2 + c r + k with c or k not positive has a root that is not on the left, and a motion that does not decay,
+    as near the rest as one likes; this needs no state to show it."""
+    demand(not evidence, "the evidence is not that of an axis")
+    rest.form()
+    demand(not all(rest.stable), "every axis returns")
+    return "an axis does not return"

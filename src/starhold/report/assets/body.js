@@ -1,22 +1,9 @@
 // The turning body, one view for each law: hub, panels and axes as polygons drawn from back to front.
 "use strict";
 
-const scene = report.scene;
 const views = [...document.querySelectorAll(".view")].map((box, law) => ({
   canvas: box.querySelector("canvas"), angle: box.querySelector("output"), frames: scene.attitudes[law],
 }));
-const slider = document.getElementById("moment");
-const clock = document.getElementById("clock");
-const button = document.getElementById("play");
-const last = scene.times.length - 1;
-// Where the reader stands, as turns about the target's third axis and above its horizon; dragging changes both.
-const eye = { around: -0.9, above: 0.42 };
-let place = 0;
-let playing = false;
-
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-const plus = (a, b, s = 1) => [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]];
 
 // q v q*: from body to target components.
 function turn(q, v) {
@@ -35,11 +22,6 @@ function between(frames, where) {
   const q = a.map((c, i) => w * c + s * b[i]);
   const size = Math.hypot(...q);
   return q.map((c) => c / size);
-}
-
-function timeAt(where) {
-  const k = Math.min(Math.floor(where), last - 1);
-  return scene.times[k] + (where - k) * (scene.times[k + 1] - scene.times[k]);
 }
 
 // Corners of a box between two opposite corners, in principal axes, as six faces seen from outside.
@@ -91,21 +73,13 @@ function shade(colour, light) {
 }
 
 function paint(view, where) {
-  const { canvas, frames } = view;
-  const ratio = window.devicePixelRatio || 1;
-  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-  if (canvas.width !== Math.round(width * ratio)) canvas.width = Math.round(width * ratio);
-  if (canvas.height !== Math.round(height * ratio)) canvas.height = Math.round(height * ratio);
-  const pen = canvas.getContext("2d");
-  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-  pen.clearRect(0, 0, width, height);
+  const { frames } = view;
+  const { pen, width, height } = cleared(view.canvas);
   const q = between(frames, where);
   view.angle.textContent = `${(2 * Math.atan2(Math.hypot(q[1], q[2], q[3]), Math.abs(q[0])) * 180 / Math.PI).toPrecision(3)}°`
     + (where > frames.length - 1 ? " diverged" : "");
 
-  const away = [Math.cos(eye.above) * Math.cos(eye.around), Math.cos(eye.above) * Math.sin(eye.around), Math.sin(eye.above)];
-  const right = [-Math.sin(eye.around), Math.cos(eye.around), 0];
-  const up = cross(away, right);
+  const { away, right, up } = stance();
   const lamp = plus(plus(away, up, 0.6), right, -0.5).map((c) => c / 1.27);
   const scale = Math.min(width, 0.95 * height) * 0.385;
   // Below the middle, for the target's axes have only upper halves.
@@ -198,43 +172,4 @@ function reach(i) {
   return Math.min(...e.map((c, k) => scene.size[k] / Math.max(Math.abs(c), 1e-9)));
 }
 
-function show(where) {
-  place = Math.max(0, Math.min(last, where));
-  slider.value = place;
-  const text = `${timeAt(place).toFixed(scene.digits)} s`;
-  clock.textContent = text;
-  slider.setAttribute("aria-valuetext", text);
-  views.forEach((view) => paint(view, place));
-}
-
-function play(on) {
-  if (on && !playing && place >= last) place = 0;
-  playing = on;
-  button.textContent = on ? "Pause" : "Play";
-  if (!on) return;
-  let before = null;
-  const tick = (now) => {
-    if (!playing) return;
-    if (before !== null) show(place + (now - before) * last / (scene.seconds * 1000));
-    before = now;
-    if (place >= last) play(false);
-    else requestAnimationFrame(tick);
-  };
-  requestAnimationFrame(tick);
-}
-
-slider.max = last;
-slider.addEventListener("input", () => { play(false); show(Number(slider.value)); });
-button.addEventListener("click", () => play(!playing));
-for (const { canvas } of views) {
-  canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
-  canvas.addEventListener("pointermove", (event) => {
-    if (!canvas.hasPointerCapture(event.pointerId)) return;
-    eye.around -= 0.01 * event.movementX;
-    eye.above = Math.max(-1.5, Math.min(1.5, eye.above + 0.01 * event.movementY));
-    show(place);
-  });
-}
-new ResizeObserver(() => show(place)).observe(views[0].canvas);
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => show(place));
-show(Number(slider.value));
+startShow(views, paint, (time) => `${time.toFixed(scene.digits)} s`);

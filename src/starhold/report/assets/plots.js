@@ -78,7 +78,7 @@ function draw(plot) {
 }
 
 function drawAll() {
-  report.plots.forEach(draw);
+  report.plots.filter((plot) => !plot.planes).forEach(draw);
 }
 
 drawAll();

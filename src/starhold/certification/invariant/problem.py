@@ -1,0 +1,269 @@
+"""A system and claims about it, from a TOML file or from Python, and the certificate of all of them."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import keyword
+import math
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from importlib import resources
+from pathlib import Path
+from typing import Any, cast
+
+from starhold.algebra.polynomial import Polynomial, exact, pieces
+from starhold.certification.certificate import Certificate
+from starhold.certification.certificate import write as write_certificates
+from starhold.certification.invariant.system import System
+from starhold.certification.invariant.text import RESERVED, ExpressionError, read
+from starhold.certification.invariant.theorems import THEOREMS, Wanted, prove
+from starhold.errors import InputError
+
+FORMAT = "starhold invariant certificate 1"
+MOST = 6
+"""Variables and parameters together: beyond, branch and bound would not end."""
+_KEYS = ("name", "description", "variables", "parameters", "define", "rates", "box", "claim")
+_CLAIM = ("name", "theorem", "V", "box", "rest", "level", "escape", "squares", "known", "orbit")
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A system with what is to be shown of it. `written`: what the certificate says the system is; `orbits`: for each claim
+    a state whose motion backwards in time goes to the border of the true region, or None."""
+
+    name: str
+    system: System
+    claims: tuple[Wanted, ...]
+    description: str = ""
+    written: dict[str, Any] = field(default_factory=dict[str, Any])
+    orbits: tuple[tuple[float, ...] | None, ...] = ()
+
+    def orbit(self, place: int) -> tuple[float, ...] | None:
+        """The state on the border of the true region that a claim comes with."""
+        return self.orbits[place] if place < len(self.orbits) else None
+
+
+def certify(problem: Problem) -> Certificate:
+    """What is shown of each claim."""
+    system = problem.system
+    rates = zip(system.variables, system.rates, strict=True)
+    written = problem.written or {"rates": {name: [str(piece.value) for piece in pieces(rate)] for name, rate in rates}}
+    subject = {"variables": list(system.variables), "parameters": list(system.parameters), **written}
+    return Certificate(problem.name, subject, tuple(prove(system, wanted) for wanted in problem.claims))
+
+
+def write(certificate: Certificate, path: Path) -> None:
+    """The certificate as a JSON file, in the form that all certificates have."""
+    write_certificates([certificate], certificate.name, path)
+    content = json.loads(path.read_text(encoding="utf-8"))
+    content["format"] = FORMAT
+    path.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def builtin_names() -> list[str]:
+    """The problems that come with starhold."""
+    folder = resources.files("starhold.certification.invariant") / "builtin"
+    return sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
+
+
+def load(source: str | Path) -> Problem:
+    """The problem in a file, or the built-in one of that name. InputError says what is wrong with it."""
+    path = Path(source)
+    if not path.exists() and str(source) in builtin_names():
+        file = resources.files("starhold.certification.invariant") / "builtin" / f"{source}.toml"
+        return parse(file.read_text(encoding="utf-8"), str(source))
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        known = _nearest(str(source), builtin_names())
+        raise InputError(str(source), "", "no such file", f"a file with a system, or a built-in one: {known}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or type(error).__name__
+        raise InputError(str(source), "", str(reason), "a readable text file") from None
+    return parse(text, str(source))
+
+
+def parse(text: str, where: str) -> Problem:
+    """The problem of a TOML text; `where` names it in errors."""
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(where, "", f"not TOML: {error}", "a TOML file") from None
+    return _File(where, data).problem()
+
+
+class _File:
+    """Reads the tables of one file."""
+
+    def __init__(self, where: str, data: dict[str, Any]) -> None:
+        self.where, self.data = where, data
+        self.names: dict[str, Any] = {}
+        self.variables: tuple[str, ...] = ()
+        self.parameters: dict[str, tuple[float, float]] = {}
+
+    def problem(self) -> Problem:
+        """All of it."""
+        self._known(self.data, _KEYS, "")
+        self._variables()
+        for name, value in self._table(self.data.get("define", {}), "define").items():
+            self._fresh(name, f"define.{name}")
+            self.names[name] = self._expression(value, f"define.{name}")
+        rates = self._table(self._required(self.data, "rates", ""), "rates")
+        self._exactly(rates, self.variables, "rates")
+        read_rates = tuple(self._expression(rates[name], f"rates.{name}") for name in self.variables)
+        system = System(self.variables, read_rates, tuple(self.parameters))
+        claims = self._required(self.data, "claim", "")
+        if not isinstance(claims, list) or not claims:
+            raise InputError(self.where, "claim", _show(claims), "at least one [[claim]] table")
+        tables = [self._table(item, f"claim[{k}]") for k, item in enumerate(cast(list[Any], claims), 1)]
+        wanted = [self._claim(table, f"claim[{k}]") for k, table in enumerate(tables, 1)]
+        written: dict[str, Any] = {name: self.data[name] for name in ("define", "rates") if name in self.data}
+        written["V"] = [table["V"] for table in tables]
+        return Problem(
+            self._text(self.data, "name", "", Path(self.where).stem),
+            system,
+            tuple(item[0] for item in wanted),
+            self._text(self.data, "description", "", ""),
+            written,
+            tuple(item[1] for item in wanted),
+        )
+
+    def _variables(self) -> None:
+        names = self._required(self.data, "variables", "")
+        allowed = f"a list of 1 to {MOST} names"
+        if not isinstance(names, list) or not names or not all(isinstance(n, str) for n in cast(list[Any], names)):
+            raise InputError(self.where, "variables", _show(names), allowed)
+        parameters = self._table(self.data.get("parameters", {}), "parameters")
+        for name in (*cast(list[str], names), *parameters):
+            self._fresh(name, "parameters" if name in parameters else "variables")
+            self.names[name] = Polynomial.variable(name)
+        if len(self.names) > MOST:
+            raise InputError(self.where, "variables", f"{len(self.names)} with parameters", f"at most {MOST}")
+        self.variables = tuple(cast(list[str], names))
+        self.parameters = {name: self._interval(value, f"parameters.{name}") for name, value in parameters.items()}
+
+    def _claim(self, table: dict[str, Any], key: str) -> tuple[Wanted, tuple[float, ...] | None]:
+        self._known(table, _CLAIM, key)
+        theorem = self._required(table, "theorem", key)
+        if theorem not in THEOREMS:
+            raise InputError(self.where, f"{key}.theorem", _show(theorem), _nearest(str(theorem), THEOREMS))
+        V = self._indicator(self._required(table, "V", key), theorem, f"{key}.V")
+        rest = self._state(table["rest"], f"{key}.rest") if "rest" in table else None
+        escape = self._polynomial(table["escape"], f"{key}.escape") if "escape" in table else None
+        listed = self._list(table.get("squares", []), f"{key}.squares")
+        squares = tuple(self._polynomial(h, f"{key}.squares[{k}]") for k, h in enumerate(listed, 1))
+        level, known = (self._positive(table, name, key) for name in ("level", "known"))
+        orbit = tuple(float(x) for x in self._state(table["orbit"], f"{key}.orbit")) if "orbit" in table else None
+        exactly = None if rest is None else tuple(exact(x) for x in rest)
+        name = self._text(table, "name", key, "")
+        return Wanted(theorem, V, self._box(table, key), exactly, level, escape, squares, known, name), orbit
+
+    def _indicator(self, value: Any, theorem: str, key: str) -> Any:
+        if theorem != "intersection":
+            return self._expression(value, key)
+        if not value:
+            raise InputError(self.where, key, _show(value), "a list of expressions")
+        return tuple(self._expression(v, f"{key}[{k}]") for k, v in enumerate(self._list(value, key), 1))
+
+    def _list(self, value: Any, key: str) -> list[Any]:
+        if not isinstance(value, list):
+            raise InputError(self.where, key, _show(value), "a list of expressions")
+        return cast(list[Any], value)
+
+    def _polynomial(self, value: Any, key: str) -> Any:
+        found = self._expression(value, key)
+        if len(pieces(found)) > 1:
+            raise InputError(self.where, key, "a piecewise function", "one polynomial")
+        return found
+
+    def _box(self, table: dict[str, Any], key: str) -> tuple[tuple[float, float], ...]:
+        place = f"{key}.box" if "box" in table else "box"
+        box = self._table(table["box"] if "box" in table else self._required(self.data, "box", ""), place)
+        self._exactly(box, self.variables, place)
+        sides = [self._interval(box[name], f"{place}.{name}") for name in self.variables]
+        return (*sides, *self.parameters.values())
+
+    def _state(self, value: Any, key: str) -> tuple[Fraction, ...]:
+        table = self._table(value, key)
+        self._exactly(table, self.variables, key)
+        found: list[Fraction] = []
+        for name in self.variables:
+            x = table[name]
+            try:
+                if isinstance(x, bool):
+                    raise ValueError
+                # As written: 0.1 is one tenth, and a text may be a fraction.
+                found.append(Fraction(str(x)))
+            except (ValueError, ZeroDivisionError):
+                raise InputError(self.where, f"{key}.{name}", _show(x), 'a number, or a fraction such as "1/3"') from None
+        return tuple(found)
+
+    def _interval(self, value: Any, key: str) -> tuple[float, float]:
+        ends = cast(list[Any], value) if isinstance(value, list) else []
+        if len(ends) == 2 and all(type(x) in (int, float) and math.isfinite(x) for x in ends) and ends[0] < ends[1]:
+            return float(ends[0]), float(ends[1])
+        raise InputError(self.where, key, _show(value), "two numbers [low, high], low < high")
+
+    def _positive(self, table: dict[str, Any], name: str, key: str) -> float | None:
+        value = table.get(name)
+        if value is None or (type(value) in (int, float) and 0.0 < value < math.inf):
+            return None if value is None else float(value)
+        raise InputError(self.where, f"{key}.{name}", _show(value), "a positive number")
+
+    def _expression(self, value: Any, key: str) -> Any:
+        if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+            raise InputError(self.where, key, _show(value), "an expression in quotes")
+        try:
+            return read(str(value), self.names)
+        except ExpressionError as error:
+            raise InputError(self.where, key, error.found, error.allowed) from None
+
+    def _fresh(self, name: str, key: str) -> None:
+        if not name.isidentifier() or keyword.iskeyword(name) or name in RESERVED:
+            raise InputError(self.where, key, _show(name), "a name of letters, digits and _ that no function has")
+        if name in self.names:
+            raise InputError(self.where, key, _show(name), "a name that is not taken")
+
+    def _exactly(self, table: dict[str, Any], names: Sequence[str], key: str) -> None:
+        self._known(table, names, key)
+        for name in names:
+            self._required(table, name, key)
+
+    def _known(self, table: dict[str, Any], names: Sequence[str], key: str) -> None:
+        for name in table:
+            if name not in names:
+                raise InputError(self.where, f"{key}.{name}".lstrip("."), "an unknown key", _nearest(name, names))
+
+    def _required(self, table: dict[str, Any], name: str, key: str) -> Any:
+        if name not in table:
+            raise InputError(self.where, f"{key}.{name}".lstrip("."), "nothing", "this key is required")
+        return table[name]
+
+    def _table(self, value: Any, key: str) -> dict[str, Any]:
+        if not isinstance(value, dict):
+            raise InputError(self.where, key, _show(value), f"a table, one line for each of {', '.join(self.variables)}")
+        return cast(dict[str, Any], value)
+
+    def _text(self, table: dict[str, Any], name: str, key: str, default: str) -> str:
+        value = table.get(name, default)
+        if not isinstance(value, str) or (name == "name" and not key and not _file_name(value)):
+            allowed = "letters, digits, '-', '_', '.' and spaces"
+            raise InputError(self.where, f"{key}.{name}".lstrip("."), _show(value), allowed)
+        return value
+
+
+def _file_name(text: str) -> bool:
+    return bool(text) and all(c.isalnum() or c in "-_. " for c in text) and not text.startswith(".")
+
+
+def _show(value: Any) -> str:
+    text = f'"{value}"' if isinstance(value, str) else str(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _nearest(word: str, known: Sequence[str]) -> str:
+    near = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
+    return f"did you mean {near[0]}?" if near else f"one of {', '.join(known)}"

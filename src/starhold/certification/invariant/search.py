@@ -1,0 +1,314 @@
+"""What floats guess: how large a level may be, and states that refute. The latter are verified in exact rationals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from itertools import islice
+from typing import Any
+
+import numpy as np
+from flint import fmpq
+from numpy.typing import NDArray
+
+from starhold.algebra.polynomial import exact
+from starhold.certification.invariant.descent import Candidate, Guarded
+from starhold.certification.invariant.enclosure import Boxes, Form
+from starhold.certification.invariant.signs import from_rest, lowest
+from starhold.certification.invariant.system import Cell, Poly, along
+from starhold.certification.matrices import number
+
+Array = NDArray[np.float64]
+POINTS = {1: 4001, 2: 301, 3: 61, 4: 23}
+"""Of a grid along each side, by the number of sides."""
+TRIES = 40
+"""States that are verified exactly before one gives up."""
+
+
+class Values:
+    """V and V' in floats at points (n, N); NaN where no cell is. `cell`: its number at each point."""
+
+    def __init__(self, what: Candidate, points: Array) -> None:
+        count = points.shape[1]
+        self.points = points
+        self.V, self.slope = np.full(count, np.nan), np.full(count, np.nan)
+        self.cell = np.full(count, -1)
+        surfaces = [Form(s).at(points) for s in what.pieces.surfaces]
+        for place, cell in enumerate(what.pieces.cells):
+            here = self.cell < 0
+            for side, values in zip(cell.signs, surfaces, strict=True):
+                here &= side * values >= 0.0
+            self.cell[here] = place
+            self.V[here] = Form(cell.V).at(points[:, here])
+            self.slope[here] = Form(cell.slope).at(points[:, here])
+
+
+def grid(box: Sequence[tuple[float, float]], count: int | None = None) -> Array:
+    """Points of a grid (n, N)."""
+    count = POINTS.get(len(box), 9) if count is None else count
+    axes = [np.linspace(low, high, count if high > low else 1) for low, high in box]
+    return np.array([side.ravel() for side in np.meshgrid(*axes, indexing="ij")])
+
+
+def wrong(what: Candidate, sense: int, count: int = 8) -> list[Array]:
+    """States at which V is positive and does not fall (sense -1: grow), those of the least V first, refined by grids that
+    shrink around them."""
+    values = Values(what, grid(what.box))
+    tolerance = 1e-12 * float(np.nanmax(np.abs(values.slope), initial=0.0))
+    floor = 1e-12 * float(np.nanmax(np.abs(values.V), initial=0.0))
+    place = np.flatnonzero((floor < values.V) & (sense * values.slope > tolerance))
+    starts: list[Array] = []
+    spread = np.array([[high - low] for low, high in what.box])
+    for k in place[np.argsort(values.V[place], kind="stable")]:
+        point = values.points[:, k]
+        if all(np.max(np.abs(point - other) / np.maximum(spread[:, 0], 1e-300)) > 0.1 for other in starts):
+            starts.append(point)
+        if len(starts) == count:
+            break
+    points_each = max(5, round(4_000 ** (1.0 / len(what.box))))
+    found = [_refined(what, start, sense, spread, points_each, (floor, tolerance)) for start in starts]
+    return sorted(found, key=lambda x: float(Values(what, x[:, None]).V[0]))
+
+
+def _refined(what: Candidate, start: Array, sense: int, spread: Array, count: int, least: tuple[float, float]) -> Array:
+    best, width = start, 2.0 * spread[:, 0] / POINTS.get(len(what.box), 9)
+    for _ in range(14):
+        box = [(max(a, x - w), min(b, x + w)) for (a, b), x, w in zip(what.box, best, width, strict=True)]
+        points = np.concatenate([grid(box, count), best[:, None]], axis=1)
+        values = Values(what, points)
+        values.V[~((least[0] < values.V) & (sense * values.slope > least[1]))] = np.inf
+        best = points[:, int(np.argmin(values.V))]
+        width = width * 0.4
+    return best
+
+
+def stuck(what: Candidate) -> list[Array]:
+    """Rests of single cells with V > 0, by Newton's method from a coarse grid."""
+    found: list[Array] = []
+    moving = what.pieces.moving
+    for place, cell in enumerate(what.pieces.cells):
+        rates = [Form(rate) for rate in cell.rates[:moving]]
+        slopes = [[Form(rate.derivative(k)) for k in range(moving)] for rate in cell.rates[:moving]]
+        points = grid(what.box, 7)
+        for _ in range(12):
+            f = np.array([rate.at(points) for rate in rates])
+            jacobian = np.moveaxis(np.array([[s.at(points) for s in row] for row in slopes]), -1, 0)
+            with np.errstate(all="ignore"):
+                steps = np.linalg.pinv(np.nan_to_num(jacobian, posinf=0.0, neginf=0.0)) @ np.nan_to_num(f.T)[:, :, None]
+            points[:moving] -= steps[:, :, 0].T
+            points = np.clip(points, *np.array(what.box).T[:, :, None])
+        values = Values(what, points)
+        size = np.max(np.abs([rate.at(points) for rate in rates]), axis=0)
+        for k in np.flatnonzero((size < 1e-9) & (values.cell == place) & (values.V > 1e-9)):
+            if all(np.max(np.abs(points[:, k] - other)) > 1e-6 for other in found):
+                found.append(points[:, k])
+    return found
+
+
+def ceiling(what: Candidate, sense: int = 1) -> float:
+    """The least V that points of a grid give for a state that no set may hold: on the border of the box, where V rises, or
+    at rest. Infinite if there is none."""
+    least = math.inf
+    for k in range(what.pieces.moving):
+        for end in what.box[k]:
+            face = [(end, end) if j == k else side for j, side in enumerate(what.box)]
+            count = POINTS.get(len(face) - 1, 9)
+            least = min(least, float(np.nanmin(Values(what, grid(face, count)).V)))
+    states = [*wrong(what, sense, 3), *stuck(what)]
+    return min([least, *(float(Values(what, x[:, None]).V[0]) for x in states)])
+
+
+SIMPLE, NEAR = (2, 3, 4, 6, 9, 12, 17), (6, 9, 12, 17, 4, 3, 2)
+"""Digits of states that are tried: those a reader likes best first, or those nearest to a guess."""
+
+
+def rounded(point: Array, digits: Sequence[int] = SIMPLE) -> Iterator[tuple[Any, ...]]:
+    """Exact states near a point, all of them floats too."""
+    for count in digits:
+        # What is zero up to rounding is taken for zero.
+        yield tuple(exact(float(f"{round(float(x), 12):.{count}g}")) for x in point)
+
+
+def in_box(what: Candidate, state: Sequence[Any]) -> bool:
+    """Whether the box holds an exact state."""
+    return all(exact(low) <= x <= exact(high) for x, (low, high) in zip(state, what.box, strict=True))
+
+
+def cell_of(what: Candidate, state: Sequence[Any]) -> Cell | None:
+    """The cell whose interior holds an exact state of the box; None for states on a surface or outside."""
+    if not in_box(what, state):
+        return None
+    sides = [surface(*state) for surface in what.pieces.surfaces]
+    return next((c for c in what.pieces.cells if all(not s or s * v > 0 for s, v in zip(c.signs, sides, strict=True))), None)
+
+
+def closed_cells(what: Candidate, state: Sequence[Any]) -> list[Cell]:
+    """All the cells whose closures hold an exact state."""
+    sides = [surface(*state) for surface in what.pieces.surfaces]
+    return [c for c in what.pieces.cells if all(s * v >= 0 for s, v in zip(c.signs, sides, strict=True))]
+
+
+def at(polynomial: Poly, rest: Sequence[Any]) -> Poly:
+    """A polynomial at a rest: one of the parameters."""
+    context = polynomial.context()
+    return polynomial.compose(*(g if x is None else context.constant(x) for g, x in zip(context.gens(), rest, strict=True)))
+
+
+def cells_at(what: Candidate, rest: Sequence[Any]) -> list[Cell]:
+    """The cells whose closures hold a rest for some of the parameters."""
+    found: list[Cell] = []
+    for cell in what.pieces.cells:
+        sides = [at(guard, rest) for guard in what.pieces.guards(cell)]
+        if not any(side.is_constant() and not side.is_zero() and side.leading_coefficient() < 0 for side in sides):
+            found.append(cell)
+    return found
+
+
+def value(what: Candidate, state: Sequence[Any]) -> Any:
+    """V at an exact state, None where its cells do not agree."""
+    found = [cell.V(*state) for cell in closed_cells(what, state)]
+    return found[0] if found and all(v == found[0] for v in found) else None
+
+
+def rising(what: Candidate, level: float, sense: int = 1, digits: Sequence[int] = SIMPLE) -> dict[str, Any] | None:
+    """A state with 0 < V <= level at which V rises (sense -1: does not grow) or that is a rest, verified; or None."""
+    for point in islice([*wrong(what, sense), *stuck(what)], TRIES):
+        for state in rounded(point, digits):
+            cell = cell_of(what, state)
+            if cell is None:
+                continue
+            V, slope = cell.V(*state), cell.slope(*state)
+            still = slope == 0 and (sense < 0 or not any(rate(*state) != 0 for rate in cell.rates))
+            if V > 0 and at_most(V, level) and (sense * slope > 0 or still):
+                return {"state": named(what, state), "V": number(V), "V'": number(slope)}
+    return None
+
+
+def reaching(what: Candidate, level: float, digits: Sequence[int] = SIMPLE) -> dict[str, Any] | None:
+    """A state on the border of the box with V <= level, of those found the one of the least V, verified; or None."""
+    best: tuple[Any, tuple[Any, ...]] | None = None
+    for k in range(what.pieces.moving):
+        for end in what.box[k]:
+            face = [(end, end) if j == k else side for j, side in enumerate(what.box)]
+            values = Values(what, grid(face, POINTS.get(len(face) - 1, 9)))
+            for state in rounded(values.points[:, int(np.nanargmin(values.V))], digits):
+                on_face = tuple(exact(end) if j == k else x for j, x in enumerate(state))
+                V = value(what, on_face) if in_box(what, on_face) else None
+                if V is not None and at_most(V, level):
+                    best = (V, on_face) if best is None or best[0] > V else best
+                    break
+    return None if best is None else {"state": named(what, best[1]), "V": number(best[0])}
+
+
+def not_positive(what: Candidate) -> dict[str, Any] | None:
+    """A state of the box that is not the rest and has V <= 0, verified; None if none is found."""
+    values = Values(what, grid(what.box))
+    for place in np.argsort(values.V, kind="stable")[:TRIES]:
+        for state in rounded(values.points[:, place]):
+            V = value(what, state)
+            rest = what.rest is not None and all(r is None or r == x for r, x in zip(what.rest, state, strict=True))
+            if V is not None and V <= 0 and not rest and closed_cells(what, state):
+                return {"state": named(what, state), "V": number(V)}
+    return None
+
+
+def member(what: Candidate, level: float) -> tuple[Any, ...] | None:
+    """An exact state with V <= level, None if none is found."""
+    values = Values(what, grid(what.box))
+    for place in np.argsort(values.V, kind="stable")[:TRIES]:
+        for state in rounded(values.points[:, place]):
+            V = value(what, state)
+            if V is not None and at_most(V, level):
+                return state
+    return None
+
+
+def leaving(what: Candidate) -> dict[str, Any] | None:
+    """Two states of a small box in which V' > 0, the first in M, the second with V > 0: on the way between them M ends, and
+    motions leave it. Verified; None if none is found."""
+    values = Values(what, grid(what.box))
+    near = np.flatnonzero((values.V > 0.0) & (values.slope > 1e-9 * np.nanmax(np.abs(values.slope), initial=1e-300)))
+    for place in near[np.argsort(values.V[near], kind="stable")][:TRIES]:
+        cell = what.guarded[int(values.cell[place])]
+        found = _border(what, cell, values.points[:, place])
+        if found is not None:
+            return found
+    return None
+
+
+def _border(what: Candidate, cell: Guarded, point: Array) -> dict[str, Any] | None:
+    gradient = [Form(cell.cell.V.derivative(k)) for k in range(len(point))]
+    g = np.zeros(len(point))
+    for _ in range(8):
+        g = np.array([float(slope.at(point[:, None])[0]) for slope in gradient])
+        g[what.pieces.moving :] = 0.0
+        if not g.any():
+            return None
+        point = point - float(cell.V.at(point[:, None])[0]) * g / float(g @ g)
+    size = float(np.max([high - low for low, high in what.box]))
+    for share in (1e-2, 1e-3, 1e-4, 1e-6):
+        step = share * size * g / float(np.linalg.norm(g))
+        ends = [tuple(exact(float(f"{x:.9g}")) for x in point + way * step) for way in (-1.0, 1.0)]
+        inside, outside = (value(what, end) for end in ends)
+        if inside is None or outside is None or not (inside <= 0 < outside):
+            continue
+        sides = [(min(number(a), number(b)), max(number(a), number(b))) for a, b in zip(*ends, strict=True)]
+        boxes = Boxes(tuple(_interval(low, high) for low, high in sides))
+        here = [other for other in what.guarded if other.inside(boxes)[0]]
+        if any(other.cell.rates != cell.cell.rates for other in here):
+            continue
+        least = float(Form(along(cell.cell.V, cell.cell.rates)).on(boxes).low[0])
+        if least > 0.0 and all(_same_or_less(what, other.cell, cell.cell.V) for other in here):
+            return {"state": named(what, ends[0]), "outside": named(what, ends[1]), "V' between": least}
+    return None
+
+
+def _same_or_less(what: Candidate, cell: Cell, V: Poly) -> bool:
+    """Whether V of a cell is this one, or zero where this one is not positive."""
+    leading = V.leading_coefficient()
+    sides = zip(what.pieces.surfaces, cell.signs, strict=True)
+    return cell.V == V or (cell.V.is_zero() and any(s * leading == V and side * leading < 0 for s, side in sides))
+
+
+def _interval(low: float, high: float) -> Any:
+    from starhold.algebra.intervals import Intervals
+
+    return Intervals(np.array([low]), np.array([high]))
+
+
+def ray(what: Candidate, wanted: Callable[[Poly, Poly], Poly | None]) -> dict[str, Any] | None:
+    """A direction from the rest in which a polynomial that `wanted` makes of V and V' of the cell there is positive however
+    near the rest, by its terms of the lowest degree; None if none is found."""
+    rest = what.rest
+    if rest is None or any(x is None for x in rest):
+        return None
+    moving = range(what.pieces.moving)
+    random = np.random.default_rng(0)
+    choices = [*np.eye(len(rest)), *-np.eye(len(rest)), *random.integers(-9, 10, size=(300, len(rest)))]
+    directions = [tuple(fmpq(int(x)) for x in choice) for choice in choices]
+    for cell in what.pieces.cells:
+        asked = wanted(cell.V, cell.slope)
+        if asked is None or asked.is_zero():
+            continue
+        leading = [_lowest_part(q, rest, moving) for q in (asked, *what.pieces.guards(cell))]
+        for d in directions:
+            if all(part(*d) > 0 for part in leading):
+                return {"direction": dict(zip(what.pieces.names, map(number, d), strict=True))}
+    return None
+
+
+def _lowest_part(q: Poly, rest: Sequence[Any], moving: Sequence[int]) -> Poly:
+    about = from_rest(q, rest)
+    degree = lowest(about, moving)
+    return q.context().from_dict({p: c for p, c in about.to_dict().items() if sum(p[k] for k in moving) == degree})
+
+
+def at_most(V: Any, level: float) -> bool:
+    """Whether an exact value is at most a float, which may be infinite."""
+    return math.isinf(level) or exact(level) >= V
+
+
+def named(what: Candidate, state: Sequence[Any]) -> dict[str, float]:
+    """A state by the names of its variables."""
+    pairs = zip(what.pieces.names, state, strict=True)
+    return {name: number(x) for name, x in pairs if x is not None}

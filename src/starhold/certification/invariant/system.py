@@ -1,0 +1,199 @@
+"""A system of few variables as cells: on each, its right-hand sides and V are polynomials with rational coefficients.
+
+Where equations compare (`where`, `clip`, `min` and so on) the space splits along the surfaces on which what is compared is
+equal. A cell is what certain sides of certain surfaces have in common; the cells leave nothing out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+from flint import Ordering, fmpq_mpoly_ctx
+
+from starhold.algebra.polynomial import Condition, Polynomial, jointly
+
+Poly: TypeAlias = Any
+"""A polynomial of python-flint (`fmpq_mpoly`): exact, with division and factors."""
+
+
+@dataclass(frozen=True)
+class System:
+    """x' = rates(x). `variables` move, `parameters` stay: whatever is shown holds for each of their values in the box.
+    Rates: polynomials over the names, or piecewise ones."""
+
+    variables: tuple[str, ...]
+    rates: tuple[Any, ...]
+    parameters: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Variables, then parameters."""
+        return self.variables + self.parameters
+
+    @classmethod
+    def of(cls, variables: Sequence[str], rates: Callable[..., Sequence[Any]], parameters: Sequence[str] = ()) -> System:
+        """From an equation: a function of all variables and parameters that gives the derivative of every variable. It may
+        use + - *, division by numbers, and `starhold.algebra.scalar`, whose `where` and `less` make pieces."""
+        names = (*variables, *parameters)
+        found = tuple(rates(*(Polynomial.variable(name) for name in names)))
+        if len(found) != len(variables):
+            raise ValueError(f"{len(found)} derivatives for {len(variables)} variables")
+        return cls(tuple(variables), found, tuple(parameters))
+
+    def function(self, equation: Callable[..., Any]) -> Any:
+        """An equation over the same names, as polynomials."""
+        return equation(*(Polynomial.variable(name) for name in self.names))
+
+
+@dataclass(frozen=True)
+class Cell:
+    """`signs`: which side of each surface, 0 where it does not matter. The closed cell is where surfaces times signs are
+    not negative; rates (of parameters too, zero) and V are polynomials on it, `slope` is V'."""
+
+    signs: tuple[int, ...]
+    rates: tuple[Poly, ...]
+    V: Poly
+
+    @property
+    def slope(self) -> Poly:
+        """V' along the motion in the cell."""
+        return along(self.V, self.rates)
+
+    def apart(self, other: Cell) -> list[int]:
+        """The surfaces between two cells."""
+        return [k for k, (a, b) in enumerate(zip(self.signs, other.signs, strict=True)) if a * b < 0]
+
+
+def along(function: Poly, rates: Sequence[Poly]) -> Poly:
+    """The derivative of a polynomial along the motion."""
+    total = function * 0
+    for k, rate in enumerate(rates):
+        total = total + function.derivative(k) * rate
+    return total
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """All cells of a system together with a function V."""
+
+    names: tuple[str, ...]
+    moving: int
+    surfaces: tuple[Poly, ...]
+    cells: tuple[Cell, ...]
+
+    @property
+    def context(self) -> Any:
+        """The ring of the polynomials."""
+        return self.cells[0].V.context()
+
+    def instead(self, zeros: Sequence[Poly]) -> list[Poly]:
+        """What stands for each variable where these polynomials vanish: the linear ones among them eliminate one each."""
+        generators = list(self.context.gens())
+        for zero in zeros:
+            solved = solve(zero.compose(*generators))
+            if solved is not None:
+                place, instead = solved
+                step = [instead if j == place else x for j, x in enumerate(self.context.gens())]
+                generators = [x.compose(*step) for x in generators]
+        return generators
+
+    def reduced(self, value: Poly, zeros: Sequence[Poly]) -> Poly:
+        """A polynomial with variables eliminated: equal to it where the others vanish."""
+        return value.compose(*self.instead(zeros)) if zeros else value
+
+    def agree(self, one: Cell, other: Cell, pairs: Sequence[tuple[Poly, Poly]]) -> bool:
+        """Whether the polynomials of each pair are shown to be equal wherever two closed cells meet, exactly."""
+        between = one.apart(other)
+        onto = [self.surfaces[k] for k in between]
+        zeros = [self.reduced(surface, onto) for surface in onto]
+        curved = [z for z in zeros if not z.is_constant()]
+        mine, yours = ([_modulo(g, curved) for g in self.guards(cell, onto)] for cell in (one, other))
+        # What is not negative in one cell and not positive in the other is zero where they meet.
+        zeros += [a for a in mine for b in yours if opposite(a, b)]
+        if any(z.is_constant() and not z.is_zero() for z in zeros) or any(
+            guard.is_constant() and not guard.is_zero() and guard.leading_coefficient() < 0 for guard in mine + yours
+        ):
+            # They do not meet.
+            return True
+        zeros = [z for z in zeros if not z.is_zero()]
+        gaps = [_modulo(self.reduced(a - b, onto), curved) for a, b in pairs]
+        return all(gap.is_zero() or any(divmod(gap, z)[1].is_zero() for z in zeros) for gap in gaps)
+
+    def guards(self, cell: Cell, onto: Sequence[Poly] = ()) -> list[Poly]:
+        """What is not negative in a closed cell, where the polynomials `onto` vanish."""
+        sided = [(s, side) for s, side in zip(self.surfaces, cell.signs, strict=True) if side and s not in onto]
+        return [self.reduced(surface, onto) * side for surface, side in sided]
+
+
+def _modulo(value: Poly, zeros: Sequence[Poly]) -> Poly:
+    """A polynomial less multiples of others: equal to it where these vanish."""
+    for zero in zeros:
+        value = divmod(value, zero)[1]
+    return value
+
+
+def opposite(a: Poly, b: Poly) -> bool:
+    """Whether one polynomial is a negative number times the other."""
+    if a.is_zero() or b.is_zero():
+        return False
+    ratio = a.leading_coefficient() / b.leading_coefficient()
+    return ratio < 0 and a == b * ratio
+
+
+def solve(surface: Poly) -> tuple[int, Poly] | None:
+    """A variable of a linear polynomial, and what it is where the polynomial vanishes; None for others."""
+    if surface.is_zero() or surface.total_degree() != 1:
+        return None
+    generators = surface.context().gens()
+    slopes = [surface.derivative(k) for k in range(len(generators))]
+    place = max(range(len(slopes)), key=lambda k: 0 if slopes[k].is_zero() else abs(slopes[k].leading_coefficient()))
+    return place, generators[place] - surface / slopes[place].leading_coefficient()
+
+
+def split(system: System, V: Any) -> Pieces:
+    """The cells of a system and a function, polynomial or piecewise. Sets without interior are left out: a function is
+    what it is on the closures of its cells."""
+    names = system.names
+    ring = fmpq_mpoly_ctx.get(names, Ordering.degrevlex)
+    zero = Polynomial({})
+    surfaces: list[Poly] = []
+    found: list[tuple[dict[int, int], list[Poly]]] = []
+    for truths, values in jointly([*system.rates, *(zero for _ in system.parameters), V]):
+        sides = _sides(truths, surfaces, ring, names)
+        if sides is not None:
+            found.append((sides, [_poly(value, ring, names) for value in values]))
+    cells = [
+        Cell(tuple(sides.get(k, 0) for k in range(len(surfaces))), tuple(polys[:-1]), polys[-1]) for sides, polys in found
+    ]
+    return Pieces(names, len(system.variables), tuple(surfaces), tuple(cells))
+
+
+def _sides(
+    truths: Sequence[tuple[Condition, bool]], surfaces: list[Poly], ring: Any, names: tuple[str, ...]
+) -> dict[int, int] | None:
+    """The side of each surface, None where two are asked for; new surfaces are added."""
+    sides: dict[int, int] = {}
+    for condition, truth in truths:
+        polynomial = _poly(condition.positive, ring, names)
+        leading = polynomial.leading_coefficient()
+        polynomial, side = polynomial / leading, (1 if truth else -1) * (1 if leading > 0 else -1)
+        place = next((k for k, known in enumerate(surfaces) if known == polynomial), len(surfaces))
+        if place == len(surfaces):
+            surfaces.append(polynomial)
+        if sides.setdefault(place, side) != side:
+            return None
+    return sides
+
+
+def _poly(value: Polynomial, ring: Any, names: tuple[str, ...]) -> Poly:
+    return ring.from_dict({tuple(m.count(name) for name in names): c for m, c in value.terms.items()})
+
+
+def plain(system: System, function: Any) -> Poly:
+    """A function that is not piecewise as a polynomial; ValueError for others."""
+    found = jointly([function])
+    if len(found) != 1:
+        raise ValueError("the function has to be one polynomial")
+    return _poly(found[0][1][0], fmpq_mpoly_ctx.get(system.names, Ordering.degrevlex), system.names)

@@ -1,0 +1,198 @@
+"""Expressions that a user writes: read by a list of what is allowed, never evaluated as Python.
+
+Arithmetic, whole powers, comparisons and the piecewise functions below make a piecewise polynomial with rational
+coefficients. A number stands for what is written: 0.1 is one tenth.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from typing import Any
+
+from starhold.algebra.polynomial import Cases, Polynomial, pieces
+from starhold.algebra.scalar import absolute, less, maximum, minimum, sign, where
+
+LONGEST = 2_000
+"""Characters of an expression."""
+MOST_TERMS, MOST_CASES, HIGHEST = 600, 64, 24
+"""Terms of a polynomial, cases of a piecewise one, and the degree: beyond these a proof would not end anyway."""
+ALLOWED = "numbers, variables, + - * / **, comparisons, 'a if b else c', and where, min, max, abs, clip, sat, sign"
+
+
+class ExpressionError(ValueError):
+    """What is wrong with an expression: what was found, and what is allowed."""
+
+    def __init__(self, found: str, allowed: str = ALLOWED) -> None:
+        self.found, self.allowed = found, allowed
+        super().__init__(f"found {found}; allowed: {allowed}")
+
+
+def _sat(x: Any, limit: Any = 1) -> Any:
+    return minimum(maximum(x, -limit), limit)
+
+
+def _extreme(pick: Callable[[Any, Any], Any]) -> Callable[..., Any]:
+    def several(first: Any, *others: Any) -> Any:
+        for other in others:
+            first = pick(first, other)
+        return first
+
+    return several
+
+
+_FUNCTIONS: dict[str, tuple[Callable[..., Any], int, int]] = {
+    "min": (_extreme(minimum), 2, 8),
+    "max": (_extreme(maximum), 2, 8),
+    "abs": (absolute, 1, 1),
+    "clip": (_sat, 2, 2),
+    "sat": (_sat, 1, 2),
+    "sign": (sign, 1, 1),
+}
+"""What a name stands for, and how many arguments it takes at least and at most."""
+
+
+def read(text: str, names: Mapping[str, Any]) -> Any:
+    """The polynomial or piecewise polynomial that an expression is, over names that stand for such. ExpressionError says
+    what it may not hold."""
+    if len(text) > LONGEST:
+        raise ExpressionError(f"{len(text)} characters", f"at most {LONGEST}")
+    try:
+        # In one line, so that a long one may be written in several.
+        text = " ".join(text.split())
+        return _Reader(text, names).number(ast.parse(text, mode="eval").body)
+    except SyntaxError as error:
+        raise ExpressionError(f"{_short(text)} ({error.msg})", "an expression") from None
+    except (RecursionError, MemoryError):
+        raise ExpressionError(_short(text), "an expression that is nested less deeply") from None
+    except ValueError as error:
+        if isinstance(error, ExpressionError):
+            raise
+        raise ExpressionError(f"{_short(text)} ({error})", "an expression") from None
+
+
+class _Reader:
+    """Goes down the tree; `number` and `_choose` know all the nodes there may be."""
+
+    def __init__(self, text: str, names: Mapping[str, Any]) -> None:
+        self._text, self._names = text, names
+
+    def number(self, node: ast.expr) -> Any:
+        """The value of an expression."""
+        found = self._number(node)
+        if isinstance(found, Cases) and len(found.pieces) > MOST_CASES:
+            raise ExpressionError(f"{len(found.pieces)} pieces", f"at most {MOST_CASES}")
+        for piece in pieces(found):
+            if len(piece.value.terms) > MOST_TERMS or max(map(len, piece.value.terms), default=0) > HIGHEST:
+                raise ExpressionError("a polynomial that is too large", f"degree {HIGHEST} and {MOST_TERMS} terms")
+        return found
+
+    def _number(self, node: ast.expr) -> Any:
+        match node:
+            case ast.Constant(value=int() | float()) if not isinstance(node.value, bool):
+                return Polynomial.constant(Fraction(ast.get_source_segment(self._text, node) or str(node.value)))
+            case ast.Name(id=name):
+                if name not in self._names:
+                    raise ExpressionError(f'the name "{name}"', f"one of {', '.join(self._names)}")
+                return self._names[name]
+            case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=operand):
+                value = self.number(operand)
+                return -value if isinstance(node.op, ast.USub) else value
+            case ast.BinOp():
+                return self._operation(node)
+            case ast.IfExp(test=test, body=body, orelse=other):
+                return self._choose(test, self.number(body), self.number(other))
+            case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
+                return self._call(name, arguments)
+            case _:
+                raise ExpressionError(self._shown(node))
+
+    def _operation(self, node: ast.BinOp) -> Any:
+        if isinstance(node.op, ast.Pow):
+            return self._power(self.number(node.left), node.right)
+        a, b = self.number(node.left), self.number(node.right)
+        match node.op:
+            case ast.Add():
+                return a + b
+            case ast.Sub():
+                return a - b
+            case ast.Mult():
+                return a * b
+            case ast.Div():
+                if isinstance(b, Cases) or b.value is None or b.value == 0:
+                    raise ExpressionError(f"division by {self._shown(node.right)}", "a number other than zero below /")
+                return a / b
+            case ast.BitXor():
+                raise ExpressionError(self._shown(node), "** for powers")
+            case _:
+                raise ExpressionError(self._shown(node))
+
+    def _power(self, base: Any, node: ast.expr) -> Any:
+        if not (isinstance(node, ast.Constant) and type(node.value) is int and 0 <= node.value <= HIGHEST):
+            raise ExpressionError(f"the power {self._shown(node)}", f"a whole number from 0 to {HIGHEST}")
+        found: Any = Polynomial.constant(1)
+        for _ in range(node.value):
+            found = found * base
+            self._sized(found)
+        return found
+
+    def _sized(self, found: Any) -> None:
+        if max(len(piece.value.terms) for piece in pieces(found)) > MOST_TERMS:
+            raise ExpressionError("a polynomial that is too large", f"degree {HIGHEST} and {MOST_TERMS} terms")
+
+    def _call(self, name: str, arguments: list[ast.expr]) -> Any:
+        if name == "where" and len(arguments) == 3:
+            return self._choose(arguments[0], self.number(arguments[1]), self.number(arguments[2]))
+        if name not in _FUNCTIONS:
+            raise ExpressionError(f'the function "{name}"', f"one of where, {', '.join(_FUNCTIONS)}")
+        function, least, most = _FUNCTIONS[name]
+        if not least <= len(arguments) <= most:
+            raise ExpressionError(f"{name} with {len(arguments)} arguments", f"{least} to {most}")
+        return function(*(self.number(argument) for argument in arguments))
+
+    def _choose(self, test: ast.expr, a: Any, b: Any) -> Any:
+        """a where the test holds, else b."""
+        match test:
+            case ast.BoolOp(op=ast.And(), values=values):
+                for value in values:
+                    a = self._choose(value, a, b)
+                return a
+            case ast.BoolOp(op=ast.Or(), values=values):
+                for value in values:
+                    b = self._choose(value, a, b)
+                return b
+            case ast.UnaryOp(op=ast.Not(), operand=operand):
+                return self._choose(operand, b, a)
+            case ast.Compare(left=left, ops=operations, comparators=others):
+                sides = [self.number(side) for side in (left, *others)]
+                for one, operation, other in zip(sides[:-1], operations, sides[1:], strict=True):
+                    a = self._compared(operation, one, other, a, b, test)
+                return a
+            case _:
+                raise ExpressionError(self._shown(test), "a comparison, or several with and, or, not")
+
+    def _compared(self, operation: ast.cmpop, one: Any, other: Any, a: Any, b: Any, test: ast.expr) -> Any:
+        match operation:
+            case ast.Lt():
+                return where(less(one, other), a, b)
+            case ast.Gt():
+                return where(less(other, one), a, b)
+            case ast.LtE():
+                return where(less(other, one), b, a)
+            case ast.GtE():
+                return where(less(one, other), b, a)
+            case _:
+                raise ExpressionError(self._shown(test), "< <= > >=")
+
+    def _shown(self, node: ast.expr) -> str:
+        return _short(ast.get_source_segment(self._text, node) or type(node).__name__)
+
+
+def _short(text: str) -> str:
+    text = " ".join(text.split())
+    return f'"{text}"' if len(text) <= 60 else f'"{text[:57]}..."'
+
+
+RESERVED = frozenset({"where", *_FUNCTIONS})
+"""Names that no variable may have."""

@@ -1,0 +1,93 @@
+"""Certificates of invariant sets in sentences. Every number in them comes from the claim."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from starhold.certification.certificate import Claim, Obligation
+
+HEADINGS = {
+    "stable": "stable (theorem 1)",
+    "attracts": "asymptotically stable (theorem 2)",
+    "region": "region of attraction (theorem 2)",
+    "unstable": "unstable (theorem 3)",
+    "intersection": "region of attraction (theorem 4)",
+}
+
+OBLIGATIONS = {
+    "rest": "the point is a rest of the system",
+    "continuous": "V is continuous",
+    "set": "M is not empty, and V is zero on it",
+    "positive": "V > 0 everywhere in the box but at the rest",
+    "positive nearby": "V > 0 somewhere in every neighbourhood of the rest",
+    "bounded": "V is above the level all over the border of the box, so that the set is compact and inside",
+    "falls": "V never rises on the set, and falls but where told",
+    "grows": "V grows wherever it is positive in the box",
+    "switching": "where the right-hand side jumps, motions cross, or V changes as it must for every mean of both sides",
+    "leaves": "no motion stays where V does not fall, but in M",
+    "invariant": "no motion leaves M",
+}
+
+
+def sentence(claim: Claim) -> str:
+    """What a claim says, whether or not it is proved."""
+    n = claim.numbers
+    theorem, level = n["theorem"], n.get("level")
+    where = "a level set of V" if level is None else f"{{V <= {down(level)}}}"
+    M = "the rest" if any(o.name == "rest" for o in claim.obligations) else "M"
+    if theorem == "unstable":
+        return f"{M} is unstable: every motion that starts in the box where V > 0 leaves the box"
+    if theorem == "stable":
+        return f"{M} is stable: no motion leaves {where}, nor any smaller level set"
+    if theorem == "attracts":
+        return f"{M} is asymptotically stable: all motions that start in {where} stay there and come to it"
+    return f"all motions that start in {where} stay there and come to {M}"
+
+
+def size(numbers: Mapping[str, Any], orbit: float | None = None) -> str:
+    """How large the set is, and its share of what is known of the true region (`orbit`: the area inside of it)."""
+    if "size" not in numbers:
+        return ""
+    low, high = numbers["size"]
+    text = f"its size is at least {down(low)} and at most {_up(high)}"
+    known = numbers.get("known", orbit)
+    if known is not None:
+        text += f": {100.0 * low / known:.1f} % of the true region's {known:.4g}"
+        text += ", as the file tells" if "known" in numbers else ", integrated in floats"
+    return text
+
+
+def limit(numbers: Mapping[str, Any]) -> str:
+    """What the level cannot exceed for this V, and why."""
+    if "refuted_level" not in numbers:
+        return ""
+    why = {"V rises": "where V does not fall", "border": "on the border of the box"}[numbers["limited_by"]]
+    return f"no level reaches {numbers['refuted_level']:.6g}: there is a state {why}"
+
+
+def evidence(obligation: Obligation) -> str:
+    """Why an obligation is refuted or undecided."""
+    parts: list[str] = []
+    for key, value in obligation.evidence.items():
+        if key == "reason":
+            return str(value)
+        if isinstance(value, dict):
+            inside = ", ".join(f"{name} = {x:g}" for name, x in value.items())  # pyright: ignore
+            parts.append(f"{key} ({inside})")
+        elif isinstance(value, list):
+            parts.append(f"{key}: {', '.join(str(x) for x in value)}")  # pyright: ignore
+        else:
+            parts.append(f"{key} = {value:.6g}" if isinstance(value, float) else f"{key} = {value}")
+    return "; ".join(parts)
+
+
+def down(value: float) -> str:
+    """Four digits or six, not above the number."""
+    text = f"{value:.6g}"
+    return text if float(text) <= value else f"{value * (1.0 - 5e-6):.6g}"
+
+
+def _up(value: float) -> str:
+    text = f"{value:.6g}"
+    return text if float(text) >= value else f"{value * (1.0 + 5e-6):.6g}"

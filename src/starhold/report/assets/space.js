@@ -1,0 +1,85 @@
+// What views in three dimensions share: vectors, where the reader stands, and the player that runs through a scene.
+"use strict";
+
+const scene = report.scene;
+const last = scene.times.length - 1;
+// Where the reader stands, as turns about the third axis and above the horizon; dragging changes both.
+const eye = { around: -0.9, above: 0.42 };
+
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const plus = (a, b, s = 1) => [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]];
+
+// The direction to the reader, and what is right and up for the reader.
+function stance() {
+  const away = [Math.cos(eye.above) * Math.cos(eye.around), Math.cos(eye.above) * Math.sin(eye.around), Math.sin(eye.above)];
+  const right = [-Math.sin(eye.around), Math.cos(eye.around), 0];
+  return { away, right, up: cross(away, right) };
+}
+
+// A canvas with as many pixels as the screen has there, wiped.
+function cleared(canvas) {
+  const ratio = window.devicePixelRatio || 1;
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+  if (canvas.width !== Math.round(width * ratio)) canvas.width = Math.round(width * ratio);
+  if (canvas.height !== Math.round(height * ratio)) canvas.height = Math.round(height * ratio);
+  const pen = canvas.getContext("2d");
+  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  pen.clearRect(0, 0, width, height);
+  return { pen, width, height };
+}
+
+function timeAt(where) {
+  const k = Math.min(Math.floor(where), last - 1);
+  return scene.times[k] + (where - k) * (scene.times[k + 1] - scene.times[k]);
+}
+
+// Slider, button and clock; `paint(view, where)` draws a view at a frame, which need not be whole.
+function startShow(views, paint, timeText) {
+  const slider = document.getElementById("moment");
+  const clock = document.getElementById("clock");
+  const button = document.getElementById("play");
+  let place = 0;
+  let playing = false;
+
+  function show(where) {
+    place = Math.max(0, Math.min(last, where));
+    slider.value = place;
+    const text = timeText(timeAt(place));
+    clock.textContent = text;
+    slider.setAttribute("aria-valuetext", text);
+    views.forEach((view) => paint(view, place));
+  }
+
+  function play(on) {
+    if (on && !playing && place >= last) place = 0;
+    playing = on;
+    button.textContent = on ? "Pause" : "Play";
+    if (!on) return;
+    let before = null;
+    const tick = (now) => {
+      if (!playing) return;
+      if (before !== null) show(place + (now - before) * last / (scene.seconds * 1000));
+      before = now;
+      if (place >= last) play(false);
+      else requestAnimationFrame(tick);
+    };
+    requestAnimationFrame(tick);
+  }
+
+  slider.max = last;
+  slider.addEventListener("input", () => { play(false); show(Number(slider.value)); });
+  button.addEventListener("click", () => play(!playing));
+  for (const { canvas } of views) {
+    canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
+    canvas.addEventListener("pointermove", (event) => {
+      if (!canvas.hasPointerCapture(event.pointerId)) return;
+      eye.around -= 0.01 * event.movementX;
+      eye.above = Math.max(-1.5, Math.min(1.5, eye.above + 0.01 * event.movementY));
+      show(place);
+    });
+  }
+  new ResizeObserver(() => show(place)).observe(views[0].canvas);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => show(place));
+  show(Number(slider.value));
+}

@@ -1,0 +1,250 @@
+"""What report pages of all kinds of scenario are made of: text, tables, and data for their scripts."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from importlib import metadata, resources
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from starhold.report.flight import Flight, colour, number_text
+from starhold.report.plots import Panel, Plot, back_to_front
+from starhold.report.proved import swatch
+
+if TYPE_CHECKING:
+    from starhold.scenario.checking import LawBook
+
+POINTS = 1500
+"""Samples of a curve."""
+MANY = 9
+"""Numbers of a setting beyond which only the first and the last are shown."""
+
+BEST, LOST = '<td class="best">', '<tr class="lost">'
+_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
+
+
+def document(
+    scenario: LawBook[Any], sections: Iterable[str], data: Mapping[str, Any], scripts: Sequence[str], footer: str
+) -> str:
+    """A page of these sections, headed by the scenario's name and ended by its text; the scripts, of the assets, read the
+    data, which names the laws."""
+    from plotly.offline import get_plotlyjs
+
+    title = escape(scenario.name)
+    body = [
+        f"<h1>{title}</h1>",
+        f'<p class="lead">{escape(scenario.table.description)}</p>' if scenario.table.description else "",
+        *sections,
+        f"<details><summary>Scenario text</summary><pre>{escape(scenario.text)}</pre></details>",
+        f"<footer>{escape(footer)}</footer>",
+    ]
+    # A script's text ends at the first "</", also within a string.
+    embedded = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    return "\n".join(
+        [
+            "<!DOCTYPE html>",
+            '<html lang="en"><head><meta charset="utf-8">',
+            f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            f"<title>{title} — starhold</title>",
+            f"<style>\n{_asset('page.css')}</style></head><body>",
+            *(part for part in body if part),
+            f'<script type="application/json" id="data">{embedded}</script>',
+            f"<script>{get_plotlyjs()}</script>",
+            f"<script>\n{_asset('plots.js')}</script>",
+            f"<script>\n{''.join(_asset(name) for name in scripts)}</script>",
+            "</body></html>\n",
+        ]
+    )
+
+
+def _asset(name: str) -> str:
+    return (resources.files("starhold.report") / "assets" / name).read_text(encoding="utf-8")
+
+
+def law_data(flights: Sequence[Flight]) -> list[dict[str, str]]:
+    """Names and colours."""
+    return [{"name": flight.name, "colour": colour(number)} for number, flight in enumerate(flights)]
+
+
+def views(flights: Sequence[Flight], frames: int, what: str, note: str) -> str:
+    """A view of each law in three dimensions, and the player for all of them."""
+    boxes = "".join(
+        f'<div class="view"><div><span>{swatch(number)}{escape(flight.name)}</span><output></output></div>'
+        f'<canvas role="img" aria-label="{what} under {escape(flight.name)}"></canvas></div>'
+        for number, flight in enumerate(flights)
+    )
+    return (
+        f'<p class="note">{note} Drag a view to look from elsewhere.</p>\n'
+        '<div class="player"><button id="play" type="button">Play</button>'
+        f'<input id="moment" type="range" min="0" max="{frames - 1}" step="0.01" value="0" '
+        'aria-label="time">'
+        f'<output id="clock"></output></div>\n<div class="views">{boxes}</div>'
+    )
+
+
+OVER_TIME = (
+    "<h2>Over time</h2>\n"
+    '<p class="note">Click a law in the legend to hide it, double-click to see it alone; drag to zoom, '
+    "double-click to zoom out.</p>"
+)
+
+
+def over_time(plot: Plot, flights: Sequence[Flight], marks: Sequence[float] = ()) -> dict[str, Any]:
+    """A plot over time for the script that draws it."""
+    order = back_to_front(flights, plot)
+    panels = [panel_data(panel, order, thin=plot.chatters) for panel in plot.panels]
+    label = f"time, {plot.clock}"
+    return {
+        "name": plot.name,
+        "title": plot.title,
+        "dashed": plot.dashed,
+        "xlabel": label,
+        "panels": panels,
+        "marks": tuple(marks),
+    }
+
+
+def lost_alarm(flights: Sequence[Flight]) -> str:
+    """Which motions were lost; empty where none was."""
+    lost = [f"{flight.name} (at {flight.lost_text()})" for flight in flights if flight.lost is not None]
+    if not lost:
+        return ""
+    return f'<p class="alarm">Diverged, and so without final values: {escape(", ".join(lost))}.</p>'
+
+
+def ranking(flights: Sequence[Flight]) -> str:
+    """The ranked table."""
+    board = flights[0].board
+    results = {flight.name: flight.metrics for flight in flights}
+    metrics = board.columns(results)
+    best = board.winners(results)
+    numbers = {flight.name: number for number, flight in enumerate(flights)}
+    head = "".join(
+        f'<th scope="col" title="{escape(measure.meaning)}">{escape(measure.heading)}'
+        f"<small>{escape(measure.unit) or '&nbsp;'}</small></th>"
+        for measure in (board.measures[metric] for metric in metrics)
+    )
+    rows: list[str] = []
+    for place, name in enumerate(board.ranked(results), 1):
+        flight = flights[numbers[name]]
+        lost = flight.lost is not None
+        cells = "".join(
+            f"{BEST if name in best[metric] else '<td>'}{board.shown(metric, flight.metrics.get(metric))}</td>"
+            for metric in metrics
+        )
+        fate = f"diverged at {flight.lost_text()}" if lost else flight.law if flight.law != name else ""
+        rows.append(
+            f"{LOST if lost else '<tr>'}<td>{place}</td>"
+            f'<th scope="row" style="text-align:left">{swatch(numbers[name])}{escape(name)}'
+            f"{f'<small>{escape(fate)}</small>' if fate else ''}</th>{cells}</tr>"
+        )
+    order = ", then ".join(board.headings(results))
+    return (
+        '<h2>Ranking</h2>\n<div class="wide"><table><thead><tr><th scope="col">#</th>'
+        f'<th scope="col" style="text-align:left">law</th>{head}</tr></thead>\n'
+        f"<tbody>{''.join(rows)}</tbody></table></div>\n"
+        f'<p class="note">Ordered by {escape(order)}; less is better in every column, and the best value is marked. '
+        "A dash: never reached, or not measured.</p>"
+    )
+
+
+def plot_box(plot: Mapping[str, Any]) -> str:
+    """The place of a plot, which a script fills."""
+    dashed = f"<span>– – {escape(plot['dashed'])}</span>" if plot["dashed"] else ""
+    return f'<div class="plot"><h3>{escape(plot["title"])}{dashed}</h3><div id="{plot["name"]}"></div></div>'
+
+
+def laws_table(flights: Sequence[Flight]) -> str:
+    """The laws with their gains."""
+    rows = "".join(
+        f'<tr><th scope="row">{swatch(number)}{escape(flight.name)}</th><td>{escape(flight.law)}</td>'
+        f"<td>{', '.join(f'{escape(key)} = {escape(text)}' for key, text in flight.gains.items()) or '—'}</td></tr>"
+        for number, flight in enumerate(flights)
+    )
+    head = '<th scope="col">name</th><th scope="col">type</th><th scope="col">gains</th>'
+    return (
+        f'<h2>Laws</h2>\n<div class="wide"><table class="text"><thead><tr>{head}</tr></thead>'
+        f"<tbody>{rows}</tbody></table></div>"
+    )
+
+
+def settings(scenario: LawBook[Any], title: str) -> str:
+    """All tables of a scenario."""
+    from pydantic import BaseModel
+
+    parts: list[str] = []
+    for name in type(scenario.table).model_fields:
+        table = getattr(scenario.table, name)
+        if isinstance(table, BaseModel):
+            parts.append(_table(name, table))
+    return f'<h2>{title}</h2>\n<div class="columns">{"".join(parts)}</div>'
+
+
+def _table(name: str, table: Any) -> str:
+    """One table of the scenario with the descriptions its schema holds; keys without a value are left out."""
+    properties = type(table).model_json_schema()["properties"]
+    rows: list[str] = []
+    for key in type(table).model_fields:
+        value = getattr(table, key)
+        if value is not None:
+            meaning = str(properties.get(key, {}).get("description", "")).replace("^2", "²").replace("^3", "³")
+            rows.append(f"<tr><td>{escape(key)}</td><td>{escape(_value(value))}</td><td>{escape(meaning)}</td></tr>")
+    title = name.replace("_", " ")
+    return f'<section><h3>{escape(title)}</h3><table class="text"><tbody>{"".join(rows)}</tbody></table></section>'
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float) and math.isinf(value):
+        return "none"
+    if isinstance(value, tuple) and len(value) > MANY:
+        return f"{number_text(value[0])} to {number_text(value[-1])}, {len(value)} values"
+    return number_text(value) if isinstance(value, (int, float, tuple, list, np.ndarray)) else str(value)
+
+
+def columns_list(flights: Sequence[Flight]) -> str:
+    """What the columns of the ranking mean."""
+    board = flights[0].board
+    measures = [board.measures[metric] for metric in board.columns({flight.name: flight.metrics for flight in flights})]
+    items = "".join(
+        f"<dt>{escape(measure.heading)}{f', {escape(measure.unit)}' if measure.unit else ''}</dt>"
+        f"<dd>{escape(measure.meaning)}</dd>"
+        for measure in measures
+    )
+    return f"<h2>How to read the columns</h2>\n<dl>{items}</dl>"
+
+
+def versions() -> str:
+    """What made the page."""
+    from starhold import __version__
+
+    libraries = ", ".join(f"{name} {metadata.version(name)}" for name in ("numba", "numpy", "plotly"))
+    return f"starhold {__version__}, {libraries}"
+
+
+def panel_data(panel: Panel, order: list[int], thin: bool = False) -> dict[str, Any]:
+    """A panel for the script that draws it; laws in the order from back to front."""
+    # Later laws get thinner lines, so that equal curves show as a line within a line.
+    slimmer = [1.0 - 0.5 * number / max(len(order) - 1, 1) for number in range(len(order))]
+    return {
+        "label": panel.label,
+        "curves": [rounded(curve) for curve in panel.curves],
+        "widths": [round((1.7 if thin else 2.6) * share, 2) for share in slimmer],
+        "order": order,
+        "log": panel.log,
+        # Ticks at powers of ten where there are several of them, else where Plotly likes.
+        "ticks": max(1, math.ceil(panel.decades() / 6.0)) if panel.decades() > 2.0 else None,
+        "levels": rounded(panel.levels),
+        "span": None if panel.span is None else rounded(panel.span),
+    }
+
+
+def rounded(values: Iterable[float], digits: int = 6) -> list[float | None]:
+    """Numbers of a few digits for JSON, which has none for what is not finite."""
+    return [float(f"{v:.{digits}g}") if math.isfinite(v) else None for v in np.asarray(list(values), dtype=float).tolist()]

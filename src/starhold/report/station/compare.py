@@ -1,0 +1,69 @@
+"""Flies the laws of a scenario of station keeping, measures them, and writes what came of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from starhold.analysis.station import BOARD, goal_of, measure_station
+from starhold.analysis.station_trial import fly_station, station_start_inside
+from starhold.certification.station import certify_station
+from starhold.loop.station import StationLoop
+from starhold.report.certificates import Tried
+from starhold.report.compare import Notice, write_proved
+from starhold.report.files import whole
+from starhold.report.flight import Flight, gain_text, number_text
+from starhold.report.results import SUMMARY, write_summary
+from starhold.report.station.figures import sketch as sketch
+from starhold.scenario.station.building import build as build
+from starhold.scenario.station.reading import StationEntry, StationScenario
+from starhold.simulation.lane import Progress, Recording
+from starhold.simulation.station import simulate_station
+
+
+def fly_law(scenario: StationScenario, entry: StationEntry, loop: StationLoop, notice: Notice | None = None) -> Flight:
+    """One law of the scenario, with the loop that `build` gives for it, flown and measured."""
+    progress = None if notice is None else lambda done, total: notice(entry.name, done, total)
+    run = record(scenario, loop, progress)
+    metrics = measure_station(run, scenario.units, goal_of(entry.gains), scenario.table.settling.tolerance)
+    gains = {item.name: gain_text(item, value) for item, value in zip(entry.law.fields(), entry.gains, strict=True)}
+    gains |= {"limit": number_text(entry.limit)} | ({"lag": number_text(entry.lag)} if entry.lag else {})
+    proved = certify_station(loop, entry.name)
+    return Flight(entry.name, entry.law.name, run, metrics, gains, (proved,), board=BOARD)
+
+
+def certify_scenario(scenario: StationScenario, law: str | None = None) -> list[Tried]:
+    """Certificates of all laws of a scenario, or of one. Raises `BrokenClaimError` where a flight contradicts one."""
+    found: list[Tried] = []
+    for entry in scenario.laws if law is None else (scenario.pick(law),):
+        loop = build(scenario, entry)
+        certificate = certify_station(loop, entry.name)
+        found.append(Tried(certificate, fly_station(loop, certificate), station_start_inside(certificate, loop)))
+    return found
+
+
+def record(scenario: StationScenario, loop: StationLoop, progress: Progress | None = None) -> Recording:
+    """The run of a loop, scaled, with what its units are worth among its attributes."""
+    timing, units = scenario.table.simulation, scenario.units
+    run = simulate_station(loop, timing.steps, timing.record_every, progress)
+    worth = {"length_unit_m": units.length, "time_unit_s": units.time}
+    worth |= {"velocity_unit_m_per_s": units.velocity, "acceleration_unit_m_per_s2": units.acceleration}
+    return replace(run, attrs=run.attrs | worth)
+
+
+def compare(scenario: StationScenario, notice: Notice | None = None) -> list[Flight]:
+    """Every law of the scenario flown on it, in the order of the file."""
+    return [fly_law(scenario, entry, build(scenario, entry), notice) for entry in scenario.laws]
+
+
+def write(scenario: StationScenario, flights: Sequence[Flight], folder: Path) -> Path:
+    """Summary, certificates and page into an existing folder; returns the page's path."""
+    from starhold.report.station.page import write_page
+
+    write_summary(scenario, {flight.name: flight.metrics for flight in flights}, folder / SUMMARY)
+    write_proved(scenario.name, flights, folder)
+    page = folder / "report.html"
+    with whole(page) as hidden:
+        write_page(hidden, scenario, flights)
+    return page

@@ -1,0 +1,178 @@
+"""What the pictures of station keeping show, whoever draws them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.analysis.station import DAY, YEAR, Circle, Rest, goal_of
+from starhold.models.libration import EARTH_DIAMETER
+from starhold.report.flight import Flight, colour
+from starhold.report.plots import Curve, Panel, Plot, near, positive, sound, thin, thin_times
+from starhold.report.station.phase import phase_portrait
+from starhold.report.station.planes import Guide, Line, Plane, PlanePlot, ring
+from starhold.scenario.station.reading import StationEntry, StationScenario
+
+LONG = 400.0 * DAY
+"""Runs of more seconds are drawn over years."""
+ROOM = 0.08
+"""Share of a picture left free around what it shows."""
+PATH = 4000
+"""Samples of a path at most."""
+LEAST = 0.02
+"""Half the width of a picture of x at least, as a share of the circle's radius: less is as good as nothing."""
+
+
+@dataclass(frozen=True)
+class StationPlots:
+    """All pictures: the projections that the publication draws, the phase portrait of X where a law holds a place of rest,
+    paths (n, 3) in length units, and the plots over time with their times."""
+
+    times: Curve
+    over_time: list[Plot]
+    planes: list[PlanePlot]
+    paths: list[NDArray[np.float64]]
+    rings: list[float]
+    unit: str
+
+
+def collect(flights: Sequence[Flight], points: int, scenario: StationScenario) -> StationPlots:
+    """The pictures of a comparison, curves over time thinned to about `points` samples."""
+    entries = [scenario.pick(flight.name) for flight in flights]
+    units = scenario.units
+    longest = max((flight.recording["time"] for flight in flights), key=len)
+    factor = 1 if len(longest) <= points else int(np.ceil(2 * len(longest) / points))
+    clock, tick = ("years", YEAR) if longest[-1] * units.time > LONG else ("days", DAY)
+    rings = sorted({goal.radius for goal in map(_goal, entries) if isinstance(goal, Circle)})
+    portrait = phase_portrait(flights, entries, scenario)
+    return StationPlots(
+        thin_times(longest, factor) * (units.time / tick),
+        [_away(flights, entries, factor, scenario, clock), _control(flights, entries, factor, scenario, clock)],
+        [_projections(flights, entries, scenario), *([] if portrait is None else [portrait])],
+        [_path(flight.recording["position"]) for flight in flights],
+        rings,
+        unit_text(scenario),
+    )
+
+
+def unit_text(scenario: StationScenario) -> str:
+    """What lengths are counted in."""
+    length = scenario.units.length
+    return "Earth diameters" if length == EARTH_DIAMETER else f"units of {length / 1e3:g} km"
+
+
+def _goal(entry: StationEntry) -> object:
+    return goal_of(entry.gains)
+
+
+def _path(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return values[:: max(1, -(-len(values) // PATH))]
+
+
+def _away(
+    flights: Sequence[Flight], entries: Sequence[StationEntry], factor: int, scenario: StationScenario, clock: str
+) -> Plot:
+    """How far from the circle in its plane and across it, or from the place of rest."""
+    length = scenario.units.length / 1e3
+    x = [thin(flight.recording["position"][:, 0] * length, factor) for flight in flights]
+    goals = [goal_of(entry.gains) for entry in entries]
+    off: list[Curve] = []
+    circles = all(isinstance(goal, Circle) for goal in goals)
+    for flight, goal in zip(flights, goals, strict=True):
+        position = flight.recording["position"]
+        if circles and isinstance(goal, Circle):
+            off.append(thin((np.hypot(position[:, 1], position[:, 2]) - goal.radius) * length, factor))
+        else:
+            off.append(thin(goal.distance(position) * length, factor))
+    if circles:
+        panels = [Panel("from X axis − radius, km", off), Panel("x, km", x)]
+        return Plot("deviation", "off the circle, in its plane and across", [sound(p, flights) for p in panels], clock=clock)
+    near_km = scenario.table.settling.tolerance * length
+    panels = [positive("distance, km", off, (near_km,)), Panel("x, km", x)]
+    title = "distance from what is to be held, and along X"
+    return Plot("deviation", title, [sound(p, flights) for p in panels], "tolerance", clock=clock)
+
+
+def _control(
+    flights: Sequence[Flight], entries: Sequence[StationEntry], factor: int, scenario: StationScenario, clock: str
+) -> Plot:
+    worth = scenario.units.acceleration * 1e6
+    limits = sorted({entry.limit * worth for entry in entries if math.isfinite(entry.limit)})
+    kind = scenario.table.control.limit_kind
+    each = tuple(sign * limit for limit in limits for sign in (-1.0, 1.0)) if kind == "axis" else ()
+    panels: list[Panel] = []
+    for i, axis in enumerate("xyz"):
+        curves = [thin(flight.recording["control"][:, i] * worth, factor) for flight in flights]
+        panels.append(Panel(f"{axis}, µm/s²", curves, False, near(each, curves) if each else ()))
+    sizes = [thin(np.linalg.norm(flight.recording["control"], axis=1) * worth, factor) for flight in flights]
+    panels.append(Panel("norm, µm/s²", sizes, False, near(tuple(limits), sizes) if limits and kind == "norm" else ()))
+    told = ", ".join(f"{limit:.4g}" for limit in limits)
+    dashed = f"limit of {'each axis' if kind == 'axis' else 'the norm'}, {told} µm/s²" if limits else "no limit"
+    return Plot("control", "control acceleration", panels, dashed, True, clock)
+
+
+def _projections(flights: Sequence[Flight], entries: Sequence[StationEntry], scenario: StationScenario) -> PlanePlot:
+    """(x, y), (y, z) and (u_y, u_z), as published, and (u_x, u_z), in which the control comes nearest to the limit; with the
+    circle and the limit."""
+    radii = sorted({goal.radius for goal in map(_goal, entries) if isinstance(goal, Circle)})
+    size = max([*radii, *(max(map(abs, goal_of(entry.gains).at(0.0)[0])) for entry in entries)]) or 1.0
+    kept = [flight for flight in flights if flight.lost is None]
+    places = [_path(flight.recording["position"]) for flight in flights]
+    controls = [_path(flight.recording["control"]) for flight in flights]
+    sound_places = [place for place, flight in zip(places, flights, strict=True) if flight in kept]
+
+    def reach(column: int) -> float:
+        farthest = max((float(np.abs(place[:, column]).max()) for place in sound_places), default=2.0 * size)
+        return (1.0 + ROOM) * max(farthest, LEAST * size)
+
+    across = (1.0 + ROOM) * max([size, *(reach(i) / (1.0 + ROOM) for i in (1, 2))])
+    limits: dict[float, str] = {}
+    for number, entry in enumerate(entries):
+        if math.isfinite(entry.limit):
+            limits.setdefault(entry.limit, colour(number))
+    same = len(limits) == 1
+    most = max((float(np.abs(control).max()) for control in controls), default=1.0)
+    bounds = [
+        ring(limit, "limit", None if same else shade) for limit, shade in limits.items() if limit < 3.0 * max(most, 1e-9)
+    ]
+    if scenario.table.control.limit_kind == "axis":
+        bounds = [_square(guide) for guide in bounds]
+    strong = (1.0 + ROOM) * max([most, *(float(np.abs(guide.x).max()) for guide in bounds)])
+    x = reach(0)
+    places_of = [goal.place for goal in map(_goal, entries) if isinstance(goal, Rest)]
+    rests = [Guide(np.array([y]), np.array([z]), "rest", kind="points") for _, y, z in places_of]
+    planes = [
+        Plane("x", "y", [Line(p[:, 0], p[:, 1]) for p in places], [], (-x, x, -across, across), False),
+        Plane(
+            "y",
+            "z",
+            [Line(p[:, 1], p[:, 2]) for p in places],
+            [*(ring(radius, "circle") for radius in radii), *rests],
+            (-across, across, -across, across),
+        ),
+        *(
+            Plane(
+                f"u_{'xyz'[i]}",
+                "u_z",
+                [Line(u[:, i], u[:, 2]) for u in controls],
+                bounds,
+                (-strong, strong, -strong, strong),
+            )
+            for i in (1, 0)
+        ),
+    ]
+    dashed = " and ".join([*(["circle to be held"] if radii else []), *(["limit"] if bounds else [])])
+    worth = scenario.units
+    note = f"1 = {worth.length / 1e3:g} km; of the control {worth.acceleration * 1e6:.4g} µm/s²"
+    return PlanePlot("projections", "projections of motion and control", planes, dashed, note)
+
+
+def _square(guide: Guide) -> Guide:
+    """The limit of each axis in place of that of the norm."""
+    size = float(np.abs(guide.x).max())
+    x, y = size * np.array([1.0, 1.0, -1.0, -1.0, 1.0]), size * np.array([-1.0, 1.0, 1.0, -1.0, -1.0])
+    return Guide(x, y, guide.text, guide.colour)

@@ -1,0 +1,150 @@
+"""What reading any kind of scenario file takes: whatever is wrong with one becomes one line."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Iterable, Mapping
+from typing import Any, Generic, TypeVar, cast
+
+from pydantic import BaseModel, ValidationError
+
+from starhold.errors import InputError
+from starhold.laws.catalogue import Law
+
+_Model = TypeVar("_Model", bound=BaseModel)
+_Law = TypeVar("_Law", bound=Law)
+_Entry = TypeVar("_Entry")
+
+
+class LawBook(Generic[_Entry]):
+    """What scenarios of all kinds share: a table with a name, and laws with names of their own."""
+
+    table: Any
+    laws: tuple[_Entry, ...]
+    text: str
+    where: str
+
+    @property
+    def name(self) -> str:
+        """The scenario's name."""
+        return self.table.name
+
+    def pick(self, name: str) -> _Entry:
+        """The law of this name; InputError names the nearest when there is none."""
+        for entry in self.laws:
+            if cast(Any, entry).name == name:
+                return entry
+        raise InputError(self.where, "law", name, nearest(name, [cast(Any, entry).name for entry in self.laws]))
+
+
+def read_toml(text: str, where: str) -> dict[str, Any]:
+    """The tables of a TOML text; `where` names it in errors."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(where, "", f"not TOML: {error}", "a TOML file") from None
+
+
+def numbered(laws: Any, where: str) -> list[tuple[str, Any]]:
+    """The law tables of a file with the keys that errors call them by; InputError where there is none."""
+    if not isinstance(laws, list) or not laws:
+        found = "no law" if laws is None else show(laws)
+        raise InputError(where, "law", found, "at least one [[law]] table")
+    return [(f"law[{number}]", item) for number, item in enumerate(cast(list[Any], laws), 1)]
+
+
+def pick_law(data: Any, known: Mapping[str, _Law], where: str, key: str) -> tuple[dict[str, Any], _Law, str | None]:
+    """A law table, the law of its type, and its form."""
+    if not isinstance(data, dict):
+        raise InputError(where, key, show(data), "a [[law]] table")
+    table = cast(dict[str, Any], data)
+    kind = table.get("type")
+    if not isinstance(kind, str) or kind not in known:
+        raise InputError(where, f"{key}.type", show(kind), nearest(str(kind), list(known)))
+    law = known[kind]
+    form = table.get("form")
+    if form is not None and (not isinstance(form, str) or form not in law.forms):
+        allowed = nearest(str(form), list(law.forms)) if law.forms else f"no form; {law.name} takes its gains"
+        raise InputError(where, f"{key}.form", show(form), allowed)
+    return table, law, form
+
+
+def make_gains(law: Law, values: list[Any], spec: Any, craft: Any, where: str, key: str) -> Any:
+    """The gains themselves, or those that a design gives from its inputs `spec`."""
+    try:
+        return law.gains(*values) if spec is None else law.design(craft, spec)
+    except ValueError as error:
+        raise InputError(where, key, "", str(error)) from None
+
+
+def free_name(given: str | None, kind: str, taken: set[str], where: str, key: str) -> str:
+    """The name of a law, its type if none is given; names of a file differ."""
+    if given is None:
+        counted = (kind if n == 1 else f"{kind}-{n}" for n in range(1, len(taken) + 2))
+        return next(name for name in counted if name not in taken)
+    if given in taken:
+        raise InputError(where, f"{key}.name", show(given), "a name that no other law of the file has")
+    if not all(c.isalnum() or c in "-_. " for c in given) or given.startswith("."):
+        raise InputError(where, f"{key}.name", show(given), "letters, digits, '-', '_', '.' and spaces")
+    return given
+
+
+def validate(
+    model: type[_Model], data: Any, where: str, prefix: str, extra: Iterable[str] = (), context: Any = None
+) -> _Model:
+    """A table as the model reads it; `extra`: keys that are known besides the model's, `context`: what its validators need.
+    InputError tells the first fault."""
+    try:
+        return model.model_validate(data, context=context)
+    except ValidationError as error:
+        raise _translate(error, model, data, where, prefix, list(extra)) from None
+
+
+def _translate(
+    error: ValidationError, model: type[BaseModel], data: Any, where: str, prefix: str, extra: list[str]
+) -> InputError:
+    """The first fault pydantic found, in starhold's words."""
+    # Unknown keys first: a misspelt key is the reason that the right one is missing.
+    fault = min(error.errors(include_url=False), key=lambda e: e["type"] != "extra_forbidden")
+    place = [f"[{part + 1}]" if isinstance(part, int) else part for part in fault["loc"]]
+    context: dict[str, Any] = fault.get("ctx", {})
+    if fault["type"] == "quantity_at":
+        place.append(context["key"])
+    key = ".".join(part for part in [prefix, *place] if part).replace(".[", "[")
+    found = show(context.get("found", fault.get("input")))
+    if fault["type"] == "extra_forbidden":
+        known = list(_model_at(model, place[:-1]).model_fields) + (extra if len(place) == 1 else [])
+        return InputError(where, key, "an unknown key", nearest(place[-1], known))
+    if fault["type"] == "missing":
+        return InputError(where, key, "nothing", "this key is required")
+    if fault["type"] in ("quantity", "quantity_at"):
+        return InputError(where, key, found, str(context["reason"]).removeprefix("must be "))
+    return InputError(where, key, found, _plain(fault["msg"]))
+
+
+def _model_at(model: Any, place: list[str]) -> Any:
+    for part in place:
+        if part.startswith("["):
+            continue
+        annotation = model.model_fields[part].annotation
+        options = [annotation, *getattr(annotation, "__args__", ())]
+        model = next(o for o in options if isinstance(o, type) and issubclass(o, BaseModel))
+    return model
+
+
+def _plain(message: str) -> str:
+    text = message.removeprefix("Input should be ").removeprefix("a valid ")
+    return text.replace("dictionary or instance of", "table of").replace("boolean", "true or false")
+
+
+def show(value: Any) -> str:
+    """What was found, short enough for one line."""
+    text = f'"{value}"' if isinstance(value, str) else str(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def nearest(word: str, known: list[str]) -> str:
+    """The nearest known words first; all of them when none is near."""
+    near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
+    return f"did you mean {near[0]}?" if near else f"one of {', '.join(sorted(known))}"

@@ -1,0 +1,32 @@
+"""Opens scenarios of every kind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from starhold.scenario.checking import read_toml
+from starhold.scenario.reading import MARK, Scenario, parse, read_text
+from starhold.scenario.schema import attitude_schema
+from starhold.scenario.station.reading import StationScenario, parse_station
+from starhold.scenario.station.schema import station_schema
+
+AnyScenario: TypeAlias = Scenario | StationScenario
+
+
+def open_scenario(source: str | Path, allow_unstable: bool = False) -> AnyScenario:
+    """The scenario in a file, or the built-in one of that name, of whichever kind. InputError says what is wrong with it."""
+    text, where, folder = read_text(source)
+    if MARK in read_toml(text, where):
+        return parse_station(text, where, folder)
+    return parse(text, where, folder, allow_unstable)
+
+
+def json_schema() -> dict[str, Any]:
+    """A JSON Schema of scenario files of both kinds, for completion and checks in editors."""
+    kinds = [attitude_schema(), station_schema()]
+    shared: dict[str, Any] = {}
+    for kind in kinds:
+        shared |= kind.pop("$defs", {})
+    title = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "starhold scenario", "type": "object"}
+    return {**title, "anyOf": kinds, "$defs": shared}

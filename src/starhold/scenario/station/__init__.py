@@ -1,0 +1,1 @@
+"""Scenarios of the second kind: keeping a craft near a libration point."""

@@ -1,0 +1,57 @@
+"""From a scenario of station keeping to closed loops."""
+
+from __future__ import annotations
+
+import math
+
+from starhold.algebra.scalar import is_finite
+from starhold.algebra.vector import ZERO, add, dot, norm
+from starhold.analysis.station import goal_of
+from starhold.errors import InputError
+from starhold.laws.interface import NoMemory
+from starhold.laws.station.interface import SeenPoint
+from starhold.loop.station import StationLoop
+from starhold.models.libration import PointState
+from starhold.scenario.station.reading import StationEntry, StationScenario
+
+NEAR = 0.4
+"""Share of the nearer body's distance at which a motion counts as lost unless the file says where."""
+
+
+def build(scenario: StationScenario, entry: StationEntry) -> StationLoop:
+    """The closed loop of one law. InputError where the law cannot work with what it has."""
+    table, plant = scenario.table, scenario.craft
+    nearer = min(abs(plant.from_smaller), abs(plant.from_larger))
+    loop = StationLoop(
+        plant=plant,
+        law=entry.law,
+        gains=entry.gains,
+        start=_start(scenario, entry),
+        period=table.simulation.control_period,
+        substeps=table.simulation.substeps,
+        model=table.libration.model,
+        limit=entry.limit,
+        limit_kind="none" if math.isinf(entry.limit) else table.control.limit_kind,
+        lag=entry.lag,
+        far=table.simulation.lost_beyond or NEAR * nearer,
+    )
+    away = norm(loop.start.position)
+    if away >= loop.far:
+        raise InputError(
+            scenario.where, "initial.position", f"a start {away:.6g} away", f"less than lost_beyond, {loop.far:.6g}"
+        )
+    seen = SeenPoint(loop.start.position, loop.start.velocity, loop.period, loop.limit)
+    command, _ = entry.law.control(seen, entry.gains, plant, NoMemory())
+    if not is_finite(dot(command, command)):
+        allowed = "a limit, margin or deficit: this law takes as much control as there is"
+        raise InputError(scenario.where, f"law {entry.name}", "no limit of the control", allowed)
+    return loop
+
+
+def _start(scenario: StationScenario, entry: StationEntry) -> PointState:
+    """The first state; control surfaces that lag start without control."""
+    start = scenario.table.initial
+    if start.relative_to == "point":
+        return PointState(start.position, start.velocity, ZERO)
+    position, velocity = goal_of(entry.gains).at(start.phase)
+    return PointState(add(position, start.position), add(velocity, start.velocity), ZERO)

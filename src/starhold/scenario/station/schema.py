@@ -1,0 +1,186 @@
+"""The tables of a scenario of station keeping. Plain numbers are scaled: the length unit, and a revolution in 2 pi."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
+
+from starhold.laws.interface import Gain
+from starhold.laws.station.interface import station_laws
+from starhold.models.libration import EARTH_DIAMETER, PRIMARIES, Libration, Primaries, Units
+from starhold.scenario.checking import nearest
+from starhold.scenario.quantity import quantity, scaled
+from starhold.scenario.schema import MOST_STEPS, file_schema
+from starhold.scenario.tables import Table, at_key, refuse
+
+
+def _known_pair(value: Any) -> Any:
+    if value not in PRIMARIES:
+        raise refuse(nearest(str(value), list(PRIMARIES)))
+    return value
+
+
+class LibrationTable(Table):
+    """Which point of which two bodies, what acts there, and the unit of length. Two bodies of one's own take the place of
+    `primaries`."""
+
+    primaries: Annotated[
+        str | None,
+        BeforeValidator(_known_pair),
+        WithJsonSchema({"enum": list(PRIMARIES), "description": "two bodies by name; sun-earth if none are given"}),
+    ] = None
+    larger: Annotated[float | None, *quantity(Gain("m^3/s^2", above=0.0, text="GM of the larger body"))] = None
+    smaller: Annotated[float | None, *quantity(Gain("m^3/s^2", above=0.0, text="GM of the smaller body"))] = None
+    separation: Annotated[float | None, *quantity(Gain("m", above=0.0, text="distance between the two bodies"))] = None
+    point: Annotated[Literal["L1", "L2", "L3"], Field(description="collinear libration point")] = "L2"
+    model: Annotated[Literal["linear", "nonlinear"], Field(description="motion near the point, or three-body problem")] = (
+        "linear"
+    )
+    length_unit: Annotated[float, *quantity(Gain("m", above=0.0, text="unit of length, an Earth diameter if absent"))] = (
+        EARTH_DIAMETER
+    )
+
+    @model_validator(mode="after")
+    def _bodies(self) -> LibrationTable:
+        own = {"larger": self.larger, "smaller": self.smaller, "separation": self.separation}
+        missing = [key for key, value in own.items() if value is None]
+        if self.primaries is not None and len(missing) < len(own):
+            raise at_key("primaries", "either primaries or larger, smaller and separation", self.primaries)
+        if missing and len(missing) < len(own):
+            raise at_key(missing[0], "larger, smaller and separation together", None)
+        if not missing and self.pair.smaller > self.pair.larger:
+            raise at_key("smaller", f"at most that of the larger body, {self.pair.larger:g}", self.smaller)
+        return self
+
+    @property
+    def pair(self) -> Primaries:
+        """The two bodies."""
+        if self.larger is None or self.smaller is None or self.separation is None:
+            return PRIMARIES[self.primaries or "sun-earth"]
+        return Primaries("two bodies", self.larger, self.smaller, self.separation, 0.0, 0.0)
+
+    @property
+    def units(self) -> Units:
+        """What scaled numbers are worth."""
+        return self.pair.units(self.length_unit)
+
+    @property
+    def plant(self) -> Libration:
+        """The numbers of the point."""
+        return self.pair.point(self.point, self.length_unit)
+
+
+class Resources(Table):
+    """How much control there is, given in one of three ways, and how fast it follows."""
+
+    limit: Annotated[float | None, *scaled("acceleration", Gain("m/s^2", above=0.0, text="largest control"))] = None
+    margin: Annotated[
+        float | None, *quantity(Gain("1", at_least=0.0, text="share by which the limit exceeds the circle's peak demand"))
+    ] = None
+    deficit: Annotated[
+        float | None,
+        *quantity(Gain("1", at_least=0.0, at_most=0.99, text="share by which it falls short of that demand")),
+    ] = None
+    lag: Annotated[float | None, *scaled("time", Gain("s", at_least=0.0, text="time constant of the control surfaces"))] = (
+        None
+    )
+
+    @property
+    def told(self) -> dict[str, float]:
+        """What is said of the limit."""
+        given = {"limit": self.limit, "margin": self.margin, "deficit": self.deficit}
+        return {key: value for key, value in given.items() if value is not None}
+
+    @model_validator(mode="after")
+    def _one_limit(self) -> Resources:
+        if len(self.told) > 1:
+            raise at_key(list(self.told)[1], f"one of limit, margin and deficit, not also {next(iter(self.told))}", None)
+        return self
+
+
+class ControlTable(Resources):
+    """What holds for every law that does not say otherwise."""
+
+    limit_kind: Annotated[
+        Literal["norm", "axis", "none"],
+        Field(description="whether the limit holds for the norm, each axis, or not at all"),
+    ] = "norm"
+
+
+class PointInitial(Table):
+    """Where the craft starts: from the libration point, or from the law's circle or place of rest."""
+
+    relative_to: Annotated[
+        Literal["point", "target"],
+        Field(
+            description="what position and velocity count from; target: the law's circle at a phase, or its place of rest"
+        ),
+    ] = "point"
+    phase: Annotated[float, *quantity(Gain("rad", text="place on the circle, from Y towards Z"))] = 0.0
+    position: Annotated[Any, *scaled("length", Gain("m", shape=(3,), spread=False, text="position"))] = (0.0, 0.0, 0.0)
+    velocity: Annotated[Any, *scaled("velocity", Gain("m/s", shape=(3,), spread=False, text="velocity"))] = (0.0, 0.0, 0.0)
+
+
+class Timing(Table):
+    """How long and how finely."""
+
+    duration: Annotated[float, *scaled("time", Gain("s", above=0.0, text="length of the run, in whole control periods"))]
+    control_period: Annotated[float, *scaled("time", Gain("s", above=0.0, text="for which a control is held"))] = 0.001
+    substeps: Annotated[int, *quantity(Gain("1", at_least=1, whole=True, text="integration steps a control period"))] = 1
+    record_every: Annotated[int, *quantity(Gain("1", at_least=1, whole=True, text="control steps a sample"))] = 10
+    lost_beyond: Annotated[
+        float | None,
+        *scaled(
+            "length", Gain("m", above=0.0, text="distance at which the motion is lost; 0.4 of the nearer body's if absent")
+        ),
+    ] = None
+
+    @model_validator(mode="after")
+    def _whole_steps(self) -> Timing:
+        if self.control_period > self.duration:
+            raise at_key("control_period", f"at most the duration, {self.duration:g}", self.control_period)
+        if not self.duration / self.control_period <= MOST_STEPS:
+            raise at_key("duration", f"at most {MOST_STEPS:.0e} control periods", self.duration)
+        return self
+
+    @property
+    def steps(self) -> int:
+        """Control steps of a run."""
+        return round(self.duration / self.control_period)
+
+
+class Near(Table):
+    """When the circle or the place of rest counts as reached."""
+
+    tolerance: Annotated[float, *scaled("length", Gain("m", above=0.0, text="distance from it"))] = 0.05
+
+
+class StationLawTable(Resources):
+    """What every law table may say beside the law's own gains."""
+
+    type: str
+    name: Annotated[str | None, Field(description="how tables and folders call it; the type if absent", min_length=1)] = None
+
+
+class StationTable(Table):
+    """A whole file, but for its law tables, which are read law by law."""
+
+    name: Annotated[str, Field(min_length=1)]
+    description: str = ""
+    libration: LibrationTable
+    control: ControlTable = ControlTable()
+    initial: PointInitial = PointInitial()
+    simulation: Timing
+    settling: Near = Near()
+
+    @model_validator(mode="after")
+    def _limit_is_of_something(self) -> StationTable:
+        if self.control.limit_kind == "none" and self.control.told:
+            raise at_key("control.limit_kind", "norm or axis where there is a limit", "none")
+        return self
+
+
+def station_schema() -> dict[str, Any]:
+    """A JSON Schema of scenarios of station keeping."""
+    return file_schema(StationTable, station_laws().values(), StationLawTable)

@@ -1,0 +1,49 @@
+"""Systems and claims for the tests of invariant sets."""
+
+from fractions import Fraction
+from functools import cache
+
+from starhold.algebra.polynomial import Polynomial
+from starhold.certification.invariant import System, Wanted, certify, load, prove
+from starhold.certification.invariant.text import read
+
+SQUARE = ((-2.0, 2.0), (-2.0, 2.0))
+
+
+def names(variables):
+    return {name: Polynomial.variable(name) for name in variables.split()}
+
+
+def system(rates, variables="x y", parameters=""):
+    """A system from texts."""
+    known = names(f"{variables} {parameters}")
+    return System(tuple(variables.split()), tuple(read(rate, known) for rate in rates), tuple(parameters.split()))
+
+
+def expression(text, variables="x y"):
+    return read(text, names(variables))
+
+
+def claim(rates, theorem, V, box=SQUARE, rest=None, level=None, escape=None, variables="x y", parameters="", **more):
+    """What is shown of a claim that is written as texts."""
+    every = f"{variables} {parameters}"
+    indicator = tuple(expression(v, every) for v in V) if isinstance(V, (tuple, list)) else expression(V, every)
+    tool = None if escape is None else expression(escape, every)
+    return prove(system(rates, variables, parameters), Wanted(theorem, indicator, box, rest, level, tool, **more))
+
+
+def outcomes(found):
+    """Obligation to outcome."""
+    return {o.name: o.outcome for o in found.obligations}
+
+
+def fractions(state):
+    """An exact state of evidence."""
+    return {name: Fraction(x) for name, x in state.items()}
+
+
+@cache
+def proved(name):
+    """A built-in problem and its certificate."""
+    problem = load(name)
+    return problem, certify(problem)

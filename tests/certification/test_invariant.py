@@ -1,0 +1,293 @@
+"""The theorems on invariant sets: what is proved, what is refuted and by which state, what stays undecided."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from starhold.algebra.polynomial import exact
+from starhold.algebra.scalar import clip, less, maximum, where
+from starhold.certification.invariant import Problem, System, Wanted, builtin_names, certify, enclosure, prove
+from starhold.certification.invariant.descent import Candidate, falls, jumps, leaves, switches
+from starhold.certification.invariant.wording import OBLIGATIONS, evidence, limit, sentence, size
+from tests.certification.invariants import SQUARE, claim, expression, fractions, outcomes, proved, system
+
+ORIGIN = (0, 0)
+ROUND = "x**2 + y**2"
+TURNS, DAMPED, SPIRALS = ("y", "-x"), ("y", "-x - y"), ("y", "-x + y/10")
+
+
+@pytest.fixture
+def impatient(monkeypatch):
+    """Few boxes, for what is not shown with any number of them."""
+    monkeypatch.setattr(enclosure, "MOST", 10_000)
+
+
+# --- theorem 1 -----------------------------------------------------------------------------------------------------------
+
+
+def test_a_centre_is_stable():
+    assert claim(TURNS, "stable", ROUND, rest=ORIGIN).outcome == "proved"
+
+
+def test_what_spirals_out_is_refuted_however_near_the_rest():
+    found = claim(SPIRALS, "stable", ROUND, rest=ORIGIN)
+    assert found.outcome == "refuted"
+    d = found.refutation().evidence["direction"]
+    # V' = y^2/5 on the whole ray.
+    assert d["y"] != 0.0
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_semidefinite_form_that_does_not_factor_is_undecided():
+    found = claim(("-x", "-y", "0"), "stable", "x**2 + y**2 + z**2", (*SQUARE, (-2.0, 2.0)), (0, 0, 0), variables="x y z")
+    assert found.outcome == "undecided"
+
+
+def test_a_form_is_semidefinite_as_a_sum_of_squares():
+    squares = tuple(expression(name, "x y z") for name in "xy")
+    box = (*SQUARE, (-2.0, 2.0))
+    found = claim(("-x", "-y", "0"), "stable", "x**2 + y**2 + z**2", box, (0, 0, 0), variables="x y z", squares=squares)
+    assert found.outcome == "proved"
+    no_sum = claim(("-x", "y", "0"), "stable", "x**2 + y**2 + z**2", box, (0, 0, 0), variables="x y z", squares=squares)
+    assert no_sum.outcome == "refuted"
+
+
+# --- theorem 2 and the corollary ------------------------------------------------------------------------------------------
+
+
+def test_strict_descent_needs_nothing_else():
+    found = claim(("-x + y", "-x - y"), "attracts", ROUND, rest=ORIGIN)
+    assert found.outcome == "proved"
+    assert "leaves" not in outcomes(found)
+
+
+def test_energy_of_the_damped_oscillator_by_what_cannot_vanish_all_at_once():
+    found = claim(DAMPED, "attracts", ROUND, rest=ORIGIN)
+    assert found.outcome == "proved"
+    assert outcomes(found)["leaves"] == "proved"
+
+
+def test_a_centre_does_not_attract_and_that_is_not_known():
+    found = claim(TURNS, "attracts", ROUND, rest=ORIGIN)
+    assert found.outcome == "undecided"
+    assert outcomes(found)["leaves"] == "undecided"
+
+
+@pytest.mark.parametrize("power", [3, 5])
+def test_descent_of_any_even_power(power):
+    assert claim((f"-x**{power}", "-y"), "region", ROUND, rest=ORIGIN).outcome == "proved"
+
+
+def test_largest_level_is_bounded_by_the_box_or_by_v():
+    free = claim(("-x", "-y"), "region", ROUND, rest=ORIGIN)
+    assert 3.9 < free.numbers["level"] < 4.0
+    assert free.numbers["limited_by"] == "border"
+    # x' = -x + x^3: everything up to |x| = 1.
+    held = claim(("-x + x**3", "-y"), "region", ROUND, rest=ORIGIN)
+    assert 0.99 < held.numbers["level"] < 1.0 <= held.numbers["refuted_level"] < 1.001
+    low, high = held.numbers["size"]
+    assert low < np.pi * held.numbers["level"] < high < 1.01 * low
+    assert held.numbers["limited_by"] == "V rises"
+
+
+@pytest.mark.parametrize("level", [0.5, 0.9, 0.99])
+def test_given_level_that_holds(level):
+    found = claim(("-x + x**3", "-y"), "region", ROUND, rest=ORIGIN, level=level)
+    assert (found.outcome, found.numbers["level"]) == ("proved", level)
+
+
+def test_too_large_a_level_is_refuted_by_an_exact_state():
+    found = claim(("-x + x**3", "-y"), "region", ROUND, rest=ORIGIN, level=1.5)
+    assert found.outcome == "refuted"
+    s = fractions(found.refutation().evidence["state"])
+    x, y = s["x"], s["y"]
+    assert 0 < x * x + y * y <= Fraction(3, 2)
+    assert 2 * x * (-x + x**3) - 2 * y * y >= 0
+
+
+def test_level_that_reaches_the_border_is_refuted_there():
+    found = claim(("-x", "-y"), "region", ROUND, rest=ORIGIN, level=4.5)
+    s = fractions(found.refutation().evidence["state"])
+    assert found.refutation().name == "bounded"
+    assert max(abs(s["x"]), abs(s["y"])) == 2
+    assert s["x"] ** 2 + s["y"] ** 2 <= Fraction(9, 2)
+
+
+def test_set_that_motions_leave_is_refuted_between_two_states():
+    found = claim(("1", "-y"), "region", f"{ROUND} - 1")
+    assert found.outcome == "refuted"
+    refuted = found.refutation()
+    assert refuted.name == "invariant"
+    inside, outside = (fractions(refuted.evidence[key]) for key in ("state", "outside"))
+    assert inside["x"] ** 2 + inside["y"] ** 2 <= 1 < outside["x"] ** 2 + outside["y"] ** 2
+    for s in (inside, outside):
+        assert 2 * s["x"] - 2 * s["y"] ** 2 > 0
+
+
+def test_false_indicators_are_refuted():
+    not_positive = claim(("-x", "-y"), "region", "x**2 - y**2", rest=ORIGIN)
+    assert outcomes(not_positive)["positive"] == "refuted"
+    s = fractions(not_positive.refutation().evidence["state"])
+    assert s["x"] ** 2 - s["y"] ** 2 <= 0
+    shifted = claim(("-x", "-y"), "region", f"{ROUND} + 1", rest=ORIGIN)
+    assert outcomes(shifted)["set"] == "refuted"
+    no_rest = claim(("1 - x", "-y"), "region", ROUND, rest=ORIGIN)
+    assert outcomes(no_rest)["rest"] == "refuted"
+    jumps_at_zero = claim(("-x", "-y"), "region", "max(where(y <= 0, 1, 2)*(x**2 + y**2) - 1, 0)")
+    assert outcomes(jumps_at_zero)["continuous"] == "refuted"
+    s = fractions(jumps_at_zero.refutation().evidence["state"])
+    assert s["y"] == 0
+    assert s["x"] ** 2 > Fraction(1, 2)
+
+
+def test_empty_set_is_not_claimed():
+    found = claim(("-x", "-y"), "region", f"{ROUND} + 1")
+    assert found.outcome != "proved"
+
+
+def test_set_on_the_border_is_not_claimed():
+    assert claim(("-x", "-y"), "region", f"{ROUND} - 5").outcome == "refuted"
+
+
+def test_equal_powers_of_a_limit_cycle():
+    f = f"({ROUND} - 1)"
+    found = claim((f"-y - x*{f}", f"x - y*{f}"), "region", f"{f}**2")
+    assert found.outcome == "proved"
+    assert 0.999 < found.numbers["level"] < 1.0
+
+
+@pytest.mark.usefixtures("impatient")
+def test_parameters_take_all_their_values():
+    every = claim(("-a*x", "-y"), "region", ROUND, (*SQUARE, (0.5, 2.0)), ORIGIN, parameters="a")
+    assert every.outcome == "proved"
+    some = claim(("-a*x", "-y"), "region", ROUND, (*SQUARE, (-0.5, 2.0)), ORIGIN, parameters="a")
+    assert some.outcome != "proved"
+
+
+# --- theorem 3 ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_saddle_is_unstable_by_an_indefinite_function():
+    found = claim(("x", "-y"), "unstable", "x**2 - y**2", rest=ORIGIN)
+    assert found.outcome == "proved"
+
+
+def test_a_stable_node_is_not_unstable():
+    found = claim(("-x", "-y"), "unstable", ROUND, rest=ORIGIN)
+    assert found.outcome == "refuted"
+    s = fractions(found.refutation().evidence["state"])
+    assert -2 * s["x"] ** 2 - 2 * s["y"] ** 2 <= 0 < s["x"] ** 2 + s["y"] ** 2
+
+
+def test_rest_outside_of_the_box_is_undecided():
+    assert claim(("x", "y"), "unstable", ROUND, ((1.0, 2.0), (1.0, 2.0)), rest=ORIGIN).outcome == "undecided"
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_set_that_repels():
+    f = f"({ROUND} - 1)"
+    found = claim((f"-y + x*{f}", f"x + y*{f}"), "unstable", f"{f}**2", ((-2.0, 2.0), (-2.0, 2.0)))
+    # The centre is at rest, with V = 1.
+    assert found.outcome == "refuted"
+    outer = claim((f"-y + x*{f}", f"x + y*{f}"), "unstable", f"{ROUND} - 1")
+    assert outer.outcome == "proved"
+
+
+# --- theorem 4 ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_square_is_an_intersection():
+    found = claim(("-x", "-y"), "intersection", ("x**2 - 1", "y**2 - 1"))
+    assert found.outcome == "proved"
+    assert 2.9 < found.numbers["level"] < 3.0
+
+
+def test_intersection_that_one_function_leaves():
+    found = claim(("x", "-y"), "intersection", ("x**2 - 1", "y**2 - 1"))
+    assert found.outcome == "refuted"
+
+
+@pytest.mark.usefixtures("impatient")
+def test_intersection_where_one_function_stands_still_is_undecided():
+    found = claim(("0", "-y"), "intersection", ("x**2 - 1", "y**2 - 1"))
+    assert found.outcome == "undecided"
+
+
+# --- right-hand sides that jump ------------------------------------------------------------------------------------------
+
+
+def test_sliding_to_rest():
+    found = claim(("-sign(x) + y/4", "-y"), "region", ROUND, ((-1.0, 1.0), (-1.0, 1.0)), ORIGIN)
+    assert found.outcome == "proved"
+    assert outcomes(found)["switching"] == "proved"
+    assert "motions in the sense of Filippov where the right-hand side jumps" in found.assumptions
+
+
+def test_v_may_fall_on_both_sides_and_rise_in_between():
+    what = Candidate(system(("-sign(x)", "-1")), expression("2*abs(x) - y + 3"), ((-1.0, 1.0), (-1.0, 1.0)))
+    assert jumps(what.pieces)
+    assert falls(what, 10.0) == []
+    assert not switches(what, 10.0)
+
+
+def test_clipping_does_not_jump():
+    what = Candidate(system(("y", "-sat(3*x + y)")), expression(ROUND), SQUARE)
+    assert len(what.pieces.cells) == 3
+    assert jumps(what.pieces) == []
+
+
+def test_what_does_not_escape_is_not_shown_to():
+    what = Candidate(system(TURNS), expression(ROUND), SQUARE, tuple(map(exact, ORIGIN)))
+    weak = falls(what, 1.0)
+    assert weak
+    x = what.pieces.context.gens()[0]
+    assert not leaves(what, weak, 1.0, x)
+    assert not leaves(what, weak, 1.0, None)
+
+
+# --- the examples that come with it ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", builtin_names())
+def test_examples_are_proved(name):
+    _, certificate = proved(name)
+    assert certificate.outcome == "proved"
+    for one in certificate.claims:
+        assert sentence(one)
+        assert {o.name for o in one.obligations} <= set(OBLIGATIONS)
+
+
+def test_published_example_with_the_function_as_it_is_printed():
+    # Without a factor of four the two halves do not meet, but at (0, 0) and (2, 0).
+    below, above = "(2*x + y)**2 - 8*(x + y)", "(x - 1)**2 + y**2 - 1"
+    rates = ("y", "-2*x - 3*y if y <= 0 else 1 - x")
+    box = ((-4.0, 7.0), (-9.0, 4.0))
+    printed = claim(rates, "region", f"max({below} if y <= 0 else {above}, 0)", box, escape="4*x + y - x*y")
+    assert outcomes(printed) == {"continuous": "refuted"}
+    scaled = claim(rates, "region", f"max({below} if y <= 0 else 4*({above}), 0)", box, escape="4*x + y - x*y")
+    assert scaled.outcome == "proved"
+    assert scaled.numbers["level"] > 31.9
+    # Without a function that escapes, motions on the circles of the upper half are not excluded.
+    alone = claim(rates, "region", f"max({below} if y <= 0 else 4*({above}), 0)", box)
+    assert outcomes(alone)["leaves"] == "undecided"
+
+
+def test_a_python_function_is_a_system():
+    saturated = System.of(("x", "v"), lambda x, v: (v, x + clip(-2.0 * x - 2.0 * v, 1.0)))
+    V = saturated.function(lambda x, v: maximum((x + v) * (x + v), x * x / 9.0))
+    found = prove(saturated, Wanted("region", V, ((-4.0, 4.0), (-6.0, 6.0)), (0, 0), level=0.9))
+    assert found.outcome == "proved"
+    pieces = System.of(("x", "y"), lambda x, y: (y, where(less(0.0, y), 1.0 - x, -2.0 * x - 3.0 * y)))
+    wanted = Wanted("unstable", pieces.function(lambda x, y: y), ((-0.5, 0.5), (-0.5, 0.5)), (0, 0))
+    assert certify(Problem("origin", pieces, (wanted,))).outcome == "proved"
+    with pytest.raises(ValueError, match="derivatives"):
+        System.of(("x", "y"), lambda x, y: (y,))
+
+
+def test_words_bound_numbers_from_the_right_side():
+    found = proved("saturated-axis")[1].claims[0]
+    assert "99.7 % of the true region's 12" in size(found.numbers)
+    assert "no level reaches 1" in limit(found.numbers)
+    refuted = claim(("1", "-y"), "region", f"{ROUND} - 1").refutation()
+    assert "outside (x = " in evidence(refuted)

@@ -1,0 +1,229 @@
+"""Expressions and files of invariant sets: what is read means what Python means, and all else is refused in one line."""
+
+import math
+import re
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from flint import fmpq
+from hypothesis import given
+from hypothesis import strategies as st
+
+from starhold.algebra.intervals import Intervals
+from starhold.algebra.polynomial import Polynomial, exact, pieces
+from starhold.certification.invariant import System, load, parse
+from starhold.certification.invariant.enclosure import Boxes, Form
+from starhold.certification.invariant.system import split
+from starhold.certification.invariant.text import ExpressionError, read
+from starhold.errors import InputError
+
+NAMES = {name: Polynomial.variable(name) for name in "xy"}
+
+
+def sat(x, limit=1):
+    return min(max(x, -limit), limit)
+
+
+def sign(x):
+    return (x > 0) - (x < 0)
+
+
+PYTHON = {"min": min, "max": max, "abs": abs, "sat": sat, "clip": sat, "sign": sign, "where": lambda c, a, b: a if c else b}
+atoms = st.sampled_from(["x", "y", "1", "2", "0.5", "3e-1", "7"])
+
+
+def grown(inner):
+    two = st.tuples(inner, inner)
+    return st.one_of(
+        st.builds("({} {} {})".format, inner, st.sampled_from("+-*"), inner),
+        st.builds("(-{})".format, inner),
+        st.builds("({}) / 4".format, inner),
+        st.builds("({})**2".format, inner),
+        two.map(lambda t: f"max({t[0]}, {t[1]})"),
+        inner.map(lambda t: f"sat({t})"),
+        inner.map(lambda t: f"abs({t})"),
+        st.builds("({} if {} {} {} else {})".format, inner, inner, st.sampled_from(["<", "<=", ">", ">="]), inner, inner),
+    )
+
+
+expressions = st.recursive(atoms, grown, max_leaves=5)
+numbers = st.integers(-12, 12).map(lambda n: Fraction(n, 4))
+
+
+def exactly(text, x, y):
+    """The value by Python's own rules, in fractions."""
+    for written in ("0.5", "3e-1"):
+        text = text.replace(written, f"Fraction('{written}')")
+    return eval(text, {"Fraction": Fraction, **PYTHON}, {"x": x, "y": y})
+
+
+@given(expressions, numbers, numbers)
+def test_expressions_mean_what_python_means(text, x, y):
+    try:
+        value = read(text, NAMES)
+    except ExpressionError:
+        # Too large; what is said of that is tested below.
+        return
+    at = {"x": exact(x), "y": exact(y)}
+    found = [
+        case.value.at(at)
+        for case in pieces(value)
+        if all((condition.positive.at(at) > 0) == truth for condition, truth in case.truths)
+    ]
+    assert len(found) == 1
+    assert found[0] == exact(exactly(text, x, y))
+
+
+@given(expressions, numbers, numbers, st.integers(0, 40))
+def test_enclosures_hold_floats_and_exact_values(text, x, y, width):
+    try:
+        cells = split(System(("x", "y"), (Polynomial({}), Polynomial({}))), read(text, NAMES)).cells
+    except ExpressionError:
+        return
+    size = width / 40
+    sides = tuple(Intervals(np.array([float(c) - size]), np.array([float(c) + size])) for c in (x, y))
+    for cell in cells:
+        form = Form(cell.V)
+        for sharp in (False, True):
+            box = form.on(Boxes(sides, sharp))
+            for dx in (-size, 0.0, size):
+                point = (float(x) + dx, float(y) - dx)
+                value = cell.V(*(fmpq(*p.as_integer_ratio()) for p in point))
+                assert exact(float(box.low[0])) <= value <= exact(float(box.high[0]))
+                near = float(form.at(np.array([[point[0]], [point[1]]]))[0])
+                assert math.isclose(near, int(value.p) / int(value.q), rel_tol=1e-9, abs_tol=1e-6)
+
+
+def test_conditions_may_be_joined():
+    value = read("1 if 0 < x < 1 and not y > 0 or x > 5 else 0", NAMES)
+    for x, y, wanted in ((0.5, -1, 1), (0.5, 1, 0), (2, -1, 0), (6, 1, 1), (-1, -1, 0)):
+        at = {"x": exact(x), "y": exact(y)}
+        found = {c.value.at(at) for c in pieces(value) if all((k.positive.at(at) > 0) == t for k, t in c.truths)}
+        assert found == {fmpq(wanted)}
+
+
+def test_numbers_are_taken_as_written():
+    assert read("0.1", NAMES).value == fmpq(1, 10)
+
+
+@pytest.mark.parametrize(
+    ("text", "found", "allowed"),
+    [
+        ("__import__('os')", "function", "one of where"),
+        ("x.real", '"x.real"', "numbers, variables"),
+        ("(lambda: 1)()", "lambda", "numbers"),
+        ("[x for x in y]", "for", "numbers"),
+        ("sin(x)", 'function "sin"', "one of where"),
+        ("z + 1", 'name "z"', "one of x, y"),
+        ("1/x", 'division by "x"', "a number"),
+        ("x/0", "division", "a number"),
+        ("x ^ 2", '"x ^ 2"', "** for powers"),
+        ("x**y", "power", "whole number"),
+        ("x**-1", "power", "whole number"),
+        ("x**0.5", "power", "whole number"),
+        ("x**99", "power", "whole number"),
+        ("x == y", '"x == y"', "numbers"),
+        ("1 if x == y else 0", '"x == y"', "< <= > >="),
+        ("1 if x else 0", '"x"', "a comparison"),
+        ("x +", "invalid syntax", "an expression"),
+        ("", "invalid syntax", "an expression"),
+        ("True", '"True"', "numbers"),
+        ("'x'", "'x'", "numbers"),
+        ("1j", '"1j"', "numbers"),
+        ("sat(x, 1, 2)", "sat with 3", "1 to 2"),
+        ("max(x)", "max with 1", "2 to 8"),
+        ("max(x, key=y)", "max", "numbers"),
+        ("((x+y+1)**24)**2", "too large", "degree"),
+        ("+".join(["x"] * 3000), "characters", "at most"),
+        ("(" * 400 + "x" + ")" * 400, "", "an expression"),
+        ("-" * 1900 + "x", "", "nested less deeply"),
+        ("abs(x+abs(y+abs(x+abs(y+abs(x+abs(y+abs(x-y)))))))", "", ""),
+        ("x\0y", "", "an expression"),
+    ],
+)
+def test_what_is_not_allowed_is_said(text, found, allowed):
+    with pytest.raises(ExpressionError) as said:
+        read(text, NAMES)
+    assert found in str(said.value)
+    assert allowed in str(said.value)
+    assert "\n" not in str(said.value)
+
+
+GOOD = """
+name = "small"
+variables = ["x", "y"]
+[rates]
+x = "-x"
+y = "-y"
+[box]
+x = [-1, 1]
+y = [-1, 1]
+[[claim]]
+theorem = "region"
+V = "x**2 + y**2"
+rest = { x = 0, y = 0 }
+"""
+
+
+def test_a_small_file_is_read():
+    problem = parse(GOOD, "small.toml")
+    assert problem.name == "small"
+    assert problem.claims[0].rest == (0, 0)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "said"),
+    [
+        ('x = "-x"', 'x = "-z"', "rates.x", 'found the name "z"; allowed: one of x, y'),
+        ('x = "-x"\n', "", "rates.x", "this key is required"),
+        ('x = "-x"', "x = true", "rates.x", "found True; allowed: an expression in quotes"),
+        ('y = "-y"', 'y = "-y"\nz = "1"', "rates.z", "an unknown key"),
+        ("x = [-1, 1]", "x = [1, -1]", "box.x", "two numbers [low, high]"),
+        ("x = [-1, 1]", "x = [-inf, 1]", "box.x", "two numbers [low, high]"),
+        ("x = [-1, 1]", "x = 1", "box.x", "two numbers [low, high]"),
+        ('"region"', '"regoin"', "claim[1].theorem", "did you mean region?"),
+        ('V = "x**2 + y**2"', 'V = "x**2 + w"', "claim[1].V", 'found the name "w"'),
+        ('V = "x**2 + y**2"\n', "", "claim[1].V", "this key is required"),
+        ("rest = { x = 0, y = 0 }", "rest = { x = 0 }", "claim[1].rest.y", "this key is required"),
+        ("rest = { x = 0, y = 0 }", 'rest = { x = 0, y = "1/0" }', "claim[1].rest.y", "a fraction"),
+        ("rest = { x = 0, y = 0 }", "level = -1", "claim[1].level", "a positive number"),
+        ("rest = { x = 0, y = 0 }", "escapes = 1", "claim[1].escapes", "did you mean escape?"),
+        ("rest = { x = 0, y = 0 }", 'escape = "abs(x)"', "claim[1].escape", "one polynomial"),
+        ('["x", "y"]', '["x", "max"]', "variables", "a name of letters"),
+        ('["x", "y"]', '["x", "x"]', "variables", "a name that is not taken"),
+        ('["x", "y"]', "[]", "variables", "a list of 1 to 6 names"),
+        ('["x", "y"]', '["a","b","c","d","e","f","g"]', "variables", "at most 6"),
+        ('name = "small"', 'nane = "small"', "nane", "did you mean name?"),
+        ('name = "small"', 'name = "../up"', "name", "letters, digits"),
+        ("[rates]", "[rates", "", "not TOML"),
+        ('"region"', '"intersection"', "claim[1].V", "a list of expressions"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_one_line(old, new, key, said):
+    assert old in GOOD
+    with pytest.raises(InputError) as error:
+        parse(GOOD.replace(old, new, 1), "small.toml")
+    text = str(error.value)
+    assert text.startswith(f"small.toml: {key}")
+    assert said in text
+    assert "\n" not in text
+
+
+def test_missing_files_name_the_nearest(tmp_path):
+    with pytest.raises(InputError, match="did you mean van-der-pol"):
+        load("van-der-pole")
+    with pytest.raises(InputError, match=r"claim: found \[\]; allowed: at least one"):
+        parse("claim = []\n" + GOOD.partition("[[claim]]")[0], "x")
+    binary = tmp_path / "b.toml"
+    binary.write_bytes(b"\xff\xfe")
+    with pytest.raises(InputError, match="readable text file"):
+        load(binary)
+
+
+def test_examples_of_the_documents():
+    page = (Path(__file__).parents[2] / "docs" / "invariant-sets.md").read_text(encoding="utf-8")
+    (toml,), (python,) = (re.findall(rf"```{kind}\n(.*?)```", page, flags=re.DOTALL) for kind in ("toml", "python"))
+    assert parse(toml, "docs").system.parameters == ("k",)
+    exec(compile(python, "docs", "exec"), {})

@@ -1,0 +1,95 @@
+"""The command `invariant`: what is printed, what is written, the exit codes."""
+
+import json
+
+import pytest
+
+import starhold as sh
+from starhold.certification.invariant.problem import FORMAT
+from tests.cli.test_certify_cli import starhold
+
+pytestmark = pytest.mark.xdist_group("cli")
+
+FILE = """
+name = "mine"
+variables = ["x", "y"]
+[rates]
+x = "-x + x**3"
+y = "{y}"
+[box]
+x = [-2, 2]
+y = [-2, 2]
+[[claim]]
+theorem = "{theorem}"
+V = "x**2 + y**2"
+rest = {{ x = 0, y = 0 }}
+{more}
+"""
+
+
+def written(folder, y="-y", theorem="region", more=""):
+    (folder / "mine.toml").write_text(FILE.format(y=y, theorem=theorem, more=more), encoding="utf-8")
+    return starhold("invariant", "mine.toml", "-o", "out", "--force", cwd=folder)
+
+
+def test_what_is_proved(tmp_path):
+    done = written(tmp_path)
+    assert done.returncode == 0, done.stderr
+    for word in (
+        "proved",
+        "region of attraction (theorem 2)",
+        "come to the rest",
+        "no level reaches 1",
+        "interval arithmetic",
+    ):
+        assert word in " ".join(done.stdout.split())
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["certificate.json", "invariant.png"]
+    content = json.loads((tmp_path / "out" / "certificate.json").read_text(encoding="utf-8"))
+    assert content["format"] == FORMAT
+    (certificate,) = content["certificates"]
+    assert certificate["subject"]["rates"] == {"x": "-x + x**3", "y": "-y"}
+    (claim,) = certificate["claims"]
+    assert (claim["kind"], claim["outcome"]) == ("invariant-region", "proved")
+    assert 0.99 < claim["numbers"]["level"] < 1.0
+    assert sh.invariant(tmp_path / "mine.toml").claims[0].numbers == claim["numbers"]
+
+
+def test_a_refuted_claim_ends_with_three_and_its_state(tmp_path):
+    done = written(tmp_path, more="level = 2")
+    assert done.returncode == 3
+    assert "needed, but refuted: V never rises on the set" in " ".join(done.stdout.split()).replace(" │ │ │ ", " ")
+    assert (tmp_path / "out" / "invariant.png").stat().st_size > 10_000
+
+
+def test_an_undecided_claim_ends_with_four(tmp_path):
+    assert written(tmp_path, y="0", theorem="attracts").returncode == 4
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("invariant", "none.toml"), "no such file"),
+        (("invariant", "van-der-pole"), "did you mean van-der-pol?"),
+        (("invariant", "bad.toml"), 'bad.toml: rates.y: found the function "sin"; allowed: one of where, min'),
+    ],
+)
+def test_user_errors_are_one_line(tmp_path, words, said):
+    (tmp_path / "bad.toml").write_text(FILE.format(y="sin(x)", theorem="region", more=""), encoding="utf-8")
+    done = starhold(*words, cwd=tmp_path)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_systems_that_come_with_it_are_listed(tmp_path):
+    done = starhold("invariant", cwd=tmp_path)
+    assert done.returncode == 0
+    for name in ("switching", "van-der-pol", "saturated-axis", "saturated-strip", "circle", "orbit"):
+        assert name in done.stdout
+
+
+def test_existing_results_are_refused(tmp_path):
+    assert written(tmp_path).returncode == 0
+    again = starhold("invariant", "mine.toml", "-o", "out", cwd=tmp_path)
+    assert again.returncode == 2
+    assert "--force" in again.stderr

@@ -1,0 +1,70 @@
+"""The design of a sail as a user meets it."""
+
+import csv
+import subprocess
+import sys
+
+import pytest
+
+
+def starhold(*words, cwd):
+    return subprocess.run([sys.executable, "-m", "starhold", *words], cwd=cwd, capture_output=True, text=True)
+
+
+def test_sail_prints_the_design_and_writes_the_table(tmp_path):
+    words = ("sail", "--area", "200 m^2", "--reflectivity", "0.83", "--diffuse", "5 %", "-o", "out.csv")
+    done = starhold(*words, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    for said in (
+        "C = 3.94052 Ω²",
+        "best rate √(C − 2Ω²) = 1.393 Ω, period 262.2 days",
+        "2Ω√(C − Ω²) = 3.4296 Ω² × radius = 1.7323e-06 m/s²",
+        "98.69 % of the Sun's disc",
+        "0.6026 m²/kg, 180.8 m² for 300 kg",
+        "margin of 200 m²: 1.106",
+        "11467.8",
+        "Table: out.csv",
+    ):
+        assert said in done.stdout
+    rows = list(csv.DictReader((tmp_path / "out.csv").read_text().splitlines()))
+    assert len(rows) == 7 * 7
+    best = [row for row in rows if row["specular"] == "0.83" and row["rate"].startswith("1.393")]
+    assert float(best[0]["area_per_mass"]) == pytest.approx(0.6026, abs=1e-4)
+    assert min(float(row["peak"]) for row in rows) == float(best[0]["peak"])
+    again = starhold(*words, cwd=tmp_path)
+    assert again.returncode == 2
+    assert "a file that exists" in again.stderr
+    assert starhold(*words, "--force", cwd=tmp_path).returncode == 0
+
+
+def test_another_pair_and_point(tmp_path):
+    done = starhold("sail", "--primaries", "sun-mars", "--point", "L1", "--radius", "7000 km", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "C = 4.02872 Ω²" in done.stdout
+    assert "100 % of the Sun's disc" in done.stdout
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--radius", "3 s"), "--radius: found 3 s; allowed: a quantity in m"),
+        (("--radius", "-2"), "--radius: found -2; allowed: must be above 0"),
+        (("--radius", "1e9 km"), "--radius: found 1e9 km; allowed: a circle smaller than"),
+        (("--primaries", "earth-moon"), "--primaries: found earth-moon; allowed: a pair with the Sun"),
+        (("--primaries", "sun-erth"), "did you mean sun-earth?"),
+        (("--primaries", "sun-jupiter", "--radius", "1 km"), "a circle that the Sun reaches"),
+        (("--point", "L3"), "--point: found L3; allowed: L1 or L2"),
+        (("--reflectivity", "1.2"), "--reflectivity: found 1.2; allowed: must be at most 1"),
+        (("--diffuse", "0.5"), "must add up to more than 0 and at most 1, not 1.5"),
+        (("--mass", "heavy"), "--mass: found heavy; allowed: a number"),
+        (("--area", "nan"), "--area: found nan; allowed: must be finite"),
+        (("-o", "no/such/folder.csv"), "cannot write there"),
+    ],
+)
+def test_user_errors_are_one_line_and_exit_code_2(words, said, tmp_path):
+    done = starhold("sail", *words, cwd=tmp_path)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert "Traceback" not in done.stderr + done.stdout

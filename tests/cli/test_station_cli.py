@@ -1,0 +1,116 @@
+"""The commands with scenarios of station keeping."""
+
+import json
+
+import pytest
+import xarray as xr
+
+from starhold.laws.station.interface import station_laws
+from starhold.scenario.reading import builtin_text
+from tests.cli.test_cli import starhold
+
+SHORT = builtin_text("l2-deficit").replace('"4 yr"', '"1 yr"')
+
+
+@pytest.fixture
+def short(tmp_path):
+    (tmp_path / "short.toml").write_text(SHORT)
+    return tmp_path
+
+
+@pytest.mark.xdist_group("cli")
+def test_compare_writes_everything_and_prints_the_table(short):
+    done = starhold("compare", "short.toml", "-o", "out", cwd=short)
+    assert done.returncode == 0, done.stderr
+    out = short / "out"
+    for word in (
+        "deficit 0",
+        "deficit 10",
+        "delta-v a year",
+        "2.786 as printed diverged at 288.861 days",
+        "Report: out/report.html",
+    ):
+        assert word in done.stdout
+    run = xr.open_dataset(out / "deficit 0" / "run.nc", engine="h5netcdf")
+    assert run.attrs["scenario"] == SHORT
+    assert run["position"].attrs["units"] == "length unit"
+    assert run.attrs["length_unit_m"] == 12_742_000.0
+    assert float(run["time"][-1]) * run.attrs["time_unit_s"] == pytest.approx(365.25 * 86400, rel=2e-3)
+    run.close()
+    summary = json.loads((out / "summary.json").read_text())["laws"]
+    assert list(summary) == ["deficit 0", "deficit 5", "deficit 10", "2.786 as printed"]
+    assert summary["2.786 as printed"]["deviation"] is None
+    assert {path.name for path in out.glob("*.png")} == {"projections.png", "space.png", "control.png", "deviation.png"}
+    assert "</html>" in (out / "report.html").read_text()
+    assert not list(out.rglob(".writing-*"))
+    assert starhold("compare", "short.toml", "-o", "out", cwd=short).returncode == 2
+
+
+@pytest.mark.xdist_group("cli")
+def test_run_flies_one_law_and_tells_a_lost_one_by_its_exit_code(short):
+    done = starhold("run", "short.toml", "--law", "deficit 5", "-o", "one", cwd=short)
+    assert done.returncode == 0, done.stderr
+    assert (short / "one" / "run.nc").exists()
+    lost = starhold("run", "short.toml", "--law", "2.786 as printed", "-o", "lost", cwd=short)
+    assert lost.returncode == 1
+    wrong = starhold("run", "short.toml", "--law", "deficit 6", cwd=short)
+    assert wrong.returncode == 2
+    assert "did you mean deficit" in wrong.stderr
+
+
+@pytest.mark.xdist_group("cli")
+@pytest.mark.parametrize("command", ["failures", "modal-roots"])
+def test_commands_for_bodies_that_turn_say_so(command, short):
+    done = starhold(command, "short.toml", cwd=short)
+    assert done.returncode == 2
+    assert "short.toml: libration: found a scenario of station keeping" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.xdist_group("cli")
+def test_certifies_and_checks(short):
+    done = starhold("certify", "short.toml", "-o", "sure", cwd=short)
+    assert done.returncode == 3, done.stderr
+    assert "deficit 5: refuted" in done.stdout
+    assert "control = 3.43" in done.stdout
+    found = json.loads((short / "sure" / "certificate.json").read_text())["certificates"]
+    assert [c["outcome"] for c in found] == ["undecided", "refuted", "refuted", "refuted"]
+    assert [claim["outcome"] for claim in found[1]["claims"]] == ["proved", "refuted"]
+    checked = starhold("check", "sure/certificate.json", cwd=short)
+    assert checked.returncode == 0, checked.stdout
+    rest = starhold("certify", "l2-rest", "--law", "beside Y", "-o", "rest", cwd=short)
+    assert rest.returncode == 0, rest.stderr
+    assert "99.9 %" in rest.stdout
+
+
+@pytest.mark.xdist_group("cli")
+def test_lists_design_and_new(short):
+    listed = starhold("laws", cwd=short).stdout
+    assert all(name in listed for name in station_laws())
+    assert "radius" in starhold("laws", "l2-circle", cwd=short).stdout
+    assert "l2-nonlinear" in starhold("scenarios", cwd=short).stdout
+    designed = starhold("design", "short.toml", "--law", "deficit 0", cwd=short)
+    assert designed.returncode == 0, designed.stderr
+    assert "peak demand (scaled): 3.43" in designed.stdout
+    made = starhold("new", "my.toml", "--libration", cwd=short)
+    assert made.returncode == 0, made.stderr
+    assert "[libration]" in (short / "my.toml").read_text()
+    assert starhold("new", "x.toml", "--libration", "--wheels", cwd=short).returncode == 2
+
+
+def test_python_interface_takes_both_kinds(short):
+    import starhold as sh
+    from starhold.scenario.template import template_text
+
+    (short / "new.toml").write_text(template_text(libration=True))
+    assert [flight.lost for flight in sh.compare(short / "new.toml")] == [None, None]
+
+    scenario = sh.load(short / "short.toml")
+    run = sh.simulate(scenario, law="deficit 5")
+    assert run.attrs["law"] == "l2-circle"
+    flights = sh.compare(scenario)
+    assert flights[1].run.equals(run)
+    assert sh.design(scenario)[0].gains["rate"] == pytest.approx(1.393, abs=1e-3)
+    assert [c.outcome for c in sh.certify(scenario, law="deficit 10")] == ["refuted"]
+    with pytest.raises(sh.InputError, match="station keeping"):
+        sh.failures(scenario)

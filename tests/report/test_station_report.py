@@ -1,0 +1,177 @@
+"""Report of station keeping: the page opens offline and is the same every time, the pictures show every law."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from starhold.analysis.station import BOARD, Circle, Rest, measure_station
+from starhold.report.flight import Flight, colour
+from starhold.report.station.compare import compare
+from starhold.report.station.figures import draw
+from starhold.report.station.page import render, write_page
+from starhold.report.station.phase import phase_portrait
+from starhold.report.station.plots import collect
+from starhold.scenario.reading import builtin_text
+from starhold.scenario.station.reading import StationScenario, parse_station
+from starhold.simulation.lane import Recording
+from tests.report import flown
+from tests.report.test_page import Reader
+
+
+@cache
+def told(name: str, duration: str = "1 yr") -> StationScenario:
+    """A built-in scenario, shorter."""
+    text = builtin_text(name)
+    for years in ("1 yr", "2 yr", "4 yr", "10 yr"):
+        text = text.replace(f'duration = "{years}"', f'duration = "{duration}"')
+    return parse_station(text, name)
+
+
+@cache
+def flights(name: str) -> tuple[Flight, ...]:
+    """Its laws, flown."""
+    return tuple(compare(told(name)))
+
+
+@pytest.fixture(scope="module")
+def page() -> str:
+    return render(told("l2-deficit"), flights("l2-deficit"))
+
+
+@pytest.fixture(scope="module")
+def reader(page: str) -> Reader:
+    return Reader(page)
+
+
+def test_nothing_is_loaded(page: str, reader: Reader) -> None:
+    for tag, attrs in reader.tags:
+        assert tag not in {"link", "iframe", "img", "object", "embed", "base"}, tag
+        assert not {"src", "href", "srcset", "action", "data", "poster"} & set(attrs), (tag, attrs)
+    policy = next(attrs["content"] for _, attrs in reader.tags if attrs.get("http-equiv") == "Content-Security-Policy")
+    assert policy is not None
+    assert policy.startswith("default-src 'none'")
+    assert page.count("* plotly.js v") == 1
+
+
+def test_equal_flights_give_equal_bytes(tmp_path: Path, page: str) -> None:
+    path = tmp_path / "report.html"
+    write_page(path, told("l2-deficit"), compare(told("l2-deficit")))
+    assert path.read_bytes() == page.encode()
+
+
+def test_every_law_every_metric_and_every_picture_is_there(reader: Reader) -> None:
+    for flight in flights("l2-deficit"):
+        assert flight.name in reader.words
+        for metric in BOARD.measures:
+            if metric in flight.metrics:
+                assert BOARD.shown(metric, flight.metrics[metric]) in reader.words, metric
+    data = reader.data()
+    assert [plot["name"] for plot in data["plots"]] == ["projections", "deviation", "control"]
+    ids = {attrs.get("id") for _, attrs in reader.tags}
+    assert {plot["name"] for plot in data["plots"]} <= ids
+    assert [(p["xlabel"], p["ylabel"]) for p in data["plots"][0]["planes"]] == [
+        ("x", "y"),
+        ("y", "z"),
+        ("u_y", "u_z"),
+        ("u_x", "u_z"),
+    ]
+    assert len(data["scene"]["paths"]) == len(flights("l2-deficit"))
+    assert "diverged at 288" in reader.text
+    assert "0.505" in reader.text
+    assert len(reader.scripts[0]) < 900_000
+
+
+def test_names_from_files_are_no_markup() -> None:
+    name = flown.HOSTILE.replace("'", "")
+    text = told("l2-circle").text.replace('name = "l2-circle"', f"name = '{name}'", 1)
+    scenario = parse_station(text, "odd")
+    found = Reader(render(scenario, flights("l2-circle")))
+    assert sum(tag == "script" for tag, _ in found.tags) == 4
+    assert "alert(" not in "".join(found.scripts[1:])
+    assert name in found.words
+
+
+@pytest.mark.parametrize("name", ["l2-circle", "l2-deficit", "l2-rest"])
+def test_every_figure_is_drawn_with_every_law(tmp_path: Path, name: str) -> None:
+    paths = draw(flights(name), tmp_path, told(name))
+    names = {"deviation.png", "control.png", "projections.png", "space.png"} | (
+        {"phase.png"} if name == "l2-rest" else set()
+    )
+    assert {path.name for path in paths} == names
+    for path in paths:
+        with Image.open(path) as image:
+            picture = np.asarray(image.convert("RGB")).astype(int)
+        assert picture.shape[1] == 880
+        for number in range(len(flights(name))):
+            wanted = np.array([int(colour(number)[i : i + 2], 16) for i in (1, 3, 5)])
+            assert (np.abs(picture - wanted).max(axis=2) < 12).sum() > 20, (path.name, number)
+
+
+def test_one_law_and_a_lost_one_alone_are_drawn(tmp_path: Path) -> None:
+    for number in (0, 3):
+        assert draw(flights("l2-deficit")[number : number + 1], tmp_path, told("l2-deficit"))
+        render(told("l2-deficit"), flights("l2-deficit")[number : number + 1])
+
+
+def test_the_phase_portrait_is_as_the_publication_draws_it() -> None:
+    scenario = told("l2-rest")
+    plot = phase_portrait(flights("l2-rest"), scenario.laws, scenario)
+    assert plot is not None
+    (plane,) = plot.planes
+    saddle = scenario.laws[0].limit / (1.0 + 2.0 * scenario.craft.stiffness)
+    points = next(guide for guide in plane.guides if guide.kind == "points")
+    assert np.sort(points.x).tolist() == pytest.approx([-saddle, saddle])
+    # Scaled by the saddle's distance and the natural rate it is x'' = x + sat(-2x - 2x'): the separatrices are x + x' = +-1,
+    # and the linear zone |x + x'| < 1/2 is half of the region of attraction.
+    for guide in plane.guides:
+        if guide.kind == "dashed":
+            inside = np.abs(guide.x) < 2.0 * saddle
+            edge = np.abs(guide.x + guide.y)[inside]
+            assert np.ptp(edge) < 1e-4 * saddle
+    first = next(guide for guide in plane.guides if guide.kind == "dashed")
+    zone = next(guide for guide in plane.guides if guide.kind == "dark")
+    assert abs(zone.x[0] + zone.y[0]) == pytest.approx(0.5 * abs(first.x + first.y)[len(first.x) // 2], rel=1e-4)
+    assert phase_portrait(flights("l2-circle"), told("l2-circle").laws, told("l2-circle")) is None
+
+
+def test_curves_over_time_are_in_si() -> None:
+    scenario = told("l2-circle")
+    plots = collect(flights("l2-circle"), 2000, scenario)
+    deviation, control = plots.over_time
+    assert plots.times[-1] == pytest.approx(365.25, abs=1.0)
+    assert deviation.clock == "days"
+    assert deviation.panels[0].curves[0][0] == pytest.approx(-0.25 * 12742, rel=1e-3)
+    assert control.panels[3].levels == pytest.approx([scenario.laws[0].limit * 0.505092], rel=1e-4)
+
+
+def recording(position: np.ndarray, control: np.ndarray, **attrs: object) -> Recording:
+    """A run of three samples a unit of time apart."""
+    arrays = {"time": np.arange(len(position), dtype=float), "position": position, "control": control, "command": control}
+    return Recording(arrays, {"control_limit": 2.0, "limit": "norm", **attrs})
+
+
+def test_metrics_of_a_run_made_by_hand() -> None:
+    units = told("l2-circle").units
+    position = np.array([[0.5, 1.5, 0.0], [0.0, 0.0, 1.1], [0.1, 0.9, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    control = np.array([[0.0, 2.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 2.0], [0.0, 0.0, 0.0]])
+    found = measure_station(recording(position, control), units, Circle(1.0, 1.4), 0.15)
+    assert found["settling_time"] == pytest.approx(units.time)
+    assert found["deviation"] == pytest.approx(0.1 * units.length)
+    assert found["deviation_overall"] == pytest.approx(0.5 * units.length)
+    assert found["largest_x"] == pytest.approx(0.1 * units.length)
+    assert found["limit_share"] == pytest.approx(0.4)
+    assert found["peak_ratio"] == pytest.approx(1.0)
+    assert found["effort"] == pytest.approx(6.0 * units.velocity)
+    assert found["effort_per_year"] == pytest.approx(6.0 * units.velocity * 365.25 * 86400 / (4.0 * units.time))
+    rest = measure_station(recording(position, control), units, Rest((0.0, 0.0, 1.0)), 0.01)
+    assert rest["final_distance"] == pytest.approx(np.sqrt(2.0) * units.length)
+    assert rest["settling_time"] is None
+    lost = measure_station(recording(position, control, diverged_at=5.0), units, Circle(1.0, 1.4), 0.15)
+    assert lost["diverged_at"] == pytest.approx(5.0 * units.time)
+    assert lost["deviation"] is None
+    assert BOARD.ranked({"a": lost, "b": found}) == ["b", "a"]

@@ -1,0 +1,175 @@
+"""Scenarios of station keeping: what is read, and that every fault becomes one clear line."""
+
+import math
+import tomllib
+
+import jsonschema
+import numpy as np
+import pytest
+
+from starhold.analysis.station import Circle, Rest, goal_of
+from starhold.errors import InputError
+from starhold.laws.station.interface import station_laws
+from starhold.models.libration import EARTH_DIAMETER, PRIMARIES
+from starhold.report.kinds import kind_of
+from starhold.scenario.opening import json_schema, open_scenario
+from starhold.scenario.reading import builtin_text, load, parse
+from starhold.scenario.station.building import build
+from starhold.scenario.station.reading import StationScenario, parse_station
+from starhold.scenario.station.schema import StationLawTable, StationTable
+from starhold.scenario.template import template_text
+
+BASE = builtin_text("l2-circle")
+OWN = 'larger = 1.327e20\nsmaller = 4.035e14\nseparation = "1.496e11 m"'
+
+
+def build_all(text):
+    scenario = parse_station(text, "my.toml")
+    return [build(scenario, entry) for entry in scenario.laws]
+
+
+FAULTS = {
+    "unknown table": ("[control]", "[controls]", ["controls", "unknown key", "control?"]),
+    "unknown key": ("margin =", "margn =", ["control.margn", "unknown key", "margin?"]),
+    "unknown pair": ('"sun-earth"', '"sun-earht"', ["libration.primaries", "sun-earht", "sun-earth?"]),
+    "unknown point": ('point = "L2"', 'point = "L4"', ["libration.point", "L4", "L1"]),
+    "unknown model": ('model = "linear"', 'model = "lin"', ["libration.model", "nonlinear"]),
+    "pair twice": ('primaries = "sun-earth"', f'primaries = "sun-earth"\n{OWN}', ["libration.primaries", "either"]),
+    "half a pair": ('primaries = "sun-earth"', "larger = 1e20", ["libration.smaller", "together"]),
+    "pair the wrong way": ('primaries = "sun-earth"', OWN.replace("e14", "e24"), ["libration.smaller", "at most"]),
+    "libration no table": (
+        '[libration]\nprimaries = "sun-earth"\npoint = "L2"\nmodel = "linear"',
+        "libration = 3",
+        ["libration"],
+    ),
+    "length unit": ('point = "L2"', 'point = "L2"\nlength_unit = "3 s"', ["libration.length_unit", '"3 s"', "m"]),
+    "two limits": ("margin = 0.10", 'margin = 0.10\nlimit = "1e-6 m/s^2"', ["control.margin", "one of limit"]),
+    "wrong unit": ("margin = 0.10", 'limit = "1e-6 N"', ["control.limit", "m/s^2"]),
+    "limit zero": ("margin = 0.10", "limit = 0", ["control.limit", "above 0"]),
+    "deficit of all": ("margin = 0.10", "deficit = 1.0", ["control.deficit", "at most 0.99"]),
+    "limit of nothing": ("margin = 0.10", 'margin = 0.10\nlimit_kind = "none"', ["control.limit_kind", "norm or axis"]),
+    "greedy without a limit": ("margin = 0.10", "", ["law l2-optimal", "no limit", "margin"]),
+    "position of two": ("[0.02, -0.25, 0.0]", "[0.02, -0.25]", ["initial.position", "3 numbers"]),
+    "position in seconds": ("[0.02, -0.25, 0.0]", '["1 s", 0, 0]', ["initial.position", "m"]),
+    "too far": ("[0.02, -0.25, 0.0]", '["1e6 km", 0, 0]', ["initial.position", "lost_beyond"]),
+    "relative to": ('"target"', '"circle"', ["initial.relative_to", "point"]),
+    "no duration": ('duration = "2 yr"', "", ["simulation.duration", "required"]),
+    "period too long": ("control_period = 0.001", 'control_period = "3 yr"', ["simulation.control_period", "duration"]),
+    "too many steps": ("control_period = 0.001", "control_period = 1e-15", ["simulation.duration", "control periods"]),
+    "tolerance": ("tolerance = 0.02", "tolerance = 0.0", ["settling.tolerance", "above 0"]),
+    "attitude law": ('type = "l2-optimal"', 'type = "pd"', ["law[4].type", "l2-circle"]),
+    "unknown form": ('form = "best"', 'form = "bets"', ["law[1].form", "best?"]),
+    "unknown gain": ("radius = 1.0", "radius = 1.0\nradus = 2", ["law[1].radus", "radius?"]),
+    "gain out of bounds": ("radius = 1.0", "radius = -1.0", ["law[1].radius", "above 0"]),
+    "same name": ('name = "relay"', 'name = "smooth"', ["law[2].name", "no other law"]),
+    "deficit of rest": (
+        'type = "l2-optimal"\nlayer = 0.005\nform = "best"\nradius = 1.0',
+        'type = "l2-rest"\nform = "degree"\ndeficit = 0.1',
+        ["law[4].deficit", "without a circle"],
+    ),
+    "margin of rest": (
+        'type = "l2-optimal"\nlayer = 0.005\nform = "best"\nradius = 1.0',
+        'type = "l2-rest"\nform = "degree"',
+        ["control.margin", "without a circle"],
+    ),
+    "no best rate": ('point = "L2"', 'point = "L3"', ["law[1]", "not above 2"]),
+    "not TOML": ("[control]", "[control", ["not TOML"]),
+}
+
+
+@pytest.mark.parametrize("name", sorted(FAULTS))
+def test_a_fault_is_one_line_with_file_key_and_what_is_allowed(name):
+    old, new, words = FAULTS[name]
+    assert old in BASE
+    with pytest.raises(InputError) as caught:
+        build_all(BASE.replace(old, new))
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith("my.toml: ")
+    for word in words:
+        assert word in message
+
+
+def test_a_file_without_laws():
+    with pytest.raises(InputError, match=r"law: found no law"):
+        parse_station(BASE.split("[[law]]")[0], "my.toml")
+
+
+def test_strings_with_units_are_scaled():
+    text = BASE.replace("[0.02, -0.25, 0.0]", '["12742 km", -0.25, "0 m"]\nvelocity = ["1 m/s", 0.0, 0.0]')
+    text = text.replace("margin = 0.10", 'limit = "2e-6 m/s^2"\nlag = "12 h"').replace('"2 yr"', '"100 d"')
+    scenario = parse_station(text, "my.toml")
+    units, table = scenario.units, scenario.table
+    assert units.length == EARTH_DIAMETER
+    assert table.initial.position == pytest.approx((1.0, -0.25, 0.0))
+    assert table.initial.velocity[0] * units.velocity == pytest.approx(1.0)
+    assert table.control.limit is not None
+    assert table.control.limit * units.acceleration == pytest.approx(2e-6)
+    assert [entry.lag * units.time for entry in scenario.laws] == pytest.approx([43200.0] * 4)
+    assert table.simulation.steps == round(100 * 86400 / units.time / 0.001)
+
+
+def test_a_limit_in_the_law_comes_before_the_common_one():
+    scenario = open_scenario("l2-deficit")
+    assert isinstance(scenario, StationScenario)
+    shares = [entry.limit / scenario.laws[0].limit for entry in scenario.laws]
+    assert shares[:3] == pytest.approx([1.0, 0.95, 0.9])
+    assert scenario.laws[3].limit == 2.786
+    free = parse_station(builtin_text("l2-deficit").replace("deficit = 0.0\n", ""), "my.toml")
+    assert math.isinf(free.laws[0].limit)
+    assert build(free, free.laws[0]).limit_kind == "none"
+
+
+def test_starts_on_the_circle_of_each_law_and_at_its_place_of_rest():
+    for name in ("l2-circle", "l2-rest"):
+        scenario = open_scenario(name)
+        assert isinstance(scenario, StationScenario)
+        for entry in scenario.laws:
+            loop, goal = build(scenario, entry), goal_of(entry.gains)
+            offset = np.array(scenario.table.initial.position)
+            assert goal.distance(np.array([loop.start.position]) - offset)[0] == pytest.approx(0.0, abs=1e-15)
+            if isinstance(goal, Circle):
+                assert loop.start.velocity == (0.0, 0.0, goal.rate)
+            else:
+                assert isinstance(goal, Rest)
+                assert loop.start.velocity == (0.0, 0.0, 0.0)
+
+
+def test_two_bodies_of_ones_own():
+    sun_earth = PRIMARIES["sun-earth"]
+    own = f"larger = {sun_earth.larger!r}\nsmaller = {sun_earth.smaller!r}\nseparation = {sun_earth.separation!r}"
+    ours, theirs = (parse_station(BASE.replace('primaries = "sun-earth"', text), "my") for text in (own, ""))
+    assert ours.craft == theirs.craft
+    assert ours.units == theirs.units
+
+
+def test_the_template_names_every_key_and_the_schema_takes_it():
+    scenario = parse_station(template_text(libration=True), "new.toml")
+    assert [kind_of(scenario).build(scenario, entry) for entry in scenario.laws]
+    for name, field in StationTable.model_fields.items():
+        options = [field.annotation, *getattr(field.annotation, "__args__", ())]
+        for model in (o for o in options if hasattr(o, "model_fields")):
+            assert f"[{name}]" in template_text(libration=True)
+            for key in model.model_fields:
+                assert f"{key} = " in template_text(libration=True) or key == "deficit"
+    for key in StationLawTable.model_fields:
+        assert key in template_text(libration=True)
+    check = jsonschema.Draft202012Validator(json_schema())
+    assert not list(check.iter_errors(tomllib.loads(BASE)))
+    for old, new in (("radius =", "raduis ="), ("margin", "margn"), ('"L2"', '"L4"'), ('"sun-earth"', '"sun"')):
+        assert list(check.iter_errors(tomllib.loads(BASE.replace(old, new))))
+
+
+def test_each_kind_is_refused_where_the_other_is_needed():
+    with pytest.raises(InputError, match="station keeping"):
+        load("l2-circle")
+    with pytest.raises(InputError, match="station keeping"):
+        parse(BASE, "my.toml")
+    with pytest.raises(InputError, match="spacecraft: found an unknown key"):
+        parse_station(BASE.replace("[control]", "[spacecraft]\n[control]"), "my.toml")
+
+
+def test_every_station_law_has_a_goal():
+    for law in station_laws().values():
+        for gains in law.examples():
+            assert isinstance(goal_of(gains), Circle | Rest)
