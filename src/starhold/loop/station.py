@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 from starhold.algebra.scalar import both, equation, is_finite, less, opposite, where
-from starhold.algebra.structure import move
 from starhold.algebra.vector import ZERO, Vector, dot
 from starhold.laws.interface import NoMemory
 from starhold.laws.station.interface import SeenPoint, StationLaw
 from starhold.loop.closed_loop import LIMITS
-from starhold.loop.step import Step
+from starhold.loop.step import Step, runge_kutta
 from starhold.models import actuator, libration
 from starhold.models.libration import Libration, PointState
 
@@ -121,10 +120,6 @@ class StationLoop:
         """The plant, under the name that kernels have for what a law acts on."""
         return self.plant
 
-    def with_limit(self, limit: float) -> StationLoop:
-        """The same with another limit."""
-        return replace(self, limit=limit)
-
 
 def station_step(parts: StationParts) -> Step:
     """The equations of a control step made of these parts."""
@@ -147,15 +142,12 @@ def station_step(parts: StationParts) -> Step:
         control_rate = response(state.control, carry.command, begun, setup.substep, setup.dynamics)
         return libration.motion(state, acceleration, control_rate)
 
+    advance = runge_kutta(slope)
+
     @equation
     def hold(carry, plant, setup):
-        """One substep: the classical Runge-Kutta method of fourth order."""
-        s, h = carry.state, setup.substep
-        a = slope(s, s.control, carry, plant, setup)
-        b = slope(move(s, 0.5 * h, a), s.control, carry, plant, setup)
-        c = slope(move(s, 0.5 * h, b), s.control, carry, plant, setup)
-        d = slope(move(s, h, c), s.control, carry, plant, setup)
-        end = move(s, h / 6.0, move(move(move(a, 2.0, b), 2.0, c), 1.0, d))
+        """One substep."""
+        end = advance(carry.state, carry.state.control, carry, plant, setup)
         return StationCarry(end, carry.memory, carry.command, carry.lost_at)
 
     @equation

@@ -38,6 +38,24 @@ class Step(NamedTuple):
     sample: Callable[..., Any]
 
 
+def runge_kutta(slope: Callable[..., Any]) -> Callable[..., Any]:
+    """The classical method of fourth order over a substep, for d(state)/dt = slope(state, begun, carry, craft, setup).
+
+    begun: what the actuators gave as it started.
+    """
+
+    @equation
+    def advance(state, begun, carry, craft, setup):
+        h = setup.substep
+        a = slope(state, begun, carry, craft, setup)
+        b = slope(move(state, 0.5 * h, a), begun, carry, craft, setup)
+        c = slope(move(state, 0.5 * h, b), begun, carry, craft, setup)
+        d = slope(move(state, h, c), begun, carry, craft, setup)
+        return move(state, h / 6.0, move(move(move(a, 2.0, b), 2.0, c), 1.0, d))
+
+    return advance
+
+
 def attitude_step(parts: Parts) -> Step:
     """The equations of a control step made of these parts."""
     environment, target, sense, disturb, cover, law, limit, begin, response, *body = parts
@@ -96,15 +114,12 @@ def attitude_step(parts: Parts) -> Step:
         outside = add(carry.disturbance, external)
         return rates(state, outside, acceleration, torque_rate, craft, setup.wheels, share)
 
+    advance = runge_kutta(slope)
+
     @equation
     def hold(carry, craft, setup):
-        """One substep: the classical Runge-Kutta method of fourth order."""
-        s, h = carry.state, setup.substep
-        a = slope(s, s.torque, carry, craft, setup)
-        b = slope(move(s, 0.5 * h, a), s.torque, carry, craft, setup)
-        c = slope(move(s, 0.5 * h, b), s.torque, carry, craft, setup)
-        d = slope(move(s, h, c), s.torque, carry, craft, setup)
-        end = move(s, h / 6.0, move(move(move(a, 2.0, b), 2.0, c), 1.0, d))
+        """One substep."""
+        end = advance(carry.state, carry.state.torque, carry, craft, setup)
         return Carry(tidy(end), carry.memory, carry.goal, carry.h, carry.command, carry.disturbance, carry.lost_at)
 
     @equation

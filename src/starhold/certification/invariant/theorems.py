@@ -217,7 +217,8 @@ def _falling(proof: _Proof) -> bool:
             return False
         shown = _largest(proof)
         if shown is None:
-            return proof.add("falls", INTERVALS, None, _exhausted())
+            hint = "" if what.rest is not None else "; where M is one point, say so by `rest`"
+            return proof.add("falls", INTERVALS, None, {"reason": _exhausted()["reason"] + hint})
     if what.rest is None and wanted.theorem != "stable":
         _inhabited(proof, shown.level)
     proof.add("bounded", INTERVALS, True)
