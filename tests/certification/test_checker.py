@@ -412,7 +412,7 @@ def replaced(content, path, change):
     return changed
 
 
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(some.data())
 def test_nothing_can_be_taken_away_or_be_of_another_type(made, data):
     content = made(data.draw(some.sampled_from(["pd-2", "lqr-II-uneven", "sliding-1"])), disturbance=1e-6)
@@ -436,7 +436,7 @@ def content_at(content, path):
     return content
 
 
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(some.data())
 def test_no_number_makes_the_checker_stumble(made, data):
     content = made(data.draw(some.sampled_from(["pd-2", "lqr-I", "sliding-1"])), "hysteresis", 1e-6)

@@ -164,7 +164,7 @@ def test_modelled_torque_is_bounded_over_the_whole_orbit():
 
 
 @pytest.mark.parametrize("name", ["pd-0", "lqr-I", "lqr-II", "lqr-III", "matrix-pd-inertial"])
-@pytest.mark.parametrize("cover", ["as_published", "hysteresis"])
+@pytest.mark.parametrize("cover", ["as_published", pytest.param("hysteresis", marks=pytest.mark.slow)])
 def test_disturbed_flights_end_within_the_ultimate_bound(name, cover):
     """A torque of the claimed size that always pushes away cannot leave the claimed ball, nor one that is constant."""
     loop = loop_of(LOOPS[name].law.name, LOOPS[name].gains, LOOPS[name].craft, cover=cover)

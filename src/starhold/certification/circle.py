@@ -3,7 +3,8 @@
 With f1 = y^2 + z^2 - radius^2, f2 = y' + rate z, f3 = z' - rate y and V = (alpha f1^2 + f2^2 + f3^2)/2 the law's neutral
 control keeps V, and what it takes off is k (f2, f3), or of a relay k (f2, f3)/max(|(f2, f3)|, layer); so V' <= 0, and
 V' = 0 only where f2 = f3 = 0. There f2' = -2 alpha f1 y and f3' = -2 alpha f1 z: a motion that stays there has f1 = 0, which
-is the circle, or y = z = 0, where V = alpha radius^4/2. Along X the motion is linear and on its own.
+is the circle, or y = z = 0, where V = alpha radius^4/2. Along X the motion is linear and on its own. In the full problem a
+level below that also keeps the motion off the bodies, which lie at y = z = 0.
 
 A relay without a layer is a set of controls where f2 = f3 = 0, all of norm up to k. It holds every circle with
 2 alpha |f1| r <= k: V stays there, and the circle attracts nothing but the band around it.
