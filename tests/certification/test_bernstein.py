@@ -50,7 +50,7 @@ def test_halves_have_the_coefficients_of_halves(terms, low, width, x, y):
     # In whole numbers that may only be too large, by less than one for each average.
     scaled = bounds.bernstein(found * 1024, whole, [3, 2])
     rows = np.array([[int(c.ceil()) for c in row] for row in scaled], dtype=np.int64)[None, None]
-    half = bounds._halves(np.concatenate([rows, rows], axis=1), 2)[0, 0]
+    half = bounds.halves(np.concatenate([rows, rows], axis=1), 2)[0, 0]
     wanted = bounds.bernstein(found * 1024, left, [3, 2])
     excess = [int(a) - b for a, b in zip(half.flat, wanted.flat, strict=True)]
     assert all(0 <= e <= 4 for e in excess)

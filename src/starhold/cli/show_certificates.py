@@ -21,6 +21,7 @@ COLOURS = {
     "undecided": "yellow",
     "holds": "green",
     "fails": "red",
+    "not checked": "yellow",
     "not claimed": "dim",
 }
 
@@ -106,15 +107,21 @@ def print_findings(findings: Sequence[Finding]) -> None:
         groups.setdefault((finding.certificate, finding.claim), []).append(finding)
     for (name, claim), group in groups.items():
         verdicts = {finding.verdict for finding in group}
-        worst = next(v for v in ("fails", "not claimed", "holds") if v in verdicts)
+        worst = next(v for v in ("fails", "not checked", "not claimed", "holds") if v in verdicts)
         table.add_row(name, claim, ", ".join(f.obligation for f in group if f.obligation), _coloured(worst))
     console.print(table)
     failed = [finding for finding in findings if finding.verdict == "fails"]
     for f in failed:
         where = " / ".join(part for part in (f.certificate, f.claim, f.obligation) if part)
         console.print(f"[red]fails[/red]  {where}: {f.reason}", highlight=False)
+    left = [finding for finding in findings if finding.verdict == "not checked"]
+    for f in left:
+        where = " / ".join(part for part in (f.certificate, f.claim, f.obligation) if part)
+        console.print(f"[yellow]not checked[/yellow]  {where}: {f.reason}", highlight=False)
     claimed = sum(finding.verdict == "holds" for finding in findings)
-    console.print(f"{claimed} obligations hold, {len(failed)} fail.", highlight=False)
+    console.print(
+        f"{claimed} obligations hold, {len(failed)} fail{f', {len(left)} are not checked' if left else ''}.", highlight=False
+    )
 
 
 def _coloured(outcome: str) -> str:

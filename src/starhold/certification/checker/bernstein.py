@@ -20,7 +20,7 @@ Box: TypeAlias = Mapping[str, tuple[Any, Any]]
 """Ends of each variable's interval, rationals."""
 Whole: TypeAlias = NDArray[np.int64]
 SIZE, SHARE, GREATEST = 40, 12, 20
-"""Coefficients are 2^SIZE at most, weights multiples of 2^-SHARE up to 2^GREATEST of these: what `_decided` adds up is below
+"""Coefficients are 2^SIZE at most, weights multiples of 2^-SHARE up to 2^GREATEST of these: what `decided` adds up is below
 2^62."""
 MOST = 20_000
 """So many boxes are looked at, at most."""
@@ -35,15 +35,15 @@ def negative_where(fall: Polynomial, room: Polynomial, box: Box) -> bool:
     negative all over, and decides those on its border, where neither polynomial has one sign.
     """
     degrees = [max(_degree(p, name) for p in (fall, room)) for name in box]
-    waiting: Whole = np.stack([_rounded(bernstein(p, box, degrees)) for p in (fall, room)])[None]
+    waiting = stacked((fall, room), box, degrees)
     seen = 0
     while len(waiting):
         seen += len(waiting)
         if seen > MOST or _fails_at_a_corner(waiting):
             return False
-        left = waiting[~_decided(waiting)]
-        steepest = _steepest(left)
-        waiting = np.concatenate([_halves(left[steepest == axis], axis) for axis in range(2, waiting.ndim)])
+        left = waiting[~decided(waiting)]
+        axes = steepest(left)
+        waiting = np.concatenate([halves(left[axes == axis], axis) for axis in range(2, waiting.ndim)])
     return True
 
 
@@ -55,6 +55,11 @@ def positive_on(polynomial: Polynomial, name: str, low: Any, high: Any, pieces: 
         for k in range(pieces)
         for c in bernstein(polynomial, {name: (low + k * step, low + (k + 1) * step)}, [_degree(polynomial, name)])
     )
+
+
+def stacked(polynomials: Sequence[Polynomial], box: Box, degrees: Sequence[int]) -> Whole:
+    """The coefficients of several polynomials over one box, each in units of its own."""
+    return np.stack([_rounded(bernstein(p, box, degrees)) for p in polynomials])[None]
 
 
 def bernstein(polynomial: Polynomial, box: Box, degrees: Sequence[int]) -> NDArray[Any]:
@@ -87,7 +92,7 @@ def _rounded(coefficients: NDArray[Any]) -> Whole:
     return np.array([int((c / unit).ceil()) for c in coefficients.flat], dtype=np.int64).reshape(coefficients.shape)
 
 
-def _decided(boxes: Whole) -> NDArray[np.bool_]:
+def decided(boxes: Whole) -> NDArray[np.bool_]:
     """The boxes where room is negative, or fall + weight room for the weight that floats guess."""
     rows: Any = boxes.reshape(len(boxes), 2, -1)
     fall, room = rows[:, 0], rows[:, 1]
@@ -112,7 +117,7 @@ def _fails_at_a_corner(boxes: Whole) -> bool:
     return bool((corners > CLEAR).all(axis=1).any())
 
 
-def _steepest(boxes: Whole) -> NDArray[np.intp]:
+def steepest(boxes: Whole) -> NDArray[np.intp]:
     """The axis along which the coefficients of either polynomial change most."""
     steps = [
         np.abs(np.diff(boxes, axis=axis)).max(axis=tuple(range(2, boxes.ndim)), initial=0).sum(axis=1) * boxes.shape[axis]
@@ -121,7 +126,7 @@ def _steepest(boxes: Whole) -> NDArray[np.intp]:
     return np.argmax(steps, axis=0) + 2
 
 
-def _halves(boxes: Whole, axis: int) -> Whole:
+def halves(boxes: Whole, axis: int) -> Whole:
     """Both halves of boxes along an axis, by de Casteljau's averages rounded up."""
     row = np.moveaxis(boxes, axis, 0)
     first, last = [row[0]], [row[-1]]

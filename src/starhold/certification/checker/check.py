@@ -9,13 +9,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any
 
 import numpy as np
 from flint import ctx
 
 from starhold.certification.checker.claims import CLAIMS
-from starhold.certification.checker.exact import CheckError, Obligation, demand
+from starhold.certification.checker.exact import CheckError, Obligation, Verdict, demand
+from starhold.certification.checker.invariant import FORMAT as INVARIANT
+from starhold.certification.checker.invariant import invariant_findings
 from starhold.certification.checker.refutation import refutation
 from starhold.certification.checker.shapes import (
     CERTIFICATE,
@@ -36,8 +38,6 @@ FORMAT = "starhold certificate 1"
 BITS = 192
 """Precision of balls: enough that they are far narrower than the margins of a certificate."""
 
-Verdict: TypeAlias = Literal["holds", "fails", "not claimed"]
-
 
 @dataclass(frozen=True)
 class Finding:
@@ -51,8 +51,8 @@ class Finding:
 
 
 def passed(findings: Sequence[Finding]) -> bool:
-    """Whether nothing fails. What is not claimed is not proved either."""
-    return all(finding.verdict != "fails" for finding in findings)
+    """Whether all that is claimed to be proved was shown again. What is not claimed is not proved either."""
+    return all(finding.verdict not in ("fails", "not checked") for finding in findings)
 
 
 def check_file(path: Path | str) -> list[Finding]:
@@ -83,10 +83,16 @@ def check(content: Any) -> list[Finding]:
     with ctx.workprec(BITS), np.errstate(all="ignore"):
         try:
             shaped(content, FILE, "the file")
-            demand(content["format"] == FORMAT, f"the format is not {FORMAT!r}")
+            demand(content["format"] in (FORMAT, INVARIANT), f"the format is not {FORMAT!r} or {INVARIANT!r}")
             demand(len(content["certificates"]) > 0, "there are no certificates")
         except CheckError as fault:
             return [Finding("", "", "", "fails", str(fault))]
+        if content["format"] == INVARIANT:
+            return [
+                Finding(str(given.get("name", "")), *found)
+                for given in content["certificates"]
+                for found in invariant_findings(given)
+            ]
         return [finding for given in content["certificates"] for finding in _certificate(given)]
 
 

@@ -12,7 +12,7 @@ from fractions import Fraction
 from functools import reduce
 from itertools import combinations, zip_longest
 from operator import mul
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from flint import acb, acb_poly, arb, fmpq, fmpq_mat, fmpq_poly
@@ -23,6 +23,7 @@ Rows: TypeAlias = list[list[Any]]
 Truths: TypeAlias = Sequence[tuple[Condition, bool]]
 Interval: TypeAlias = tuple[Any, Any]
 """Ends of a closed interval; None for an end at infinity."""
+Verdict: TypeAlias = Literal["holds", "fails", "not checked", "not claimed"]
 Obligation: TypeAlias = tuple[str, str, Callable[[], str]]
 """Its name, how it is to be shown ("" for numbers that are no obligation of their own), and what shows it: the reason, or a
 CheckError."""
@@ -33,6 +34,10 @@ SHARES = (0.0, *(2.0**k for k in range(-52, 4)))
 
 class CheckError(Exception):
     """Why something in a certificate does not hold, or cannot be verified."""
+
+
+class NotCheckedError(CheckError):
+    """Why the checker's methods neither showed something nor found it false."""
 
 
 def demand(holds: bool, otherwise: str) -> None:

@@ -122,6 +122,14 @@ class _File:
         wanted = [self._claim(table, f"claim[{k}]") for k, table in enumerate(tables, 1)]
         written: dict[str, Any] = {name: self.data[name] for name in ("define", "rates") if name in self.data}
         written["V"] = [table["V"] for table in tables]
+        # Whatever a claim is made of, so that it can be checked from the certificate alone.
+        rests = [item[0].rest for item in wanted]
+        if any(rest is not None for rest in rests):
+            names = self.variables
+            written["rest"] = [rest and {n: str(x) for n, x in zip(names, rest, strict=True)} for rest in rests]
+        for key in ("escape", "squares"):
+            if any(key in table for table in tables):
+                written[key] = [table.get(key) for table in tables]
         return Problem(
             self._text(self.data, "name", "", Path(self.where).stem),
             system,

@@ -65,6 +65,8 @@ class _Proof:
     what: Candidate
     found: list[Obligation] = field(default_factory=list[Obligation])
     numbers: dict[str, Any] = field(default_factory=dict[str, Any])
+    limit: dict[str, float] | None = None
+    """The state that stops the level."""
 
     def add(self, name: str, how: str, holds: bool | None, evidence: dict[str, Any] | None = None) -> bool:
         outcome: Outcome = "proved" if holds else "undecided" if holds is None else "refuted"
@@ -77,6 +79,8 @@ class _Proof:
 
     def claim(self) -> Claim:
         witness: dict[str, Any] = {"name": self.wanted.name, "box": [list(side) for side in self.wanted.box]}
+        if self.limit is not None:
+            witness["limit"] = self.limit
         told = {"theorem": self.wanted.theorem} | self.numbers
         assumptions = ASSUMPTIONS if jumps(self.what.pieces) else ASSUMPTIONS[:1]
         return Claim(f"invariant-{self.wanted.theorem}", told, witness, assumptions, tuple(self.found))
@@ -296,6 +300,7 @@ def _tell(proof: _Proof, level: float) -> None:
         if above:
             numbers["limited_by"] = min(above, key=lambda kind: above[kind])
             numbers["refuted_level"] = above[numbers["limited_by"]]
+            proof.limit = (kinds[numbers["limited_by"]] or {})["state"]
     if len(what.box) <= 3 and not what.system.parameters:
         numbers["size"] = volume(what, level)
         if proof.wanted.known is not None:
