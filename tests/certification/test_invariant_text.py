@@ -16,7 +16,7 @@ from starhold.algebra.polynomial import Polynomial, exact, pieces
 from starhold.certification.invariant import System, load, parse
 from starhold.certification.invariant.enclosure import Boxes, Form
 from starhold.certification.invariant.system import split
-from starhold.certification.invariant.text import ExpressionError, read
+from starhold.certification.invariant.text import ExpressionError, as_written, read
 from starhold.errors import InputError
 
 NAMES = {name: Polynomial.variable(name) for name in "xy"}
@@ -227,3 +227,15 @@ def test_examples_of_the_documents():
     (toml,), (python,) = (re.findall(rf"```{kind}\n(.*?)```", page, flags=re.DOTALL) for kind in ("toml", "python"))
     assert parse(toml, "docs").system.parameters == ("k",)
     exec(compile(python, "docs", "exec"), {})
+
+
+@pytest.mark.parametrize("text", ["1e-999999999", "2.5E+1000000", "1e9999"])
+def test_a_number_that_would_fill_the_memory_is_refused(text):
+    with pytest.raises(ExpressionError, match="a power of ten"):
+        as_written(text)
+
+
+def test_numbers_are_taken_as_written():
+    assert as_written("0.1") == Fraction(1, 10)
+    assert as_written("1e-3") == Fraction(1, 1000)
+    assert as_written("-2/6") == Fraction(-1, 3)

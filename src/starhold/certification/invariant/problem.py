@@ -18,7 +18,7 @@ from starhold.algebra.polynomial import Polynomial, exact, pieces
 from starhold.certification.certificate import Certificate
 from starhold.certification.certificate import write as write_certificates
 from starhold.certification.invariant.system import System
-from starhold.certification.invariant.text import RESERVED, ExpressionError, read
+from starhold.certification.invariant.text import RESERVED, ExpressionError, as_written, read
 from starhold.certification.invariant.theorems import THEOREMS, Wanted, prove
 from starhold.errors import InputError
 
@@ -204,7 +204,7 @@ class _File:
                 if isinstance(x, bool):
                     raise ValueError
                 # As written: 0.1 is one tenth, and a text may be a fraction.
-                found.append(Fraction(str(x)))
+                found.append(as_written(str(x)))
             except (ValueError, ZeroDivisionError):
                 raise InputError(self.where, f"{key}.{name}", _show(x), 'a number, or a fraction such as "1/3"') from None
         return tuple(found)

@@ -16,6 +16,8 @@ from starhold.algebra.scalar import absolute, less, maximum, minimum, sign, wher
 
 LONGEST = 2_000
 """Characters of an expression."""
+DIGITS = 3
+"""Of a power of ten: floats have no more."""
 MOST_TERMS, MOST_CASES, HIGHEST = 600, 64, 24
 """Terms of a polynomial, cases of a piecewise one, and the degree: beyond these a proof would not end anyway."""
 ALLOWED = "numbers, variables, + - * / **, comparisons, 'a if b else c', and where, min, max, abs, clip, sat, sign"
@@ -27,6 +29,13 @@ class ExpressionError(ValueError):
     def __init__(self, found: str, allowed: str = ALLOWED) -> None:
         self.found, self.allowed = found, allowed
         super().__init__(f"found {found}; allowed: {allowed}")
+
+
+def as_written(text: str) -> Fraction:
+    """The number that a text says: 0.1 is one tenth. ExpressionError, a ValueError, for powers of ten that fill the memory."""
+    if len(text.lower().partition("e")[2].lstrip("+-")) > DIGITS:
+        raise ExpressionError(text, f"a power of ten of at most {DIGITS} digits")
+    return Fraction(text)
 
 
 def _sat(x: Any, limit: Any = 1) -> Any:
@@ -91,7 +100,7 @@ class _Reader:
     def _number(self, node: ast.expr) -> Any:
         match node:
             case ast.Constant(value=int() | float()) if not isinstance(node.value, bool):
-                return Polynomial.constant(Fraction(ast.get_source_segment(self._text, node) or str(node.value)))
+                return Polynomial.constant(as_written(ast.get_source_segment(self._text, node) or str(node.value)))
             case ast.Name(id=name):
                 if name not in self._names:
                     raise ExpressionError(f'the name "{name}"', f"one of {', '.join(self._names)}")
