@@ -235,7 +235,7 @@ def test_a_number_that_would_fill_the_memory_is_refused(text):
         as_written(text)
 
 
-def test_numbers_are_taken_as_written():
+def test_numbers_and_fractions_alone():
     assert as_written("0.1") == Fraction(1, 10)
     assert as_written("1e-3") == Fraction(1, 1000)
     assert as_written("-2/6") == Fraction(-1, 3)

@@ -32,7 +32,7 @@ class ExpressionError(ValueError):
 
 
 def as_written(text: str) -> Fraction:
-    """The number that a text says: 0.1 is one tenth. ExpressionError, a ValueError, for powers of ten that fill the memory."""
+    """The number that a text says: 0.1 is one tenth. ExpressionError for powers of ten that would fill the memory."""
     if len(text.lower().partition("e")[2].lstrip("+-")) > DIGITS:
         raise ExpressionError(text, f"a power of ten of at most {DIGITS} digits")
     return Fraction(text)
