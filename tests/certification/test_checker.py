@@ -249,7 +249,9 @@ def test_a_number_that_says_more_fails(made, name, cover, kind, keys, factor):
         assert not passed(check(changed)), key
 
 
-@pytest.mark.parametrize("name", ["pd-2", "lqr-I", "lqr-II-uneven", "lyapunov-0", "sliding-1"])
+@pytest.mark.parametrize(
+    "name", ["pd-2", pytest.param("lqr-I", marks=pytest.mark.slow), "lqr-II-uneven", "lyapunov-0", "sliding-1"]
+)
 def test_a_bound_that_is_dropped_or_a_witness_that_is_not_one_fails(made, name):
     for cover in ("as_published", "shortest", "hysteresis"):
         whole = made(name, cover, 1e-6)
