@@ -59,7 +59,7 @@ def compiled(function: Callable[..., Any], parts: AnyParts) -> Callable[..., Any
 @cache
 def _drop_stale(folder: Path, sources: str) -> None:
     """Delete the cached kernels of sources that have changed since; no process will ask for them again."""
-    for file in folder.glob("kernels.*-*-*.nb[ic]"):
+    for file in folder.glob("*.*-*-*.nb[ic]"):
         if f"-{sources}-" not in file.name:
             with suppress(OSError):
                 file.unlink()
