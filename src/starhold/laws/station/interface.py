@@ -16,6 +16,7 @@ from starhold.algebra.vector import Vector, dot, scale, subtract
 from starhold.laws import catalogue as laws
 from starhold.laws.interface import NoMemory
 from starhold.models.libration import Libration, linear, nonlinear
+from starhold.models.station import best_rate
 
 MODELS = ("linear", "nonlinear")
 """Of the motion, in the order of the numbers that gains hold for them."""
@@ -56,6 +57,13 @@ def station_laws() -> dict[str, StationLaw]:
     return {
         law.name: law for law in laws.found_in("starhold.laws.station", StationLaw, ("CARD", "Gains", "control", "examples"))
     }
+
+
+def least_rate(plant: Libration) -> float:
+    """The rate (scaled) at which a circle asks least of the control, sqrt(C - 2 Omega^2). ValueError where there is none."""
+    if plant.stiffness <= 2.0 * plant.rate**2:
+        raise ValueError(f"no rate has a least demand where C = {plant.stiffness:g} is not above 2")
+    return plant.rate * best_rate(plant)
 
 
 @equation

@@ -8,8 +8,9 @@ from typing import Annotated, Any, NamedTuple
 from starhold.algebra.scalar import Scalar, equation, less, where
 from starhold.algebra.vector import Vector, scale, subtract
 from starhold.laws.interface import Card, Gain, NoMemory
-from starhold.laws.station.interface import MODELS, SeenPoint, along, bend, hold_x
+from starhold.laws.station.interface import MODELS, SeenPoint, along, bend, hold_x, least_rate
 from starhold.models.libration import Libration
+from starhold.models.station import demand
 
 CARD = Card(
     title="Circle round a libration point",
@@ -51,11 +52,7 @@ FORMS: dict[str, Any] = {"best": Best}
 
 def design(plant: Libration, spec: Best) -> Gains:
     """rate = sqrt(C - 2 Omega^2), at which the peak demand is 2 Omega sqrt(C - Omega^2) radius. ValueError for less C."""
-    square = plant.rate**2
-    if plant.stiffness <= 2.0 * square:
-        raise ValueError(f"no rate has a least demand where C = {plant.stiffness:g} is not above 2")
-    steep = square + 2.0 * plant.stiffness
-    rate = math.sqrt(plant.stiffness - 2.0 * square)
+    rate, steep = least_rate(plant), plant.rate**2 + 2.0 * plant.stiffness
     x = (2.0 * steep, 2.0 * math.sqrt(steep))
     return Gains(spec.radius, rate, spec.alpha, spec.k, *x, spec.feedback, spec.layer, spec.model)
 
@@ -70,9 +67,7 @@ def explain(plant: Libration, spec: Best) -> list[tuple[str, Any]]:
 def peak_demand(plant: Libration, rate: float) -> float:
     """The largest norm of the control on a circle of radius one: sqrt(4 Omega^2 rate^2 + (C - rate^2)^2), or C - Omega^2
     - rate^2 in the Y direction where that is more."""
-    return max(
-        math.hypot(2.0 * plant.rate * rate, plant.stiffness - rate**2), abs(plant.stiffness - plant.rate**2 - rate**2)
-    )
+    return max(demand(rate / plant.rate, plant), abs(plant.stiffness - plant.rate**2 - rate**2))
 
 
 @equation

@@ -13,7 +13,7 @@ from typing import Annotated, Any, NamedTuple
 from starhold.algebra.scalar import Scalar, equation
 from starhold.algebra.vector import Vector
 from starhold.laws.interface import Card, Gain, NoMemory
-from starhold.laws.station.interface import SeenPoint, along
+from starhold.laws.station.interface import SeenPoint, along, least_rate
 from starhold.models.libration import Libration
 
 CARD = Card(
@@ -52,10 +52,7 @@ FORMS: dict[str, Any] = {"best": Best}
 
 def design(plant: Libration, spec: Best) -> Gains:
     """rate = sqrt(C - 2 Omega^2), slope = sqrt(Omega^2 + 2 C). ValueError where C is less than 2 Omega^2."""
-    square = plant.rate**2
-    if plant.stiffness <= 2.0 * square:
-        raise ValueError(f"no rate has a least demand where C = {plant.stiffness:g} is not above 2")
-    rates = math.sqrt(plant.stiffness - 2.0 * square), math.sqrt(square + 2.0 * plant.stiffness)
+    rates = least_rate(plant), math.sqrt(plant.rate**2 + 2.0 * plant.stiffness)
     return Gains(spec.radius, rates[0], spec.alpha, spec.beta, rates[1], spec.pull, spec.layer)
 
 
