@@ -25,7 +25,7 @@ from starhold.algebra.vector import add
 from starhold.certification.boxes import Sides, holds_on
 from starhold.certification.certificate import BALLS, EXACT, EXACT_SIGN, LASALLE, Claim
 from starhold.certification.convergence import ALMOST, Obligations
-from starhold.certification.matrices import number
+from starhold.certification.matrices import number, root_float
 from starhold.certification.station_terms import UNLIMITED, assumed, mismatch, seen_point
 from starhold.certification.subject import above, below
 from starhold.laws.station import l2_circle as law
@@ -116,22 +116,14 @@ def control_limit(loop: StationLoop) -> Claim:
 def _told(circle: Circle, level: float) -> dict[str, Any]:
     """The level; the radii between which all circles at the right rate are in its set, and the largest velocity error on
     the circle, all rounded inward."""
-    square, reach = circle.gains.radius**2, _root(2 * exact(level) / circle.gains.alpha)
+    square, reach = circle.gains.radius**2, root_float(2 * exact(level) / circle.gains.alpha)
     inner, outer = square - exact(reach), square + exact(reach)
     return {
         "level": level,
-        "inner": _root(inner, up=True) if inner > 0 else 0.0,
-        "outer": _root(outer),
-        "velocity": _root(2 * exact(level)),
+        "inner": root_float(inner, up=True) if inner > 0 else 0.0,
+        "outer": root_float(outer),
+        "velocity": root_float(2 * exact(level)),
     }
-
-
-def _root(square: Any, up: bool = False) -> float:
-    """A float not above, or not below, the square root of a rational."""
-    root, toward = math.sqrt(number(square)), math.inf if up else 0.0
-    while (exact(root) ** 2 < square) if up else (exact(root) ** 2 > square):
-        root = math.nextafter(root, toward)
-    return root
 
 
 def _is_neutral(circle: Circle) -> bool:

@@ -162,3 +162,11 @@ def _dot(a: list[Any], b: list[Any]) -> Any:
 def spectral_norm_above(a: Rows) -> Any:
     """A rational above the largest singular value."""
     return root_above(greatest(product(transposed(a), a)))
+
+
+def root_float(square: Any, up: bool = False) -> float:
+    """The float next to the square root of a rational that is not above it, or, up, not below it."""
+    root, toward = math.sqrt(number(square)), math.inf if up else 0.0
+    while (exact(root) ** 2 < square) if up else (exact(root) ** 2 > square):
+        root = math.nextafter(root, toward)
+    return root

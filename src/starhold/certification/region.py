@@ -31,7 +31,7 @@ from starhold.algebra.vector import add, apply, cross, dot, scale, subtract
 from starhold.certification.boxes import Sides, holds_on
 from starhold.certification.certificate import BALLS, EXACT, EXACT_SIGN, LASALLE, Claim
 from starhold.certification.convergence import Obligations, assumed
-from starhold.certification.matrices import number
+from starhold.certification.matrices import number, root_float
 from starhold.certification.motion import Motion
 from starhold.certification.subject import Subject, above, below, direction
 
@@ -61,19 +61,19 @@ class Shape(NamedTuple):
         turned = a * a * (self.p * u + self.c2 * u * u)
         return np.sum(w * w, axis=0) / 2.0 + turned - a * (self.g + self.m * u) * along
 
+    def room(self, bound: float, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """{V <= bound alpha^2} at u is a ball of rates over alpha: its radius squared, below zero where it is empty."""
+        return 2.0 * (bound - self.p * u - self.c2 * u * u) + (self.g + self.m * u) ** 2 * u * (2.0 - u)
+
     def draw(self, a: float, level: float, count: int, random: np.random.Generator) -> NDArray[np.float64]:
         """States (16, count) of {V <= level}, half of them on its surface. Not part of any proof."""
         axes, directions = random.normal(size=(2, 3, count))
         axes /= np.linalg.norm(axes, axis=0)
         directions /= np.linalg.norm(directions, axis=0)
         u = random.uniform(0.0, 2.0, size=count)
-        mixed = (self.g + self.m * u) ** 2 * u * (2.0 - u)
         # Where no rate is small enough, less of the turn.
-        room = 2.0 * (level / (a * a) - self.p * u - self.c2 * u * u) + mixed
-        while (room < 0.0).any():
+        while ((room := self.room(level / (a * a), u)) < 0.0).any():
             u = np.where(room < 0.0, 0.9 * u, u)
-            mixed = (self.g + self.m * u) ** 2 * u * (2.0 - u)
-            room = 2.0 * (level / (a * a) - self.p * u - self.c2 * u * u) + mixed
         inside = np.where(np.arange(count) % 2 == 0, 1.0 - 1e-9, random.uniform(size=count) ** (1.0 / 3.0))
         states = np.zeros((16, count))
         states[0], states[1:4] = 1.0 - u, np.sqrt(u * (2.0 - u)) * axes
@@ -123,7 +123,7 @@ def region(subject: Subject) -> Claim | None:
         return finish()
     shape, level = best
     witness |= shape._asdict()
-    told |= {"level": level, "turn": _turn(shape, exact(level) / (a * a)), "rate": _rate(exact(level))}
+    told |= {"level": level, "turn": _turn(shape, exact(level) / (a * a)), "rate": root_float(2 * exact(level))}
     found.add("descent", BALLS, True)
     if shape == ENERGY:
         found.add("only rest", LASALLE, True)
@@ -196,9 +196,7 @@ def _guess(shape: Shape, beta: Any, count: int = 60) -> float:
 def _volume(shape: Shape, bound: float) -> float:
     """The volume of {V <= bound alpha^2} among attitudes and rates, up to a factor."""
     u = np.linspace(0.0, 2.0, 201)
-    l2 = u * (2.0 - u)
-    squares = 2.0 * (bound - shape.p * u - shape.c2 * u * u) + (shape.g + shape.m * u) ** 2 * l2
-    return float(np.sum(np.maximum(squares, 0.0) ** 1.5 * np.sqrt(l2)))
+    return float(np.sum(np.maximum(shape.room(bound, u), 0.0) ** 1.5 * np.sqrt(u * (2.0 - u))))
 
 
 def _turn(shape: Shape, bound: Any) -> float:
@@ -212,14 +210,6 @@ def _turn(shape: Shape, bound: Any) -> float:
         if p * most + c2 * most * most <= arb(bound):
             return turn
         turn *= 1.0 - 1e-12
-
-
-def _rate(level: Any) -> float:
-    """A float not above sqrt(2 level)."""
-    rate = math.sqrt(2.0 * number(level))
-    while exact(rate) * exact(rate) > 2 * level:
-        rate = math.nextafter(rate, 0.0)
-    return rate
 
 
 def _enclosed(x: Any) -> Intervals:

@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.circle import attracts, control_limit
 from starhold.certification.rest import rests, saturated_axis
-from starhold.laws.interface import fields
+from starhold.certification.subject import described_gains
 from starhold.loop.station import StationLoop
 
 
@@ -31,12 +29,9 @@ def certify_station(loop: StationLoop, name: str = "") -> Certificate:
 
 def described_station(loop: StationLoop) -> dict[str, Any]:
     """The loop as plain numbers and names, all that a checker needs to build it again."""
-    gains: dict[str, Any] = {}
-    for item, value in zip(fields(loop.law.gains), loop.gains, strict=True):
-        gains[item.name] = item.gain.choices[value] if item.gain.choices else np.asarray(value).tolist()
     return {
         "law": loop.law.name,
-        "gains": gains,
+        "gains": described_gains(loop.law, loop.gains),
         "plant": loop.plant._asdict(),
         "model": loop.model,
         "limit": loop.limit_kind,

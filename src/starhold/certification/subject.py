@@ -13,7 +13,6 @@ from starhold.algebra.vector import Matrix, Vector
 from starhold.certification.matrices import Rows, greatest, inverse, least, matrix_of, number, plus, rows, scaled
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law
-from starhold.laws.interface import fields
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.models.craft import Craft, tensor
 from starhold.models.environment import gravity_gradient
@@ -70,9 +69,6 @@ def make_subject(loop: ClosedLoop, disturbance: float = 0.0, momentum: float | N
 def described(subject: Subject) -> dict[str, Any]:
     """The subject as plain numbers and names, all that a checker needs to build it again."""
     loop = subject.loop
-    gains: dict[str, Any] = {}
-    for item, value in zip(fields(loop.law.gains), loop.gains, strict=True):
-        gains[item.name] = item.gain.choices[value] if item.gain.choices else _plain(value)
     limit = loop.craft.torque_limit
     orbit = {
         "position": list(loop.start.position),
@@ -82,7 +78,7 @@ def described(subject: Subject) -> dict[str, Any]:
     kind = loop.target if isinstance(loop.target, str) else "history" if isinstance(loop.target, np.ndarray) else "inertial"
     return {
         "law": loop.law.name,
-        "gains": gains,
+        "gains": described_gains(loop.law, loop.gains),
         "double_cover": loop.cover,
         "hysteresis_width": loop.hysteresis_width,
         "inertia": tensor(loop.craft.inertia).tolist(),
@@ -99,6 +95,14 @@ def described(subject: Subject) -> dict[str, Any]:
         "control_period": loop.period,
         "wheels": None if loop.wheels is None else _described_wheels(subject, loop.wheels),
     }
+
+
+def described_gains(law: Law, gains: Any) -> dict[str, Any]:
+    """A law's gains by name, choices by theirs."""
+    found: dict[str, Any] = {}
+    for item, value in zip(law.fields(), gains, strict=True):
+        found[item.name] = item.gain.choices[value] if item.gain.choices else _plain(value)
+    return found
 
 
 def _described_wheels(subject: Subject, wheels: Wheels) -> dict[str, Any]:
