@@ -19,7 +19,6 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from starhold.algebra.quaternion import Quaternion, vector_part
-from starhold.algebra.scalar import equation
 from starhold.algebra.vector import ZERO, Vector, add, scale
 from starhold.laws.catalogue import Law
 from starhold.laws.interface import Card, NoMemory, Seen
@@ -38,7 +37,7 @@ START = PUBLISHED._replace(attitude=(0.01, 0.4, 0.7, 0.3499**0.5))
 
 def header(*packages: str) -> str:
     """The machine and the versions, for the top of a report."""
-    names = ("starhold", "numba", "numpy", *packages)
+    names = ("starhold", "llvmlite", "numpy", *packages)
     versions = ", ".join(f"{name} {_version(name)}" for name in names)
     system = f"{platform.system()} {platform.machine()}, Python {platform.python_version()}"
     return f"{_processor()}, {os.cpu_count()} threads, {system}\n{versions}\n"
@@ -93,14 +92,12 @@ def show(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     print()
 
 
-@equation
 def feedback(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """u = -k_attitude sigma - k_rate w, sigma = q/(1 + q0); shown q0 >= 0, it keeps |sigma| <= 1."""
     q = seen.attitude
     return add(scale(-gains.k_attitude / (1.0 + q[0]), vector_part(q)), scale(-gains.k_rate, seen.rate)), memory
 
 
-@equation
 def steady(seen: Seen, gains: Vector, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """A constant torque, no control at all."""
     return gains, memory

@@ -25,11 +25,9 @@ from typing import Any
 import numpy as np
 
 from common import EARTH, INERTIA, header, interleaved, show
-from starhold.algebra.structure import flatten
-from starhold.analysis.cost import CALLS, call_costs
+from starhold.analysis.cost import CALLS, Replay, call_costs
 from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.loop.kernels import make_replay
 from starhold.scenario.building import build
 from starhold.scenario.reading import load
 from starhold.simulation.lane import fly
@@ -70,10 +68,9 @@ def loops() -> dict[str, ClosedLoop]:
 
 def whole(loop: ClosedLoop, samples: Any, calls: int = CALLS) -> Callable[[], Any]:
     """A replay of that many calls. With none it costs what entering compiled code does."""
-    replay, setup, carry = make_replay(loop.parts()), loop.setup(), loop.carry()
-    states = np.ascontiguousarray(np.tile(samples, -(-CALLS // samples.shape[1]))[:, :CALLS])
-    end = np.empty((len(flatten(carry)), 1))
-    return lambda: replay(states, 0, calls, loop.carry(), loop.gains, loop.craft, setup, end)
+    states = np.tile(samples, -(-CALLS // samples.shape[1]))[:, :CALLS]
+    kernel = Replay(loop, states)
+    return lambda: kernel(0, calls)
 
 
 def by_hand(law: Callable[[Any, Any, Any], Any], samples: Any) -> Callable[[], Any]:
@@ -94,7 +91,7 @@ def main() -> None:
         assert worst < 1e-12
     print()
 
-    cheap = {name: whole(*pair) for name, pair in flown.items() if not pair[0].law.card.compiled_only}
+    cheap = {name: whole(*pair) for name, pair in flown.items() if name != "mpc"}
     hand = {f"{name} in NumPy": by_hand(law, flown[name][1]) for name, law in BY_HAND.items()}
     entered = {f"{name}, none": whole(*flown[name], calls=0) for name in cheap}
     times = interleaved(cheap | entered | hand, ROUNDS)

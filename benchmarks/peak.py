@@ -1,193 +1,133 @@
 """What share of the processor's arithmetic the many-lane kernel reaches.
 
-The processor's peak on one core is measured: independent chains of multiplications and additions on numbers in the
-first cache, many chain shapes, the fastest counts. Once in strict IEEE arithmetic, as starhold's kernels compute (a
-product and a sum are two instructions), and once with the two fused, which strict arithmetic forbids. Division and
-square root are measured too: they are far slower, and have a unit of their own.
+The processor's peak on one core is measured: independent chains of multiplications and additions on numbers in registers,
+many chain shapes, the fastest counts, in explicit vectors of the widest kind that the machine has. Once in strict IEEE
+arithmetic, as starhold's kernels compute (a product and a sum are two instructions), and once with the two fused, which
+strict arithmetic forbids. Division and square root are measured too: they are far slower, and have a unit of their own.
 
-The operations of a step are counted by flying it in plain Python with numbers that count: the same equations, another
-reader. What the compiler finds twice or in vain it may drop, so the count is what the equations ask for, not what runs.
+The operations of a step are those of the kernel's own trace, common subexpressions once and nothing in vain.
 
 Run: python benchmarks/peak.py
 """
 
 from __future__ import annotations
 
-import math
-from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import ctypes
+from collections.abc import Callable
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
-from unittest.mock import patch
 
-import numba
-import numpy as np
+import llvmlite.binding as llvm
 
 import common
+import steps
 from common import header, interleaved, show
-from starhold.algebra import scalar
-from starhold.algebra.scalar import less, sqrt, where
-from starhold.algebra.structure import LANES, flatten, pack
 from starhold.laws.catalogue import catalogue
-from starhold.loop.closed_loop import Carry, ClosedLoop
-from starhold.loop.kernels import make_kernels, make_step
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.loop.kernels import Numbers, make_step, many
 from starhold.models.craft import make_craft
+from starhold.trace.bounds import Work, work
+from starhold.trace.llvm import hexadecimal
 
-CHAINS, DEPTHS = (1, 2, 4), (4, 8, 16, 32)
-"""Shapes of the peak: chains for each number of the array, and operations on each chain."""
-SIZE, AGAIN = 512, 200
-"""Numbers of the array, and passes over it in a timed call."""
-BLOCKS, STEPS, REPEATS = 2, 500, 40
-
-tally: Counter[str] = Counter()
+CHAINS, DEPTH, AGAIN = (4, 8, 12, 16), 8, 100_000
+"""Independent chains, operations on each in a turn of the loop, and turns."""
+STEPS, REPEATS = 1000, 20
 
 
-def _counting(kind: str, name: str) -> Callable[..., Any]:
-    plain = getattr(float, name)
-
-    def operation(*numbers: float) -> Any:
-        result = plain(*numbers)
-        if result is NotImplemented:
-            return result
-        tally[kind] += 1
-        return Counted(result)
-
-    return operation
-
-
-class Counted(float):
-    """A number that counts the operations it takes part in; operations of constants alone are not counted."""
-
-    __add__, __radd__ = _counting("add", "__add__"), _counting("add", "__radd__")
-    __sub__, __rsub__ = _counting("add", "__sub__"), _counting("add", "__rsub__")
-    __mul__, __rmul__ = _counting("multiply", "__mul__"), _counting("multiply", "__rmul__")
-    __truediv__, __rtruediv__ = _counting("divide", "__truediv__"), _counting("divide", "__rtruediv__")
-    __neg__ = _counting("negate", "__neg__")
-
-    def __lt__(self, other: float) -> bool:
-        tally["compare"] += 1
-        return float.__lt__(self, other)
-
-    def __gt__(self, other: float) -> bool:
-        # Python asks this of the right operand of `plain < counted`.
-        tally["compare"] += 1
-        return float.__gt__(self, other)
-
-
-def _root(x: float) -> Counted:
-    tally["root"] += 1
-    return Counted(math.sqrt(x))
-
-
-@contextmanager
-def counting() -> Iterator[Counter[str]]:
-    """Count within; yields the tally."""
-    tally.clear()
-    with patch.object(scalar, "math", SimpleNamespace(sqrt=_root, nan=math.nan)):
-        yield tally
-
-
-def counted(structure: Any) -> Any:
-    """The same structure with every float turned into one that counts."""
-    if isinstance(structure, tuple):
-        parts = [counted(part) for part in structure]
-        return type(structure)(*parts) if hasattr(structure, "_fields") else tuple(parts)
-    return Counted(structure) if isinstance(structure, float) else structure
-
-
-def check_counter() -> None:
-    """The counter counts what it should, roots and selects included, and changes no result."""
-    with counting():
-        a, b = Counted(2.0), Counted(3.0)
-        value = where(less(1.0, a), sqrt(a * b + 1.0), -b) / 2.0 - 0.5 * a
-        seen = dict(tally)
-    assert seen == {"multiply": 2, "add": 2, "root": 1, "negate": 1, "divide": 1, "compare": 1}, seen
-    assert isinstance(value, Counted)
-    assert value == math.sqrt(7.0) / 2.0 - 1.0
-
-
-def operations(loop: ClosedLoop) -> Counter[str]:
-    """Operations of one control step of one lane, in the order of the many-lane kernel."""
-    equations, setup = make_step(loop.parts()), loop.setup()
-    carry: Carry = counted(loop.carry())
-    for step in range(2):
-        with counting():
-            carry = equations.decide(equations.check(carry, step, setup), step, 0, loop.gains, loop.craft, setup)
-            for _ in range(loop.substeps):
-                carry = equations.hold(carry, loop.craft, setup)
-            total = Counter(tally)
-    plain = loop.carry()
-    for step in range(2):
-        plain = equations.decide(equations.check(plain, step, setup), step, 0, loop.gains, loop.craft, setup)
-        plain = equations.hold(plain, loop.craft, setup)
-    assert flatten(plain) == [float(number) for number in flatten(carry)]
-    return total
-
-
-def chain(body: str, chains: int, depth: int, fused: bool) -> Callable[[Any], None]:
-    """A kernel that repeats `body` on independent chains, written out so that the compiler keeps them in registers."""
-    names = [f"v{k}" for k in range(chains)]
-    lines = [f"{name} = x[{k}, i]" for k, name in enumerate(names)]
-    lines += [body.format(v=name) for _ in range(depth) for name in names]
-    lines += [f"x[{k}, i] = {name}" for k, name in enumerate(names)]
-    text = "\n            ".join(lines)
-    space: dict[str, Any] = {"sqrt": math.sqrt, "AGAIN": AGAIN, "SIZE": SIZE}
-    head = "def kernel(x):\n    for again in range(AGAIN):\n        for i in range(SIZE):\n            "
-    exec(head + text, space)
-    options: dict[str, Any] = {"fastmath": {"contract"}} if fused else {}
-    kernel = numba.njit(error_model="numpy", **options)(space["kernel"])
-    numbers = np.linspace(1.0, 2.0, chains * SIZE).reshape(chains, SIZE)
-    return lambda: kernel(numbers)
+def width() -> int:
+    """Numbers in the widest vector of this processor."""
+    features = llvm.get_host_cpu_features()
+    return 8 if features.get("avx512f") else 4 if features.get("avx") else 2
 
 
 BODIES = {
-    "multiply and add, strict": ("{v} = {v} * 0.999 + 1e-3", 2, False),
-    "fused multiply-add": ("{v} = {v} * 0.999 + 1e-3", 2, True),
-    "divide": ("{v} = 1.5 / {v}", 1, False),
-    "root": ("{v} = sqrt({v})", 1, False),
+    "multiply and add, strict": ("fmul {t} {x}, {c}|fadd {t} {x}, {d}", 2),
+    "fused multiply-add": ("call {t} @llvm.fma.v{w}f64({t} {x}, {t} {c}, {t} {d})", 2),
+    "divide": ("fdiv {t} {c}, {x}", 1),
+    "root": ("call {t} @llvm.sqrt.v{w}f64({t} {x})", 1),
 }
-"""Text of a chain's link, floating-point operations in it, fused or not."""
+"""Text of a chain's link, and floating-point operations in it."""
+
+
+def chain(body: str, chains: int) -> Callable[[], None]:
+    """A kernel that repeats `body` on independent chains of vectors in registers."""
+    w = width()
+    t = f"<{w} x double>"
+    links = body.split("|")
+    c, d = (f"splat (double {hexadecimal(number)})" for number in (0.999, 1e-3))
+    lines = [
+        f"declare {t} @llvm.fma.v{w}f64({t}, {t}, {t})",
+        f"declare {t} @llvm.sqrt.v{w}f64({t})",
+        'define void @peak(ptr %out) "prefer-vector-width"="512" "min-legal-vector-width"="512" {',
+        "entry:",
+        "  br label %turn",
+        "turn:",
+        "  %k = phi i64 [ 0, %entry ], [ %k1, %turn ]",
+    ]
+    ends = {n: f"%v{n}.{DEPTH * len(links) - 1}" for n in range(chains)}
+    lines += [
+        f"  %v{n} = phi {t} [ splat (double {hexadecimal(1.0 + n / 64)}), %entry ], [ {end}, %turn ]"
+        for n, end in ends.items()
+    ]
+    for place in range(DEPTH * len(links)):
+        for n in range(chains):
+            x = f"%v{n}" if place == 0 else f"%v{n}.{place - 1}"
+            lines.append(f"  %v{n}.{place} = " + links[place % len(links)].format(t=t, w=w, x=x, c=c, d=d))
+    lines += [
+        "  %k1 = add i64 %k, 1",
+        f"  %more = icmp ult i64 %k1, {AGAIN}",
+        "  br i1 %more, label %turn, label %end",
+        "end:",
+    ]
+    for n, end in ends.items():
+        lines += [f"  %p{n} = getelementptr {t}, ptr %out, i64 {n}", f"  store {t} {end}, ptr %p{n}, align 8"]
+    lines += ["  ret void", "}"]
+    target = llvm.Target.from_default_triple()
+    features = llvm.get_host_cpu_features().flatten()
+    machine = target.create_target_machine(opt=3, cpu=llvm.get_host_cpu_name(), features=features)
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly("\n".join(lines)), machine)
+    engine.finalize_object()
+    kernel: Any = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(engine.get_function_address("peak"))
+    out = (ctypes.c_double * (chains * w))()
+    kernel.kept = engine, out
+    return lambda: kernel(ctypes.addressof(out))
+
+
+def operations(loop: ClosedLoop) -> Work:
+    """Operations of one control step of one lane."""
+    numbers = Numbers(loop.gains, loop.craft, loop.craft, loop.setup())
+    program = many(make_step(loop.parts()), loop.carry(), numbers, loop.substeps, None)
+    counts = {"first": 0, "blocks": 1, "width": 1}
+    one, two = (work(program, counts | {"count": count}).work for count in (1, 2))
+    return Work(*(b - a for a, b in zip(one, two, strict=True)))
 
 
 def measure(loops: dict[str, ClosedLoop]) -> tuple[dict[str, float], dict[str, float]]:
     """Operations a second of each body (its best shape), and seconds of a lane-step of each loop."""
     tasks: dict[str, Callable[[], Any]] = {}
-    work: dict[str, tuple[str, int]] = {}
-    for name, (body, count, fused) in BODIES.items():
-        slow = name in ("divide", "root")
-        for chains in CHAINS if not slow else CHAINS[:2]:
-            for depth in DEPTHS if not slow else DEPTHS[:2]:
-                key = f"{name} {chains} {depth}"
-                tasks[key] = chain(body, chains, depth, fused)
-                work[key] = (name, count * chains * depth * SIZE * AGAIN)
+    counts: dict[str, tuple[str, int]] = {}
+    for name, (body, count) in BODIES.items():
+        for chains in CHAINS:
+            key = f"{name} {chains}"
+            tasks[key] = chain(body, chains)
+            counts[key] = (name, count * chains * DEPTH * width() * AGAIN)
     for name, loop in loops.items():
-        tasks[name], tasks[f"{name}, none"] = lane_steps(loop, STEPS), lane_steps(loop, 0)
+        batch = steps.Batch(loop, 1)
+        tasks[name], tasks[f"{name}, none"] = (lambda batch=batch, count=count: batch.run(count) for count in (STEPS, 0))
     times = interleaved(tasks, REPEATS)
     rates: dict[str, float] = {}
-    for key, (name, count) in work.items():
+    for key, (name, count) in counts.items():
         rates[name] = max(rates.get(name, 0.0), count / times[key].work)
-    # Entering compiled code costs a little too, which is no arithmetic.
-    return rates, {name: (times[name].work - times[f"{name}, none"].work) / (BLOCKS * LANES * STEPS) for name in loops}
-
-
-def lane_steps(loop: ClosedLoop, steps: int) -> Callable[[], None]:
-    """The many-lane kernel alone on some blocks, on one thread; each call goes on from where the last one was."""
-    blocks = pack(np.repeat(np.array(flatten(loop.carry()))[:, None], BLOCKS * LANES, axis=1))
-    kernel, setup, like = make_kernels(loop.parts()).many, loop.setup(), loop.carry()
-
-    def work() -> None:
-        for block in blocks:
-            kernel(block, like, 0, steps, 0, loop.gains, loop.gains, loop.craft, loop.craft, setup, loop.substeps)
-
-    return work
+    # Setting up a batch costs a little too, which is no arithmetic.
+    done = STEPS * steps.LANES
+    return rates, {name: (times[name].work - times[f"{name}, none"].work) / done for name in loops}
 
 
 def main() -> None:
-    """Check the counter, measure, print."""
+    """Measure and print."""
     print(header())
-    check_counter()
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
     full = make_craft([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]], torque_limit=0.01)
     loops: dict[str, ClosedLoop] = {}
     for name in ("lyapunov", "sliding", "pd"):
@@ -204,21 +144,21 @@ def main() -> None:
     shares: list[list[str]] = []
     for name, loop in loops.items():
         ops = operations(loop)
-        hard = ops["divide"] + ops["root"]
-        total = ops["add"] + ops["multiply"] + hard
-        counts.append([name, *(str(ops[kind]) for kind in KINDS), str(total)])
-        rate = total / costs[name]
-        cells = [f"{costs[name] * 1e9:.2f}", f"{rate / 1e9:.1f}", f"{rate / strict:.0%}", f"{rate / fused:.0%}"]
-        easy, slow = (total - hard) / strict, ops["divide"] / rates["divide"] + ops["root"] / rates["root"]
-        shares.append([name, *cells, f"{easy * 1e9:.2f}", f"{slow * 1e9:.2f}"])
+        cells = (ops.additions, ops.multiplications, ops.divisions, ops.roots, ops.arithmetic)
+        counts.append([name, *map(str, (*cells, ops.negations, ops.comparisons, ops.selects))])
+        rate = ops.arithmetic / costs[name]
+        row = [f"{costs[name] * 1e9:.2f}", f"{rate / 1e9:.1f}", f"{rate / strict:.0%}", f"{rate / fused:.0%}"]
+        easy, hard = (
+            (ops.additions + ops.multiplications) / strict,
+            ops.divisions / rates["divide"] + ops.roots / rates["root"],
+        )
+        shares.append([name, *row, f"{easy * 1e9:.2f}", f"{hard * 1e9:.2f}"])
     print("Operations of a lane-step: the control law and four slopes of the motion. `flop`: sum of the first four.")
-    show(["law", *KINDS, "flop"], counts)
+    show(["law", "add", "multiply", "divide", "root", "flop", "negate", "compare", "select"], counts)
     print("The kernel on one core. Last two: the time that its additions and multiplications, and its divisions and")
     print("roots, take at their measured peaks. The units work side by side: the larger is a lower bound.")
     show(["law", "ns", "10^9 flop/s", "of strict peak", "of fused peak", "add, multiply ns", "divide, root ns"], shares)
 
-
-KINDS = ("add", "multiply", "divide", "root", "negate", "compare")
 
 if __name__ == "__main__":
     main()

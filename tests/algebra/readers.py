@@ -8,24 +8,33 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable, Iterator
-from functools import cache
 from typing import Any
 
-import numba
 import sympy
 from flint import arb, ctx
 from hypothesis import strategies as st
 
 from starhold.algebra.cosines import from_axis_angle
+from starhold.loop.kernels import form
+from starhold.trace.calling import Compiled
 
 EXACT_BITS = 400
 """Precision of the balls that stand for the exact value."""
 
 
-@cache
+_COMPILED: dict[Any, Compiled] = {}
+
+
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The equation called from compiled code, as kernels call it; compiled once for the whole test run."""
-    return numba.njit(error_model="numpy")(lambda *arguments: function(*arguments))
+    """The equation as a kernel runs it; compiled once for the whole test run for each form of its arguments."""
+
+    def call(*arguments: Any) -> Any:
+        key = (function, form(arguments))
+        if key not in _COMPILED:
+            _COMPILED[key] = Compiled(function, *arguments)
+        return _COMPILED[key](*arguments)
+
+    return call
 
 
 def bits(number: Any) -> Any:

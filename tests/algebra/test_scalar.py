@@ -13,7 +13,6 @@ from flint import arb
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from starhold.algebra import scalar
 from starhold.algebra.scalar import (
     absolute,
     both,
@@ -37,12 +36,10 @@ TRUTHS = (True, False, None)
 truths = st.sampled_from(TRUTHS)
 
 
-@scalar.equation
 def select(a, b, x, y):
     return where(less(a, b), x, y)
 
 
-@scalar.equation
 def logic(a, b, c):
     p, q = less(a, b), less(b, c)
     return both(p, q), either(p, q), opposite(p), both(p, opposite(q)), either(opposite(p), opposite(q))

@@ -1,18 +1,20 @@
-"""Whole states: moved, kept in columns and blocks of arrays, flattened; compiled code does what plain Python does."""
+"""Whole states: moved and flattened; compiled code does what plain Python does."""
 
 from __future__ import annotations
 
 import math
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 import pytest
 import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from starhold.algebra.structure import LANES, flatten, load, move, pack, store, unflatten, unpack
+from starhold.algebra.structure import buffers, flatten, move, unflatten
+from starhold.algebra.structured import Buffer
+from starhold.loop.kernels import numbers_of, state_of
+from starhold.trace.calling import Compiled
 from tests.algebra.readers import agree, bits, leaves, numbers, same
 
 
@@ -36,7 +38,7 @@ class Body(NamedTuple):
 
 SIZE = 4 + 4 + 8 + 1
 LIKE = unflatten([0.0] * SIZE, Body((0.0,) * 4, Pair((0.0,) * 3, 0.0), Empty(), (), (Pair((0.0,) * 3, 0.0),) * 2, 0.0))
-LANE_COUNTS = (1, 127, 128, 129, 1000)
+LANE_COUNTS = (1, 7, 8, 9, 100)
 
 states = st.lists(numbers, min_size=SIZE, max_size=SIZE).map(lambda x: unflatten(x, LIKE))
 any_states = st.lists(st.floats(), min_size=SIZE, max_size=SIZE).map(lambda x: unflatten(x, LIKE))
@@ -120,108 +122,28 @@ def test_flatten_undoes_unflatten(x):
     assert all(type(number) is float for number in flatten(state))
 
 
-@numba.njit(error_model="numpy")
-def compiled_store(x, lane, state):
-    store(x, lane, state)
+def test_buffers_change_in_place():
+    class Memory(NamedTuple):
+        count: float
+        plan: Buffer
 
-
-@numba.njit(error_model="numpy")
-def compiled_load(x, lane, like):
-    return load(x, lane, like)
-
-
-def numbered(rows: int, lanes: int) -> np.ndarray:
-    """An array whose every entry differs."""
-    return np.arange(rows * lanes, dtype=float).reshape(rows, lanes) + 0.25
-
-
-@pytest.mark.parametrize(("put", "get"), [(store, load), (compiled_store, compiled_load)])
-@pytest.mark.parametrize("lane", [0, 1, 5])
-def test_load_reads_what_store_wrote_in_a_column(put, get, lane):
-    x = numbered(SIZE, 6)
-    before = x.copy()
-    assert flatten(get(x, lane, LIKE)) == before[:, lane].tolist()
-    state = unflatten(-np.arange(1.0, SIZE + 1.0), LIKE)
-    put(x, lane, state)
-    assert get(x, lane, LIKE) == state
-    assert type(get(x, lane, LIKE).inner) is Pair
-    np.testing.assert_array_equal(np.delete(x, lane, axis=1), np.delete(before, lane, axis=1))
-
-
-@pytest.mark.parametrize(("put", "get"), [(store, load), (compiled_store, compiled_load)])
-@pytest.mark.parametrize("lane", [0, 1, LANES - 1])
-def test_load_reads_what_store_wrote_in_a_block(put, get, lane):
-    columns = numbered(SIZE, 2 * LANES)
-    blocks = pack(columns)
-    assert flatten(get(blocks[1], lane, LIKE)) == columns[:, LANES + lane].tolist()
-    state = unflatten(-np.arange(1.0, SIZE + 1.0), LIKE)
-    put(blocks[1], lane, state)
-    assert get(blocks[1], lane, LIKE) == state
-    columns[:, LANES + lane] = flatten(state)
-    np.testing.assert_array_equal(unpack(blocks, 2 * LANES), columns)
-
-
-@pytest.mark.parametrize("get", [load, compiled_load])
-def test_a_state_stands_for_every_lane(get):
-    state = unflatten(np.arange(1.0, SIZE + 1.0), LIKE)
-    assert get(state, 0, LIKE) == state
-    assert get(state, 77, LIKE) == state
-
-
-def test_plain_and_compiled_store_write_alike():
-    x = numbered(3, 4)
-    before = x.copy()
-    store(x, 1, (1.0, 2.0, 3.0))
-    compiled_store(x, 2, (1.0, 2.0, 3.0))
-    np.testing.assert_array_equal(x[:, 1], x[:, 2])
-    np.testing.assert_array_equal(x[:, [0, 3]], before[:, [0, 3]])
-
-
-@pytest.mark.parametrize(("put", "get"), [(store, load), (compiled_store, compiled_load)])
-def test_a_state_without_numbers(put, get):
-    x = numbered(0, 4)
-    put(x, 2, Empty())
-    assert get(x, 2, Empty()) == Empty()
+    memory = Memory(1.0, Buffer([2.0, 3.0]))
+    assert flatten(memory) == [1.0]
+    assert buffers(memory) == [memory.plan]
+    other = unflatten([5.0], memory)
+    assert other == Memory(5.0, memory.plan)
+    assert numbers_of(memory) == [1.0, 2.0, 3.0]
+    copied = state_of(np.array([7.0, 8.0, 9.0]), memory)
+    assert copied.count == 7.0
+    assert [copied.plan[0], copied.plan[1]] == [8.0, 9.0]
+    copied.plan[0] = 0.0
+    assert memory.plan[0] == 2.0
 
 
 @pytest.mark.parametrize("lanes", LANE_COUNTS)
-@pytest.mark.parametrize("components", [1, 3, SIZE])
-def test_pack_and_unpack(lanes, components):
-    states = numbered(components, lanes)
-    blocks = pack(states)
-    count = math.ceil(lanes / LANES)
-    assert blocks.shape == (count, components * LANES)
-    assert blocks.flags["C_CONTIGUOUS"]
-    back = unpack(blocks, lanes)
-    assert back.flags["C_CONTIGUOUS"]
-    np.testing.assert_array_equal(back, states)
-    for lane in {0, lanes // 2, lanes - 1}:
-        block, place = divmod(lane, LANES)
-        np.testing.assert_array_equal(blocks[block].reshape(components, LANES)[:, place], states[:, lane])
-    # The lanes that fill up the last block repeat the last one, so they never meet a number that no run has.
-    rest = blocks[-1].reshape(components, LANES)[:, (lanes - 1) % LANES + 1 :]
-    np.testing.assert_array_equal(rest, np.repeat(states[:, -1:], rest.shape[1], axis=1))
-
-
-def test_pack_copies():
-    states = numbered(2, 2 * LANES)
-    blocks = pack(states)
-    blocks[:] = 0.0
-    assert states.min() > 0.0
-
-
-@numba.njit(error_model="numpy")
-def advance(blocks, step, rate, like):
-    for b in range(blocks.shape[0]):
-        for lane in range(LANES):
-            store(blocks[b], lane, move(load(blocks[b], lane, like), step, rate))
-
-
-@pytest.mark.parametrize("lanes", LANE_COUNTS)
-def test_every_lane_of_every_block_moves_as_one_state_does(lanes):
+def test_every_lane_moves_as_one_state_does(lanes):
     columns = np.random.default_rng(lanes).normal(size=(SIZE, lanes))
     rate = unflatten(np.random.default_rng(1).normal(size=SIZE), LIKE)._replace(inner=None)
-    blocks = pack(columns)
-    advance(blocks, 0.1, rate, LIKE)
+    moved = Compiled(lambda state: move(state, 0.1, rate), LIKE).over(columns)
     alone = np.array([flatten(move(unflatten(column, LIKE), 0.1, rate)) for column in columns.T]).T
-    np.testing.assert_array_equal(unpack(blocks, lanes).view(np.uint64), np.ascontiguousarray(alone).view(np.uint64))
+    np.testing.assert_array_equal(moved, alone)

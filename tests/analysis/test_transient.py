@@ -54,7 +54,7 @@ def test_threads_and_company_change_nothing():
     gains, start = made.gains(roots), np.array([made.start(1.0)]).T
     watcher = made.watcher()
     one, other = (watcher.fly(np.repeat(start, 300, axis=1), gains, 1500, threads=count) for count in (1, 3))
-    alone = watcher.block(start, gains[:, 100:101], 1500)
+    alone = watcher.fly(start, made.gains(roots[100:101]), 1500)
     for name in ("time", "peak_rate", "peak_acceleration"):
         assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True)
         assert getattr(alone, name).tolist() == getattr(one, name)[..., 100:101].tolist()
@@ -73,7 +73,7 @@ def test_a_moving_target_is_refused():
     from starhold.algebra.structure import flatten
 
     with pytest.raises(ValueError, match="target at rest"):
-        watcher.block(np.array([flatten(far)]).T, made.gains([-1.0]), 10)
+        watcher.fly(np.array([flatten(far)]).T, made.gains([-1.0]), 10)
 
 
 def recorded(angles, rates, period=0.1, every=1, **attrs):

@@ -3,13 +3,12 @@
 from dataclasses import replace
 from functools import cache
 
-import numba
 import numpy as np
 import pytest
 from scipy.optimize import minimize
 
 from starhold.algebra.polynomial import exact
-from starhold.algebra.quaternion import derivative
+from starhold.algebra.quaternion import NO_TURN, derivative
 from starhold.algebra.vector import ZERO, add
 from starhold.analysis.trial import draw
 from starhold.certification.certify import Wanted, certify
@@ -20,6 +19,7 @@ from starhold.certification.potential import Spring
 from starhold.certification.subject import make_subject
 from starhold.laws.interface import NoMemory, Seen
 from starhold.models.rigid_body import angular_acceleration
+from starhold.trace.calling import Compiled
 from tests.certification.loops import textbook
 
 LOOPS = textbook()
@@ -28,33 +28,22 @@ STATES = -(-10_000_000 // len(LOOPS))
 
 
 @cache
-def motion_of(law):
-    """Compiled, over columns of states: torque and the derivative of the state, from the law's and the models' equations."""
-    torque = law.torque
+def motion_of(name):
+    """Compiled: the derivative of a state and the torque, from the law's and the models' equations."""
+    loop = LOOPS[name]
 
-    @numba.njit(error_model="numpy")
-    def move(states, push, gains, craft, out):
-        for k in range(states.shape[1]):
-            q = (states[0, k], states[1, k], states[2, k], states[3, k])
-            w = (states[4, k], states[5, k], states[6, k])
-            seen = Seen(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.1, ZERO)
-            u, _ = torque(seen, gains, craft, NoMemory())
-            d = derivative(q, w)
-            a = angular_acceleration(w, add(u, (push[0, k], push[1, k], push[2, k])), craft)
-            for i in range(4):
-                out[i, k] = d[i]
-            for i in range(3):
-                out[4 + i, k] = a[i]
-                out[7 + i, k] = u[i]
+    def motion(q, w, push):
+        seen = Seen(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.1, ZERO)
+        u, _ = loop.law.torque(seen, loop.gains, loop.craft, NoMemory())
+        return derivative(q, w), angular_acceleration(w, add(u, push), loop.craft), u
 
-    return move
+    return Compiled(motion, NO_TURN, ZERO, ZERO)
 
 
 def moved(loop, states, push=None):
-    out = np.empty((10, states.shape[1]))
+    name = next(name for name, known in LOOPS.items() if known is loop)
     push = np.zeros((3, states.shape[1])) if push is None else push
-    motion_of(loop.law)(np.ascontiguousarray(states[:7]), np.ascontiguousarray(push), loop.gains, loop.craft, out)
-    return out
+    return motion_of(name).over(np.vstack([states[:7], push]))
 
 
 class Function:

@@ -1,29 +1,40 @@
-"""Counter-based random numbers: published answers, exact agreement of compiled code, the right distribution."""
+"""Counter-based random numbers: published answers, compiled code bit for bit, stated errors, the right distribution."""
 
 from __future__ import annotations
 
 import math
+import struct
 
 import mpmath
-import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtr
 
-from starhold.models.random import inverse_normal, logarithm, normal_vector, threefry, to_unit
-from tests.algebra.readers import bits, compiled, same
+from starhold.algebra.words import bits_of, with_bits
+from starhold.models.random import (
+    cosine_and_sine,
+    normal_vector,
+    normals,
+    squared_radius,
+    threefry,
+    to_angle,
+    to_unit,
+    transform,
+)
+from starhold.trace.calling import Compiled
+from starhold.trace.program import Op, statements
 
 ONES = 2**64 - 1
+FRACTION = 2**52 - 1
+ROTATIONS = (16, 42, 12, 31, 16, 32, 24, 21)
 words = st.integers(0, ONES)
-probabilities = st.one_of(
-    st.floats(2.0**-54, 1.0 - 2.0**-53),
-    st.floats(-54.0, -1.0).map(lambda e: 2.0**e),
-    st.floats(-53.0, -1.0).map(lambda e: 1.0 - 2.0**e),
-    st.floats(-40.0, -2.0).map(lambda e: 0.5 + 2.0**e),
-    st.sampled_from((2.0**-54, 2.0**-53, 0.075, 0.925, 0.5, 1.0 - 2.0**-53)),
+fractions = st.one_of(
+    st.integers(0, FRACTION), st.integers(0, 51).map(lambda e: 2**e), st.integers(0, 51).map(lambda e: FRACTION - 2**e)
 )
+telling = st.builds(lambda top, fraction: top << 52 | fraction, st.integers(0, 2**12 - 1), fractions)
+"""Words whose uniform number is often next to 0, 1 or the middle."""
 
 KNOWN = [
     # Counter, key, answer: the known answers published with the generator, Threefry-2x64 with 20 rounds.
@@ -37,21 +48,48 @@ KNOWN = [
 ]
 
 
-@numba.njit(error_model="numpy")
-def compiled_threefry(key0, key1, counter0, counter1):
-    return threefry((key0, key1), (counter0, counter1))
+def on_bits(function):
+    """The function of words as one of the doubles with the same bits, which compiled code is called with."""
+
+    def equation(*doubles):
+        return function(*(bits_of(x) for x in doubles))
+
+    return equation
+
+
+def doubles(*columns):
+    """Columns of words as columns of doubles with the same bits."""
+    return np.array([np.array([w & ONES for w in column], dtype=np.uint64) for column in columns]).view(np.float64)
+
+
+def same_bits(found, wanted):
+    return [struct.pack("<d", x) for x in found] == [struct.pack("<d", x) for x in wanted]
+
+
+def shown(function):
+    """The words that a function of words gives, as the doubles with their bits."""
+    return lambda *given: tuple(with_bits(w) for w in function(*given))
+
+
+FOUR, TWO = (0.0,) * 4, (0.0,) * 2
+THREEFRY = Compiled(on_bits(shown(lambda k0, k1, c0, c1: threefry((k0, k1), (c0, c1)))), *FOUR)
+UNIFORM = Compiled(on_bits(lambda word: (to_unit(word), to_angle(word))), 0.0)
+TRANSFORM = Compiled(on_bits(transform), *TWO)
+NINE = Compiled(on_bits(lambda seed, run, step: normals((seed, run), step, 0, 9)), *(0.0,) * 3)
+SQUARED_RADIUS, COSINE_AND_SINE = Compiled(squared_radius, 1.0), Compiled(cosine_and_sine, 1.0)
 
 
 def fast_threefry(key, counter):
-    """The compiled generator on words given as unsigned numbers."""
-    a, b = compiled_threefry(*(np.uint64(word) for word in (*key, *counter)))
-    return int(a), int(b)
+    """The compiled generator on one lane, on words."""
+    return tuple(bits_of(x) for x in THREEFRY(*(with_bits(w & ONES) for w in (*key, *counter))))
 
 
 @pytest.mark.parametrize(("counter", "key", "answer"), KNOWN)
 def test_known_answers(counter, key, answer):
     assert threefry(key, counter) == answer
     assert fast_threefry(key, counter) == answer
+    on_lanes = THREEFRY.over(doubles(*([w] * 9 for w in (*key, *counter)))).view(np.uint64)
+    assert [tuple(map(int, lane)) for lane in on_lanes.T] == [answer] * 9
 
 
 @given(words, words, words, words)
@@ -59,24 +97,34 @@ def test_compiled_words(k0, k1, c0, c1):
     assert fast_threefry((k0, k1), (c0, c1)) == threefry((k0, k1), (c0, c1))
 
 
-@given(*[st.integers(-(2**63), 2**63 - 1)] * 4)
-def test_signed_numbers_stand_for_their_words(k0, k1, c0, c1):
-    plain = threefry((k0, k1), (c0, c1))
-    assert plain == threefry((k0 & ONES, k1 & ONES), (c0 & ONES, c1 & ONES))
-    a, b = compiled_threefry(k0, k1, c0, c1)
-    assert (int(a) & ONES, int(b) & ONES) == plain
+@given(*[st.integers(-(2**70), 2**70)] * 4)
+def test_any_integer_stands_for_a_word(k0, k1, c0, c1):
+    a, b = threefry((k0, k1), (c0, c1))
+    assert 0 <= a <= ONES
+    assert 0 <= b <= ONES
+    assert (a, b) == threefry((k0 & ONES, k1 & ONES), (c0 & ONES, c1 & ONES))
+
+
+@pytest.mark.parametrize("seed", [-1, 2**63, -(2**63), 2**200 + 7, 1 - 2**64])
+def test_a_seed_that_is_no_word_may_be_a_constant_of_compiled_code(seed):
+    def constant(key):
+        return Compiled(lambda step: normals(key, bits_of(step), 0, 2), 0.0)
+
+    found, wanted = constant((seed, -seed)), constant((seed & ONES, -seed & ONES))
+    # Languages write constants of 64 bits only: it is the remainder that is recorded.
+    assert found.program == wanted.program
+    assert same_bits(found(with_bits(5)), normals((seed, -seed), 5, 0, 2))
 
 
 def undo(key, out):
     """The counter that gives these words: the rounds backwards."""
-    rotations = (16, 42, 12, 31, 16, 32, 24, 21)
     keys = (*key, key[0] ^ key[1] ^ 0x1BD11BDAA9FC1A22)
     a, b = out
     for i in reversed(range(20)):
         if i % 4 == 3:
             j = i // 4 + 1
             a, b = (a - keys[j % 3]) & ONES, (b - keys[(j + 1) % 3] - j) & ONES
-        turned, turn = a ^ b, rotations[i % 8]
+        turned, turn = a ^ b, ROTATIONS[i % 8]
         b = ((turned >> turn) | (turned << (64 - turn))) & ONES
         a = (a - b) & ONES
     return (a - keys[0]) & ONES, (b - keys[1]) & ONES
@@ -99,100 +147,205 @@ def test_one_bit_of_input_turns_half_of_the_output(k0, k1, c0, c1, bit):
     assert 30 < changed < 98
 
 
-@numba.njit(error_model="numpy")
-def compiled_unit(word):
-    return to_unit(word)
+@given(words | telling | st.sampled_from((0, ONES, FRACTION, 2**52, 2**51, 2**51 - 1)))
+def test_uniform_numbers_are_exact(word):
+    k = word & FRACTION
+    unit, angle = to_unit(word), to_angle(word)
+    assert unit.as_integer_ratio() == ((2 * k + 1), 2**53)
+    assert 0.0 < unit < 1.0
+    assert angle == math.ldexp(k - 2**51, -52)
+    assert -0.5 <= angle < 0.5
+    # Symmetric: the complement of the bits is the complement of the number.
+    assert to_unit(word ^ ONES) == 1.0 - unit
+    assert same_bits(UNIFORM(with_bits(word)), (unit, angle))
 
 
-@given(words | st.sampled_from((0, ONES, 2**63, 2**63 - 1, 2**11, 2**12)))
-def test_unit_numbers_are_strictly_inside(word):
-    x = to_unit(word)
-    assert 0.0 < x < 1.0
-    assert abs(x - word / 2**64) <= 2.0**-52
-    # Symmetric: the complement of the bits is the complement of the number, exactly.
-    assert to_unit(word ^ ONES) == 1.0 - x
-    assert compiled_unit(np.uint64(word)) == x
+def relative(found, exact):
+    return float(abs((mpmath.mpf(found) - exact) / exact))
 
 
-def ulps(found, wanted):
-    return abs(found - wanted) / math.ulp(wanted)
+ROOT = math.sqrt(0.5)
+EDGES = [x * 2.0**-e for e in range(54) for x in (1.0, ROOT)]
+NEAR = [x for edge in EDGES for x in (math.nextafter(edge, 0.0), edge, math.nextafter(edge, 2.0)) if 2.0**-53 <= x < 1.0]
 
 
-@given(st.floats(-63.0, 0.0).map(lambda e: 2.0**e) | st.floats(0.5, 1.0))
-def test_logarithm(x):
-    assert ulps(logarithm(x), math.log(x)) <= 4.0
+def check_squared_radius(x):
+    found = squared_radius(x)
+    with mpmath.workdps(40):
+        assert relative(found, -2 * mpmath.log(mpmath.mpf(x))) < 2.8e-14
+    assert same_bits([SQUARED_RADIUS(x)], [found])
 
 
-def test_logarithm_at_the_edges_of_its_pieces():
-    edges = [2.0**-e for e in range(64)] + [0.7071067811865476 * 2.0**-e for e in range(60)]
-    near = [f(x) for x in edges for f in (float, lambda x: math.nextafter(x, 0.0), lambda x: math.nextafter(x, 1.0))]
-    worst = max(ulps(same(logarithm, x), math.log(x)) for x in near if 2.0**-63 <= x < 1.0)
-    assert worst <= 4.0
-    assert same(logarithm, 1.0) == 0.0
+@given(
+    st.floats(2.0**-53, 1.0 - 2.0**-53)
+    | st.floats(-53.0, -1e-9).map(lambda e: 2.0**e)
+    | st.floats(-52.0, -1.0).map(lambda e: 1.0 - 2.0**e)
+)
+def test_squared_radius(x):
+    check_squared_radius(x)
+
+
+def test_squared_radius_at_the_edges_of_its_pieces():
+    for x in NEAR:
+        check_squared_radius(x)
+    assert squared_radius(1.0) == 0.0
+
+
+def test_squared_radius_has_its_stated_error():
+    # The largest error is that of the polynomial: where the fraction comes to the square root of 1/2, and x to 1.
+    with mpmath.workdps(40):
+        worst = max(
+            relative(squared_radius(x), -2 * mpmath.log(mpmath.mpf(x))) for x in np.linspace(ROOT, 1.0, 400)[:-1].tolist()
+        )
+    assert 2.5e-14 < worst < 2.8e-14
+
+
+def check_cosine_and_sine(x):
+    c, s = cosine_and_sine(x)
+    with mpmath.workdps(40):
+        angle = mpmath.mpf(x) * mpmath.pi / 2
+        assert relative(c, mpmath.cos(angle)) < 6.7e-14
+        assert s == 0.0 if x == 0.0 else relative(s, mpmath.sin(angle)) < 5e-15
+    assert same_bits(COSINE_AND_SINE(x), (c, s))
+
+
+@given(
+    st.floats(-0.5, 0.5, allow_subnormal=False) | st.floats(-52.0, -1.0).map(lambda e: 2.0**e) | st.sampled_from((0.0, -0.0))
+)
+def test_cosine_and_sine(x):
+    # The smallest angle on the grid is 2^-52; what underflows is not met.
+    x = x if abs(x) >= 2.0**-60 else 0.0
+    check_cosine_and_sine(x)
+    assert cosine_and_sine(-x) == (cosine_and_sine(x)[0], -cosine_and_sine(x)[1])
+
+
+def test_cosine_and_sine_over_their_range():
+    for k in range(-256, 257):
+        check_cosine_and_sine(k / 512)
+    for edge in (0.5, math.nextafter(0.5, 0.0), 2.0**-52):
+        check_cosine_and_sine(edge)
+        check_cosine_and_sine(-edge)
+
+
+def exact_transform(a, b):
+    """The transform of Box and Muller of the numbers that two words stand for, and the largest part that either can be."""
+    with mpmath.workdps(40):
+        unit = (mpmath.mpf(a & FRACTION) + mpmath.mpf(1) / 2) / 2**52
+        angle = (mpmath.mpf(b & FRACTION) / 2**52 - mpmath.mpf(1) / 2) * mpmath.pi / 2
+        radius = mpmath.sqrt(-2 * mpmath.log(unit)) * (-1 if a >> 63 else 1)
+        pair = radius * mpmath.cos(angle), radius * mpmath.sin(angle)
+    return pair[::-1] if b >> 63 else pair
+
+
+def check_transform(a, b):
+    pair = transform(a, b)
+    for found, exact in zip(pair, exact_transform(a, b), strict=True):
+        assert found == 0.0 if exact == 0 else relative(found, exact) < 8.1e-14
+    assert same_bits(TRANSFORM(with_bits(a), with_bits(b)), pair)
 
 
 @settings(max_examples=300)
-@given(probabilities)
-def test_inverse_normal(p):
-    z = same(inverse_normal, p)
-    assert z == pytest.approx(float(ndtri(p)), rel=1e-14, abs=1e-16)
-    assert (z < 0.0) == (p < 0.5)
-    assert (z > 0.0) == (p > 0.5)
+@given(words | telling, words | telling)
+def test_transform(a, b):
+    check_transform(a, b)
 
 
-@pytest.mark.parametrize("p", [2.0**-54, 1e-15, 1e-10, 1.4e-11, 1e-5, 0.01, 0.0749, 0.0751, 0.3, 0.49, 0.5 - 1e-9])
-def test_inverse_normal_to_its_last_digits(p):
-    with mpmath.workdps(40):
-        exact = float(mpmath.sqrt(2) * mpmath.erfinv(2 * mpmath.mpf(p) - 1))
-    assert inverse_normal(p) == pytest.approx(exact, rel=2e-15)
+# Smallest and largest uniform number, both sides of the middle, each with both choices of a bit of the quarter.
+EXTREMES = [top | k for top in (0, 1 << 63) for k in (0, 1, 2**51 - 1, 2**51, 2**51 + 1, FRACTION - 1, FRACTION)]
 
 
-@given(st.integers(1, 2**52 - 1))
-def test_inverse_normal_is_odd(k):
-    p = k * 2.0**-53
-    assert inverse_normal(1.0 - p) == -inverse_normal(p)
+@pytest.mark.parametrize("a", EXTREMES)
+@pytest.mark.parametrize("b", EXTREMES)
+def test_transform_at_the_extremes_and_the_edges_of_all_quarters(a, b):
+    check_transform(a, b)
 
 
-def test_inverse_normal_rises():
-    p = np.concatenate([2.0 ** np.linspace(-54, -2, 3000), np.linspace(0.2501, 0.75, 3000)])
-    z = [compiled(inverse_normal)(x) for x in p]
-    assert np.all(np.diff(z) > 0.0)
+def test_the_bits_between_do_not_matter():
+    # Bits 52 to 62 of either word.
+    assert transform(7 | 0x7FF << 52, 9 | 0x7FF << 52) == transform(7, 9)
 
 
-@numba.njit(error_model="numpy")
-def many(seed, run, channel, deviation, count):
-    out = np.empty((count, 3))
-    for step in range(count):
-        out[step] = normal_vector(seed, run, step, channel, deviation)
-    return out
+def test_all_quarters():
+    # The same angle with each choice of sign and exchange: mirrored in the diagonal and in the origin.
+    k, top = 2**51 + 2**49, 1 << 63
+    x, y = transform(123456, k)
+    assert 0.0 < y < x
+    assert transform(123456, k | top) == (y, x)
+    assert transform(123456 | top, k) == (-x, -y)
+    assert transform(123456 | top, k | top) == (-y, -x)
+
+
+def test_the_largest_and_the_smallest_radius():
+    largest, smallest = math.hypot(*transform(0, 12345)), math.hypot(*transform(FRACTION, 12345))
+    assert largest == pytest.approx(math.sqrt(106.0 * math.log(2.0)), rel=1e-13)
+    assert largest == pytest.approx(8.5717, abs=1e-4)
+    assert smallest == pytest.approx(2.0**-26, rel=1e-13)
+
+
+@given(st.lists(telling, min_size=1, max_size=20), st.data())
+def test_lanes_give_the_bits_of_plain_python(first, data):
+    second = data.draw(st.lists(telling, min_size=len(first), max_size=len(first)))
+    found = TRANSFORM.over(doubles(first, second))
+    assert all(same_bits(found[:, i], transform(a, b)) for i, (a, b) in enumerate(zip(first, second, strict=True)))
 
 
 COUNT = 20000
-SAMPLE = many(1, 0, 0, 1.0, COUNT)
 
 
-@settings(max_examples=50)
-@given(st.integers(0, 2**63 - 1), st.integers(0, 10**9), st.integers(0, 10**9), st.sampled_from((0, 2, 4)))
-def test_compiled_vectors(seed, run, step, channel):
-    x = same(normal_vector, seed, run, step, channel, 0.3)
-    assert all(math.isfinite(c) and abs(c) < 0.3 * 8.3 for c in x)
-    assert list(map(bits, x)) == list(map(bits, normal_vector(seed, run, step, channel, 0.3)))
+def nine(seed, run):
+    """The nine Gaussians of each of many steps, (9, steps)."""
+    return NINE.over(doubles([seed] * COUNT, [run] * COUNT, range(COUNT)))
 
 
-def test_vectors_of_an_array_are_those_of_plain_python():
-    for step in (0, 1, 2, 999):
-        assert tuple(SAMPLE[step]) == normal_vector(1, 0, step, 0, 1.0)
+SAMPLE = nine(1, 0)
+
+
+@settings(max_examples=30)
+@given(st.integers(-(2**70), 2**70), words, words)
+def test_compiled_numbers(seed, run, step):
+    plain = normals((seed, run), step, 0, 9)
+    assert all(math.isfinite(x) and abs(x) < 8.6 for x in plain)
+    assert same_bits(NINE(*(with_bits(w & ONES) for w in (seed, run, step))), plain)
+
+
+def test_numbers_of_an_array_are_those_of_plain_python():
+    for step in (0, 1, 2, 7, 8, 9, 999, COUNT - 1):
+        assert same_bits(SAMPLE[:, step], normals((1, 0), step, 0, 9))
+
+
+@pytest.mark.parametrize("first", range(7))
+@pytest.mark.parametrize("count", range(7))
+def test_a_number_does_not_depend_on_what_else_is_drawn(first, count):
+    assert normals((1, 2), 3, first, count) == normals((1, 2), 3, 0, 20)[first : first + count]
+
+
+def test_a_number_is_one_of_the_two_of_its_call():
+    for number in range(10):
+        assert normals((4, 5), 6, number, 1) == transform(*threefry((4, 5), (6, number // 2)))[number % 2 :][:1]
+
+
+def test_calls_are_shared_while_recorded():
+    # Three vectors of three make use of five calls, each recorded once.
+    def vectors(seed, run, step):
+        return tuple(normal_vector((seed, run), step, first, 1.0) for first in (0, 3, 6))
+
+    program = Compiled(on_bits(vectors), *(0.0,) * 3).program
+    operations = [s.operation.name for s in statements(program.main.body) if isinstance(s, Op)]
+    assert operations.count("sqrt") == operations.count("divide") == 5
+    assert operations.count("rotate_left") == 5 * 20
 
 
 def test_deviation_scales():
-    np.testing.assert_array_equal(many(1, 0, 0, 2.0, 100), 2.0 * SAMPLE[:100])
-    assert normal_vector(1, 0, 0, 0, 0.0) == (0.0, 0.0, 0.0)
+    whole = normal_vector((1, 2), 3, 6, 1.0)
+    assert whole == normals((1, 2), 3, 6, 3)
+    assert normal_vector((1, 2), 3, 6, 0.3) == tuple(0.3 * x for x in whole)
+    assert normal_vector((1, 2), 3, 6, 0.0) == (0.0, 0.0, 0.0)
 
 
 def test_moments():
     # Four standard errors of each moment of as many normal numbers.
     error = 4.0 / math.sqrt(COUNT)
-    for x in SAMPLE.T:
+    for x in SAMPLE:
         assert abs(x.mean()) < error
         assert abs(x.var() - 1.0) < error * math.sqrt(2.0)
         assert abs((x**3).mean()) < error * math.sqrt(15.0)
@@ -208,20 +361,33 @@ def distance_to_normal(x):
 
 def test_distribution():
     # 1.95 is exceeded by one sample of a thousand; a wrong deviation by a few per cent is seen.
-    for x in SAMPLE.T:
+    for x in SAMPLE:
         assert distance_to_normal(x) < 1.95
-    assert distance_to_normal(1.05 * SAMPLE.ravel()) > 1.95
+    assert distance_to_normal(SAMPLE.ravel()) < 1.95
+    assert distance_to_normal(1.02 * SAMPLE.ravel()) > 1.95
     assert distance_to_normal(SAMPLE.ravel() + 0.02) > 1.95
 
 
+def test_distribution_of_the_tail():
+    # Beyond three deviations: 0.27 per cent, within four standard errors of a count.
+    found, p = np.count_nonzero(np.abs(SAMPLE) > 3.0), 2.0 * ndtr(-3.0)
+    assert abs(found - p * SAMPLE.size) < 4.0 * math.sqrt(p * SAMPLE.size)
+
+
+def test_pairs_point_everywhere_alike():
+    # Both numbers of a call as a vector: as many in each of 64 directions. Chi squared with 63 degrees of freedom.
+    angles = np.arctan2(SAMPLE[1:8:2], SAMPLE[0:8:2]).ravel()
+    counts = np.histogram(angles, 64, (-math.pi, math.pi))[0]
+    expected = angles.size / 64
+    assert abs(np.sum((counts - expected) ** 2) / expected - 63.0) < 4.0 * math.sqrt(126.0)
+
+
 def test_independence():
-    # Components, channels, runs, seeds and successive steps: no two series are correlated, and no number comes twice.
-    others = [many(*where, 1.0, COUNT) for where in ((1, 0, 2), (1, 0, 4), (1, 1, 0), (2, 0, 0), (0, 1, 0))]
-    series = np.hstack([SAMPLE, *others]).T
+    # Numbers, runs, seeds and successive steps: no two series are correlated, and no number comes twice.
+    series = np.vstack([SAMPLE, nine(1, 1), nine(2, 0), nine(0, 1)])
     bound = 5.0 / math.sqrt(COUNT)
-    correlation = np.corrcoef(series) - np.eye(len(series))
-    assert np.abs(correlation).max() < bound
-    assert np.abs(np.corrcoef(series**2) - np.eye(len(series))).max() < bound
+    for power in (series, series**2 - 1.0, np.abs(series)):
+        assert np.abs(np.corrcoef(power) - np.eye(len(series))).max() < bound
     for x in series:
         assert abs(np.mean(x[1:] * x[:-1])) < bound
     assert len(np.unique(series)) == series.size

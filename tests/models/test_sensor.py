@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from starhold.algebra.quaternion import NO_TURN, stretch
-from starhold.algebra.vector import ZERO, subtract
+from starhold.algebra.vector import ZERO, add
+from starhold.algebra.words import bits_of, with_bits
 from starhold.models.random import normal_vector
 from starhold.models.sensor import (
     ATTITUDE,
@@ -23,93 +23,107 @@ from starhold.models.sensor import (
     no_disturbance,
     noisy,
 )
+from starhold.trace.calling import Compiled
 from tests.algebra.readers import agree, close, quaternions, same, small_vectors
 
 NOISE = Noise(0.02, 0.001, 0.003)
 indices = st.integers(0, 10**9)
-seeds = st.integers(0, 2**63 - 1)
+# As bits of a float, below those of NaN.
+seeds = st.integers(0, 2**62)
+
+
+def of_words(equation):
+    """An equation of seed, run and step as one of floats, which carry the bits of the words."""
+    return lambda *values: equation(*values[:-3], (bits_of(values[-3]), bits_of(values[-2])), bits_of(values[-1]))
+
+
+SENSES = [of_words(sense) for sense in (exact, noisy)]
+DISTURBANCES = [of_words(disturb) for disturb in (no_disturbance, gaussian_disturbance)]
 
 
 @settings(max_examples=50)
 @given(quaternions, small_vectors, seeds, indices, indices)
 def test_compiled_equals_floats(attitude, rate, seed, run, step):
-    for sense in (exact, noisy):
-        same(sense, attitude, rate, NOISE, seed, run, step)
-    for disturb in (no_disturbance, gaussian_disturbance):
-        same(disturb, NOISE, seed, run, step)
+    words = with_bits(seed), with_bits(run), with_bits(step)
+    for sense in SENSES:
+        same(sense, attitude, rate, NOISE, *words)
+    for disturb in DISTURBANCES:
+        same(disturb, NOISE, *words)
 
 
 @settings(max_examples=10)
 @given(quaternions, small_vectors, indices)
 def test_every_reader_gives_the_same_without_random_numbers(attitude, rate, step):
-    agree(exact, attitude, rate, NOISE, 1, 2, step)
-    agree(no_disturbance, NOISE, 1, 2, step)
+    agree(exact, attitude, rate, NOISE, (1, 2), step)
+    agree(no_disturbance, NOISE, (1, 2), step)
 
 
 @given(quaternions, small_vectors, seeds, indices, indices)
 def test_exact(attitude, rate, seed, run, step):
-    assert exact(attitude, rate, NOISE, seed, run, step) == (attitude, rate)
-    assert no_disturbance(NOISE, seed, run, step) == ZERO
-    seen, measured = noisy(attitude, rate, Noise(0.02, 0.0, 0.0), seed, run, step)
+    assert exact(attitude, rate, NOISE, (seed, run), step) == (attitude, rate)
+    assert no_disturbance(NOISE, (seed, run), step) == ZERO
+    seen, measured = noisy(attitude, rate, Noise(0.02, 0.0, 0.0), (seed, run), step)
     assert close(seen, attitude, 1e-15)
     assert measured == rate
-    assert gaussian_disturbance(Noise(0.0, 0.1, 0.1), seed, run, step) == ZERO
+    assert gaussian_disturbance(Noise(0.0, 0.1, 0.1), (seed, run), step) == ZERO
 
 
 @given(quaternions, small_vectors, st.floats(0.0, 0.1), seeds, indices, indices)
 def test_noisy_attitude_is_a_unit_quaternion_near_the_true_one(attitude, rate, deviation, seed, run, step):
-    seen, _ = noisy(attitude, rate, Noise(0.0, deviation, 0.0), seed, run, step)
+    seen, _ = noisy(attitude, rate, Noise(0.0, deviation, 0.0), (seed, run), step)
     assert abs(sum(c * c for c in seen) - 1.0) < 1e-15
-    added = math.hypot(*normal_vector(seed, run, step, ATTITUDE, deviation))
+    added = math.hypot(*normal_vector((seed, run), step, ATTITUDE, deviation))
     # The error added is at most what is seen, by more than the length it changes.
     assert math.dist(seen, attitude) <= 2.0 * added + 1e-15
 
 
 @given(small_vectors, seeds, indices, indices)
 def test_errors_are_those_of_their_channels(rate, seed, run, step):
-    _, measured = noisy(NO_TURN, rate, NOISE, seed, run, step)
-    assert close(subtract(measured, rate), normal_vector(seed, run, step, RATE, NOISE.rate), 1e-16)
-    assert gaussian_disturbance(NOISE, seed, run, step) == normal_vector(seed, run, step, TORQUE, NOISE.torque)
-    seen, _ = noisy(NO_TURN, rate, NOISE, seed, run, step)
-    error = normal_vector(seed, run, step, ATTITUDE, NOISE.attitude)
+    _, measured = noisy(NO_TURN, rate, NOISE, (seed, run), step)
+    assert measured == add(rate, normal_vector((seed, run), step, RATE, NOISE.rate))
+    assert gaussian_disturbance(NOISE, (seed, run), step) == normal_vector((seed, run), step, TORQUE, NOISE.torque)
+    seen, _ = noisy(NO_TURN, rate, NOISE, (seed, run), step)
+    error = normal_vector((seed, run), step, ATTITUDE, NOISE.attitude)
     assert close(tuple(x / seen[0] for x in seen[1:]), error, 1e-16)
-    # Three numbers take two counters, so channels are two apart.
-    assert len({TORQUE, ATTITUDE, RATE, TORQUE + 1, ATTITUDE + 1, RATE + 1}) == 6
+    # Three numbers each.
+    assert len({place + axis for place in (TORQUE, ATTITUDE, RATE) for axis in range(3)}) == 9
 
 
 def test_the_same_seed_run_and_step_give_the_same_numbers():
     rate = (0.1, 0.2, 0.3)
-    first = noisy(NO_TURN, rate, NOISE, 1, 2, 3)
-    assert noisy(NO_TURN, rate, NOISE, 1, 2, 3) == first
-    others = {noisy(NO_TURN, rate, NOISE, *where) for where in ((2, 2, 3), (1, 3, 3), (1, 2, 4), (3, 2, 1), (2, 1, 3))}
+    first = noisy(NO_TURN, rate, NOISE, (1, 2), 3)
+    assert noisy(NO_TURN, rate, NOISE, (1, 2), 3) == first
+    elsewhere = ((2, 2, 3), (1, 3, 3), (1, 2, 4), (3, 2, 1), (2, 1, 3))
+    others = {noisy(NO_TURN, rate, NOISE, where[:2], where[2]) for where in elsewhere}
     assert len(others | {first}) == 6
-    torques = {gaussian_disturbance(NOISE, *where) for where in ((1, 2, 3), (2, 2, 3), (1, 3, 3), (1, 2, 4))}
+    torques = {gaussian_disturbance(NOISE, where[:2], where[2]) for where in ((1, 2, 3), (2, 2, 3), (1, 3, 3), (1, 2, 4))}
     assert len(torques) == 4
 
 
 def test_opposite_quaternions_are_seen_with_independent_signs():
     # The error is added to the numbers of q, so -q is not seen as minus what q is seen as.
-    seen, _ = noisy((0.6, 0.8, 0.0, 0.0), ZERO, NOISE, 1, 2, 3)
-    other, _ = noisy((-0.6, -0.8, 0.0, 0.0), ZERO, NOISE, 1, 2, 3)
+    seen, _ = noisy((0.6, 0.8, 0.0, 0.0), ZERO, NOISE, (1, 2), 3)
+    other, _ = noisy((-0.6, -0.8, 0.0, 0.0), ZERO, NOISE, (1, 2), 3)
     assert not close(seen, stretch(-1.0, other), 1e-6)
     assert close(seen, stretch(-1.0, other), 0.02)
 
 
-@numba.njit(error_model="numpy")
-def series(attitude, rate, noise, count):
-    out = np.empty((count, 10))
-    for step in range(count):
-        seen, measured = noisy(attitude, rate, noise, 5, 0, step)
-        torque = gaussian_disturbance(noise, 5, 0, step)
-        out[step, 0], out[step, 1], out[step, 2], out[step, 3] = seen
-        out[step, 4], out[step, 5], out[step, 6] = measured
-        out[step, 7], out[step, 8], out[step, 9] = torque
-    return out
-
-
 COUNT = 20000
 RATES = (0.1, -0.2, 0.3)
-SERIES = series(NO_TURN, RATES, NOISE, COUNT)
+
+
+def series(count):
+    """What is seen of one state at steps 0, 1, ..., and the torque: attitude (4), rate (3), torque (3), one row a step."""
+
+    def at_step(bits):
+        step = bits_of(bits)
+        return noisy(NO_TURN, RATES, NOISE, (5, 0), step), gaussian_disturbance(NOISE, (5, 0), step)
+
+    steps = np.arange(count, dtype=np.int64).view(np.float64)
+    return Compiled(at_step, 0.0).over(steps[None]).T
+
+
+SERIES = series(COUNT)
 
 
 def test_statistics():

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-import re
 
-import numba
 import numpy as np
 import pytest
 from flint import fmpq
@@ -16,9 +14,9 @@ from scipy.optimize import linprog
 
 from starhold.algebra.polynomial import Polynomial, constants, pieces
 from starhold.algebra.quaternion import derivative, renormalise, to_reference
-from starhold.algebra.scalar import equation
-from starhold.algebra.structure import LANES, load, move, pack, store, unpack
-from starhold.algebra.vector import add, apply, inverse, scale, subtract, swing
+from starhold.algebra.structure import flatten, leaves, move, unflatten
+from starhold.algebra.structured import Buffer, repeat
+from starhold.algebra.vector import add, apply, dot, inverse, scale, subtract, swing
 from starhold.models.craft import matrix
 from starhold.models.wheel_units import WHEEL_UNITS
 from starhold.models.wheels import (
@@ -36,6 +34,9 @@ from starhold.models.wheels import (
     stored,
     three_orthogonal,
 )
+from starhold.trace.calling import Compiled
+from starhold.trace.machine import load
+from starhold.trace.recording import Recorder
 from tests.algebra.readers import agree, same
 
 finite = st.floats(-1.0, 1.0)
@@ -177,7 +178,6 @@ def test_layouts():
 # What compiled code and the other readers make of the equations.
 
 
-@equation
 def everything(torque, momentum, rate, wheels):
     first = allocate(torque, wheels)
     h_rate = motor(first, momentum, rate, wheels)
@@ -200,28 +200,16 @@ def test_compiled_code_gives_the_same_bits(layout):
 
 def test_compiled_lanes_give_the_same_bits():
     wheels = simple(pyramid(), viscous=1e-4, coulomb=2e-3)
-    states = np.random.default_rng(3).normal(size=(10, LANES))
+    states = np.random.default_rng(3).normal(size=(10, 130))
     like = ((0.0,) * 3, (0.0,) * 4, (0.0,) * 3)
 
-    @numba.njit(error_model="numpy")
-    def lanes(x, like, wheels):
-        for k in range(LANES):
-            torque, momentum, rate = load(x, k, like)
-            h_rate = motor(allocate_peak(torque, wheels), momentum, rate, wheels)
-            store(x, k, (on_body(h_rate, momentum, rate, wheels), h_rate, rate))
-
-    blocks = pack(states)
-    lanes(blocks[0], like, wheels)
-    found = unpack(blocks, LANES)
-    for k in range(LANES):
-        torque, momentum, rate = load(states, k, like)
+    def shared(torque, momentum, rate):
         h_rate = motor(allocate_peak(torque, wheels), momentum, rate, wheels)
-        assert tuple(found[:3, k]) == on_body(h_rate, momentum, rate, wheels)
-        assert tuple(found[3:7, k]) == h_rate
-    # The loop became vector instructions, products as well as choices.
-    code = lanes.inspect_llvm(lanes.signatures[0])
-    assert re.search(r"fmul <\d+ x double>", code)
-    assert re.search(r"select <\d+ x i1>", code)
+        return on_body(h_rate, momentum, rate, wheels), h_rate
+
+    found = Compiled(shared, *like).over(states)
+    for k in range(130):
+        assert tuple(found[:, k]) == tuple(leaves(shared(*unflatten(states[:, k], like))))
 
 
 @settings(max_examples=10)
@@ -286,7 +274,6 @@ def test_friction():
 TOTAL = ((12.0, 0.5, -0.3), (0.5, 9.0, 0.2), (-0.3, 0.2, 15.0))
 
 
-@equation
 def slope(state, command, inertia, wheels):
     attitude, rate, momentum = state
     h_rate = motor(command, momentum, rate, wheels)
@@ -294,7 +281,6 @@ def slope(state, command, inertia, wheels):
     return derivative(attitude, rate), apply(inverse(inertia), torque), h_rate
 
 
-@equation
 def step(state, h, command, inertia, wheels):
     a = slope(state, command, inertia, wheels)
     b = slope(move(state, 0.5 * h, a), command, inertia, wheels)
@@ -304,38 +290,41 @@ def step(state, h, command, inertia, wheels):
     return renormalise(end[0]), end[1], end[2]
 
 
-@equation
 def whole_momentum(state, inertia, wheels):
     return to_reference(state[0], add(apply(inertia, state[1]), stored(state[2], wheels)))
 
 
-@numba.njit(error_model="numpy")
-def fly(state, h, commands, held, steps, inertia, wheels, out):
-    """Hold each row of `commands` for `held` steps; momentum of the whole (3), energy of the whole, wheel momenta."""
-    for k in range(steps):
-        row = commands[k // held]
-        command = (row[0], row[1], row[2], row[3])
-        whole = whole_momentum(state, inertia, wheels)
-        rate, momentum = state[1], state[2]
-        spin = apply(inertia, rate)
-        energy = 0.5 * (spin[0] * rate[0] + spin[1] * rate[1] + spin[2] * rate[2])
-        for i in range(3):
-            out[k, i] = whole[i]
-        for i in range(4):
-            energy += 0.5 * momentum[i] * momentum[i] / wheels.inertia[i]
-            out[k, 4 + i] = momentum[i]
-        out[k, 3] = energy
-        state = step(state, h, command, inertia, wheels)
-    return state
+def noted(state, inertia, wheels):
+    """Momentum of the whole (3), energy of the whole, wheel momenta."""
+    _, rate, momentum = state
+    energy = 0.5 * dot(apply(inertia, rate), rate)
+    for h, rotor in zip(momentum, wheels.inertia, strict=True):
+        energy = energy + 0.5 * h * h / rotor
+    return (*whole_momentum(state, inertia, wheels), energy, *momentum)
 
 
 def flight(wheels, commands, held, steps, rate=(0.01, -0.005, 0.008), size=1.0):
-    momentum = (0.3, -0.2, 0.1, 0.25)
+    """Hold each row of `commands` for `held` steps; what `noted` gives before each step, and the last state."""
     inertia = matrix(body_inertia(size * np.array(TOTAL), wheels))
-    out = np.empty((steps, 8))
-    state = ((1.0, 0.0, 0.0, 0.0), rate, momentum)
-    last = fly(state, 0.1, np.asarray(commands, dtype=float), held, steps, inertia, wheels, out)
-    return out, last
+    recorder = Recorder()
+    with recorder.recording():
+        cells, out = (recorder.memory(name, writable=True) for name in ("state", "out"))
+        given = Buffer(recorder.memory("commands"), 0, len(commands) * 4)
+
+        def turn(row, k, state):
+            for i, number in enumerate(noted(state, inertia, wheels)):
+                out[(row * held + k) * 8 + i] = number
+            return (step(state, 0.1, given.row(row, 4), inertia, wheels),)
+
+        start = Buffer(cells, 0, 11)
+        state = ((start.row(0, 4), start.part(4, 3).row(0, 3), start.part(7, 4).row(0, 4)),)
+        end = repeat(steps // held, lambda row, state: repeat(held, lambda k, now: turn(row, k, now), state), *state)
+        for i, number in enumerate(flatten(end)):
+            cells[i] = number
+    x = np.array([1.0, 0.0, 0.0, 0.0, *rate, 0.3, -0.2, 0.1, 0.25])
+    rows, table = np.empty((steps, 8)), np.ascontiguousarray(commands, dtype=float)
+    load(recorder.program("flight"), 1)(x.ctypes.data, rows.ctypes.data, table.ctypes.data)
+    return rows, unflatten(x, ((0.0,) * 4, (0.0,) * 3, (0.0,) * 4))
 
 
 @pytest.mark.parametrize("layout", ["pyramid", "nasa"])

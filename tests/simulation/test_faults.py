@@ -100,7 +100,7 @@ def test_lanes_chunks_and_plain_python_agree_bit_for_bit(case):
     for phase in loop.phases(steps):
         carry = carry._replace(state=carry.state._replace(rate=phase.rate_from(carry.state.rate)))
         for k in range(phase.first, phase.last):
-            carry = step.decide(step.check(carry, k, phase.setup), k, 0, phase.gains, phase.known, phase.setup)
+            carry = step.decide(step.check(carry, k, phase.setup), k, (1, 0), phase.gains, phase.known, phase.setup)
             carry = step.hold(carry, phase.craft, phase.setup)
     assert flatten(carry.state) == flatten(end.state)
 

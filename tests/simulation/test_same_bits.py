@@ -8,12 +8,15 @@ import pytest
 from starhold.algebra.structure import flatten
 from starhold.conformance.bench import random_quaternions, sample_loop
 from starhold.laws.catalogue import catalogue
-from starhold.loop.kernels import make_step
+from starhold.loop.kernels import fly_plainly
+from starhold.models.actuator import Dynamics
+from starhold.models.craft import make_craft
 from starhold.models.sensor import Noise
 from starhold.simulation.lane import fly, simulate
-from starhold.simulation.lanes import _carries, simulate_many
+from starhold.simulation.lanes import alongside, carry_columns, simulate_many
 
 STEPS, LANES = 60, 300
+TURNED = (0.6, 0.0, 0.8, 0.0)
 
 
 def flown(name="sliding", **options):
@@ -36,7 +39,7 @@ def test_every_lane_equals_its_own_single_flight():
 def test_lanes_start_like_single_flights(target):
     loop = flown(target=target)
     starts = [loop.start._replace(attitude=q) for q in random_quaternions(40)]
-    columns = _carries(loop, np.array([flatten(s) for s in starts]).T)
+    columns = carry_columns(loop, np.array([flatten(s) for s in starts]).T)
     for lane, start in enumerate(starts):
         assert columns[:, lane].tolist() == flatten(loop.carry(start))
     assert set(columns[16 if target != "orbital" else 20]) == {-1.0, 1.0}
@@ -55,22 +58,45 @@ def test_threads_change_nothing(threads):
 
 def test_plain_python_equals_compiled_with_noise():
     loop = flown("lyapunov")
-    step, carry, setup = make_step(loop.parts()), loop.carry(), loop.setup()
-    for k in range(20):
-        carry = step.decide(step.check(carry, k, setup), k, 5, loop.gains, loop.craft, setup)
-        carry = step.hold(carry, loop.craft, setup)
-    assert flatten(carry.state) == flatten(fly(loop, 20, run=5)[1].state)
+    assert flatten(fly_plainly(loop, 20, run=5)) == flatten(fly(loop, 20, run=5)[1])
 
 
 def test_gains_may_differ_between_lanes():
     loop = flown("lyapunov")
     rates = np.linspace(0.05, 0.2, LANES)
-    gains = np.vstack([rates, np.full(LANES, 0.009)])
+    phases = [phase._replace(gains=loop.law.gains(rates, 0.009)) for phase in loop.phases(STEPS)]
     starts = np.tile(np.array(flatten(loop.start))[:, None], (1, LANES))
-    batch = simulate_many(loop, starts, STEPS, gains=gains)
+    batch = simulate_many(loop, starts, STEPS, phases=phases)
     for lane in (0, 130, LANES - 1):
         alone = fly(replace(loop, gains=loop.law.gains(rates[lane], 0.009)), STEPS, run=lane)[1].state
         assert batch.states[:, lane].tolist() == flatten(alone)
+
+
+def test_lanes_may_differ_in_any_number():
+    law, random = catalogue()["sliding"], np.random.default_rng(5)
+    loops = []
+    for moments in (np.array([2.0, 3.0, 4.0]) * random.uniform(0.9, 1.1, size=(11, 3))).tolist():
+        slope, layer, limit = random.uniform(0.05, 0.1, size=3).tolist(), float(random.uniform(1e-3, 1e-2)), 0.02
+        gains = law.gains(tuple(slope), (5e-3, 5e-3, 5e-3), layer)
+        noise = Noise(*random.uniform(1e-5, 1e-4, size=3).tolist())
+        craft = make_craft(moments, limit * float(random.uniform(0.5, 2.0)))
+        lag = Dynamics(float(random.uniform(0.2, 0.4)), float(random.uniform(0.01, 0.1)))
+        start = flown().start._replace(rate=tuple(random.normal(scale=0.05, size=3).tolist()))
+        loops.append(replace(flown(), craft=craft, gains=gains, noise=noise, dynamics=lag, start=start, target=TURNED))
+    phases = alongside([loop.phases(STEPS) for loop in loops])
+    batch = simulate_many(loops[0], [loop.start for loop in loops], STEPS, phases=phases, width=4)
+    for lane, loop in enumerate(loops):
+        assert batch.states[:, lane].tolist() == flatten(fly(loop, STEPS, run=lane)[1].state)
+
+
+def test_what_is_a_constant_of_the_kernel_may_not_differ():
+    law = catalogue()["pd"]
+    plain = flown("pd")
+    clipped = replace(plain, gains=law.gains(0.09, 0.009, 1))
+    with pytest.raises(ValueError, match="constant of their kernel"):
+        alongside([plain.phases(5), clipped.phases(5)])
+    with pytest.raises(ValueError, match="more than numbers"):
+        alongside([plain.phases(5), replace(plain, craft=make_craft([2.0, 3.0, 4.0])).phases(5)])
 
 
 def test_chunks_and_recording_change_nothing():
@@ -83,7 +109,7 @@ def test_chunks_and_recording_change_nothing():
     assert np.array_equal(whole[:, ::7], sparse)
 
 
-def test_compiled_only_law_is_the_same_in_a_batch():
+def test_a_law_with_memory_is_the_same_in_a_batch():
     loop = flown("mpc")
     starts = [loop.start, loop.start._replace(rate=(0.0, 0.01, 0.0)), loop.start]
     batch = simulate_many(loop, starts, 15, threads=2)

@@ -9,11 +9,10 @@ from __future__ import annotations
 import math
 
 from starhold.algebra.quaternion import Quaternion, multiply, normalise
-from starhold.algebra.scalar import equation, less, where
+from starhold.algebra.scalar import less, where
 from starhold.algebra.vector import Matrix, Vector
 
 
-@equation
 def from_quaternion(q: Quaternion) -> Matrix:
     """The matrix A with R_body = A r_reference. Its rows are the body axes in reference components."""
     return (
@@ -35,7 +34,6 @@ def from_quaternion(q: Quaternion) -> Matrix:
     )
 
 
-@equation
 def _choose(condition: bool, a: Quaternion, b: Quaternion) -> Quaternion:
     return (
         where(condition, a[0], b[0]),
@@ -45,7 +43,6 @@ def _choose(condition: bool, a: Quaternion, b: Quaternion) -> Quaternion:
     )
 
 
-@equation
 def to_quaternion(a: Matrix) -> Quaternion:
     """The quaternion of a rotation matrix, from the largest of its four squared components (Shepperd's method).
 

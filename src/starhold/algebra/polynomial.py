@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 from flint import arb, fmpq
 
@@ -43,6 +43,7 @@ class Polynomial:
     """A polynomial; `terms` maps monomials to coefficients, none of them an exact zero."""
 
     __slots__ = ("terms",)
+    reader = "polynomial"
 
     def __init__(self, terms: Mapping[Monomial, Coefficient]) -> None:
         self.terms = {m: c for m, c in terms.items() if not (isinstance(c, fmpq) and c == 0)}
@@ -167,6 +168,7 @@ class Condition:
     """`positive` > 0; as a comparison reads it, a < b is b - a > 0."""
 
     positive: Polynomial
+    reader: ClassVar[str] = "polynomial"
 
     def key(self) -> tuple[Any, ...]:
         """Equal for equal polynomials."""
@@ -185,6 +187,7 @@ class Cases:
     """A piecewise polynomial: cases that exclude one another and leave nothing out."""
 
     __slots__ = ("pieces",)
+    reader = "polynomial"
 
     def __init__(self, pieces: Iterable[Case]) -> None:
         self.pieces = tuple(pieces)
@@ -225,6 +228,7 @@ class Split:
     """A comparison of piecewise polynomials: cases as theirs, each with what the comparison is there."""
 
     pieces: tuple[tuple[tuple[tuple[Condition, bool], ...], bool | Condition], ...]
+    reader: ClassVar[str] = "polynomial"
 
 
 def pieces(value: Any) -> tuple[Case, ...]:
@@ -288,7 +292,16 @@ def _less(a: Any, b: Any) -> bool | Condition:
     return Condition(difference) if value is None else bool(value > 0)
 
 
+def less_equal(a: Any, b: Any) -> bool:
+    turned = less(b, a)
+    if not isinstance(turned, bool):
+        raise TypeError("polynomials are compared by less alone")
+    return not turned
+
+
 def where(condition: Any, a: Any, b: Any) -> Any:
+    if isinstance(condition, bool):
+        return a if condition else b
     if isinstance(condition, Split):
         return Cases(
             Case(merged, case.value)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
-from starhold.algebra.scalar import Scalar, absolute, equation, side, sqrt
+from starhold.algebra.scalar import Scalar, absolute, side, sqrt
 from starhold.algebra.vector import Vector, add, cross, dot, scale
 
 Quaternion: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar]
@@ -16,13 +16,11 @@ Quaternion: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar]
 NO_TURN: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
 
-@equation
 def vector_part(q: Quaternion) -> Vector:
     """(q1, q2, q3)."""
     return (q[1], q[2], q[3])
 
 
-@equation
 def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
     """The Hamilton product a b: first the turn a, then the turn b about the axes already turned."""
     return (
@@ -33,31 +31,26 @@ def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
     )
 
 
-@equation
 def conjugate(q: Quaternion) -> Quaternion:
     """The inverse turn."""
     return (q[0], -q[1], -q[2], -q[3])
 
 
-@equation
 def stretch(c: Scalar, q: Quaternion) -> Quaternion:
     """c q."""
     return (c * q[0], c * q[1], c * q[2], c * q[3])
 
 
-@equation
 def normalise(q: Quaternion) -> Quaternion:
     """q / |q|; not defined at zero."""
     return stretch(1.0 / sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), q)
 
 
-@equation
 def renormalise(q: Quaternion) -> Quaternion:
     """A quaternion of nearly unit length brought back to it by one Newton step: an error e of |q|2 leaves 3/8 e2 of |q|."""
     return stretch(1.5 - 0.5 * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), q)
 
 
-@equation
 def to_body(q: Quaternion, r: Vector) -> Vector:
     """Body components of a vector given in reference axes, R = q* r q."""
     v = vector_part(q)
@@ -65,7 +58,6 @@ def to_body(q: Quaternion, r: Vector) -> Vector:
     return add(add(r, scale(q[0], t)), cross(t, v))
 
 
-@equation
 def to_reference(q: Quaternion, r: Vector) -> Vector:
     """Reference components of a vector given in body axes, r = q R q*."""
     v = vector_part(q)
@@ -73,7 +65,6 @@ def to_reference(q: Quaternion, r: Vector) -> Vector:
     return add(add(r, scale(q[0], t)), cross(v, t))
 
 
-@equation
 def derivative(q: Quaternion, rate: Vector) -> Quaternion:
     """dq/dt for the angular velocity `rate` (rad/s, body axes), q' = q (0, rate) / 2."""
     v = vector_part(q)
@@ -81,25 +72,21 @@ def derivative(q: Quaternion, rate: Vector) -> Quaternion:
     return (-0.5 * dot(rate, v), d[0], d[1], d[2])
 
 
-@equation
 def relative(target: Quaternion, q: Quaternion) -> Quaternion:
     """The turn from the target axes to the body axes, target* q; no turn when the attitudes agree."""
     return multiply(conjugate(target), q)
 
 
-@equation
 def nearer(q: Quaternion, other: Quaternion) -> Quaternion:
     """Of q and -q, the same attitude, the one nearer to `other`."""
     return stretch(side(q[0] * other[0] + q[1] * other[1] + q[2] * other[2] + q[3] * other[3]), q)
 
 
-@equation
 def half_angle_sine(q: Quaternion) -> Scalar:
     """|sin(angle/2)|, the length of the vector part."""
     return sqrt(dot(vector_part(q), vector_part(q)))
 
 
-@equation
 def half_angle_cosine(q: Quaternion) -> Scalar:
     """cos(angle/2) of the shorter turn."""
     return absolute(q[0])

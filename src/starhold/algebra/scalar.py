@@ -1,158 +1,219 @@
-"""Scalar operations that every reader of an equation understands, and `equation` itself.
+"""Scalar operations that every reader of an equation understands.
 
-An equation is a plain function over numbers and tuples of numbers. Python floats, Numba (one lane or many),
-SymPy symbols, balls (python-flint `arb`) and exact polynomials all read the same text, so it may use only `+ - * /`,
-other equations and the operations of this module: no `math`, no `if` on a number, no NumPy array.
+An equation is a plain function over numbers and tuples of numbers. Python floats, a trace (which is printed as machine
+code, C and JavaScript), SymPy symbols, balls (python-flint `arb`) and exact polynomials all read the same text, so it may
+use only `+ - * /`, other equations, the operations of this module and the loops of `structured`: no `math`, no `if` on a
+number, no NumPy array.
 
-A comparison yields a `Truth` (a bool, a SymPy relation, a condition on a polynomial, or for balls True, False or None when
-undecided); only `where`, `both`, `either` and `opposite` consume it.
+A comparison yields a `Truth`; only `where`, `both`, `either` and `opposite` consume it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from importlib import import_module
-from types import ModuleType
-from typing import Any, TypeAlias, TypeVar, cast
+import operator as op
+from typing import Any, TypeAlias, cast
 
-from numba.extending import overload, register_jitable  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
+from starhold.algebra.operations import EXACT, library, operation
 
 Scalar: TypeAlias = float
 """A number of any reader; typed as float, the reader that type checkers can follow."""
 Truth: TypeAlias = Any
-"""What a comparison yields: a bool, a SymPy relation, or True, False or None of balls."""
-
-STRICT: dict[str, Any] = {"forceinline": True, "error_model": "numpy"}
-"""Compiler options of an equation: inlined into kernels, IEEE arithmetic, division by zero gives inf as in C."""
-
-_READERS = {
-    "sympy": "starhold.algebra.symbolic",
-    "flint": "starhold.algebra.balls",
-    "starhold": "starhold.algebra.polynomial",
-}
-
-_Function = TypeVar("_Function", bound=Callable[..., Any])
+"""What a comparison yields: a bool, a SymPy relation, a recorded truth, or True, False or None of balls."""
 
 
-def equation(function: _Function) -> _Function:
-    """Mark a function as an equation: it stays plain Python, and is inlined where a compiled kernel calls it."""
-    return register_jitable(**STRICT)(function)
+def _native(operator: Any) -> dict[str, Any]:
+    """The meanings of an operator of Python, which the numbers of these readers have of their own."""
+    return dict.fromkeys(EXACT, operator)
 
 
-def compiled_as(function: Callable[..., Any]) -> Callable[[_Function], _Function]:
-    """Register the compiled meaning of a scalar operation, under the compiler options of an equation."""
-
-    def register(maker: _Function) -> _Function:
-        # Numba compares the maker's signature with that of the function it makes, annotations included.
-        maker.__annotations__ = {}
-        return overload(function, jit_options=cast(Any, STRICT))(maker)
-
-    return register
+def _sympy(name: str) -> Any:
+    return _of("sympy", name)
 
 
-def _reader(*numbers: Any) -> ModuleType | None:
-    """The module that reads these numbers, or None when all are plain Python numbers."""
-    for number in numbers:
-        if not isinstance(number, (float, int)):
-            root = type(number).__module__.partition(".")[0]
-            if root not in _READERS:
-                raise TypeError(f"no reader for numbers of type {type(number).__name__}")
-            return import_module(_READERS[root])
-    return None
+def _polynomial(name: str) -> Any:
+    return _of("starhold.algebra.polynomial", name)
 
 
+def _of(module: str, name: str) -> Any:
+    """A function of a module that is loaded when it is first called."""
+
+    def call(*values: Any) -> Any:
+        return getattr(library(module), name)(*values)
+
+    return call
+
+
+def _ball(x: Any) -> Any:
+    return library("flint").arb(x)
+
+
+def _ball_sqrt(x: Any) -> Any:
+    return _ball(x).sqrt()
+
+
+@operation("number number", "number", llvm="fadd {number} {0}, {1}", c="{0} + {1}", javascript="{0} + {1}",
+           **_native(op.add))  # fmt: skip
+def plus(a: Scalar, b: Scalar) -> Scalar:
+    """a + b, as `+` between numbers."""
+    return a + b
+
+
+@operation("number number", "number", llvm="fsub {number} {0}, {1}", c="{0} - {1}", javascript="{0} - {1}",
+           **_native(op.sub))  # fmt: skip
+def minus(a: Scalar, b: Scalar) -> Scalar:
+    """a - b, as `-` between numbers."""
+    return a - b
+
+
+@operation("number number", "number", llvm="fmul {number} {0}, {1}", c="{0} * {1}", javascript="{0} * {1}",
+           **_native(op.mul))  # fmt: skip
+def product(a: Scalar, b: Scalar) -> Scalar:
+    """a b, as `*` between numbers."""
+    return a * b
+
+
+@operation("number number", "number", llvm="fdiv {number} {0}, {1}", c="{0} / {1}", javascript="{0} / {1}",
+           **_native(cast(Any, op).truediv))  # fmt: skip
+def divide(a: Scalar, b: Scalar) -> Scalar:
+    """a / b, infinite or NaN where b is zero, as compiled code gives: for quotients that `where` may not choose."""
+    if b == 0.0:
+        return math.nan if a == 0.0 or math.isnan(a) else math.copysign(math.inf, a) * math.copysign(1.0, b)
+    return a / b
+
+
+@operation("number", "number", llvm="fneg {number} {0}", c="-{0}", javascript="-{0}",
+           **_native(op.neg))  # fmt: skip
+def negative(a: Scalar) -> Scalar:
+    """-a, as `-` before a number."""
+    return -a
+
+
+@operation("number", "number", llvm="call {number} @llvm.sqrt.{suffix}({number} {0})", c="sqrt({0})",
+           javascript="Math.sqrt({0})", symbolic=_sympy("sqrt"), ball=_ball_sqrt,
+           polynomial=_polynomial("sqrt"))  # fmt: skip
 def sqrt(x: Scalar) -> Scalar:
     """Square root; NaN for a negative float, as compiled code gives."""
-    reader = _reader(x)
-    if reader is not None:
-        return reader.sqrt(x)
     return math.sqrt(x) if x >= 0.0 else math.nan
 
 
+def _ball_less(a: Any, b: Any) -> bool | None:
+    a, b = _ball(a), _ball(b)
+    return True if a < b else False if a >= b else None
+
+
+def _ball_less_equal(a: Any, b: Any) -> bool | None:
+    return _ball_not(_ball_less(b, a))
+
+
+@operation("number number", "truth", llvm="fcmp olt {number} {0}, {1}", c="{0} < {1}", javascript="{0} < {1}",
+           symbolic=_sympy("StrictLessThan"), ball=_ball_less,
+           polynomial=_polynomial("less"))  # fmt: skip
 def less(a: Scalar, b: Scalar) -> Truth:
     """a < b."""
-    reader = _reader(a, b)
-    return bool(a < b) if reader is None else reader.less(a, b)
+    return bool(a < b)
+
+
+@operation("number number", "truth", llvm="fcmp ole {number} {0}, {1}", c="{0} <= {1}", javascript="{0} <= {1}",
+           symbolic=_sympy("LessThan"), ball=_ball_less_equal,
+           polynomial=_polynomial("less_equal"))  # fmt: skip
+def less_equal(a: Scalar, b: Scalar) -> Truth:
+    """a <= b."""
+    return bool(a <= b)
+
+
+def _symbolic_select(condition: Any, a: Any, b: Any) -> Any:
+    return library("sympy").Piecewise((a, condition), (b, True))
+
+
+def _ball_select(condition: bool | None, a: Any, b: Any) -> Any:
+    if condition is None:
+        # Undecided: a ball that holds both branches.
+        return _ball(a).union(_ball(b))
+    return a if condition else b
+
+
+@operation("truth number number", "number", llvm="select {truth} {0}, {number} {1}, {number} {2}", c="{0} ? {1} : {2}",
+           javascript="{0} ? {1} : {2}", symbolic=_symbolic_select,
+           ball=_ball_select, polynomial=_polynomial("where"))  # fmt: skip
+def select(condition: Truth, a: Scalar, b: Scalar) -> Scalar:
+    """`where` on a condition that is not known while recording."""
+    return a if condition else b
 
 
 def where(condition: Truth, a: Scalar, b: Scalar) -> Scalar:
     """a where the condition holds, else b; both are always evaluated."""
-    if isinstance(condition, bool):
+    if condition is True or condition is False:
         return a if condition else b
-    return _truth_reader(condition).where(condition, a, b)
+    return select(condition, a, b)
 
 
+def _ball_and(a: bool | None, b: bool | None) -> bool | None:
+    if a is False or b is False:
+        return False
+    return None if a is None or b is None else True
+
+
+def _ball_not(a: bool | None) -> bool | None:
+    return None if a is None else not a
+
+
+def _ball_or(a: bool | None, b: bool | None) -> bool | None:
+    return _ball_not(_ball_and(_ball_not(a), _ball_not(b)))
+
+
+@operation("truth truth", "truth", llvm="and {truth} {0}, {1}", c="{0} && {1}", javascript="{0} && {1}",
+           symbolic=_sympy("And"), ball=_ball_and, polynomial=_polynomial("both"))  # fmt: skip
 def both(a: Truth, b: Truth) -> Truth:
     """Logical and, without short circuit."""
-    if isinstance(a, bool) and isinstance(b, bool):
-        return a and b
-    return _truth_reader(a, b).both(a, b)
+    return a and b
 
 
+@operation("truth truth", "truth", llvm="or {truth} {0}, {1}", c="{0} || {1}", javascript="{0} || {1}",
+           symbolic=_sympy("Or"),
+           ball=_ball_or, polynomial=_polynomial("either"))  # fmt: skip
 def either(a: Truth, b: Truth) -> Truth:
     """Logical or, without short circuit."""
-    if isinstance(a, bool) and isinstance(b, bool):
-        return a or b
-    return _truth_reader(a, b).either(a, b)
+    return a or b
 
 
+@operation("truth", "truth", llvm="xor {truth} {0}, {yes}", c="!{0}", javascript="!{0}",
+           symbolic=_sympy("Not"), ball=_ball_not, polynomial=_polynomial("opposite"))  # fmt: skip
 def opposite(a: Truth) -> Truth:
     """Logical not."""
-    return not a if isinstance(a, bool) else _truth_reader(a).opposite(a)
+    return not a
 
 
-def _truth_reader(*truths: Any) -> ModuleType:
-    roots = {type(t).__module__.partition(".")[0] for t in truths}
-    return import_module(_READERS[next((root for root in ("sympy", "starhold") if root in roots), "flint")])
-
-
-# The compiled meanings. Each returns a lambda because Numba asks an overload for the function to compile.
-compiled_as(sqrt)(lambda x: lambda x: math.sqrt(x))  # pyright: ignore
-compiled_as(less)(lambda a, b: lambda a, b: a < b)  # pyright: ignore
-compiled_as(where)(lambda condition, a, b: lambda condition, a, b: a if condition else b)  # pyright: ignore
-compiled_as(both)(lambda a, b: lambda a, b: a & b)  # pyright: ignore
-compiled_as(either)(lambda a, b: lambda a, b: a | b)  # pyright: ignore
-compiled_as(opposite)(lambda a: lambda a: not a)  # pyright: ignore
-
-
-@equation
 def absolute(x: Scalar) -> Scalar:
     """|x|."""
     return where(less(x, 0.0), -x, x)
 
 
-@equation
 def minimum(a: Scalar, b: Scalar) -> Scalar:
     """The smaller; NaN in either argument is not hidden when it is the second."""
     return where(less(a, b), a, b)
 
 
-@equation
 def maximum(a: Scalar, b: Scalar) -> Scalar:
     """The larger."""
     return where(less(b, a), a, b)
 
 
-@equation
 def sign(x: Scalar) -> Scalar:
     """-1, 0 or +1; a NaN passes through."""
     return where(less(x, 0.0), -1.0, where(less(0.0, x), 1.0, x))
 
 
-@equation
 def side(x: Scalar) -> Scalar:
     """-1 for negative x, else +1: the sign that never vanishes."""
     return where(less(x, 0.0), -1.0, 1.0)
 
 
-@equation
 def clip(x: Scalar, limit: Scalar) -> Scalar:
     """x kept within [-limit, limit]; a NaN passes through."""
     return where(less(limit, x), limit, where(less(x, -limit), -limit, x))
 
 
-@equation
 def is_finite(x: Scalar) -> Truth:
     """True unless x is infinite or NaN."""
     return less(absolute(x - x), 1.0)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias, TypeGuard
+from typing import Any, TypeAlias
 
-from numba import types  # pyright: ignore
-
-from starhold.algebra.scalar import Scalar, clip, compiled_as, equation, less, maximum, sign, sqrt, where
+from starhold.algebra.scalar import Scalar, clip, less, maximum, sign, sqrt, where
 
 Vector: TypeAlias = tuple[Scalar, Scalar, Scalar]
 Matrix: TypeAlias = tuple[Vector, Vector, Vector]
@@ -15,67 +13,56 @@ ZERO: Vector = (0.0, 0.0, 0.0)
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-@equation
 def add(a: Vector, b: Vector) -> Vector:
     """a + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
-@equation
 def subtract(a: Vector, b: Vector) -> Vector:
     """a - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
-@equation
 def scale(c: Scalar, a: Vector) -> Vector:
     """c a."""
     return (c * a[0], c * a[1], c * a[2])
 
 
-@equation
 def times(a: Vector, b: Vector) -> Vector:
     """The product component by component."""
     return (a[0] * b[0], a[1] * b[1], a[2] * b[2])
 
 
-@equation
 def dot(a: Vector, b: Vector) -> Scalar:
     """The scalar product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@equation
 def cross(a: Vector, b: Vector) -> Vector:
     """The vector product."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-@equation
 def norm(a: Vector) -> Scalar:
     """The Euclidean length."""
     return sqrt(dot(a, a))
 
 
-@equation
 def unit(a: Vector) -> Vector:
     """a / |a|; not defined at zero."""
     return scale(1.0 / norm(a), a)
 
 
-@equation
 def signs(a: Vector) -> Vector:
     """The sign of each component."""
     return (sign(a[0]), sign(a[1]), sign(a[2]))
 
 
-@equation
 def clip_axes(a: Vector, limit: Scalar) -> Vector:
     """Each component kept within [-limit, limit]."""
     return (clip(a[0], limit), clip(a[1], limit), clip(a[2], limit))
 
 
-@equation
 def clip_norm(a: Vector, limit: Scalar) -> Vector:
     """a shortened to the given length where it is longer; the direction is kept. The limit must be positive; it may be
     infinite."""
@@ -85,75 +72,28 @@ def clip_norm(a: Vector, limit: Scalar) -> Vector:
 
 def apply(m: Matrix | Vector, a: Vector) -> Vector:
     """The matrix-vector product; a vector in place of the matrix is a diagonal one."""
-    return _apply_diagonal(m, a) if _is_diagonal(m) else _apply_matrix(m, a)
+    rows: Any = m
+    return times(rows, a) if _is_diagonal(m) else (dot(rows[0], a), dot(rows[1], a), dot(rows[2], a))
 
 
 def swing(m: Matrix | Vector, a: Vector) -> Vector:
     """a x (m a) for a symmetric m: the gyroscopic torque is swing(J, w). A vector stands for a diagonal m."""
-    return _swing_diagonal(m, a) if _is_diagonal(m) else _swing_matrix(m, a)
+    if _is_diagonal(m):
+        j: Any = m
+        return ((j[2] - j[1]) * (a[1] * a[2]), (j[0] - j[2]) * (a[2] * a[0]), (j[1] - j[0]) * (a[0] * a[1]))
+    return cross(a, apply(m, a))
 
 
 def solve(m: Matrix | Vector, a: Vector) -> Vector:
     """The x with m x = a; not defined for a singular matrix. A vector in place of the matrix is a diagonal one."""
-    return _solve_diagonal(m, a) if _is_diagonal(m) else _solve_matrix(m, a)
+    rows: Any = m
+    return (a[0] / rows[0], a[1] / rows[1], a[2] / rows[2]) if _is_diagonal(m) else apply(inverse(rows), a)
 
 
-def _is_diagonal(m: Matrix | Vector) -> TypeGuard[Vector]:
+def _is_diagonal(m: Matrix | Vector) -> bool:
     return not isinstance(m[0], tuple)
 
 
-@equation
-def _apply_diagonal(m: Any, a: Vector) -> Vector:
-    return times(m, a)
-
-
-@equation
-def _apply_matrix(m: Any, a: Vector) -> Vector:
-    return (dot(m[0], a), dot(m[1], a), dot(m[2], a))
-
-
-@equation
-def _solve_diagonal(m: Any, a: Vector) -> Vector:
-    return (a[0] / m[0], a[1] / m[1], a[2] / m[2])
-
-
-@equation
-def _solve_matrix(m: Any, a: Vector) -> Vector:
-    return _apply_matrix(inverse(m), a)
-
-
-@equation
-def _swing_diagonal(m: Any, a: Vector) -> Vector:
-    return ((m[2] - m[1]) * (a[1] * a[2]), (m[0] - m[2]) * (a[2] * a[0]), (m[1] - m[0]) * (a[0] * a[1]))
-
-
-@equation
-def _swing_matrix(m: Any, a: Vector) -> Vector:
-    return cross(a, _apply_matrix(m, a))
-
-
-@compiled_as(apply)
-def _compiled_apply(m: Any, a: Any) -> Any:
-    if isinstance(m[0], types.BaseTuple):
-        return lambda m, a: _apply_matrix(m, a)  # pyright: ignore
-    return lambda m, a: _apply_diagonal(m, a)  # pyright: ignore
-
-
-@compiled_as(solve)
-def _compiled_solve(m: Any, a: Any) -> Any:
-    if isinstance(m[0], types.BaseTuple):
-        return lambda m, a: _solve_matrix(m, a)  # pyright: ignore
-    return lambda m, a: _solve_diagonal(m, a)  # pyright: ignore
-
-
-@compiled_as(swing)
-def _compiled_swing(m: Any, a: Any) -> Any:
-    if isinstance(m[0], types.BaseTuple):
-        return lambda m, a: _swing_matrix(m, a)  # pyright: ignore
-    return lambda m, a: _swing_diagonal(m, a)  # pyright: ignore
-
-
-@equation
 def column(m: Matrix, a: Vector) -> Vector:
     """The product of the transposed matrix and a vector."""
     return (
@@ -163,7 +103,6 @@ def column(m: Matrix, a: Vector) -> Vector:
     )
 
 
-@equation
 def transpose(m: Matrix) -> Matrix:
     """The transposed matrix."""
     return (
@@ -173,13 +112,11 @@ def transpose(m: Matrix) -> Matrix:
     )
 
 
-@equation
 def multiply(a: Matrix, b: Matrix) -> Matrix:
     """The matrix product a b."""
     return (column(b, a[0]), column(b, a[1]), column(b, a[2]))
 
 
-@equation
 def combine(c: Scalar, a: Matrix, d: Scalar, b: Matrix) -> Matrix:
     """c a + d b."""
     return (
@@ -189,25 +126,21 @@ def combine(c: Scalar, a: Matrix, d: Scalar, b: Matrix) -> Matrix:
     )
 
 
-@equation
 def skew(a: Vector) -> Matrix:
     """[a]x, the matrix of the vector product: apply(skew(a), b) = a x b."""
     return ((0.0, -a[2], a[1]), (a[2], 0.0, -a[0]), (-a[1], a[0], 0.0))
 
 
-@equation
 def diagonal(a: Vector) -> Matrix:
     """The diagonal matrix."""
     return ((a[0], 0.0, 0.0), (0.0, a[1], 0.0), (0.0, 0.0, a[2]))
 
 
-@equation
 def determinant(m: Matrix) -> Scalar:
     """The determinant."""
     return dot(m[0], cross(m[1], m[2]))
 
 
-@equation
 def inverse(m: Matrix) -> Matrix:
     """The inverse by the adjugate; not defined for a singular matrix."""
     c = 1.0 / determinant(m)

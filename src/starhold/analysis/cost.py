@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.structure import flatten
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.loop.kernels import make_replay
+from starhold.loop.kernels import Arguments, Numbers, make_kernel, numbers_of, replay
 from starhold.models.sensor import exact, no_disturbance
 
 CALLS = 50_000
@@ -18,22 +18,37 @@ CHUNK = 1e-4
 """Seconds that a timed chunk should last, long beside what it takes to start one; a slow law is timed by fewer calls."""
 
 
+class Replay:
+    """The compiled calls of a loop's law on the states of recorded samples (numbers of a sample, number), as `fly` gives
+    them: from the measured state to the limited torque, models the law needs included, each waiting for the one before. What
+    the law remembers goes on from call to call."""
+
+    def __init__(self, loop: ClosedLoop, samples: NDArray[np.float64]) -> None:
+        # The noise of the simulation is no part of a call.
+        quiet: Any = loop.parts()._replace(sense=exact, disturb=no_disturbance)
+        numbers = Numbers(loop.gains, loop.craft, loop.craft, loop.setup())
+        arguments = Arguments(*numbers)
+        self._kernel, self._seed = make_kernel(replay, quiet, 1, loop.carry(), numbers, len(samples)), loop.seed
+        # A sample a row, as it was recorded.
+        self._memories = {"record": np.ascontiguousarray(samples.T), "shared": arguments.shared, "own": arguments.shared}
+        self._memories |= {"tables": arguments.tables, "carry": np.array(numbers_of(loop.carry()))}
+
+    def __call__(self, first: int, last: int) -> None:
+        """Call the law on samples first .. last-1."""
+        self._kernel(self._memories, first, last - first, self._seed, 0)
+
+
 def call_costs(loop: ClosedLoop, samples: NDArray[np.float64], calls: int = CALLS, seconds: float = 1.0) -> dict[str, float]:
     """Median and worst processor time (s) of a call, over chunks of calls that replay the samples of a flight in order.
 
-    A call goes from the measured state to the limited torque, models the law needs included, and waits for the call
-    before it, so the figures are latencies.
+    The figures are latencies, see `Replay`.
     """
-    # The noise of the simulation is no part of a call.
-    quiet = loop.parts()._replace(sense=exact, disturb=no_disturbance)
-    replay, setup = make_replay(quiet), loop.setup()
-    carry = loop.carry()
-    end = np.empty((len(flatten(carry)), 1))
+    repeat = Replay(loop, samples)
     few = min(1000, samples.shape[1])
 
     def timed(first: int, last: int) -> float:
         begun = time.thread_time()
-        replay(samples, first, last, carry, loop.gains, loop.craft, setup, end)
+        repeat(first, last)
         return time.thread_time() - begun
 
     timed(0, 1)

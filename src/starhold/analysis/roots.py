@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize_scalar
 
 from starhold.algebra.quaternion import multiply
-from starhold.algebra.structure import LANES, flatten
+from starhold.algebra.structure import flatten
 from starhold.analysis.transient import Flown, Limits, Transient, Transients, Watcher
 from starhold.laws import modal
 from starhold.laws.modal import fitted
@@ -23,6 +23,8 @@ from starhold.loop.closed_loop import ClosedLoop
 
 PIECE = 3
 """Angles that each piece of the fit has at least: it has three numbers."""
+TOGETHER = 128
+"""Roots flown together, after which those that cannot be the best are left out."""
 DECAYS = np.geomspace(0.02, 30.0, 80)
 """Decays (1/rad) among which the best of a piece is looked for first."""
 
@@ -106,15 +108,15 @@ class Problem:
         goal: Any = self.loop.target
         return flatten(self.loop.start._replace(attitude=multiply(goal, turn), rate=self.rate))
 
-    def gains(self, roots: ArrayLike) -> NDArray[np.float64]:
-        """The numbers of the law's gains, one column a root."""
-        roots = np.asarray(roots, dtype=float)
-        return np.array([*[roots] * 6, np.full(roots.shape, self.b)])
+    def gains(self, roots: ArrayLike) -> modal.Gains:
+        """The law's gains, with one number for each of the roots (n,)."""
+        root: Any = np.asarray(roots, dtype=float)
+        return modal.Gains((root, root, root), (root, root, root), self.b)
 
     def fly(self, angle: float, roots: ArrayLike) -> Transients:
         """The turn of this angle (rad) with each of roots (n,), all of them to their end."""
-        gains = self.gains(roots)
-        return self.watcher().fly(np.repeat(np.array([self.start(angle)]).T, gains.shape[1], axis=1), gains, self.steps)
+        starts = np.repeat(np.array([self.start(angle)]).T, len(np.asarray(roots)), axis=1)
+        return self.watcher().fly(starts, self.gains(roots), self.steps)
 
 
 def search(
@@ -148,11 +150,11 @@ def _best(problem: Problem, watcher: Watcher, roots: Any, limits: Limits, eased:
     """The search at one angle: block by block from the fastest roots on."""
     start = np.array(problem.start(angle))[:, None]
     best: dict[Limits, Best] = {}
-    for at in range(0, len(roots), LANES):
-        block = roots[at : at + LANES]
+    for at in range(0, len(roots), TOGETHER):
+        block = roots[at : at + TOGETHER]
         enough = partial(_settled, eased, best[limits].time if limits in best else math.inf, problem.loop.period)
         starts = np.repeat(start, len(block), axis=1)
-        flown = watcher.block(starts, problem.gains(block), problem.steps, enough=enough)
+        flown = watcher.search(starts, problem.gains(block), problem.steps, enough)
         for kind in {limits, eased}:
             times = np.where(flown.within(kind) & ~np.isnan(flown.time), flown.time, np.inf)
             lane = int(np.argmin(times))

@@ -5,20 +5,22 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import relative
-from starhold.algebra.structure import LANES, flatten, pack, unflatten
+from starhold.algebra.structure import unflatten
 from starhold.algebra.vector import ZERO, dot
 from starhold.analysis.metrics import acceleration
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.loop.watch import Ends, Watched, make_watch
+from starhold.loop.kernels import Observer
+from starhold.loop.watch import Ends, Watched, watch
 from starhold.simulation.lane import Recording
+from starhold.simulation.lanes import Fleet, carry_columns
+from starhold.trace.machine import widest
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -101,8 +103,8 @@ def _ends(angle: float, rate: float) -> Ends:
 
 
 class Flown(NamedTuple):
-    """A block after some control steps: how many, what is noted of its lanes (numbers of `Watched`, LANES), and which of
-    them lost their motion (LANES,)."""
+    """Lanes after some control steps: how many, what is noted of them (numbers of `Watched`, lanes), and which of them lost
+    their motion (lanes,)."""
 
     steps: int
     seen: Array
@@ -119,54 +121,43 @@ class Flown(NamedTuple):
         return Transients(time, np.sqrt(self.seen[4]), self.seen[5:8])
 
 
-def _forever(flown: Flown) -> bool:
-    return False
-
-
 class Watcher:
     """Flies a loop on many lanes and notes their transients. The loop is flown as it is, but for events."""
 
     def __init__(self, loop: ClosedLoop, angle_end: float, rate_end: float) -> None:
-        self.loop, self.ends = loop, _ends(angle_end, rate_end)
-        self._kernel = make_watch(loop.parts())
+        self.loop, self.ends = replace(loop, events=()), _ends(angle_end, rate_end)
         self._leg = max(1, round(LEG / loop.period))
 
-    def fly(self, starts: Array, gains: Array, steps: int, threads: int | None = None) -> Transients:
-        """starts: (numbers of a state, lanes); gains: (numbers of the law's gains, lanes); steps: control steps."""
-        groups = [slice(at, at + LANES) for at in range(0, starts.shape[1], LANES)]
-        with ThreadPoolExecutor(max_workers=threads or os.cpu_count() or 1) as pool:
-            parts = list(pool.map(lambda group: self.block(starts[:, group], gains[:, group], steps, group.start), groups))
-        peaks = np.concatenate([part.peak_acceleration for part in parts], axis=1)
-        times, rates = (np.concatenate([getattr(part, name) for part in parts]) for name in ("time", "peak_rate"))
-        return Transients(times, rates, peaks)
+    def fly(self, starts: Array, gains: Any, steps: int, threads: int | None = None) -> Transients:
+        """starts: (numbers of a state, lanes); gains: the law's, with an array (lanes,) in place of every number that
+        differs between lanes; steps: control steps."""
+        fleet, phase = self._fleet(starts, gains, steps)
+        fleet.share_out(lambda piece: fleet.fly(phase, piece), threads or os.cpu_count() or 1)
+        return self._flown(fleet, steps).transients(self.loop.period)
 
-    def block(
-        self, starts: Array, gains: Array, steps: int, first_run: int = 0, enough: Callable[[Flown], bool] = _forever
-    ) -> Transients:
-        """The same of at most LANES lanes on this thread; ends early once `enough` says so. Lanes that are then still
-        outside their end have no time."""
-        loop, count = self.loop, starts.shape[1]
-        # Lanes of a search start alike; each start is made ready once.
-        unlike, which = np.unique(starts, axis=1, return_inverse=True)
-        carries = [loop.carry(unflatten(column, loop.start)) for column in unlike.T]
-        seen = [self._first(carry) for carry in carries]
-        columns = (np.array([flatten(item) for item in items]).T[:, which.ravel()] for items in (carries, seen))
-        x, noted = (pack(items)[0] for items in columns)
-        setup, like, own = loop.setup(), loop.carry(), pack(gains)[0]
-        rates, flown = np.empty(3 * LANES), Flown(0, noted.reshape(-1, LANES), np.zeros(LANES, dtype=bool))
+    def search(self, starts: Array, gains: Any, steps: int, enough: Callable[[Flown], bool]) -> Transients:
+        """The same on this thread; ends early once `enough` says so. Lanes that are then still outside their end have no
+        time."""
+        fleet, phase = self._fleet(starts, gains, steps)
+        flown = self._flown(fleet, 0)
         while flown.steps < steps and not enough(flown):
             leg = min(self._leg, steps - flown.steps)
-            numbers = loop.craft, loop.craft, setup, loop.substeps, self.ends
-            self._kernel(x, like, flown.steps, leg, first_run, own, loop.gains, *numbers, noted, seen[0], rates)
-            flown = Flown(flown.steps + leg, flown.seen, x.reshape(-1, LANES)[-1] >= 0.0)
-        told = flown.transients(loop.period)
-        return Transients(told.time[:count], told.peak_rate[:count], told.peak_acceleration[:, :count].copy())
+            fleet.fly(phase, range(fleet.count), flown.steps, leg)
+            flown = self._flown(fleet, flown.steps + leg)
+        return flown.transients(self.loop.period)
 
-    def _first(self, carry: Any) -> Watched:
-        """What is noted of the start."""
-        state, goal = carry.state, self.loop.target
+    def _fleet(self, starts: Array, gains: Any, steps: int) -> tuple[Fleet, Any]:
+        state, goal = unflatten(list(starts), self.loop.start), self.loop.target
         if not isinstance(goal, tuple):
             raise ValueError("transients are watched towards a target at rest alone")
-        error = relative(goal, state.attitude)
+        error, none = relative(goal, state.attitude), np.zeros(starts.shape[1])
         angle, square = self.ends.angle * dot(error[1:], error[1:]), dot(state.rate, state.rate)
-        return Watched(angle, self.ends.rate * square, 0.0, 0.0, square, ZERO)
+        noted = np.array([angle, self.ends.rate * square, none, none, square, none, none, none])
+        observer = Observer(watch(self.loop.parts()), Watched(0.0, 0.0, 0.0, 0.0, 0.0, ZERO), self.ends)
+        (phase,) = self.loop.phases(max(steps, 1))
+        phase = phase._replace(last=steps, gains=gains)
+        carries = carry_columns(self.loop, starts, phase)
+        return Fleet(self.loop, carries, 0, widest(), observer, noted), phase
+
+    def _flown(self, fleet: Fleet, steps: int) -> Flown:
+        return Flown(steps, fleet.notes(), fleet.carries()[fleet.lost_row] >= 0.0)

@@ -41,13 +41,13 @@ BEST = Wanted()
 
 
 def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certificate:
-    """The certificate of a closed loop as it starts, whatever happens to it later. A law that is compiled-only or declares
+    """The certificate of a closed loop as it starts, whatever happens to it later. A law that keeps a memory or declares
     neither V nor a surface nor a single root gets one without claims, which is undecided; so does a surface with wheels, and
     a loop that counts on a lost wheel."""
     subject = make_subject(loop, wanted.disturbance, wanted.momentum)
     claims: list[Claim] = []
     sound = loop.wheels is None or gives_what_is_asked(loop.wheels)
-    if sound and not loop.law.card.compiled_only:
+    if sound and not loop.remembers:
         if loop.law.lyapunov is not None:
             claims.extend(_by_lyapunov(subject, wanted))
         else:

@@ -93,7 +93,9 @@ def _fly(file: str, law: str | None, output: Path | None, force: bool, allow_uns
                 flights.append(kind.fly_law(scenario, entry, loop, notice))
                 if entry is entries[-1]:
                     painter.start(kind.sketch(flights, scenario), folder)
-                write_run(flights[-1].run, scenario, (folder / entry.name if nested else folder) / "run.nc")
+                write_run(flights[-1].recording, scenario, (folder / entry.name if nested else folder) / "run.nc")
+        # While the pictures are drawn.
+        flights = [kind.prove(scenario, *trio) for trio in zip(entries, loops, flights, strict=True)]
         page = kind.write(scenario, flights, folder)
         painter.finish()
     print_outcome(flights, page)
@@ -269,7 +271,7 @@ _interrupted = Event()
 
 
 def _interrupt(number: int, frame: object) -> None:
-    # Noted as well as raised: in a callback of the compiler or of the garbage collector an exception is swallowed.
+    # Noted as well as raised: in a callback of the garbage collector an exception is swallowed.
     _interrupted.set()
     raise InterruptedByUserError
 
@@ -281,14 +283,12 @@ def _heed_interrupt() -> None:
 
 def main() -> None:
     """Entry point: user errors become one line and exit code 2, an interrupt 130."""
-    code = _run_command()
-    sys.stdout.flush()
-    sys.stderr.flush()
-    # All files are closed. Taking the compiler's and the libraries' memory apart would cost a quarter of a command's time.
-    os._exit(code)
+    sys.exit(_run_command())
 
 
 def _run_command() -> int:
+    # Before NumPy loads: on matrices as small as a law's, its library's threads only wait for one another.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     signal.signal(signal.SIGINT, _interrupt)
     # A command loads much and lives briefly: looking for garbage at every step of that is time lost.
     gc.set_threshold(200_000)

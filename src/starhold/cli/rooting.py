@@ -6,7 +6,6 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
 from starhold.cli.arguments import Force, Output, ScenarioFile, Unstable
@@ -71,8 +70,8 @@ def print_roots(found: Study) -> None:
     console.print()
     console.print(table)
     for name, pieces in fits.items():
-        off = 100.0 * np.abs(pieces.errors(found.angles, found.roots))
-        said = f"{name}: off by {np.sqrt(np.mean(off**2)):.2f} % rms, {off.max():.2f} % at most"
+        off = 100.0 * abs(pieces.errors(found.angles, found.roots))
+        said = f"{name}: off by {(off**2).mean() ** 0.5:.2f} % rms, {off.max():.2f} % at most"
         console.print(said, highlight=False)
 
 

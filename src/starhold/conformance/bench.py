@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from functools import cache
+from collections.abc import Iterator
 from typing import Any
 
-import numba
 import numpy as np
 
 from starhold.algebra.quaternion import NO_TURN, Quaternion
@@ -59,16 +57,5 @@ def sample_loop(law: Law, gains: Any) -> ClosedLoop:
 
 
 def call(law: Law, seen: Seen, gains: Any, craft: Craft = CRAFT) -> Vector:
-    """The torque of a law called once, with a fresh memory; compiled if the law is compiled-only."""
-    memory = law.remember(gains, craft, seen.period)
-    torque = _compiled(law.torque) if law.card.compiled_only else law.torque
-    return torque(seen, gains, craft, memory)[0]
-
-
-@cache
-def _compiled(torque: Callable[..., Any]) -> Callable[..., Any]:
-    @numba.njit(error_model="numpy")
-    def compiled(seen, gains, craft, memory):
-        return torque(seen, gains, craft, memory)
-
-    return compiled
+    """The torque of a law called once, with a fresh memory."""
+    return law.torque(seen, gains, craft, law.remember(gains, craft, seen.period))[0]

@@ -85,6 +85,12 @@ class Law:
         maker = getattr(self.module, "remember", None)
         return NoMemory() if maker is None else maker(gains, craft, period)
 
+    def counters(self, memory: Any) -> tuple[int, ...] | None:
+        """What a law that iterates has counted: calls, iterations in all, the most in a call, calls that ended without the
+        optimum; None for other laws."""
+        teller = getattr(self.module, "counters", None)
+        return None if teller is None else teller(memory)
+
 
 AnyLaw = TypeVar("AnyLaw", bound=Law)
 
@@ -128,7 +134,7 @@ def from_file(path: Path) -> Law:
     if spec is None or spec.loader is None:
         raise ValueError(f"{path}: not a Python file")
     module = importlib.util.module_from_spec(spec)
-    # Registered so that the equations' sources and NamedTuples can be found by their module name.
+    # Registered so that its NamedTuples can be found by their module name.
     sys.modules[name] = module
     spec.loader.exec_module(module)
     return _as_law(module, name=path.stem)
@@ -151,6 +157,4 @@ def _as_law(
     if missing:
         raise ValueError(f"{module.__file__}: a law needs {', '.join(missing)}")
     name = module.__name__.rpartition(".")[2] if name is None else name
-    # Numba tells NamedTuple classes apart at the speed of calls only by their names.
-    module.Gains.__name__ = f"{name}_gains"
     return kind(name.replace("_", "-"), module)

@@ -7,22 +7,19 @@ back and the new memory.
 from __future__ import annotations
 
 from starhold.algebra.quaternion import Quaternion, stretch
-from starhold.algebra.scalar import Scalar, equation, less, side, where
+from starhold.algebra.scalar import Scalar, less, side, where
 
 
-@equation
 def as_published(attitude: Quaternion, h: Scalar, width: Scalar) -> tuple[Quaternion, Scalar]:
     """Feed back q itself: continuous, but the body may turn the long way (unwinding)."""
     return attitude, h
 
 
-@equation
 def shortest(attitude: Quaternion, h: Scalar, width: Scalar) -> tuple[Quaternion, Scalar]:
     """Feed back sign(q0) q: the shorter way, without memory and so not robust to noise near a half turn."""
     return stretch(side(attitude[0]), attitude), h
 
 
-@equation
 def hysteresis(attitude: Quaternion, h: Scalar, width: Scalar) -> tuple[Quaternion, Scalar]:
     """Feed back h q; h flips when h q0 < -width ("Quaternion-Based Hybrid Control for Robust Global Attitude Tracking")."""
     h = where(less(h * attitude[0], -width), -h, h)

@@ -15,7 +15,6 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeAlias, get_args, get
 import numpy as np
 
 from starhold.algebra.quaternion import Quaternion
-from starhold.algebra.scalar import equation
 from starhold.algebra.vector import ZERO, Vector, add, apply, subtract, swing
 from starhold.models.craft import Craft, compact
 
@@ -41,22 +40,6 @@ class Seen(NamedTuple):
     stored: Vector = ZERO
 
 
-@equation
-def with_attitude(seen: Seen, attitude: Quaternion) -> Seen:
-    """The same but for the error attitude."""
-    return Seen(
-        attitude,
-        seen.rate,
-        seen.body_rate,
-        seen.target_rate,
-        seen.target_acceleration,
-        seen.external_torque,
-        seen.position,
-        seen.period,
-        seen.stored,
-    )
-
-
 class NoMemory(NamedTuple):
     """The memory of a law that keeps nothing."""
 
@@ -75,7 +58,6 @@ class Card:
     claims: Claim
     double_cover: Literal["odd", "even"] = "odd"
     """odd: feeding back -q in place of q changes the torque; even: it does not."""
-    compiled_only: bool = False
     rest_tolerance: float = 0.0
     """Largest torque (N m) at rest on target; zero but for laws that solve a problem to a tolerance."""
 
@@ -165,7 +147,6 @@ def fields(cls: Any) -> list[Field]:
     return found
 
 
-@equation
 def tracking_torque(seen: Seen, craft: Craft) -> Vector:
     """The torque (N m) that makes the motion relative to a moving target obey the equations of a target at rest,
     J w_e' + w_e x J w_e = rest of the torque; zero for a target at rest."""

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import vector_part
-from starhold.algebra.scalar import equation
 from starhold.algebra.vector import Matrix, Vector, add, apply, scale, subtract, swing
 from starhold.laws import matrix_pd
 from starhold.laws.interface import Card, Gain, NoMemory, Seen, tracking_torque
@@ -87,7 +86,6 @@ class Numeric(NamedTuple):
 FORMS: dict[str, Any] = {"I": FormI, "II": FormII, "III": FormIII, "numeric": Numeric}
 
 
-@equation
 def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Control torque (N m, body)."""
     feedback = add(apply(gains.k_rate, seen.rate), apply(gains.k_attitude, vector_part(seen.attitude)))

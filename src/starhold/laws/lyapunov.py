@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from starhold.algebra.quaternion import vector_part
-from starhold.algebra.scalar import Scalar, equation
+from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Vector, add, apply, dot, scale, subtract, swing
 from starhold.laws.interface import Card, Gain, NoMemory, Seen
 from starhold.models.craft import Craft
@@ -26,7 +26,6 @@ class Gains(NamedTuple):
     k_attitude: Annotated[float, Gain("N m", above=0.0, text="stiffness against the quaternion's vector part")]
 
 
-@equation
 def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Control torque (N m, body)."""
     feedback = add(scale(-gains.k_rate, seen.rate), scale(-gains.k_attitude, vector_part(seen.attitude)))
@@ -35,7 +34,6 @@ def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Ve
     return add(feedback, model), memory
 
 
-@equation
 def lyapunov(seen: Seen, gains: Gains, craft: Craft) -> Scalar:
     """V = w.Jw/2 + 2 k_attitude (1 - q0) (J); V' = -k_rate |w|2."""
     energy = 0.5 * dot(seen.rate, apply(craft.inertia, seen.rate))

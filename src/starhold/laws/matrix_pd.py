@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from starhold.algebra.quaternion import vector_part
-from starhold.algebra.scalar import Scalar, equation
+from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Matrix, Vector, add, apply, dot, solve, subtract
 from starhold.laws.interface import Card, Gain, NoMemory, Seen, tracking_torque
 from starhold.models.craft import Craft, compact, tensor
@@ -66,14 +66,12 @@ def design(craft: Craft, spec: Inertial | Diagonal) -> Gains:
     return Gains(compact(k_rate), compact(np.linalg.inv(spec.a * inertia + spec.b * np.eye(3))))
 
 
-@equation
 def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Control torque (N m, body)."""
     feedback = add(apply(gains.k_rate, seen.rate), apply(gains.k_attitude, vector_part(seen.attitude)))
     return subtract(tracking_torque(seen, craft), feedback), memory
 
 
-@equation
 def lyapunov(seen: Seen, gains: Gains, craft: Craft) -> Scalar:
     """V = w.K_attitude^-1 Jw/2 + 2 (1 - q0); V' = -w.K_attitude^-1 K_rate w under the law's assumptions."""
     weighted = solve(gains.k_attitude, apply(craft.inertia, seen.rate))

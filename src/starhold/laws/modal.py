@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from starhold.algebra.quaternion import derivative, vector_part
-from starhold.algebra.scalar import Scalar, equation
+from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Matrix, Vector, add, apply, cross, dot, scale, subtract, swing
 from starhold.laws.interface import Card, Gain, NoMemory, Seen
 from starhold.models.craft import Craft, tensor
@@ -112,14 +112,12 @@ def single_root(gains: Gains) -> tuple[float, float] | None:
     return (a, gains.b) if (first == a * np.eye(3)).all() and (second == first).all() else None
 
 
-@equation
 def _straighten(q: Vector, v: Vector) -> Vector:
     """D^-1 v with D v = v + q x v."""
     # D v = v + q x v is regular for every q, and needs no pivot.
     return scale(1.0 / (1.0 + dot(q, q)), add(subtract(v, cross(q, v)), scale(dot(q, v), q)))
 
 
-@equation
 def _upper(q: Vector, w: Vector, gains: Gains, craft: Craft, first: Scalar, rest: Vector) -> Vector:
     """K_1 (first, rest): what gives the quaternion the spectra phi_1 and b |w|2, if it could be steered by the momentum."""
     half = apply(craft.inertia, _straighten(q, w))
@@ -129,7 +127,6 @@ def _upper(q: Vector, w: Vector, gains: Gains, craft: Craft, first: Scalar, rest
     return subtract(subtract(scale(first, half), scale(0.5 * dot(w, rest), last)), pulled)
 
 
-@equation
 def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Control torque (N m, body).
 

@@ -3,16 +3,21 @@ applied."""
 
 from __future__ import annotations
 
+import math
 from importlib import import_module
 from typing import Annotated, Any, NamedTuple, cast
 
 import numpy as np
 
-from starhold.algebra.scalar import equation
+from starhold.algebra.quaternion import vector_part
+from starhold.algebra.scalar import less, maximum, where
+from starhold.algebra.structured import Buffer, when
 from starhold.algebra.vector import Vector, add, clip_axes, clip_norm, scale
 from starhold.laws.interface import Card, Gain, Seen, tracking_torque
-from starhold.laws.predictive.problem import Problem, carve, compiled, hold, linearise, make_store
-from starhold.laws.predictive.solver import advance, improve
+from starhold.laws.predictive.motion import linearise, sample
+from starhold.laws.predictive.problem import COUNTERS, Problem, Store, carve, put_limits, size
+from starhold.laws.predictive.sixes import triple
+from starhold.laws.predictive.solver import Solved, advance, improve
 from starhold.models.craft import Craft, tensor
 
 CARD = Card(
@@ -26,7 +31,6 @@ CARD = Card(
         "small attitude error, or a horizon short against the turn",
     ),
     claims="local",
-    compiled_only=True,
 )
 
 TERMINALS = ("riccati", "stage", "none")
@@ -46,21 +50,16 @@ class Gains(NamedTuple):
     budget: Annotated[int, Gain(at_least=1, at_most=10000, whole=True, text="most Riccati sweeps a call")] = 50
 
 
-CALLS, SWEEPS, WORST, EXHAUSTED, SHAPED = range(5)
+CALLS, SWEEPS, WORST, EXHAUSTED, SHAPED = range(COUNTERS)
 """Places in the counters: calls, Riccati sweeps in all, most sweeps in a call, calls that ended at the budget without
 the optimum, and whether limits shaped the last plan (1) or not (0), which decides how the next call starts."""
 
 
 class Memory(NamedTuple):
-    """What the law keeps between calls, changed in place and made anew for each trajectory.
+    """What the law keeps between calls, changed in place and made anew for each trajectory: the numbers of its program,
+    see `predictive.problem`."""
 
-    plan (3N): the moves planned, beyond the torque that tracks the target (N m); numbers: weights, matrices and work
-    arrays, see `carve`; counters (5): see CALLS.
-    """
-
-    plan: Any
-    numbers: Any
-    counters: Any
+    numbers: Buffer
 
 
 def remember(gains: Gains, craft: Craft, period: float) -> Memory:
@@ -69,15 +68,22 @@ def remember(gains: Gains, craft: Craft, period: float) -> Memory:
     Raises ValueError where the Riccati equation of the terminal weight has no solution in double precision.
     """
     terminal, tail = terminal_weight(gains, craft, period)
-    r = np.array(gains.r, dtype=float)
-    numbers = make_store(gains.horizon)
-    store = carve(numbers, gains.horizon)
-    store.q[:] = np.diag(np.array([*gains.q_attitude, *gains.q_rate], dtype=float)).ravel()
-    store.r[:] = np.diag(r).ravel()
-    store.r_inverse[:] = np.diag(1.0 / r).ravel()
-    store.p[:] = terminal.ravel()
-    store.tail[:] = tail.ravel()
-    return Memory(np.zeros(3 * gains.horizon), numbers, np.zeros(5, dtype=np.int64))
+    memory = Memory(Buffer([0.0] * size(gains.horizon)))
+    store = carve(program(gains, memory))
+    diagonals = [*gains.q_attitude, *gains.q_rate, *gains.r, *(1.0 / weight for weight in gains.r)]
+    store.weights.put(0, [float(weight) for weight in (*diagonals, *terminal.ravel())])
+    store.tail.put(0, tail.ravel().tolist())
+    return memory
+
+
+def program(gains: Gains, memory: Memory) -> Problem:
+    """The quadratic program of a memory."""
+    return Problem(memory.numbers, gains.horizon, gains.limit == BALL)
+
+
+def counters(memory: Memory) -> tuple[int, ...]:
+    """The counters of a memory, outside kernels: see CALLS."""
+    return tuple(int(memory.numbers[place]) for place in range(COUNTERS))
 
 
 @np.errstate(all="ignore")
@@ -116,40 +122,35 @@ def terminal_weight(gains: Gains, craft: Craft, period: float) -> tuple[Any, Any
     return p, feedback
 
 
-@equation
 def torque(seen: Seen, gains: Gains, craft: Craft, memory: Memory) -> tuple[Vector, Memory]:
-    """Control torque (N m, body). Weights and horizon are those the memory was made for; the memory is changed."""
-    return first_move(seen, gains, craft, memory), memory
-
-
-@compiled
-def first_move(seen: Seen, gains: Gains, craft: Craft, memory: Memory) -> Vector:
-    """Linearise, solve, and give the first move (N m, body)."""
-    plan, counters = memory.plan, memory.counters
-    store = carve(memory.numbers, plan.size // 3)
-    space = store.space
+    """Control torque (N m, body): the first move of the best plan. Weights and horizon are those the memory was made for;
+    the memory is changed."""
+    problem = program(gains, memory)
+    store = carve(problem)
     ahead = tracking_torque(seen, craft)
-    bound = np.inf if gains.limit == UNLIMITED else craft.torque_limit
-    ball = gains.limit == BALL and bound < np.inf
-    linearise(seen, craft, store.a, store.b)
-    hold(store.a, store.b, seen.period, space.small)
-    centre = scale(-1.0, ahead)
-    problem = Problem(store.a, store.b, store.q, store.r, store.r_inverse, store.p, centre, bound, ball)
-    warm = counters[SHAPED] == 1
-    if warm:
-        advance(problem, plan, store.tail, space)
-    states, q, w = space.states, seen.attitude, seen.rate
-    states[0], states[1], states[2], states[3], states[4], states[5] = q[1], q[2], q[3], w[0], w[1], w[2]
-    sweeps, solved, shaped = improve(problem, plan, space, gains.budget, warm)
-    counters[CALLS] += 1
-    counters[SWEEPS] += sweeps
-    counters[WORST] = max(counters[WORST], sweeps)
-    counters[EXHAUSTED] += 0 if solved else 1
-    # A plan that is not finite must not start the next one.
-    counters[SHAPED] = 1 if shaped and abs(plan[0]) < np.inf else 0
-    command = add((plan[0], plan[1], plan[2]), ahead)
+    bound = math.inf if gains.limit == UNLIMITED else craft.torque_limit
+    sample(problem, linearise(seen, craft), seen.period)
+    put_limits(problem, scale(-1.0, ahead), bound)
+    warm = less(0.0, store.counters[SHAPED])
+    when(warm, lambda: advance(problem))
+    store.states.put(0, (*vector_part(seen.attitude), *seen.rate))
+    _count(store, improve(problem, gains.budget, warm))
+    command = add(triple(store.plan, 0), ahead)
     # Adding the tracking torque back rounds; the limit is kept exactly.
-    return clip_norm(command, bound) if ball else clip_axes(command, bound)
+    return (clip_norm if problem.ball else clip_axes)(command, bound), memory
+
+
+def _count(store: Store, end: Solved) -> None:
+    """Bring the counters up to date."""
+    before = store.counters.row(0, COUNTERS)
+    now = {
+        CALLS: before[CALLS] + 1.0,
+        SWEEPS: before[SWEEPS] + end.sweeps,
+        WORST: maximum(before[WORST], end.sweeps),
+        EXHAUSTED: before[EXHAUSTED] + where(end.solved, 0.0, 1.0),
+        SHAPED: where(end.shaped, 1.0, 0.0),
+    }
+    store.counters.put(0, [now[place] for place in range(COUNTERS)])
 
 
 def examples() -> list[Gains]:

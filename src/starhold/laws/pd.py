@@ -6,7 +6,7 @@ import math
 from typing import Annotated, NamedTuple
 
 from starhold.algebra.quaternion import vector_part
-from starhold.algebra.scalar import Scalar, equation, less, where
+from starhold.algebra.scalar import Scalar, less, where
 from starhold.algebra.vector import Vector, add, apply, clip_axes, dot, scale, subtract
 from starhold.laws.interface import Card, Gain, NoMemory, Seen, tracking_torque
 from starhold.models.craft import Craft
@@ -39,7 +39,6 @@ def remember(gains: Gains, craft: Craft, period: float) -> NoMemory:
     return NoMemory()
 
 
-@equation
 def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Control torque (N m, body)."""
     damping = scale(gains.k_rate, seen.rate)
@@ -54,7 +53,6 @@ def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Ve
     return subtract(tracking_torque(seen, craft), feedback), memory
 
 
-@equation
 def lyapunov(seen: Seen, gains: Gains, craft: Craft) -> Scalar:
     """V = w.Jw/2 + 2 k_attitude (1 - q0) (J); V' = -w.damping."""
     energy = 0.5 * dot(seen.rate, apply(craft.inertia, seen.rate))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from starhold.algebra.quaternion import vector_part
-from starhold.algebra.scalar import Scalar, clip, equation, less, maximum, sign, where
+from starhold.algebra.scalar import Scalar, clip, less, maximum, sign, where
 from starhold.algebra.vector import Matrix, Vector, add, apply, cross, scale, subtract, swing, times
 from starhold.laws.interface import Card, Gain, NoMemory, Seen
 from starhold.models.craft import Craft
@@ -38,20 +38,17 @@ class Gains(NamedTuple):
     layer: Annotated[float, Gain("rad/s", at_least=0.0, text="boundary layer; 0 switches by sign")] = 0.0
 
 
-@equation
 def surface(seen: Seen, gains: Gains) -> Vector:
     """s = w + K q (rad/s)."""
     return add(seen.rate, apply(gains.slope, vector_part(seen.attitude)))
 
 
-@equation
 def switch(s: Scalar, layer: Scalar) -> Scalar:
     """sign(s), or s/layer within the layer."""
     inside = less(0.0, layer)
     return where(inside, clip(s / maximum(layer, 1e-300), 1.0), sign(s))
 
 
-@equation
 def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Control torque (N m, body)."""
     q = vector_part(seen.attitude)

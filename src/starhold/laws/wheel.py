@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from starhold.algebra.quaternion import vector_part
-from starhold.algebra.scalar import Scalar, equation
+from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Vector, add, apply, cross, dot, scale, subtract
 from starhold.laws.interface import Card, Gain, NoMemory, Seen
 from starhold.laws.stability_degree import Designed, brute_force, design_gains
@@ -85,13 +85,11 @@ def _optimum(craft: Craft, spec: Stability) -> Designed:
     return design_gains(moments, spec.torque, spec.momentum, spec.angle, spec.rate)
 
 
-@equation
 def _twist(k: Vector, q: Vector) -> Vector:
     """M q with M = tr(k) - diag(k): sum k_i (1 - a_ii) = 2 q.Mq."""
     return ((k[1] + k[2]) * q[0], (k[2] + k[0]) * q[1], (k[0] + k[1]) * q[2])
 
 
-@equation
 def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Torque asked of the wheels (N m, body)."""
     q = vector_part(seen.attitude)
@@ -105,7 +103,6 @@ def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Ve
     return subtract(scale(gains.compensation, model), feedback), memory
 
 
-@equation
 def lyapunov(seen: Seen, gains: Gains, craft: Craft) -> Scalar:
     """V = w.Jw/2 + sum k_i (1 - a_ii) = w.Jw/2 + 2 q.Mq (J); V' = -k_rate |w|2 with full compensation.
 

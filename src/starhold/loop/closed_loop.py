@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import NO_TURN, Quaternion, relative
 from starhold.algebra.scalar import side
-from starhold.algebra.structure import alike, unflatten
+from starhold.algebra.structure import alike, leaves, unflatten
+from starhold.algebra.structured import Buffer
 from starhold.algebra.vector import ZERO, Vector, apply
 from starhold.laws.catalogue import Law
 from starhold.laws.double_cover import COVERS
@@ -37,14 +38,13 @@ class Setup(NamedTuple):
     substep: float
     target: Any
     noise: sensor.Noise
-    seed: int
     width: float
     dynamics: actuator.Dynamics
     wheels: Any
 
 
 class Parts(NamedTuple):
-    """The equations of a loop; each combination is compiled once."""
+    """The equations of a loop."""
 
     environment: Callable[..., Any]
     target: Callable[..., Any]
@@ -101,10 +101,16 @@ class Phase(NamedTuple):
     before: Craft
     """What the craft was until this phase."""
 
+    @property
+    def turns(self) -> bool:
+        """Whether the body's rate jumps as the phase begins."""
+        pairs = zip(leaves(self.craft.inertia), leaves(self.before.inertia), strict=True)
+        return not all(np.array_equal(*pair) for pair in pairs)
+
     def rate_from(self, rate: Vector) -> Vector:
         """The body's rate (rad/s) as the phase begins, from that at the end of the one before: what moves inside the craft
         leaves its angular momentum."""
-        if self.craft.inertia == self.before.inertia:
+        if not self.turns:
             return rate
         return apply(self.craft.inverse_inertia, apply(self.before.inertia, rate))
 
@@ -174,17 +180,24 @@ class ClosedLoop:
             ALLOCATIONS[self.allocation],
         )
 
+    @property
+    def remembers(self) -> bool:
+        """Whether the law keeps anything from call to call."""
+        return any(True for _ in leaves(self.law.remember(self.gains, self.craft, self.period)))
+
     def setup(self) -> Setup:
         """The numbers of this loop."""
         goal = NO_TURN if isinstance(self.target, str) else self.target
+        if isinstance(goal, np.ndarray):
+            goal = Buffer(goal.ravel().tolist())
         substep = self.period / self.substeps
         wheels = NoMemory() if self.wheels is None else self.wheels
-        return Setup(self.period, substep, goal, self.noise, self.seed, self.hysteresis_width, self.dynamics, wheels)
+        return Setup(self.period, substep, goal, self.noise, self.hysteresis_width, self.dynamics, wheels)
 
     def phases(self, steps: int) -> list[Phase]:
         """A run of so many control steps, cut where something changes."""
         events = (Event(0, self.wheels, self.gains, self.craft, self.craft), *self.events)
-        # Of one form in all phases, so that one kernel flies them.
+        # Of one form in all phases, so that one kernel flies them all.
         gains = alike([event.gains for event in events])
         crafts = alike([event.craft for event in events] + [event.known for event in events])
         lasts = [*(min(event.step, steps) for event in self.events), steps]
@@ -197,10 +210,10 @@ class ClosedLoop:
                 before = craft
         return found
 
-    def carry(self, start: State | WheeledState | None = None) -> Carry:
-        """What a trajectory starts with."""
+    def carry(self, start: State | WheeledState | None = None, gains: Any = None, known: Craft | None = None) -> Carry:
+        """What a trajectory starts with; from another start, with other gains or a craft that the law takes it for."""
         start = self.start if start is None else start
-        memory = self.law.remember(self.gains, self.craft, self.period)
+        memory = self.law.remember(gains or self.gains, known or self.craft, self.period)
         goal = NoMemory()
         if isinstance(self.target, str):
             goal = target.orbital(None, start.position, start.velocity, 0, NO_TURN).attitude

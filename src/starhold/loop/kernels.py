@@ -1,34 +1,50 @@
-"""The compiled kernels that repeat the step of a closed loop, of whatever kind, over one lane or many.
+"""The kernels that repeat the step of a closed loop, of whatever kind, over one lane or many: programs recorded from the
+equations of a step, compiled when they are first asked for.
 
-All readers share the equations of a step, so one lane, any lane of a batch and plain Python agree bit for bit. No fast-math
-anywhere.
+One lane, any lane of a batch, plain Python, C and JavaScript agree bit for bit. No fast-math anywhere.
 """
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
-from contextlib import suppress
 from functools import cache
-from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
-import numba
+import numpy as np
+from numpy.typing import NDArray
 
-from starhold.algebra.structure import LANES, load, move, store
-from starhold.loop.closed_loop import Carry, Parts
-from starhold.loop.fingerprint import fingerprint, outside_modules
+from starhold.algebra.scalar import less
+from starhold.algebra.structure import buffers, flatten, leaves, mapped, move, unflatten
+from starhold.algebra.structured import Buffer, at, repeat
+from starhold.algebra.words import word_add, word_of
+from starhold.loop.closed_loop import Parts
 from starhold.loop.station import StationParts, station_step
 from starhold.loop.step import Step, attitude_step
+from starhold.trace.machine import load, word
+from starhold.trace.program import Program
+from starhold.trace.recording import Cells, Recorder
 
 AnyParts: TypeAlias = Parts | StationParts
+Array: TypeAlias = NDArray[np.float64]
 
 
-class Kernels(NamedTuple):
-    """Compiled: `one` flies a trajectory and records it, `many` flies the columns of an array."""
+class Numbers(NamedTuple):
+    """What a kernel takes as arguments: gains, the craft that the law takes it for, the craft that flies, the setup. Numbers
+    of theirs may be arrays (lanes,), where lanes differ. Whole numbers are constants of the kernel."""
 
-    one: Callable[..., Any]
-    many: Callable[..., Any]
+    gains: Any
+    known: Any
+    craft: Any
+    setup: Any
+
+
+class Observer(NamedTuple):
+    """What is noted of a flight along the way: note(noted, before, carry, step, numbers) -> noted, after each control step,
+    `before` and `carry` at its start and its end; `first` gives its shape, `numbers` are arguments of the kernel."""
+
+    note: Callable[..., Any]
+    first: Any
+    numbers: Any
 
 
 @cache
@@ -37,93 +53,213 @@ def make_step(parts: AnyParts) -> Step:
     return station_step(parts) if isinstance(parts, StationParts) else attitude_step(parts)
 
 
-@cache
-def make_kernels(parts: AnyParts) -> Kernels:
-    """Kernels for these parts, from the disk cache where nothing they are built from has changed."""
-    return Kernels(_one(parts), _many(parts))
+def form(value: Any) -> Any:
+    """Equal for arguments that one kernel serves: their structure and what is constant in them."""
+    if isinstance(value, tuple):
+        return (type(value), *(form(part) for part in value))  # pyright: ignore
+    if isinstance(value, Buffer):
+        return ("buffer", value.size)
+    if isinstance(value, np.ndarray):
+        return "lanes"
+    return "number" if isinstance(value, float) else (type(value), value)
 
 
-def compiled(function: Callable[..., Any], parts: AnyParts) -> Callable[..., Any]:
-    """Compile a kernel, or find it in the disk cache under a name made of its parts and all their sources.
-
-    A name of its own for each kernel also means that a law which is no longer there spoils no other law's cache entry.
-    """
-    sources = fingerprint()[:16]
-    mark = fingerprint(outside_modules(parts)) + "".join(f"{part.__module__}.{part.__qualname__}" for part in parts)
-    function.__qualname__ = f"{function.__name__}-{sources}-{hashlib.sha256(mark.encode()).hexdigest()[:32]}"
-    kernel: Any = numba.njit(error_model="numpy", cache=True, nogil=True)(function)
-    _drop_stale(Path(kernel.stats.cache_path), sources)
-    return kernel
+def fly_plainly(loop: Any, steps: int, run: int = 0) -> Any:
+    """What a loop without events carries after so many control steps in plain Python."""
+    step, carry, setup, key = make_step(loop.parts()), loop.carry(), loop.setup(), (getattr(loop, "seed", 0), run)
+    for k in range(steps):
+        carry = step.decide(step.check(carry, k, setup), k, key, loop.gains, loop.craft, setup)
+        for _ in range(loop.substeps):
+            carry = step.hold(carry, loop.craft, setup)
+    return step.check(carry, steps, setup)
 
 
-@cache
-def _drop_stale(folder: Path, sources: str) -> None:
-    """Delete the cached kernels of sources that have changed since; no process will ask for them again."""
-    for file in folder.glob("*.*-*-*.nb[ic]"):
-        if f"-{sources}-" not in file.name:
-            with suppress(OSError):
-                file.unlink()
+class Arguments:
+    """Numbers as a kernel takes them: those that all lanes share, those that differ between lanes, and tables."""
+
+    def __init__(self, *values: Any) -> None:
+        self.values = values
+        found = list(leaves(values))
+        self.shared = np.array([leaf for leaf in found if isinstance(leaf, float)])
+        self.own = [leaf for leaf in found if isinstance(leaf, np.ndarray)]
+        self.tables = np.array([x for table in buffers(values) for x in table.cells])
+
+    def bound(self, recorder: Recorder, base: Any) -> Any:
+        """The same values while recording; `base` is where a lane's own numbers begin."""
+        shared, own, tables = (recorder.memory(name, lanes=name == "own") for name in ("shared", "own", "tables"))
+        places = {name: iter(range(1 << 40)) for name in ("shared", "own")}
+        offset = 0
+
+        def leaf(value: Any) -> Any:
+            nonlocal offset
+            if isinstance(value, float):
+                return shared[next(places["shared"])]
+            if isinstance(value, np.ndarray):
+                return own[base + next(places["own"])]
+            if isinstance(value, Buffer):
+                offset += value.size
+                return Buffer(tables, offset - value.size, value.size)
+            return value
+
+        return mapped(self.values, leaf)
+
+    def rows(self, lanes: int) -> Array:
+        """The numbers that differ between lanes, (numbers, lanes)."""
+        return np.array([np.broadcast_to(row, (lanes,)) for row in self.own]).reshape(len(self.own), lanes)
 
 
-def _one(parts: AnyParts) -> Callable[..., Any]:
-    _, decide, hold, check, sample = make_step(parts)
-
-    def one(carry, first, count, finish, every, run, gains, known, craft, setup, substeps, out, end):
-        """Fly control steps first .. first+count-1; write every `every`-th into a column of `out`, and with `finish` the
-        last state as well. What is carried on goes into the one column of `end`; stops where the motion is lost. `known` is
-        the craft that the law takes it for."""
-        # Nothing is returned: a result made of Python objects would be built by code that a signal can break into.
-        for step in range(first, first + count):
-            carry = check(carry, step, setup)
-            if carry.lost_at >= 0.0:
-                break
-            carry = decide(carry, step, run, gains, known, setup)
-            if step % every == 0:
-                store(out, step // every, sample(carry, step, setup))
-            for _ in range(substeps):
-                carry = hold(carry, craft, setup)
-        last = first + count
-        carry = check(carry, last, setup)
-        if finish and carry.lost_at < 0.0 and last % every == 0:
-            store(out, last // every, sample(decide(carry, last, run, gains, known, setup), last, setup))
-        store(end, 0, carry)
-
-    return compiled(one, parts)
+def numbers_of(state: Any) -> list[float]:
+    """A state's numbers in order, then what its buffers hold."""
+    return [*flatten(state), *(buffer[k] for buffer in buffers(state) for k in range(buffer.size))]
 
 
-def _many(parts: AnyParts) -> Callable[..., Any]:
-    _, decide, hold, check, _ = make_step(parts)
-
-    def many(x, like, first, count, run, gains, like_gains, known, craft, setup, substeps):
-        """Fly control steps first .. first+count-1 of every lane of the block x, in place; lane 0 is
-        run number `run`. Gains are a NamedTuple shared by all lanes, or a block too."""
-        for step in range(first, first + count):
-            for k in range(LANES):
-                c = check(load(x, k, like), step, setup)
-                store(x, k, decide(c, step, run + k, load(gains, k, like_gains), known, setup))
-            for _ in range(substeps):
-                for k in range(LANES):
-                    store(x, k, hold(load(x, k, like), craft, setup))
-        for k in range(LANES):
-            store(x, k, check(load(x, k, like), first + count, setup))
-
-    return compiled(many, parts)
+def state_of(numbers: Any, like: Any) -> Any:
+    """The state shaped like `like` of the numbers that `numbers_of` gave."""
+    values = numbers.tolist()
+    count = len(flatten(like))
+    rest = iter(values[count:])
+    state = unflatten(values[:count], like)
+    return mapped(state, lambda leaf: Buffer([next(rest) for _ in range(leaf.size)]) if isinstance(leaf, Buffer) else leaf)
 
 
-@cache
-def make_replay(parts: Parts) -> Callable[..., Any]:
-    """A kernel that repeats the control calls of a run, to time them: from the state to the limited command."""
-    decide = make_step(parts).decide
+def _state(like: Any, cells: Cells, base: Any) -> tuple[Any, int]:
+    """The state that lies in memory from `base` on, as `numbers_of` orders it, and how many numbers that is."""
+    place, start = 0, len(flatten(like))
 
-    def replay(samples, first, last, carry, gains, craft, setup, end):
-        """Decide on the states in columns first .. last-1 of recorded samples, each call after the one before."""
-        for k in range(first, last):
-            # The first rows of a sample are the state; every number of it waits for the torque of the call before.
+    def leaf(value: Any) -> Any:
+        nonlocal place, start
+        if isinstance(value, Buffer):
+            start += value.size
+            return Buffer(cells, base + start - value.size, value.size)
+        place += 1
+        return cells[base + place - 1]
+
+    return mapped(like, leaf), len(numbers_of(like))
+
+
+def _put(cells: Cells, base: Any, state: Any) -> None:
+    for place, number in enumerate(flatten(state)):
+        cells[base + place] = number
+
+
+class Kernel:
+    """A compiled program. Called with its memories by name, then counts and words in the order the program states."""
+
+    def __init__(self, program: Program, width: int) -> None:
+        self.program, self.width = program, width
+        self._call = load(program, width)
+
+    def __call__(self, memories: dict[str, Array], *counts: int) -> None:
+        pointers = [memories[memory.name].ctypes.data for memory in self.program.memories]
+        self._call(*pointers, *map(word, counts))
+
+
+_KERNELS: dict[Any, Kernel] = {}
+
+
+def make_kernel(kind: Callable[..., Program], parts: AnyParts, width: int, *arguments: Any) -> Kernel:
+    """The kernel of a program kind(step, *arguments); one serves all arguments of the same form."""
+    key = (kind, parts, width, *map(form, arguments))
+    if key not in _KERNELS:
+        _KERNELS[key] = Kernel(kind(make_step(parts), *arguments), width)
+    return _KERNELS[key]
+
+
+def one(step: Step, carry: Any, numbers: Numbers, substeps: int) -> Program:
+    """The flight of one lane, recorded: `groups` times `each` control steps from `first` on, with a sample of the step
+    number `place` of every group, written to the row `row` and those after it. It stops where the motion is lost; what is
+    carried on stays in `carry`."""
+    recorder = Recorder()
+    with recorder.recording():
+        cells, record = recorder.memory("carry", lanes=True, writable=True), recorder.memory("record", writable=True)
+        counts = [recorder.input(name, "index") for name in ("first", "groups", "each", "place", "row")]
+        first, groups, each, place, row = counts
+        key = (recorder.input("seed", "word"), recorder.input("run", "word"))
+        gains, known, craft, setup = Arguments(*numbers).bound(recorder, 0)
+        state, _ = _state(carry, cells, 0)
+
+        def lost(carry: Any) -> Any:
+            return less(-1.0, carry.lost_at)
+
+        def group(g: Any, carry: Any) -> Any:
+            def turn(k: Any, carry: Any) -> Any:
+                now = first + (g * each + k)
+                decided = step.decide(carry, now, key, gains, known, setup)
+
+                def write() -> None:
+                    sample = flatten(step.sample(decided, now, setup))
+                    for i, number in enumerate(sample):
+                        record[(row + g) * len(sample) + i] = number
+
+                at(k, place, write)
+                return (step.check(_held(step, decided, craft, setup, substeps), now + 1, setup),)
+
+            return repeat(each, turn, carry, stop=lost)
+
+        _put(cells, 0, repeat(groups, group, step.check(state, first, setup), stop=lost)[0])
+    return recorder.program("fly", "Flies a closed loop.")
+
+
+def many(step: Step, carry: Any, numbers: Numbers, substeps: int, observer: Observer | None) -> Program:
+    """The flight of many lanes, recorded: control steps first .. first+count-1 of every lane of `blocks` blocks of lanes, in
+    place; lane 0 is run number `run`. What an observer notes lies in `noted`."""
+    recorder = Recorder()
+    with recorder.recording():
+        cells = recorder.memory("carry", lanes=True, writable=True)
+        seen = recorder.memory("noted", lanes=True, writable=True)
+        first, count, blocks, width = (recorder.input(name, "index") for name in ("first", "count", "blocks", "width"))
+        seed, run = recorder.input("seed", "word"), recorder.input("run", "word")
+        arguments = Arguments(*numbers, () if observer is None else observer.numbers)
+
+        def block(b: Any) -> None:
+            gains, known, craft, setup, noting = arguments.bound(recorder, b * len(arguments.own))
+            key = (seed, word_add(word_add(run, word_of(b * width)), recorder.lane()))
+            base, size = b * len(numbers_of(carry)), 0
+            state, _ = _state(carry, cells, base)
+            noted: Any = ()
+            if observer is not None:
+                noted, size = _state(observer.first, seen, b * len(flatten(observer.first)))
+
+            def turn(k: Any, carry: Any, noted: Any) -> Any:
+                now = first + k
+                decided = step.decide(carry, now, key, gains, known, setup)
+                after = step.check(_held(step, decided, craft, setup, substeps), now + 1, setup)
+                if observer is not None:
+                    noted = observer.note(noted, carry, after, now + 1, setup, noting)
+                return after, noted
+
+            end, noted = repeat(count, turn, step.check(state, first, setup), noted)
+            _put(cells, base, end)
+            _put(seen, b * size, noted)
+
+        repeat(blocks, block)
+    return recorder.program("fly", "Flies many closed loops.")
+
+
+def _held(step: Step, carry: Any, craft: Any, setup: Any, substeps: int) -> Any:
+    """The carry after the substeps of a control step."""
+    if substeps == 1:
+        return step.hold(carry, craft, setup)
+    return repeat(substeps, lambda _, carry: (step.hold(carry, craft, setup),), carry)[0]
+
+
+def replay(step: Step, carry: Any, numbers: Numbers, width: int) -> Program:
+    """The control calls of a run, recorded, to time them: decisions on the states in rows first .. first+count-1 of recorded
+    samples of `width` numbers, each call after the one before."""
+    recorder = Recorder()
+    with recorder.recording():
+        cells, samples = recorder.memory("carry", lanes=True, writable=True), recorder.memory("record")
+        first, count = recorder.input("first", "index"), recorder.input("count", "index")
+        key = (recorder.input("seed", "word"), recorder.input("run", "word"))
+        gains, known, _, setup = Arguments(*numbers).bound(recorder, 0)
+        begun, _ = _state(carry, cells, 0)
+
+        def turn(k: Any, carry: Any) -> Any:
+            # The first numbers of a sample are the state; each waits for the torque of the call before.
             u = carry.command
             wait = 0.0 * (u[0] + u[1] + u[2])
-            state = move(load(samples, k, carry.state), wait, load(samples, k, carry.state))
-            carry = Carry(state, carry.memory, carry.goal, carry.h, u, carry.disturbance, carry.lost_at)
-            carry = decide(carry, k, 0, gains, craft, setup)
-        store(end, 0, carry)
+            state, _ = _state(carry.state, samples, (first + k) * width)
+            return (step.decide(carry._replace(state=move(state, wait, state)), first + k, key, gains, known, setup),)
 
-    return compiled(replay, parts)
+        _put(cells, 0, repeat(count, turn, begun)[0])
+    return recorder.program("replay", "Repeats the control calls of a run.")

@@ -6,8 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
-from starhold.algebra.scalar import both, equation, is_finite, less, opposite, where
+from starhold.algebra.scalar import both, is_finite, less, opposite, where
 from starhold.algebra.vector import ZERO, Vector, dot
+from starhold.algebra.words import number_of
 from starhold.laws.interface import NoMemory
 from starhold.laws.station.interface import SeenPoint, StationLaw
 from starhold.loop.closed_loop import LIMITS
@@ -29,7 +30,7 @@ class StationSetup(NamedTuple):
 
 
 class StationParts(NamedTuple):
-    """The equations of a loop; each combination is compiled once."""
+    """The equations of a loop."""
 
     motion: Callable[..., Any]
     law: Callable[..., Any]
@@ -125,18 +126,15 @@ def station_step(parts: StationParts) -> Step:
     """The equations of a control step made of these parts."""
     motion, law, limit, begin, response = parts
 
-    @equation
-    def look(carry, step, run, plant, setup):
+    def look(carry, step, key, plant, setup):
         return SeenPoint(carry.state.position, carry.state.velocity, setup.period, setup.limit)
 
-    @equation
-    def decide(carry, step, run, gains, plant, setup):
-        command, memory = law(look(carry, step, run, plant, setup), gains, plant, carry.memory)
+    def decide(carry, step, key, gains, plant, setup):
+        command, memory = law(look(carry, step, key, plant, setup), gains, plant, carry.memory)
         command = limit(command, setup.limit)
-        s = carry.state
-        return StationCarry(PointState(s.position, s.velocity, begin(s.control, command)), memory, command, carry.lost_at)
+        state = carry.state._replace(control=begin(carry.state.control, command))
+        return StationCarry(state, memory, command, carry.lost_at)
 
-    @equation
     def slope(state, begun, carry, plant, setup):
         acceleration = motion(state.position, state.velocity, plant)
         control_rate = response(state.control, carry.command, begun, setup.substep, setup.dynamics)
@@ -144,21 +142,18 @@ def station_step(parts: StationParts) -> Step:
 
     advance = runge_kutta(slope)
 
-    @equation
     def hold(carry, plant, setup):
         """One substep."""
         end = advance(carry.state, carry.state.control, carry, plant, setup)
-        return StationCarry(end, carry.memory, carry.command, carry.lost_at)
+        return carry._replace(state=end)
 
-    @equation
     def check(carry, step, setup):
         """Note the step at which the motion is not finite or far away."""
         s = carry.state
         sound = both(is_finite(dot(s.velocity, s.velocity)), less(dot(s.position, s.position), setup.far * setup.far))
-        lost = where(both(opposite(sound), less(carry.lost_at, 0.0)), 1.0 * step, carry.lost_at)
-        return StationCarry(s, carry.memory, carry.command, lost)
+        lost = where(both(opposite(sound), less(carry.lost_at, 0.0)), number_of(step), carry.lost_at)
+        return carry._replace(lost_at=lost)
 
-    @equation
     def sample(carry, step, setup):
         s = carry.state
         return StationSample(s.position, s.velocity, s.control, carry.command)

@@ -7,10 +7,11 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from starhold.algebra.quaternion import Quaternion, relative, to_body
-from starhold.algebra.scalar import both, equation, is_finite, less, opposite, where
+from starhold.algebra.scalar import both, is_finite, less, opposite, where
 from starhold.algebra.structure import move
 from starhold.algebra.vector import ZERO, Vector, add, cross, dot, subtract
-from starhold.laws.interface import Seen, with_attitude
+from starhold.algebra.words import number_of, word_of
+from starhold.laws.interface import Seen
 from starhold.loop.closed_loop import Carry, Parts
 from starhold.models.target import inertial, orbital
 
@@ -44,7 +45,6 @@ def runge_kutta(slope: Callable[..., Any]) -> Callable[..., Any]:
     begun: what the actuators gave as it started.
     """
 
-    @equation
     def advance(state, begun, carry, craft, setup):
         h = setup.substep
         a = slope(state, begun, carry, craft, setup)
@@ -61,11 +61,10 @@ def attitude_step(parts: Parts) -> Step:
     environment, target, sense, disturb, cover, law, limit, begin, response, *body = parts
     tidy, with_torque, rates, stored, given, record, share = body
 
-    @equation
-    def look(carry, step, run, craft, setup):
+    def look(carry, step, key, craft, setup):
         state = carry.state
         goal = target(setup.target, state.position, state.velocity, step, carry.goal)
-        attitude, rate = sense(state.attitude, state.rate, setup.noise, setup.seed, run, step)
+        attitude, rate = sense(state.attitude, state.rate, setup.noise, key, word_of(step))
         error = relative(goal.attitude, attitude)
         external = environment(state.position, attitude, craft)[1]
         position = to_body(attitude, state.position)
@@ -75,39 +74,34 @@ def attitude_step(parts: Parts) -> Step:
         held = stored(state, setup.wheels)
         return Seen(error, error_rate, rate, target_rate, target_acceleration, external, position, setup.period, held)
 
-    @equation
-    def look_at_rest(carry, step, run, craft, setup):
-        # The same for a target that does not turn, spared the arithmetic on zeros that a compiler may not drop.
+    def look_at_rest(carry, step, key, craft, setup):
+        # The same for a target that does not turn, spared the arithmetic on zeros, which must not be dropped.
         state = carry.state
         goal = target(setup.target, state.position, state.velocity, step, carry.goal)
-        attitude, rate = sense(state.attitude, state.rate, setup.noise, setup.seed, run, step)
+        attitude, rate = sense(state.attitude, state.rate, setup.noise, key, word_of(step))
         external = environment(state.position, attitude, craft)[1]
         position = to_body(attitude, state.position)
         held = stored(state, setup.wheels)
         return Seen(relative(goal.attitude, attitude), rate, rate, ZERO, ZERO, external, position, setup.period, held)
 
-    @equation
     def keep(carry, step, setup):
         return carry.goal
 
-    @equation
     def renew(carry, step, setup):
         return target(setup.target, carry.state.position, carry.state.velocity, step, carry.goal).attitude
 
     see = look_at_rest if target is inertial else look
     follow = renew if target is orbital else keep
 
-    @equation
-    def decide(carry, step, run, gains, craft, setup):
-        seen = see(carry, step, run, craft, setup)
+    def decide(carry, step, key, gains, craft, setup):
+        seen = see(carry, step, key, craft, setup)
         shown, h = cover(seen.attitude, carry.h, setup.width)
-        command, memory = law(with_attitude(seen, shown), gains, craft, carry.memory)
+        command, memory = law(seen._replace(attitude=shown), gains, craft, carry.memory)
         command = limit(command, craft.torque_limit)
         state = with_torque(carry.state, begin(carry.state.torque, command))
-        disturbance = disturb(setup.noise, setup.seed, run, step)
+        disturbance = disturb(setup.noise, key, word_of(step))
         return Carry(state, memory, follow(carry, step, setup), h, command, disturbance, carry.lost_at)
 
-    @equation
     def slope(state, begun, carry, craft, setup):
         acceleration, external = environment(state.position, state.attitude, craft)
         torque_rate = response(state.torque, carry.command, begun, setup.substep, setup.dynamics)
@@ -116,22 +110,19 @@ def attitude_step(parts: Parts) -> Step:
 
     advance = runge_kutta(slope)
 
-    @equation
     def hold(carry, craft, setup):
         """One substep."""
         end = advance(carry.state, carry.state.torque, carry, craft, setup)
-        return Carry(tidy(end), carry.memory, carry.goal, carry.h, carry.command, carry.disturbance, carry.lost_at)
+        return carry._replace(state=tidy(end))
 
-    @equation
     def check(carry, step, setup):
         """Note the step at which the motion is not finite, or turns by more than a radian in one substep."""
         s = carry.state
         turn = setup.substep * setup.substep * dot(s.rate, s.rate)
         sound = both(less(turn, 1.0), both(is_finite(s.attitude[0]), is_finite(dot(s.position, s.position))))
-        lost = where(both(opposite(sound), less(carry.lost_at, 0.0)), 1.0 * step, carry.lost_at)
-        return Carry(s, carry.memory, carry.goal, carry.h, carry.command, carry.disturbance, lost)
+        lost = where(both(opposite(sound), less(carry.lost_at, 0.0)), number_of(step), carry.lost_at)
+        return carry._replace(lost_at=lost)
 
-    @equation
     def sample(carry, step, setup):
         s = carry.state
         goal = target(setup.target, s.position, s.velocity, step, carry.goal)

@@ -1,17 +1,15 @@
-"""A kernel that flies many lanes and notes how long a turn takes, and how fast the body gets on the way."""
+"""Notes along a flight how long a turn takes, and how fast the body gets on the way."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
 from starhold.algebra.quaternion import relative, to_body
-from starhold.algebra.scalar import absolute, equation, less, maximum, where
-from starhold.algebra.structure import LANES, load, store
-from starhold.algebra.vector import ZERO, Vector, dot, subtract
+from starhold.algebra.scalar import absolute, less, maximum, where
+from starhold.algebra.vector import Vector, dot, subtract
+from starhold.algebra.words import number_of
 from starhold.loop.closed_loop import Parts
-from starhold.loop.kernels import compiled, make_step
 
 
 class Ends(NamedTuple):
@@ -35,27 +33,23 @@ class Watched(NamedTuple):
 
 
 @cache
-def make_watch(parts: Parts) -> Callable[..., Any]:
-    """A kernel that flies many lanes as `many` does, and notes a `Watched` of each."""
-    _, decide, hold, check, _ = make_step(parts)
+def watch(parts: Parts) -> Any:
+    """The `note` of an `Observer` that keeps a `Watched`; its numbers are `Ends`."""
     target = parts.target
 
-    @equation
-    def last_above(then, now, before, step):
+    def last_above(then: Any, now: Any, before: Any, step: Any) -> Any:
         # A fraction of the step before, by a line through the two squares.
-        crossing = step - 1.0 + (before - 1.0) / (before - now)
-        return where(less(1.0, now), 1.0 * step, where(less(1.0, before), crossing, then))
+        crossing = number_of(step) - 1.0 + (before - 1.0) / (before - now)
+        return where(less(1.0, now), number_of(step), where(less(1.0, before), crossing, then))
 
-    @equation
-    def note(seen, before, carry, step, ends, setup):
-        """What is seen once step `step` is reached; `before` is the body's rate a control step ago."""
+    def note(seen: Watched, before: Any, carry: Any, step: Any, setup: Any, ends: Ends) -> Watched:
         s = carry.state
         goal = target(setup.target, s.position, s.velocity, step, carry.goal)
         error = relative(goal.attitude, s.attitude)
         left = subtract(s.rate, to_body(error, goal.rate))
         angle = ends.angle * (error[1] * error[1] + error[2] * error[2] + error[3] * error[3])
         rate = ends.rate * dot(left, left)
-        moved, most = subtract(s.rate, before), seen.peak_acceleration
+        moved, most = subtract(s.rate, before.state.rate), seen.peak_acceleration
         return Watched(
             angle,
             rate,
@@ -69,21 +63,4 @@ def make_watch(parts: Parts) -> Callable[..., Any]:
             ),
         )
 
-    def watch(x, like, first, count, run, gains, like_gains, known, craft, setup, substeps, ends, seen, like_seen, rates):
-        """Fly control steps first .. first+count-1 of every lane of the block x, in place, and go on noting in the block
-        `seen`; `rates` is a block of three for the kernel's own use. The rest is as in `many`."""
-        for step in range(first, first + count):
-            for k in range(LANES):
-                c = check(load(x, k, like), step, setup)
-                store(rates, k, c.state.rate)
-                store(x, k, decide(c, step, run + k, load(gains, k, like_gains), known, setup))
-            for _ in range(substeps):
-                for k in range(LANES):
-                    store(x, k, hold(load(x, k, like), craft, setup))
-            for k in range(LANES):
-                now = note(load(seen, k, like_seen), load(rates, k, ZERO), load(x, k, like), step + 1, ends, setup)
-                store(seen, k, now)
-        for k in range(LANES):
-            store(x, k, check(load(x, k, like), first + count, setup))
-
-    return compiled(watch, parts)
+    return note

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.scalar import compiled_as
 from starhold.algebra.vector import Matrix, Vector
 
 EARTH = 3.986e14
@@ -31,13 +30,6 @@ class Craft(NamedTuple):
 def whole(craft: Craft) -> Matrix | Vector:
     """The inertia with all that is in the craft, which gravity acts on (kg m2)."""
     return craft.with_rotors or craft.inertia
-
-
-@compiled_as(whole)
-def _compiled_whole(craft: Any) -> Any:
-    if len(craft.types[Craft._fields.index("with_rotors")]):
-        return lambda craft: craft.with_rotors  # pyright: ignore
-    return lambda craft: craft.inertia  # pyright: ignore
 
 
 def make_craft(inertia: Any, torque_limit: float = math.inf, gravity: float = EARTH) -> Craft:

@@ -4,37 +4,32 @@ external torque (body, N m) at a position and attitude. A scenario picks one of 
 from __future__ import annotations
 
 from starhold.algebra.quaternion import Quaternion, to_body
-from starhold.algebra.scalar import Scalar, equation, sqrt
+from starhold.algebra.scalar import Scalar, sqrt
 from starhold.algebra.vector import ZERO, Vector, dot, scale, swing
 from starhold.models.craft import Craft, whole
 
 
-@equation
 def free_space(position: Vector, attitude: Quaternion, craft: Craft) -> tuple[Vector, Vector]:
     """No forces and no torques."""
     return ZERO, ZERO
 
 
-@equation
 def two_body(position: Vector, attitude: Quaternion, craft: Craft) -> tuple[Vector, Vector]:
     """Attraction by a point mass."""
     return scale(-_attraction(position, craft)[0], position), ZERO
 
 
-@equation
 def two_body_gravity_gradient(position: Vector, attitude: Quaternion, craft: Craft) -> tuple[Vector, Vector]:
     """Attraction by a point mass, and its torque 3 (mu/r5) R x J R on the body."""
     n2, inverse_square = _attraction(position, craft)
     return scale(-n2, position), gravity_gradient(to_body(attitude, position), 3.0 * n2 * inverse_square, craft)
 
 
-@equation
 def gravity_gradient(position: Vector, strength: Scalar, craft: Craft) -> Vector:
     """Gravity-gradient torque (N m) for the position in body axes (m) and strength 3 mu/r5 (1/(m2 s2))."""
     return scale(strength, swing(whole(craft), position))
 
 
-@equation
 def _attraction(position: Vector, craft: Craft) -> tuple[Scalar, Scalar]:
     """mu/r3 and 1/r2, with one division."""
     inverse_square = 1.0 / dot(position, position)

@@ -12,7 +12,7 @@ import math
 from typing import NamedTuple
 
 from starhold.algebra.halving import rising
-from starhold.algebra.scalar import Scalar, equation, sqrt
+from starhold.algebra.scalar import Scalar, sqrt
 from starhold.algebra.vector import Vector, add, dot
 
 EARTH_DIAMETER = 12_742_000.0
@@ -43,7 +43,6 @@ class PointState(NamedTuple):
     control: Vector
 
 
-@equation
 def linear(position: Vector, velocity: Vector, plant: Libration) -> Vector:
     """Acceleration without control, to first order in the distance from the point (scaled)."""
     turning, square = 2.0 * plant.rate, plant.rate * plant.rate
@@ -54,7 +53,6 @@ def linear(position: Vector, velocity: Vector, plant: Libration) -> Vector:
     )
 
 
-@equation
 def nonlinear(position: Vector, velocity: Vector, plant: Libration) -> Vector:
     """Acceleration without control in the circular restricted three-body problem (scaled).
 
@@ -72,7 +70,6 @@ def nonlinear(position: Vector, velocity: Vector, plant: Libration) -> Vector:
     )
 
 
-@equation
 def _tide(position: Vector, distance: Scalar, pull: Scalar) -> Vector:
     """The attraction of a body that the origin is `distance` along X away from, less that at the origin.
 
@@ -86,7 +83,6 @@ def _tide(position: Vector, distance: Scalar, pull: Scalar) -> Vector:
     return (c * (along - position[0]), -c * position[1], -c * position[2])
 
 
-@equation
 def _stretch(position: Vector, distance: Scalar) -> tuple[Scalar, Scalar]:
     """q and sqrt(1 + q), by which the distance to a body has grown."""
     inverse = 1.0 / distance
@@ -94,7 +90,6 @@ def _stretch(position: Vector, distance: Scalar) -> tuple[Scalar, Scalar]:
     return q, sqrt(1.0 + q)
 
 
-@equation
 def jacobi(position: Vector, velocity: Vector, plant: Libration) -> Scalar:
     """The Jacobi constant 2 U - v2 of `nonlinear`, less its value for rest at the point (scaled); likewise without
     cancellation."""
@@ -104,7 +99,6 @@ def jacobi(position: Vector, velocity: Vector, plant: Libration) -> Scalar:
     return plant.rate * plant.rate * flat + 2.0 * (larger + smaller) - dot(velocity, velocity)
 
 
-@equation
 def _potential(position: Vector, distance: Scalar, pull: Scalar) -> Scalar:
     """The potential of `_tide`, zero at the origin."""
     q, s = _stretch(position, distance)
@@ -112,7 +106,6 @@ def _potential(position: Vector, distance: Scalar, pull: Scalar) -> Scalar:
     return pull * (bent - dot(position, position)) / (s * (1.0 + s))
 
 
-@equation
 def motion(state: PointState, acceleration: Vector, control_rate: Vector | None) -> tuple[Vector, Vector, Vector | None]:
     """d(state)/dt under the acceleration of `linear` or `nonlinear` and the control the state holds, which changes at the
     given rate (None: held); `actuator.lagging` is the rate of surfaces that lag."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from starhold.algebra.quaternion import Quaternion, derivative, renormalise, to_reference
-from starhold.algebra.scalar import Scalar, equation
+from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import ZERO, Vector, add, apply, dot, subtract, swing
 from starhold.models.craft import Craft
 
@@ -21,13 +21,11 @@ class State(NamedTuple):
     torque: Vector
 
 
-@equation
 def angular_acceleration(rate: Vector, torque: Vector, craft: Craft) -> Vector:
     """Euler's equation solved for the rate's derivative (rad/s2): J w' = torque - w x J w."""
     return apply(craft.inverse_inertia, subtract(torque, swing(craft.inertia, rate)))
 
 
-@equation
 def motion(
     state: State, torque: Vector, acceleration: Vector, torque_rate: Vector | None, craft: Craft
 ) -> tuple[Quaternion, Vector, Vector, Vector, Vector | None]:
@@ -37,19 +35,16 @@ def motion(
     return (turning, angular_acceleration(state.rate, torque, craft), state.velocity, acceleration, torque_rate)
 
 
-@equation
 def tidy(state: State) -> State:
     """The state with its quaternion brought back to unit length."""
-    return State(renormalise(state.attitude), state.rate, state.position, state.velocity, state.torque)
+    return state._replace(attitude=renormalise(state.attitude))
 
 
-@equation
 def with_torque(state: State, torque: Vector) -> State:
     """The state with another actuator torque."""
-    return State(state.attitude, state.rate, state.position, state.velocity, torque)
+    return state._replace(torque=torque)
 
 
-@equation
 def rates(
     state: State,
     outside: Vector,
@@ -63,31 +58,26 @@ def rates(
     return motion(state, add(state.torque, outside), acceleration, torque_rate, craft)
 
 
-@equation
 def stored(state: State, wheels: Any) -> Vector:
     """The angular momentum of parts that spin (N m s): none."""
     return ZERO
 
 
-@equation
 def given(state: State, wheels: Any, share: Any) -> Vector:
     """The torque that the actuators give the body (N m)."""
     return state.torque
 
 
-@equation
 def record(body: Any, state: State, wheels: Any, share: Any) -> Any:
     """What is recorded: the body's sample."""
     return body
 
 
-@equation
 def kinetic_energy(rate: Vector, craft: Craft) -> Scalar:
     """Rotational energy (J)."""
     return 0.5 * dot(rate, apply(craft.inertia, rate))
 
 
-@equation
 def angular_momentum(state: State, craft: Craft) -> Vector:
     """Angular momentum about the centre of mass in inertial axes (N m s)."""
     return to_reference(state.attitude, apply(craft.inertia, state.rate))

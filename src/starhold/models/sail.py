@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.halving import rising
-from starhold.algebra.scalar import Scalar, equation
+from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Vector, add, norm, scale
 
 LAMBERT = 2.0 / 3.0
@@ -74,7 +74,6 @@ def check_optics(specular: float, diffuse: float) -> None:
         )
 
 
-@equation
 def force(normal: Vector, area: Scalar, sail: Sail) -> Vector:
     """Force (N) on a flat panel of this area (m2) whose unit normal points away from the Sun, normal_x >= 0.
 
@@ -87,7 +86,6 @@ def force(normal: Vector, area: Scalar, sail: Sail) -> Vector:
     return add(along, (strength * (1.0 - sail.specular), 0.0, 0.0))
 
 
-@equation
 def mirror(wanted: Vector, pressure: Scalar) -> tuple[Scalar, Vector]:
     """Area (m2) and unit normal of a perfect mirror that give this force (N) at this pressure (N/m2); the force must have a
     part away from the Sun."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from starhold.algebra.quaternion import Quaternion, normalise
-from starhold.algebra.scalar import equation
 from starhold.algebra.vector import Vector, add
-from starhold.models.random import normal_vector
+from starhold.models.random import Word, normal_vector
+
+Key: TypeAlias = tuple[Word, Word]
+"""Seed and number of a run."""
 
 
 class Noise(NamedTuple):
@@ -20,31 +22,27 @@ class Noise(NamedTuple):
 
 
 SILENT = Noise(0.0, 0.0, 0.0)
-TORQUE, ATTITUDE, RATE = 0, 2, 4
-"""Channels of the random numbers."""
+TORQUE, ATTITUDE, RATE = 0, 3, 6
+"""Places of the random numbers of a step, three each."""
 
 
-@equation
-def exact(attitude: Quaternion, rate: Vector, noise: Noise, seed: int, run: int, step: int) -> tuple[Quaternion, Vector]:
+def exact(attitude: Quaternion, rate: Vector, noise: Noise, key: Key, step: Word) -> tuple[Quaternion, Vector]:
     """The true attitude and rate."""
     return attitude, rate
 
 
-@equation
-def noisy(attitude: Quaternion, rate: Vector, noise: Noise, seed: int, run: int, step: int) -> tuple[Quaternion, Vector]:
+def noisy(attitude: Quaternion, rate: Vector, noise: Noise, key: Key, step: Word) -> tuple[Quaternion, Vector]:
     """Attitude with a Gaussian error added to the vector part (then normalised), rate with a Gaussian error."""
-    d = normal_vector(seed, run, step, ATTITUDE, noise.attitude)
+    d = normal_vector(key, step, ATTITUDE, noise.attitude)
     seen = normalise((attitude[0], attitude[1] + d[0], attitude[2] + d[1], attitude[3] + d[2]))
-    return seen, add(rate, normal_vector(seed, run, step, RATE, noise.rate))
+    return seen, add(rate, normal_vector(key, step, RATE, noise.rate))
 
 
-@equation
-def no_disturbance(noise: Noise, seed: int, run: int, step: int) -> Vector:
+def no_disturbance(noise: Noise, key: Key, step: Word) -> Vector:
     """No random torque."""
     return (0.0, 0.0, 0.0)
 
 
-@equation
-def gaussian_disturbance(noise: Noise, seed: int, run: int, step: int) -> Vector:
+def gaussian_disturbance(noise: Noise, key: Key, step: Word) -> Vector:
     """A random external torque (body, N m), new each control step."""
-    return normal_vector(seed, run, step, TORQUE, noise.torque)
+    return normal_vector(key, step, TORQUE, noise.torque)

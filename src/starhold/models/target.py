@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from starhold.algebra.cosines import to_quaternion
 from starhold.algebra.quaternion import Quaternion, nearer
-from starhold.algebra.scalar import equation, sqrt
+from starhold.algebra.scalar import sqrt
+from starhold.algebra.structured import Buffer
 from starhold.algebra.vector import ZERO, Vector, cross, dot, scale
 
 
@@ -23,13 +24,11 @@ class Target(NamedTuple):
     acceleration: Vector
 
 
-@equation
 def inertial(fixed: Quaternion, position: Vector, velocity: Vector, step: int, before: Any) -> Target:
     """A constant attitude."""
     return Target(fixed, ZERO, ZERO)
 
 
-@equation
 def orbital(table: Any, position: Vector, velocity: Vector, step: int, before: Quaternion) -> Target:
     """The orbital frame: third axis to the centre of attraction, second against the orbit normal, first along the motion.
 
@@ -45,14 +44,10 @@ def orbital(table: Any, position: Vector, velocity: Vector, step: int, before: Q
     return Target(attitude, (0.0, -rate, 0.0), (0.0, 2.0 * rate * dot(position, velocity) / r2, 0.0))
 
 
-@equation
-def history(table: Any, position: Vector, velocity: Vector, step: int, before: Any) -> Target:
+def history(table: Buffer, position: Vector, velocity: Vector, step: int, before: Any) -> Target:
     """A row of a table prepared by `tabulate`, one row a control step."""
-    return Target(
-        (table[step, 0], table[step, 1], table[step, 2], table[step, 3]),
-        (table[step, 4], table[step, 5], table[step, 6]),
-        (table[step, 7], table[step, 8], table[step, 9]),
-    )
+    row: Any = table.row(step, 10)
+    return Target(row[:4], row[4:7], row[7:])
 
 
 def tabulate(times: Any, attitudes: Any, sample_times: Any) -> NDArray[np.float64]:

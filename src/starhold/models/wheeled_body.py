@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from starhold.algebra.quaternion import Quaternion, renormalise
-from starhold.algebra.scalar import equation
 from starhold.algebra.several import weighted
 from starhold.algebra.vector import Vector, add, scale
 from starhold.models.craft import Craft
@@ -37,20 +36,16 @@ class WheelSample(NamedTuple):
     torque: tuple[float, ...]
 
 
-@equation
 def tidy(state: WheeledState) -> WheeledState:
     """The state with its quaternion brought back to unit length."""
-    attitude = renormalise(state.attitude)
-    return WheeledState(attitude, state.rate, state.position, state.velocity, state.torque, state.momentum)
+    return state._replace(attitude=renormalise(state.attitude))
 
 
-@equation
 def with_torque(state: WheeledState, torque: Vector) -> WheeledState:
     """The state with another torque asked of the wheels."""
-    return WheeledState(state.attitude, state.rate, state.position, state.velocity, torque, state.momentum)
+    return state._replace(torque=torque)
 
 
-@equation
 def rates(
     state: WheeledState,
     outside: Vector,
@@ -64,16 +59,14 @@ def rates(
     rotors = turn_rotors(share(state.torque, wheels), state.momentum, state.rate, wheels)
     total = add(on_body(rotors, state.momentum, state.rate, wheels), outside)
     body = motion(state, total, acceleration, torque_rate, craft)  # type: ignore[arg-type]
-    return (body[0], body[1], body[2], body[3], body[4], rotors)
+    return (*body, rotors)
 
 
-@equation
 def stored(state: WheeledState, wheels: Wheels) -> Vector:
     """The rotors' momentum in body axes (N m s)."""
     return stored_momentum(state.momentum, wheels)
 
 
-@equation
 def given(state: WheeledState, wheels: Wheels, share: Any) -> Vector:
     """The torque that motors and friction of the wheels give the body (N m), less than what is asked where they are at
     their limits or lost."""
@@ -81,7 +74,6 @@ def given(state: WheeledState, wheels: Wheels, share: Any) -> Vector:
     return scale(-1.0, weighted(rotors, wheels.axes))
 
 
-@equation
 def record(body: Any, state: WheeledState, wheels: Wheels, share: Any) -> Any:
     """What is recorded: the body's sample and the wheels'."""
     rotors = turn_rotors(share(state.torque, wheels), state.momentum, state.rate, wheels)

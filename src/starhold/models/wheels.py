@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.scalar import Scalar, absolute, clip, equation, less, where
+from starhold.algebra.scalar import Scalar, absolute, clip, less, where
 from starhold.algebra.several import choose, each, weighted
 from starhold.algebra.vector import Vector, add, cross, dot, scale
 from starhold.models.craft import check_inertia, vector
@@ -62,14 +62,12 @@ class Wheels(NamedTuple):
     facets: tuple[Facet, ...]
 
 
-@equation
 def allocate(torque: Vector, wheels: Wheels) -> Numbers:
     """Motor torques (N m) that together give the body this torque (N m), -sum a_i tau_i = torque, with the least sum of
     squares. Neither limits nor friction are looked at; a lost wheel gets none."""
     return each(dot, (wheels.least,), torque)
 
 
-@equation
 def allocate_peak(torque: Vector, wheels: Wheels) -> Numbers:
     """Motor torques (N m) that together give the body this torque (N m), the largest of them as small as can be; where
     that leaves a choice, the next largest too. Continuous and piecewise linear in the torque. Neither limits nor friction
@@ -82,27 +80,22 @@ def allocate_peak(torque: Vector, wheels: Wheels) -> Numbers:
     return choose(each(_steepness, (wheels.facets,), torque), each(_within, (wheels.facets,), torque))
 
 
-@equation
 def _steepness(facet: Facet, torque: Vector) -> Scalar:
     return absolute(dot(facet.normal, torque))
 
 
-@equation
 def _within(facet: Facet, torque: Vector) -> Numbers:
     return choose(each(_size, (facet.edges,), torque), each(_torques, (facet.options,), torque))
 
 
-@equation
 def _size(edge: Vector, torque: Vector) -> Scalar:
     return absolute(dot(edge, torque))
 
 
-@equation
 def _torques(rows: Rows, torque: Vector) -> Numbers:
     return each(dot, (rows,), torque)
 
 
-@equation
 def motor(command: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels) -> Numbers:
     """d(momentum)/dt of each wheel (N m) under the commanded motor torques (N m), at axial momenta (N m s) and body rate
     (rad/s): the command within the torque limit, faded out where it would carry the momentum beyond its limit (see BAND),
@@ -120,7 +113,6 @@ def motor(command: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels) -> 
     return each(_motor, columns, rate)
 
 
-@equation
 def _motor(
     command: Scalar,
     momentum: Scalar,
@@ -140,20 +132,17 @@ def _motor(
     return room * clip(command, torque_limit) - viscous * speed - coulomb * clip(speed * (1.0 / CREEP), 1.0)
 
 
-@equation
 def _fraction(x: Scalar) -> Scalar:
     """x kept within [0, 1]."""
     return where(less(x, 0.0), 0.0, where(less(x, 1.0), x, 1.0))
 
 
-@equation
 def on_body(momentum_rate: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels) -> Vector:
     """The torque of the wheels on the body (N m): -sum a_i h_i' - rate x sum a_i h_i."""
     turning = add(weighted(momentum_rate, wheels.axes), cross(rate, stored(momentum, wheels)))
     return scale(-1.0, turning)
 
 
-@equation
 def stored(momentum: Numbers, wheels: Wheels) -> Vector:
     """The wheels' momentum in body axes (N m s): sum a_i h_i."""
     return weighted(momentum, wheels.axes)

@@ -12,7 +12,6 @@ from starhold.certification.certificate import Certificate
 from starhold.certification.certify import Wanted, certify
 from starhold.certification.region import Shape
 from starhold.laws.double_cover import COVERS
-from starhold.laws.interface import with_attitude
 from starhold.loop.kernels import make_step
 from starhold.models.craft import tensor
 from starhold.models.rigid_body import kinetic_energy
@@ -56,7 +55,7 @@ def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[I
 def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:
     """The loop as it starts, and at each control step of a run from which on it is another that the law knows."""
     found = [(0, replace(loop, events=()))]
-    if loop.law.card.compiled_only:
+    if loop.remembers:
         return found
     latest = {event.step: event for event in loop.events if event.step < steps}
     for step, event in latest.items():
@@ -87,10 +86,10 @@ def certify_scenario(scenario: Scenario, law: str | None = None) -> list[Tried]:
 
 def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
     """Whether the loop's start lies in the sets of the proved claims that are about a level of V."""
-    if loop.law.card.compiled_only:
+    if loop.remembers:
         return {}
     seen = make_step(loop.parts()).look(loop.carry(), 0, 0, loop.craft, loop.setup())
-    shown = with_attitude(seen, COVERS[loop.cover](seen.attitude, loop.carry().h, loop.hysteresis_width)[0])
+    shown = seen._replace(attitude=COVERS[loop.cover](seen.attitude, loop.carry().h, loop.hysteresis_width)[0])
     total = tensor(loop.craft.inertia) @ seen.body_rate + np.array(seen.stored)
     function, found = loop.law.lyapunov, dict[str, bool]()
     for claim in certificate.claims:

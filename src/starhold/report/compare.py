@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
-
-import numpy as np
 
 from starhold.analysis.cost import call_costs
 from starhold.analysis.metrics import measure
@@ -37,10 +36,14 @@ def fly_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, notice: Notic
     metrics = measure(recording, settling.attitude_tolerance, settling.rate_tolerance)
     metrics |= against_limits(recording, scenario.table.transient)
     metrics |= call_costs(loop, samples)
-    metrics |= _law_counters(carry.memory)
+    metrics |= _law_counters(entry, carry.memory)
     gains = {item.name: gain_text(item, value) for item, value in zip(entry.law.fields(), entry.gains, strict=True)}
-    proved = tuple(issued.certificate for issued in certify_law(scenario, entry, loop))
-    return Flight(entry.name, entry.law.name, recording, metrics, gains, proved)
+    return Flight(entry.name, entry.law.name, recording, metrics, gains)
+
+
+def prove(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, flight: Flight) -> Flight:
+    """The flight with the certificates of its law."""
+    return replace(flight, certificates=tuple(issued.certificate for issued in certify_law(scenario, entry, loop)))
 
 
 def record(scenario: Scenario, loop: ClosedLoop, progress: Progress | None = None) -> Recording:
@@ -52,7 +55,8 @@ def record(scenario: Scenario, loop: ClosedLoop, progress: Progress | None = Non
 
 def compare(scenario: Scenario, notice: Notice | None = None) -> list[Flight]:
     """Every law of the scenario flown on it, in the order of the file."""
-    return [fly_law(scenario, entry, build(scenario, entry), notice) for entry in scenario.laws]
+    loops = [(entry, build(scenario, entry)) for entry in scenario.laws]
+    return [prove(scenario, entry, loop, fly_law(scenario, entry, loop, notice)) for entry, loop in loops]
 
 
 def write(scenario: Scenario, flights: Sequence[Flight], folder: Path) -> Path:
@@ -74,12 +78,12 @@ def write_proved(name: str, flights: Sequence[Flight], folder: Path) -> None:
         write_certificates([certificate for flight in flights for certificate in flight.certificates], name, hidden)
 
 
-def _law_counters(memory: Any) -> dict[str, Any]:
+def _law_counters(entry: LawEntry, memory: Any) -> dict[str, Any]:
     """What an iterating law counted during the run: solver iterations and the calls that used up their budget."""
-    counters = getattr(memory, "counters", None)
-    if counters is None:
+    counted = entry.law.counters(memory)
+    if counted is None:
         return {}
-    calls, total, worst, hits = (int(value) for value in np.asarray(counters)[:4])
+    calls, total, worst, hits = counted[:4]
     return {
         "solver_calls": calls,
         "solver_iterations_mean": total / max(calls, 1),

@@ -224,7 +224,7 @@ def versions() -> str:
     """What made the page."""
     from starhold import __version__
 
-    libraries = ", ".join(f"{name} {metadata.version(name)}" for name in ("numba", "numpy", "plotly"))
+    libraries = ", ".join(f"{name} {metadata.version(name)}" for name in ("llvmlite", "numpy", "plotly"))
     return f"starhold {__version__}, {libraries}"
 
 

@@ -6,15 +6,15 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeAlias, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.structure import flatten, load
+from starhold.algebra.structure import flatten
 from starhold.errors import InputError
 from starhold.loop.closed_loop import Carry, ClosedLoop
-from starhold.loop.kernels import make_kernels, make_step
+from starhold.loop.kernels import Arguments, Numbers, make_kernel, make_step, numbers_of, one, state_of
 from starhold.loop.station import StationCarry, StationLoop
 from starhold.loop.step import Sample
 
@@ -46,6 +46,14 @@ WHEELS: dict[str, tuple[str, str, str]] = {
 """What is recorded of wheels, after the quantities of COLUMNS."""
 
 
+class Variable(NamedTuple):
+    """Names of the dimensions, values, and attributes such as the unit."""
+
+    dimensions: tuple[str, ...]
+    data: Any
+    attrs: dict[str, str]
+
+
 @dataclass(frozen=True)
 class Recording:
     """A trajectory as arrays: `time` (n,) and the quantities of `columns`; of an attitude loop in SI those of COLUMNS,
@@ -64,17 +72,22 @@ class Recording:
         # Loaded here, for it takes longer than most flights, and measuring and drawing do without.
         import xarray as xr
 
-        data: dict[str, Any] = {}
+        data, coords = self.variables()
+        return xr.Dataset(data, coords, self.attrs)
+
+    def variables(self) -> tuple[dict[str, Variable], dict[str, Variable]]:
+        """What is recorded, and its coordinates, by name."""
+        data: dict[str, Variable] = {}
         columns = {name: told for name, told in self.columns.items() if name in self.arrays}
         for name, (dimension, unit, meaning) in columns.items():
-            data[name] = (("time", dimension), self[name], {"units": unit, "long_name": meaning})
-        coords: dict[str, Any] = {
-            "time": ("time", self["time"], {"units": self.time_unit, "long_name": "time"}),
-            "axis": ("axis", ["x", "y", "z"]),
+            data[name] = Variable(("time", dimension), self[name], {"units": unit, "long_name": meaning})
+        coords = {
+            "time": Variable(("time",), self["time"], {"units": self.time_unit, "long_name": "time"}),
+            "axis": Variable(("axis",), ["x", "y", "z"], {}),
         }
         if any(dimension == "quaternion" for dimension, _, _ in columns.values()):
-            coords["quaternion"] = ("quaternion", ["q0", "q1", "q2", "q3"])
-        return xr.Dataset(data, coords, self.attrs)
+            coords["quaternion"] = Variable(("quaternion",), ["q0", "q1", "q2", "q3"], {})
+        return data, coords
 
 
 def simulate(
@@ -102,32 +115,54 @@ def fly(
     loop: ClosedLoop | StationLoop, steps: int, record_every: int = 1, run: int = 0, progress: Progress | None = None
 ) -> tuple[NDArray[np.float64], Any]:
     """The samples (number, sample) of a trajectory, one row for each number of a sample, and what it carries at its end."""
-    kernel = make_kernels(loop.parts()).one
+    like: Any = loop.carry()
     phases: Any = loop.phases(steps)
-    carry: Any
-    carry, done, chunk = loop.carry(), 0, steps if progress is None else 1
-    width = len(flatten(make_step(loop.parts()).sample(carry, 0, loop.setup())))
-    samples = np.full((width, _sample_count(steps, record_every, width)), np.nan)
-    end = np.empty((len(flatten(carry)), 1))
+    width = len(flatten(make_step(loop.parts()).sample(like, 0, loop.setup())))
+    samples = np.full((_sample_count(steps, record_every, width), width), np.nan)
+    carry, done, chunk = np.array(numbers_of(like)), 0, steps if progress is None else 1
+    flight = _Flight(loop, like, record_every, run, samples)
     while done < steps:
         begun = time.perf_counter()
         now = next(phase for phase in phases if done < phase.last)
-        count = min(chunk, now.last - done)
-        last = done + count == steps
         if done == now.first:
-            carry = now.entered(carry)
-        numbers = now.gains, now.known, now.craft, now.setup, loop.substeps
-        kernel(carry, done, count, last, record_every, run, *numbers, samples, end)
-        carry = load(end, 0, carry)
+            carry = np.array(numbers_of(now.entered(state_of(carry, like))))
+        count = flight.fly(now, carry, done, min(chunk, now.last - done))
         done += count
         if progress is not None:
             progress(done, steps)
             # Chunks grow until each takes about a pulse; the result does not depend on where they end.
             chunk = max(1, int(chunk * min(8.0, PULSE / max(time.perf_counter() - begun, 1e-9))))
-        if carry.lost_at >= 0.0:
-            kept = int(np.ceil(carry.lost_at / record_every))
-            return samples[:, :kept], carry
-    return samples, carry
+        lost_at = state_of(carry, like).lost_at
+        if lost_at >= 0.0:
+            return samples[: int(np.ceil(lost_at / record_every))].T, state_of(carry, like)
+    if steps % record_every == 0 and phases:
+        # The last sample shows what would be commanded next; the step that follows is flown for it and forgotten.
+        flight.fly(phases[-1], carry.copy(), steps, 1)
+    return samples.T, state_of(carry, like)
+
+
+class _Flight:
+    """A kernel with the memories of one flight."""
+
+    def __init__(self, loop: Any, like: Any, every: int, run: int, samples: NDArray[np.float64]) -> None:
+        self.loop, self.like, self.every, self.run, self.samples = loop, like, every, run, samples
+
+    def fly(self, phase: Any, carry: NDArray[np.float64], first: int, count: int) -> int:
+        """Fly up to `count` control steps from `first` on: to the next sample, or by whole groups between samples. What is
+        carried changes in place. Returns the steps flown."""
+        numbers = Numbers(phase.gains, phase.known, phase.craft, phase.setup)
+        arguments = Arguments(*numbers)
+        kernel = make_kernel(one, self.loop.parts(), 1, self.like, numbers, self.loop.substeps)
+        memories = {"carry": carry, "record": self.samples, "shared": arguments.shared, "tables": arguments.tables}
+        memories["own"] = arguments.shared
+        seed, into = getattr(self.loop, "seed", 0), first % self.every
+        if into or count < self.every:
+            # A part of a group: its sample, if it begins here, and the steps up to the next one.
+            groups, each, place = 1, min(count, self.every - into), 0 if into == 0 else -1
+        else:
+            groups, each, place = count // self.every, self.every, 0
+        kernel(memories, first, groups, each, place, -(-first // self.every), seed, self.run)
+        return groups * each
 
 
 def label(loop: ClosedLoop, samples: NDArray[np.float64], carry: Carry, record_every: int) -> Recording:

@@ -1,36 +1,40 @@
-"""Flies many trajectories at once: blocks of lanes, blocks shared out over threads."""
+"""Flies many trajectories at once: blocks of lanes, shared out over threads."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.structure import LANES, flatten, pack, unflatten, unpack
-from starhold.loop.closed_loop import Carry, ClosedLoop, Phase
-from starhold.loop.kernels import make_kernels
-from starhold.loop.station import StationLoop
+from starhold.algebra.structure import flatten, leaves, mapped, rebuild, unflatten
+from starhold.loop.closed_loop import ClosedLoop, Phase
+from starhold.loop.kernels import Arguments, Numbers, Observer, make_kernel, many, numbers_of
+from starhold.loop.station import StationLoop, StationPhase
 from starhold.models.libration import PointState
 from starhold.models.rigid_body import State
-from starhold.simulation.lane import Progress, fly
+from starhold.simulation.lane import Progress
+from starhold.trace.machine import aligned, widest
 
 RATE = slice(4, 7)
 """The rows of the rate among the numbers of a state."""
+PIECES = 16
+"""Pieces of a batch for each thread, between which progress is told and an interrupt is heeded."""
 
 
 @dataclass(frozen=True)
 class Batch:
     """Where many trajectories ended. states: (numbers of a state, lanes), rows in the order of the loop's `start`; lost_at:
-    (lanes,) control step at which the motion was lost, -1 where it was not."""
+    (lanes,) control step at which the motion was lost, -1 where it was not; noted: (numbers, lanes) of an observer."""
 
     states: NDArray[np.float64]
     lost_at: NDArray[np.float64]
     like: Any
+    noted: NDArray[np.float64]
 
     def state(self, lane: int) -> Any:
         """The state of a lane, a `State`, `WheeledState` or `PointState`."""
@@ -41,92 +45,193 @@ def simulate_many(
     loop: ClosedLoop | StationLoop,
     starts: Sequence[State | PointState] | NDArray[np.float64],
     steps: int,
-    gains: NDArray[np.float64] | None = None,
     first_run: int = 0,
     threads: int | None = None,
     progress: Progress | None = None,
+    phases: Sequence[Phase | StationPhase] | None = None,
+    width: int | None = None,
 ) -> Batch:
     """Fly `loop` from each of many states for `steps` control periods.
 
-    starts: states, or an array (numbers of a state, lanes); gains: (numbers of the law's gains, lanes) where they differ
-    between lanes; first_run: the run number of lane 0, which with the seed fixes its random numbers. The result is the same,
-    bit for bit, for any number of threads, and equals that of `simulate` lane by lane.
+    starts: states, or an array (numbers of a state, lanes); first_run: the run number of lane 0, which with the seed fixes
+    its random numbers; phases: those of the loop, `loop.phases(steps)`, with an array (lanes,) in place of every number that
+    differs between lanes, whole numbers excepted, see `alongside`; width: lanes in flight at once on a core.
+
+    The result is the same, bit for bit, for any number of threads and any width, and equals that of `simulate` lane by lane
+    while the motion is not lost.
     """
     start = np.asarray(starts if isinstance(starts, np.ndarray) else [flatten(s) for s in starts], dtype=float)
     start = start if isinstance(starts, np.ndarray) else start.T
-    workers = os.cpu_count() or 1 if threads is None else threads
-    if gains is not None and isinstance(loop, ClosedLoop) and loop.events:
-        raise ValueError("gains of their own for each lane do not go with events that change gains")
-    if isinstance(loop, ClosedLoop) and loop.law.card.compiled_only:
-        return _one_by_one(loop, start, steps, gains, first_run, workers, progress)
-    carries = _carries(loop, start)
-    blocks = pack(carries)
-    gain_blocks = None if gains is None else pack(gains)
-    kernel, like, phases = make_kernels(loop.parts()).many, loop.carry(), loop.phases(steps)
+    cut = list(loop.phases(steps) if phases is None else phases)
+    carries = carry_columns(loop, start, cut[0] if cut else None)
+    fleet = Fleet(loop, carries, first_run, width or widest())
+    workers = max(1, os.cpu_count() or 1 if threads is None else threads)
 
-    def work(block: int) -> None:
-        run = first_run + block * LANES
-        for now in phases:
-            own = now.gains if gain_blocks is None else gain_blocks[block]
-            count = now.last - now.first
-            if isinstance(now, Phase):
-                rate = blocks[block].reshape(-1, LANES)[RATE]
-                rate[:] = now.rate_from(tuple(rate))
-            numbers = own, now.gains, now.known, now.craft, now.setup, loop.substeps
-            kernel(blocks[block], like, now.first, count, run, *numbers)
+    def work(piece: range) -> None:
+        for now in cut:
+            fleet.fly(now, piece)
 
-    _share_out(work, len(blocks), workers, progress)
-    ends = unpack(blocks, start.shape[1])
-    return Batch(ends[: len(start)], ends[-1], loop.start)
+    fleet.share_out(work, workers, progress)
+    ends = fleet.carries()
+    return Batch(ends[: len(start)], ends[fleet.lost_row], loop.start, np.empty((0, start.shape[1])))
 
 
-def _carries(loop: ClosedLoop | StationLoop, start: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What each lane starts with, one column a lane."""
-    if isinstance(loop, StationLoop):
-        columns = np.repeat(np.array(flatten(loop.carry()))[:, None], start.shape[1], axis=1)
-        columns[: len(start)] = start
-        return columns
-    if isinstance(loop.target, str):
-        return np.array([flatten(loop.carry(unflatten(column, loop.start))) for column in start.T]).T
+class Fleet:
+    """Many lanes on their way: what each carries, in blocks of `width`, and what an observer has noted of it.
+
+    carries: (numbers, lanes), see `carry_columns`; noted: (numbers, lanes).
+    """
+
+    def __init__(
+        self,
+        loop: ClosedLoop | StationLoop,
+        carries: NDArray[np.float64],
+        first_run: int,
+        width: int,
+        observer: Observer | None = None,
+        noted: NDArray[np.float64] | None = None,
+    ) -> None:
+        self.loop, self.first_run, self.width, self.observer = loop, first_run, width, observer
+        self.lanes = carries.shape[1]
+        self.count = -(-self.lanes // width)
+        self.like: Any = loop.carry()
+        self.lost_row = len(flatten(self.like)) - 1
+        self.x = self._packed(carries)
+        self.noted = self._packed(np.empty((0, self.lanes)) if noted is None else noted)
+        self._ready: dict[int, Any] = {}
+
+    def _packed(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Blocks (blocks, numbers, width) of rows (numbers, lanes); the last lane fills up the last block."""
+        blocks = aligned(self.count, len(rows), self.width)
+        padded = np.pad(rows, ((0, 0), (0, self.count * self.width - self.lanes)), mode="edge")
+        blocks[:] = padded.reshape(len(rows), self.count, self.width).swapaxes(0, 1)
+        return blocks
+
+    def _unpacked(self, blocks: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.ascontiguousarray(blocks.swapaxes(0, 1).reshape(blocks.shape[1], -1)[:, : self.lanes])
+
+    def carries(self) -> NDArray[np.float64]:
+        """What each lane carries now, (numbers, lanes)."""
+        return self._unpacked(self.x)
+
+    def notes(self) -> NDArray[np.float64]:
+        """What has been noted of each lane, (numbers, lanes)."""
+        return self._unpacked(self.noted)
+
+    def fly(self, phase: Any, piece: range, first: int | None = None, count: int | None = None) -> None:
+        """Fly the blocks of a piece through a phase, or through `count` control steps of it from `first` on."""
+        kernel, arguments, own, turn = self._prepared(phase)
+        part = self.x[piece.start : piece.stop]
+        if turn is not None and first is None:
+            rates = self._unblocked(part[:, RATE])
+            part[:, RATE] = self._blocked(np.array(turn(tuple(rates), piece)), len(piece))
+        memories = {
+            "carry": part,
+            "noted": self.noted[piece.start : piece.stop],
+            "shared": arguments.shared,
+            "own": own[piece.start : piece.stop],
+            "tables": arguments.tables,
+        }
+        begin = phase.first if first is None else first
+        steps = phase.last - phase.first if count is None else count
+        run = self.first_run + piece.start * self.width
+        seed = getattr(self.loop, "seed", 0)
+        kernel(memories, begin, steps, len(piece), self.width, seed, run)
+
+    def _unblocked(self, blocks: NDArray[np.float64]) -> NDArray[np.float64]:
+        return blocks.swapaxes(0, 1).reshape(blocks.shape[1], -1)
+
+    def _blocked(self, rows: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+        return rows.reshape(len(rows), count, self.width).swapaxes(0, 1)
+
+    def _prepared(self, phase: Any) -> Any:
+        if id(phase) not in self._ready:
+            observer = self.observer
+            numbers = Numbers(phase.gains, phase.known, phase.craft, phase.setup)
+            arguments = Arguments(*numbers, () if observer is None else observer.numbers)
+            kernel = make_kernel(many, self.loop.parts(), self.width, self.like, numbers, self.loop.substeps, observer)
+            turn = self._turned(phase) if isinstance(phase, Phase) and phase.turns else None
+            self._ready[id(phase)] = (kernel, arguments, self._packed(arguments.rows(self.lanes)), turn)
+        return self._ready[id(phase)]
+
+    def _turned(self, phase: Phase) -> Any:
+        """Of the rates of the lanes of a piece, what the phase makes of them as it begins."""
+        size = self.count * self.width
+
+        def whole(leaf: Any) -> Any:
+            return np.pad(leaf, (0, size - self.lanes), mode="edge") if isinstance(leaf, np.ndarray) else leaf
+
+        craft, before = mapped(phase.craft, whole), mapped(phase.before, whole)
+
+        def turn(rates: Any, piece: range) -> Any:
+            span = slice(piece.start * self.width, piece.stop * self.width)
+
+            def cut(leaf: Any) -> Any:
+                return leaf[span] if isinstance(leaf, np.ndarray) else leaf
+
+            return phase._replace(craft=mapped(craft, cut), before=mapped(before, cut)).rate_from(rates)
+
+        return turn
+
+    def share_out(self, work: Any, workers: int, progress: Progress | None = None) -> None:
+        """Call work(piece) for all blocks, in pieces, on so many threads."""
+        size = max(1, -(-self.count // (workers * PIECES)))
+        pieces = [range(at, min(at + size, self.count)) for at in range(0, self.count, size)]
+        if workers == 1 or len(pieces) < 2:
+            for done, piece in enumerate(pieces, 1):
+                work(piece)
+                if progress is not None:
+                    progress(done, len(pieces))
+            return
+        with ThreadPoolExecutor(max_workers=workers) as pool:
+            try:
+                for done, _ in enumerate(pool.map(work, pieces), 1):
+                    if progress is not None:
+                        progress(done, len(pieces))
+            except BaseException:
+                pool.shutdown(cancel_futures=True)
+                raise
+
+
+def carry_columns(loop: ClosedLoop | StationLoop, start: NDArray[np.float64], phase: Any = None) -> NDArray[np.float64]:
+    """What each lane starts with, one column a lane, from its state (numbers of a state, lanes). phase: the first, where
+    numbers of it differ between lanes."""
+    lanes = start.shape[1]
+    own = phase is not None and any(isinstance(leaf, np.ndarray) for leaf in leaves((phase.gains, phase.known)))
+    if isinstance(loop, ClosedLoop) and (isinstance(loop.target, str) or (own and loop.remembers)):
+        gains, known = (None, None) if phase is None else (phase.gains, phase.known)
+        carries = (
+            loop.carry(unflatten(start[:, lane], loop.start), _of_lane(gains, lane), _of_lane(known, lane))
+            for lane in range(lanes)
+        )
+        return np.array([numbers_of(carry) for carry in carries]).T
     # Lanes differ in their state and in the side of the double cover they start on, and in nothing else.
-    first = loop.carry()
-    columns = np.repeat(np.array(flatten(first))[:, None], start.shape[1], axis=1)
+    first: Any = loop.carry()
+    columns = np.repeat(np.array(numbers_of(first))[:, None], lanes, axis=1)
     columns[: len(start)] = start
-    goal = loop.target[0, :4] if isinstance(loop.target, np.ndarray) else np.array(loop.target)
-    columns[len(start) + len(flatten((first.memory, first.goal)))] = np.where(goal @ start[:4] < 0.0, -1.0, 1.0)
+    if isinstance(loop, ClosedLoop):
+        goal = loop.target[0, :4] if isinstance(loop.target, np.ndarray) else np.array(loop.target)
+        columns[len(start) + len(flatten((first.memory, first.goal)))] = np.where(goal @ start[:4] < 0.0, -1.0, 1.0)
     return columns
 
 
-def _one_by_one(
-    loop: ClosedLoop, start: Any, steps: int, gains: Any, first_run: int, workers: int, progress: Progress | None
-) -> Batch:
-    """For laws whose memory is not a handful of numbers: threads over single trajectories."""
-    from dataclasses import replace
+def alongside(values: Sequence[Any]) -> Any:
+    """One structure for many lanes from one of each: numbers that differ become arrays (lanes,).
 
-    carries: list[Carry | None] = [None] * start.shape[1]
+    Raises ValueError where more than numbers differ: the form, whole numbers, tables.
+    """
+    first = values[0]
+    if isinstance(first, (tuple, list)):
+        if any(type(value) is not type(first) or len(value) != len(first) for value in values):
+            raise ValueError("lanes differ in more than numbers")
+        parts: list[Any] = [alongside(parts) for parts in zip(*values, strict=True)]
+        return parts if isinstance(first, list) else rebuild(first, parts)
+    if isinstance(first, float):
+        return first if len(set(values)) == 1 else np.array(values)
+    if any(not (value is first or (type(value) is type(first) and value == first)) for value in values):
+        raise ValueError(f"lanes differ in what is a constant of their kernel: {first} and others")
+    return first
 
-    def work(lane: int) -> None:
-        own = loop.gains if gains is None else unflatten(gains[:, lane], loop.gains)
-        flown = replace(loop, start=unflatten(start[:, lane], loop.start), gains=own)
-        carries[lane] = fly(flown, steps, max(steps, 1), first_run + lane)[1]
 
-    _share_out(work, len(carries), workers, progress)
-    ends = [carry for carry in carries if carry is not None]
-    return Batch(np.array([flatten(c.state) for c in ends]).T, np.array([c.lost_at for c in ends]), loop.start)
-
-
-def _share_out(work: Any, count: int, workers: int, progress: Progress | None) -> None:
-    with ThreadPoolExecutor(max_workers=max(1, workers)) as pool:
-        todo = {pool.submit(work, item) for item in range(count)}
-        done = 0
-        try:
-            while todo:
-                finished, todo = wait(todo, return_when=FIRST_COMPLETED)
-                for future in finished:
-                    future.result()
-                done += len(finished)
-                if progress is not None:
-                    progress(done, count)
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
+def _of_lane(value: Any, lane: int) -> Any:
+    return mapped(value, lambda leaf: float(leaf[lane]) if isinstance(leaf, np.ndarray) else leaf)

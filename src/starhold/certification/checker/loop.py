@@ -16,6 +16,7 @@ from typing import Any
 
 from starhold.algebra.polynomial import Monomial, Polynomial, constants, jointly, reciprocal
 from starhold.algebra.quaternion import derivative, vector_part
+from starhold.algebra.structure import leaves
 from starhold.algebra.vector import add, apply, cross, dot, scale, subtract
 from starhold.certification.checker.exact import (
     ONE,
@@ -123,7 +124,7 @@ class Loop:
     def pieces(self) -> list[tuple[Truths, dict[str, Polynomial]]]:
         """The law's torque on each of its pieces."""
         subject = self.subject
-        demand(not subject.law.card.compiled_only, "the law is no equation")
+        demand(not any(True for _ in leaves(subject.memory)), "the law keeps a memory")
         craft = self._craft(subject.inertia, inverted(subject.inertia))
         q: Any = vector_part(self.seen.attitude)
         with reciprocal(1 + dot(q, q), QUOTIENT):

@@ -95,8 +95,7 @@ def read_subject(given: Mapping[str, Any]) -> Subject:
     demand(given["control_period"] > 0, "the control period is not positive")
     for name in ("target_rate", "target_acceleration", "modelled_torque_norm", "disturbance", "hysteresis_width"):
         demand(given[name] >= 0, f"{name} is negative")
-    # A law that plans ahead makes a costly memory, which no claim needs.
-    memory = None if law.card.compiled_only else law.remember(gains, craft, given["control_period"])
+    memory = law.remember(gains, craft, given["control_period"])
     _check_bounds(given, whole)
     exact = {name: rational(given[name]) for name in ("target_rate", "target_acceleration", "disturbance")}
     return Subject(

@@ -1,238 +1,250 @@
-# pyright: basic
-# Basic, not strict: every function is compiled, and Numba's own types are not visible to a type checker.
 """Passes over the horizon of a predictive program, each in time proportional to its length: states under a plan, the
-gradient, and the Newton step by a backward Riccati sweep."""
+gradient, the Newton step by a backward Riccati sweep, and flights of a step through the limits."""
 
 from __future__ import annotations
 
-from starhold.algebra.scalar import equation
+from collections.abc import Callable
+from typing import Any, NamedTuple, cast
+
+from starhold.algebra.scalar import Scalar, Truth, both, either, less, less_equal, where
+from starhold.algebra.structured import Index, function, repeat, unless
+from starhold.algebra.vector import Vector, add, dot, subtract
+from starhold.laws.predictive import sixes
 from starhold.laws.predictive.limits import (
+    Limits,
+    Symmetric,
     box_inverse,
     held,
-    inverse3,
+    inverse,
     loose,
     plane_inverse,
     pressure,
-    put,
+    project,
     repelled,
-    triple,
 )
-from starhold.laws.predictive.problem import compiled
+from starhold.laws.predictive.problem import Problem, Store, carve, limits, motion, weights
+from starhold.laws.predictive.sixes import Numbers, Rows, entry, form, is_diagonal, transposed, triple
+
+REST: Numbers = (0.0,) * 6
+"""The state at rest on target."""
 
 
-@equation
-def transition(problem, x, o, v, y, p):
-    """y[p:p+6] = A x[o:o+6] + B v."""
-    a, b = problem.a, problem.b
-    for i in range(6):
-        s = b[3 * i] * v[0] + b[3 * i + 1] * v[1] + b[3 * i + 2] * v[2]
-        for j in range(6):
-            s += a[6 * i + j] * x[o + j]
-        y[p + i] = s
+def transition(a: Rows, b: Rows, x: Numbers, v: Vector) -> Numbers:
+    """A x + B v."""
+    return tuple(sixes.dot(row, x, dot(cast(Vector, push), v)) for row, push in zip(a, b, strict=True))
 
 
-@equation
-def form(m, x, o):
-    """x'Mx for a 6x6 M and x[o:o+6]."""
-    total = 0.0
-    for i in range(6):
-        s = 0.0
-        for j in range(6):
-            s += m[6 * i + j] * x[o + j]
-        total += s * x[o + i]
-    return total
+@function
+def rollout(problem: Problem) -> Scalar:
+    """Find the states under the plan, and half its cost."""
+    store, (a, b), weight = carve(problem), motion(problem), weights(problem)
+
+    def stage(k: Index, cost: Scalar, x: Numbers) -> tuple[Scalar, Numbers]:
+        v = triple(store.plan, k)
+        after = transition(a, b, x, v)
+        store.states.put(k + 1, after)
+        return cost + (form(weight.q, x) + form(weight.r, v)), after
+
+    cost, x = repeat(problem.horizon, stage, 0.0, store.states.row(0, 6))
+    return 0.5 * (cost + form(weight.p, x))
 
 
-@equation
-def form3(m, v):
-    """v'Mv for a 3x3 M."""
-    return (
-        v[0] * (m[0] * v[0] + m[1] * v[1] + m[2] * v[2])
-        + v[1] * (m[3] * v[0] + m[4] * v[1] + m[5] * v[2])
-        + v[2] * (m[6] * v[0] + m[7] * v[1] + m[8] * v[2])
-    )
+@function
+def adjoint(problem: Problem) -> Scalar:
+    """Find the gradient of half the cost, and a bound on its gap to the optimum if all that is held has to be."""
+    store, (a, b), weight, bounds = carve(problem), motion(problem), weights(problem), limits(problem)
+    n, columns, pushes = problem.horizon, transposed(a), transposed(b)
 
+    def stage(back: Index, gap: Scalar, y: Numbers) -> tuple[Scalar, Numbers]:
+        k = n - 1 - back
+        v, x = triple(store.plan, k), store.states.row(k, 6)
+        g = cast(Vector, tuple(sixes.dot(push, y, r) for push, r in zip(pushes, _weighed(weight.r, v), strict=True)))
+        store.gradient.put(k, g)
+        return gap + form(weight.r_inverse, loose(bounds, v, g)), _costate(weight.q, columns, x, y)
 
-@compiled
-def rollout(problem, plan, x):
-    """States under the plan from x[0:6]; half the cost."""
-    n = plan.size // 3
-    total = 0.0
-    for k in range(n):
-        v = triple(plan, k)
-        total += form(problem.q, x, 6 * k) + form3(problem.r, v)
-        transition(problem, x, 6 * k, v, x, 6 * k + 6)
-    return 0.5 * (total + form(problem.p, x, 6 * n))
-
-
-@compiled
-def adjoint(problem, plan, space):
-    """The gradient of half the cost, and a bound on its gap to the optimum if all that is held has to be."""
-    a, b, q, r, x = problem.a, problem.b, problem.q, problem.r, space.states
-    n = plan.size // 3
-    y = space.small
-    for i in range(6):
-        s = 0.0
-        for j in range(6):
-            s += problem.p[6 * i + j] * x[6 * n + j]
-        y[i] = s
-    gap = 0.0
-    for k in range(n - 1, -1, -1):
-        v = triple(plan, k)
-        for i in range(3):
-            s = r[3 * i] * v[0] + r[3 * i + 1] * v[1] + r[3 * i + 2] * v[2]
-            for j in range(6):
-                s += b[3 * j + i] * y[j]
-            space.gradient[3 * k + i] = s
-        g = triple(space.gradient, k)
-        gap += form3(problem.r_inverse, loose(problem, v, g))
-        for i in range(6):
-            s = 0.0
-            for j in range(6):
-                s += q[6 * i + j] * x[6 * k + j] + a[6 * j + i] * y[j]
-            y[6 + i] = s
-        for i in range(6):
-            y[i] = y[6 + i]
+    gap, _ = repeat(n, stage, 0.0, sixes.apply(weight.p, store.states.row(n, 6)))
     return 0.5 * gap
 
 
-@compiled
-def sweep(problem, plan, space, barrier):
-    """One backward Riccati sweep: the Newton step as a policy, step + feedback (x - x of the plan). With a
-    gradient of zeros nothing is held, which gives the policy without limits. Returns the Newton decrement and the number
-    of limits held.
+def _weighed(r: Any, v: Vector) -> Vector:
+    """R v."""
+    return (r[0] * v[0], r[1] * v[1], r[2] * v[2]) if is_diagonal(r) else (dot(r[0], v), dot(r[1], v), dot(r[2], v))
+
+
+def _costate(q: Any, columns: Rows, x: Numbers, y: Numbers) -> Numbers:
+    """Q x + A'y, summed up together."""
+
+    def component(i: int) -> Scalar:
+        total = 0.0
+        for j in range(6):
+            term = columns[i][j] * y[j]
+            if not is_diagonal(q) or i == j:
+                term = entry(q, i, j) * x[j] + term
+            total = total + term
+        return total
+
+    return tuple(component(i) for i in range(6))
+
+
+class Value(NamedTuple):
+    """Half the best cost from a state on: x'curvature x / 2 + slope'x + constant, and what is known of the moves so far:
+    the Newton decrement and the number of limits held."""
+
+    curvature: Rows
+    slope: Numbers
+    decrement: Scalar
+    holding: Scalar
+
+
+@function
+def sweep(problem: Problem, barrier: Scalar) -> tuple[Scalar, Scalar]:
+    """Find the Newton step by one backward Riccati sweep, as a policy: step + feedback (x - x of the plan). What presses
+    against a limit is held; with a gradient of zeros nothing is, which gives the policy without limits. Gives the Newton
+    decrement and the number of limits held.
 
     A barrier above zero asks for the step of the interior-point method instead: nothing is held, and the limits repel.
     """
-    a, b, q, r, value, small = problem.a, problem.b, problem.q, problem.r, space.value, space.small
-    n = plan.size // 3
-    va, vb, qux = 0, 36, 54
-    decrement, holding = 0.0, 0
-    for i in range(36):
-        value[i] = problem.p[i]
-    for i in range(36, 42):
-        value[i] = 0.0
-    for k in range(n - 1, -1, -1):
-        for i in range(6):
-            w0, w1, w2, w3, w4, w5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            y0, y1, y2 = 0.0, 0.0, 0.0
-            for j in range(6):
-                s = value[6 * i + j]
-                w0 += s * a[6 * j]
-                w1 += s * a[6 * j + 1]
-                w2 += s * a[6 * j + 2]
-                w3 += s * a[6 * j + 3]
-                w4 += s * a[6 * j + 4]
-                w5 += s * a[6 * j + 5]
-                y0 += s * b[3 * j]
-                y1 += s * b[3 * j + 1]
-                y2 += s * b[3 * j + 2]
-            small[va + 6 * i], small[va + 6 * i + 1], small[va + 6 * i + 2] = w0, w1, w2
-            small[va + 6 * i + 3], small[va + 6 * i + 4], small[va + 6 * i + 5] = w3, w4, w5
-            small[vb + 3 * i], small[vb + 3 * i + 1], small[vb + 3 * i + 2] = y0, y1, y2
-        m0, m1, m2, m3, m4, m5 = r[0], r[1], r[2], r[4], r[5], r[8]
-        g0, g1, g2 = 0.0, 0.0, 0.0
-        for j in range(6):
-            b0, b1, b2 = b[3 * j], b[3 * j + 1], b[3 * j + 2]
-            y0, y1, y2 = small[vb + 3 * j], small[vb + 3 * j + 1], small[vb + 3 * j + 2]
-            m0 += b0 * y0
-            m1 += b0 * y1
-            m2 += b0 * y2
-            m3 += b1 * y1
-            m4 += b1 * y2
-            m5 += b2 * y2
-            s = value[36 + j]
-            g0 += b0 * s
-            g1 += b1 * s
-            g2 += b2 * s
-        m = (m0, m1, m2, m3, m4, m5)
-        for i in range(3):
-            w0, w1, w2, w3, w4, w5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            for j in range(6):
-                s = b[3 * j + i]
-                w0 += s * small[va + 6 * j]
-                w1 += s * small[va + 6 * j + 1]
-                w2 += s * small[va + 6 * j + 2]
-                w3 += s * small[va + 6 * j + 3]
-                w4 += s * small[va + 6 * j + 4]
-                w5 += s * small[va + 6 * j + 5]
-            small[qux + 6 * i], small[qux + 6 * i + 1], small[qux + 6 * i + 2] = w0, w1, w2
-            small[qux + 6 * i + 3], small[qux + 6 * i + 4], small[qux + 6 * i + 5] = w3, w4, w5
-        v, g = triple(plan, k), triple(space.gradient, k)
-        g0, g1, g2 = g0 + g[0], g1 + g[1], g2 + g[2]
-        space.stiffness[k] = m0 + m3 + m5
-        if barrier > 0.0:
-            m, push = repelled(problem, v, triple(space.multipliers, k), barrier, m)
-            g0, g1, g2 = g0 + push[0], g1 + push[1], g2 + push[2]
-            w = inverse3(m)
-        elif problem.ball:
-            normal, multiplier = pressure(problem, v, g)
-            if multiplier > 0.0:
-                holding += 1
-                w = plane_inverse(m, normal, multiplier)
-            else:
-                w = inverse3(m)
-        else:
-            fixed = held(problem, v, g)
-            holding += fixed[0] + fixed[1] + fixed[2]
-            w = box_inverse(m, fixed)
-        e0 = -(w[0] * g0 + w[1] * g1 + w[2] * g2)
-        e1 = -(w[1] * g0 + w[3] * g1 + w[4] * g2)
-        e2 = -(w[2] * g0 + w[4] * g1 + w[5] * g2)
-        decrement -= e0 * g0 + e1 * g1 + e2 * g2
-        put(space.step, k, (e0, e1, e2))
-        o = 18 * k
-        feedback = space.feedback
-        for j in range(6):
-            s0, s1, s2 = small[qux + j], small[qux + 6 + j], small[qux + 12 + j]
-            feedback[o + j] = -(w[0] * s0 + w[1] * s1 + w[2] * s2)
-            feedback[o + 6 + j] = -(w[1] * s0 + w[3] * s1 + w[4] * s2)
-            feedback[o + 12 + j] = -(w[2] * s0 + w[4] * s1 + w[5] * s2)
-        if k > 0:
-            for i in range(6):
-                s0, s1, s2 = small[qux + i], small[qux + 6 + i], small[qux + 12 + i]
-                t = s0 * e0 + s1 * e1 + s2 * e2
-                for j in range(6):
-                    t += a[6 * j + i] * value[36 + j]
-                small[72 + i] = t
-                w0 = q[6 * i] + s0 * feedback[o] + s1 * feedback[o + 6] + s2 * feedback[o + 12]
-                w1 = q[6 * i + 1] + s0 * feedback[o + 1] + s1 * feedback[o + 7] + s2 * feedback[o + 13]
-                w2 = q[6 * i + 2] + s0 * feedback[o + 2] + s1 * feedback[o + 8] + s2 * feedback[o + 14]
-                w3 = q[6 * i + 3] + s0 * feedback[o + 3] + s1 * feedback[o + 9] + s2 * feedback[o + 15]
-                w4 = q[6 * i + 4] + s0 * feedback[o + 4] + s1 * feedback[o + 10] + s2 * feedback[o + 16]
-                w5 = q[6 * i + 5] + s0 * feedback[o + 5] + s1 * feedback[o + 11] + s2 * feedback[o + 17]
-                for j in range(6):
-                    s = a[6 * j + i]
-                    w0 += s * small[va + 6 * j]
-                    w1 += s * small[va + 6 * j + 1]
-                    w2 += s * small[va + 6 * j + 2]
-                    w3 += s * small[va + 6 * j + 3]
-                    w4 += s * small[va + 6 * j + 4]
-                    w5 += s * small[va + 6 * j + 5]
-                value[6 * i], value[6 * i + 1], value[6 * i + 2] = w0, w1, w2
-                value[6 * i + 3], value[6 * i + 4], value[6 * i + 5] = w3, w4, w5
-            for i in range(6):
-                value[36 + i] = small[72 + i]
-                for j in range(i):
-                    # Kept symmetric against rounding, which long horizons would amplify.
-                    s = 0.5 * (value[6 * i + j] + value[6 * j + i])
-                    value[6 * i + j], value[6 * j + i] = s, s
-    return decrement, holding
+    store, (a, b), weight, bounds = carve(problem), motion(problem), weights(problem), limits(problem)
+    n, columns, pushes = problem.horizon, transposed(a), transposed(b)
+    holds = less_equal(barrier, 0.0)
+
+    def stage(back: Index, value: Value) -> tuple[Value]:
+        k = n - 1 - back
+        # Columns of P A, P B and B'P A.
+        onward = transposed(sixes.product(value.curvature, a))
+        pushed = transposed(sixes.product(value.curvature, b))
+        cross = transposed(tuple(sixes.apply(onward, push) for push in pushes))
+        m = _curvature(weight.r, pushes, pushed)
+        store.stiffness[k] = m[0] + m[3] + m[5]
+        v, pull = triple(store.plan, k), triple(store.gradient, k)
+        g = add(cast(Vector, sixes.apply(pushes, value.slope)), pull)
+
+        def repel(m: Symmetric, g: Vector) -> tuple[Symmetric, Vector]:
+            curved, push = repelled(bounds, v, triple(store.multipliers, k), barrier, m)
+            return curved, add(g, push)
+
+        m, g = unless(holds, repel, m, g)
+        w, holding = _held_inverse(bounds, v, pull, m, holds)
+        step = _minus(w, g)
+        gains = tuple(_minus(w, cast(Vector, column)) for column in cross)
+        store.step.put(k, step)
+        store.feedback.put(k, [x for row in transposed(gains) for x in row])
+        curvature = tuple(
+            tuple(sixes.dot(columns[i], onward[j], sixes.dot(cross[i], gains[j], entry(weight.q, i, j))) for j in range(6))
+            for i in range(6)
+        )
+        slope = tuple(sixes.dot(columns[i], value.slope, dot(cast(Vector, cross[i]), step)) for i in range(6))
+        return (Value(_symmetric(curvature), slope, value.decrement - dot(step, g), value.holding + holding),)
+
+    (value,) = repeat(n, stage, Value(weight.p, REST, 0.0, 0.0))
+    return value.decrement, value.holding
 
 
-@compiled
-def unroll(plan, problem, space):
+def _held_inverse(bounds: Limits, v: Vector, g: Vector, m: Symmetric, holds: Truth) -> tuple[Symmetric, Scalar]:
+    """The inverse of m on what no limit holds, and the number of limits that hold."""
+    if bounds.ball:
+        normal, multiplier = pressure(bounds, v, g)
+        pressed = both(holds, less(0.0, multiplier))
+        pairs = zip(plane_inverse(m, normal, multiplier), inverse(m), strict=True)
+        return cast(Symmetric, tuple(where(pressed, x, y) for x, y in pairs)), where(pressed, 1.0, 0.0)
+    x, y, z = held(bounds, v, g)
+    fixed = (both(holds, x), both(holds, y), both(holds, z))
+    count = [where(axis, 1.0, 0.0) for axis in fixed]
+    return box_inverse(m, fixed), count[0] + count[1] + count[2]
+
+
+def _curvature(r: Any, pushes: Rows, pushed: Rows) -> Symmetric:
+    """R + B'P B."""
+
+    def at(i: int, j: int) -> Scalar:
+        return sixes.dot(pushes[i], pushed[j], entry(r, i, j))
+
+    return (at(0, 0), at(0, 1), at(0, 2), at(1, 1), at(1, 2), at(2, 2))
+
+
+def _minus(w: Symmetric, x: Vector) -> Vector:
+    """-w x."""
+    return (
+        -(w[0] * x[0] + w[1] * x[1] + w[2] * x[2]),
+        -(w[1] * x[0] + w[3] * x[1] + w[4] * x[2]),
+        -(w[2] * x[0] + w[4] * x[1] + w[5] * x[2]),
+    )
+
+
+def _symmetric(m: Rows) -> Rows:
+    """Kept symmetric against rounding, which long horizons would amplify."""
+
+    def at(i: int, j: int) -> Scalar:
+        return m[i][i] if i == j else 0.5 * (m[max(i, j)][min(i, j)] + m[min(i, j)][max(i, j)])
+
+    return tuple(tuple(at(i, j) for j in range(6)) for i in range(6))
+
+
+def policy(store: Store, k: Index, x: Numbers, start: Vector) -> Vector:
+    """start + feedback x."""
+
+    def component(i: int) -> Scalar:
+        return sixes.dot(store.feedback.row(3 * k + i, 6), x, start[i])
+
+    return (component(0), component(1), component(2))
+
+
+@function
+def unroll(problem: Problem) -> None:
     """Turn the policy into a direction: step becomes the Newton step without limits."""
-    bend, feedback = space.bend, space.feedback
-    for i in range(6):
-        bend[i] = 0.0
-    for k in range(plan.size // 3):
-        d0, d1, d2 = triple(space.step, k)
-        o = 18 * k
-        for j in range(6):
-            s = bend[6 * k + j]
-            d0 += feedback[o + j] * s
-            d1 += feedback[o + 6 + j] * s
-            d2 += feedback[o + 12 + j] * s
-        put(space.step, k, (d0, d1, d2))
-        transition(problem, bend, 6 * k, (d0, d1, d2), bend, 6 * k + 6)
+    store, (a, b) = carve(problem), motion(problem)
+
+    def stage(k: Index, x: Numbers) -> tuple[Numbers]:
+        d = policy(store, k, x, triple(store.step, k))
+        store.step.put(k, d)
+        return (transition(a, b, x, d),)
+
+    repeat(problem.horizon, stage, REST)
+
+
+class Trial(NamedTuple):
+    """A trial plan: whether a limit cut anything, and half the cost towards it, which changes by slope + curvature / 2,
+    free of the cancellation that a difference of two costs suffers."""
+
+    cut: Truth
+    slope: Scalar
+    change: Scalar
+
+
+def fly(problem: Problem, move: Callable[[Index, Numbers, Vector], Vector], start: Numbers) -> Trial:
+    """Fly moves through the limits: the trial plan, and the change of the states from `start` on. move(k, x, v): where
+    the k-th move, v in the plan, would go for a change x of the state before it."""
+    store, (a, b), weight, bounds = carve(problem), motion(problem), weights(problem), limits(problem)
+
+    def stage(k: Index, trial: Trial, x: Numbers) -> tuple[Trial, Numbers]:
+        v = triple(store.plan, k)
+        w, outside = project(bounds, move(k, x, v))
+        d = subtract(w, v)
+        after = transition(a, b, x, d)
+        store.trial.put(k, w)
+        store.bend.put(k, after)
+        slope = trial.slope + dot(triple(store.gradient, k), d)
+        curvature = trial.change + (form(weight.r, d) + form(weight.q, x))
+        return Trial(either(trial.cut, outside), slope, curvature), after
+
+    (cut, slope, curvature), x = repeat(problem.horizon, stage, Trial(False, 0.0, 0.0), start)
+    return Trial(cut, slope, slope + 0.5 * (curvature + form(weight.p, x)))
+
+
+@function
+def follow(problem: Problem, start: Numbers) -> Trial:
+    """Fly the policy of a sweep through the limits."""
+    store = carve(problem)
+    return fly(problem, lambda k, x, v: policy(store, k, x, add(v, triple(store.step, k))), start)
+
+
+@function
+def take_over(problem: Problem) -> None:
+    """Take the trial plan over."""
+    store = carve(problem)
+
+    def stage(k: Index) -> None:
+        store.plan.put(k, triple(store.trial, k))
+        store.states.put(k + 1, sixes.plus(store.states.row(k + 1, 6), store.bend.row(k, 6)))
+
+    repeat(problem.horizon, stage)

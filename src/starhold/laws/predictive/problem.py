@@ -1,231 +1,144 @@
-# pyright: basic
-# Basic, not strict: every function is compiled, and Numba's own types are not visible to a type checker.
-"""The quadratic program of predictive control: the motion linearised and sampled, its cost, and its limits.
+"""The quadratic program of predictive control, and where its numbers lie.
 
     minimise   sum over k < N of x_k'Q x_k + v_k'R v_k,  plus x_N'P x_N,   x_{k+1} = A x_k + B v_k,
     subject to |v_k - centre| <= bound, on each axis (box) or in norm (ball).
 
-Matrices are flat arrays, row after row: with fixed offsets the compiler unrolls the loops.
+All numbers of a program lie in one buffer, from which `carve` makes the named parts: one buffer, not twenty, is what a
+trajectory carries and what the passes over the horizon hand to each other.
 """
 
 from __future__ import annotations
 
-import math
+from itertools import accumulate
 from typing import Any, NamedTuple
 
-import numba
-import numpy as np
+from starhold.algebra.scalar import Scalar
+from starhold.algebra.structured import Buffer, Index
+from starhold.algebra.vector import Vector
+from starhold.laws.predictive.limits import Limits, make_limits
+from starhold.laws.predictive.sixes import Rows, Weight, matrix, triple
 
-from starhold.algebra.scalar import equation
-from starhold.algebra.vector import apply, cross, scale, subtract
-from starhold.models.craft import whole
-
-# Not inlined, said outright: what an equation calls inherits its options, and inlining all this at each of five levels
-# would multiply the time a kernel takes to compile.
-compiled = numba.njit(error_model="numpy", forceinline=False)
-
-TERMS = 30
-"""Most terms of the Taylor series; fewer once they no longer count."""
-
-
-class Space(NamedTuple):
-    """Work arrays of a horizon of N: all that a solution needs, so that a call allocates nothing."""
-
-    states: Any
-    bend: Any
-    gradient: Any
-    trial: Any
-    step: Any
-    feedback: Any
-    stiffness: Any
-    multipliers: Any
-    spare: Any
-    value: Any
-    small: Any
+COUNTERS = 5
+"""How many counters there are."""
 
 
 class Problem(NamedTuple):
-    """A (36), B (18), Q (36), R (9), R^-1 (9), P (36), the limit's centre, its size (inf: none), and ball or box."""
+    """A program of `horizon` moves: its numbers, limits in norm (ball) or on each axis, and Q and R full (dense) or
+    diagonal."""
 
-    a: Any
-    b: Any
-    q: Any
-    r: Any
-    r_inverse: Any
-    p: Any
-    centre: Any
-    bound: Any
-    ball: Any
+    numbers: Buffer
+    horizon: Index
+    ball: bool
+    dense: bool = False
 
 
 class Store(NamedTuple):
-    """All numbers of a program: A (36) and B (18), the weights Q (36), R (9), R^-1 (9) and P (36), the feedback (18) for
-    the move that a shifted plan lacks, and the work arrays."""
+    """The parts of a program's numbers. Counters, weights, tail, plan and states are kept from call to call; the rest is
+    written before it is read. Matrices lie row after row, of a diagonal Q or R the diagonal alone."""
 
-    a: Any
-    b: Any
-    q: Any
-    r: Any
-    r_inverse: Any
-    p: Any
+    counters: Any
+    """Numbers of the law's own; they come first."""
+    weights: Any
+    """Q, R, R^-1, P (36)."""
     tail: Any
-    space: Space
+    """The feedback (18) for the move that a shifted plan lacks."""
+    motion: Any
+    """A (36), B (18)."""
+    limits: Any
+    """The centre (3) and the bound."""
+    mean: Any
+    """A matrix (36), column after column, of the sampling of the motion."""
+    term: Any
+    """Another."""
+    plan: Any
+    """The moves (3 each)."""
+    states: Any
+    """The states (6 each) under the plan, from the first to the one after the last move."""
+    gradient: Any
+    """Of half the cost (3 each)."""
+    step: Any
+    """A step of each move (3 each), to which the feedback adds."""
+    feedback: Any
+    """What a move answers to a change of the state before it (18 each)."""
+    stiffness: Any
+    """The trace of each move's curvature."""
+    trial: Any
+    """A plan on trial (3 each)."""
+    bend: Any
+    """The change that the trial plan makes to the state after each move (6 each)."""
+    multipliers: Any
+    """Of the limits, in the interior-point method (3 each)."""
+    spare: Any
+    """A plan put aside (3 each)."""
 
 
-FIXED = 312
-PER_MOVE = 46
-"""A store has FIXED + 12 numbers, and PER_MOVE for each move; the 12 are the state's at the end of the horizon."""
-
-
-@equation
-def carve(numbers: Any, horizon: int) -> Store:
-    """The store that lives in the flat array of `make_store`: views, nothing is copied.
-
-    One array rather than twenty travels with a trajectory; that halves the time a kernel takes to compile.
-    """
-    n = horizon
-    per = numbers[FIXED:]
-    space = Space(
-        per[: 6 * n + 6],
-        per[6 * n + 6 : 12 * n + 12],
-        per[12 * n + 12 : 15 * n + 12],
-        per[15 * n + 12 : 18 * n + 12],
-        per[18 * n + 12 : 21 * n + 12],
-        per[21 * n + 12 : 39 * n + 12],
-        per[39 * n + 12 : 40 * n + 12],
-        per[40 * n + 12 : 43 * n + 12],
-        per[43 * n + 12 : 46 * n + 12],
-        numbers[162:204],
-        numbers[204:312],
-    )
+def _sizes(n: Index, *, dense: bool) -> Store:
+    q, r = (36, 9) if dense else (6, 3)
     return Store(
-        numbers[0:36],
-        numbers[36:54],
-        numbers[54:90],
-        numbers[90:99],
-        numbers[99:108],
-        numbers[108:144],
-        numbers[144:162],
-        space,
+        counters=COUNTERS,
+        weights=q + r + r + 36,
+        tail=18,
+        motion=54,
+        limits=4,
+        mean=36,
+        term=36,
+        plan=3 * n,
+        states=6 * n + 6,
+        gradient=3 * n,
+        step=3 * n,
+        feedback=18 * n,
+        stiffness=n,
+        trial=3 * n,
+        bend=6 * n,
+        multipliers=3 * n,
+        spare=3 * n,
     )
 
 
-@equation
-def make_store(horizon: int) -> Any:
-    """The numbers of a store for that many moves, all zero."""
-    return np.zeros(FIXED + 12 + PER_MOVE * horizon)
+def carve(problem: Problem) -> Store:
+    """The parts of a program's numbers: nothing is copied."""
+    sizes = _sizes(problem.horizon, dense=problem.dense)
+    starts = accumulate(sizes, initial=0)
+    return Store(*(problem.numbers.part(start, size) for start, size in zip(starts, sizes, strict=False)))
 
 
-@compiled
-def linearise(seen: Any, craft: Any, a: Any, b: Any) -> None:
-    """Fill a (36) and b (18) with A_c and B_c of x' = A_c x + B_c u for x = (q; w), small about the motion seen.
-
-    A_c = [[-[w]x, E/2], [J^-1 G, J^-1 ([Jw]x - [w]x J)]], B_c = [0; J^-1], G = 6 (mu/R^5) ([R]x J - [JR]x) [R]x with
-    R from the centre of attraction in body axes; G = 0 where there is none (R = 0).
-    """
-    w, position = seen.rate, seen.position
-    momentum, pull = apply(craft.inertia, w), apply(whole(craft), position)
-    square = position[0] * position[0] + position[1] * position[1] + position[2] * position[2]
-    strength = 0.0
-    if square > 0.0:
-        strength = 6.0 * craft.gravity / (square * square * math.sqrt(square))
-    for j in range(3):
-        e = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
-        turning = cross(e, w)
-        lever = cross(position, e)
-        tilt = subtract(cross(position, apply(whole(craft), lever)), cross(pull, lever))
-        stiffness = scale(strength, apply(craft.inverse_inertia, tilt))
-        swung = subtract(cross(momentum, e), cross(w, apply(craft.inertia, e)))
-        damping = apply(craft.inverse_inertia, swung)
-        inverse = apply(craft.inverse_inertia, e)
-        for i in range(3):
-            a[6 * i + j] = turning[i]
-            a[6 * i + 3 + j] = 0.5 * e[i]
-            a[18 + 6 * i + j] = stiffness[i]
-            a[21 + 6 * i + j] = damping[i]
-            b[3 * i + j] = 0.0
-            b[9 + 3 * i + j] = inverse[i]
+def size(horizon: int, *, dense: bool = False) -> int:
+    """How many numbers a program of that many moves has."""
+    *_, end = accumulate(_sizes(horizon, dense=dense))
+    return end
 
 
-@compiled
-def hold(a: Any, b: Any, period: float, work: Any) -> None:
-    """Exact sampling with a held input, in place: a = exp(A_c h), b = (integral of exp(A_c s) over 0..h) B_c.
+class Weights(NamedTuple):
+    """Q and R, full or as their diagonals, the inverse of R, and P."""
 
-    Both come from S = sum of (A_c h)^k / (k + 1)!, which loses no digits where A_c is singular. work holds 108 numbers.
-    """
-    # Time counted in periods: then all entries of A_c and S are of comparable size.
-    for i in range(3):
-        for j in range(3):
-            a[6 * i + j] *= period
-            a[18 + 6 * i + j] *= period * period
-            a[21 + 6 * i + j] *= period
-            b[3 * i + j] *= period
-            b[9 + 3 * i + j] *= period * period
-    size = 0.0
-    for i in range(6):
-        row = 0.0
-        for j in range(6):
-            row += abs(a[6 * i + j])
-        size = max(size, row)
-    doublings = 0
-    while size > 1.0 and doublings < 60:
-        size *= 0.5
-        doublings += 1
-    shrink = 0.5**doublings
-    s, t, y = 0, 36, 72
-    for i in range(36):
-        a[i] *= shrink
-        work[s + i] = 1.0 if i % 7 == 0 else 0.0
-        work[t + i] = work[s + i]
-    for k in range(1, TERMS):
-        multiply6(a, 0, work, t, work, y)
-        peak = 0.0
-        for i in range(36):
-            term = work[y + i] / (k + 1.0)
-            work[t + i] = term
-            work[s + i] += term
-            peak = max(peak, abs(term))
-        if peak < 1e-21:
-            break
-    for _ in range(doublings):
-        # S over twice the time is (S + exp(A) S) / 2 when each is divided by its own time.
-        multiply6(a, 0, work, s, work, t)
-        multiply6(work, t, work, s, work, y)
-        for i in range(36):
-            work[s + i] += 0.5 * work[y + i]
-            a[i] *= 2.0
-    multiply6(a, 0, work, s, work, t)
-    for i in range(6):
-        x0, x1, x2 = 0.0, 0.0, 0.0
-        for j in range(6):
-            c = work[s + 6 * i + j]
-            x0 += c * b[3 * j]
-            x1 += c * b[3 * j + 1]
-            x2 += c * b[3 * j + 2]
-        work[y + 3 * i], work[y + 3 * i + 1], work[y + 3 * i + 2] = x0, x1, x2
-    for i in range(36):
-        a[i] = work[t + i] + (1.0 if i % 7 == 0 else 0.0)
-    per = 1.0 / period
-    for i in range(3):
-        for j in range(3):
-            a[6 * i + 3 + j] *= period
-            a[18 + 6 * i + j] *= per
-            b[3 * i + j] = work[y + 3 * i + j]
-            b[9 + 3 * i + j] = work[y + 9 + 3 * i + j] * per
+    q: Weight
+    r: Weight
+    r_inverse: Weight
+    p: Rows
 
 
-@equation
-def multiply6(a, p, b, q, c, o):
-    """c[o:] = a[p:] b[q:] for 6x6 matrices; c must lie apart."""
-    for i in range(6):
-        w0, w1, w2, w3, w4, w5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for j in range(6):
-            s = a[p + 6 * i + j]
-            w0 += s * b[q + 6 * j]
-            w1 += s * b[q + 6 * j + 1]
-            w2 += s * b[q + 6 * j + 2]
-            w3 += s * b[q + 6 * j + 3]
-            w4 += s * b[q + 6 * j + 4]
-            w5 += s * b[q + 6 * j + 5]
-        c[o + 6 * i], c[o + 6 * i + 1], c[o + 6 * i + 2] = w0, w1, w2
-        c[o + 6 * i + 3], c[o + 6 * i + 4], c[o + 6 * i + 5] = w3, w4, w5
+def weights(problem: Problem) -> Weights:
+    """The weights of the cost."""
+    numbers = carve(problem).weights
+    q, r = (36, 9) if problem.dense else (6, 3)
+    parts = [numbers.part(start, length) for start, length in ((0, q), (q, r), (q + r, r), (q + r + r, 36))]
+    if problem.dense:
+        return Weights(matrix(parts[0], 6), matrix(parts[1], 3), matrix(parts[2], 3), matrix(parts[3], 6))
+    return Weights(parts[0].row(0, 6), parts[1].row(0, 3), parts[2].row(0, 3), matrix(parts[3], 6))
+
+
+def motion(problem: Problem) -> tuple[Rows, Rows]:
+    """A (6, 6) and B (6, 3)."""
+    numbers = carve(problem).motion
+    return matrix(numbers.part(0, 36), 6), matrix(numbers.part(36, 18), 3)
+
+
+def limits(problem: Problem) -> Limits:
+    """The limits of every move."""
+    numbers = carve(problem).limits
+    return make_limits(triple(numbers, 0), numbers[3], ball=problem.ball)
+
+
+def put_limits(problem: Problem, centre: Vector, bound: Scalar) -> None:
+    """Set the limits: their centre and their bound (inf: none)."""
+    carve(problem).limits.put(0, (*centre, bound))

@@ -1,6 +1,4 @@
-# pyright: basic
-# Basic, not strict: every function is compiled, and Numba's own types are not visible to a type checker.
-"""Quadratic programs of predictive control, solved inside a compiled kernel: no allocation, no Python, no library.
+"""Quadratic programs of predictive control, solved by equations: no allocation, no library, and a bound on the work.
 
 The method is a projected Newton method of two metrics (Bertsekas 1982, "Projected Newton methods for optimization
 problems with simple constraints"). What presses against a limit is held there, for a ball with the curvature of the
@@ -14,297 +12,226 @@ bounds the gap of half the cost by g'R^-1 g / 2, g being the gradient that is no
 
 from __future__ import annotations
 
-import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
-
-from starhold.laws.predictive.horizon import adjoint, form, form3, rollout, sweep, transition, unroll
-from starhold.laws.predictive.limits import project, put, slack, triple
-from starhold.laws.predictive.problem import Problem, carve, compiled, make_store
+from starhold.algebra.scalar import Scalar, Truth, both, divide, either, is_finite, less, less_equal, opposite, where
+from starhold.algebra.structured import Index, function, repeat, unless, until, when
+from starhold.algebra.vector import ZERO, Vector, add, scale
+from starhold.algebra.words import number_of
+from starhold.laws.predictive import sixes
+from starhold.laws.predictive.horizon import REST, adjoint, fly, follow, rollout, sweep, take_over, unroll
+from starhold.laws.predictive.interior import interior
+from starhold.laws.predictive.limits import project
+from starhold.laws.predictive.problem import Problem, carve, limits
+from starhold.laws.predictive.sixes import triple
 
 TOLERANCE = 1e-16
 """Relative gap of the objective at which a solution is accepted."""
+STALLED = 1e-12
+"""Relative decrement below which a plan that cannot be improved counts as solved."""
+ENOUGH = 0.25
+"""Share of the Newton decrement that the flown step must bring to be taken without a search."""
 SUFFICIENT = 1e-4
 """Share of the decrease promised by the slope that a step must bring."""
-HALVINGS = 8
+HALVINGS, MOST_HALVINGS = 8, 60
+"""Lengths tried along the Newton step, and along the gradient."""
 PATIENCE = 12
 """Sweeps without a solution after which the interior-point method takes over."""
-INTERIOR_SWEEPS = 30
 
 
-@compiled
-def follow(problem, plan, space):
-    """Fly the policy of a sweep through the limits from space.bend[0:6]: the trial plan, and its change of the states.
-    Says whether a limit cut anything."""
-    cut = False
-    bend, feedback = space.bend, space.feedback
-    for k in range(plan.size // 3):
-        v = triple(plan, k)
-        w0, w1, w2 = v[0] + space.step[3 * k], v[1] + space.step[3 * k + 1], v[2] + space.step[3 * k + 2]
-        o = 18 * k
-        for j in range(6):
-            s = bend[6 * k + j]
-            w0 += feedback[o + j] * s
-            w1 += feedback[o + 6 + j] * s
-            w2 += feedback[o + 12 + j] * s
-        w, outside = project((w0, w1, w2), problem)
-        cut = cut or outside
-        put(space.trial, k, w)
-        transition(problem, bend, 6 * k, (w[0] - v[0], w[1] - v[1], w[2] - v[2]), bend, 6 * k + 6)
-    return cut
+class Solved(NamedTuple):
+    """The number of Riccati sweeps, whether the optimum was reached, and whether limits shape it."""
+
+    sweeps: Scalar
+    solved: Truth
+    shaped: Truth
 
 
-@compiled
-def along(problem, plan, space, length):
-    """The trial plan at that length of the step, brought within the limits, and its change of the states."""
-    for k in range(plan.size // 3):
-        v, d = triple(plan, k), triple(space.step, k)
-        w, _ = project((v[0] + length * d[0], v[1] + length * d[1], v[2] + length * d[2]), problem)
-        put(space.trial, k, w)
-        transition(problem, space.bend, 6 * k, (w[0] - v[0], w[1] - v[1], w[2] - v[2]), space.bend, 6 * k + 6)
+class Progress(NamedTuple):
+    """Half the cost of the plan, the sweeps so far, whether the interior-point method has been used, whether the run is
+    over, and what `Solved` says then."""
+
+    half: Scalar
+    sweeps: Scalar
+    rescued: Truth
+    over: Truth
+    solved: Truth
+    shaped: Truth
 
 
-@compiled
-def change(problem, plan, space):
-    """Slope and curvature of half the cost towards the trial plan: it changes by slope + curvature / 2, free of the
-    cancellation that a difference of two costs suffers."""
-    slope, curvature = 0.0, 0.0
-    n = plan.size // 3
-    for k in range(n):
-        v, w, g = triple(plan, k), triple(space.trial, k), triple(space.gradient, k)
-        d = (w[0] - v[0], w[1] - v[1], w[2] - v[2])
-        slope += g[0] * d[0] + g[1] * d[1] + g[2] * d[2]
-        curvature += form3(problem.r, d) + form(problem.q, space.bend, 6 * k)
-    return slope, curvature + form(problem.p, space.bend, 6 * n)
+class Attempt(NamedTuple):
+    """What a Newton step gave, and whether the interior-point method is asked for."""
+
+    progress: Progress
+    rescue: Truth
 
 
-@compiled
-def shorten(problem, plan, space, halvings):
-    """Armijo's search along the projection arc of `space.step`, the step halved until the cost falls enough. Returns the
-    change of half the cost, zero where it never did."""
-    length = 1.0
-    for _ in range(halvings):
-        along(problem, plan, space, length)
-        slope, curvature = change(problem, plan, space)
-        if slope < 0.0 and slope + 0.5 * curvature <= SUFFICIENT * slope:
-            return slope + 0.5 * curvature
-        length *= 0.5
-    return 0.0
+def improve(problem: Problem, budget: Index, warm: Truth) -> Solved:
+    """Solve the program from the first of its states, starting with its plan if warm; the plan is overwritten. At most
+    `budget` sweeps are made; the plan respects the limits in any case."""
+
+    def fly_freely(_sweeps: Scalar, _cut: Truth) -> tuple[Scalar, Truth]:
+        return 1.0, _fly_freely(problem)
+
+    def descend(start: Solved) -> tuple[Solved]:
+        return (_descend(problem, budget, start.sweeps),)
+
+    sweeps, cut = unless(warm, fly_freely, 0.0, True)
+    (end,) = when(cut, descend, Solved(sweeps, True, False))
+    return end
 
 
-@compiled
-def search(problem, plan, space, decrement):
-    """A trial plan along the Newton step that brings the cost down; returns the change of half the cost, zero where
-    none was found."""
-    slope, curvature = change(problem, plan, space)
-    if slope + 0.5 * curvature <= -0.25 * decrement:
-        return slope + 0.5 * curvature
-    unroll(plan, problem, space)
-    return shorten(problem, plan, space, HALVINGS)
+def _fly_freely(problem: Problem) -> Truth:
+    """Fly the policy without limits through them: the optimum if nothing is cut, which it says, else a good start."""
+    store = carve(problem)
+
+    def clear(k: Index) -> None:
+        store.plan.put(k, ZERO)
+        store.gradient.put(k, ZERO)
+
+    repeat(problem.horizon, clear)
+    sweep(problem, 0.0)
+    trial = follow(problem, store.states.row(0, 6))
+
+    def keep(k: Index) -> None:
+        store.plan.put(k, triple(store.trial, k))
+
+    repeat(problem.horizon, keep)
+    return trial.cut
 
 
-@compiled
-def descend(problem, plan, space):
+def _descend(problem: Problem, budget: Index, sweeps: Scalar) -> Solved:
+    """Improve the plan until it is the optimum or the sweeps are used up."""
+
+    def over(now: Progress) -> Truth:
+        return now.over
+
+    def turn(now: Progress) -> tuple[Progress]:
+        return (_turn(problem, budget, now),)
+
+    begun = Progress(rollout(problem), sweeps, False, False, False, True)
+    # Each turn but the last makes a sweep.
+    (end,) = until(over, turn, begun, at_most=budget + 1)
+    # A plan that is not finite must not start the next one.
+    return Solved(end.sweeps, end.solved, both(end.shaped, is_finite(end.half)))
+
+
+def _turn(problem: Problem, budget: Index, now: Progress) -> Progress:
+    """One turn: ends the run or improves the plan."""
+    optimal = less_equal(adjoint(problem), TOLERANCE * now.half)
+    used_up = less_equal(number_of(budget), now.sweeps)
+
+    def better(_ended: Progress) -> tuple[Progress]:
+        return (_better(problem, budget, now),)
+
+    (then,) = unless(either(optimal, used_up), better, now._replace(over=True, solved=optimal))
+    return then
+
+
+def _better(problem: Problem, budget: Index, now: Progress) -> Progress:
+    """A Newton step, or the interior-point method where that does not serve."""
+
+    def newton(_tried: Attempt) -> tuple[Attempt]:
+        return (_newton(problem, budget, now),)
+
+    def rescue(before: Progress) -> tuple[Progress]:
+        sweeps, half = interior(problem, before.half, number_of(budget) - before.sweeps)
+        return (before._replace(half=half, sweeps=before.sweeps + sweeps, rescued=True),)
+
+    slow = both(less_equal(PATIENCE, now.sweeps), opposite(now.rescued))
+    (tried,) = unless(slow, newton, Attempt(now, slow))
+    (then,) = when(tried.rescue, rescue, tried.progress)
+    return then
+
+
+def _newton(problem: Problem, budget: Index, now: Progress) -> Attempt:
+    """The projected Newton step, a search along it, or a gradient step, whichever first brings the cost down."""
+
+    def search(_change: Scalar) -> tuple[Scalar]:
+        return (_search(problem),)
+
+    def gradient_step(_change: Scalar) -> tuple[Scalar]:
+        return (_gradient_step(problem),)
+
+    decrement, holding = sweep(problem, 0.0)
+    sweeps = now.sweeps + 1.0
+    trial = follow(problem, REST)
+    none_held = less_equal(holding, 0.0)
+    # Flown as it is, the step gives the exact optimum of what is not held; on a ball only where nothing is.
+    free = opposite(trial.cut)
+    free = both(free, none_held) if problem.ball else free
+    change = where(free, -(0.5 * decrement), trial.change)
+    enough = either(free, less_equal(change, -ENOUGH * decrement))
+    (change,) = unless(enough, search, change)
+    failed = both(opposite(free), _is_zero(change))
+    hopeful = both(less(STALLED * now.half, decrement), less(sweeps, number_of(budget)))
+    rescue = both(failed, both(hopeful, opposite(now.rescued)))
+    (change,) = when(both(failed, opposite(rescue)), gradient_step, change)
+    moves = either(free, opposite(_is_zero(change)))
+    when(moves, lambda: take_over(problem))
+    half = now.half + where(moves, change, 0.0)
+    # Where nothing moves, rounding hides any further descent.
+    stuck = both(opposite(moves), opposite(rescue))
+    unshaped = both(free, none_held)
+    exact = both(free, either(none_held, less_equal(decrement, TOLERANCE * half)))
+    solved = either(exact, both(stuck, less_equal(decrement, STALLED * half)))
+    return Attempt(Progress(half, sweeps, now.rescued, either(exact, stuck), solved, opposite(unshaped)), rescue)
+
+
+def _is_zero(x: Scalar) -> Truth:
+    return both(less_equal(x, 0.0), less_equal(0.0, x))
+
+
+def _search(problem: Problem) -> Scalar:
+    """A trial plan along the Newton step without limits; gives the change of half the cost, zero where none was found."""
+    unroll(problem)
+    return shorten(problem, float(HALVINGS))
+
+
+def _gradient_step(problem: Problem) -> Scalar:
     """A trial plan along the gradient, each move in its own scale: the projection guarantees descent for short steps.
-    Returns the change of half the cost, zero where rounding hides any."""
-    for k in range(plan.size // 3):
-        s = -1.0 / space.stiffness[k]
-        g = triple(space.gradient, k)
-        put(space.step, k, (s * g[0], s * g[1], s * g[2]))
-    return shorten(problem, plan, space, 60)
+    Gives the change of half the cost, zero where rounding hides any."""
+    store = carve(problem)
+
+    def stage(k: Index) -> None:
+        store.step.put(k, scale(divide(-1.0, store.stiffness[k]), triple(store.gradient, k)))
+
+    repeat(problem.horizon, stage)
+    return shorten(problem, float(MOST_HALVINGS))
 
 
-@compiled
-def accept(plan, space):
-    """Take the trial plan over."""
-    for i in range(plan.size):
-        plan[i] = space.trial[i]
-    for i in range(6, space.states.size):
-        space.states[i] += space.bend[i]
+@function
+def shorten(problem: Problem, halvings: Scalar) -> Scalar:
+    """Search along the projection arc of the step (Armijo), halved so many times at most, until the cost falls enough.
+    Gives the change of half the cost, zero where it never did."""
+    store = carve(problem)
+
+    def over(_length: Scalar, change: Scalar, left: Scalar) -> Truth:
+        return either(less(change, 0.0), less_equal(left, 0.0))
+
+    def turn(length: Scalar, _change: Scalar, left: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+        trial = fly(problem, lambda k, x, v: add(v, scale(length, triple(store.step, k))), REST)
+        falls = both(less(trial.slope, 0.0), less_equal(trial.change, SUFFICIENT * trial.slope))
+        return 0.5 * length, where(falls, trial.change, 0.0), left - 1.0
+
+    _, change, _ = until(over, turn, 1.0, 0.0, halvings, at_most=MOST_HALVINGS)
+    return change
 
 
-@compiled
-def interior(problem, plan, space, half, budget):
-    """The primal-dual interior-point method (Boyd and Vandenberghe 2004, section 11.7), for programs on which the
-    projected Newton method is slow: it comes near the optimum in a number of sweeps that hardly depends on the program,
-    and what then lies near a limit is put on it. The better of its plan and the one given is kept. Returns the sweeps.
-    """
-    n = plan.size // 3
-    c, bound, spare, multipliers, x = problem.centre, problem.bound, space.spare, space.multipliers, space.states
-    per = 1 if problem.ball else 3
-    count = per * n
-    barrier = 0.1 * half / count
-    for k in range(n):
-        v = triple(plan, k)
-        put(spare, k, v)
-        w = (c[0] + 0.9 * (v[0] - c[0]), c[1] + 0.9 * (v[1] - c[1]), c[2] + 0.9 * (v[2] - c[2]))
-        put(plan, k, w)
-        s = slack(problem, w)
-        put(multipliers, k, (barrier / s[0], barrier / s[1], barrier / s[2]))
-    now = rollout(problem, plan, x)
-    sweeps = 0
-    while sweeps < min(budget, INTERIOR_SWEEPS):
-        adjoint(problem, plan, space)
-        sweep(problem, plan, space, barrier)
-        sweeps += 1
-        unroll(plan, problem, space)
-        length = 1.0
-        for k in range(n):
-            v, d, s = triple(plan, k), triple(space.step, k), slack(problem, triple(plan, k))
-            e = (v[0] - c[0], v[1] - c[1], v[2] - c[2])
-            dot = (e[0] * d[0], e[1] * d[1], e[2] * d[2])
-            square = (d[0] * d[0], d[1] * d[1], d[2] * d[2])
-            if problem.ball:
-                total, long = dot[0] + dot[1] + dot[2], square[0] + square[1] + square[2]
-                dot, square = (total, total, total), (long, long, long)
-            for i in range(per):
-                old = multipliers[3 * k + i]
-                new = barrier / s[i] - old + old / s[i] * dot[i]
-                space.trial[3 * k + i] = new
-                if new < 0.0:
-                    length = min(length, -0.95 * old / new)
-                # Where the step leaves the limit: slack(v + t d) = 0.
-                ahead = dot[i] + math.sqrt(dot[i] * dot[i] + 2.0 * s[i] * square[i])
-                if ahead > 0.0:
-                    length = min(length, 0.95 * 2.0 * s[i] / ahead)
-        gap = 0.0
-        for k in range(n):
-            v, d = triple(plan, k), triple(space.step, k)
-            w = (v[0] + length * d[0], v[1] + length * d[1], v[2] + length * d[2])
-            put(plan, k, w)
-            s = slack(problem, w)
-            for i in range(per):
-                multipliers[3 * k + i] += length * space.trial[3 * k + i]
-                gap += multipliers[3 * k + i] * s[i]
-        now = rollout(problem, plan, x)
-        barrier = (0.1 if length > 0.5 else 0.5) * gap / count
-        # Short steps near the end: the slacks have lost their digits.
-        if gap <= (1e-8 if length > 0.5 else 1e-5) * now:
-            break
-    for k in range(n):
-        v, s = triple(plan, k), slack(problem, triple(plan, k))
-        near = 1e-5 * bound * bound
-        d = (v[0] - c[0], v[1] - c[1], v[2] - c[2])
-        stretch = (
-            2.0 if s[0] < near else 1.0,
-            2.0 if s[per // 2] < near else 1.0,
-            2.0 if s[per - 1] < near else 1.0,
-        )
-        w, _ = project((c[0] + stretch[0] * d[0], c[1] + stretch[1] * d[1], c[2] + stretch[2] * d[2]), problem)
-        put(plan, k, w)
-    now = rollout(problem, plan, x)
-    if not now <= half:
-        for i in range(plan.size):
-            plan[i] = spare[i]
-        rollout(problem, plan, x)
-    return sweeps
+def advance(problem: Problem) -> None:
+    """Shift a solved plan by one move; the last is what the tail gives at its end."""
+    store, bounds, n = carve(problem), limits(problem), problem.horizon
+    against = [-x for x in store.states.row(n, 6)]
+    last: Vector = (
+        sixes.dot(store.tail.row(0, 6), against),
+        sixes.dot(store.tail.row(1, 6), against),
+        sixes.dot(store.tail.row(2, 6), against),
+    )
 
+    # Within the limits, whose centre moves with the target.
+    def shift(k: Index) -> None:
+        w, _ = project(bounds, triple(store.plan, k + 1))
+        store.plan.put(k, w)
 
-@compiled
-def improve(problem: Any, plan: Any, space: Any, budget: int, warm: bool) -> tuple[int, bool, bool]:
-    """Solve the program from the state in space.states[0:6], starting with `plan` if warm; the plan is overwritten.
-
-    Returns the number of Riccati sweeps, whether the optimum was reached within `budget` of them, and whether limits
-    shape it. The plan respects the limits in any case.
-    """
-    x = space.states
-    sweeps = 0
-    if not warm:
-        # The policy without limits, flown through them: the optimum if nothing is cut, else a good start.
-        for i in range(plan.size):
-            plan[i], space.gradient[i] = 0.0, 0.0
-        for i in range(6):
-            space.bend[i] = x[i]
-        for i in range(6, x.size):
-            x[i] = 0.0
-        sweep(problem, plan, space, 0.0)
-        sweeps = 1
-        cut = follow(problem, plan, space)
-        accept(plan, space)
-        if not cut:
-            return sweeps, True, False
-    half = rollout(problem, plan, x)
-    rescued = False
-    while True:
-        if adjoint(problem, plan, space) <= TOLERANCE * half:
-            return sweeps, True, True
-        if sweeps >= budget:
-            return sweeps, False, True
-        if sweeps >= PATIENCE and not rescued:
-            sweeps += interior(problem, plan, space, half, budget - sweeps)
-            half = rollout(problem, plan, x)
-            rescued = True
-            continue
-        decrement, holding = sweep(problem, plan, space, 0.0)
-        sweeps += 1
-        for i in range(6):
-            space.bend[i] = 0.0
-        cut = follow(problem, plan, space)
-        if not cut and (holding == 0 or not problem.ball):
-            # The exact optimum of what is not held.
-            accept(plan, space)
-            half -= 0.5 * decrement
-            if holding == 0:
-                return sweeps, True, False
-            if decrement <= TOLERANCE * half:
-                return sweeps, True, True
-            continue
-        fall = search(problem, plan, space, decrement)
-        if fall == 0.0 and decrement > 1e-12 * half and not rescued and sweeps < budget:
-            sweeps += interior(problem, plan, space, half, budget - sweeps)
-            half = rollout(problem, plan, x)
-            rescued = True
-            continue
-        if fall == 0.0:
-            fall = descend(problem, plan, space)
-        if fall == 0.0:
-            # Rounding hides any further descent.
-            return sweeps, decrement <= 1e-12 * half, True
-        accept(plan, space)
-        half += fall
-
-
-@compiled
-def advance(problem: Any, plan: Any, tail: Any, space: Any) -> None:
-    """Shift a solved plan by one move; the last is the feedback -tail x at its end."""
-    n = plan.size // 3
-    last = 6 * n
-    for i in range(plan.size - 3):
-        plan[i] = plan[i + 3]
-    v0, v1, v2 = 0.0, 0.0, 0.0
-    for j in range(6):
-        s = space.states[last + j]
-        v0 -= tail[j] * s
-        v1 -= tail[6 + j] * s
-        v2 -= tail[12 + j] * s
-    put(plan, n - 1, (v0, v1, v2))
-    for k in range(n):
-        # The centre moves with the target.
-        w, _ = project(triple(plan, k), problem)
-        put(plan, k, w)
-
-
-class Solution(NamedTuple):
-    """plan (N, 3), its cost, the number of Riccati sweeps, and whether the optimum was reached."""
-
-    plan: np.ndarray
-    cost: float
-    sweeps: int
-    solved: bool
-
-
-@compiled
-def solve(a, b, q, r, p, x, horizon, bound, centre, ball, budget):
-    """Solve one program from scratch: A (6, 6), B (6, 3), Q (6, 6), R (3, 3) and P (6, 6) symmetric, Q and P positive
-    semidefinite, R positive definite; x (6); limits |v - centre| <= bound per axis or, with ball, in norm (inf: none).
-    For use outside kernels: it allocates.
-    """
-    space = carve(make_store(horizon), horizon).space
-    problem = Problem(a.ravel(), b.ravel(), q.ravel(), r.ravel(), np.linalg.inv(r).ravel(), p.ravel(), centre, bound, ball)
-    plan = np.zeros(3 * horizon)
-    space.states[:6] = x
-    sweeps, solved, _ = improve(problem, plan, space, budget, False)
-    space.states[:6] = x
-    cost = 2.0 * rollout(problem, plan, space.states)
-    return Solution(plan.reshape((horizon, 3)), cost, sweeps, solved)
+    repeat(n - 1, shift)
+    store.plan.put(n - 1, project(bounds, last)[0])

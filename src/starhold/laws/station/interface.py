@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, NamedTuple
 
-from starhold.algebra.scalar import Scalar, equation, less, maximum, sqrt, where
+from starhold.algebra.scalar import Scalar, less, maximum, sqrt, where
 from starhold.algebra.vector import Vector, dot, scale, subtract
 from starhold.laws import catalogue as laws
 from starhold.laws.interface import NoMemory
@@ -66,21 +66,18 @@ def least_rate(plant: Libration) -> float:
     return plant.rate * best_rate(plant)
 
 
-@equation
 def bend(seen: SeenPoint, plant: Libration, model: Scalar) -> Vector:
     """What the full problem adds to the linear acceleration here, where `model` asks for it, else zero."""
     more = subtract(nonlinear(seen.position, seen.velocity, plant), linear(seen.position, seen.velocity, plant))
     return (model * more[0], model * more[1], model * more[2])
 
 
-@equation
 def hold_x(seen: SeenPoint, k_position: Scalar, k_velocity: Scalar, plant: Libration) -> Scalar:
     """Control along X that undoes the Coriolis acceleration and feeds back."""
     coriolis = 2.0 * plant.rate * seen.velocity[1]
     return -coriolis - k_position * seen.position[0] - k_velocity * seen.velocity[0]
 
 
-@equation
 def along(direction: Vector, size: Scalar, layer: Scalar) -> Vector:
     """The vector of this size in a direction, shorter in proportion where the direction's length is within the layer; zero
     for no direction at all."""

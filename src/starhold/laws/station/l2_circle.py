@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
-from starhold.algebra.scalar import Scalar, equation, less, where
+from starhold.algebra.scalar import Scalar, less, where
 from starhold.algebra.vector import Vector, scale, subtract
 from starhold.laws.interface import Card, Gain, NoMemory
 from starhold.laws.station.interface import MODELS, SeenPoint, along, bend, hold_x, least_rate
@@ -70,7 +70,6 @@ def peak_demand(plant: Libration, rate: float) -> float:
     return max(demand(rate / plant.rate, plant), abs(plant.stiffness - plant.rate**2 - rate**2))
 
 
-@equation
 def errors(seen: SeenPoint, gains: Gains) -> Vector:
     """f1 = y^2 + z^2 - radius^2, f2 = y' + rate z, f3 = z' - rate y, which vanish on the circle."""
     y, z = seen.position[1], seen.position[2]
@@ -81,7 +80,6 @@ def errors(seen: SeenPoint, gains: Gains) -> Vector:
     )
 
 
-@equation
 def neutral(seen: SeenPoint, gains: Gains, plant: Libration) -> Vector:
     """The control under which V stays as it is (scaled)."""
     y, z, v = seen.position[1], seen.position[2], seen.velocity
@@ -93,7 +91,6 @@ def neutral(seen: SeenPoint, gains: Gains, plant: Libration) -> Vector:
     )
 
 
-@equation
 def feedback(seen: SeenPoint, gains: Gains, plant: Libration) -> Vector:
     """Control acceleration for the linear model (scaled): what keeps V, and what lowers it."""
     off = errors(seen, gains)
@@ -104,13 +101,11 @@ def feedback(seen: SeenPoint, gains: Gains, plant: Libration) -> Vector:
     return subtract(neutral(seen, gains, plant), damping)
 
 
-@equation
 def control(seen: SeenPoint, gains: Gains, plant: Libration, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Control acceleration (scaled)."""
     return subtract(feedback(seen, gains, plant), bend(seen, plant, gains.model)), memory
 
 
-@equation
 def lyapunov(seen: SeenPoint, gains: Gains, plant: Libration) -> Scalar:
     """V = (alpha f1^2 + f2^2 + f3^2)/2, zero on the circle; V' = -k (f2^2 + f3^2), of a relay -k |(f2, f3)|."""
     off = errors(seen, gains)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
-from starhold.algebra.scalar import Scalar, equation
+from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Vector
 from starhold.laws.interface import Card, Gain, NoMemory
 from starhold.laws.station.interface import SeenPoint, along, least_rate
@@ -56,14 +56,12 @@ def design(plant: Libration, spec: Best) -> Gains:
     return Gains(spec.radius, rates[0], spec.alpha, spec.beta, rates[1], spec.pull, spec.layer)
 
 
-@equation
 def _off(seen: SeenPoint, gains: Gains) -> Scalar:
     """f1."""
     p = seen.position
     return p[1] * p[1] + p[2] * p[2] - gains.radius * gains.radius
 
 
-@equation
 def _slopes(seen: SeenPoint, gains: Gains) -> Vector:
     """dV/dv."""
     p, v = seen.position, seen.velocity
@@ -75,13 +73,11 @@ def _slopes(seen: SeenPoint, gains: Gains) -> Vector:
     )
 
 
-@equation
 def control(seen: SeenPoint, gains: Gains, plant: Libration, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Control acceleration (scaled): V' is linear in it, so that the least is on the limit, against dV/dv."""
     return along(_slopes(seen, gains), -seen.limit, gains.layer), memory
 
 
-@equation
 def lyapunov(seen: SeenPoint, gains: Gains, plant: Libration) -> Scalar:
     """V = (alpha f1^2 + f2^2 + f3^2 + beta (x' + slope x)^2)/2, f2 and f3 what the velocity is off by along Y and Z."""
     g, f1 = _slopes(seen, gains), _off(seen, gains)

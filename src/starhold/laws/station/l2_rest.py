@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
-from starhold.algebra.scalar import equation
 from starhold.algebra.vector import Vector, subtract
 from starhold.laws.interface import Card, Gain, NoMemory
 from starhold.laws.station.interface import MODELS, SeenPoint, bend, hold_x
@@ -50,7 +49,6 @@ def design(plant: Libration, spec: Degree) -> Gains:
     return Gains(spec.y, spec.z, 2.0 * steep, velocity, spec.model)
 
 
-@equation
 def feedback(seen: SeenPoint, gains: Gains, plant: Libration) -> Vector:
     """Control acceleration for the linear model (scaled)."""
     square = plant.rate * plant.rate
@@ -62,7 +60,6 @@ def feedback(seen: SeenPoint, gains: Gains, plant: Libration) -> Vector:
     )
 
 
-@equation
 def control(seen: SeenPoint, gains: Gains, plant: Libration, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Control acceleration (scaled)."""
     return subtract(feedback(seen, gains, plant), bend(seen, plant, gains.model)), memory

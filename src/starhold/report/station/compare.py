@@ -29,8 +29,12 @@ def fly_law(scenario: StationScenario, entry: StationEntry, loop: StationLoop, n
     metrics = measure_station(run, scenario.units, goal_of(entry.gains), scenario.table.settling.tolerance)
     gains = {item.name: gain_text(item, value) for item, value in zip(entry.law.fields(), entry.gains, strict=True)}
     gains |= {"limit": number_text(entry.limit)} | ({"lag": number_text(entry.lag)} if entry.lag else {})
-    proved = certify_station(loop, entry.name)
-    return Flight(entry.name, entry.law.name, run, metrics, gains, (proved,), board=BOARD)
+    return Flight(entry.name, entry.law.name, run, metrics, gains, board=BOARD)
+
+
+def prove(scenario: StationScenario, entry: StationEntry, loop: StationLoop, flight: Flight) -> Flight:
+    """The flight with the certificate of its law."""
+    return replace(flight, certificates=(certify_station(loop, entry.name),))
 
 
 def certify_scenario(scenario: StationScenario, law: str | None = None) -> list[Tried]:
@@ -54,7 +58,8 @@ def record(scenario: StationScenario, loop: StationLoop, progress: Progress | No
 
 def compare(scenario: StationScenario, notice: Notice | None = None) -> list[Flight]:
     """Every law of the scenario flown on it, in the order of the file."""
-    return [fly_law(scenario, entry, build(scenario, entry), notice) for entry in scenario.laws]
+    loops = [(entry, build(scenario, entry)) for entry in scenario.laws]
+    return [prove(scenario, entry, loop, fly_law(scenario, entry, loop, notice)) for entry, loop in loops]
 
 
 def write(scenario: StationScenario, flights: Sequence[Flight], folder: Path) -> Path:

@@ -1,0 +1,100 @@
+"""What an operation is: its plain meaning, and what every other reader of an equation makes of it.
+
+An operation is written once, as a function of floats under `@operation(...)`, which names its meaning for SymPy, for balls,
+for exact polynomials, and in the languages that a trace is printed in. Numbers of other readers find their meaning by
+their type.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from importlib import import_module
+from typing import Any, NamedTuple, TypeVar, cast
+
+NUMBER, TRUTH, WORD, INDEX, UNIFORM, STATIC = "number", "truth", "word", "index", "uniform", "static"
+"""Kinds of values: numbers (IEEE doubles), truths, 64-bit unsigned words, and the two that all lanes share: indices (counts
+and counters of loops) and truths about them. A static argument is a Python number known while recording."""
+
+PRINTED = ("llvm", "c", "javascript")
+"""Languages; a text for each, with {0}, {1}, ... for the operands."""
+EXACT = ("symbolic", "ball", "polynomial")
+"""Readers that prove; operations on words and indices mean nothing to them."""
+
+_PLAIN = frozenset((float, int, bool))
+_LIBRARIES = {"sympy": "symbolic", "flint": "ball"}
+
+
+class Operation(NamedTuple):
+    """Name, kinds of the arguments and of the result, and a meaning for each reader (a function, or a text to print)."""
+
+    name: str
+    takes: tuple[str, ...]
+    gives: str
+    plain: Callable[..., Any]
+    meanings: dict[str, Any]
+
+    def missing(self) -> list[str]:
+        """The readers that this operation should mean something to and does not."""
+        about = {*self.takes, self.gives}
+        readers = PRINTED if about & {WORD, INDEX, UNIFORM} else (*PRINTED, *EXACT)
+        return [reader for reader in readers if reader not in self.meanings]
+
+
+OPERATIONS: dict[str, Operation] = {}
+"""All operations by name."""
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def operation(takes: str, gives: str, **meanings: Any) -> Callable[[_Function], _Function]:
+    """Make a function of floats an operation of the same name. takes: kinds of its arguments, separated by blanks."""
+
+    def register(function: _Function) -> _Function:
+        entry = OPERATIONS[function.__name__] = Operation(function.__name__, tuple(takes.split()), gives, function, meanings)
+
+        @wraps(function)
+        def read(*values: Any) -> Any:
+            for value in values:
+                if type(value) not in _PLAIN:
+                    return _read(entry, values)
+            return function(*values)
+
+        return cast(_Function, read)
+
+    return register
+
+
+def _read(entry: Operation, values: tuple[Any, ...]) -> Any:
+    """What the reader whose number is among the values makes of the operation."""
+    readers = [found for value in values if (found := _reader(value)) is not None]
+    if not readers:
+        return entry.plain(*values)
+    for value, reader in zip(values, map(_reader, values), strict=True):
+        if reader == "record":
+            return value.recorder.apply(entry, values)
+    # SymPy and polynomials keep their own truths; a ball's are True, False and None.
+    reader = next((found for found in readers if found != "ball"), "ball")
+    if reader not in entry.meanings:
+        raise TypeError(f"{entry.name} means nothing to the reader {reader}")
+    return entry.meanings[reader](*values)
+
+
+def _reader(value: Any) -> str | None:
+    """The reader of a number; None for plain ones."""
+    if isinstance(value, (float, int)) or type(value).__name__ == "bool_":
+        return None
+    if value is None:
+        return "ball"
+    cls = cast(Any, type(value))
+    own: str | None = getattr(cls, "reader", None)
+    root = cls.__module__.partition(".")[0]
+    if own is None and root not in _LIBRARIES:
+        raise TypeError(f"no reader for numbers of type {cls.__name__}")
+    return own if own is not None else _LIBRARIES[root]
+
+
+def library(name: str) -> Any:
+    """A reader's module, loaded when a number of its own is met; named at run time because its types are too loose for a
+    strict checker."""
+    return import_module(name)

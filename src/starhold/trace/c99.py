@@ -1,0 +1,156 @@
+"""Prints a program as C99, for one lane: a function for each that was recorded, the last of which is what is called.
+
+It is given the memories as pointers, then counts as `long` and words as `uint64_t`. It uses nothing of the library but
+`sqrt` (and `memcpy`, where it takes doubles apart), allocates nothing, and gives the bits that plain Python gives where
+doubles are IEEE doubles and the compiler contracts nothing (`-std=c99 -ffp-contract=off`, never `-ffast-math`).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from starhold.algebra.operations import INDEX, NUMBER, TRUTH, UNIFORM, WORD
+from starhold.trace.program import Call, Function, Memory, Value
+from starhold.trace.source import Source, names
+
+TYPES = {NUMBER: "double", TRUTH: "int", WORD: "uint64_t", INDEX: "long", UNIFORM: "int"}
+
+_MATH = """
+    acos acosh asin asinh atan atan2 atanh cbrt ceil copysign cos cosh erf erfc exp exp2 expm1 fabs fdim floor fma fmax fmin
+    fmod frexp hypot ilogb ldexp lgamma llrint llround log log10 log1p log2 logb lrint lround modf nan nearbyint nextafter
+    nexttoward pow remainder remquo rint round scalbln scalbn sin sinh sqrt tan tanh tgamma trunc
+"""
+_STRING = """
+    memchr memcmp memcpy memmove memset strcat strchr strcmp strcoll strcpy strcspn strerror strlen strncat strncmp strncpy
+    strpbrk strrchr strspn strstr strtok strxfrm
+"""
+_GUARD = """\
+#if defined(__FAST_MATH__) || (defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ != 0)
+#error "this code needs IEEE arithmetic in doubles: no -ffast-math, no x87"
+#endif
+#if !defined(__GNUC__) || defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#endif"""
+_BITS_OF = """\
+/* The bits of a double. */
+static uint64_t bits_of(double x)
+{
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return bits;
+}"""
+_WITH_BITS = """\
+/* The double with these bits. */
+static double with_bits(uint64_t bits)
+{
+    double x;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}"""
+_HELPERS = {"bits_of": _BITS_OF, "with_bits": _WITH_BITS}
+
+
+class C99(Source):
+    """The text of a program. What a function gives, it returns, or writes to pointers where that is more than one value."""
+
+    language = "c"
+    taken = frozenset(name + end for name in _MATH.split() for end in ("", "f", "l")) | frozenset((*_STRING.split(), "main"))
+
+    @property
+    def prototype(self) -> str:
+        """The declaration of what is called, for a header."""
+        return self._head(self.program.main) + ";"
+
+    def _opening(self) -> list[str]:
+        body = "\n".join(self.lines)
+        helpers = [text for name, text in _HELPERS.items() if f"{name}(" in body]
+        found = ["#include <math.h>", "#include <stdint.h>", *["#include <string.h>"] * bool(helpers), "", _GUARD]
+        for text in helpers:
+            found += ["", text]
+        return found
+
+    def _head(self, function: Function) -> str:
+        main = self.is_main(function)
+        memories = self.program.memories if main else self.memories[function.name]
+        given = [_pointer(memory) for memory in memories]
+        given += [f"{TYPES[kind]} {name}" for name, kind in function.params]
+        gives = "void"
+        if len(function.outs) == 1:
+            gives = TYPES[function.outs[0][1]]
+        else:
+            given += [
+                f"{TYPES[kind]} *{name}" for (_, kind), name in zip(function.outs, self._pointers(function), strict=True)
+            ]
+        return f"{'' if main else 'static '}{gives} {self.titles[function.name]}({', '.join(given) or 'void'})"
+
+    def _pointers(self, function: Function) -> list[str]:
+        """Names of the pointers that a function's values are written to."""
+        used, mark = {*names(function), *self.titles.values(), *(memory.name for memory in self.program.memories)}, "out"
+        count = len(function.outs)
+        while not used.isdisjoint(f"{mark}{place}" for place in range(count)):
+            mark += "_"
+        return [f"{mark}{place}" for place in range(count)]
+
+    def _define(self, function: Function) -> None:
+        self.lines.append("")
+        self.remark(function.doc)
+        self.put(self._head(function))
+        self.put("{")
+        self.depth += 1
+        memories = self.program.memories if self.is_main(function) else self.memories[function.name]
+        for memory in memories:
+            if memory not in self.memories[function.name]:
+                self.put(f"(void){memory.name};")
+        for name, _ in function.params:
+            if name not in self._read:
+                self.put(f"(void){name};")
+        self._block(function.body)
+        if len(function.outs) == 1:
+            self.put(f"return {self.text(*function.outs[0])};")
+        else:
+            for pointer, (value, kind) in zip(self._pointers(function), function.outs, strict=True):
+                self.put(f"*{pointer} = {self.text(value, kind)};")
+        self.close()
+
+    def _constant(self, value: Any, kind: str) -> str:
+        if kind == WORD:
+            return f"UINT64_C(0x{value:X})"
+        if kind != NUMBER:
+            return str(int(value))
+        number = float(value)
+        if math.isnan(number):
+            return "NAN"
+        if math.isinf(number):
+            return "INFINITY" if number > 0.0 else "-INFINITY"
+        return repr(number)
+
+    def _let(self, kind: str, name: str, text: str) -> None:
+        self.put(f"const {TYPES[kind]} {name} = {text};")
+
+    def _variable(self, kind: str, name: str, value: Value) -> None:
+        self.put(f"{TYPES[kind]} {name} = {self.text(value, kind)};")
+
+    def _assign(self, kind: str, name: str, value: Value) -> None:
+        self.put(f"{name} = {self.text(value, kind)};")
+
+    def _counted(self, counter: str, most: str) -> str:
+        return f"for (long {counter} = 0; {counter} < {most}; {counter}++)"
+
+    def _call(self, s: Call) -> None:
+        function = self.functions[s.function.name]
+        given = [memory.name for memory in self.memories[function.name]]
+        given += [self.text(value, kind) for value, (_, kind) in zip(s.args, function.params, strict=True)]
+        if len(s.refs) == 1 and s.refs[0][0] in self._read:
+            name, kind = s.refs[0]
+            self._let(kind, name, f"{self.titles[function.name]}({', '.join(given)})")
+            return
+        if len(s.refs) > 1:
+            for name, kind in s.refs:
+                self.put(f"{TYPES[kind]} {name};")
+            given += [f"&{name}" for name, _ in s.refs]
+        self.put(f"{self.titles[function.name]}({', '.join(given)});")
+
+
+def _pointer(memory: Memory) -> str:
+    return f"{'' if memory.writable else 'const '}double *{memory.name}"

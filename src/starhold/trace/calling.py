@@ -1,0 +1,87 @@
+"""One equation, compiled: called with numbers, or over columns of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.operations import TRUTH
+from starhold.algebra.scalar import where
+from starhold.algebra.structure import leaves, mapped
+from starhold.algebra.structured import repeat
+from starhold.trace.handles import Handle, kind_of
+from starhold.trace.machine import aligned, load
+from starhold.trace.program import Program
+from starhold.trace.recording import Cells, Recorder
+
+WIDTH = 8
+"""Lanes in flight at once over columns."""
+
+
+class Compiled:
+    """An equation for arguments shaped like the ones given: their floats are arguments, all else is a constant of it."""
+
+    def __init__(self, equation: Callable[..., Any], *like: Any) -> None:
+        self.program, self._like = record_call(equation, like)
+        self._count = sum(isinstance(leaf, float) for leaf in leaves(like))
+        self._leaves = list(leaves(self._like))
+        self._one = load(self.program, 1)
+        self._many: Callable[..., None] | None = None
+
+    def __call__(self, *values: Any) -> Any:
+        """What the equation gives."""
+        x = np.array([leaf for leaf in leaves(values) if isinstance(leaf, float)])
+        y = np.empty(len(self._leaves))
+        self._one(x.ctypes.data, y.ctypes.data, 1)
+        source = iter(y.tolist())
+        return mapped(self._like, lambda leaf: _told(leaf, next(source)))
+
+    def over(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The numbers it gives, (numbers, lanes), for arguments whose floats are the columns of (floats, lanes); truths are
+        1 and 0."""
+        if self._many is None:
+            self._many = load(self.program, WIDTH)
+        count = columns.shape[1]
+        blocks = -(-count // WIDTH)
+        x, y = aligned(blocks, self._count, WIDTH), aligned(blocks, len(self._leaves), WIDTH)
+        padded = np.pad(columns, ((0, 0), (0, blocks * WIDTH - count)), mode="edge")
+        x[:] = padded.reshape(self._count, blocks, WIDTH).swapaxes(0, 1)
+        self._many(x.ctypes.data, y.ctypes.data, blocks)
+        return y.swapaxes(0, 1).reshape(len(self._leaves), -1)[:, :count]
+
+
+def _told(leaf: Any, number: float) -> Any:
+    if not isinstance(leaf, Handle):
+        return leaf
+    return number == 1.0 if leaf.kind == TRUTH else number
+
+
+def record_call(equation: Callable[..., Any], like: tuple[Any, ...]) -> tuple[Program, Any]:
+    """A program that reads the floats of the arguments from the memory `x` and writes what the equation gives to `y`, both
+    `count` times over; and what it gives, with handles for numbers."""
+    recorder = Recorder()
+    x = recorder.memory("x", lanes=True)
+    y = recorder.memory("y", lanes=True, writable=True)
+    count = recorder.input("count", "index")
+    size = sum(isinstance(leaf, float) for leaf in leaves(like))
+    given: list[Any] = []
+
+    def turn(k: Any) -> None:
+        values = bind(like, x, k * size)
+        given.append(equation(*values))
+        for place, leaf in enumerate(leaves(given[0])):
+            truth = kind_of(leaf) == TRUTH
+            y[k * len(list(leaves(given[0]))) + place] = where(leaf, 1.0, 0.0) if truth else leaf
+
+    with recorder.recording():
+        repeat(count, turn)
+    return recorder.program("call"), given[0]
+
+
+def bind(like: Any, cells: Cells, base: Any = 0) -> Any:
+    """The same structure with its floats read from memory, from `base` on, in order."""
+    places: Iterator[int] = iter(range(1 << 30))
+    return mapped(like, lambda leaf: cells[base + next(places)] if isinstance(leaf, float) else leaf)

@@ -1,0 +1,160 @@
+"""What equations meet while they are recorded: handles, which note what is done to them, and refuse what cannot be noted."""
+
+from __future__ import annotations
+
+import linecache
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from starhold.algebra.operations import INDEX, NUMBER, OPERATIONS, TRUTH, UNIFORM, WORD
+from starhold.errors import InputError
+
+if TYPE_CHECKING:
+    from starhold.trace.recording import Recorder
+
+INSTEAD = "+ - * /, sqrt and the other operations of starhold.algebra.scalar"
+
+
+class RecordingError(InputError):
+    """An equation does what cannot be recorded; the text names the law, the line of its file and what to write instead."""
+
+
+class Handle:
+    """What an equation meets in place of a value while it is recorded."""
+
+    __slots__ = ("recorder", "ref")
+    reader = "record"
+    kind = ""
+    __hash__ = object.__hash__
+
+    def __init__(self, recorder: Recorder, ref: str) -> None:
+        self.recorder, self.ref = recorder, ref
+
+    def __bool__(self) -> NoReturn:
+        refuse(
+            "an `if`, `while`, `and`, `or` or `not` on a truth that is not known yet",
+            "where(truth, a, b), both, either, opposite",
+        )
+
+    def __float__(self) -> NoReturn:
+        refuse("a function that is none of the scalar operations", INSTEAD)
+
+    __int__ = __index__ = __complex__ = __float__  # pyright: ignore
+
+    def _array(self, *_: Any, **__: Any) -> NoReturn:
+        refuse("a function of NumPy", f"tuples, starhold.algebra.vector, {INSTEAD}")
+
+    __array__ = __array_ufunc__ = __array_function__ = _array
+
+    def _unknown(self, *_: Any) -> NoReturn:
+        refuse("an operator that is none of the scalar operations", INSTEAD)
+
+    def _powered(self, *_: Any) -> NoReturn:
+        refuse("a power", "products, sqrt of starhold.algebra.scalar")
+
+    def __abs__(self) -> NoReturn:
+        refuse("abs of a number", "absolute of starhold.algebra.scalar")
+
+    __pow__ = __rpow__ = _powered
+    __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __matmul__ = __rmatmul__ = _unknown
+    __round__ = __trunc__ = __floor__ = __ceil__ = __divmod__ = __iter__ = __len__ = __getitem__ = _unknown
+    __invert__ = __and__ = __rand__ = __or__ = __ror__ = __xor__ = __rxor__ = __lshift__ = __rshift__ = _unknown
+
+    def _compared(self, other: Any) -> NoReturn:
+        refuse(
+            "a comparison of numbers by < > == or !=, or by `min` or `max`",
+            "less or less_equal, and where(less(a, b), x, y); minimum, maximum",
+        )
+
+    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = _compared  # pyright: ignore
+
+
+def _binary(name: str, turned: bool = False) -> Any:
+    entry = OPERATIONS[name]
+
+    def apply(self: Handle, other: Any) -> Any:
+        return self.recorder.apply(entry, (other, self) if turned else (self, other))
+
+    return apply
+
+
+class Number(Handle):
+    """A number."""
+
+    __slots__ = ()
+    kind = NUMBER
+    __add__, __radd__ = _binary("plus"), _binary("plus", turned=True)
+    __sub__, __rsub__ = _binary("minus"), _binary("minus", turned=True)
+    __mul__, __rmul__ = _binary("product"), _binary("product", turned=True)
+    __truediv__, __rtruediv__ = _binary("divide"), _binary("divide", turned=True)
+
+    def __neg__(self) -> Any:
+        return self.recorder.apply(OPERATIONS["negative"], (self,))
+
+    def __pos__(self) -> Number:
+        return self
+
+
+class Truth(Handle):
+    """What a comparison gives."""
+
+    __slots__ = ()
+    kind = TRUTH
+
+
+class Word(Handle):
+    """A 64-bit unsigned integer."""
+
+    __slots__ = ()
+    kind = WORD
+
+
+class Index(Handle):
+    """An integer that all lanes share: a count, a loop's counter, or made of such by + - *."""
+
+    __slots__ = ()
+    kind = INDEX
+    __add__, __radd__ = _binary("index_plus"), _binary("index_plus", turned=True)
+    __sub__, __rsub__ = _binary("index_minus"), _binary("index_minus", turned=True)
+    __mul__, __rmul__ = _binary("index_product"), _binary("index_product", turned=True)
+
+
+class Uniform(Handle):
+    """A truth about indices, which all lanes share."""
+
+    __slots__ = ()
+    kind = UNIFORM
+
+
+HANDLES: dict[str, type[Handle]] = {cls.kind: cls for cls in (Number, Truth, Word, Index, Uniform)}
+_OWN = tuple(str(Path(__file__).parents[1] / folder) for folder in ("trace", "algebra"))
+
+
+def refuse(found: str, allowed: str) -> NoReturn:
+    """Raise a RecordingError that points at the line of the equation that runs now."""
+    frame: Any = sys._getframe(1)  # pyright: ignore[reportPrivateUsage]
+    frames: list[Any] = []
+    while frame is not None:
+        if not frame.f_code.co_filename.startswith(_OWN):
+            frames.append(frame)
+        frame = frame.f_back
+    if not frames:
+        raise RecordingError("an equation", "", found, allowed)
+    # The law's own line rather than that of a library which it calls.
+    frame = next((frame for frame in frames if "CARD" in frame.f_globals), frames[0])
+    file, line = frame.f_code.co_filename, frame.f_lineno
+    text = linecache.getline(file, line).strip()
+    law = f"law {Path(file).stem.replace('_', '-')}: " if "CARD" in frame.f_globals else ""
+    raise RecordingError(f"{law}{Path(file).name}, line {line}", "", f"{found}, in `{text}`", allowed)
+
+
+def kind_of(value: Any) -> str:
+    """The kind of a recorded value or a constant."""
+    if isinstance(value, Handle):
+        return value.kind
+    if isinstance(value, bool):
+        return TRUTH
+    if isinstance(value, (float, int)):
+        return NUMBER
+    refuse(f"a value of type {type(value).__name__}", "numbers, and tuples of them")

@@ -1,0 +1,153 @@
+"""Prints a program as JavaScript (ES2017), for one lane: a function for each that was recorded, the last of which is what is
+called.
+
+It is given the memories as Float64Arrays, then counts as numbers and words as pairs [high, low] of 32-bit integers, which
+is what a word is everywhere here. It needs neither a library nor a module, and gives the bits that plain Python gives.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from starhold.algebra.operations import NUMBER, STATIC, TRUTH, UNIFORM, WORD
+from starhold.trace.program import Call, Function, Op, Value
+from starhold.trace.source import Source
+
+_HELPERS = """\
+const double_view = new Float64Array([1.0]);
+const half_view = new Int32Array(double_view.buffer);
+// Which half of a double in memory is the high one: of 1.0 the low one is zero.
+const high_place = half_view[0] === 0 ? 1 : 0;
+
+function high_bits(x) {
+    double_view[0] = x;
+    return half_view[high_place];
+}
+
+function low_bits(x) {
+    double_view[0] = x;
+    return half_view[1 - high_place];
+}
+
+function with_bits(high, low) {
+    half_view[high_place] = high;
+    half_view[1 - high_place] = low;
+    return double_view[0];
+}"""
+
+
+class JavaScript(Source):
+    """The text of a program. A function gives a value, or an array of them where there are more."""
+
+    language = "javascript"
+    taken = frozenset(("double_view", "half_view", "high_place"))
+
+    def _opening(self) -> list[str]:
+        body = "\n".join(self.lines)
+        used = any(f"{name}(" in body for name in ("high_bits", "low_bits", "with_bits"))
+        return ['"use strict";', *["", _HELPERS] * used]
+
+    def _define(self, function: Function) -> None:
+        main = self.is_main(function)
+        memories = self.program.memories if main else self.memories[function.name]
+        given = [memory.name for memory in memories]
+        for name, kind in function.params:
+            given += [name] if main else _parts(name, kind)
+        self.lines.append("")
+        self.remark(function.doc)
+        self.open(f"function {self.titles[function.name]}({', '.join(given)})")
+        for name, kind in function.params if main else ():
+            if kind == WORD and name in self._read:
+                high, low = _parts(name, kind)
+                self.put(f"const {high} = {name}[0] ^ 0, {low} = {name}[1] ^ 0;")
+        self._block(function.body)
+        outs = [text for value, kind in function.outs for text in self._both(value, kind)]
+        if outs:
+            self.put(f"return {outs[0]};" if len(outs) == 1 else f"return [{', '.join(outs)}];")
+        self.close()
+
+    def _constant(self, value: Any, kind: str) -> str:
+        if kind in (TRUTH, UNIFORM):
+            return str(bool(value)).lower()
+        if kind != NUMBER:
+            return str(value)
+        number = float(value)
+        if math.isnan(number):
+            return "NaN"
+        if math.isinf(number):
+            return "Infinity" if number > 0.0 else "-Infinity"
+        return repr(number)
+
+    def _both(self, value: Value, kind: str) -> list[str]:
+        """The texts of a value: of a word that of each half."""
+        if kind != WORD:
+            return [self.text(value, kind)]
+        if isinstance(value, str):
+            return _parts(value, kind)
+        return [str(_signed(value >> 32)), str(_signed(value))]
+
+    def _halves(self, kind: str) -> int:
+        return 2 if kind == WORD else 1
+
+    def _texts(self, s: Op) -> Sequence[str]:
+        meaning: Any = s.operation.meanings["javascript"]
+        if callable(meaning):
+            meaning = meaning(*(value for value, kind in zip(s.args, s.operation.takes, strict=True) if kind == STATIC))
+        texts: Sequence[str] = (meaning,) if isinstance(meaning, str) else meaning
+        return texts
+
+    def _op(self, s: Op) -> None:
+        texts = self._texts(s)
+        halves: dict[str, str] = {}
+        for place, (value, kind) in enumerate(zip(s.args, s.operation.takes, strict=True)):
+            if kind == WORD:
+                halves[f"{place}h"], halves[f"{place}l"] = self._both(value, kind)
+        if s.operation.gives != WORD:
+            self._keep(s.ref, s.operation.gives, self.written(s, texts[0], halves))
+            return
+        high, low = _parts(s.ref, WORD)
+        self.put(f"const {low} = {self.written(s, texts[1], halves).text};")
+        self.put(f"const {high} = {self.written(s, texts[0], {**halves, 'low': low}).text};")
+
+    def _let(self, kind: str, name: str, text: str) -> None:
+        self.put(f"const {name} = {text};")
+
+    def _keep_slot(self, kind: str, name: str, end: str) -> None:
+        for part, of_end in zip(_parts(name, kind), _parts(end, kind), strict=True):
+            self._let(kind, part, of_end)
+
+    def _variable(self, kind: str, name: str, value: Value) -> None:
+        for part, text in zip(_parts(name, kind), self._both(value, kind), strict=True):
+            self.put(f"let {part} = {text};")
+
+    def _assign(self, kind: str, name: str, value: Value) -> None:
+        for part, text in zip(_parts(name, kind), self._both(value, kind), strict=True):
+            self.put(f"{part} = {text};")
+
+    def _counted(self, counter: str, most: str) -> str:
+        return f"for (let {counter} = 0; {counter} < {most}; {counter}++)"
+
+    def _call(self, s: Call) -> None:
+        function = self.functions[s.function.name]
+        given = [memory.name for memory in self.memories[function.name]]
+        for value, (_, kind) in zip(s.args, function.params, strict=True):
+            given += self._both(value, kind)
+        call = f"{self.titles[function.name]}({', '.join(given)})"
+        parts = [part for name, kind in s.refs for part in _parts(name, kind)]
+        if not parts:
+            self.put(f"{call};")
+        else:
+            self.put(f"const {parts[0]} = {call};" if len(parts) == 1 else f"const [{', '.join(parts)}] = {call};")
+
+
+def _parts(name: str, kind: str) -> list[str]:
+    """The names of a value's parts; no name of a trace holds a dollar."""
+    return [f"{name}$high", f"{name}$low"] if kind == WORD else [name]
+
+
+def _signed(half: int) -> int:
+    """Thirty-two bits as a signed integer, which operators on bits give."""
+    half &= 0xFFFFFFFF
+    return half - (1 << 32) if half >= 1 << 31 else half

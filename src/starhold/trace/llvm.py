@@ -1,0 +1,275 @@
+"""Prints a program as LLVM's intermediate representation, for one lane or for W lanes in explicit vectors.
+
+No operation is reassociated or contracted. Lanes go through loops together: a lane that is done keeps what its slots hold
+and writes nothing, by masks.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import Any, ClassVar
+
+from starhold.algebra.operations import INDEX, NUMBER, STATIC, TRUTH, UNIFORM, WORD
+from starhold.trace.program import Branch, Call, Function, Load, Loop, Op, Program, Store, Value
+
+ATTRIBUTES = 'attributes #0 = { nounwind "prefer-vector-width"="512" "min-legal-vector-width"="512" }'
+
+
+def hexadecimal(number: float) -> str:
+    """The bits of a double, as LLVM writes a constant of any value."""
+    return "0x" + struct.pack(">d", number).hex().upper()
+
+
+def check_apart(program: Program) -> None:
+    """ValueError for a program whose lanes would write to the same memory."""
+    if common := [memory.name for memory in program.memories if memory.writable and not memory.lanes]:
+        raise ValueError(f"{', '.join(common)}: all lanes write to the same memory")
+
+
+class Types:
+    """Names of types and constants for so many lanes."""
+
+    def __init__(self, width: int, lane: str = "0") -> None:
+        self.width = width
+        lanes = "{}" if width == 1 else f"<{width} x {{}}>"
+        self.names = {NUMBER: lanes.format("double"), TRUTH: lanes.format("i1"), WORD: lanes.format("i64")}
+        self.names |= {INDEX: "i64", UNIFORM: "i1"}
+        self.suffix, self.words = ("f64", "i64") if width == 1 else (f"v{width}f64", f"v{width}i64")
+        self.fields = {
+            "number": self.names[NUMBER],
+            "truth": self.names[TRUTH],
+            "word": self.names[WORD],
+            "suffix": self.suffix,
+            "words": self.words,
+            "yes": self.constant(True, TRUTH),
+            "zero": self.constant(0, WORD),
+            "lanes": lane if width == 1 else "<" + ", ".join(f"i64 {lane}" for lane in range(width)) + ">",
+        }
+
+    def constant(self, value: Any, kind: str) -> str:
+        """A Python number as a constant."""
+        if kind == NUMBER:
+            single, text = "double", hexadecimal(float(value))
+        elif kind == TRUTH:
+            single, text = "i1", str(bool(value)).lower()
+        else:
+            single, text = "i64", str(value if value < 1 << 63 else value - (1 << 64))
+        return text if self.width == 1 or kind in (INDEX, UNIFORM) else f"splat ({single} {text})"
+
+
+class Llvm:
+    """The text of a program. Memories are pointers: a memory of lanes holds W numbers for each index."""
+
+    convention: ClassVar[str] = ""
+    """How what is run is called, where not as C calls it."""
+    passed: ClassVar[tuple[str, ...]] = ()
+    """Integers that every function is given last."""
+    lane: ClassVar[str] = "0"
+    """The number of the lane where there is one alone."""
+
+    def __init__(self, program: Program, width: int) -> None:
+        if width > 1:
+            check_apart(program)
+        self.program, self.types = program, Types(width, self.lane)
+        self.lines: list[str] = []
+        self.label = ""
+        self.count = 0
+        self.text = [*self._declarations(), ATTRIBUTES]
+        for function in program.functions:
+            self._define(function, masked=function is not program.main and width > 1)
+
+    def __str__(self) -> str:
+        return "\n".join(self.text) + "\n"
+
+    def _declarations(self) -> list[str]:
+        t = self.types
+        number, word = t.names[NUMBER], t.names[WORD]
+        found = [
+            f"declare {number} @llvm.sqrt.{t.suffix}({number})",
+            f"declare {word} @llvm.fshl.{t.words}({word}, {word}, {word})",
+        ]
+        if t.width > 1:
+            found.append(f"declare void @llvm.masked.store.{t.suffix}.p0({number}, ptr, i32, {t.names[TRUTH]})")
+        return found
+
+    # Text of the parts.
+
+    def _put(self, line: str) -> None:
+        self.lines.append("  " + line)
+
+    def _new(self) -> str:
+        self.count += 1
+        return f"%.{self.count}"
+
+    def _let(self, line: str) -> str:
+        name = self._new()
+        self._put(f"{name} = {line}")
+        return name
+
+    def _value(self, value: Value, kind: str) -> str:
+        if isinstance(value, str):
+            return value if value.startswith("%") or " " in value else f"%{value}"
+        return self.types.constant(value, kind)
+
+    def _typed(self, value: Value, kind: str) -> str:
+        return f"{self.types.names[kind]} {self._value(value, kind)}"
+
+    def _splat(self, single: str, value: str, kind: str, name: str | None = None) -> str:
+        """A value for all lanes from one that they share."""
+        name = name or self._new()
+        if self.types.width == 1:
+            self._put(f"{name} = bitcast {single} {value} to {single}")
+            return name
+        many = self.types.names[kind]
+        first = self._let(f"insertelement {many} poison, {single} {value}, i64 0")
+        self._put(f"{name} = shufflevector {many} {first}, {many} poison, <{self.types.width} x i32> zeroinitializer")
+        return name
+
+    def _begin_block(self, label: str) -> None:
+        self._put(f"\n{label}:")
+        self.label = label
+
+    # Functions.
+
+    def _parameters(self, function: Function) -> list[tuple[str, str]]:
+        pointers = [("ptr noalias", f"%{memory.name}") for memory in self.program.memories]
+        if function is self.program.main:
+            return pointers + [("i64", f"%{name}" if kind == INDEX else f"%{name}.given") for name, kind in function.params]
+        own = [(self.types.names[kind], f"%{name}") for name, kind in function.params]
+        return pointers + own + [("i64", name) for name in self.passed]
+
+    def _gives(self, function: Function) -> str:
+        return "{ " + ", ".join(self.types.names[kind] for _, kind in function.outs) + " }" if function.outs else "void"
+
+    def _define(self, function: Function, masked: bool) -> None:
+        self.lines = []
+        self._begin_block(".entry")
+        main = function is self.program.main
+        if main:
+            self._begin(function)
+        self._block(function.body, "%.mask" if masked else None)
+        gives, out = self._gives(function), ""
+        for place, (value, kind) in enumerate(function.outs):
+            out = self._let(f"insertvalue {gives} {out or 'poison'}, {self._typed(value, kind)}, {place}")
+        parameters = self._parameters(function) + [(self.types.names[TRUTH], "%.mask")] * masked
+        listed = ", ".join(f"{kind} {name}" for kind, name in parameters)
+        head = f"define {self.convention if main else 'internal '}{gives} @{function.name}({listed}) #0 {{"
+        self.text += [head, *self.lines, f"  ret {gives} {out}".rstrip(), "}"]
+
+    def _begin(self, main: Function) -> None:
+        """What comes first in what is run."""
+        for name, kind in main.params:
+            if kind == WORD:
+                self._splat("i64", f"%{name}.given", WORD, f"%{name}")
+
+    def _call(self, s: Call, mask: str | None) -> None:
+        given = [f"ptr %{memory.name}" for memory in self.program.memories]
+        given += [self._typed(value, kind) for value, (_, kind) in zip(s.args, s.function.params, strict=True)]
+        given += [f"i64 {name}" for name in self.passed]
+        if self.types.width > 1:
+            given.append(self._typed(mask or self.types.fields["yes"], TRUTH))
+        gives = self._gives(s.function)
+        line = f"call {gives} @{s.function.name}({', '.join(given)})"
+        if not s.function.outs:
+            self._put(line)
+            return
+        out = self._let(line)
+        for place, (name, _) in enumerate(s.refs):
+            self._put(f"%{name} = extractvalue {gives} {out}, {place}")
+
+    # Statements.
+
+    def _block(self, block: tuple[Any, ...], mask: str | None) -> None:
+        for s in block:
+            if isinstance(s, Op):
+                self._op(s)
+            elif isinstance(s, Load):
+                self._load(s)
+            elif isinstance(s, Store):
+                self._store(s, mask)
+            elif isinstance(s, Call):
+                self._call(s, mask)
+            elif isinstance(s, Branch):
+                self._branch(s, mask)
+            else:
+                self._loop(s, mask)
+
+    def _op(self, s: Op) -> None:
+        values: list[str] = []
+        kinds = s.operation.takes
+        for value, kind in zip(s.args, kinds, strict=True):
+            # What a word is turned by is a word of its own here.
+            values.append(self._value(value, WORD if kind == STATIC else kind))
+        line = s.operation.meanings["llvm"].format(*values, **self.types.fields)
+        if INDEX in kinds and s.operation.gives in (NUMBER, WORD):
+            single = {NUMBER: "double", WORD: "i64"}[s.operation.gives]
+            self._splat(single, self._let(line), s.operation.gives, f"%{s.ref}")
+        else:
+            self._put(f"%{s.ref} = {line}")
+
+    def _address(self, name: str, index: Value) -> str:
+        kind = self.types.names[NUMBER] if self.program.memory(name).lanes else "double"
+        return self._let(f"getelementptr {kind}, ptr %{name}, {self._typed(index, INDEX)}")
+
+    def _load(self, s: Load) -> None:
+        place = self._address(s.memory, s.index)
+        if self.program.memory(s.memory).lanes or self.types.width == 1:
+            self._put(f"%{s.ref} = load {self.types.names[NUMBER]}, ptr {place}")
+        else:
+            self._splat("double", self._let(f"load double, ptr {place}"), NUMBER, f"%{s.ref}")
+
+    def _store(self, s: Store, mask: str | None) -> None:
+        value, place = self._typed(s.value, NUMBER), self._address(s.memory, s.index)
+        if mask is None:
+            self._put(f"store {value}, ptr {place}")
+            return
+        t = self.types
+        where = self._typed(mask, TRUTH)
+        self._put(f"call void @llvm.masked.store.{t.suffix}.p0({value}, ptr {place}, i32 {8 * t.width}, {where})")
+
+    def _branch(self, s: Branch, mask: str | None) -> None:
+        at = self._new()[2:]
+        self._put(f"br i1 {self._value(s.truth, UNIFORM)}, label %then.{at}, label %past.{at}")
+        self._begin_block(f"then.{at}")
+        self._block(s.body, mask)
+        self._put(f"br label %past.{at}")
+        self._begin_block(f"past.{at}")
+
+    def _loop(self, s: Loop, mask: str | None) -> None:
+        at, truth, yes = self._new()[2:], self.types.names[TRUTH], self.types.fields["yes"]
+        # Lanes that are not done yet; on one lane the branch says it.
+        narrows = s.done is not None and self.types.width > 1
+        on, before = f"%.on{at}", mask or yes
+        first = self.label
+        self._put(f"br label %head.{at}")
+        self._begin_block(f"head.{at}")
+        start = len(self.lines)
+        self._block(s.head, mask)
+        more = self._let(f"icmp slt i64 %{s.counter}, {self._value(s.most, INDEX)}")
+        if s.done is not None:
+            go = self._let(f"xor {self._typed(s.done, TRUTH)}, {yes}")
+            if narrows:
+                mask = self._let(f"and {truth} {on}, {go}")
+                bits = self._let(f"bitcast {truth} {mask} to i{self.types.width}")
+                go = self._let(f"icmp ne i{self.types.width} {bits}, 0")
+            more = self._let(f"and i1 {more}, {go}")
+        asked = self.label
+        self._put(f"br i1 {more}, label %turn.{at}, label %past.{at}")
+        self._begin_block(f"turn.{at}")
+        self._block(s.body, mask)
+        phis = [(s.counter, "i64", "0", self._let(f"add i64 %{s.counter}, 1"))]
+        for slot in s.slots:
+            kind, after = self.types.names[slot.kind], self._value(slot.after, slot.kind)
+            if narrows:
+                after = self._let(f"select {truth} {mask}, {kind} {after}, {kind} %{slot.name}")
+            phis.append((slot.name, kind, self._value(slot.before, slot.kind), after))
+        if narrows:
+            phis.append((on[1:], truth, before, mask or before))
+        self.lines[start:start] = [
+            f"  %{name} = phi {kind} [ {first_value}, %{first} ], [ {next_value}, %{self.label} ]"
+            for name, kind, first_value, next_value in phis
+        ]
+        self._put(f"br label %head.{at}")
+        self._begin_block(f"past.{at}")
+        for slot in s.slots:
+            self._put(f"%{slot.end} = phi {self.types.names[slot.kind]} [ %{slot.name}, %{asked} ]")

@@ -1,0 +1,81 @@
+"""Compiles programs for this processor and calls them."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.trace.llvm import Llvm
+from starhold.trace.program import Call, Program, statements
+
+ALIGNMENT = 64
+"""Bytes: the widest vector of any processor that is met today."""
+
+
+@cache
+def _llvm() -> Any:
+    """The library, loaded when the first kernel is compiled."""
+    llvm: Any = import_module("llvmlite.binding")
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm
+
+
+def _machine() -> Any:
+    """This processor, with all it can do. An engine takes the description over, so each needs its own."""
+    llvm = _llvm()
+    target, features = llvm.Target.from_default_triple(), llvm.get_host_cpu_features().flatten()
+    return target.create_target_machine(opt=3, cpu=llvm.get_host_cpu_name(), features=features)
+
+
+def widest() -> int:
+    """Lanes in flight at once on this processor that fly fastest: two of its widest registers where there are 32 of them,
+    one where there are 16."""
+    return 16 if _llvm().get_host_cpu_features().get("avx512f") else 4
+
+
+def load(program: Program, width: int, passes: bool | None = None) -> Callable[..., None]:
+    """The program as a function of this process, for so many lanes at once: addresses of the memories (a memory of lanes
+    holds `width` numbers for each index, aligned to their size), then counts and words. It lets go of the interpreter.
+
+    passes: whether LLVM reworks what is printed before it makes code of it; left open, where that brings more than it costs:
+    on one lane, for the matrices of a law that solves a program.
+    """
+    if passes is None:
+        passes = width == 1 and any(isinstance(s, Call) for s in statements(program.main.body))
+    llvm, machine = _llvm(), _machine()
+    module = llvm.parse_assembly(str(Llvm(program, width)))
+    module.verify()
+    if passes:
+        options = llvm.create_pipeline_tuning_options(speed_level=3)
+        options.slp_vectorization = True
+        builder = llvm.create_pass_builder(machine, options)
+        builder.getModulePassManager().run(module, builder)
+    engine = llvm.create_mcjit_compiler(module, machine)
+    engine.finalize_object()
+    kinds = [ctypes.c_void_p] * len(program.memories) + [ctypes.c_int64] * len(program.main.params)
+    kernel: Any = ctypes.CFUNCTYPE(None, *kinds)(engine.get_function_address(program.main.name))
+    # The code lives as long as its engine.
+    kernel.engine = engine
+    return kernel
+
+
+def aligned(*shape: int) -> NDArray[np.float64]:
+    """An array of zeros that begins where a whole vector may be read at once."""
+    size = int(np.prod(shape))
+    step = max(ALIGNMENT, 8 * shape[-1]) // 8 if shape else 8
+    store = np.zeros(size + step)
+    start = -(store.ctypes.data // 8) % step
+    return store[start : start + size].reshape(shape)
+
+
+def word(number: int) -> int:
+    """A seed or a run's number as the signed integer that a kernel takes."""
+    number &= 0xFFFFFFFFFFFFFFFF
+    return number - (1 << 64) if number >= 1 << 63 else number

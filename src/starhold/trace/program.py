@@ -1,0 +1,263 @@
+"""What a trace is: a tree of blocks. A block is a list of operations, stores, loops, branches and calls."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any, NamedTuple, TypeAlias
+
+from starhold.algebra.operations import Operation
+
+Value: TypeAlias = Any
+"""The name of what an earlier statement gave (a str), or a constant (a float, bool or int)."""
+
+
+class Op(NamedTuple):
+    """ref = operation(args)."""
+
+    ref: str
+    operation: Operation
+    args: tuple[Value, ...]
+
+
+class Load(NamedTuple):
+    """ref = memory[index]."""
+
+    ref: str
+    memory: str
+    index: Value
+
+
+class Store(NamedTuple):
+    """memory[index] = value."""
+
+    memory: str
+    index: Value
+    value: Value
+
+
+class Slot(NamedTuple):
+    """A variable of a loop: called `name` within it and `name` with an underscore after it; what it holds before the first
+    turn, and what each turn makes of it."""
+
+    name: str
+    kind: str
+    before: Value
+    after: Value
+
+    @property
+    def end(self) -> str:
+        """Its name after the loop."""
+        return self.name + "_"
+
+
+class Loop(NamedTuple):
+    """Repeat the body at most so many times; with `done`, until that holds at the start of a turn, which `head` computes."""
+
+    counter: str
+    most: Value
+    slots: tuple[Slot, ...]
+    head: tuple[Any, ...]
+    done: Value | None
+    body: tuple[Any, ...]
+
+
+class Branch(NamedTuple):
+    """Run the body where a truth that all lanes share holds."""
+
+    truth: Value
+    body: tuple[Any, ...]
+
+
+class Call(NamedTuple):
+    """refs = function(args)."""
+
+    refs: tuple[tuple[str, str], ...]
+    function: Function
+    args: tuple[Value, ...]
+
+
+Block: TypeAlias = tuple[Any, ...]
+
+
+class Function(NamedTuple):
+    """A block of its own; params and outs are pairs of a name (or constant) and a kind."""
+
+    name: str
+    doc: str
+    params: tuple[tuple[str, str], ...]
+    body: Block
+    outs: tuple[tuple[Value, str], ...]
+
+
+class Memory(NamedTuple):
+    """Numbers that a program is given: a block of them for each lane, or one for all; size, where it is known."""
+
+    name: str
+    lanes: bool
+    writable: bool
+    size: int | None = None
+
+
+class Program(NamedTuple):
+    """Functions in the order of their definition, the last of which is what is run; the memories it is given, in order."""
+
+    functions: tuple[Function, ...]
+    memories: tuple[Memory, ...]
+
+    @property
+    def main(self) -> Function:
+        """What is run."""
+        return self.functions[-1]
+
+    def memory(self, name: str) -> Memory:
+        """The memory of this name."""
+        return next(memory for memory in self.memories if memory.name == name)
+
+
+def statements(block: Block) -> Iterator[Any]:
+    """All statements of a block and of those within it, but not of the functions it calls."""
+    for s in block:
+        yield s
+        if isinstance(s, Loop):
+            yield from statements(s.head)
+        if isinstance(s, (Loop, Branch)):
+            yield from statements(s.body)
+
+
+def reads(block: Block) -> Iterator[Value]:
+    """The names that a block reads, with repetitions, and constants."""
+    for s in statements(block):
+        if isinstance(s, (Op, Call)):
+            yield from s.args
+        elif isinstance(s, Load):
+            yield s.index
+        elif isinstance(s, Store):
+            yield from (s.index, s.value)
+        elif isinstance(s, Branch):
+            yield s.truth
+        else:
+            yield from (s.most, s.done, *(x for slot in s.slots for x in (slot.before, slot.after)))
+
+
+def writes(block: Block) -> bool:
+    """Whether a block, or a function that it calls, writes to memory."""
+    return any(isinstance(s, Store) or (isinstance(s, Call) and writes(s.function.body)) for s in statements(block))
+
+
+def touched(program: Program, function: Function) -> list[Memory]:
+    """The memories that a function or those it calls use, in the program's order."""
+    names: set[str] = set()
+    for s in statements(function.body):
+        if isinstance(s, (Load, Store)):
+            names.add(s.memory)
+        elif isinstance(s, Call):
+            names |= {memory.name for memory in touched(program, s.function)}
+    return [memory for memory in program.memories if memory.name in names]
+
+
+def prune(block: Block, outs: Iterable[Value]) -> tuple[Block, dict[str, Value]]:
+    """The block without operations and slots that nobody reads, and with slots that never change replaced by what they
+    hold; and what stands for their names now."""
+    wanted, names = set(outs), dict[str, Value]()
+    # A loop within may show that a slot of the loop round it never changes either.
+    while True:
+        found: dict[str, Value] = {}
+        block = _settled(block, found)
+        if not found:
+            break
+        wanted = {renamed(out, found) for out in wanted}
+        names = {name: renamed(value, found) for name, value in names.items()} | found
+    return _kept(block, _live(block, wanted)), names
+
+
+def single_turns(function: Function) -> Function:
+    """The function with what the loops of one turn hold in it read where it comes from: such a loop is a branch, and what
+    only its slots read is gone."""
+    names: dict[str, Value] = {}
+    for s in statements(function.body):
+        if isinstance(s, Loop) and s.most == 1:
+            names[s.counter] = 0
+            names.update({slot.name: renamed(slot.before, names) for slot in s.slots})
+    body, more = prune(_settled(function.body, names), [out for out, _ in function.outs])
+    names = {name: renamed(value, more) for name, value in names.items()} | more
+    return function._replace(body=body, outs=tuple((renamed(out, names), kind) for out, kind in function.outs))
+
+
+def renamed(value: Value, names: dict[str, Value]) -> Value:
+    """What stands for a value."""
+    return names.get(value, value) if isinstance(value, str) else value
+
+
+def _settled(block: Block, names: dict[str, Value]) -> Block:
+    """The block with settled slots replaced; `names` says by what, and grows."""
+    found: list[Any] = []
+    for s in block:
+        if isinstance(s, Loop):
+            slots = [slot._replace(before=renamed(slot.before, names)) for slot in s.slots]
+            # A slot that each turn hands on as it is.
+            for slot in slots:
+                if slot.after == slot.name or (not isinstance(slot.after, str) and _same(slot.after, slot.before)):
+                    names[slot.name] = names[slot.end] = slot.before
+            head, body = _settled(s.head, names), _settled(s.body, names)
+            kept = tuple(slot._replace(after=renamed(slot.after, names)) for slot in slots if slot.end not in names)
+            s = Loop(s.counter, renamed(s.most, names), kept, head, renamed(s.done, names), body)
+        elif isinstance(s, Branch):
+            s = Branch(renamed(s.truth, names), _settled(s.body, names))
+        elif isinstance(s, (Op, Call)):
+            s = s._replace(args=tuple(renamed(x, names) for x in s.args))
+        elif isinstance(s, Load):
+            s = s._replace(index=renamed(s.index, names))
+        else:
+            s = Store(s.memory, renamed(s.index, names), renamed(s.value, names))
+        found.append(s)
+    return tuple(found)
+
+
+def _same(a: Value, b: Value) -> bool:
+    return type(a) is type(b) and repr(a) == repr(b)
+
+
+def _live(block: Block, outs: Iterable[Value]) -> set[Value]:
+    """What is read for the sake of the outs, of what is written, or of functions that are called."""
+    live, before = set(outs), -1
+    # Backwards, so that what is read by what is read is mostly found at once.
+    order = [*statements(block)][::-1]
+    acts = {id(s): _acts(s.body) for s in order if isinstance(s, (Loop, Branch))}
+    while before != (before := len(live)):
+        for s in order:
+            if isinstance(s, (Op, Load)):
+                if s.ref in live:
+                    live.update(reads((s,)))
+            elif isinstance(s, Loop):
+                slots = [slot for slot in s.slots if {slot.name, slot.end} & live]
+                if slots or acts[id(s)]:
+                    live.update((s.most, s.done, *(x for slot in slots for x in (slot.before, slot.after))))
+            elif isinstance(s, Branch):
+                if acts[id(s)]:
+                    live.add(s.truth)
+            else:
+                live.update(reads((s,)))
+    return live
+
+
+def _acts(block: Block) -> bool:
+    """Whether a block does anything but compute."""
+    return any(isinstance(s, (Store, Call)) for s in statements(block))
+
+
+def _kept(block: Block, live: set[Value]) -> Block:
+    found: list[Any] = []
+    for s in block:
+        if isinstance(s, Loop):
+            slots = tuple(slot for slot in s.slots if {slot.name, slot.end} & live)
+            s = s._replace(slots=slots, head=_kept(s.head, live), body=_kept(s.body, live))
+            if not slots and not _acts(s.body):
+                continue
+        elif isinstance(s, Branch):
+            s = s._replace(body=_kept(s.body, live))
+            if not _acts(s.body):
+                continue
+        elif isinstance(s, (Op, Load)) and s.ref not in live:
+            continue
+        found.append(s)
+    return tuple(found)

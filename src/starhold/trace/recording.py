@@ -1,0 +1,324 @@
+"""Keeps the notes while equations are recorded: what is done to handles becomes a tree of blocks."""
+
+from __future__ import annotations
+
+import inspect
+from collections import Counter
+from collections.abc import Callable, Generator, Iterable
+from contextlib import contextmanager
+from typing import Any, NoReturn
+
+from starhold.algebra.operations import INDEX, NUMBER, OPERATIONS, STATIC, TRUTH, WORD, Operation
+from starhold.algebra.structure import leaves, mapped
+from starhold.algebra.structured import RECORDER, Buffer
+from starhold.trace.handles import HANDLES, Handle, Index, Number, kind_of, refuse
+from starhold.trace.program import (
+    Branch,
+    Call,
+    Function,
+    Load,
+    Loop,
+    Memory,
+    Op,
+    Program,
+    Slot,
+    Store,
+    Value,
+    prune,
+    reads,
+    renamed,
+    writes,
+)
+
+_WORDS = """
+    arguments async auto await bool break case catch char class const continue debugger default delete do double else enum
+    eval export extends extern false finally float for function goto if implements import in inline instanceof int
+    interface let long new null package private protected public register restrict return short signed sizeof static struct
+    super switch this throw true try typedef typeof undefined union unsigned var void volatile while with yield
+    sqrt memcpy uint64_t INFINITY NAN NULL UINT64_C NaN Infinity Math Float64Array Int32Array
+    bits_of with_bits high_bits low_bits
+"""
+RESERVED = frozenset(_WORDS.split())
+"""Words of the languages printed, which no variable may be called."""
+
+
+_CONSTANTS = {NUMBER: (float, int), TRUTH: (bool,), WORD: (int,), INDEX: (int,), STATIC: (int,)}
+
+
+def _ref(value: Any) -> Value:
+    return value.ref if isinstance(value, Handle) else value
+
+
+class Cells:
+    """Memory of a trace, as the cells of a buffer."""
+
+    def __init__(self, recorder: Recorder, memory: Memory) -> None:
+        self.recorder, self.memory = recorder, memory
+
+    def __getitem__(self, index: Any) -> Number:
+        return self.recorder.load(self.memory, index)
+
+    def __setitem__(self, index: Any, value: Any) -> None:
+        self.recorder.store(self.memory, index, value)
+
+
+class _Names:
+    """Gives every variable a name of its own."""
+
+    def __init__(self, taken: Iterable[str]) -> None:
+        self._taken, self._counts = {*taken, *RESERVED}, Counter[str]()
+
+    def new(self, hint: str) -> str:
+        """The hint, or with a number. Names never end in an underscore: that marks what a loop leaves."""
+        name = hint = hint.strip("_") or "x"
+        while name in self._taken or name == "t":
+            self._counts[hint] += 1
+            name = f"{hint}{self._counts[hint]}"
+        self._taken.add(name)
+        return name
+
+
+class Recorder:
+    """Keeps what is done to handles as a tree of blocks, equal operations of a block and those round it once."""
+
+    def __init__(self) -> None:
+        self.memories: list[Memory] = []
+        self._functions: dict[Any, tuple[Function, list[int], Any]] = {}
+        self._open: list[list[Any]] = [[]]
+        self._seen: list[dict[Any, Handle]] = [{}]
+        self._names = _Names(())
+        # Of the whole program: functions are recorded within one another.
+        self._titles = _Names(())
+        self._inputs: list[tuple[str, str]] = []
+
+    def input(self, name: str, kind: str) -> Any:
+        """A count (`index`) or a `word` that the program is given."""
+        self._inputs.append((self._names.new(name), kind))
+        return HANDLES[kind](self, self._inputs[-1][0])
+
+    def memory(self, name: str, *, lanes: bool = False, writable: bool = False, size: int | None = None) -> Cells:
+        """Memory that the program is given."""
+        self.memories.append(Memory(self._names.new(name), lanes, writable, size))
+        return Cells(self, self.memories[-1])
+
+    def lane(self) -> Any:
+        """The number of the lane."""
+        return self.apply(OPERATIONS["lane"], ())
+
+    @contextmanager
+    def recording(self) -> Generator[None]:
+        """Let the structured forms of `algebra.structured` record here."""
+        token = RECORDER.set(self)
+        try:
+            yield
+        finally:
+            RECORDER.reset(token)
+
+    def program(self, name: str, doc: str = "") -> Program:
+        """What has been recorded."""
+        body, _ = prune(tuple(self._open[0]), ())
+        main = Function(self._titles.new(name), doc, tuple(self._inputs), body, ())
+        return Program((*(function for function, _, _ in self._functions.values()), main), tuple(self.memories))
+
+    def apply(self, operation: Operation, values: tuple[Any, ...]) -> Any:
+        """Record an operation."""
+        if len(values) != len(operation.takes):
+            raise TypeError(f"{operation.name} takes {len(operation.takes)} values, not {len(values)}")
+        for value, kind in zip(values, operation.takes, strict=True):
+            fits = value.kind == kind if isinstance(value, Handle) else isinstance(value, _CONSTANTS.get(kind, ()))
+            if not fits or (isinstance(value, bool) and kind != TRUTH):
+                self._unfit(operation, value, kind)
+        # A truth that is known decides.
+        if operation.name in ("both", "either"):
+            known = next((value for value in values if isinstance(value, bool)), None)
+            if known is not None:
+                other = values[1] if values[0] is known else values[0]
+                return other if known is (operation.name == "both") else known
+        refs = tuple(
+            float(value) if kind == NUMBER and not isinstance(value, Handle) else _ref(value)
+            for value, kind in zip(values, operation.takes, strict=True)
+        )
+        if operation.name == "same_index" and refs[0] == refs[1]:
+            return True
+        if operation.name in ("index_plus", "index_minus") and refs[1] == 0:
+            return values[0]
+        if operation.name == "index_plus" and refs[0] == 0:
+            return values[1]
+        if operation.name == "index_product" and 1 in refs:
+            return values[0] if refs[1] == 1 else values[1]
+        key: Any = (operation.name, *((type(r), repr(r)) for r in refs))
+        return self._once(key, lambda ref: Op(ref, operation, refs), operation.gives)
+
+    def _unfit(self, operation: Operation, value: Any, kind: str) -> NoReturn:
+        found = value.kind if isinstance(value, Handle) else type(value).__name__
+        wanted = {NUMBER: "a number", TRUTH: "a truth, as less gives", INDEX: "a count or a counter"}.get(kind, f"a {kind}")
+        instead = "number_of(index)" if found == INDEX and kind == NUMBER else wanted
+        refuse(f"{operation.name} of a value of kind {found}", instead)
+
+    def _once(self, key: Any, make: Callable[[str], Any], gives: str) -> Any:
+        for seen in self._seen:
+            if key in seen:
+                return seen[key]
+        ref = self._names.new("t")
+        self._open[-1].append(make(ref))
+        return self._seen[-1].setdefault(key, HANDLES[gives](self, ref))
+
+    def load(self, memory: Memory, index: Any) -> Number:
+        """Record memory[index]."""
+        self._check_index(index)
+        ref = _ref(index)
+        if not memory.writable:
+            return self._once(("load", memory.name, ref), lambda name: Load(name, memory.name, ref), NUMBER)
+        self._open[-1].append(Load(self._names.new("t"), memory.name, ref))
+        return Number(self, self._open[-1][-1].ref)
+
+    def store(self, memory: Memory, index: Any, value: Any) -> None:
+        """Record memory[index] = value."""
+        self._check_index(index)
+        if kind_of(value) != NUMBER:
+            refuse(f"a value of kind {kind_of(value)} in a buffer", "a number")
+        if not memory.writable:
+            refuse("writing to a table", "a buffer of the law's memory")
+        self._open[-1].append(Store(memory.name, _ref(index), value.ref if isinstance(value, Handle) else float(value)))
+
+    def _check_index(self, index: Any) -> None:
+        if not isinstance(index, Index) and type(index) is not int:
+            refuse("an index made of numbers", "a count, a loop's counter, or made of such by + - *")
+
+    def loop(
+        self, most: Any, done: Callable[..., Any] | None, body: Callable[..., Any], state: tuple[Any, ...], *, counted: bool
+    ) -> tuple[Any, ...]:
+        """Record `repeat` (counted: the body takes the counter) or `until`."""
+        self._check_index(most)
+        words = [*inspect.signature(body).parameters] + ["x"] * len(state)
+        counter = self._names.new(words.pop(0).strip("_") if counted else "turn")
+        names = self._named(state, words)
+        inner = self._handles(state, names)
+        head, stop = self._block(done, *inner) if done is not None else ((), None)
+        if done is not None:
+            self._check_done(head, stop)
+        turn = [Index(self, counter)] if counted else []
+        block, after = self._block(body, *turn, *inner)
+        after = () if after is None else after
+        kinds = [kind for _, kind in names]
+        if INDEX in kinds:
+            refuse("an index handed from turn to turn of a loop", "the loop's counter, or number_of(index)")
+        found = [kind_of(x) for x in leaves(after) if not isinstance(x, Buffer)]
+        if found != kinds:
+            refuse(
+                f"a turn of a loop that takes {', '.join(kinds) or 'nothing'} and gives {', '.join(found) or 'nothing'}",
+                "the same",
+            )
+        pairs = zip(names, self._refs(state), self._refs(after), strict=True)
+        slots = tuple(Slot(name, kind, before, then) for (name, kind), before, then in pairs)
+        self._open[-1].append(Loop(counter, _ref(most), slots, head, None if done is None else _ref(stop), block))
+        return self._handles(state, [(name + "_", kind) for name, kind in names])
+
+    def _check_done(self, head: tuple[Any, ...], stop: Any) -> None:
+        if kind_of(stop) != TRUTH:
+            refuse(f"a loop that ends by a value of kind {kind_of(stop)}", "a truth, as less gives")
+        if writes(head):
+            refuse("writing to a buffer to find out whether a loop is done", "writing in the turns of the loop")
+
+    def branch(self, truth: Any, body: Callable[..., Any]) -> None:
+        """Record `at`."""
+        if isinstance(truth, bool):
+            return body() if truth else None
+        block, _ = self._block(body)
+        self._open[-1].append(Branch(_ref(truth), block))
+        return None
+
+    def call(self, equation: Callable[..., Any], values: tuple[Any, ...]) -> Any:
+        """Record a call of an equation that is recorded once for each form of its arguments."""
+        flat = [value for leaf in leaves(values) for value in self._parts(leaf)]
+        key = (equation, self._form(values))
+        if key not in self._functions:
+            self._functions[key] = self._define(equation, values)
+        function, kept, out = self._functions[key]
+        refs = tuple((self._names.new("r"), kind) for _, kind in function.outs)
+        self._open[-1].append(Call(refs, function, tuple(_ref(flat[place]) for place in kept)))
+        return self._handles(out, list(refs))
+
+    def _define(self, equation: Callable[..., Any], values: tuple[Any, ...]) -> tuple[Function, list[int], Any]:
+        outer = self._open, self._seen, self._names
+        self._open, self._seen, self._names = [], [], _Names(memory.name for memory in self.memories)
+        params: list[tuple[str, str]] = []
+
+        def formal(word: str) -> Callable[[Any], Any]:
+            def make(leaf: Any) -> Any:
+                if isinstance(leaf, Buffer):
+                    return Buffer(leaf.cells, make(leaf.base), make(leaf.size))
+                if type(leaf) in (int, bool):
+                    return leaf
+                params.append((self._names.new(word), kind_of(leaf)))
+                return HANDLES[params[-1][1]](self, params[-1][0])
+
+            return make
+
+        words = [*inspect.signature(equation).parameters]
+        given = [mapped(value, formal(word)) for value, word in zip(values, words, strict=True)]
+        body, out = self._block(equation, *given)
+        outs = self._refs(out)
+        body, names = prune(body, outs)
+        ends = tuple((renamed(x, names), kind_of(leaf)) for x, leaf in zip(outs, leaves(out), strict=True))
+        self._open, self._seen, self._names = outer
+        used = {*reads(body), *(x for x, _ in ends)}
+        kept = [place for place, (name, _) in enumerate(params) if name in used]
+        params = [params[place] for place in kept]
+        doc = inspect.cleandoc(equation.__doc__ or "")
+        return Function(self._titles.new(equation.__name__), doc, tuple(params), body, ends), kept, out
+
+    def _parts(self, leaf: Any) -> list[Any]:
+        """What of an argument is passed on: what is not known while recording."""
+        if isinstance(leaf, Buffer):
+            return self._parts(leaf.base) + self._parts(leaf.size)
+        return [] if type(leaf) in (int, bool) else [leaf]
+
+    def _form(self, value: Any) -> Any:
+        """Equal for arguments that one recording serves."""
+        if isinstance(value, tuple):
+            return (type(value), *(self._form(part) for part in value))  # pyright: ignore
+        if isinstance(value, Buffer):
+            return (value.cells.memory.name, self._form(value.base), self._form(value.size))
+        if value is None or type(value) in (int, bool):
+            return (type(value), value)
+        return kind_of(value)
+
+    def _block(self, body: Callable[..., Any], *values: Any) -> tuple[tuple[Any, ...], Any]:
+        self._open.append([])
+        self._seen.append({})
+        out = body(*values)
+        self._seen.pop()
+        return tuple(self._open.pop()), out
+
+    def _named(self, state: tuple[Any, ...], words: list[str]) -> list[tuple[str, str]]:
+        found: list[tuple[str, str]] = []
+        for part, word in zip(state, words, strict=False):
+            for label, leaf in _labelled(part, word.strip("_") or "x"):
+                if not isinstance(leaf, Buffer):
+                    found.append((self._names.new(label), kind_of(leaf)))
+        return found
+
+    def _handles(self, like: Any, names: list[tuple[str, str]]) -> Any:
+        source = iter(names)
+
+        def make(leaf: Any) -> Any:
+            if isinstance(leaf, Buffer):
+                return leaf
+            name, kind = next(source)
+            return HANDLES[kind](self, name)
+
+        return mapped(like, make)
+
+    def _refs(self, value: Any) -> list[Value]:
+        return [float(leaf) if type(leaf) is int else _ref(leaf) for leaf in leaves(value) if not isinstance(leaf, Buffer)]
+
+
+def _labelled(value: Any, label: str) -> Generator[tuple[str, Any]]:
+    """The leaves of a nested value, each under the name of its field."""
+    if isinstance(value, tuple):
+        names = getattr(value, "_fields", [label] * len(value))  # pyright: ignore
+        for part, name in zip(value, names, strict=True):  # pyright: ignore
+            yield from _labelled(part, name)
+    elif value is not None:
+        yield label, value

@@ -1,0 +1,360 @@
+"""Prints a program as text that people read: what C and JavaScript have in common.
+
+An operation that is read once is written where it is read, unless the text grows long; so is what reads a table, but not
+what reads memory that may be written to in between. Loops of the trace are loops, and those of one turn are branches.
+"""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+from types import MappingProxyType
+from typing import Any, ClassVar, NamedTuple
+
+from starhold.algebra.operations import INDEX, NUMBER, TRUTH, UNIFORM
+from starhold.trace.program import (
+    Branch,
+    Call,
+    Function,
+    Load,
+    Loop,
+    Memory,
+    Op,
+    Program,
+    Store,
+    Value,
+    reads,
+    single_turns,
+    statements,
+)
+
+WIDTH = 110
+"""Characters of a line, where one can be broken."""
+LONG, SHORT = 72, 28
+"""Characters of an expression that is written where it is read: of one that is read once, and of any made of indices."""
+
+_CALL, _UNARY, _OTHER = "()", "unary", "other"
+_LEVELS = {_CALL: 9, _UNARY: 8, "*": 7, "/": 7, "+": 6, "-": 6, "<": 5, "<=": 5, "==": 5, "===": 5,
+           "&&": 4, "||": 4, "&": 4, "|": 4, "^": 4, ">>": 4, "?": 3, _OTHER: 0}  # fmt: skip
+_BITS = ("&", "|", "^", ">>")
+
+
+class Expression(NamedTuple):
+    """A text, and the operator that binds it least."""
+
+    text: str
+    operator: str = _CALL
+
+
+@cache
+def operator_of(text: str) -> str:
+    """The operator of a text with places for its operands."""
+    if found := re.fullmatch(r"\{0\} (\S+) (?:\{1\}|\d+)", text):
+        return found[1] if found[1] in _LEVELS else _OTHER
+    if re.fullmatch(r"(-|!|\(\w+\))\{0\}", text):
+        return _UNARY
+    if re.fullmatch(r"[\w.]+(\([^()]*\))?", text):
+        return _CALL
+    return "?" if text == "{0} ? {1} : {2}" else _OTHER
+
+
+def _stands(inner: str, outer: str, place: int) -> bool:
+    """Whether an operand needs no parentheses; they are also written where only a compiler's warning asks for them."""
+    if outer == _CALL:
+        return True
+    if outer in _BITS:
+        return _LEVELS[inner] > _LEVELS["*"]
+    if outer in (_UNARY, _OTHER):
+        return inner == _CALL
+    if outer == "?":
+        return _LEVELS[inner] > 3 or (inner == "?" and place == 2)
+    if _LEVELS[inner] != _LEVELS[outer]:
+        return _LEVELS[inner] > _LEVELS[outer]
+    return place == 0 and (inner == outer or outer in "+-*/")
+
+
+def fitted(inner: Expression, outer: str, place: int) -> str:
+    """The text of an operand, in parentheses where it needs them."""
+    return inner.text if _stands(inner.operator, outer, place) else f"({inner.text})"
+
+
+class Source:
+    """The text of a program in a language with braces. Memories keep their order, and counts and words come last."""
+
+    language: ClassVar[str]
+    taken: ClassVar[frozenset[str]]
+    """What no function may be called, besides words of the language."""
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        self.lines: list[str] = []
+        self.depth = 0
+        called = _reached(program.main, {f.name: single_turns(f) for f in program.functions})
+        self.functions = {f.name: called[f.name] for f in program.functions if f.name in called}
+        self.memories = {name: self._touched(f) for name, f in self.functions.items()}
+        used = {name for f in self.functions.values() for name in names(f)} | {memory.name for memory in program.memories}
+        self.titles = _titles(list(self.functions), used | self.taken)
+        self._once: set[str] = set()
+        self._read: set[str] = set()
+        self._folded: dict[str, Expression] = {}
+        for function in self.functions.values():
+            self._prepare(function)
+            self._define(function)
+
+    @property
+    def name(self) -> str:
+        """What is called."""
+        return self.titles[self.program.main.name]
+
+    def __str__(self) -> str:
+        return "\n".join([*self._opening(), *self.lines]) + "\n"
+
+    def is_main(self, function: Function) -> bool:
+        """Whether a function is what is called."""
+        return function.name == self.program.main.name
+
+    def _touched(self, function: Function) -> list[Memory]:
+        used = {s.memory for f in _reached(function, self.functions).values() for s in statements(f.body)
+                if isinstance(s, (Load, Store))}  # fmt: skip
+        return [memory for memory in self.program.memories if memory.name in used]
+
+    # What a language says.
+
+    def _opening(self) -> list[str]:
+        """What comes before the functions."""
+        raise NotImplementedError
+
+    def _define(self, function: Function) -> None:
+        raise NotImplementedError
+
+    def _constant(self, value: Any, kind: str) -> str:
+        raise NotImplementedError
+
+    def _let(self, kind: str, name: str, text: str) -> None:
+        """Name a value."""
+        raise NotImplementedError
+
+    def _variable(self, kind: str, name: str, value: Value) -> None:
+        """Declare what changes."""
+        raise NotImplementedError
+
+    def _assign(self, kind: str, name: str, value: Value) -> None:
+        raise NotImplementedError
+
+    def _counted(self, counter: str, most: str) -> str:
+        """The head of a loop."""
+        raise NotImplementedError
+
+    def _call(self, s: Call) -> None:
+        raise NotImplementedError
+
+    # Text of the parts.
+
+    def put(self, line: str) -> None:
+        """Add a line, broken where it is long."""
+        before = "    " * self.depth
+        self.lines += textwrap.wrap(
+            line,
+            WIDTH,
+            initial_indent=before,
+            subsequent_indent=before + "    ",
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+
+    def open(self, line: str) -> None:
+        """Begin what stands in braces."""
+        self.put(line + " {")
+        self.depth += 1
+
+    def close(self) -> None:
+        """End it."""
+        self.depth -= 1
+        self.put("}")
+
+    def remark(self, text: str) -> None:
+        """Add a comment."""
+        if text:
+            text = text.replace("/*", "/ *").replace("*/", "* /")
+            first, *rest = text.splitlines()
+            self.lines += [f"/* {first}", *("   " + line if line else "" for line in rest)]
+            self.lines[-1] += " */"
+
+    def use(self, value: Value, kind: str) -> Expression:
+        """What stands for a value."""
+        if isinstance(value, str):
+            return self._folded.get(value, Expression(value))
+        text = self._constant(value, kind)
+        return Expression(text, _UNARY if text.startswith("-") else _CALL)
+
+    def text(self, value: Value, kind: str) -> str:
+        """The same where no operator is near."""
+        return self.use(value, kind).text
+
+    # Where names are read.
+
+    def _prepare(self, function: Function) -> None:
+        """Find what is read once, in the block that computes it."""
+        home: dict[str, int] = {}
+        seen: dict[Value, list[int]] = defaultdict(list)
+        blocks = 0
+
+        def walk(block: tuple[Any, ...], own: int) -> None:
+            nonlocal blocks
+            for s in block:
+                if isinstance(s, (Op, Load)):
+                    home[s.ref] = own
+                for value, times in self._operands(s):
+                    seen[value] += [own] * times
+                if isinstance(s, (Branch, Loop)):
+                    blocks += 1
+                    inner = blocks
+                    if isinstance(s, Loop):
+                        head = own if s.most == 1 else inner
+                        walk(s.head, head)
+                        seen[s.done].append(head)
+                        for slot in s.slots:
+                            seen[slot.after] += [inner] * self._halves(slot.kind)
+                    walk(s.body, inner)
+
+        walk(function.body, 0)
+        for out, kind in function.outs:
+            seen[out] += [0] * self._halves(kind)
+        self._once = {name for name, own in home.items() if seen[name] == [own]}
+        self._read = {value for value in seen if isinstance(value, str)}
+        self._folded = {}
+
+    def _operands(self, s: Any) -> Iterator[tuple[Value, int]]:
+        """What a statement reads where it stands, and how often its text says it."""
+        if isinstance(s, Op):
+            texts = self._texts(s)
+            for place, value in enumerate(s.args):
+                yield value, sum(len(re.findall(rf"\{{{place}[hl]?\}}", text)) for text in texts)
+        elif isinstance(s, Call):
+            yield from ((value, self._halves(kind)) for value, (_, kind) in zip(s.args, s.function.params, strict=True))
+        elif isinstance(s, Loop):
+            yield s.most, 1
+            yield from ((slot.before, self._halves(slot.kind)) for slot in s.slots)
+        else:
+            yield from ((value, 1) for value in reads((s._replace(body=()),) if isinstance(s, Branch) else (s,)))
+
+    def _halves(self, kind: str) -> int:
+        """How many texts a value is made of."""
+        return 1
+
+    def _texts(self, s: Op) -> Sequence[str]:
+        """The texts of an operation."""
+        return (s.operation.meanings[self.language],)
+
+    # Statements.
+
+    def _block(self, block: tuple[Any, ...]) -> None:
+        for s in block:
+            if isinstance(s, Op):
+                self._op(s)
+            elif isinstance(s, Load):
+                text = f"{s.memory}[{self.text(s.index, INDEX)}]"
+                self._keep(s.ref, NUMBER, Expression(text), moves=not self.program.memory(s.memory).writable)
+            elif isinstance(s, Store):
+                self.put(f"{s.memory}[{self.text(s.index, INDEX)}] = {self.text(s.value, NUMBER)};")
+            elif isinstance(s, Call):
+                self._call(s)
+            elif isinstance(s, Branch):
+                self.open(f"if ({self.text(s.truth, UNIFORM)})")
+                self._block(s.body)
+                self.close()
+            else:
+                self._loop(s)
+
+    def _op(self, s: Op) -> None:
+        (text,) = self._texts(s)
+        self._keep(s.ref, s.operation.gives, self.written(s, text))
+
+    def written(self, s: Op, text: str, names: Mapping[str, str] = MappingProxyType({})) -> Expression:
+        """An operation with its operands in place; names: what else its text speaks of."""
+        if s.operation.name == "same_index" and (s.args[0] == s.args[1] or not any(isinstance(x, str) for x in s.args)):
+            # Compilers warn of what is known.
+            return Expression(self._constant(s.args[0] == s.args[1], UNIFORM))
+        operator = operator_of(text)
+        values = [self.use(value, kind) for value, kind in zip(s.args, s.operation.takes, strict=True)]
+        return Expression(
+            text.format(*(fitted(value, operator, place) for place, value in enumerate(values)), **names), operator
+        )
+
+    def _keep(self, ref: str, kind: str, expression: Expression, moves: bool = True) -> None:
+        """Name a value, or keep its text for where it is read."""
+        short = kind == INDEX and len(expression.text) <= SHORT
+        if short or (moves and ref in self._once and len(expression.text) <= LONG):
+            self._folded[ref] = expression
+        else:
+            self._let(kind, ref, expression.text)
+
+    def _loop(self, s: Loop) -> None:
+        for slot in s.slots:
+            self._variable(slot.kind, slot.end, slot.before)
+        one, braces = s.most == 1, True
+        if not one:
+            self.open(self._counted(s.counter, self.text(s.most, INDEX)))
+            # What a turn begins with stays while the variables change one after another.
+            for slot in s.slots:
+                if slot.name in self._read:
+                    self._keep_slot(slot.kind, slot.name, slot.end)
+        self._block(s.head)
+        if s.done is not None and one:
+            self.open(f"if ({self._denied(self.use(s.done, TRUTH))})")
+        elif s.done is not None:
+            self.put(f"if ({self.text(s.done, TRUTH)}) break;")
+        else:
+            braces = not one
+        self._block(s.body)
+        for slot in s.slots:
+            self._assign(slot.kind, slot.end, slot.after)
+        if braces:
+            self.close()
+
+    def _keep_slot(self, kind: str, name: str, end: str) -> None:
+        self._let(kind, name, end)
+
+    def _denied(self, truth: Expression) -> str:
+        """The opposite of a truth."""
+        if truth.text.startswith("!") and truth.operator == _UNARY:
+            return re.sub(r"^\((.*)\)$", r"\1", truth.text[1:])
+        return "!" + fitted(truth, _UNARY, 0)
+
+
+def names(function: Function) -> Iterator[str]:
+    """All names within a function."""
+    yield from (name for name, _ in function.params)
+    for s in statements(function.body):
+        if isinstance(s, (Op, Load)):
+            yield s.ref
+        elif isinstance(s, Call):
+            yield from (name for name, _ in s.refs)
+        elif isinstance(s, Loop):
+            yield s.counter
+            yield from (name for slot in s.slots for name in (slot.name, slot.end))
+
+
+def _reached(function: Function, functions: dict[str, Function]) -> dict[str, Function]:
+    """A function and those that it calls, by name."""
+    found: dict[str, Function] = {}
+    left = [function.name]
+    while left:
+        name = left.pop()
+        if name not in found:
+            found[name] = functions[name]
+            left += [s.function.name for s in statements(found[name].body) if isinstance(s, Call)]
+    return found
+
+
+def _titles(names: list[str], taken: set[str]) -> dict[str, str]:
+    """What functions are called in the text: their names, numbered where those are taken."""
+    titles: dict[str, str] = {}
+    for name in names:
+        free = (f"{name}_{number}" if number else name for number in range(len(taken) + len(names) + 1))
+        titles[name] = next(title for title in free if title not in taken)
+        taken = taken | {titles[name]}
+    return titles

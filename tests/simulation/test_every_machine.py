@@ -1,0 +1,137 @@
+"""Every loop gives the same bits in plain Python, on one lane, on every lane of many, in C and in JavaScript."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from starhold.algebra.structure import flatten
+from starhold.loop.kernels import Arguments, Numbers, form, make_step, numbers_of, one, state_of
+from starhold.loop.station import StationLoop
+from starhold.simulation.lane import fly
+from starhold.simulation.lanes import simulate_many
+from tests.simulation.loops import builtin, choices
+from tests.trace.machines import LEVELS, Job, on_c, on_node
+
+# On one worker, which flies each loop in plain Python once.
+pytestmark = pytest.mark.xdist_group("every machine")
+
+STEPS = 1000
+RUN = 3
+COSTLY = 60
+"""Steps of a law that solves a program at each, in plain Python."""
+
+SLOW = pytest.mark.slow
+"""Each compiler's other level, and what takes long to compile, is left to `make test-all`."""
+
+LOOPS = builtin() | choices()
+
+
+def is_costly(name: str) -> bool:
+    return "mpc" in name
+
+
+def steps_of(name: str) -> int:
+    return COSTLY if is_costly(name) else STEPS
+
+
+class Leg(NamedTuple):
+    """A phase of a flight in plain Python: what is carried into it, the sample of its last step, what is carried on."""
+
+    phase: Any
+    begun: Any
+    sample: list[float]
+    end: Any
+
+
+@cache
+def legs(name: str) -> list[Leg]:
+    """The flight in plain Python."""
+    loop, found = LOOPS[name], list[Leg]()
+    step, key, carry = make_step(loop.parts()), (getattr(loop, "seed", 0), RUN), loop.carry()
+    for phase in loop.phases(steps_of(name)):
+        carry = phase.entered(carry)
+        # Buffers change in place.
+        begun = state_of(np.array(numbers_of(carry)), carry)
+        sample: list[float] = []
+        for k in range(phase.first, phase.last):
+            carry = step.decide(step.check(carry, k, phase.setup), k, key, phase.gains, phase.known, phase.setup)
+            sample = flatten(step.sample(carry, k, phase.setup)) if k == phase.last - 1 else sample
+            for _ in range(loop.substeps):
+                carry = step.hold(carry, phase.craft, phase.setup)
+        carry = step.check(carry, phase.last, phase.setup)
+        found.append(Leg(phase, begun, sample, carry))
+    return found
+
+
+def same(found: Any, expected: Any) -> None:
+    assert np.array_equal(np.asarray(found).view(np.uint64), np.asarray(expected).view(np.uint64))
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_one_lane(name):
+    same(numbers_of(fly(LOOPS[name], steps_of(name), run=RUN)[1]), numbers_of(legs(name)[-1].end))
+
+
+LANES = [
+    pytest.param(name, width, marks=SLOW if width == 16 and is_costly(name) else ()) for name in LOOPS for width in (8, 16)
+]
+
+
+@pytest.mark.parametrize(("name", "width"), LANES)
+def test_every_lane_of_many(name, width):
+    loop = LOOPS[name]
+    # Lanes differ in their starts, so that what is alike in all of them cannot hide a mixture; the last is the loop's own.
+    start = np.array(flatten(loop.start))
+    starts = np.repeat(start[:, None], width, axis=1)
+    differs = slice(0, 3) if isinstance(loop, StationLoop) else slice(4, 7)
+    starts[differs] = starts[differs] * np.linspace(0.3, 1.0, width) + np.linspace(1e-3, 0.0, width)
+    batch = simulate_many(loop, starts, steps_of(name), first_run=RUN - width + 1, width=width)
+    same(batch.states[:, -1], numbers_of(legs(name)[-1].end)[: len(start)])
+    assert len(np.unique(batch.states[differs.start])) == width
+
+
+@cache
+def jobs() -> list[tuple[Leg, Job]]:
+    """Every leg of every flight as a job of the printed program."""
+    programs, found = dict[Any, Any](), list[tuple[Leg, Job]]()
+    for name, loop in LOOPS.items():
+        for leg in legs(name):
+            phase = leg.phase
+            numbers = Numbers(phase.gains, phase.known, phase.craft, phase.setup)
+            arguments, steps = Arguments(*numbers), phase.last - phase.first
+            key = (loop.parts(), form(leg.begun), form(numbers), loop.substeps)
+            if key not in programs:
+                programs[key] = one(make_step(loop.parts()), leg.begun, numbers, loop.substeps)
+            memories = {"carry": np.array(numbers_of(leg.begun)), "record": np.zeros(len(leg.sample))}
+            memories |= {"shared": arguments.shared, "own": np.zeros(0), "tables": arguments.tables}
+            counts = {"first": phase.first, "groups": 1, "each": steps, "place": steps - 1, "row": 0}
+            counts |= {"seed": getattr(loop, "seed", 0), "run": RUN}
+            found.append((leg, Job(programs[key], memories, counts)))
+    return found
+
+
+def compare(results: list[Any]) -> None:
+    for (leg, _), found in zip(jobs(), results, strict=True):
+        same(found["carry"], numbers_of(leg.end))
+        same(found["record"], leg.sample)
+
+
+@pytest.mark.parametrize(
+    ("compiler", "level"),
+    [
+        ("gcc", LEVELS[0]),
+        ("clang", LEVELS[1]),
+        pytest.param("gcc", LEVELS[1], marks=SLOW),
+        pytest.param("clang", LEVELS[0], marks=SLOW),
+    ],
+)
+def test_c(compiler, level):
+    compare(on_c([job for _, job in jobs()], compiler, *level))
+
+
+def test_javascript():
+    compare(on_node([job for _, job in jobs()]))

@@ -1,0 +1,126 @@
+"""What other machines are given: every operation on numbers rounds to nearest, and none is fused with another."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from typing import Any
+
+import llvmlite.binding as llvm
+import pytest
+
+from starhold.algebra.operations import INDEX, WORD
+from starhold.algebra.scalar import less, sqrt, where
+from starhold.algebra.structured import Buffer, function, repeat, until
+from starhold.algebra.words import number_of, small_number, word_add, word_and
+from starhold.trace.llvm import Llvm
+from starhold.trace.program import Memory
+from starhold.trace.ptx import assembly, ptx
+from tests.trace.machines import Subject
+
+FUSED = re.compile(r"\b(?:v?f(?:n?m(?:add|sub|la|ls)|ma)\w*|f64x2\.\w*madd|fmaf?|__fma)\b", re.I)
+"""Names of fused operations of all of these machines."""
+
+
+@function
+def fall(cells: Buffer, x: float, rate: float) -> float:
+    """A sum of products with numbers in memory, where a fused operation would be of use."""
+
+    def turn(k: Any, x: Any) -> Any:
+        cells[k] = x * rate + cells[k]
+        return (x - rate * cells[k],)
+
+    return repeat(cells.size, turn, x)[0]
+
+
+def law(cells: Buffer, table: Buffer, count: Any, seed: Any, lane: Any) -> None:
+    """Something of everything that laws do."""
+    x = fall(cells.part(0, count), table[0], table[1])
+    y = fall(cells.part(1, count), x, number_of(count))
+    (z,) = until(lambda z: less(z * z - y, 1e-9), lambda z: (0.5 * (z + y / z),), 1.0, at_most=40)
+    cells[4] = where(less(z, 0.0), -z, sqrt(z)) + small_number(word_and(word_add(seed, lane), 0xFFFF))
+
+
+MEMORIES = Memory("cells", True, True, 5), Memory("table", False, False, 2)
+PROGRAM = Subject(law, MEMORIES, {"count": INDEX, "seed": WORD}).program("law")
+
+OTHERS = {
+    "wasm32": ("wasm32-unknown-unknown", "", ""),
+    "sparc": ("sparc-none-elf", "leon3", ""),
+    "riscv64": ("riscv64-unknown-elf", "generic-rv64", "+m,+a,+f,+d,+c"),
+    "aarch64": ("aarch64-unknown-linux-gnu", "cortex-a72", ""),
+}
+NAMES = {
+    "wasm32": ("f64.add", "f64.sub", "f64.mul", "f64.div", "f64.sqrt"),
+    "sparc": ("faddd", "fsubd", "fmuld", "fdivd", "fsqrtd"),
+    "riscv64": ("fadd.d", "fsub.d", "fmul.d", "fdiv.d", "fsqrt.d"),
+    "aarch64": ("fadd", "fsub", "fmul", "fdiv", "fsqrt"),
+}
+
+
+def instructions(text: str) -> Counter[str]:
+    """How often each instruction stands in an assembly, by name."""
+    return Counter(re.findall(r"^\s+(?:@\S+\s+)?([a-z_][\w.]*)", text, re.M))
+
+
+def need_target(name: str, triple: str) -> None:
+    """Skip where LLVM was built without a machine."""
+    llvm.initialize_all_targets()
+    try:
+        llvm.Target.from_triple(triple)
+    except RuntimeError:
+        pytest.skip(f"LLVM was built without {name}")
+
+
+@pytest.mark.parametrize("processor", ["sm_80", "sm_90"])
+def test_ptx_rounds_every_operation_to_nearest_and_fuses_none(processor: str) -> None:
+    need_target("nvptx64", "nvptx64-nvidia-cuda")
+    text = ptx(PROGRAM, processor)
+    assert f".target {processor}" in text
+    assert len(re.findall(r"^\.visible \.entry law\(", text, re.M)) == 1
+    arithmetic = {
+        name for name in instructions(text) if re.match(r"(add|sub|mul|div|sqrt|rcp|fma|mad)\b.*f(16|32|64)", name)
+    }
+    assert arithmetic == {f"{name}.rn.f64" for name in ("add", "sub", "mul", "div", "sqrt")}
+    assert not FUSED.search(text)
+    assert not {name for name in instructions(text) if ".approx" in name or ".ftz" in name or name.endswith(".f32")}
+
+
+def test_ptx_gives_each_thread_a_lane() -> None:
+    need_target("nvptx64", "nvptx64-nvidia-cuda")
+    text = ptx(PROGRAM)
+    # Two memories, a count, a word and the number of lanes; threads beyond it return at once.
+    assert len(re.findall(r"^\s*\.param \.u64", text, re.M)) == len(MEMORIES) + 3
+    last = re.search(r"ld\.param\S* \s*(%rd\d+), \[law_param_4\];", text)
+    assert last is not None
+    assert re.search(rf"setp\.(?:lt|ge)\.s64 \s*%p\d+, %rd\d+, {last[1]};", text)
+    assert "%tid.x" in text
+    assert "%ctaid.x" in text
+    assert "%ntid.x" in text
+
+
+def test_ptx_is_refused_where_lanes_would_write_to_the_same_memory() -> None:
+    program = Subject(lambda out, lane: out.put(0, (1.0,)), (Memory("out", False, True, 1),), {}).program()
+    with pytest.raises(ValueError, match="out: all lanes write to the same memory"):
+        ptx(program)
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_the_same_text_compiles_for_other_machines_and_nothing_is_fused(name: str) -> None:
+    triple, processor, features = OTHERS[name]
+    need_target(name, triple)
+    text = assembly(Llvm(PROGRAM, 1), triple, processor, features)
+    found = instructions(text)
+    assert not FUSED.search(text), FUSED.findall(text)
+    assert all(found[instruction] for instruction in NAMES[name]), found
+
+
+def test_a_machine_that_llvm_does_not_know_is_an_error() -> None:
+    with pytest.raises(RuntimeError, match="nowhere"):
+        assembly(Llvm(PROGRAM, 1), "nowhere-none-none")
+
+
+def test_the_search_for_fused_operations_finds_them() -> None:
+    fused = "fma.rn.f64", "fmadd.d", "fmadd", "fmla", "fmadds", "vfmadd213sd", "fnmsub", "call fma", "f64x2.relaxed_madd"
+    assert all(FUSED.search(f" {text} %a, %b") for text in fused)
+    assert not FUSED.search("fmul d0\n faddd %f0\n f64.mul\n fmv.d fa0\n fmov d0\n format")
