@@ -31,7 +31,7 @@ LIBRARIES = (
     "numpy",
     "scipy.linalg",
     "scipy.integrate",
-    "numba",
+    "llvmlite.binding",
     "sympy",
     "xarray",
     "h5netcdf",

@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+import ctypes
 import re
 from collections import Counter
 from typing import Any
 
 import llvmlite.binding as llvm
+import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from starhold.algebra.operations import INDEX, WORD
 from starhold.algebra.scalar import less, sqrt, where
 from starhold.algebra.structured import Buffer, function, repeat, until
 from starhold.algebra.words import number_of, small_number, word_add, word_and
 from starhold.trace.llvm import Llvm
+from starhold.trace.machine import word
 from starhold.trace.program import Memory
-from starhold.trace.ptx import assembly, ptx
-from tests.trace.machines import Subject
+from starhold.trace.ptx import Threads, assembly, ptx
+from tests.trace.machines import Job, Subject, column, same
+from tests.trace.scripts import Script, scripts, subject, values
 
 FUSED = re.compile(r"\b(?:v?f(?:n?m(?:add|sub|la|ls)|ma)\w*|f64x2\.\w*madd|fmaf?|__fma)\b", re.I)
 """Names of fused operations of all of these machines."""
@@ -97,6 +104,49 @@ def test_ptx_gives_each_thread_a_lane() -> None:
     assert "%tid.x" in text
     assert "%ctaid.x" in text
     assert "%ntid.x" in text
+
+
+def on_threads(job: Job, lanes: int, size: int) -> dict[str, NDArray[np.float64]]:
+    """What the text for a GPU leaves where this processor runs it, one thread after the other, in blocks of such a size."""
+    registers = ("tid.x", "ctaid.x", "ntid.x")
+    text = str(Threads(job.program)).replace("define ptx_kernel ", "define ")
+    for name in registers:
+        text = text.replace(f"@llvm.nvvm.read.ptx.sreg.{name}", f"@{name}")
+        read = f"@now.{name} = global i32 0\ndefine i32 @{name}() {{\n  %r = load i32, ptr @now.{name}\n  ret i32 %r\n}}"
+        text = text.replace(f"declare i32 @{name}()", read)
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    module = llvm.parse_assembly(text)
+    module.verify()
+    machine = llvm.Target.from_default_triple().create_target_machine()
+    engine = llvm.create_mcjit_compiler(module, machine)
+    engine.finalize_object()
+    now = [ctypes.c_int32.from_address(engine.get_global_value_address(f"now.{name}")) for name in registers]
+    arrays = {name: np.array(array) for name, array in job.memories.items()}
+    given = [arrays[memory.name].ctypes.data for memory in job.program.memories]
+    given += [word(job.inputs[name]) for name, _ in job.program.main.params]
+    kernel: Any = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * (len(given) + 1))(
+        engine.get_function_address(job.program.main.name)
+    )
+    for block in range(-(-lanes // size)):
+        for thread in range(size):
+            now[0].value, now[1].value, now[2].value = thread, block, size
+            kernel(*given, lanes)
+    return arrays
+
+
+@settings(max_examples=12)
+@given(scripts, st.integers(0, 2**64 - 1), st.integers(0, 3))
+def test_the_text_of_ptx_leaves_the_bits_of_plain_python_where_this_processor_runs_it(
+    script: Script, seed: int, count: int
+) -> None:
+    drawn = subject(script)
+    program, inputs = drawn.program(), {"count": count, "seed": seed}
+    memories = {name: array[:, :5].copy() if array.ndim == 2 else array for name, array in values(seed).items()}
+    left = on_threads(Job(program, memories, inputs), lanes=5, size=4)
+    for lane in range(5):
+        expected = drawn.plain(column(program, memories, lane), inputs, lane)
+        same(expected, column(program, left, lane), f"thread {lane}")
 
 
 def test_ptx_is_refused_where_lanes_would_write_to_the_same_memory() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 import subprocess
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -373,8 +374,6 @@ def test_nothing_is_fused_where_the_compiler_would_by_default() -> None:
 
 def on_node_if_there(program: Any, memories: Any) -> list[Any]:
     """What JavaScript leaves, where node is installed."""
-    import shutil
-
     return on_node([Job(program, memories, {})]) if shutil.which("node") else []
 
 

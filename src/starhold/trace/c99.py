@@ -12,7 +12,7 @@ from typing import Any
 
 from starhold.algebra.operations import INDEX, NUMBER, TRUTH, UNIFORM, WORD
 from starhold.trace.program import Call, Function, Memory, Value
-from starhold.trace.source import Source, names
+from starhold.trace.source import TIE, Source, names
 
 TYPES = {NUMBER: "double", TRUTH: "int", WORD: "uint64_t", INDEX: "long", UNIFORM: "int"}
 
@@ -60,7 +60,7 @@ class C99(Source):
     @property
     def prototype(self) -> str:
         """The declaration of what is called, for a header."""
-        return self._head(self.program.main) + ";"
+        return self._head(self.program.main).replace(TIE, " ") + ";"
 
     def _opening(self) -> list[str]:
         body = "\n".join(self.lines)
@@ -74,13 +74,13 @@ class C99(Source):
         main = self.is_main(function)
         memories = self.program.memories if main else self.memories[function.name]
         given = [_pointer(memory) for memory in memories]
-        given += [f"{TYPES[kind]} {name}" for name, kind in function.params]
+        given += [f"{TYPES[kind]}{TIE}{name}" for name, kind in function.params]
         gives = "void"
         if len(function.outs) == 1:
             gives = TYPES[function.outs[0][1]]
         else:
             given += [
-                f"{TYPES[kind]} *{name}" for (_, kind), name in zip(function.outs, self._pointers(function), strict=True)
+                f"{TYPES[kind]}{TIE}*{name}" for (_, kind), name in zip(function.outs, self._pointers(function), strict=True)
             ]
         return f"{'' if main else 'static '}{gives} {self.titles[function.name]}({', '.join(given) or 'void'})"
 
@@ -153,4 +153,4 @@ class C99(Source):
 
 
 def _pointer(memory: Memory) -> str:
-    return f"{'' if memory.writable else 'const '}double *{memory.name}"
+    return f"{'' if memory.writable else f'const{TIE}'}double{TIE}*{memory.name}"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import textwrap
+from abc import ABC, abstractmethod
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
@@ -33,6 +34,8 @@ from starhold.trace.program import (
 
 WIDTH = 110
 """Characters of a line, where one can be broken."""
+TIE = "\N{NO-BREAK SPACE}"
+"""What is written as a blank, and where no line is broken."""
 LONG, SHORT = 72, 28
 """Characters of an expression that is written where it is read: of one that is read once, and of any made of indices."""
 
@@ -81,7 +84,7 @@ def fitted(inner: Expression, outer: str, place: int) -> str:
     return inner.text if _stands(inner.operator, outer, place) else f"({inner.text})"
 
 
-class Source:
+class Source(ABC):
     """The text of a program in a language with braces. Memories keep their order, and counts and words come last."""
 
     language: ClassVar[str]
@@ -123,47 +126,45 @@ class Source:
 
     # What a language says.
 
+    @abstractmethod
     def _opening(self) -> list[str]:
         """What comes before the functions."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _define(self, function: Function) -> None:
-        raise NotImplementedError
+        """Add a function."""
 
+    @abstractmethod
     def _constant(self, value: Any, kind: str) -> str:
-        raise NotImplementedError
+        """A Python number as a constant."""
 
+    @abstractmethod
     def _let(self, kind: str, name: str, text: str) -> None:
         """Name a value."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _variable(self, kind: str, name: str, value: Value) -> None:
         """Declare what changes."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _assign(self, kind: str, name: str, value: Value) -> None:
-        raise NotImplementedError
+        """Change it."""
 
+    @abstractmethod
     def _counted(self, counter: str, most: str) -> str:
         """The head of a loop."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _call(self, s: Call) -> None:
-        raise NotImplementedError
+        """Call a function, and name what it gives."""
 
     # Text of the parts.
 
     def put(self, line: str) -> None:
-        """Add a line, broken where it is long."""
+        """Add a line, broken where it is long, but not at `TIE`."""
         before = "    " * self.depth
-        self.lines += textwrap.wrap(
-            line,
-            WIDTH,
-            initial_indent=before,
-            subsequent_indent=before + "    ",
-            break_long_words=False,
-            break_on_hyphens=False,
-        )
+        wide = textwrap.TextWrapper(WIDTH, before, before + "    ", break_long_words=False, break_on_hyphens=False)
+        self.lines += [part.replace(TIE, " ") for part in wide.wrap(line)]
 
     def open(self, line: str) -> None:
         """Begin what stands in braces."""
