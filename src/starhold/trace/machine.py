@@ -37,24 +37,31 @@ def _machine() -> Any:
 def widest() -> int:
     """Lanes in flight at once on this processor that fly fastest: two of its widest registers where there are 32 of them,
     one where there are 16."""
-    return 16 if _llvm().get_host_cpu_features().get("avx512f") else 4
+    return 16 if _is_wide() else 4
+
+
+def _is_wide() -> bool:
+    """Whether there are 32 registers of 512 bits."""
+    return bool(_llvm().get_host_cpu_features().get("avx512f"))
 
 
 def load(program: Program, width: int, passes: bool | None = None) -> Callable[..., None]:
     """The program as a function of this process, for so many lanes at once: addresses of the memories (a memory of lanes
     holds `width` numbers for each index, aligned to their size), then counts and words. It lets go of the interpreter.
 
-    passes: whether LLVM reworks what is printed before it makes code of it; left open, where that brings more than it costs:
-    on one lane, for the matrices of a law that solves a program.
+    passes: whether LLVM reworks what is printed before it makes code of it; left open, where that has been measured to bring
+    more than it costs: on one lane, and on many where registers are plenty and nothing is called.
     """
+    calls = any(isinstance(s, Call) for s in statements(program.main.body))
     if passes is None:
-        passes = width == 1 and any(isinstance(s, Call) for s in statements(program.main.body))
+        passes = width == 1 or (_is_wide() and not calls)
     llvm, machine = _llvm(), _machine()
     module = llvm.parse_assembly(str(Llvm(program, width)))
     module.verify()
     if passes:
         options = llvm.create_pipeline_tuning_options(speed_level=3)
-        options.slp_vectorization = True
+        # It pays for the matrices of a law that solves a program, and costs where vectors have three components.
+        options.slp_vectorization = width == 1 and calls
         builder = llvm.create_pass_builder(machine, options)
         builder.getModulePassManager().run(module, builder)
     engine = llvm.create_mcjit_compiler(module, machine)
