@@ -4,8 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from starhold.conformance.bench import sample_loop
 from starhold.conformance.suite import CHECKS, NotApplicableError, examine
+from starhold.errors import InputError
 from starhold.laws.catalogue import catalogue, from_file
+from starhold.simulation.lane import fly
 
 
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
@@ -61,3 +64,32 @@ def test_examine_reports_each_check_once():
     verdicts = list(examine(catalogue()["pd"]))
     assert len(verdicts) == len(CHECKS) == len({v.name for v in verdicts})
     assert {v.outcome for v in verdicts} == {"passed"}
+
+
+UNREADABLE = {
+    "a library's root": ("size = math.sqrt(dot(seen.rate, seen.rate))", "none of the scalar operations", "sqrt"),
+    "an if": ("size = 1.0 if seen.rate[0] > 0.0 else 2.0", "a comparison of numbers", "where"),
+    "NumPy": ("size = np.linalg.norm(seen.rate)", "a function of NumPy", "starhold.algebra.vector"),
+    "a power": ("size = seen.rate[0] ** 2", "a power", "products"),
+    "an unknown operator": ("size = seen.rate[0] % 2.0", "an operator that is none", "+ - * /"),
+}
+
+
+@pytest.mark.parametrize("kind", UNREADABLE)
+def test_what_cannot_be_recorded_is_told_in_one_line(kind, tmp_path):
+    """It names the law, the line of its file, and what to write instead."""
+    text, found, instead = UNREADABLE[kind]
+    law_text = GOOD.replace("    damping = scale(", f"    {text}\n    damping = scale(size * ", 1)
+    law_text = law_text.replace("from typing", "import math\n\nimport numpy as np\nfrom typing", 1)
+    path = tmp_path / "own_law.py"
+    path.write_text(law_text)
+    line = next(number for number, row in enumerate(path.read_text().splitlines(), 1) if text in row)
+    law = from_file(path)
+    reasons = {verdict.reason for verdict in examine(law) if verdict.outcome == "failed" and "own-law" in verdict.reason}
+    assert len(reasons) == 1
+    (reason,) = reasons
+    assert reason.startswith(f"law own-law: own_law.py, line {line}: found ")
+    assert found in reason
+    assert instead in reason.partition("allowed: ")[2]
+    with pytest.raises(InputError, match=r"own_law\.py, line"):
+        fly(sample_loop(law, law.examples()[0]), 1)
