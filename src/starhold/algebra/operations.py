@@ -7,9 +7,12 @@ their type.
 
 from __future__ import annotations
 
+import linecache
+import sys
 from collections.abc import Callable
 from functools import wraps
 from importlib import import_module
+from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, cast
 
 NUMBER, TRUTH, WORD, INDEX, UNIFORM, STATIC = "number", "truth", "word", "index", "uniform", "static"
@@ -41,6 +44,7 @@ class Operation(NamedTuple):
         return [reader for reader in readers if reader not in self.meanings]
 
 
+_OWN = tuple(str(Path(__file__).parents[1] / folder) for folder in ("trace", "algebra"))
 OPERATIONS: dict[str, Operation] = {}
 """All operations by name."""
 
@@ -92,6 +96,21 @@ def _reader(value: Any) -> str | None:
     if own is None and root not in _LIBRARIES:
         raise TypeError(f"no reader for numbers of type {cls.__name__}")
     return own if own is not None else _LIBRARIES[root]
+
+
+def written_at() -> tuple[str, str]:
+    """Where the equation that runs now is written, and the text of that line: of a law its name, file and line, rather than
+    those of a library which it calls."""
+    frame: Any = sys._getframe(1)  # pyright: ignore[reportPrivateUsage]
+    frames: list[Any] = []
+    while frame is not None:
+        if not frame.f_code.co_filename.startswith(_OWN):
+            frames.append(frame)
+        frame = frame.f_back
+    frame = next((frame for frame in frames if "CARD" in frame.f_globals), frames[0])
+    file, line = Path(frame.f_code.co_filename), frame.f_lineno
+    law = f"law {file.stem.replace('_', '-')}: " if "CARD" in frame.f_globals else ""
+    return f"{law}{file.name}, line {line}", linecache.getline(str(file), line).strip()
 
 
 def library(name: str) -> Any:

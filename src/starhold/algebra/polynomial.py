@@ -15,10 +15,22 @@ from typing import Any, ClassVar, TypeAlias
 
 from flint import arb, fmpq
 
+from starhold.algebra.operations import written_at
+
 Coefficient: TypeAlias = Any
 """A rational (`fmpq`), or a ball (`arb`) where a coefficient is known to lie in it."""
 Monomial: TypeAlias = tuple[str, ...]
 """Variables in alphabetic order, one repeated as often as its power says; () is the constant."""
+
+
+class UnreadableError(TypeError):
+    """An equation does what polynomials cannot follow; the text names the operation and the line."""
+
+
+def unreadable(what: str) -> UnreadableError:
+    """The error that names an operation and where it is written."""
+    place, text = written_at()
+    return UnreadableError(f"{place}: {what}, in `{text}`")
 
 
 def exact(number: Any) -> Coefficient:
@@ -138,7 +150,7 @@ class Polynomial:
         if value is None:
             name = next((name for known, name in _RECIPROCALS.get() if not (divisor - known).terms), None)
             if name is None:
-                raise TypeError("a polynomial is divided by constants only")
+                raise unreadable("a division by what varies: a polynomial is divided by constants only")
             return self * Polynomial.variable(name)
         return Polynomial({m: c / value for m, c in self.terms.items()})
 
@@ -275,7 +287,7 @@ def _merged(
 
 
 def sqrt(x: Any) -> Any:
-    raise TypeError("a polynomial has no square root")
+    raise unreadable("a square root: a polynomial has no square root")
 
 
 def less(a: Any, b: Any) -> bool | Condition | Split:
@@ -295,7 +307,7 @@ def _less(a: Any, b: Any) -> bool | Condition:
 def less_equal(a: Any, b: Any) -> bool:
     turned = less(b, a)
     if not isinstance(turned, bool):
-        raise TypeError("polynomials are compared by less alone")
+        raise unreadable("less_equal: polynomials are compared by less alone")
     return not turned
 
 
@@ -318,11 +330,11 @@ def where(condition: Any, a: Any, b: Any) -> Any:
 
 
 def both(a: Any, b: Any) -> Any:
-    raise TypeError("conditions on polynomials are not joined")
+    raise unreadable("both or either: conditions on polynomials are not joined")
 
 
 either = both
 
 
 def opposite(a: Any) -> Any:
-    raise TypeError("conditions on polynomials are not turned round")
+    raise unreadable("opposite: conditions on polynomials are not turned round")

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from math import isfinite, isinf
 from typing import Any
 
+from starhold.algebra.polynomial import UnreadableError
 from starhold.certification.certificate import EXACT, Certificate, Claim, Obligation
 from starhold.certification.convergence import assumed, converge
 from starhold.certification.disturbance import disturbance
@@ -43,10 +44,23 @@ BEST = Wanted()
 def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certificate:
     """The certificate of a closed loop as it starts, whatever happens to it later. A law that keeps a memory or declares
     neither V nor a surface nor a single root gets one without claims, which is undecided; so does a surface with wheels, and
-    a loop that counts on a lost wheel."""
+    a loop that counts on a lost wheel. Of a law that polynomials cannot follow the one claim is undecided, and names the
+    operation and its line."""
     subject = make_subject(loop, wanted.disturbance, wanted.momentum)
-    claims: list[Claim] = []
+    try:
+        claims = _claims(subject, wanted)
+    except UnreadableError as reason:
+        # Nothing is known of such a law, whatever else was asked for.
+        claims = [_undecided("convergence", {"rate_everywhere": None, "everything": True}, subject, str(reason))]
+    return Certificate(name or loop.law.name, described(subject), tuple(claims))
+
+
+def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:
+    loop, claims = subject.loop, list[Claim]()
     sound = loop.wheels is None or gives_what_is_asked(loop.wheels)
+    if loop.remembers and loop.law.lyapunov is not None:
+        everywhere = {"rate_everywhere": None, "everything": True}
+        claims.append(_undecided("convergence", everywhere, subject, "the law keeps a memory from call to call"))
     if sound and not loop.remembers:
         if loop.law.lyapunov is not None:
             claims.extend(_by_lyapunov(subject, wanted))
@@ -56,7 +70,7 @@ def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certific
             claims.extend(_unshown(subject, wanted))
         sampled = sampling(Motion(subject))
         claims.extend([] if sampled is None else [sampled])
-    return Certificate(name or loop.law.name, described(subject), tuple(claims))
+    return claims
 
 
 def _by_lyapunov(subject: Subject, wanted: Wanted) -> list[Claim]:
@@ -89,5 +103,8 @@ def _unshown(subject: Subject, wanted: Wanted) -> list[Claim]:
         asked.append(("torque-limit", {"turn": turn, "kind": subject.loop.limit, "limit": limit}))
     if tolerance is not None:
         asked.append(("inertia", {"tolerance": tolerance}))
-    reason = Obligation("form", EXACT, "undecided", {"reason": "the law declares no V to show it with"})
-    return [Claim(kind, numbers, {}, assumed(subject), (reason,)) for kind, numbers in asked]
+    return [_undecided(kind, numbers, subject, "the law declares no V to show it with") for kind, numbers in asked]
+
+
+def _undecided(kind: str, numbers: dict[str, Any], subject: Subject, reason: str) -> Claim:
+    return Claim(kind, numbers, {}, assumed(subject), (Obligation("form", EXACT, "undecided", {"reason": reason}),))

@@ -13,4 +13,5 @@ ScenarioFile = Annotated[str, typer.Argument(metavar="FILE", help="a scenario fi
 Output = Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="folder for results, created")]
 Force = Annotated[bool, typer.Option("--force", help="replace results that are already there")]
 Unstable = Annotated[bool, typer.Option("--allow-unstable", help="take gains that are known to be unstable")]
+Certified = Annotated[bool, typer.Option("--certify/--no-certify", help="prove what the laws guarantee, or fly alone")]
 OneLaw = Annotated[str | None, typer.Option(help="which law of the file; all if not given")]

@@ -21,6 +21,7 @@ from starhold.cli.arguments import (
     INTERNAL_ERROR,
     INTERRUPTED,
     USER_ERROR,
+    Certified,
     Force,
     Output,
     ScenarioFile,
@@ -49,22 +50,29 @@ def run(
     output: Output = None,
     force: Force = False,
     allow_unstable: Unstable = False,
+    certify: Certified = True,
 ) -> None:
     """Fly one law: run.nc, summary.json, pictures and report.html."""
-    flights = _fly(file, law, output, force, allow_unstable, nested=False)
+    flights = _fly(file, law, output, force, allow_unstable, certify, nested=False)
     if flights[0].metrics["diverged_at"] is not None:
         raise typer.Exit(DIVERGED)
 
 
 @app.command()
 def compare(
-    file: ScenarioFile = DEFAULT, output: Output = None, force: Force = False, allow_unstable: Unstable = False
+    file: ScenarioFile = DEFAULT,
+    output: Output = None,
+    force: Force = False,
+    allow_unstable: Unstable = False,
+    certify: Certified = True,
 ) -> None:
     """Fly every law of a file on the same problem: ranked table, pictures and report.html."""
-    _fly(file, None, output, force, allow_unstable, nested=True)
+    _fly(file, None, output, force, allow_unstable, certify, nested=True)
 
 
-def _fly(file: str, law: str | None, output: Path | None, force: bool, allow_unstable: bool, nested: bool) -> list[Flight]:
+def _fly(
+    file: str, law: str | None, output: Path | None, force: bool, allow_unstable: bool, certify: bool, nested: bool
+) -> list[Flight]:
     """Fly one law of a file (the first if `law` is None) or, nested, all of them, each into a folder of its own."""
     from starhold.report.painter import Painter
 
@@ -95,7 +103,8 @@ def _fly(file: str, law: str | None, output: Path | None, force: bool, allow_uns
                     painter.start(kind.sketch(flights, scenario), folder)
                 write_run(flights[-1].recording, scenario, (folder / entry.name if nested else folder) / "run.nc")
         # While the pictures are drawn.
-        flights = [kind.prove(scenario, *trio) for trio in zip(entries, loops, flights, strict=True)]
+        if certify:
+            flights = [kind.prove(scenario, *trio) for trio in zip(entries, loops, flights, strict=True)]
         page = kind.write(scenario, flights, folder)
         painter.finish()
     print_outcome(flights, page)

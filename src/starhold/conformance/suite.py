@@ -12,6 +12,7 @@ import numpy as np
 from starhold.algebra.quaternion import derivative, multiply, normalise, stretch, to_reference
 from starhold.algebra.structure import flatten, move
 from starhold.algebra.vector import ZERO
+from starhold.certification.certify import certify
 from starhold.conformance.bench import CRAFT, call, random_quaternions, random_seen, sample_loop
 from starhold.conformance.units import rescaled
 from starhold.errors import InputError
@@ -194,6 +195,19 @@ def decreases_lyapunov(law: Law) -> None:
             _require(slope <= 1e-7 * value, f"dV/dt = {slope:g} at {seen}")
 
 
+def can_be_certified(law: Law) -> None:
+    """The certifier reads the law, or says what of it cannot be read."""
+    for gains in law.examples():
+        plain = sample_loop(law, gains)
+        for loop in (plain, replace(plain, target="orbital"), replace(plain, limit="norm", cover="as_published")):
+            certificate = certify(loop)
+            _require(certificate.outcome in ("proved", "refuted", "undecided"), f"outcome {certificate.outcome}")
+            for claim in certificate.claims:
+                for obligation in claim.obligations:
+                    told = obligation.outcome == "proved" or bool(obligation.evidence)
+                    _require(told, f"{claim.kind}: {obligation.name} is {obligation.outcome} without a reason")
+
+
 def _slope(law: Law, seen: Seen, gains: Any) -> float:
     """dV/dt along the closed loop, by a central difference."""
     rates = angular_acceleration(seen.body_rate, call(law, seen, gains), CRAFT)
@@ -220,4 +234,5 @@ CHECKS: tuple[Callable[[Law], None], ...] = (
     survives_toml,
     keeps_units,
     decreases_lyapunov,
+    can_be_certified,
 )

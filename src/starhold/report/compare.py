@@ -73,7 +73,9 @@ def write(scenario: Scenario, flights: Sequence[Flight], folder: Path) -> Path:
 
 
 def write_proved(name: str, flights: Sequence[Flight], folder: Path) -> None:
-    """The flights' certificates in one file."""
+    """The flights' certificates in one file, where there are any."""
+    if not any(flight.certificates for flight in flights):
+        return
     with whole(folder / FILE) as hidden:
         write_certificates([certificate for flight in flights for certificate in flight.certificates], name, hidden)
 

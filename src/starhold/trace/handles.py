@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import linecache
-import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from starhold.algebra.operations import INDEX, NUMBER, OPERATIONS, TRUTH, UNIFORM, WORD
+from starhold.algebra.operations import INDEX, NUMBER, OPERATIONS, TRUTH, UNIFORM, WORD, written_at
 from starhold.errors import InputError
 
 if TYPE_CHECKING:
@@ -128,25 +125,12 @@ class Uniform(Handle):
 
 
 HANDLES: dict[str, type[Handle]] = {cls.kind: cls for cls in (Number, Truth, Word, Index, Uniform)}
-_OWN = tuple(str(Path(__file__).parents[1] / folder) for folder in ("trace", "algebra"))
 
 
 def refuse(found: str, allowed: str) -> NoReturn:
     """Raise a RecordingError that points at the line of the equation that runs now."""
-    frame: Any = sys._getframe(1)  # pyright: ignore[reportPrivateUsage]
-    frames: list[Any] = []
-    while frame is not None:
-        if not frame.f_code.co_filename.startswith(_OWN):
-            frames.append(frame)
-        frame = frame.f_back
-    if not frames:
-        raise RecordingError("an equation", "", found, allowed)
-    # The law's own line rather than that of a library which it calls.
-    frame = next((frame for frame in frames if "CARD" in frame.f_globals), frames[0])
-    file, line = frame.f_code.co_filename, frame.f_lineno
-    text = linecache.getline(file, line).strip()
-    law = f"law {Path(file).stem.replace('_', '-')}: " if "CARD" in frame.f_globals else ""
-    raise RecordingError(f"{law}{Path(file).name}, line {line}", "", f"{found}, in `{text}`", allowed)
+    place, text = written_at()
+    raise RecordingError(place, "", f"{found}, in `{text}`", allowed)
 
 
 def kind_of(value: Any) -> str:
