@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
-from starhold.algebra.quaternion import NO_TURN, stretch
+from starhold.algebra.quaternion import NO_TURN, relative, stretch
 from starhold.algebra.vector import ZERO, add
 from starhold.algebra.words import bits_of, with_bits
 from starhold.models.random import normal_vector
@@ -72,7 +73,7 @@ def test_exact(attitude, rate, seed, run, step):
 def test_noisy_attitude_is_a_unit_quaternion_near_the_true_one(attitude, rate, deviation, seed, run, step):
     seen, _ = noisy(attitude, rate, Noise(0.0, deviation, 0.0), (seed, run), step)
     assert abs(sum(c * c for c in seen) - 1.0) < 1e-15
-    added = math.hypot(*normal_vector((seed, run), step, ATTITUDE, deviation))
+    added = math.hypot(*normal_vector((seed, run), step, ATTITUDE, 0.5 * deviation))
     # The error added is at most what is seen, by more than the length it changes.
     assert math.dist(seen, attitude) <= 2.0 * added + 1e-15
 
@@ -83,7 +84,7 @@ def test_errors_are_those_of_their_channels(rate, seed, run, step):
     assert measured == add(rate, normal_vector((seed, run), step, RATE, NOISE.rate))
     assert gaussian_disturbance(NOISE, (seed, run), step) == normal_vector((seed, run), step, TORQUE, NOISE.torque)
     seen, _ = noisy(NO_TURN, rate, NOISE, (seed, run), step)
-    error = normal_vector((seed, run), step, ATTITUDE, NOISE.attitude)
+    error = normal_vector((seed, run), step, ATTITUDE, 0.5 * NOISE.attitude)
     assert close(tuple(x / seen[0] for x in seen[1:]), error, 1e-16)
     # Three numbers each.
     assert len({place + axis for place in (TORQUE, ATTITUDE, RATE) for axis in range(3)}) == 9
@@ -100,12 +101,20 @@ def test_the_same_seed_run_and_step_give_the_same_numbers():
     assert len(torques) == 4
 
 
-def test_opposite_quaternions_are_seen_with_independent_signs():
-    # The error is added to the numbers of q, so -q is not seen as minus what q is seen as.
+def test_opposite_quaternions_are_one_attitude_and_seen_as_one():
     seen, _ = noisy((0.6, 0.8, 0.0, 0.0), ZERO, NOISE, (1, 2), 3)
     other, _ = noisy((-0.6, -0.8, 0.0, 0.0), ZERO, NOISE, (1, 2), 3)
-    assert not close(seen, stretch(-1.0, other), 1e-6)
-    assert close(seen, stretch(-1.0, other), 0.02)
+    assert seen == stretch(-1.0, other)
+
+
+@settings(max_examples=20)
+@given(quaternions, seeds, indices, indices)
+def test_noise_is_an_angle_of_rotation_about_each_body_axis(attitude, seed, run, step):
+    """Whatever the attitude: ten arc seconds are ten arc seconds, at half a turn too."""
+    deviation = math.radians(10.0 / 3600.0)
+    seen, _ = noisy(attitude, ZERO, Noise(0.0, deviation, 0.0), (seed, run), step)
+    angles = Rotation.from_quat(relative(attitude, seen), scalar_first=True).as_rotvec()
+    assert angles == pytest.approx(normal_vector((seed, run), step, ATTITUDE, deviation), rel=1e-6, abs=1e-9 * deviation)
 
 
 COUNT = 20000
@@ -127,7 +136,7 @@ SERIES = series(COUNT)
 
 
 def test_statistics():
-    errors = np.hstack([SERIES[:, 1:4], SERIES[:, 4:7] - RATES, SERIES[:, 7:]])
+    errors = np.hstack([2.0 * SERIES[:, 1:4], SERIES[:, 4:7] - RATES, SERIES[:, 7:]])
     deviations = np.repeat([NOISE.attitude, NOISE.rate, NOISE.torque], 3)
     bound = 4.0 / math.sqrt(COUNT)
     assert np.all(np.abs(errors.mean(axis=0)) < bound * deviations)

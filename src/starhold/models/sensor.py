@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple, TypeAlias
 
-from starhold.algebra.quaternion import Quaternion, normalise
+from starhold.algebra.quaternion import Quaternion, multiply, normalise
 from starhold.algebra.vector import Vector, add
 from starhold.models.random import Word, normal_vector
 
@@ -13,8 +13,8 @@ Key: TypeAlias = tuple[Word, Word]
 
 
 class Noise(NamedTuple):
-    """Standard deviations: external torque (N m per axis, held for a control period), measured attitude (each component
-    of the vector part) and measured rate (rad/s)."""
+    """Standard deviations: external torque (N m per axis, held for a control period), measured attitude (rad,
+    rotation about each body axis) and measured rate (rad/s)."""
 
     torque: float
     attitude: float
@@ -32,9 +32,10 @@ def exact(attitude: Quaternion, rate: Vector, noise: Noise, key: Key, step: Word
 
 
 def noisy(attitude: Quaternion, rate: Vector, noise: Noise, key: Key, step: Word) -> tuple[Quaternion, Vector]:
-    """Attitude with a Gaussian error added to the vector part (then normalised), rate with a Gaussian error."""
-    d = normal_vector(key, step, ATTITUDE, noise.attitude)
-    seen = normalise((attitude[0], attitude[1] + d[0], attitude[2] + d[1], attitude[3] + d[2]))
+    """Attitude turned by Gaussian angles about the body axes, rate with a Gaussian error."""
+    # Of a small turn the quaternion's vector part is half the angle.
+    d = normal_vector(key, step, ATTITUDE, 0.5 * noise.attitude)
+    seen = normalise(multiply(attitude, (1.0, d[0], d[1], d[2])))
     return seen, add(rate, normal_vector(key, step, RATE, noise.rate))
 
 

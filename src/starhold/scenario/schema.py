@@ -120,7 +120,9 @@ class Environment(Table):
 class Sensor(Table):
     """Errors of the measured state."""
 
-    attitude_noise: Annotated[float, *quantity(Gain("1", at_least=0.0, text="standard deviation, vector part"))] = 0.0
+    attitude_noise: Annotated[
+        float, *quantity(Gain("rad", at_least=0.0, text="standard deviation, angle per axis"))
+    ] = 0.0
     rate_noise: Annotated[float, *quantity(Gain("rad/s", at_least=0.0, text="standard deviation per axis"))] = 0.0
 
 
