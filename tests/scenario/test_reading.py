@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import jsonschema
@@ -218,16 +219,27 @@ def test_history_file(tmp_path):
     table = build(scenario, scenario.laws[0]).target
     assert table.shape == (6001, 10)
     assert table[3000, 5] == pytest.approx(2e-3, rel=1e-3)
-    for bad in (
-        "0,1,0,0,0\n",
-        "0,1,0,0,0\n0,1,0,0,0\n",
-        "0,0,0,0,0\n700,1,0,0,0\n",
-        "0,1,0,0,0\n5,1,0,0,0\n",
-        "a,b\nc,d\n",
-        "",
-    ):
+    # Named columns stand where their names say.
+    swapped = np.column_stack([rows[:, 0], rows[:, 2:], rows[:, 1]])
+    np.savetxt(tmp_path / "h.csv", swapped, delimiter=", ", header="Time, q1, q2, q3, q0", comments="")
+    assert np.array_equal(build(load(tmp_path / "s.toml"), scenario.laws[0]).target, table)
+    for bad, told in {
+        "0,1,0,0,0\n": "1 rows",
+        "0,1,0,0,0\n0,1,0,0,0\n": "a time of 0 s after one of 0 s",
+        "0,0,0,0,0\n700,1,0,0,0\n": "line 1: a quaternion of length 0",
+        "0,1,0,0,0\n5,1,0,0,0\n": "covers 0 to 5 s",
+        "a,b\nc,d\n": "line 1: columns a, b",
+        "time,q1,q2,q3,w\n0,1,0,0,0\n": "line 1: columns time, q1, q2, q3, w",
+        "time,q0,q0,q2,q3\n0,1,0,0,0\n": "line 1: columns",
+        "0,1,0,0,0\n\n5,1,0,0\n": "line 3: 4 columns",
+        "0,1,0,0,0\n5,nan,0,0,0\n": "line 2: 'nan'",
+        "nan,1,0,0,0\n5,1,0,0,0\n": "line 1: 'nan'",
+        "0,1,0,0,0\n5,0.9,0,0,0\n": "line 2: a quaternion of length 0.9",
+        "0,1,0,0,0\n5,x,0,0,0\n": "line 2: 'x'",
+        "": "0 rows",
+    }.items():
         (tmp_path / "h.csv").write_text(bad)
-        with pytest.raises(InputError, match=r"target\.file"):
+        with pytest.raises(InputError, match=r"target\.file.*" + re.escape(told)):
             build(load(tmp_path / "s.toml"), scenario.laws[0])
 
 

@@ -120,9 +120,7 @@ class Environment(Table):
 class Sensor(Table):
     """Errors of the measured state."""
 
-    attitude_noise: Annotated[
-        float, *quantity(Gain("rad", at_least=0.0, text="standard deviation, angle per axis"))
-    ] = 0.0
+    attitude_noise: Annotated[float, *quantity(Gain("rad", at_least=0.0, text="standard deviation, angle per axis"))] = 0.0
     rate_noise: Annotated[float, *quantity(Gain("rad/s", at_least=0.0, text="standard deviation per axis"))] = 0.0
 
 

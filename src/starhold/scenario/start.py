@@ -14,6 +14,7 @@ from starhold.errors import InputError
 from starhold.models.rigid_body import State
 from starhold.models.target import Target, inertial, orbital, tabulate
 from starhold.models.wheeled_body import WheeledState
+from starhold.scenario.history import read_history
 from starhold.scenario.rotors import start_momenta
 from starhold.scenario.schema import Pointing
 
@@ -41,34 +42,14 @@ def target_of(scenario: Scenario) -> Any:
 def _history(scenario: Scenario) -> Any:
     simulation = scenario.table.simulation
     path = scenario.folder / str(scenario.table.target.file)
-    allowed = "a CSV file with a line 'time,q0,q1,q2,q3' or none, then numbers, at least two rows"
+    allowed = "a CSV file of columns time,q0,q1,q2,q3 (in another order if named), unit quaternions, times that increase"
     try:
-        lines = [line for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
-        if lines and not _is_number(lines[0].split(",")[0]):
-            del lines[0]
-        if len(lines) < 2:
-            raise ValueError(f"{len(lines)} rows of numbers")
-        numbers = np.loadtxt(lines, delimiter=",", ndmin=2)
-        if numbers.shape[1] != 5 or not np.isfinite(numbers).all():
-            raise ValueError(f"a table of shape {numbers.shape}")
-        if (np.diff(numbers[:, 0]) <= 0.0).any():
-            raise ValueError("times that do not increase")
-        if (np.linalg.norm(numbers[:, 1:], axis=1) == 0.0).any():
-            raise ValueError("a zero quaternion")
-        times = np.arange(simulation.steps + 1) * simulation.control_period
-        return tabulate(numbers[:, 0], numbers[:, 1:], times)
+        known, attitudes = read_history(path)
+        return tabulate(known, attitudes, np.arange(simulation.steps + 1) * simulation.control_period)
     except OSError as error:
         raise InputError(scenario.where, "target.file", f"{path}: {error.strerror}", allowed) from None
     except ValueError as error:
         raise InputError(scenario.where, "target.file", f"{path}: {error}", allowed) from None
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def start_of(scenario: Scenario, goal: Any) -> State | WheeledState:
