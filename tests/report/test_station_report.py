@@ -88,8 +88,7 @@ def test_every_law_every_metric_and_every_picture_is_there(reader: Reader) -> No
 
 def test_names_from_files_are_no_markup() -> None:
     name = flown.HOSTILE.replace("'", "")
-    text = told("l2-circle").text.replace('name = "l2-circle"', f"name = '{name}'", 1)
-    scenario = parse_station(text, "odd")
+    scenario = flown.called(told("l2-circle"), name)
     found = Reader(render(scenario, flights("l2-circle")))
     assert sum(tag == "script" for tag, _ in found.tags) == 4
     assert "alert(" not in "".join(found.scripts[1:])

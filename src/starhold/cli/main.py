@@ -54,7 +54,7 @@ def run(
 ) -> None:
     """Fly one law: run.nc, summary.json, pictures and report.html."""
     flights = _fly(file, law, output, force, allow_unstable, certify, nested=False)
-    if flights[0].metrics["diverged_at"] is not None:
+    if flights[0].lost is not None:
         raise typer.Exit(DIVERGED)
 
 
@@ -67,7 +67,9 @@ def compare(
     certify: Certified = True,
 ) -> None:
     """Fly every law of a file on the same problem: ranked table, pictures and report.html."""
-    _fly(file, None, output, force, allow_unstable, certify, nested=True)
+    flights = _fly(file, None, output, force, allow_unstable, certify, nested=True)
+    if all(flight.lost is not None for flight in flights):
+        raise typer.Exit(DIVERGED)
 
 
 def _fly(

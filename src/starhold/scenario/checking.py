@@ -85,8 +85,6 @@ def free_name(given: str | None, kind: str, taken: set[str], where: str, key: st
         return next(name for name in counted if name not in taken)
     if given in taken:
         raise InputError(where, f"{key}.name", show(given), "a name that no other law of the file has")
-    if not all(c.isalnum() or c in "-_. " for c in given) or given.startswith("."):
-        raise InputError(where, f"{key}.name", show(given), "letters, digits, '-', '_', '.' and spaces")
     return given
 
 

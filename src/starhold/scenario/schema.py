@@ -13,7 +13,7 @@ from starhold.laws.catalogue import Law, catalogue
 from starhold.laws.interface import Gain
 from starhold.models.craft import EARTH, check_inertia
 from starhold.scenario.quantity import quantity, quantity_or, reader
-from starhold.scenario.tables import Table, at_key, refuse
+from starhold.scenario.tables import Name, Table, at_key, refuse
 from starhold.scenario.transient import TransientTable
 
 QUATERNION = Gain("1", shape=(4,), spread=False, text="quaternion, scalar first, normalised on reading")
@@ -140,6 +140,8 @@ class Simulation(Table):
             raise at_key("control_period", f"at most the duration, {self.duration:g} s", self.control_period)
         if not count <= MOST_STEPS:
             raise at_key("duration", f"at most {MOST_STEPS:.0e} control periods", self.duration)
+        if self.record_every > round(count):
+            raise at_key("record_every", f"at most the {round(count)} control steps of the run", self.record_every)
         if abs(count - round(count)) > 1e-6:
             raise at_key("duration", f"a whole number of control periods of {self.control_period:g} s", self.duration)
         return self
@@ -246,7 +248,7 @@ class LawTable(Table):
     """What every law table may say beside the law's own gains."""
 
     type: str
-    name: Annotated[str | None, Field(description="how tables and folders call it; the type if absent", min_length=1)] = None
+    name: Annotated[Name | None, Field(description="how tables and folders call it; the type if absent")] = None
     double_cover: Annotated[
         Literal["as_published", "shortest", "hysteresis"], Field(description="which of q and -q is fed back")
     ] = "as_published"
@@ -256,7 +258,7 @@ class LawTable(Table):
 class ScenarioTable(Table):
     """A whole file, but for its law tables, which are read law by law."""
 
-    name: Annotated[str, Field(min_length=1)]
+    name: Name
     description: str = ""
     spacecraft: Spacecraft
     orbit: Orbit | None = None

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any, TypeAlias
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import AfterValidator, BaseModel, ConfigDict
 from pydantic_core import PydanticCustomError
 
 
@@ -22,3 +22,19 @@ def refuse(reason: str) -> PydanticCustomError:
 def at_key(key: str, reason: str, found: Any) -> PydanticCustomError:
     """The same about one key of a table that is read."""
     return PydanticCustomError("quantity_at", "{reason}", {"reason": reason, "key": key, "found": found})
+
+
+LONGEST_NAME = 100
+_RESULTS = (".json", ".html", ".nc", ".png", ".csv")
+
+
+def _check_name(name: str) -> str:
+    sound = bool(name) and all(c.isalnum() or c in "-_. " for c in name) and name == name.strip(" .")
+    if not sound or len(name) > LONGEST_NAME or name.lower().endswith(_RESULTS):
+        allowed = "letters, digits and, between them, '-', '_', '.' and spaces"
+        raise refuse(f"{allowed}; at most {LONGEST_NAME}, and not the name of a file of results")
+    return name
+
+
+Name: TypeAlias = Annotated[str, AfterValidator(_check_name)]
+"""What a scenario or a law is called: it names folders, and stands in tables and pages."""

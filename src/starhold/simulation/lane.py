@@ -133,8 +133,11 @@ def fly(
             # Chunks grow until each takes about a pulse; the result does not depend on where they end.
             chunk = max(1, int(chunk * min(8.0, PULSE / max(time.perf_counter() - begun, 1e-9))))
         lost_at = state_of(carry, like).lost_at
+        if lost_at == 0.0:
+            # Nothing was decided; what there is to see is the start.
+            samples[0] = flatten(make_step(loop.parts()).sample(like, 0, loop.setup()))
         if lost_at >= 0.0:
-            return samples[: int(np.ceil(lost_at / record_every))].T, state_of(carry, like)
+            return samples[: max(1, int(np.ceil(lost_at / record_every)))].T, state_of(carry, like)
     if steps % record_every == 0 and phases:
         # The last sample shows what would be commanded next; the step that follows is flown for it and forgotten.
         flight.fly(phases[-1], carry.copy(), steps, 1)

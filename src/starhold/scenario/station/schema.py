@@ -12,7 +12,7 @@ from starhold.models.libration import EARTH_DIAMETER, PRIMARIES, Libration, Prim
 from starhold.scenario.checking import nearest
 from starhold.scenario.quantity import quantity, scaled
 from starhold.scenario.schema import MOST_STEPS, file_schema
-from starhold.scenario.tables import Table, at_key, refuse
+from starhold.scenario.tables import Name, Table, at_key, refuse
 
 
 def _known_pair(value: Any) -> Any:
@@ -142,6 +142,8 @@ class Timing(Table):
             raise at_key("control_period", f"at most the duration, {self.duration:g}", self.control_period)
         if not self.duration / self.control_period <= MOST_STEPS:
             raise at_key("duration", f"at most {MOST_STEPS:.0e} control periods", self.duration)
+        if self.record_every > self.steps:
+            raise at_key("record_every", f"at most the {self.steps} control steps of the run", self.record_every)
         return self
 
     @property
@@ -160,13 +162,13 @@ class StationLawTable(Resources):
     """What every law table may say beside the law's own gains."""
 
     type: str
-    name: Annotated[str | None, Field(description="how tables and folders call it; the type if absent", min_length=1)] = None
+    name: Annotated[Name | None, Field(description="how tables and folders call it; the type if absent")] = None
 
 
 class StationTable(Table):
     """A whole file, but for its law tables, which are read law by law."""
 
-    name: Annotated[str, Field(min_length=1)]
+    name: Name
     description: str = ""
     libration: LibrationTable
     control: ControlTable = ControlTable()
