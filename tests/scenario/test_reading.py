@@ -90,6 +90,11 @@ FAULTS = {
         "control_period = 0.1\nrecord_every = 6001",
         ["simulation.record_every", "6001", "at most the 6000"],
     ),
+    "a lag too fast for the integration": (
+        'torque_limit = "0.01 N m"',
+        'torque_limit = "0.01 N m"\nactuator_lag = "10 ms"',
+        ["simulation.substeps", "found 1", "at least 20 substeps"],
+    ),
     "a name that leads out of the results": ('name = "three-laws"', 'name = "../../x"', ["name", "../../x", "letters"]),
     "a name of a place": ('name = "three-laws"', 'name = "/abs/x"', ["name", "/abs/x", "letters"]),
     "a name that is markup": ('name = "three-laws"', 'name = "[/red]"', ["name", "[/red]", "letters"]),

@@ -22,7 +22,7 @@ from starhold.models import actuator, environment, rigid_body, sensor, target, w
 from starhold.models.craft import Craft
 from starhold.models.rigid_body import State
 from starhold.models.wheeled_body import WheeledState
-from starhold.models.wheels import Wheels, allocate, allocate_peak
+from starhold.models.wheels import Wheels, allocate, allocate_peak, relaxation
 
 Cover = Literal["as_published", "shortest", "hysteresis"]
 Limit = Literal["axis", "norm", "none"]
@@ -179,6 +179,15 @@ class ClosedLoop:
             body.record,
             ALLOCATIONS[self.allocation],
         )
+
+    @property
+    def fastest(self) -> float:
+        """The fastest rate (1/s) at which an actuator or a rotor comes to rest by itself, which the integration must
+        resolve: 1/lag, and friction over a rotor's inertia."""
+        rates = [1.0 / self.dynamics.lag if self.dynamics.lag > 0.0 else 0.0]
+        wheels = [event.wheels for event in self.events] + [self.wheels]
+        rates += [relaxation(found) for found in wheels if found is not None]
+        return max(rates)
 
     @property
     def remembers(self) -> bool:

@@ -92,6 +92,11 @@ class StationLoop:
     lag: float = 0.0
     far: float = 1e3
 
+    @property
+    def fastest(self) -> float:
+        """The fastest rate at which the control comes to its command by itself: 1/lag."""
+        return 1.0 / self.lag if self.lag > 0.0 else 0.0
+
     def parts(self) -> StationParts:
         """The equations this loop is made of."""
         lags = self.lag > 0.0

@@ -203,6 +203,12 @@ def authority(wheels: Wheels) -> float:
     return min(used)
 
 
+def relaxation(wheels: Wheels) -> float:
+    """The fastest rate (1/s) at which friction brings a rotor to rest, that of Coulomb friction within CREEP included."""
+    columns = zip(wheels.viscous, wheels.coulomb, wheels.inertia, strict=True)
+    return max((viscous + coulomb / CREEP) / inertia for viscous, coulomb, inertia in columns)
+
+
 def gives_what_is_asked(wheels: Wheels) -> bool:
     """Whether, within the limits of the wheels, the torque on the body is the one that is shared out: not so while a lost
     wheel is still counted on."""

@@ -8,6 +8,7 @@ from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.models.actuator import Dynamics
 from starhold.models.sensor import Noise
+from starhold.scenario.checking import check_substeps
 from starhold.scenario.faults import make_events
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.scenario.start import start_of, target_of
@@ -38,6 +39,7 @@ def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
         allocation="least-squares" if table.wheels is None else table.wheels.allocation,
         events=make_events(scenario, entry) if table.fault else (),
     )
+    check_substeps(loop, scenario.where)
     try:
         loop.carry()
     except ValueError as error:

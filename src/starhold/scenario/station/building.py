@@ -12,6 +12,7 @@ from starhold.laws.interface import NoMemory
 from starhold.laws.station.interface import SeenPoint
 from starhold.loop.station import StationLoop
 from starhold.models.libration import PointState
+from starhold.scenario.checking import check_substeps
 from starhold.scenario.station.reading import StationEntry, StationScenario
 
 NEAR = 0.4
@@ -35,6 +36,7 @@ def build(scenario: StationScenario, entry: StationEntry) -> StationLoop:
         lag=entry.lag,
         far=table.simulation.lost_beyond or NEAR * nearer,
     )
+    check_substeps(loop, scenario.where)
     away = norm(loop.start.position)
     if away >= loop.far:
         raise InputError(
