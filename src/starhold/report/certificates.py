@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
-from starhold.analysis.trial import Trial, fly_claims
 from starhold.certification.certificate import Certificate
 from starhold.certification.certify import Wanted, certify
 from starhold.certification.region import Shape
@@ -20,6 +19,7 @@ from starhold.scenario.building import build
 from starhold.simulation.lane import fly
 
 if TYPE_CHECKING:
+    from starhold.analysis.trial import Trial
     from starhold.loop.closed_loop import ClosedLoop
     from starhold.scenario.reading import LawEntry, Scenario
 
@@ -78,6 +78,9 @@ def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:
 def certify_scenario(scenario: Scenario, law: str | None = None) -> list[Tried]:
     """Certificates of all laws of a scenario, or of one. Raises `BrokenClaimError` where a flight contradicts one."""
     entries = scenario.laws if law is None else (scenario.pick(law),)
+    # Loaded here, for flights do without.
+    from starhold.analysis.trial import fly_claims
+
     # All of them before the first proof, so that what is wrong with the last is said at once.
     loops = [build(scenario, entry) for entry in entries]
     issued = [found for entry, loop in zip(entries, loops, strict=True) for found in certify_law(scenario, entry, loop)]

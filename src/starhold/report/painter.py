@@ -8,7 +8,9 @@ import pickle
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
+from threading import Thread
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -19,6 +21,7 @@ class Painter:
     """A waiting process; `start` sends it what to draw, `finish` waits until it has. Leaving the context ends it."""
 
     def __init__(self) -> None:
+        self._sender: Thread | None = None
         self._process = subprocess.Popen(
             [sys.executable, "-m", "starhold.report.painter"], stdin=subprocess.PIPE, stderr=subprocess.PIPE
         )
@@ -29,16 +32,29 @@ class Painter:
     def __exit__(self, *failure: object) -> None:
         if self._process.poll() is None:
             self._process.kill()
+        self._sent()
         self._process.communicate()
 
     def start(self, picture: Picture, folder: Path) -> None:
         """Let it draw into `folder`, which exists."""
+        # On a thread, for it may not listen yet.
+        self._sender = Thread(target=self._send, args=((picture, folder.absolute()),))
+        self._sender.start()
+
+    def _send(self, what: object) -> None:
         assert self._process.stdin is not None
-        pickle.dump((picture, folder.absolute()), self._process.stdin)
-        self._process.stdin.flush()
+        # Where it has died, `finish` tells why.
+        with suppress(OSError):
+            pickle.dump(what, self._process.stdin)
+            self._process.stdin.flush()
+
+    def _sent(self) -> None:
+        if self._sender is not None:
+            self._sender.join()
 
     def finish(self) -> None:
         """Wait for the files. RuntimeError tells what went wrong."""
+        self._sent()
         _, said = self._process.communicate()
         if self._process.returncode != 0:
             raise RuntimeError(f"the figures could not be drawn: {said.decode(errors='replace').strip()[-2000:]}")
