@@ -1,5 +1,6 @@
 """Every law passes every check of the conformance suite, and broken laws do not."""
 
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
@@ -93,3 +94,15 @@ def test_what_cannot_be_recorded_is_told_in_one_line(kind, tmp_path):
     assert instead in reason.partition("allowed: ")[2]
     with pytest.raises(InputError, match=r"own_law\.py, line"):
         fly(sample_loop(law, law.examples()[0]), 1)
+
+
+def test_a_law_of_another_package_that_does_not_load_is_left_out_with_a_warning(monkeypatch):
+    broken = EntryPoint("broken", "no_such_package.law", "starhold.laws")
+    incomplete = EntryPoint("incomplete", "json", "starhold.laws")
+    monkeypatch.setattr("starhold.laws.catalogue.entry_points", lambda group: [broken, incomplete])
+    with pytest.warns(UserWarning, match="is left out") as told:
+        found = catalogue.__wrapped__()
+    assert set(found) == set(catalogue())
+    texts = [str(warning.message) for warning in told]
+    assert texts[0].startswith("the law no_such_package.law is left out: ModuleNotFoundError")
+    assert "a law needs CARD" in texts[1]

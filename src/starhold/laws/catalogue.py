@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import pkgutil
 import sys
+import warnings
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -97,10 +98,14 @@ AnyLaw = TypeVar("AnyLaw", bound=Law)
 
 @cache
 def catalogue() -> dict[str, Law]:
-    """All laws by name. A package whose entry point does not load is named in the error."""
+    """All laws by name. A law of another package that does not load is left out, with a warning that names it."""
     found = found_in(starhold.laws.__name__, Law, INTERFACE)
     for point in entry_points(group="starhold.laws"):
-        found.append(_as_law(point.load()))
+        try:
+            found.append(_as_law(point.load()))
+        except Exception as error:
+            reason = " ".join(str(error).split())
+            warnings.warn(f"the law {point.value} is left out: {type(error).__name__}: {reason}", stacklevel=2)
     return {law.name: law for law in sorted(found, key=lambda law: law.name)}
 
 
