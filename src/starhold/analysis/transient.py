@@ -132,6 +132,7 @@ class Watcher:
         """starts: (numbers of a state, lanes); gains: the law's, with an array (lanes,) in place of every number that
         differs between lanes; steps: control steps."""
         fleet, phase = self._fleet(starts, gains, steps)
+        fleet.prepare(phase)
         fleet.share_out(lambda piece: fleet.fly(phase, piece), threads or os.cpu_count() or 1)
         return self._flown(fleet, steps).transients(self.loop.period)
 

@@ -146,7 +146,7 @@ class Kernel:
     """A compiled program. Called with its memories by name, then counts and words in the order the program states."""
 
     def __init__(self, program: Program, width: int) -> None:
-        self.program, self.width = program, width
+        self.program = program
         self._call = load(program, width)
 
     def __call__(self, memories: dict[str, Array], *counts: int) -> None:

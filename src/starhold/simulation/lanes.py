@@ -29,12 +29,11 @@ PIECES = 16
 @dataclass(frozen=True)
 class Batch:
     """Where many trajectories ended. states: (numbers of a state, lanes), rows in the order of the loop's `start`; lost_at:
-    (lanes,) control step at which the motion was lost, -1 where it was not; noted: (numbers, lanes) of an observer."""
+    (lanes,) control step at which the motion was lost, -1 where it was not."""
 
     states: NDArray[np.float64]
     lost_at: NDArray[np.float64]
     like: Any
-    noted: NDArray[np.float64]
 
     def state(self, lane: int) -> Any:
         """The state of a lane, a `State`, `WheeledState` or `PointState`."""
@@ -66,6 +65,8 @@ def simulate_many(
     carries = carry_columns(loop, start, cut[0] if cut else None)
     fleet = Fleet(loop, carries, first_run, width or widest())
     workers = max(1, os.cpu_count() or 1 if threads is None else threads)
+    for phase in cut:
+        fleet.prepare(phase)
 
     def work(piece: range) -> None:
         for now in cut:
@@ -73,7 +74,7 @@ def simulate_many(
 
     fleet.share_out(work, workers, progress)
     ends = fleet.carries()
-    return Batch(ends[: len(start)], ends[fleet.lost_row], loop.start, np.empty((0, start.shape[1])))
+    return Batch(ends[: len(start)], ends[fleet.lost_row], loop.start)
 
 
 class Fleet:
@@ -120,7 +121,7 @@ class Fleet:
 
     def fly(self, phase: Any, piece: range, first: int | None = None, count: int | None = None) -> None:
         """Fly the blocks of a piece through a phase, or through `count` control steps of it from `first` on."""
-        kernel, arguments, own, turn = self._prepared(phase)
+        _, kernel, arguments, own, turn = self.prepare(phase)
         part = self.x[piece.start : piece.stop]
         if turn is not None and first is None:
             rates = self._unblocked(part[:, RATE])
@@ -144,14 +145,15 @@ class Fleet:
     def _blocked(self, rows: NDArray[np.float64], count: int) -> NDArray[np.float64]:
         return rows.reshape(len(rows), count, self.width).swapaxes(0, 1)
 
-    def _prepared(self, phase: Any) -> Any:
+    def prepare(self, phase: Any) -> Any:
+        """Compile what flies a phase, once, before threads share it out."""
         if id(phase) not in self._ready:
             observer = self.observer
             numbers = Numbers(phase.gains, phase.known, phase.craft, phase.setup)
             arguments = Arguments(*numbers, () if observer is None else observer.numbers)
             kernel = make_kernel(many, self.loop.parts(), self.width, self.like, numbers, self.loop.substeps, observer)
             turn = self._turned(phase) if isinstance(phase, Phase) and phase.turns else None
-            self._ready[id(phase)] = (kernel, arguments, self._packed(arguments.rows(self.lanes)), turn)
+            self._ready[id(phase)] = (phase, kernel, arguments, self._packed(arguments.rows(self.lanes)), turn)
         return self._ready[id(phase)]
 
     def _turned(self, phase: Phase) -> Any:
