@@ -76,6 +76,7 @@ def test_the_printed_limit_2_786_does_not_hold_the_circle_and_3_429_does():
 def lagging(lag: str) -> Flight:
     """The circle with a tenth to spare and this lag, two years."""
     text = builtin_text("l2-deficit").split("[[law]]")[0].replace('"4 yr"', '"2 yr"')
+    text = text.replace("control_period = 0.001", "control_period = 0.001\nsubsteps = 2")
     law = f'[[law]]\ntype = "l2-circle"\nform = "best"\nradius = 1.0\nmargin = 0.1\nlag = {lag}\n'
     scenario = parse_station(text + law, "lag")
     return fly_law(scenario, scenario.laws[0], build(scenario, scenario.laws[0]))
