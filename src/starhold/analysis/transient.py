@@ -158,7 +158,7 @@ class Watcher:
         (phase,) = self.loop.phases(max(steps, 1))
         phase = phase._replace(last=steps, gains=gains)
         carries = carry_columns(self.loop, starts, phase)
-        return Fleet(self.loop, carries, 0, widest(), observer, noted), phase
+        return Fleet(self.loop, carries, 0, widest(len(carries)), observer, noted), phase
 
     def _flown(self, fleet: Fleet, steps: int) -> Flown:
         return Flown(steps, fleet.notes(), fleet.carries()[fleet.lost_row] >= 0.0)

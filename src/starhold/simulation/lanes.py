@@ -63,7 +63,7 @@ def simulate_many(
     start = start if isinstance(starts, np.ndarray) else start.T
     cut = list(loop.phases(steps) if phases is None else phases)
     carries = carry_columns(loop, start, cut[0] if cut else None)
-    fleet = Fleet(loop, carries, first_run, width or widest())
+    fleet = Fleet(loop, carries, first_run, width or widest(len(carries)))
     workers = max(1, os.cpu_count() or 1 if threads is None else threads)
     for phase in cut:
         fleet.prepare(phase)

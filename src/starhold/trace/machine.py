@@ -34,10 +34,16 @@ def _machine() -> Any:
     return target.create_target_machine(opt=3, cpu=llvm.get_host_cpu_name(), features=features)
 
 
-def widest() -> int:
-    """Lanes in flight at once on this processor that fly fastest: two of its widest registers where there are 32 of them,
-    one where there are 16."""
-    return 16 if _is_wide() else 4
+FEW = 16
+"""Numbers carried from step to step for which 16 registers are still enough for two vectors of each."""
+
+
+def widest(carried: int) -> int:
+    """Lanes in flight at once on this processor that fly fastest, where each carries so many numbers: two of its widest
+    registers for a number where there are 32 of them, or where few numbers are carried; else one."""
+    if _is_wide():
+        return 16
+    return 8 if carried <= FEW else 4
 
 
 def _is_wide() -> bool:
