@@ -1,4 +1,4 @@
-"""What an operation is: its plain meaning, and what every other reader of an equation makes of it.
+"""Operations have a plain meaning, and one for every other reader of an equation.
 
 An operation is written once, as a function of floats under `@operation(...)`, which names its meaning for SymPy, for balls,
 for exact polynomials, and in the languages that a trace is printed in. Numbers of other readers find their meaning by
@@ -70,7 +70,7 @@ def operation(takes: str, gives: str, **meanings: Any) -> Callable[[_Function], 
 
 
 def _read(entry: Operation, values: tuple[Any, ...]) -> Any:
-    """What the reader whose number is among the values makes of the operation."""
+    """Apply the operation as the reader does whose number is among the values."""
     readers = [found for value in values if (found := _reader(value)) is not None]
     if not readers:
         return entry.plain(*values)

@@ -23,7 +23,7 @@ def move(state: _State, step: float, rate: Any) -> _State:
 
 
 def leaves(value: Any) -> Iterator[Any]:
-    """What a nested value is made of, in order; None and () are nothing."""
+    """Yield what a nested value is made of, in order; None and () are nothing."""
     if isinstance(value, tuple):
         for part in cast(tuple[Any, ...], value):
             yield from leaves(part)
@@ -32,7 +32,7 @@ def leaves(value: Any) -> Iterator[Any]:
 
 
 def mapped(value: Any, leaf: Callable[[Any], Any]) -> Any:
-    """The same structure with every leaf replaced by leaf(it)."""
+    """Rebuild a structure with every leaf replaced by leaf(it)."""
     if isinstance(value, tuple):
         return rebuild(value, [mapped(part, leaf) for part in cast(tuple[Any, ...], value)])
     return None if value is None else leaf(value)

@@ -137,8 +137,8 @@ class Watcher:
         return self._flown(fleet, steps).transients(self.loop.period)
 
     def search(self, starts: Array, gains: Any, steps: int, enough: Callable[[Flown], bool]) -> Transients:
-        """The same on this thread; ends early once `enough` says so. Lanes that are then still outside their end have no
-        time."""
+        """Fly likewise on this thread, and end early once `enough` says so. Lanes that are then still outside their
+        end have no time."""
         fleet, phase = self._fleet(starts, gains, steps)
         flown = self._flown(fleet, 0)
         while flown.steps < steps and not enough(flown):

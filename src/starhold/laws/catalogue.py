@@ -87,8 +87,8 @@ class Law:
         return NoMemory() if maker is None else maker(gains, craft, period)
 
     def counters(self, memory: Any) -> tuple[int, ...] | None:
-        """What a law that iterates has counted: calls, iterations in all, the most in a call, calls that ended without the
-        optimum; None for other laws."""
+        """Tell what a law that iterates has counted: calls, iterations in all, the most in a call, calls that ended
+        without the optimum; None for other laws."""
         teller = getattr(self.module, "counters", None)
         return None if teller is None else teller(memory)
 

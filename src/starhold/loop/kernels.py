@@ -66,7 +66,7 @@ def form(value: Any) -> Any:
 
 def fly_plainly(loop: Any, steps: int, run: int = 0) -> Any:
     """What a loop without events carries after so many control steps in plain Python."""
-    step, carry, setup, key = make_step(loop.parts()), loop.carry(), loop.setup(), (getattr(loop, "seed", 0), run)
+    step, carry, setup, key = make_step(loop.parts()), loop.carry(), loop.setup(), (loop.seed, run)
     for k in range(steps):
         carry = step.decide(step.check(carry, k, setup), k, key, loop.gains, loop.craft, setup)
         for _ in range(loop.substeps):
@@ -122,8 +122,8 @@ def state_of(numbers: Any, like: Any) -> Any:
     return mapped(state, lambda leaf: Buffer([next(rest) for _ in range(leaf.size)]) if isinstance(leaf, Buffer) else leaf)
 
 
-def _state(like: Any, cells: Cells, base: Any) -> tuple[Any, int]:
-    """The state that lies in memory from `base` on, as `numbers_of` orders it, and how many numbers that is."""
+def _state(like: Any, cells: Cells, base: Any) -> Any:
+    """The state that lies in memory from `base` on, as `numbers_of` orders it."""
     place, start = 0, len(flatten(like))
 
     def leaf(value: Any) -> Any:
@@ -134,7 +134,7 @@ def _state(like: Any, cells: Cells, base: Any) -> tuple[Any, int]:
         place += 1
         return cells[base + place - 1]
 
-    return mapped(like, leaf), len(numbers_of(like))
+    return mapped(like, leaf)
 
 
 def _put(cells: Cells, base: Any, state: Any) -> None:
@@ -176,7 +176,7 @@ def one(step: Step, carry: Any, numbers: Numbers, substeps: int) -> Program:
         first, groups, each, place, row = counts
         key = (recorder.input("seed", "word"), recorder.input("run", "word"))
         gains, known, craft, setup = Arguments(*numbers).bound(recorder, 0)
-        state, _ = _state(carry, cells, 0)
+        state = _state(carry, cells, 0)
 
         def lost(carry: Any) -> Any:
             return less(-1.0, carry.lost_at)
@@ -209,16 +209,14 @@ def many(step: Step, carry: Any, numbers: Numbers, substeps: int, observer: Obse
         seen = recorder.memory("noted", lanes=True, writable=True)
         first, count, blocks, width = (recorder.input(name, "index") for name in ("first", "count", "blocks", "width"))
         seed, run = recorder.input("seed", "word"), recorder.input("run", "word")
-        arguments = Arguments(*numbers, () if observer is None else observer.numbers)
+        first_noted, more = ((), ()) if observer is None else (observer.first, observer.numbers)
+        arguments = Arguments(*numbers, more)
 
         def block(b: Any) -> None:
             gains, known, craft, setup, noting = arguments.bound(recorder, b * len(arguments.own))
             key = (seed, word_add(word_add(run, word_of(b * width)), recorder.lane()))
-            base, size = b * len(numbers_of(carry)), 0
-            state, _ = _state(carry, cells, base)
-            noted: Any = ()
-            if observer is not None:
-                noted, size = _state(observer.first, seen, b * len(flatten(observer.first)))
+            base, place = b * len(numbers_of(carry)), b * len(flatten(first_noted))
+            state, noted = _state(carry, cells, base), _state(first_noted, seen, place)
 
             def turn(k: Any, carry: Any, noted: Any) -> Any:
                 now = first + k
@@ -230,7 +228,7 @@ def many(step: Step, carry: Any, numbers: Numbers, substeps: int, observer: Obse
 
             end, noted = repeat(count, turn, step.check(state, first, setup), noted)
             _put(cells, base, end)
-            _put(seen, b * size, noted)
+            _put(seen, place, noted)
 
         repeat(blocks, block)
     return recorder.program("fly", "Flies many closed loops.")
@@ -252,13 +250,13 @@ def replay(step: Step, carry: Any, numbers: Numbers, width: int) -> Program:
         first, count = recorder.input("first", "index"), recorder.input("count", "index")
         key = (recorder.input("seed", "word"), recorder.input("run", "word"))
         gains, known, _, setup = Arguments(*numbers).bound(recorder, 0)
-        begun, _ = _state(carry, cells, 0)
+        begun = _state(carry, cells, 0)
 
         def turn(k: Any, carry: Any) -> Any:
             # The first numbers of a sample are the state; each waits for the torque of the call before.
             u = carry.command
             wait = 0.0 * (u[0] + u[1] + u[2])
-            state, _ = _state(carry.state, samples, (first + k) * width)
+            state = _state(carry.state, samples, (first + k) * width)
             return (step.decide(carry._replace(state=move(state, wait, state)), first + k, key, gains, known, setup),)
 
         _put(cells, 0, repeat(count, turn, begun)[0])

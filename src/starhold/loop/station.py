@@ -93,6 +93,11 @@ class StationLoop:
     far: float = 1e3
 
     @property
+    def seed(self) -> int:
+        """The seed of random numbers, of which this kind of loop draws none."""
+        return 0
+
+    @property
     def fastest(self) -> float:
         """The fastest rate at which the control comes to its command by itself: 1/lag."""
         return 1.0 / self.lag if self.lag > 0.0 else 0.0

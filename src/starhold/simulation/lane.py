@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from starhold.algebra.structure import flatten
 from starhold.errors import InputError
 from starhold.loop.closed_loop import Carry, ClosedLoop
-from starhold.loop.kernels import Arguments, Numbers, make_kernel, make_step, numbers_of, one, state_of
+from starhold.loop.kernels import Arguments, Kernel, Numbers, make_kernel, make_step, numbers_of, one, state_of
 from starhold.loop.station import StationCarry, StationLoop
 from starhold.loop.step import Sample
 
@@ -149,16 +149,23 @@ class _Flight:
 
     def __init__(self, loop: Any, like: Any, every: int, run: int, samples: NDArray[np.float64]) -> None:
         self.loop, self.like, self.every, self.run, self.samples = loop, like, every, run, samples
+        self._ready: dict[int, tuple[Arguments, Kernel]] = {}
+
+    def _prepared(self, phase: Any) -> tuple[Arguments, Kernel]:
+        """Arguments and kernel of a phase, made once for all the chunks that it is flown in."""
+        if phase.first not in self._ready:
+            numbers = Numbers(phase.gains, phase.known, phase.craft, phase.setup)
+            kernel = make_kernel(one, self.loop.parts(), 1, self.like, numbers, self.loop.substeps)
+            self._ready[phase.first] = Arguments(*numbers), kernel
+        return self._ready[phase.first]
 
     def fly(self, phase: Any, carry: NDArray[np.float64], first: int, count: int) -> int:
         """Fly up to `count` control steps from `first` on: to the next sample, or by whole groups between samples. What is
         carried changes in place. Returns the steps flown."""
-        numbers = Numbers(phase.gains, phase.known, phase.craft, phase.setup)
-        arguments = Arguments(*numbers)
-        kernel = make_kernel(one, self.loop.parts(), 1, self.like, numbers, self.loop.substeps)
+        arguments, kernel = self._prepared(phase)
         memories = {"carry": carry, "record": self.samples, "shared": arguments.shared, "tables": arguments.tables}
         memories["own"] = arguments.shared
-        seed, into = getattr(self.loop, "seed", 0), first % self.every
+        seed, into = self.loop.seed, first % self.every
         if into or count < self.every:
             # A part of a group: its sample, if it begins here, and the steps up to the next one.
             groups, each, place = 1, min(count, self.every - into), 0 if into == 0 else -1

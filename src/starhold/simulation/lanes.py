@@ -136,8 +136,7 @@ class Fleet:
         begin = phase.first if first is None else first
         steps = phase.last - phase.first if count is None else count
         run = self.first_run + piece.start * self.width
-        seed = getattr(self.loop, "seed", 0)
-        kernel(memories, begin, steps, len(piece), self.width, seed, run)
+        kernel(memories, begin, steps, len(piece), self.width, self.loop.seed, run)
 
     def _unblocked(self, blocks: NDArray[np.float64]) -> NDArray[np.float64]:
         return blocks.swapaxes(0, 1).reshape(blocks.shape[1], -1)
