@@ -70,7 +70,9 @@ def test_overshoot_and_settling_are_measured_on_the_run(metrics):
 
 
 def test_predictive_law_costs_by_far_the_most(flights):
-    costs = {name: call_costs(loop, samples, calls=2000)["cost_median"] for name, (loop, samples, _) in flights.items()}
+    costs = {
+        name: call_costs(loop, samples[:16].T, calls=2000)["cost_median"] for name, (loop, samples, _) in flights.items()
+    }
     # Two orders stand between them; a noisy machine cannot turn that round.
     assert costs["mpc"] > 20 * max(costs["lyapunov"], costs["sliding"])
 

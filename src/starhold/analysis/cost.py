@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,9 @@ from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import Arguments, Numbers, make_kernel, numbers_of, replay
 from starhold.models.sensor import exact, no_disturbance
 
+if TYPE_CHECKING:
+    from starhold.simulation.lane import Recording
+
 CALLS = 50_000
 """Calls timed at most, as many as the published table timed."""
 CHUNK = 1e-4
@@ -19,32 +22,37 @@ CHUNK = 1e-4
 
 
 class Replay:
-    """The compiled calls of a loop's law on the states of recorded samples (numbers of a sample, number), as `fly` gives
-    them: from the measured state to the limited torque, models the law needs included, each waiting for the one before. What
-    the law remembers goes on from call to call."""
+    """The compiled calls of a loop's law on states (number, numbers of a state): from the measured state to the limited
+    torque, models the law needs included, each waiting for the one before. What the law remembers goes on from call to
+    call."""
 
-    def __init__(self, loop: ClosedLoop, samples: NDArray[np.float64]) -> None:
+    def __init__(self, loop: ClosedLoop, states: NDArray[np.float64]) -> None:
         # The noise of the simulation is no part of a call.
         quiet: Any = loop.parts()._replace(sense=exact, disturb=no_disturbance)
         numbers = Numbers(loop.gains, loop.craft, loop.craft, loop.setup())
         arguments = Arguments(*numbers)
-        self._kernel, self._seed = make_kernel(replay, quiet, 1, loop.carry(), numbers, len(samples)), loop.seed
-        # A sample a row, as it was recorded.
-        self._memories = {"record": np.ascontiguousarray(samples.T), "shared": arguments.shared, "own": arguments.shared}
+        self._kernel, self._seed = make_kernel(replay, quiet, 1, loop.carry(), numbers), loop.seed
+        self._memories = {"states": np.ascontiguousarray(states), "shared": arguments.shared, "own": arguments.shared}
         self._memories |= {"tables": arguments.tables, "carry": np.array(numbers_of(loop.carry()))}
 
     def __call__(self, first: int, last: int) -> None:
-        """Call the law on samples first .. last-1."""
+        """Call the law on states first .. last-1."""
         self._kernel(self._memories, first, last - first, self._seed, 0)
 
 
-def call_costs(loop: ClosedLoop, samples: NDArray[np.float64], calls: int = CALLS, seconds: float = 1.0) -> dict[str, float]:
-    """Median and worst processor time (s) of a call, over chunks of calls that replay the samples of a flight in order.
+def recorded_states(loop: ClosedLoop, recording: Recording) -> NDArray[np.float64]:
+    """The loop's states at the samples of its recording, of a long one at the first of them (number, numbers of a state)."""
+    names = ["wheel_momentum" if name == "momentum" else name for name in type(loop.start)._fields]
+    return np.hstack([recording[name][:CALLS] for name in names])
+
+
+def call_costs(loop: ClosedLoop, states: NDArray[np.float64], calls: int = CALLS, seconds: float = 1.0) -> dict[str, float]:
+    """Median and worst processor time (s) of a call, over chunks of calls that replay the states of a flight in order.
 
     The figures are latencies, see `Replay`.
     """
-    repeat = Replay(loop, samples)
-    few = min(1000, samples.shape[1])
+    repeat = Replay(loop, states)
+    few = min(1000, len(states))
 
     def timed(first: int, last: int) -> float:
         begun = time.thread_time()
@@ -54,11 +62,11 @@ def call_costs(loop: ClosedLoop, samples: NDArray[np.float64], calls: int = CALL
     timed(0, 1)
     overhead = float(np.median([timed(0, 0) for _ in range(50)]))
     single = max(min(timed(0, few) for _ in range(3)) - overhead, 1e-9) / few
-    chunk = max(1, min(samples.shape[1], int(CHUNK / single)))
+    chunk = max(1, min(len(states), int(CHUNK / single)))
     costs: list[float] = []
     begun, first = time.thread_time(), 0
     while len(costs) * chunk < calls and time.thread_time() - begun < seconds:
-        first = first if first + chunk <= samples.shape[1] else 0
+        first = first if first + chunk <= len(states) else 0
         costs.append(max(timed(first, first + chunk) - overhead, 0.0) / chunk)
         first += chunk
     return {"cost_median": float(np.median(costs)), "cost_worst": float(np.max(costs))}

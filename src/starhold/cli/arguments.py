@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-USER_ERROR, DIVERGED, FAILED_CHECK, REFUTED, UNDECIDED, INTERRUPTED, INTERNAL_ERROR = 2, 1, 1, 3, 4, 130, 70
+USER_ERROR, DIVERGED, FAILED_CHECK, REFUTED, UNDECIDED, INTERNAL_ERROR = 2, 1, 1, 3, 4, 70
 
 ScenarioFile = Annotated[str, typer.Argument(metavar="FILE", help="a scenario file or the name of a built-in scenario")]
 Output = Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="folder for results, created")]

@@ -9,7 +9,7 @@ import sys
 import traceback
 from pathlib import Path
 from threading import Event
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
@@ -19,7 +19,6 @@ from starhold.cli.arguments import (
     DIVERGED,
     FAILED_CHECK,
     INTERNAL_ERROR,
-    INTERRUPTED,
     USER_ERROR,
     Certified,
     Force,
@@ -27,6 +26,7 @@ from starhold.cli.arguments import (
     ScenarioFile,
     Unstable,
 )
+from starhold.cli.outlet import Outlet, open_outlets
 from starhold.errors import InputError
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def _fly(
 
     # First of all, for it takes as long to get ready as the flight takes.
     with Painter() as painter:
-        from starhold.cli.show import flying, print_outcome
+        from starhold.cli.show import console, flying, print_outcome
         from starhold.report.kinds import kind_of
         from starhold.report.results import open_folder, write_run
         from starhold.scenario.opening import open_scenario
@@ -107,9 +107,14 @@ def _fly(
         # While the pictures are drawn.
         if certify:
             flights = [kind.prove(scenario, *trio) for trio in zip(entries, loops, flights, strict=True)]
-        page = kind.write(scenario, flights, folder)
-        painter.finish()
-    print_outcome(flights, page)
+        unpainted = painter.finish()
+    # Nothing else runs by now.
+    flights = [kind.timed(loop, flight) for loop, flight in zip(loops, flights, strict=True)]
+    print_outcome(flights)
+    page = kind.write(scenario, flights, folder)
+    console.print(f"Report: {page}", soft_wrap=True)
+    if unpainted is not None:
+        raise unpainted
     return flights
 
 
@@ -275,7 +280,7 @@ def _root(version: Annotated[bool, typer.Option("--version", help="print the ver
 
 
 class InterruptedByUserError(BaseException):
-    """Ctrl-C, under a name that the command-line library does not turn into an exit code of its own."""
+    """Ctrl-C or a request to end, under a name that the command-line library does not turn into an exit code of its own."""
 
 
 _interrupted = Event()
@@ -284,23 +289,31 @@ _interrupted = Event()
 def _interrupt(number: int, frame: object) -> None:
     # Noted as well as raised: in a callback of the garbage collector an exception is swallowed.
     _interrupted.set()
-    raise InterruptedByUserError
+    raise InterruptedByUserError(number)
 
 
 def _heed_interrupt() -> None:
     if _interrupted.is_set():
-        raise InterruptedByUserError
+        raise InterruptedByUserError(signal.SIGINT)
 
 
 def main() -> None:
     """Entry point: user errors become one line and exit code 2, an interrupt 130."""
-    sys.exit(_run_command())
+    open_outlets()
+    code = _run_command()
+    sys.stdout.flush()
+    unsaid = cast(Outlet, sys.stdout).failure
+    if unsaid is not None and not isinstance(unsaid, BrokenPipeError):
+        print(f"starhold: standard output cannot be written: {unsaid.strerror}", file=sys.stderr)
+        code = code or USER_ERROR
+    sys.exit(code)
 
 
 def _run_command() -> int:
     # Before NumPy loads: on matrices as small as a law's, its library's threads only wait for one another.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    signal.signal(signal.SIGINT, _interrupt)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _interrupt)
     # A command loads much and lives briefly: looking for garbage at every step of that is time lost.
     gc.set_threshold(200_000)
     try:
@@ -310,9 +323,9 @@ def _run_command() -> int:
     except InputError as error:
         print(f"starhold: {error}", file=sys.stderr)
         return USER_ERROR
-    except InterruptedByUserError:
+    except InterruptedByUserError as interrupt:
         print("starhold: interrupted; files already written are whole", file=sys.stderr)
-        return INTERRUPTED
+        return 128 + interrupt.args[0]
     except Exception:
         traceback.print_exc()
         return INTERNAL_ERROR

@@ -11,8 +11,6 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from starhold.laws.catalogue import Law
     from starhold.models.wheel_units import WheelUnit
     from starhold.report.flight import Flight
@@ -50,8 +48,8 @@ def flying(entries: Sequence[LawEntry | StationEntry], steps: int) -> Iterator[C
         yield notice
 
 
-def print_outcome(flights: Sequence[Flight], page: Path) -> None:
-    """The table, what went wrong, and where the report is."""
+def print_outcome(flights: Sequence[Flight]) -> None:
+    """The table, what went wrong and what is proved."""
     print_table(flights)
     for flight in flights:
         if flight.lost is not None:
@@ -69,7 +67,6 @@ def print_outcome(flights: Sequence[Flight], page: Path) -> None:
         from starhold.cli.show_certificates import print_proved
 
         print_proved(certificates)
-    console.print(f"Report: {page}", soft_wrap=True)
 
 
 def print_table(flights: Sequence[Flight]) -> None:

@@ -241,22 +241,21 @@ def _held(step: Step, carry: Any, craft: Any, setup: Any, substeps: int) -> Any:
     return repeat(substeps, lambda _, carry: (step.hold(carry, craft, setup),), carry)[0]
 
 
-def replay(step: Step, carry: Any, numbers: Numbers, width: int) -> Program:
-    """The control calls of a run, recorded, to time them: decisions on the states in rows first .. first+count-1 of recorded
-    samples of `width` numbers, each call after the one before."""
+def replay(step: Step, carry: Any, numbers: Numbers) -> Program:
+    """The control calls of a run, recorded, to time them: decisions on states first .. first+count-1, one after another."""
     recorder = Recorder()
     with recorder.recording():
-        cells, samples = recorder.memory("carry", lanes=True, writable=True), recorder.memory("record")
+        cells, states = recorder.memory("carry", lanes=True, writable=True), recorder.memory("states")
         first, count = recorder.input("first", "index"), recorder.input("count", "index")
         key = (recorder.input("seed", "word"), recorder.input("run", "word"))
         gains, known, _, setup = Arguments(*numbers).bound(recorder, 0)
-        begun = _state(carry, cells, 0)
+        begun, width = _state(carry, cells, 0), len(flatten(carry.state))
 
         def turn(k: Any, carry: Any) -> Any:
-            # The first numbers of a sample are the state; each waits for the torque of the call before.
+            # Each call waits for the torque of the call before.
             u = carry.command
             wait = 0.0 * (u[0] + u[1] + u[2])
-            state = _state(carry.state, samples, (first + k) * width)
+            state = _state(carry.state, states, (first + k) * width)
             return (step.decide(carry._replace(state=move(state, wait, state)), first + k, key, gains, known, setup),)
 
         _put(cells, 0, repeat(count, turn, begun)[0])

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from starhold.analysis.cost import call_costs
+from starhold.analysis.cost import call_costs, recorded_states
 from starhold.analysis.metrics import measure
 from starhold.certification.certificate import FILE
 from starhold.certification.certificate import write as write_certificates
@@ -28,17 +28,21 @@ Notice: TypeAlias = Callable[[str, int, int], None]
 
 
 def fly_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, notice: Notice | None = None) -> Flight:
-    """One law of the scenario, with the loop that `build` gives for it, flown, measured and timed."""
+    """One law of the scenario, with the loop that `build` gives for it, flown and measured."""
     simulation, settling = scenario.table.simulation, scenario.table.settling
     progress = None if notice is None else lambda done, total: notice(entry.name, done, total)
     samples, carry = fly(loop, simulation.steps, simulation.record_every, progress=progress)
     recording = label(loop, samples, carry, simulation.record_every)
     metrics = measure(recording, settling.attitude_tolerance, settling.rate_tolerance)
     metrics |= against_limits(recording, scenario.table.transient)
-    metrics |= call_costs(loop, samples)
     metrics |= _law_counters(entry, carry.memory)
     gains = {item.name: gain_text(item, value) for item, value in zip(entry.law.fields(), entry.gains, strict=True)}
     return Flight(entry.name, entry.law.name, recording, metrics, gains)
+
+
+def timed(loop: ClosedLoop, flight: Flight) -> Flight:
+    """The flight with what a call of its law costs, told truly only where nothing else keeps the machine busy."""
+    return replace(flight, metrics=flight.metrics | call_costs(loop, recorded_states(loop, flight.recording)))
 
 
 def prove(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, flight: Flight) -> Flight:
@@ -56,7 +60,7 @@ def record(scenario: Scenario, loop: ClosedLoop, progress: Progress | None = Non
 def compare(scenario: Scenario, notice: Notice | None = None) -> list[Flight]:
     """Every law of the scenario flown on it, in the order of the file."""
     loops = [(entry, build(scenario, entry)) for entry in scenario.laws]
-    return [prove(scenario, entry, loop, fly_law(scenario, entry, loop, notice)) for entry, loop in loops]
+    return [timed(loop, prove(scenario, entry, loop, fly_law(scenario, entry, loop, notice))) for entry, loop in loops]
 
 
 def write(scenario: Scenario, flights: Sequence[Flight], folder: Path) -> Path:

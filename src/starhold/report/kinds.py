@@ -1,5 +1,5 @@
 """What flies, draws and writes each kind of scenario: modules with `build`, `record`, `fly_law`,
-`prove`, `compare`, `certify_scenario`, `sketch` and `write`."""
+`timed`, `prove`, `compare`, `certify_scenario`, `sketch` and `write`."""
 
 from __future__ import annotations
 

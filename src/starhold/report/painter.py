@@ -13,8 +13,13 @@ from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING
 
+from starhold.errors import InputError
+
 if TYPE_CHECKING:
     from starhold.report.figures import Picture
+
+UNWRITABLE = 2
+"""Exit code where the files cannot be written; the reason stands on standard error."""
 
 
 class Painter:
@@ -52,12 +57,16 @@ class Painter:
         if self._sender is not None:
             self._sender.join()
 
-    def finish(self) -> None:
-        """Wait for the files. RuntimeError tells what went wrong."""
+    def finish(self) -> InputError | None:
+        """Wait for the files. Returns why they cannot be written; RuntimeError tells what else went wrong."""
         self._sent()
         _, said = self._process.communicate()
+        told = said.decode(errors="replace").strip()
+        if self._process.returncode == UNWRITABLE:
+            return InputError(told.splitlines()[0], "", "", "")
         if self._process.returncode != 0:
-            raise RuntimeError(f"the figures could not be drawn: {said.decode(errors='replace').strip()[-2000:]}")
+            raise RuntimeError(f"the figures could not be drawn: {told[-2000:]}")
+        return None
 
 
 def main() -> None:
@@ -69,14 +78,16 @@ def main() -> None:
 
     warm_up()
     what, folder = pickle.load(sys.stdin.buffer)
-    if not hasattr(os, "fork"):
-        paint(what, folder)
-        return
     # Everything is loaded, so the other half of the figures costs a second process no start-up.
-    other = os.fork()
-    paint(what, folder, slice(0 if other else 1, None, 2))
-    if other and os.waitpid(other, 0)[1] != 0:
-        sys.exit("half of the figures are missing")
+    other = os.fork() if hasattr(os, "fork") else None
+    share = slice(None) if other is None else slice(0 if other else 1, None, 2)
+    try:
+        paint(what, folder, share)
+    except InputError as error:
+        print(error, file=sys.stderr)
+        sys.exit(UNWRITABLE)
+    if other:
+        sys.exit(os.waitstatus_to_exitcode(os.waitpid(other, 0)[1]))
 
 
 if __name__ == "__main__":

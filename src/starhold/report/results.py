@@ -7,12 +7,11 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 import starhold
 from starhold.certification.certificate import FILE as CERTIFICATES
 from starhold.errors import InputError
 from starhold.report.files import whole
+from starhold.report.netcdf import write_netcdf
 from starhold.scenario.opening import AnyScenario
 from starhold.scenario.reading import Scenario
 
@@ -58,26 +57,12 @@ def _clear(folder: Path) -> None:
 
 def write_run(run: Recording, scenario: AnyScenario, path: Path) -> None:
     """A run as netCDF-4, with the scenario's text, the version and the seed among its attributes."""
-    # Loaded here, where alone it is needed; and not xarray, which takes longer to load than most flights.
-    import h5netcdf
-    import h5py
-
     attrs = {"scenario": scenario.text, "starhold_version": starhold.__version__, **run.attrs}
     if isinstance(scenario, Scenario):
         attrs["seed"] = scenario.table.simulation.seed
     path.parent.mkdir(exist_ok=True)
-    variables, coordinates = run.variables()
-    with whole(path) as hidden, h5netcdf.File(hidden, "w") as file:
-        for name, values in (coordinates | variables).items():
-            for dimension, size in zip(values.dimensions, np.shape(values.data), strict=True):
-                if dimension not in file.dimensions:
-                    file.dimensions[dimension] = size
-            data = np.asarray(values.data)
-            text = data.dtype.kind == "U"
-            kind = h5py.string_dtype() if text else data.dtype
-            made = file.create_variable(name, values.dimensions, kind, data=data.astype(object) if text else data)
-            made.attrs.update(values.attrs)
-        file.attrs.update(attrs)
+    with whole(path) as hidden:
+        write_netcdf(run, attrs, hidden)
 
 
 def write_summary(scenario: AnyScenario, results: dict[str, dict[str, Any]], path: Path) -> None:

@@ -1,0 +1,78 @@
+"""Commands where the disk is full, the reader of the output has gone, the encoding is poor or the home cannot be written."""
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from tests.cli.test_cli import SHORT
+
+pytestmark = pytest.mark.xdist_group("cli")
+COMMAND = [sys.executable, "-m", "starhold"]
+
+
+def run(*words, cwd, **options):
+    return subprocess.run([*COMMAND, *words], cwd=cwd, text=True, stderr=subprocess.PIPE, **options)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "short.toml").write_text(SHORT)
+    return tmp_path
+
+
+@pytest.mark.parametrize("most", [0, 50_000, 400_000])
+def test_a_disk_that_is_full_is_told_in_one_line(folder, most):
+    """The first holds nothing, the second a part of run.nc, the third that and the pictures, but not the page."""
+
+    def limited():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
+
+    words = ("run", "short.toml", "--no-certify", "-o", "out")
+    done = run(*words, cwd=folder, stdout=subprocess.DEVNULL, preexec_fn=limited)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "cannot be written: File too large" in done.stderr
+    assert not list((folder / "out").rglob(".writing-*"))
+    assert (folder / "out" / "run.nc").exists() == (most == 400_000)
+
+
+def test_results_are_whole_though_nobody_reads_the_output(folder):
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = run("run", "short.toml", "--no-certify", "-o", "out", cwd=folder, stdout=writing)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert {"run.nc", "summary.json", "report.html"} <= set(os.listdir(folder / "out"))
+
+
+def test_output_that_cannot_be_written_is_told(folder):
+    with open("/dev/full", "w") as full:
+        done = run("wheels", cwd=folder, stdout=full)
+    assert done.returncode == 2
+    assert done.stderr == "starhold: standard output cannot be written: No space left on device\n"
+
+
+def test_poor_encoding_and_home_that_cannot_be_written(folder):
+    poor = os.environ | {"PYTHONIOENCODING": "ascii", "HOME": "/nonexistent", "XDG_CACHE_HOME": "/nonexistent"}
+    (folder / "units.toml").write_text(SHORT.replace("duration = 20.0", 'duration = "0.4 min"'))
+    done = run("run", "units.toml", "--no-certify", "-o", "out", cwd=folder, stdout=subprocess.PIPE, env=poor)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "Report: out/report.html" in done.stdout
+
+
+def test_a_request_to_end_leaves_nothing_half_written(folder):
+    (folder / "long.toml").write_text(SHORT.replace("duration = 20.0", "duration = 20000000.0\nrecord_every = 10000"))
+    child = subprocess.Popen([*COMMAND, "run", "long.toml", "-o", "out"], cwd=folder, stderr=subprocess.PIPE, text=True)
+    while not (folder / "out").exists() and child.poll() is None:
+        time.sleep(0.05)
+    time.sleep(0.5)
+    child.send_signal(signal.SIGTERM)
+    _, said = child.communicate(timeout=60)
+    assert child.returncode == 128 + signal.SIGTERM
+    assert said == "starhold: interrupted; files already written are whole\n"
+    assert os.listdir(folder / "out") == []
