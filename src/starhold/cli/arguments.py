@@ -14,4 +14,5 @@ Output = Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", he
 Force = Annotated[bool, typer.Option("--force", help="replace results that are already there")]
 Unstable = Annotated[bool, typer.Option("--allow-unstable", help="take gains that are known to be unstable")]
 Certified = Annotated[bool, typer.Option("--certify/--no-certify", help="prove what the laws guarantee, or fly alone")]
+CheckStep = Annotated[bool, typer.Option("--check-step", help="fly again with half the integration step: how much changes?")]
 OneLaw = Annotated[str | None, typer.Option(help="which law of the file; all if not given")]

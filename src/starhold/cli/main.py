@@ -7,9 +7,10 @@ import os
 import signal
 import sys
 import traceback
+from dataclasses import replace
 from pathlib import Path
 from threading import Event
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -21,6 +22,7 @@ from starhold.cli.arguments import (
     INTERNAL_ERROR,
     USER_ERROR,
     Certified,
+    CheckStep,
     Force,
     Output,
     ScenarioFile,
@@ -30,7 +32,10 @@ from starhold.cli.outlet import Outlet, open_outlets
 from starhold.errors import InputError
 
 if TYPE_CHECKING:
+    from types import ModuleType
+
     from starhold.report.flight import Flight
+    from starhold.scenario.opening import AnyScenario
 
 app = typer.Typer(
     help="Design, certify, fly and compare control laws for spacecraft.",
@@ -51,9 +56,10 @@ def run(
     force: Force = False,
     allow_unstable: Unstable = False,
     certify: Certified = True,
+    check_step: CheckStep = False,
 ) -> None:
     """Fly one law: run.nc, summary.json, pictures and report.html."""
-    flights = _fly(file, law, output, force, allow_unstable, certify, nested=False)
+    flights = _fly(file, law, output, force, allow_unstable, certify, check_step, nested=False)
     if flights[0].lost is not None:
         raise typer.Exit(DIVERGED)
 
@@ -65,15 +71,23 @@ def compare(
     force: Force = False,
     allow_unstable: Unstable = False,
     certify: Certified = True,
+    check_step: CheckStep = False,
 ) -> None:
     """Fly every law of a file on the same problem: ranked table, pictures and report.html."""
-    flights = _fly(file, None, output, force, allow_unstable, certify, nested=True)
+    flights = _fly(file, None, output, force, allow_unstable, certify, check_step, nested=True)
     if all(flight.lost is not None for flight in flights):
         raise typer.Exit(DIVERGED)
 
 
 def _fly(
-    file: str, law: str | None, output: Path | None, force: bool, allow_unstable: bool, certify: bool, nested: bool
+    file: str,
+    law: str | None,
+    output: Path | None,
+    force: bool,
+    allow_unstable: bool,
+    certify: bool,
+    check_step: bool,
+    nested: bool,
 ) -> list[Flight]:
     """Fly one law of a file (the first if `law` is None) or, nested, all of them, each into a folder of its own."""
     from starhold.report.painter import Painter
@@ -105,6 +119,8 @@ def _fly(
                     painter.start(kind.sketch(flights, scenario), folder)
                 write_run(flights[-1].recording, scenario, (folder / entry.name if nested else folder) / "run.nc")
         # While the pictures are drawn.
+        if check_step:
+            flights = [_step_checked(kind, scenario, *pair) for pair in zip(loops, flights, strict=True)]
         if certify:
             flights = [kind.prove(scenario, *trio) for trio in zip(entries, loops, flights, strict=True)]
         unpainted = painter.finish()
@@ -116,6 +132,14 @@ def _fly(
     if unpainted is not None:
         raise unpainted
     return flights
+
+
+def _step_checked(kind: ModuleType, scenario: AnyScenario, loop: Any, flight: Flight) -> Flight:
+    """The flight with what half the integration step changes among its metrics."""
+    from starhold.analysis.step_check import halved, step_error
+
+    finer = kind.record(scenario, halved(loop), lambda done, total: _heed_interrupt())
+    return replace(flight, metrics=flight.metrics | {"step_error": step_error(flight.recording, finer)})
 
 
 @app.command()

@@ -57,6 +57,8 @@ def print_outcome(flights: Sequence[Flight]) -> None:
         if flight.metrics.get("solver_budget_hits"):
             hits, calls = flight.metrics["solver_budget_hits"], flight.metrics["solver_calls"]
             console.print(f"{flight.name}: the solver used up its budget in {hits} of {calls} calls", style="yellow")
+        if "step_error" in flight.metrics:
+            console.print(_step_text(flight), highlight=False, markup=False)
         if "limits_kept" in flight.metrics:
             from starhold.report.transients import told
 
@@ -67,6 +69,18 @@ def print_outcome(flights: Sequence[Flight]) -> None:
         from starhold.cli.show_certificates import print_proved
 
         print_proved(certificates)
+
+
+def _step_text(flight: Flight) -> str:
+    """What half the integration step changes."""
+    errors = flight.metrics["step_error"]
+    if None in errors.values():
+        return f"{flight.name}: with half the integration step the motion is lost at another time"
+    told: list[str] = []
+    for name, error in errors.items():
+        unit = "rad" if name == "attitude" else flight.recording.columns[name][1]
+        told.append(f"{name.replace('_', ' ')} by {error:.1e} {unit}")
+    return f"{flight.name}: half the integration step changes at most the {', '.join(told)}"
 
 
 def print_table(flights: Sequence[Flight]) -> None:
