@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -26,6 +28,9 @@ Progress: TypeAlias = Callable[[int, int], None]
 
 PULSE = 0.1
 """Seconds of work between two reports of progress."""
+
+IN_MEMORY = 2**28
+"""Bytes of samples that are held in memory; more of them lie in a temporary file."""
 
 COLUMNS: dict[str, tuple[str, str, str]] = {
     "attitude": ("quaternion", "1", "attitude, inertial to body, scalar first"),
@@ -118,7 +123,7 @@ def fly(
     like: Any = loop.carry()
     phases: Any = loop.phases(steps)
     width = len(flatten(make_step(loop.parts()).sample(like, 0, loop.setup())))
-    samples = np.full((_sample_count(steps, record_every, width), width), np.nan)
+    samples = _room(steps, record_every, width)
     carry, done, chunk = np.array(numbers_of(like)), 0, steps if progress is None else 1
     flight = _Flight(loop, like, record_every, run, samples)
     while done < steps:
@@ -203,12 +208,21 @@ def _size(name: str) -> int:
     return 4 if COLUMNS[name][0] == "quaternion" else 3
 
 
-def _sample_count(steps: int, record_every: int, width: int) -> int:
-    """The number of samples of a run; refused where they would fill the memory."""
+def _room(steps: int, record_every: int, width: int) -> NDArray[np.float64]:
+    """Where the samples of a run are written, a row each: in memory or, where they are many, in a nameless file, of which
+    memory holds as much as it can spare. Refused where that file's disk has no room, or measuring them would fill memory."""
     count = steps // record_every + 1
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 2**33
-    # Labelling, measuring and drawing hold copies.
-    most = memory // 4 // (8 * width)
+    # Measuring holds a dozen numbers of each sample at a time.
+    most, mapped = memory // (8 * 16), 8 * count * width >= IN_MEMORY
+    if mapped:
+        most = min(most, shutil.disk_usage(tempfile.gettempdir()).free // (8 * width))
     if count > most:
         raise InputError("", "simulation.record_every", f"{record_every}, {count} samples", f"at least {-(-steps // most)}")
-    return count
+    if not mapped:
+        return np.full((count, width), np.nan)
+    with tempfile.TemporaryFile() as file:
+        if hasattr(os, "posix_fallocate"):
+            # A disk that fills up under a mapped file ends the process.
+            os.posix_fallocate(file.fileno(), 0, 8 * count * width)
+        return np.memmap(file, np.float64, "w+", shape=(count, width))
