@@ -14,7 +14,7 @@ import xarray as xr
 from starhold.laws.catalogue import catalogue
 from starhold.scenario.reading import builtin_text
 
-SHORT = builtin_text("three-laws").replace("duration = 600.0", "duration = 20.0")
+SHORT = builtin_text("three-laws").replace("duration = 2000.0", "duration = 20.0")
 
 
 def starhold(*words, cwd, **options):

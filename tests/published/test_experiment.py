@@ -6,9 +6,10 @@ import pytest
 from starhold.algebra.structure import flatten
 from starhold.analysis.cost import call_costs
 from starhold.analysis.metrics import measure, stays_within
+from starhold.analysis.ranking import ATTITUDE
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
-from starhold.simulation.lane import fly, label
+from starhold.simulation.lane import Recording, fly, label
 from starhold.simulation.lanes import simulate_many
 
 
@@ -43,8 +44,9 @@ def test_predictive_law_is_first_within_1e_3(metrics):
 
 
 def test_lyapunov_law_needs_over_3000_steps_but_reaches_any_accuracy(metrics):
-    assert metrics["lyapunov"]["iterations_1e-3"] > 3000
-    text = builtin_text("three-laws").replace("duration = 600.0", "duration = 6000.0")
+    # The published figure, "more than 3000", is what a longer run makes of it; a run of 600 s gave 5649.
+    assert metrics["lyapunov"]["iterations_1e-3"] == 6320
+    text = builtin_text("three-laws").replace("duration = 2000.0", "duration = 6000.0")
     scenario = parse(text, "long")
     samples, _ = fly(build(scenario, scenario.pick("lyapunov")), 60_000)
     deviation = np.linalg.norm(samples[20:23], axis=0)
@@ -52,6 +54,34 @@ def test_lyapunov_law_needs_over_3000_steps_but_reaches_any_accuracy(metrics):
     reached = [stays_within(deviation, 10.0**-k) for k in range(1, 8)]
     assert None not in reached
     assert reached == sorted(reached)
+
+
+def test_no_time_is_cut_off_by_the_end_of_the_run(metrics):
+    """Three times as long a run settles at the same steps."""
+    text = builtin_text("three-laws").replace("duration = 2000.0", "duration = 6000.0")
+    scenario = parse(text, "long")
+    for entry in scenario.laws:
+        loop = build(scenario, entry)
+        longer = measure(label(loop, *fly(loop, 60_000), 1), 2e-3, 1e-3)
+        times = {name for name in longer if "iterations" in name or "settling" in name}
+        assert len(times) == 15
+        assert {name: longer[name] for name in times} == {name: metrics[entry.name][name] for name in times}
+        assert metrics[entry.name]["cut_off"] == []
+
+
+def test_what_is_reached_at_the_very_end_does_not_count(flights):
+    """The Lyapunov law cut off at 600 s would be within 1e-3 from step 5649 on, and leaves again after the end."""
+    run = flights["lyapunov"][2]
+    short = Recording({name: values[:6001] for name, values in run.arrays.items()}, run.attrs)
+    assert stays_within(np.linalg.norm(short["attitude_error"][:, 1:], axis=1), 1e-3) == 5649
+    found = measure(short, 2e-3, 1e-3)
+    assert found["iterations_1e-3"] is None
+    assert found["iterations_1e-2"] == 4261
+    assert set(found["cut_off"]) >= {"iterations_1e-3", "settling_time", "attitude_settling_time"}
+    assert "settling_time" not in measure(run, 2e-3, 1e-3)["cut_off"]
+    assert ATTITUDE.told("settling_time", found) == "— †"
+    assert ATTITUDE.late({"lyapunov": found}) != ""
+    assert ATTITUDE.late({"lyapunov": measure(run, 2e-3, 1e-3)}) == ""
 
 
 def test_sliding_law_stalls_between_1e_2_and_1e_3_by_chatter(flights, metrics):

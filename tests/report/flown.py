@@ -20,7 +20,7 @@ HOSTILE = '</script><script>alert("ruse")</script><b>$x_1$ & co'
 @cache
 def text() -> str:
     """Twenty seconds of the three laws without the predictive one."""
-    return builtin_text("three-laws").split('[[law]]\ntype = "mpc"')[0].replace("duration = 600.0", "duration = 20.0")
+    return builtin_text("three-laws").split('[[law]]\ntype = "mpc"')[0].replace("duration = 2000.0", "duration = 20.0")
 
 
 def scenario(name: str = "three-laws", description: str = "A turn & a <half>") -> Scenario:

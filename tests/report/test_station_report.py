@@ -169,7 +169,8 @@ def test_metrics_of_a_run_made_by_hand() -> None:
     assert found["effort_per_year"] == pytest.approx(6.0 * units.velocity * 365.25 * 86400 / (4.0 * units.time))
     rest = measure_station(recording(position, control), units, Rest((0.0, 0.0, 1.0)), 0.01)
     assert rest["final_distance"] == pytest.approx(np.sqrt(2.0) * units.length)
-    assert rest["settling_time"] is None
+    assert (rest["settling_time"], rest["cut_off"]) == (None, ["settling_time"])
+    assert found["cut_off"] == []
     lost = measure_station(recording(position, control, diverged_at=5.0), units, Circle(1.0, 1.4), 0.15)
     assert lost["diverged_at"] == pytest.approx(5.0 * units.time)
     assert lost["deviation"] is None

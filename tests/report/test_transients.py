@@ -14,6 +14,7 @@ from starhold.report.page import render
 from starhold.report.plots import collect
 from starhold.report.transients import against_limits, section, told
 from starhold.scenario.reading import Scenario, parse
+from starhold.simulation.lane import Recording
 from tests.report import flown
 
 LIMITS = '[transient]\nrate_limit = 0.2\nacceleration_limit = "0.5 deg/s^2"\nangle_end = 3.0\nrate_end = 1.0\n'
@@ -50,6 +51,17 @@ def test_limits_that_are_not_given_are_null_and_kept() -> None:
     assert found["transient_time"] is None
     assert told(flights[0]).startswith("transient comes to no end; peak rate")
     assert " of " not in told(flights[0])
+
+
+def test_an_end_that_is_reached_at_the_very_end_does_not_count() -> None:
+    scenario, flights = limited()
+    run = flights[0].recording
+    time = flights[0].metrics["transient_time"]
+    assert time is not None
+    count = math.ceil(time / 0.1 / 0.95) + 1
+    short = Recording({name: values[:count] for name, values in run.arrays.items()}, run.attrs)
+    found = against_limits(short, scenario.table.transient, ["settling_time"])
+    assert (found["transient_time"], found["cut_off"]) == (None, ["settling_time", "transient_time"])
 
 
 def test_the_plot_shows_norm_components_and_the_limits_that_matter() -> None:

@@ -15,6 +15,9 @@ DECADES = range(1, 7)
 """The k of the accuracies 10^-k whose iterations are counted."""
 LAST = 0.25
 """Share of the run over which chatter and the final error are measured."""
+KEPT = 0.1
+"""Share of the run at its end in which nothing counts as settled any more: a motion that goes to and fro, or that a longer run
+would show to leave again, is within its bounds there by chance."""
 
 
 @dataclass(frozen=True)
@@ -28,8 +31,12 @@ class Measure:
 
 
 MEASURES: dict[str, Measure] = {
-    "settling_time": Measure("settling", "s", "time after which attitude and rate stay within their tolerances"),
-    "iterations_1e-3": Measure("steps to 1e-3", "", "control steps after which |q| stays within 10^-3"),
+    "settling_time": Measure(
+        "settling",
+        "s",
+        "time after which attitude and rate stay within their tolerances, the last tenth at least",
+    ),
+    "iterations_1e-3": Measure("steps to 1e-3", "", "control steps after which |q| stays within 10^-3, likewise"),
     "overshoot": Measure("overshoot", "%", "largest turn beyond the target, of the initial angle", 100.0),
     "transient_time": Measure("transient", "s", "time after which angle and rate stay within the ends of [transient]"),
     "peak_rate": Measure("peak rate", "deg/s", "largest norm of the body's rate", 180.0 / np.pi),
@@ -59,6 +66,11 @@ def stays_within(values: Any, bound: float) -> int | None:
     return first if first < len(values) else None
 
 
+def too_late(index: float, count: int, kept: float = KEPT) -> bool:
+    """Whether the sample of this index, of so many, lies within the last share of a run."""
+    return index > (1.0 - kept) * (count - 1)
+
+
 def acceleration(run: Recording) -> NDArray[np.float64]:
     """Derivative of the body's rate (rad/s2), (n, 3): its mean from each sample to the next, the last repeated."""
     rate = run["rate"]
@@ -68,25 +80,31 @@ def acceleration(run: Recording) -> NDArray[np.float64]:
 
 def measure(run: Recording, attitude_tolerance: float, rate_tolerance: float) -> dict[str, Any]:
     """Metrics of a run as `label` gives it. Times that are never reached are None, as are all final values and times of
-    a run that diverged; `diverged_at` (s) is None for one that did not."""
+    a run that diverged; `diverged_at` (s) is None for one that did not. So are times within the last tenth of the run, whose
+    names `cut_off` lists."""
     times = run["time"]
     q, w, u = (run[name] for name in ("attitude_error", "rate_error", "torque"))
     angle, speed = error_angle(q), np.linalg.norm(w, axis=1)
     lost = run.attrs.get("diverged_at")
-    reached = {} if lost is not None else _reached(times, angle, speed, attitude_tolerance, rate_tolerance)
-    steps = int(run.attrs["record_every"])
-    deviation, found = np.linalg.norm(q[:, 1:], axis=1), dict[str, int | None]()
+    turned, slowed = stays_within(angle, attitude_tolerance), stays_within(speed, rate_tolerance)
+    both = None if turned is None or slowed is None else max(turned, slowed)
+    reached = {"settling_time": both, "attitude_settling_time": turned, "rate_settling_time": slowed}
+    steps, deviation = int(run.attrs["record_every"]), np.linalg.norm(q[:, 1:], axis=1)
     for k in DECADES:
         for name, values in (("", deviation), ("rate_", speed)):
-            index = None if lost is not None else stays_within(values, 10.0**-k)
-            found[f"{name}iterations_1e-{k}"] = None if index is None else index * steps
+            reached[f"{name}iterations_1e-{k}"] = stays_within(values, 10.0**-k)
+    if lost is not None:
+        reached = dict.fromkeys(reached)
+    cut_off = [name for name, index in reached.items() if index is not None and too_late(index, len(times))]
+    reached |= dict.fromkeys(cut_off)
     tail = slice(int(len(times) * (1.0 - LAST)), None)
     return {
         "diverged_at": lost,
-        "settling_time": reached.get("both"),
-        "attitude_settling_time": reached.get("attitude"),
-        "rate_settling_time": reached.get("rate"),
-        **found,
+        "cut_off": cut_off,
+        **{
+            name: None if index is None else index * steps if "iterations" in name else float(times[index])
+            for name, index in reached.items()
+        },
         "overshoot": _overshoot(q),
         "peak_torque": float(np.abs(u).max()),
         "peak_torque_norm": float(np.linalg.norm(u, axis=1).max()),
@@ -96,14 +114,6 @@ def measure(run: Recording, attitude_tolerance: float, rate_tolerance: float) ->
         "final_attitude_error": None if lost is not None else float(angle[tail].max()),
         "final_rate_error": None if lost is not None else float(speed[tail].max()),
     }
-
-
-def _reached(
-    times: Any, angle: Any, speed: Any, attitude_tolerance: float, rate_tolerance: float
-) -> dict[str, float | None]:
-    indices = {"attitude": stays_within(angle, attitude_tolerance), "rate": stays_within(speed, rate_tolerance)}
-    indices["both"] = None if None in indices.values() else max(i for i in indices.values() if i is not None)
-    return {name: None if index is None else float(times[index]) for name, index in indices.items()}
 
 
 def _overshoot(q: NDArray[np.float64]) -> float:

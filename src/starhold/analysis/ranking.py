@@ -8,6 +8,9 @@ from typing import Any
 
 from starhold.analysis.metrics import MEASURES, Measure
 
+LATE = " †"
+"""Stands by the dash of a time that a run is too short for."""
+
 
 @dataclass(frozen=True)
 class Board:
@@ -52,6 +55,19 @@ class Board:
         if metric.startswith("iterations"):
             return f"{int(value)}"
         return f"{scaled:.3g}" if abs(scaled) < 1e3 else f"{scaled:.0f}"
+
+    def told(self, metric: str, row: Mapping[str, Any]) -> str:
+        """What `shown` shows of the results of a law, with a mark where a time is not counted for it is reached so late."""
+        return self.shown(metric, row.get(metric)) + (LATE if metric in row.get("cut_off", ()) else "")
+
+    def late(self, results: Mapping[str, Mapping[str, Any]]) -> str:
+        """What the mark means; empty where no law has one."""
+        marked = any(set(row.get("cut_off", ())) & set(self.measures) for row in results.values())
+        return (
+            f"{LATE.strip()} within its bounds only at the very end of the run, which does not count: fly longer."
+            if marked
+            else ""
+        )
 
     def headings(self, results: Mapping[str, Mapping[str, Any]]) -> list[str]:
         """What laws with these results are ranked by, as headings; the first always is."""

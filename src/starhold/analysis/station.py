@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.vector import ZERO, Vector
-from starhold.analysis.metrics import LAST, Measure, limit_share, stays_within
+from starhold.analysis.metrics import LAST, Measure, limit_share, stays_within, too_late
 from starhold.analysis.ranking import Board
 
 if TYPE_CHECKING:
@@ -80,14 +80,14 @@ BOARD = Board(MEASURES, ("deviation", "settling_time", "effort_per_year"), "days
 def measure_station(run: Recording, units: Units, goal: Circle | Rest, tolerance: float) -> dict[str, Any]:
     """Metrics of a run as `simulate_station` gives it; `tolerance` (scaled) is the distance that counts as near. Times that
     are never reached are None, as are all final values of a motion that was lost; `diverged_at` (s) is None for one that
-    was not."""
+    was not; `cut_off` names a time that is None because it lies within the last quarter of the run."""
     position, control = run["position"], run["control"]
     lost = run.attrs.get("diverged_at")
     away = goal.distance(position)
     settled = None if lost is not None else stays_within(away, tolerance)
-    if settled is not None and settled > len(away) * (1.0 - LAST):
-        # A motion that goes to and fro is near at the end of some runs by chance.
-        settled = None
+    # A quarter, for these motions go to and fro slowly.
+    cut_off = settled is not None and too_late(settled, len(away), LAST)
+    settled = None if cut_off else settled
     half = slice(len(away) // 2, None)
 
     def kept(value: Any, worth: float = units.length) -> float | None:
@@ -95,6 +95,7 @@ def measure_station(run: Recording, units: Units, goal: Circle | Rest, tolerance
 
     found: dict[str, Any] = {
         "diverged_at": None if lost is None else lost * units.time,
+        "cut_off": ["settling_time"] if cut_off else [],
         "settling_time": None if settled is None else float(run["time"][settled]) * units.time,
     }
     if isinstance(goal, Circle):

@@ -91,9 +91,7 @@ def print_table(flights: Sequence[Flight]) -> None:
     metrics = board.columns(results)
     measures = [board.measures[metric] for metric in metrics]
     heads = [f"{measure.heading}\n[dim]{measure.unit}[/dim]" for measure in measures]
-    cells = [
-        [_cell(board.shown(metric, results[name].get(metric)), name in won[metric]) for metric in metrics] for name in order
-    ]
+    cells = [[_cell(board.told(metric, results[name]), name in won[metric]) for metric in metrics] for name in order]
     table = Table(title_justify="left", show_edge=False, pad_edge=False)
     if console.width >= max(WIDE, COLUMN * (1 + len(metrics))):
         for head in ("law", *heads):
@@ -107,6 +105,8 @@ def print_table(flights: Sequence[Flight]) -> None:
             table.add_row(head.replace("\n", " "), *(row[column] for row in cells))
     console.print()
     console.print(table)
+    if late := board.late(results):
+        console.print(late, highlight=False)
     if len(flights) > 1:
         console.print(
             f"Ranked by {', then '.join(board.headings(results))}; [bold green]*[/bold green] best of its kind.",

@@ -34,7 +34,7 @@ def fly_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, notice: Notic
     samples, carry = fly(loop, simulation.steps, simulation.record_every, progress=progress)
     recording = label(loop, samples, carry, simulation.record_every)
     metrics = measure(recording, settling.attitude_tolerance, settling.rate_tolerance)
-    metrics |= against_limits(recording, scenario.table.transient)
+    metrics |= against_limits(recording, scenario.table.transient, metrics["cut_off"])
     metrics |= _law_counters(entry, carry.memory)
     gains = {item.name: gain_text(item, value) for item, value in zip(entry.law.fields(), entry.gains, strict=True)}
     return Flight(entry.name, entry.law.name, recording, metrics, gains)

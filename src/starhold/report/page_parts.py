@@ -134,8 +134,7 @@ def ranking(flights: Sequence[Flight]) -> str:
         flight = flights[numbers[name]]
         lost = flight.lost is not None
         cells = "".join(
-            f"{BEST if name in best[metric] else '<td>'}{board.shown(metric, flight.metrics.get(metric))}</td>"
-            for metric in metrics
+            f"{BEST if name in best[metric] else '<td>'}{board.told(metric, flight.metrics)}</td>" for metric in metrics
         )
         fate = f"diverged at {flight.lost_text()}" if lost else flight.law if flight.law != name else ""
         rows.append(
@@ -144,12 +143,13 @@ def ranking(flights: Sequence[Flight]) -> str:
             f"{f'<small>{escape(fate)}</small>' if fate else ''}</th>{cells}</tr>"
         )
     order = ", then ".join(board.headings(results))
+    late = f" {board.late(results)}".rstrip()
     return (
         '<h2>Ranking</h2>\n<div class="wide"><table><thead><tr><th scope="col">#</th>'
         f'<th scope="col" style="text-align:left">law</th>{head}</tr></thead>\n'
         f"<tbody>{''.join(rows)}</tbody></table></div>\n"
         f'<p class="note">Ordered by {escape(order)}; less is better in every column, and the best value is marked. '
-        "A dash: never reached, or not measured.</p>"
+        f"A dash: never reached, or not measured.{late}</p>"
     )
 
 
