@@ -13,4 +13,9 @@ class InputError(Exception):
         bare = not found or allowed.startswith("did you mean")
         hint = allowed if bare else f"allowed: {allowed}"
         joint = "; " if found else ": "
-        super().__init__(": ".join(part for part in parts if part) + (f"{joint}{hint}" if allowed else ""))
+        super().__init__(_one_line(": ".join(part for part in parts if part) + (f"{joint}{hint}" if allowed else "")))
+
+
+def _one_line(text: str) -> str:
+    """What does not print, such as a line break in a key, as its escape."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

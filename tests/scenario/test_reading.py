@@ -79,6 +79,54 @@ FAULTS = {
     "ragged inertia": ("[2.0, 3.0, 4.0]", "[[2.0], 3.0, 4.0]", ["spacecraft.inertia"]),
     "zero quaternion": ("attitude = [0, 1, 1, 1]", "attitude = [0, 0, 0, 0]", ["initial.attitude", "not zero"]),
     "three for a quaternion": ("attitude = [0, 1, 1, 1]", "attitude = [0, 1, 1]", ["initial.attitude", "4 numbers"]),
+    "a quaternion of length 10": ("attitude = [0, 1, 1, 1]", "attitude = [10, 0, 0, 0]", ["initial.attitude", "length 1"]),
+    "degrees without a unit": (
+        "attitude = [0, 1, 1, 1]",
+        "angles = [120, 20, 0]",
+        ["initial.angles", "[120, 20, 0]", '"120 deg"', "in rad"],
+    ),
+    "noise in degrees without a unit": (
+        "gravity_gradient = true",
+        "gravity_gradient = true\n[sensor]\nattitude_noise = 10",
+        ["sensor.attitude_noise", '"10 deg"'],
+    ),
+    "yes": (
+        "gravity_gradient = true",
+        'gravity_gradient = "yes"',
+        ["environment.gravity_gradient", '"yes"', "true or false"],
+    ),
+    "one for true": ("gravity_gradient = true", "gravity_gradient = 1", ["environment.gravity_gradient", "true or false"]),
+    "an inertia of 1e155": ("[2.0, 3.0, 4.0]", "[1e155, 1e155, 1e155]", ["spacecraft.inertia", "1e+30"]),
+    "noise of 1e300": (
+        "gravity_gradient = true",
+        "gravity_gradient = true\ntorque_noise = 1e300",
+        ["environment.torque_noise", "1e+30"],
+    ),
+    "samples 2^63 steps apart": (
+        "control_period = 0.1",
+        "control_period = 0.1\nrecord_every = 9223372036854775808",
+        ["simulation.record_every", "2^53"],
+    ),
+    "endless substeps": ("control_period = 0.1", "control_period = 0.1\nsubsteps = 10000000", ["substeps", "at most 1e+06"]),
+    "a lag that no substeps resolve": (
+        'torque_limit = "0.01 N m"',
+        'torque_limit = "0.01 N m"\nactuator_lag = 1e-20',
+        ["a time constant of 1e-20", "longer lag", "too many"],
+    ),
+    "a number of 310 digits": ("duration = 600.0", "duration = " + 310 * "1", ["simulation.duration", "60 digits"]),
+    "a number of 4301 digits": ("duration = 600.0", "duration = " + 4301 * "1", ["60 digits"]),
+    "a text of 310 digits": ("duration = 600.0", f'duration = "{310 * "1"} s"', ["simulation.duration", "'1 s'"]),
+    "a tower of powers": ("duration = 600.0", 'duration = "9**9**9 s"', ["simulation.duration", "'1 s'"]),
+    "brackets": ("duration = 600.0", "duration = " + 5000 * "[", ["too deep"]),
+    "lists in lists": ("duration = 600.0", "duration = " + 50 * "[" + 50 * "]", ["simulation.duration", "too deep"]),
+    "tables in tables": (
+        "duration = 600.0",
+        "duration = " + 50 * "{a=" + "1" + 50 * "}",
+        ["simulation.duration.a", "too deep"],
+    ),
+    "a key of 20000 parts": ("[orbit]", f"[{'.'.join(20000 * ['a'])}]\n[orbit]", ["a.a.a", "too deep"]),
+    "a long key": ("torque_limit =", f"{5000 * 'a'} =", ["spacecraft.aaa", "unknown key"]),
+    "a key of two lines": ("torque_limit =", '"a\\nb" =', ["spacecraft.a\\nb", "unknown key"]),
     "nan": ("rate = [0.04", "rate = [nan", ["initial.rate", "finite"]),
     "inf": ("duration = 2000.0", "duration = inf", ["simulation.duration", "finite"]),
     "control period zero": ("control_period = 0.1", "control_period = 0", ["simulation.control_period", "above 0"]),
@@ -107,7 +155,7 @@ FAULTS = {
     "unknown law": ('type = "lyapunov"', 'type = "lyapunow"', ["law[1].type", "lyapunov?"]),
     "type that is a list": ('type = "lyapunov"', "type = []", ["law[1].type", "one of"]),
     "form that is a list": ("k_rate = 0.09", "k_rate = 0.09\nform = []", ["law[1].form"]),
-    "weights without a solution": ("r = 50.0", "r = 1e300", ["law mpc", "weights"]),
+    "weights without a solution": ("r = 50.0", "r = 1e30", ["law mpc", "weights"]),
     "law without type": ('type = "lyapunov"', "", ["law[1].type"]),
     "gain out of bounds": ("k_rate = 0.09", "k_rate = -0.09", ["law[1].k_rate", "-0.09", "above 0"]),
     "unknown mode": ('mode = "inertial"', 'mode = "inertia"', ["target.mode", "inertial"]),
@@ -139,6 +187,7 @@ def test_a_fault_is_one_line_with_file_key_and_what_is_allowed(name):
     old, new, words = FAULTS[name]
     message = fault(old, new)
     assert message.startswith("my.toml: ")
+    assert len(message) < 500
     for word in words:
         assert word in message
 
@@ -184,8 +233,12 @@ def test_missing_file_names_the_nearest_builtin(tmp_path):
     with pytest.raises(InputError, match="readable"):
         load(tmp_path)
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match="readable"):
-        load(tmp_path / "binary.toml")
+    for path in (tmp_path / "binary.toml", 5000 * "x", "a\0b"):
+        with pytest.raises(InputError, match="readable") as caught:
+            load(path)
+        assert len(str(caught.value)) < 300
+    with pytest.raises(InputError, match="more than 4194304 characters"):
+        parse(2**23 * " ", "my.toml")
 
 
 def test_units_convert():
@@ -289,7 +342,7 @@ def test_template_runs_as_it_is_and_names_every_key():
                 assert f"{key} = " in template_text()
 
 
-@given(st.floats(-1e12, 1e12, allow_nan=False))
+@given(st.floats(-1e12, 1e12, allow_nan=False).filter(lambda value: value == 0 or abs(value) > 1e-30))
 def test_numbers_read_as_they_are_written(value):
     read = reader(Gain("N m"))
     assert read(value) == value

@@ -32,6 +32,33 @@ FAULTS = {
     "unknown table": ("[control]", "[controls]", ["controls", "unknown key", "control?"]),
     "unknown key": ("margin =", "margn =", ["control.margn", "unknown key", "margin?"]),
     "unknown pair": ('"sun-earth"', '"sun-earht"', ["libration.primaries", "sun-earht", "sun-earth?"]),
+    "a list of pairs": ('"sun-earth"', "[]", ["libration.primaries", "[]", "sun-earth"]),
+    "separation next to nothing": (
+        'primaries = "sun-earth"',
+        OWN.replace('"1.496e11 m"', "1e-300"),
+        ["libration.separation", "1e-30"],
+    ),
+    "separation in km": (
+        'primaries = "sun-earth"',
+        OWN.replace('"1.496e11 m"', "1.496e8"),
+        ["libration.separation", "in m"],
+    ),
+    "masses in kg": (
+        'primaries = "sun-earth"',
+        'larger = 5.97e24\nsmaller = 7.35e22\nseparation = "384400 km"',
+        ["libration.separation", "GM in m^3/s^2"],
+    ),
+    "GM in km^3/s^2": (
+        'primaries = "sun-earth"',
+        OWN.replace("1.327e20", "1.327e11"),
+        ["libration.larger", "Sun", '"1.327e+11 km^3/s^2"'],
+    ),
+    "phase in degrees without a unit": (
+        "[0.02, -0.25, 0.0]",
+        "[0.02, -0.25, 0.0]\nphase = 90",
+        ["initial.phase", '"90 deg"'],
+    ),
+    "radius in seconds": ("radius = 1.0", 'radius = "1 s"', ["law[1].radius", '"1 s"', "a quantity in m"]),
     "unknown point": ('point = "L2"', 'point = "L4"', ["libration.point", "L4", "L1"]),
     "unknown model": ('model = "linear"', 'model = "lin"', ["libration.model", "nonlinear"]),
     "pair twice": ('primaries = "sun-earth"', f'primaries = "sun-earth"\n{OWN}', ["libration.primaries", "either"]),
@@ -107,6 +134,21 @@ def test_strings_with_units_are_scaled():
     assert table.control.limit * units.acceleration == pytest.approx(2e-6)
     assert [entry.lag * units.time for entry in scenario.laws] == pytest.approx([43200.0] * 4)
     assert table.simulation.steps == round(100 * 86400 / units.time / 0.001)
+
+
+def test_lengths_of_laws_take_units_too():
+    """Laws' radii, places, rates and layers: numbers are scaled, strings carry units, as in the other tables."""
+    head = BASE.split("[[law]]")[0]
+    law = (
+        '[[law]]\ntype = "l2-circle"\nradius = "6371 km"\nrate = "0.01 rad/d"\nlayer = "1 cm/s"\nalpha = 1\nk = 1\nk_x = 18'
+    )
+    scenario = parse_station(f"{head}{law}\nk_velocity = 6", "my.toml")
+    gains, units = scenario.laws[0].gains, scenario.units
+    assert gains.radius == pytest.approx(0.5, rel=1e-15)
+    assert gains.rate == pytest.approx(0.01 / 86400.0 * units.time)
+    assert gains.layer == pytest.approx(0.01 / units.velocity)
+    rest = f'{head}[[law]]\ntype = "l2-rest"\nform = "degree"\nlimit = 1.0\ny = "-12742 km"\nz = 0.5'
+    assert parse_station(rest, "my.toml").laws[0].gains[:2] == pytest.approx((-1.0, 0.5))
 
 
 def test_a_limit_in_the_law_comes_before_the_common_one():

@@ -78,6 +78,8 @@ class Gain:
     text: str = ""
     spread: bool = True
     """Whether a number stands for a vector of equal numbers."""
+    dimension: Literal["", "length", "velocity", "acceleration", "time", "rate"] = ""
+    """What a scaled number is one of: a file may then give a string with a unit of it too."""
 
     def check(self, value: Any) -> Any:
         """The value as the law wants it; ValueError says what is allowed."""

@@ -263,7 +263,8 @@ def _orbit_period(scenario: Scenario) -> float | None:
     orbit = scenario.table.orbit
     if orbit is None:
         return None
-    inverse = 2.0 / math.hypot(*orbit.position) - math.hypot(*orbit.velocity) ** 2 / orbit.gravitational_parameter
+    position, velocity = orbit.start
+    inverse = 2.0 / math.hypot(*position) - math.hypot(*velocity) ** 2 / orbit.gravitational_parameter
     return 2.0 * math.pi / math.sqrt(orbit.gravitational_parameter * inverse**3) if inverse > 0.0 else None
 
 

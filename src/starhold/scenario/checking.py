@@ -16,6 +16,8 @@ from starhold.laws.catalogue import Law
 _Model = TypeVar("_Model", bound=BaseModel)
 _Law = TypeVar("_Law", bound=Law)
 _Entry = TypeVar("_Entry")
+MOST_SUBSTEPS = 10**6
+"""Of a control period, which is over before an interrupt is heeded."""
 
 
 class LawBook(Generic[_Entry]):
@@ -39,12 +41,41 @@ class LawBook(Generic[_Entry]):
         raise InputError(self.where, "law", name, nearest(name, [cast(Any, entry).name for entry in self.laws]))
 
 
+LONGEST_TEXT, DEEPEST, MOST_DIGITS = 2**22, 16, 60
+"""Characters of a file, tables and lists within one another, and digits of a whole number."""
+
+
 def read_toml(text: str, where: str) -> dict[str, Any]:
     """The tables of a TOML text; `where` names it in errors."""
+    if len(text) > LONGEST_TEXT:
+        raise InputError(where, "", f"more than {LONGEST_TEXT} characters", "a shorter file")
     try:
-        return tomllib.loads(text)
+        tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError(where, "", f"not TOML: {error}", "a TOML file") from None
+        raise InputError(where, "", f"not TOML: {_cut(str(error), 200)}", "a TOML file") from None
+    except RecursionError:
+        raise InputError(where, "", "tables or lists too deep", f"at most {DEEPEST} within one another") from None
+    except ValueError:
+        # What Python says of integers that are too long to convert.
+        raise InputError(where, "", "a number of thousands of digits", f"at most {MOST_DIGITS} digits") from None
+    _check_sizes(tables, where)
+    return tables
+
+
+def _check_sizes(tables: dict[str, Any], where: str) -> None:
+    """InputError where anything is nested too deeply to be worked on, or a whole number is far beyond what floats hold."""
+    left: list[tuple[int, str, Any]] = [(0, "", tables)]
+    while left:
+        depth, key, value = left.pop()
+        if depth > DEEPEST:
+            raise InputError(where, _cut(key), "tables or lists too deep", f"at most {DEEPEST} within one another")
+        if isinstance(value, dict):
+            named = cast(dict[str, Any], value)
+            left += [(depth + 1, f"{key}.{name}" if key else name, item) for name, item in named.items()]
+        elif isinstance(value, list):
+            left += [(depth + 1, key, item) for item in cast(list[Any], value)]
+        elif isinstance(value, int) and abs(value) >= 10**MOST_DIGITS:
+            raise InputError(where, key, f"more than {MOST_DIGITS} digits", "a shorter number, such as 1e20")
 
 
 def numbered(laws: Any, where: str) -> list[tuple[str, Any]]:
@@ -96,9 +127,13 @@ and from 2.8 on it is unstable."""
 
 def check_substeps(loop: Any, where: str) -> None:
     """InputError where the integration cannot follow a lag or friction."""
-    least = math.ceil(loop.period * loop.fastest / RESOLVED * (1.0 - 1e-12))
+    least = loop.period * loop.fastest / RESOLVED * (1.0 - 1e-12)
     if loop.substeps < least:
         why = "a lag, or a wheel's friction over its inertia, is too fast for longer ones"
+        if not least <= MOST_SUBSTEPS:
+            allowed = f"a longer lag, or less friction over inertia: {least:.3g} substeps a control period are too many"
+            raise InputError(where, "", f"a time constant of {1.0 / loop.fastest:.3g}", allowed)
+        least = math.ceil(least)
         raise InputError(where, "simulation.substeps", str(loop.substeps), f"at least {least} substeps: {why}")
 
 
@@ -123,7 +158,7 @@ def _translate(
     context: dict[str, Any] = fault.get("ctx", {})
     if fault["type"] == "quantity_at":
         place.append(context["key"])
-    key = ".".join(part for part in [prefix, *place] if part).replace(".[", "[")
+    key = _cut(".".join(part for part in [prefix, *place] if part).replace(".[", "["), 200)
     found = show(context.get("found", fault.get("input")))
     if fault["type"] == "extra_forbidden":
         known = list(_model_at(model, place[:-1]).model_fields) + (extra if len(place) == 1 else [])
@@ -152,11 +187,14 @@ def _plain(message: str) -> str:
 
 def show(value: Any) -> str:
     """What was found, short enough for one line."""
-    text = f'"{value}"' if isinstance(value, str) else str(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return _cut(f'"{value}"' if isinstance(value, str) else str(value))
+
+
+def _cut(text: str, most: int = 60) -> str:
+    return text if len(text) <= most else text[: most - 3] + "..."
 
 
 def nearest(word: str, known: list[str]) -> str:
     """The nearest known words first; all of them when none is near."""
-    near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
+    near = difflib.get_close_matches(word[:100], known, n=1, cutoff=0.6)
     return f"did you mean {near[0]}?" if near else f"one of {', '.join(sorted(known))}"

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from contextlib import suppress
-from functools import cache
+from dataclasses import replace
 from typing import Any, Literal, cast
 
+import numpy as np
 from pydantic import BeforeValidator, ValidationInfo, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from starhold.laws.interface import Gain
+from starhold.scenario.units import shown, to_number
+
+LEAST, MOST = 1e-30, 1e30
+"""Sizes of quantities that files may hold, beside zero; of a vector or matrix the size of its largest entry."""
+MOST_WHOLE = 2**53
+"""Up to here floats hold every whole number."""
 
 
 def quantity(gain: Gain) -> tuple[BeforeValidator, WithJsonSchema]:
@@ -25,8 +32,17 @@ def quantity_or(word: str, meaning: float, gain: Gain) -> tuple[BeforeValidator,
     return BeforeValidator(lambda value: meaning if value == word else read(value)), WithJsonSchema(described)
 
 
+SCALED = {"length": "m", "velocity": "m/s", "acceleration": "m/s^2", "time": "s", "rate": "rad/s"}
+"""Kinds of scaled numbers with their SI units."""
+
+
+def any_quantity(gain: Gain) -> tuple[BeforeValidator, WithJsonSchema]:
+    """The same, scaled where the declaration says of what."""
+    return scaled(gain.dimension, replace(gain, unit=SCALED[gain.dimension])) if gain.dimension else quantity(gain)
+
+
 def scaled(
-    kind: Literal["length", "velocity", "acceleration", "time"], gain: Gain
+    kind: Literal["length", "velocity", "acceleration", "time", "rate"], gain: Gain
 ) -> tuple[BeforeValidator, WithJsonSchema]:
     """The same for scaled numbers: plain ones are, strings with the gain's unit become so. What one is worth in SI is told
     by the validation's context, under the name of its kind; the bounds are of scaled numbers."""
@@ -45,8 +61,12 @@ def reader(gain: Gain) -> Callable[..., Any]:
 
     def read(value: Any, worth: float = 1.0) -> Any:
         try:
-            return gain.check(value if gain.choices else _to_numbers(value, gain, worth))
-        except (ValueError, TypeError) as error:
+            if gain.choices:
+                return gain.check(value)
+            checked = gain.check(_to_numbers(value, gain, worth))
+            _check_size(checked)
+            return checked
+        except (ValueError, TypeError, OverflowError) as error:
             raise PydanticCustomError("quantity", "{reason}", {"reason": _plain(error)}) from None
 
     return read
@@ -61,45 +81,25 @@ def _to_numbers(value: Any, gain: Gain, worth: float) -> Any:
     if isinstance(value, (list, tuple)):
         return [_to_numbers(item, gain, worth) for item in cast(list[Any], value)]
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        raise ValueError(f"{gain.describe()} in {_shown(gain.unit)}")
-    return _parse(value, gain.unit) / worth if isinstance(value, str) else value
+        raise ValueError(f"{gain.describe()} in {shown(gain.unit)}")
+    if isinstance(value, str):
+        return to_number(value, gain.unit) / worth
+    if gain.whole and abs(value) > MOST_WHOLE:
+        raise ValueError("at most 2^53")
+    if gain.unit == "rad" and abs(value) > math.tau:
+        raise ValueError(f'a plain number in rad, within 2 pi; degrees are "{value:g} deg", and "{value:g} rad" is taken')
+    return value
 
 
-def _parse(text: str, unit: str) -> float:
-    number, _, rest = text.strip().partition(" ")
-    if rest.split() == unit.split() and unit != "1":
-        # The common case, spared the start-up of the units library.
-        with suppress(ValueError):
-            return float(number)
-    import pint
-
-    registry = _registry()
-    try:
-        return float(registry.Quantity(text).to(_for_pint(unit)).magnitude)
-    except pint.DimensionalityError:
-        raise ValueError(f"a quantity in {_shown(unit)}") from None
-    except Exception:
-        # pint raises errors of many kinds, tokeniser errors included, on text that is no quantity.
-        raise ValueError(f"a number, or a string with a number and a unit such as '1 {_shown(unit)}'") from None
-
-
-@cache
-def _registry() -> Any:
-    import pint
-
-    return pint.UnitRegistry(cache_folder=":auto:")
-
-
-def _for_pint(unit: str) -> str:
-    return "dimensionless" if unit == "1" else unit
-
-
-def _shown(unit: str) -> str:
-    return "no unit" if unit == "1" else unit
+def _check_size(value: Any) -> None:
+    """ValueError for numbers whose powers overflow or vanish, which are no sizes of anything that flies."""
+    size = float(np.max(np.abs(np.asarray(value, dtype=float))))
+    if math.isfinite(size) and size and not LEAST <= size <= MOST:
+        raise ValueError(f"0, or between {LEAST:g} and {MOST:g} in size")
 
 
 def _schema(gain: Gain) -> dict[str, Any]:
-    described = {"description": f"{gain.text or 'quantity'} ({_shown(gain.unit)})"}
+    described = {"description": f"{gain.text or 'quantity'} ({shown(gain.unit)})"}
     if gain.choices:
         return {"enum": list(gain.choices)} | described
     number: dict[str, Any] = {"type": "integer" if gain.whole else "number"}

@@ -14,7 +14,17 @@ from starhold.errors import InputError
 from starhold.laws.catalogue import Law, catalogue
 from starhold.models.craft import Craft, compact, make_craft
 from starhold.models.wheels import Wheels, body_inertia
-from starhold.scenario.checking import LawBook, free_name, make_gains, numbered, pick_law, read_toml, validate
+from starhold.scenario.checking import (
+    LONGEST_TEXT,
+    LawBook,
+    free_name,
+    make_gains,
+    numbered,
+    pick_law,
+    read_toml,
+    show,
+    validate,
+)
 from starhold.scenario.checking import nearest as nearest
 from starhold.scenario.rotors import make_rotors
 from starhold.scenario.schema import ScenarioTable, law_model
@@ -22,6 +32,8 @@ from starhold.scenario.start import angle_at_start
 
 MARK = "libration"
 """The table by which a scenario of station keeping is known."""
+LONGEST_PATH = 500
+"""Characters of a path that errors show whole."""
 
 
 @dataclass(frozen=True)
@@ -99,17 +111,19 @@ def load(source: str | Path, allow_unstable: bool = False) -> Scenario:
 
 def read_text(source: str | Path) -> tuple[str, str, Path]:
     """The text of a file or of a built-in scenario, what errors call it, and its folder."""
-    path = Path(source)
-    if not path.is_file() and str(source) in builtin_names():
-        return builtin_text(str(source)), str(source), Path()
+    path, where = Path(source), show(Path(source).name) if len(str(source)) > LONGEST_PATH else str(source)
     try:
-        return path.read_text(encoding="utf-8"), str(source), path.parent
+        if not path.is_file() and str(source) in builtin_names():
+            return builtin_text(str(source)), str(source), Path()
+        with path.open(encoding="utf-8") as file:
+            # No more than is taken, for a device has no end.
+            return file.read(LONGEST_TEXT + 1), where, path.parent
     except FileNotFoundError:
-        known = nearest(str(source), builtin_names())
-        raise InputError(str(source), "", "no such file", f"a scenario file, or a built-in scenario: {known}") from None
-    except (OSError, UnicodeDecodeError) as error:
+        known = nearest(where, builtin_names())
+        raise InputError(where, "", "no such file", f"a scenario file, or a built-in scenario: {known}") from None
+    except (OSError, ValueError) as error:
         found = getattr(error, "strerror", None) or type(error).__name__
-        raise InputError(str(source), "", found, "a readable text file") from None
+        raise InputError(where, "", found, "a readable text file") from None
 
 
 def parse(text: str, where: str, folder: Path = Path(), allow_unstable: bool = False) -> Scenario:

@@ -11,15 +11,17 @@ from pydantic import BeforeValidator, Field, create_model, model_validator
 
 from starhold.laws.catalogue import Law, catalogue
 from starhold.laws.interface import Gain
-from starhold.models.craft import EARTH, check_inertia
-from starhold.scenario.quantity import quantity, quantity_or, reader
-from starhold.scenario.tables import Name, Table, at_key, refuse
+from starhold.models.craft import check_inertia
+from starhold.scenario.checking import MOST_SUBSTEPS
+from starhold.scenario.orbit import Orbit
+from starhold.scenario.quantity import any_quantity, quantity, quantity_or, reader
+from starhold.scenario.tables import Flag, Name, Table, at_key, refuse
 from starhold.scenario.transient import TransientTable
 
 QUATERNION = Gain("1", shape=(4,), spread=False, text="quaternion, scalar first, normalised on reading")
 ANGLES = Gain("rad", shape=(3,), spread=False, text="Euler-Krylov angles yaw, pitch, roll")
-
-
+SHORTEST, LONGEST = 0.5, 2.0
+"""Lengths between which four numbers are taken for a direction among quaternions; [0, 1, 1, 1] is one."""
 MOST_STEPS = 1e12
 """Beyond this many control steps the count is no longer told from its neighbours, and no run would end."""
 
@@ -53,20 +55,6 @@ class Spacecraft(Table):
     torque_rate_limit: Annotated[float, *quantity(Gain("N m/s", above=0.0, text="fastest change of each torque"))] = math.inf
 
 
-class Orbit(Table):
-    """Where the spacecraft starts; without this table it floats in free space."""
-
-    position: Annotated[Any, *quantity(Gain("m", shape=(3,), spread=False, text="inertial position"))]
-    velocity: Annotated[Any, *quantity(Gain("m/s", shape=(3,), spread=False, text="inertial velocity"))]
-    gravitational_parameter: Annotated[float, *quantity(Gain("m^3/s^2", above=0.0, text="of the central body"))] = EARTH
-
-    @model_validator(mode="after")
-    def _off_centre(self) -> Orbit:
-        if not any(self.position):
-            raise at_key("position", "a point away from the centre of attraction", list(self.position))
-        return self
-
-
 class Pointing(Table):
     """An attitude as a quaternion or as angles."""
 
@@ -79,6 +67,9 @@ class Pointing(Table):
             raise at_key("angles", "either attitude or angles, not both", list(self.angles))
         if self.attitude is not None and not any(self.attitude):
             raise at_key("attitude", "a quaternion that is not zero", list(self.attitude))
+        if self.attitude is not None and not SHORTEST <= math.hypot(*self.attitude) <= LONGEST:
+            allowed = f"a quaternion of length 1, or between {SHORTEST:g} and {LONGEST:g} to be normalised"
+            raise at_key("attitude", allowed, list(self.attitude))
         return self
 
 
@@ -113,14 +104,16 @@ class TargetTable(Pointing):
 class Environment(Table):
     """External torques."""
 
-    gravity_gradient: bool = False
+    gravity_gradient: Flag = False
     torque_noise: Annotated[float, *quantity(Gain("N m", at_least=0.0, text="standard deviation per axis and step"))] = 0.0
 
 
 class Sensor(Table):
     """Errors of the measured state."""
 
-    attitude_noise: Annotated[float, *quantity(Gain("rad", at_least=0.0, text="standard deviation, angle per axis"))] = 0.0
+    attitude_noise: Annotated[
+        float, *quantity(Gain("rad", at_least=0.0, at_most=math.pi, text="standard deviation, angle per axis"))
+    ] = 0.0
     rate_noise: Annotated[float, *quantity(Gain("rad/s", at_least=0.0, text="standard deviation per axis"))] = 0.0
 
 
@@ -129,7 +122,9 @@ class Simulation(Table):
 
     duration: Annotated[float, *quantity(Gain("s", above=0.0, text="length of the run"))]
     control_period: Annotated[float, *quantity(Gain("s", above=0.0, text="for which a torque is held"))] = 0.1
-    substeps: Annotated[int, *quantity(Gain("1", at_least=1, whole=True, text="integration steps a control period"))] = 1
+    substeps: Annotated[
+        int, *quantity(Gain("1", at_least=1, at_most=MOST_SUBSTEPS, whole=True, text="integration steps a control period"))
+    ] = 1
     record_every: Annotated[int, *quantity(Gain("1", at_least=1, whole=True, text="control steps a sample"))] = 1
     seed: Annotated[int, *quantity(Gain("1", at_least=0, at_most=2**53, whole=True, text="of all random numbers"))] = 1
 
@@ -193,7 +188,7 @@ class FaultTable(Table):
 
     time: Annotated[float, *quantity(Gain("s", at_least=0.0, text="when it happens"))]
     wheel: Annotated[int | None, *quantity(Gain("1", at_least=1, whole=True, text="which wheel, counted from 1"))] = None
-    lost: Annotated[bool, Field(description="the motor gives no more torque")] = False
+    lost: Annotated[Flag, Field(description="the motor gives no more torque")] = False
     torque_limit: Annotated[float | None, *quantity(Gain("N m", at_least=0.0, text="what the motor still gives"))] = None
     momentum_limit: Annotated[float | None, *quantity(Gain("N m s", above=0.0, text="what the wheel still stores"))] = None
     viscous: Annotated[float | None, *quantity(Gain("N m s", at_least=0.0, text="friction per rad/s"))] = None
@@ -287,6 +282,8 @@ class ScenarioTable(Table):
             raise at_key("environment.gravity_gradient", "false without an [orbit] table", True)
         if self.orbit is None and self.target.mode == "orbital":
             raise at_key("target.mode", '"orbital" only with an [orbit] table', "orbital")
+        if self.orbit is not None:
+            self.orbit.check_flight(self.simulation.duration)
         return self
 
 
@@ -299,7 +296,7 @@ def law_model(law: Law, form: str | None = None, base: type[Any] = LawTable) -> 
     for item in law.fields(form):
         written = item.gain.choices[item.default] if item.gain.choices and not item.required else item.default
         # What has None for its default may be left out.
-        kind = Annotated[Any, *quantity(item.gain), Field(validate_default=written is not None)]
+        kind = Annotated[Any, *any_quantity(item.gain), Field(validate_default=written is not None)]
         entries[item.name] = (kind, ... if item.required else written)
     title = law.name.replace("-", " ").title().replace(" ", "") + (form or "").title()
     return create_model(title, __base__=base, __doc__=law.card.summary, **entries)

@@ -56,7 +56,7 @@ def start_of(scenario: Scenario, goal: Any) -> State | WheeledState:
     """The first state of a run with this target."""
     table = scenario.table
     orbit = table.orbit
-    position, velocity = (ZERO, ZERO) if orbit is None else (orbit.position, orbit.velocity)
+    position, velocity = (ZERO, ZERO) if orbit is None else orbit.start
     attitude, rate = _attitude(table.initial), table.initial.rate
     if table.initial.relative_to == "target":
         held = _target_at_start(goal, position, velocity)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, TypeAlias
 
-from pydantic import AfterValidator, BaseModel, ConfigDict
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
 
@@ -12,6 +12,10 @@ class Table(BaseModel):
     """A table that refuses keys it does not know."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+Flag: TypeAlias = Annotated[bool, Field(strict=True)]
+"""true or false, and no word or number in their place."""
 
 
 def refuse(reason: str) -> PydanticCustomError:

@@ -25,25 +25,29 @@ CARD = Card(
 class Gains(NamedTuple):
     """The circle, how strongly it attracts, and the feedback along X; all scaled."""
 
-    radius: Annotated[float, Gain(above=0.0, text="of the circle, lengths")]
-    rate: Annotated[float, Gain(text="at which it is run through, from Y to Z; negative the other way")]
+    radius: Annotated[float, Gain(above=0.0, dimension="length", text="of the circle, lengths")]
+    rate: Annotated[float, Gain(dimension="rate", text="at which it is run through, from Y to Z; negative the other way")]
     alpha: Annotated[float, Gain(above=0.0, text="weight of the distance from the circle")]
     k: Annotated[float, Gain(above=0.0, text="feedback on what the velocity is off by; of a relay the size of its thrust")]
     k_x: Annotated[float, Gain(above=0.0, text="on the position along X")]
     k_velocity: Annotated[float, Gain(above=0.0, text="on the velocity along X")]
     feedback: Annotated[int, Gain(choices=("smooth", "relay"), text="relay: k in the direction against the error")] = 0
-    layer: Annotated[float, Gain(at_least=0.0, text="velocity error within which the relay is proportional")] = 0.0
+    layer: Annotated[
+        float, Gain(at_least=0.0, dimension="velocity", text="velocity error within which the relay is proportional")
+    ] = 0.0
     model: Annotated[int, Gain(choices=MODELS, text="nonlinear: what the linear model leaves out is undone too")] = 0
 
 
 class Best(NamedTuple):
     """The rate of the least control, and along X the double root of the natural rate."""
 
-    radius: Annotated[float, Gain(above=0.0, text="of the circle, lengths")]
+    radius: Annotated[float, Gain(above=0.0, dimension="length", text="of the circle, lengths")]
     alpha: Annotated[float, Gain(above=0.0, text="weight of the distance from the circle")] = 1.0
     k: Annotated[float, Gain(above=0.0, text="feedback on what the velocity is off by; of a relay its thrust")] = 1.0
     feedback: Annotated[int, Gain(choices=("smooth", "relay"), text="relay: k in the direction against the error")] = 0
-    layer: Annotated[float, Gain(at_least=0.0, text="velocity error within which the relay is proportional")] = 0.0
+    layer: Annotated[
+        float, Gain(at_least=0.0, dimension="velocity", text="velocity error within which the relay is proportional")
+    ] = 0.0
     model: Annotated[int, Gain(choices=MODELS, text="nonlinear: what the linear model leaves out is undone too")] = 0
 
 

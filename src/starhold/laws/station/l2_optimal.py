@@ -28,8 +28,8 @@ CARD = Card(
 class Gains(NamedTuple):
     """The circle and the weights of V; all scaled."""
 
-    radius: Annotated[float, Gain(above=0.0, text="of the circle, lengths")]
-    rate: Annotated[float, Gain(text="at which it is run through, from Y to Z; negative the other way")]
+    radius: Annotated[float, Gain(above=0.0, dimension="length", text="of the circle, lengths")]
+    rate: Annotated[float, Gain(dimension="rate", text="at which it is run through, from Y to Z; negative the other way")]
     alpha: Annotated[float, Gain(above=0.0, text="weight of the distance from the circle")]
     beta: Annotated[float, Gain(above=0.0, text="weight of x' + slope x")]
     slope: Annotated[float, Gain(above=0.0, text="rate at which x then falls")]
@@ -40,7 +40,7 @@ class Gains(NamedTuple):
 class Best(NamedTuple):
     """The rate of the least control on the circle; along X the natural rate."""
 
-    radius: Annotated[float, Gain(above=0.0, text="of the circle, lengths")]
+    radius: Annotated[float, Gain(above=0.0, dimension="length", text="of the circle, lengths")]
     alpha: Annotated[float, Gain(above=0.0, text="weight of the distance from the circle")] = 1.0
     beta: Annotated[float, Gain(above=0.0, text="weight of x' + slope x")] = 1.0
     pull: Annotated[float, Gain(above=0.0, text="of the velocity that is wanted, towards the circle")] = 1.0

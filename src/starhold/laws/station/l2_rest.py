@@ -22,8 +22,8 @@ CARD = Card(
 class Gains(NamedTuple):
     """Where it rests, and the feedback of each axis; all scaled."""
 
-    y: Annotated[float, Gain(text="place of rest along Y, lengths")]
-    z: Annotated[float, Gain(text="place of rest along Z, lengths")]
+    y: Annotated[float, Gain(dimension="length", text="place of rest along Y, lengths")]
+    z: Annotated[float, Gain(dimension="length", text="place of rest along Z, lengths")]
     k_x: Annotated[float, Gain(above=0.0, text="on the position along X")]
     k_velocity: Annotated[Vector, Gain(shape=(3,), text="on the velocity, by axis")]
     model: Annotated[int, Gain(choices=MODELS, text="nonlinear: what the linear model leaves out is undone too")] = 0
@@ -32,8 +32,8 @@ class Gains(NamedTuple):
 class Degree(NamedTuple):
     """The feedback of the largest degree of stability that leaves the natural stiffness along Y and Z alone."""
 
-    y: Annotated[float, Gain(text="place of rest along Y, lengths")] = 0.0
-    z: Annotated[float, Gain(text="place of rest along Z, lengths")] = 0.0
+    y: Annotated[float, Gain(dimension="length", text="place of rest along Y, lengths")] = 0.0
+    z: Annotated[float, Gain(dimension="length", text="place of rest along Z, lengths")] = 0.0
     model: Annotated[int, Gain(choices=MODELS, text="nonlinear: what the linear model leaves out is undone too")] = 0
 
 

@@ -9,14 +9,16 @@ from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 from starhold.laws.interface import Gain
 from starhold.laws.station.interface import station_laws
 from starhold.models.libration import EARTH_DIAMETER, PRIMARIES, Libration, Primaries, Units
-from starhold.scenario.checking import nearest
+from starhold.models.orbit import BODIES, body_of
+from starhold.scenario.checking import MOST_SUBSTEPS, nearest
+from starhold.scenario.orbit import check_gravity, too_dense
 from starhold.scenario.quantity import quantity, scaled
 from starhold.scenario.schema import MOST_STEPS, file_schema
 from starhold.scenario.tables import Name, Table, at_key, refuse
 
 
 def _known_pair(value: Any) -> Any:
-    if value not in PRIMARIES:
+    if not isinstance(value, str) or value not in PRIMARIES:
         raise refuse(nearest(str(value), list(PRIMARIES)))
     return value
 
@@ -49,9 +51,23 @@ class LibrationTable(Table):
             raise at_key("primaries", "either primaries or larger, smaller and separation", self.primaries)
         if missing and len(missing) < len(own):
             raise at_key(missing[0], "larger, smaller and separation together", None)
-        if not missing and self.pair.smaller > self.pair.larger:
-            raise at_key("smaller", f"at most that of the larger body, {self.pair.larger:g}", self.smaller)
+        if not missing:
+            self._check_own()
         return self
+
+    def _check_own(self) -> None:
+        """Errors where two bodies of one's own cannot be."""
+        pair = self.pair
+        check_gravity("larger", pair.larger)
+        check_gravity("smaller", pair.smaller)
+        if pair.smaller > pair.larger:
+            raise at_key("smaller", f"at most that of the larger body, {pair.larger:g}", self.smaller)
+        for gravity in (pair.larger, pair.smaller):
+            known = body_of(gravity)
+            if too_dense(gravity, pair.separation) or (known is not None and pair.separation < BODIES[known].radius):
+                raise at_key(
+                    "separation", "more than the size of a body; a plain number is in m, GM in m^3/s^2", pair.separation
+                )
 
     @property
     def pair(self) -> Primaries:
@@ -127,7 +143,9 @@ class Timing(Table):
 
     duration: Annotated[float, *scaled("time", Gain("s", above=0.0, text="length of the run, in whole control periods"))]
     control_period: Annotated[float, *scaled("time", Gain("s", above=0.0, text="for which a control is held"))] = 0.001
-    substeps: Annotated[int, *quantity(Gain("1", at_least=1, whole=True, text="integration steps a control period"))] = 1
+    substeps: Annotated[
+        int, *quantity(Gain("1", at_least=1, at_most=MOST_SUBSTEPS, whole=True, text="integration steps a control period"))
+    ] = 1
     record_every: Annotated[int, *quantity(Gain("1", at_least=1, whole=True, text="control steps a sample"))] = 10
     lost_beyond: Annotated[
         float | None,

@@ -1,0 +1,138 @@
+"""The table of an orbit, by position and velocity or by elements, and what is refused of one."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from typing import Annotated, Any
+
+from pydantic import model_validator
+
+from starhold.algebra.vector import Vector, cross, norm
+from starhold.laws.interface import Gain
+from starhold.models.craft import EARTH
+from starhold.models.orbit import BODIES, NEWTON, Elements, body_of, from_elements, lowest, meets_at
+from starhold.scenario.quantity import quantity
+from starhold.scenario.tables import Table, at_key
+
+DENSEST = 1e6
+"""Mean density (kg/m3) of what is closer to a centre of attraction than a craft can be; planets have less than 6000."""
+STRAIGHT = 1e-9
+"""Sine of the angle between position and velocity at which a path is taken for one through the centre."""
+ANGLE_UP = Gain("rad", at_least=0.0, at_most=math.pi, text="of the orbit's plane against the first two axes")
+ANGLES = ("inclination", "raan", "argument_of_perigee", "true_anomaly")
+
+
+def too_dense(gravity: float, distance: float) -> bool:
+    """Whether no body with this gravitational parameter (m3/s2) is small enough to be at this distance (m) from."""
+    return gravity > DENSEST * NEWTON * 4.0 / 3.0 * math.pi * distance**3
+
+
+def check_gravity(key: str, gravity: float) -> None:
+    """An error where a gravitational parameter is a known body's in km^3/s^2."""
+    meant = body_of(1e9 * gravity)
+    if meant is not None:
+        raise at_key(key, f'm^3/s^2; that of the {meant} is "{gravity:.10g} km^3/s^2"', gravity)
+
+
+class Orbit(Table):
+    """Where the spacecraft starts, by position and velocity or by the elements of its orbit; without this table it floats in
+    free space."""
+
+    position: Annotated[Any, *quantity(Gain("m", shape=(3,), spread=False, text="inertial position"))] = None
+    velocity: Annotated[Any, *quantity(Gain("m/s", shape=(3,), spread=False, text="inertial velocity"))] = None
+    altitude: Annotated[
+        float | None, *quantity(Gain("m", above=0.0, text="of a circular orbit, above the body's equatorial radius"))
+    ] = None
+    semi_major_axis: Annotated[float | None, *quantity(Gain("m", text="of the orbit, negative for a hyperbola"))] = None
+    eccentricity: Annotated[float | None, *quantity(Gain("1", at_least=0.0, text="of the orbit, 0 if absent"))] = None
+    inclination: Annotated[float | None, *quantity(ANGLE_UP)] = None
+    raan: Annotated[float | None, *quantity(Gain("rad", text="right ascension of the ascending node, 0 if absent"))] = None
+    argument_of_perigee: Annotated[float | None, *quantity(Gain("rad", text="from the ascending node, 0 if absent"))] = None
+    true_anomaly: Annotated[
+        float | None, *quantity(Gain("rad", text="from the perigee, of a circle from the ascending node; 0 if absent"))
+    ] = None
+    gravitational_parameter: Annotated[float, *quantity(Gain("m^3/s^2", above=0.0, text="of the central body"))] = EARTH
+    radius: Annotated[
+        float | None, *quantity(Gain("m", above=0.0, text="of the central body; known of the Sun, the planets and the Moon"))
+    ] = None
+
+    @property
+    def surface(self) -> float | None:
+        """The radius (m) of the central body, None where it is not known."""
+        known = body_of(self.gravitational_parameter)
+        return self.radius if self.radius is not None or known is None else BODIES[known].radius
+
+    @property
+    def start(self) -> tuple[Vector, Vector]:
+        """Position (m) and velocity (m/s) at the start, inertial."""
+        if self.position is not None:
+            return self.position, self.velocity
+        angles = [getattr(self, key) or 0.0 for key in ANGLES]
+        size = self.semi_major_axis if self.altitude is None else self.altitude + (self.surface or 0.0)
+        return from_elements(Elements(size or 0.0, self.eccentricity or 0.0, *angles), self.gravitational_parameter)
+
+    @model_validator(mode="after")
+    def _told_once(self) -> Orbit:
+        sizes = [key for key in ("altitude", "semi_major_axis") if getattr(self, key) is not None]
+        elements = [key for key in ("eccentricity", *ANGLES) if getattr(self, key) is not None]
+        if self.position is not None or self.velocity is not None:
+            missing = "velocity" if self.velocity is None else "position"
+            if sizes or elements:
+                key = (sizes + elements)[0]
+                raise at_key(key, "either position and velocity, or the elements of an orbit", getattr(self, key))
+            if getattr(self, missing) is None:
+                raise at_key(missing, "position and velocity together", None)
+        elif len(sizes) != 1:
+            allowed = "position and velocity, or either altitude or semi_major_axis, with inclination"
+            raise at_key(sizes[-1] if sizes else "position", allowed, getattr(self, sizes[-1]) if sizes else None)
+        elif self.inclination is None:
+            raise at_key("inclination", "an angle", None)
+        elif self.altitude is not None and self.eccentricity:
+            raise at_key(
+                "eccentricity", "0 with an altitude, which is that of a circle; else a semi_major_axis", self.eccentricity
+            )
+        elif self.altitude is not None and self.surface is None:
+            raise at_key("radius", "the radius of the body that the altitude counts from", None)
+        return self
+
+    @model_validator(mode="after")
+    def _possible(self) -> Orbit:
+        gravity = self.gravitational_parameter
+        check_gravity("gravitational_parameter", gravity)
+        try:
+            position, velocity = self.start
+        except ValueError as error:
+            key = "true_anomaly" if "anomaly" in str(error) else "semi_major_axis"
+            raise at_key(key, str(error), getattr(self, key)) from None
+        key, found = ("semi_major_axis", self.semi_major_axis) if self.position is None else ("position", list(position))
+        distance, fast = norm(position), norm(velocity)
+        if not distance:
+            raise at_key(key, "a point away from the centre of attraction", found)
+        if self.surface is not None and distance < self.surface:
+            name = body_of(gravity) or "body"
+            allowed = f"a start above the {name}'s radius of {1e-3 * self.surface:g} km; a plain number is in m"
+            raise at_key(key, allowed, found)
+        if too_dense(gravity, distance):
+            allowed = "a start that is not inside what it orbits; plain numbers are in m, GM in m^3/s^2"
+            raise at_key(key, allowed, found)
+        if norm(cross(position, velocity)) <= STRAIGHT * distance * fast:
+            raise at_key("velocity", "an orbit that passes beside the centre of attraction, not through it", list(velocity))
+        return self
+
+    def check_flight(self, duration: float) -> None:
+        """An error where the spacecraft comes down to the body's surface during a run; a warning where it would later."""
+        position, velocity = self.start
+        gravity, surface = self.gravitational_parameter, self.surface
+        if surface is None or lowest(position, velocity, gravity) >= surface:
+            return
+        key, found = ("velocity", list(velocity)) if self.position is not None else ("semi_major_axis", self.semi_major_axis)
+        name = body_of(gravity) or "body"
+        moment = meets_at(position, velocity, gravity, surface)
+        if moment < duration:
+            allowed = (
+                f"an orbit above the {name}'s surface, which this one meets after {moment:.4g} s; plain numbers are in m/s"
+            )
+            raise at_key(f"orbit.{key}", allowed, found)
+        if moment < math.inf:
+            warnings.warn(f"orbit.{key}: the orbit meets the {name}'s surface after {moment:.4g} s", stacklevel=2)

@@ -1,0 +1,137 @@
+"""Texts such as "0.01 N m" to numbers. Number and unit are read here, by a grammar that computes nothing; the units library
+only tells what units of these names are worth."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from functools import cache
+from typing import Any
+
+LONGEST = 100
+"""Characters that a quantity may have."""
+MOST_POWER = 9
+"""A unit's largest exponent, in all."""
+_NUMBER = re.compile(r"[+-]?(?:\d+(?:_\d+)*(?:\.(?:\d+(?:_\d+)*)?)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_OVER = re.compile(r"(?:1\s*)?/\s*")
+_FACTOR = re.compile(r"(?:(?P<name>[^\W\d_]+(?:_[^\W\d_]+)*|[°%])|\((?P<group>[^()]*)\))(?:\^?(?P<power>-?[0-9]))?")
+_JOINT = re.compile(r"\s*[*·⋅/]\s*|\s+|[.-]")
+_RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+_TOGETHER = re.compile(r"(?P<force>[nuµμmkM]?N)m(?P<time>s?)|(?P<mass>k?g)m")
+"""Units written together, as in mNm, Nms and kgm², which the library takes for something else."""
+_SHARES = {"%": "percent", "percent": "percent", "ppm": "ppm"}
+
+
+def to_number(text: str, unit: str) -> float:
+    """What a text such as "20 mN m" is worth in a unit such as "N m". ValueError says what is allowed."""
+    text = text.strip()
+    number = _NUMBER.match(text)
+    if number is None or len(text) > LONGEST:
+        raise ValueError(_allowed(unit))
+    value, given = float(number[0]), text[number.end() :].strip()
+    if given == unit and unit != "1":
+        # The common case, spared the start-up of the units library.
+        return value
+    return _convert(value, _powers(given, unit), unit)
+
+
+def shown(unit: str) -> str:
+    """How messages call a unit."""
+    return "no unit" if unit == "1" else unit
+
+
+def _allowed(unit: str) -> str:
+    return f"a number, or a string with a number and a unit such as '1 {shown(unit)}'"
+
+
+@cache
+def _powers(given: str, unit: str) -> dict[str, int]:
+    """The units of a text with their exponents, `unit` being what errors ask for."""
+    given = re.sub(f"[{'⁰¹²³⁴⁵⁶⁷⁸⁹⁻'}]+", lambda raised: "^" + raised[0].translate(_RAISED), given)
+    powers = _read(re.sub(r"\s*(?:\*\*|\^)\s*", "^", given), unit) if given else {}
+    if any(abs(power) > MOST_POWER for power in powers.values()):
+        raise ValueError(_allowed(unit))
+    return {name: power for name, power in powers.items() if power}
+
+
+def _read(given: str, unit: str) -> Counter[str]:
+    """Factors from left to right; of a group in parentheses, which has none within, all."""
+    powers: Counter[str] = Counter()
+    over = _OVER.match(given)
+    sign, place = (-1, over.end()) if over else (1, 0)
+    while factor := _FACTOR.match(given, place):
+        power = int(factor["power"] or 1)
+        if factor["name"] is None:
+            for name, inner in _read(factor["group"].strip(), unit).items():
+                powers[name] += sign * power * inner
+        else:
+            *others, last = _split(factor["name"])
+            powers.update(dict.fromkeys(others, sign))
+            powers[last] += sign * power
+        if factor.end() == len(given):
+            return powers
+        joint = _JOINT.match(given, factor.end())
+        if joint is None:
+            break
+        sign, place = -1 if "/" in joint[0] else 1, joint.end()
+    raise ValueError(_allowed(unit))
+
+
+def _split(name: str) -> list[str]:
+    """The units that a name is made of; an exponent after it belongs to the last."""
+    together = _TOGETHER.fullmatch(name)
+    if together is None:
+        return [name]
+    return [together["force"] or together["mass"], "m", *(["s"] if together["time"] else [])]
+
+
+def _convert(value: float, powers: dict[str, int], unit: str) -> float:
+    if unit == "1":
+        # An angle is no pure number, though the library has it so.
+        if not powers:
+            return value
+        if not powers.keys() <= _SHARES.keys() or sum(powers.values()) != 1:
+            raise ValueError(f"a quantity in {shown(unit)}")
+        powers = {_SHARES[name]: power for name, power in powers.items()}
+    import pint
+
+    registry = _registry()
+    try:
+        given, wanted = _container({"deg" if name == "°" else name: power for name, power in powers.items()}), _wanted(unit)
+        if not _angle_fits(given, wanted):
+            raise ValueError(f"a quantity in {unit}")
+        return float(registry.convert(value, given, wanted))
+    except pint.UndefinedUnitError:
+        raise ValueError(_allowed(unit)) from None
+    except (pint.PintError, OverflowError, ZeroDivisionError):
+        raise ValueError(f"a quantity in {shown(unit)}") from None
+
+
+def _angle_fits(given: Any, wanted: Any) -> bool:
+    """Whether radians stand where they are wanted; 1/s will do for rad/s, but Hz, which may count turns, will not."""
+    roots = [_registry().get_root_units(units)[1] for units in (given, wanted)]
+    angle, asked = (root._units.get("radian", 0) for root in roots)
+    if asked == 0 or angle == asked:
+        return True
+    return angle == 0 and len(roots[1]._units) > 1 and not any("hertz" in name for name in given)
+
+
+@cache
+def _wanted(unit: str) -> Any:
+    return _container({} if unit == "1" else _powers(unit, unit))
+
+
+def _container(powers: dict[str, int]) -> Any:
+    from pint.util import UnitsContainer
+
+    registry, named = _registry(), Counter[str]()
+    for name, power in powers.items():
+        named[registry.get_name(name)] += power
+    return UnitsContainer({name: power for name, power in named.items() if power})
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry(cache_folder=":auto:")

@@ -1,0 +1,190 @@
+"""Orbits by position and velocity or by elements, against their invariants and against Basilisk, and what is refused."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from starhold.errors import InputError
+from starhold.models.orbit import BODIES, Elements, body_of, from_elements, lowest, meets_at
+from starhold.scenario.reading import builtin_text, parse
+
+EARTH = BODIES["Earth"]
+BASE = builtin_text("three-laws")
+STATE = "position = [7.0e6, 0, 0]         # m, inertial\nvelocity = [0, 7550, 0]"
+FALLING = 'position = ["7000 km", 0, 0]\nvelocity = [0, 6000, 0]'
+
+angle = st.floats(0.0, math.tau)
+ellipses = st.builds(Elements, st.floats(6.5e6, 1e9), st.floats(0.0, 0.95), st.floats(0.0, math.pi), angle, angle, angle)
+hyperbolas = st.builds(
+    lambda a, e, i, node, periapsis, share: Elements(-a, e, i, node, periapsis, share * math.acos(-1.0 / e)),
+    st.floats(1e6, 1e9),
+    st.floats(1.01, 5.0),
+    st.floats(0.0, math.pi),
+    angle,
+    angle,
+    st.floats(-0.9, 0.9),
+)
+
+
+def orbit(text, duration="600.0"):
+    assert STATE in BASE
+    return parse(BASE.replace(STATE, text).replace("600.0", duration), "my.toml").table.orbit
+
+
+@given(st.one_of(ellipses, hyperbolas))
+def test_elements_come_back_from_the_invariants_of_the_motion(elements):
+    """Energy gives the axis, the eccentricity vector its length and direction, the angular momentum the plane."""
+    r, v = (np.array(found) for found in from_elements(elements, EARTH.gravity))
+    a, e, i, node, periapsis, anomaly = elements
+    distance = np.linalg.norm(r)
+    energy = v @ v / 2 - EARTH.gravity / distance
+    scale = EARTH.gravity / distance
+    assert energy == pytest.approx(-EARTH.gravity / (2 * a), abs=1e-12 * scale)
+    h = np.cross(r, v)
+    pole = np.array([math.sin(i) * math.sin(node), -math.sin(i) * math.cos(node), math.cos(i)])
+    assert h / np.linalg.norm(h) == pytest.approx(pole, abs=1e-11)
+    assert h @ h == pytest.approx(EARTH.gravity * a * (1 - e * e), rel=1e-11)
+    eccentricity = np.cross(v, h) / EARTH.gravity - r / distance
+    ascent = np.array([math.cos(node), math.sin(node), 0.0])
+    to_perigee = math.cos(periapsis) * ascent + math.sin(periapsis) * np.cross(pole, ascent)
+    assert eccentricity == pytest.approx(e * to_perigee, abs=1e-11)
+    onward = math.cos(anomaly) * to_perigee + math.sin(anomaly) * np.cross(pole, to_perigee)
+    assert r / distance == pytest.approx(onward, abs=1e-11)
+
+
+def test_elements_agree_with_basilisk():
+    motion = pytest.importorskip("Basilisk.utilities.orbitalMotion", reason="Basilisk comes with the test extra")
+    for elements in (
+        Elements(7e6, 0.0, 1.7, 0.3, 0.0, 2.0),
+        Elements(2.66e7, 0.74, math.radians(63.4), 5.0, math.radians(270), 1.0),
+        Elements(-4e7, 1.5, 0.4, 1.0, 2.0, -1.2),
+    ):
+        given_to = motion.ClassicElements()
+        given_to.a, given_to.e, given_to.i, given_to.Omega, given_to.omega, given_to.f = elements
+        for mine, theirs in zip(
+            from_elements(elements, EARTH.gravity), motion.elem2rv(EARTH.gravity, given_to), strict=True
+        ):
+            assert mine == pytest.approx(theirs, abs=1e-12 * np.linalg.norm(theirs))
+
+
+@given(st.one_of(ellipses, hyperbolas), st.floats(0.05, 2.0))
+def test_the_moment_of_coming_down_is_on_the_orbit(elements, share):
+    """Kepler's equation, by quadrature of the radius: dt = r dr / sqrt(2 (E r^2 + mu r) - h^2), free of the formula used."""
+    state = from_elements(elements, EARTH.gravity)
+    low, begun = lowest(*state, EARTH.gravity), math.hypot(*state[0])
+    assert low == pytest.approx(elements.semi_major_axis * (1 - elements.eccentricity), rel=1e-9)
+    surface = low * (1 + share)
+    assume(surface < 0.99 * begun)
+    assert meets_at(*state, EARTH.gravity, 0.99 * low) == math.inf
+    moment = meets_at(*state, EARTH.gravity, surface)
+    radial = np.dot(*state)
+    if radial >= 0.0 and elements.eccentricity > 1.0:
+        assert moment == math.inf
+        return
+    # From the surface back in time, which is as long, the same motion mirrored reaches the start.
+    a, e = elements.semi_major_axis, elements.eccentricity
+    x = np.linspace(0.0, 1.0, 20001)
+
+    def between(inner, outer):
+        r = inner + (outer - inner) * (x * x * (3 - 2 * x))
+        # Substituted so that the turning points leave no poles.
+        slope = (outer - inner) * 6 * x * (1 - x)
+        under = EARTH.gravity * (2 * r - r * r / a - a * (1 - e * e))
+        inside = np.where(under > 0, r * slope / np.sqrt(np.maximum(under, 1e-300)), 0.0)
+        return np.trapezoid(inside, x)
+
+    high = a * (1 + e)
+    expected = between(surface, begun) if radial < 0 else between(begun, high) + between(surface, high)
+    assert moment == pytest.approx(expected, rel=2e-2, abs=1.0)
+
+
+def test_a_circular_orbit_by_altitude_and_inclination():
+    found = orbit('altitude = "622 km"\ninclination = "97.9 deg"')
+    r, v = found.start
+    assert math.hypot(*r) == pytest.approx(6378137.0 + 622e3, rel=1e-15)
+    assert math.hypot(*v) == pytest.approx(math.sqrt(3.986e14 / 7000137.0), rel=1e-14)
+    assert np.dot(r, v) == pytest.approx(0.0, abs=1e-3)
+    assert (r[1], r[2]) == (0.0, 0.0)
+    assert math.atan2(v[2], v[1]) == pytest.approx(math.radians(97.9), rel=1e-14)
+    later = orbit('altitude = "622 km"\ninclination = 0\ntrue_anomaly = "90 deg"\nraan = "-90 deg"')
+    assert later.start[0] == pytest.approx((7000137.0, 0, 0), abs=1e-6)
+    moon = orbit('altitude = "100 km"\ninclination = 0\ngravitational_parameter = "4902.8 km^3/s^2"')
+    assert math.hypot(*moon.start[0]) == pytest.approx(1837.4e3)
+    assert body_of(4.9028e12) == "Moon"
+    rock = orbit("altitude = 1e4\ninclination = 0\ngravitational_parameter = 4.46e5\nradius = 8e3")
+    assert math.hypot(*rock.start[0]) == pytest.approx(18e3)
+
+
+def test_keplerian_elements_in_a_file():
+    text = 'semi_major_axis = "26600 km"\neccentricity = 0.7\ninclination = "63.4 deg"\nargument_of_perigee = "270 deg"'
+    found = orbit(text)
+    expected = from_elements(Elements(2.66e7, 0.7, math.radians(63.4), 0.0, 1.5 * math.pi, 0.0), 3.986e14)
+    assert np.allclose(found.start, expected, rtol=1e-12)
+
+
+FAULTS = {
+    "nothing": ("", ["orbit.position", "altitude or semi_major_axis"]),
+    "half a state": ("position = [7e6, 0, 0]", ["orbit.velocity", "together"]),
+    "both": (STATE + "\ninclination = 1", ["orbit.inclination", "either"]),
+    "two sizes": ("altitude = 5e5\nsemi_major_axis = 7e6\ninclination = 1", ["orbit.semi_major_axis", "either"]),
+    "no inclination": ("altitude = 5e5", ["orbit.inclination", "angle"]),
+    "an eccentric altitude": (
+        "altitude = 5e5\ninclination = 1\neccentricity = 0.1",
+        ["orbit.eccentricity", "semi_major_axis"],
+    ),
+    "altitude of an unknown body": (
+        "altitude = 5e5\ninclination = 1\ngravitational_parameter = 1e10",
+        ["orbit.radius", "altitude counts from"],
+    ),
+    "a parabola": ("semi_major_axis = 7e6\neccentricity = 1\ninclination = 1", ["orbit.semi_major_axis", "eccentricity"]),
+    "no hyperbola": ("semi_major_axis = 7e6\neccentricity = 2\ninclination = 1", ["orbit.semi_major_axis", "negative"]),
+    "beyond the asymptote": (
+        "semi_major_axis = -7e6\neccentricity = 2\ninclination = 1\ntrue_anomaly = 2.2",
+        ["orbit.true_anomaly", "120"],
+    ),
+    "degrees without a unit": ("altitude = 5e5\ninclination = 97", ["orbit.inclination", '"97 deg"']),
+    "position in km": ("position = [7000, 0, 0]\nvelocity = [0, 7550, 0]", ["orbit.position", "6378.14 km", "in m"]),
+    "axis in km": ("semi_major_axis = 7000\ninclination = 1", ["orbit.semi_major_axis", "in m"]),
+    "inside the Earth": ('position = ["6300 km", 0, 0]\nvelocity = [0, 7900, 0]', ["orbit.position", "the Earth's radius"]),
+    "inside a body of a stated radius": (STATE + "\nradius = 8e6", ["orbit.position", "8000 km"]),
+    "inside anything": (
+        "position = [50, 0, 0]\nvelocity = [0, 3, 0]\ngravitational_parameter = 4.46e5",
+        ["orbit.position", "not inside"],
+    ),
+    "GM in km^3/s^2": (
+        STATE + "\ngravitational_parameter = 398600.4",
+        ["orbit.gravitational_parameter", "Earth", "km^3/s^2"],
+    ),
+    "velocity in km/s": (
+        'position = ["7000 km", 0, 0]\nvelocity = [0, 7.55, 0]',
+        ["orbit.velocity", "surface", "after 385", "m/s"],
+    ),
+    "at rest": ('position = ["7000 km", 0, 0]\nvelocity = [0, 0, 0]', ["orbit.velocity", "through"]),
+    "straight up": ('position = ["7000 km", 0, 0]\nvelocity = [100, 0, 0]', ["orbit.velocity", "through"]),
+    "an ellipse into the ground": (
+        "semi_major_axis = 6.5e6\neccentricity = 0.1\ninclination = 1\ntrue_anomaly = 3.14",
+        ["orbit.semi_major_axis", "surface"],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", sorted(FAULTS))
+def test_what_is_refused_of_an_orbit(name):
+    text, words = FAULTS[name]
+    with pytest.raises(InputError) as caught:
+        orbit(text, "6000.0")
+    message = str(caught.value)
+    assert message.startswith("my.toml: ")
+    assert "\n" not in message
+    for word in words:
+        assert word in message
+
+
+def test_an_orbit_that_comes_down_after_the_run_is_warned_of():
+    with pytest.warns(UserWarning, match=r"orbit\.velocity: the orbit meets the Earth's surface after \d+"):
+        orbit(FALLING, "20.0")
+    with pytest.raises(InputError, match="surface"):
+        orbit(FALLING, "6000.0")

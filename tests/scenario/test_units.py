@@ -1,0 +1,127 @@
+"""Quantities: numbers and units are read strictly, and only what a unit is worth is asked of the library."""
+
+import math
+
+import pint
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from starhold.scenario.units import LONGEST, to_number
+
+REGISTRY = pint.UnitRegistry(cache_folder=":auto:")
+NAMES = ["m", "km", "cm", "s", "ms", "min", "h", "N", "mN", "kg", "rad", "deg", "rpm", "arcsec"]
+
+factors = st.lists(
+    st.tuples(st.sampled_from([" ", "*", "/", " / ", "·"]), st.sampled_from(NAMES), st.integers(-2, 2).filter(bool)),
+    min_size=1,
+    max_size=4,
+)
+
+
+def written(chosen):
+    """A unit as it may be written, and as the library's own parser takes it."""
+    text, plain = "", ""
+    for joint, name, power in chosen:
+        raised = "" if power == 1 else f"^{power}"
+        text += (joint if text else "") + name + raised
+        plain += (f" {joint.strip() or '*'} ".replace("·", "*") if plain else "") + f"{name}**({power})"
+    return text, plain
+
+
+@given(st.floats(-1e6, 1e6), factors)
+def test_units_are_read_as_the_library_reads_them(number, chosen):
+    text, plain = written(chosen)
+    parsed = REGISTRY.parse_units(plain)
+    root = {name: int(power) for name, power in REGISTRY.get_root_units(parsed)[1]._units.items()}
+    # Larger exponents are refused.
+    assume(root and all(abs(power) < 10 for power in [*root.values(), *parsed._units.values()]))
+    expected = REGISTRY.Quantity(number, parsed).to_root_units().magnitude
+    found = to_number(f"{number!r} {text}", " ".join(f"{name}^{power}" for name, power in root.items()))
+    assert found == pytest.approx(expected, rel=1e-12, abs=1e-300)
+
+
+SAME = [
+    ("20 mNm", "20 mN m", "N m"),
+    ("3 kNm", "3000 N m", "N m"),
+    ("5 µNm", "5e-6 N m", "N m"),
+    ("4 Nms", "4 N m s", "N m s"),
+    ("4 mN·m·s", "0.004 N m s", "N m s"),
+    ("4 N-m-s", "4 N m s", "N m s"),
+    ("4 N.m", "4 N m", "N m"),
+    ("7 Nm/s", "7 N m/s", "N m/s"),
+    ("2 kgm²", "2 kg m^2", "kg m^2"),
+    ("2 kg m2", "2 kg m^2", "kg m^2"),
+    ("2 kg·m**2", "2 kg m^2", "kg m^2"),
+    ("20 kg cm ^ 2", "0.002 kg m^2", "kg m^2"),
+    ("9 m s⁻²", "9 m/s^2", "m/s^2"),
+    ("9 m s-2", "9 m/s^2", "m/s^2"),
+    ("50 /(N m)²", "50 1/(N m)^2", "1/(N m)^2"),
+    ("50 1/(mN m)^2", "5e7 1/(N m)^2", "1/(N m)^2"),
+    ("500km", "500 km", "m"),
+    ("1_000 km", "1000 km", "m"),
+    ("30°", "30 deg", "rad"),
+    ("3°/s", "3 deg/s", "rad/s"),
+    ("5 %", "0.05", "1"),
+    ("1 N m/(rad/s)", "1 N m s", "N m s"),
+    ("2 1/s", "2 rad/s", "rad/s"),
+    ("398600 km^3/s^2", "3.986e14 m^3/s^2", "m^3/s^2"),
+]
+
+
+@pytest.mark.parametrize(("text", "same", "unit"), SAME)
+def test_spellings(text, same, unit):
+    assert to_number(text, unit) == pytest.approx(to_number(same, unit), rel=1e-14)
+
+
+REFUSED = [
+    ("9**9**9 s", "s"),
+    ("9 s**9**9", "s"),
+    ("9 (s^9)^9", "s"),
+    ("9 s^99", "s"),
+    ("1 ((s))", "s"),
+    ("1 s s s s s s s s s s", "s"),
+    ("1/3 s", "s"),
+    ("2*3 s", "s"),
+    ("0x10 s", "s"),
+    ("nan s", "s"),
+    ("inf", "s"),
+    ("1 s^", "s"),
+    ("1 (s", "s"),
+    ("1 s)", "s"),
+    ("1 s/", "s"),
+    ("1 s//s", "s"),
+    ("1 __import__('os')", "s"),
+    ("1 degC", "s"),
+    ("s", "s"),
+    ("", "s"),
+    ("1", "s"),
+    ("1 kg", "s"),
+    (f"{'1' * LONGEST} s", "s"),
+    ("1 Hz", "rad/s"),
+    ("1 kHz", "rad/s"),
+    ("1", "rad"),
+    ("5 %", "rad"),
+    ("1 1/s", "rad"),
+    ("30 deg", "1"),
+    ("3 bit", "1"),
+    ("5 %^2", "1"),
+    ("٣ s", "s"),
+]
+
+
+@pytest.mark.parametrize(("text", "unit"), REFUSED)
+def test_what_is_no_quantity_is_refused_with_the_unit_that_is_asked_for(text, unit):
+    with pytest.raises(ValueError, match=r"^a (number, or a string|quantity in)"):
+        to_number(text, unit)
+
+
+@given(st.text("0123456789.eE+-_*^/() sNmkgrade°²⁻", max_size=30), st.sampled_from(["s", "N m", "rad", "1", "1/(N m)^2"]))
+def test_no_text_ends_in_anything_but_a_number_or_one_line(text, unit):
+    try:
+        value, said = to_number(text, unit), "a "
+    except ValueError as error:
+        value, said = 0.0, str(error)
+    assert said.startswith("a ")
+    assert "\n" not in said
+    assert not math.isnan(value)
