@@ -51,10 +51,11 @@ class Rest(NamedTuple):
 
 
 def goal_of(gains: Any) -> Circle | Rest:
-    """What a law makes for, by its gains."""
-    if hasattr(gains, "radius"):
+    """What a law makes for, by its gains: a circle of this radius and rate, else rest at this y and z, without them at the
+    libration point."""
+    if hasattr(gains, "radius") and hasattr(gains, "rate"):
         return Circle(gains.radius, gains.rate)
-    return Rest((0.0, gains.y, gains.z))
+    return Rest((0.0, getattr(gains, "y", 0.0), getattr(gains, "z", 0.0)))
 
 
 MEASURES: dict[str, Measure] = {

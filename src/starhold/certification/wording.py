@@ -8,7 +8,7 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from typing import Any, cast
 
 from starhold.certification.certificate import Certificate, Claim, Obligation
-from starhold.laws.catalogue import catalogue
+from starhold.laws.catalogue import known_law
 
 HEADINGS = {
     "convergence": "converges",
@@ -97,7 +97,7 @@ def place(numbers: Mapping[str, Any]) -> str:
 
 
 def _cover(numbers: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
-    law = catalogue().get(subject.get("law", ""))
+    law = known_law(subject.get("law", ""))
     if law is not None and law.card.double_cover == "even":
         everywhere = numbers.get("everything") or numbers.get("rate_everywhere") is not None
         return ", almost always: it could also rest at half turns, which are unstable" if everywhere else ""

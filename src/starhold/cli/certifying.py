@@ -44,12 +44,28 @@ def certify(
         raise typer.Exit(REFUTED if "refuted" in outcomes else UNDECIDED)
 
 
-def check(path: Annotated[Path, typer.Argument(metavar="CERT", help="a certificate.json")]) -> None:
+def check(
+    path: Annotated[Path, typer.Argument(metavar="CERT", help="a certificate.json")],
+    law_file: Annotated[
+        list[Path] | None,
+        typer.Option("--law-file", metavar="FILE", help="a law it speaks of that a file holds; repeatable"),
+    ] = None,
+) -> None:
     """Check a certificate independently of the program that made it: trusts nothing in the file but what it claims."""
+    from contextlib import ExitStack
+
     from starhold.certification.checker import check_file, passed
     from starhold.cli.show_certificates import print_findings
+    from starhold.conformance.suite import find_law
+    from starhold.laws.catalogue import adopted, catalogue
+    from starhold.laws.station.interface import StationLaw, station_laws
 
-    findings = check_file(path)
+    with ExitStack() as laws:
+        # Only what the user names is run: a certificate comes from elsewhere.
+        for file in law_file or []:
+            law = find_law(str(file))
+            laws.enter_context(adopted(law, station_laws() if isinstance(law, StationLaw) else catalogue()))
+        findings = check_file(path)
     print_findings(findings)
     if not passed(findings):
         raise typer.Exit(FAILED_CHECK)

@@ -158,7 +158,7 @@ def design(
 
     scenario = open_scenario(file, allow_unstable)
     for found in designing.design(scenario, law):
-        print_design(found)
+        print_design(found, scenario.pick(found.name).law)
     if map_to is not None:
         from starhold.report.stability_map import draw_map
 
@@ -271,20 +271,15 @@ def _schema_text() -> str:
 
 
 @app.command("check-law")
-def check_law(path: Annotated[Path, typer.Argument(metavar="FILE", help="a Python file that holds a law")]) -> None:
+def check_law(
+    law: Annotated[str, typer.Argument(metavar="FILE", help="a Python file that holds a law, or the name of one")],
+) -> None:
     """Run the conformance suite over a law of your own."""
     from starhold.cli.show import console
-    from starhold.conformance.suite import examine
-    from starhold.laws.catalogue import from_file
+    from starhold.conformance.suite import examine, find_law
 
-    if not path.is_file():
-        raise InputError(str(path), "", "no such file", "a Python file with CARD, Gains, torque and examples")
-    try:
-        law = from_file(path)
-    except Exception as error:
-        raise InputError(str(path), "", f"{type(error).__name__}: {error}", "a Python file that holds a law") from None
     failed = 0
-    for verdict in examine(law):
+    for verdict in examine(find_law(law)):
         failed += verdict.outcome == "failed"
         colour = {"passed": "green", "failed": "red", "does not apply": "dim"}[verdict.outcome]
         console.print(f"[{colour}]{verdict.outcome:>14}[/{colour}]  {verdict.name}", highlight=False)

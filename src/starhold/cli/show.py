@@ -118,15 +118,12 @@ def _cell(text: str, best: bool) -> str:
     return f"[bold green]{text}*[/bold green]" if best else text
 
 
-def print_design(design: Design) -> None:
+def print_design(design: Design, law: Law) -> None:
     """The inputs of a design, its gains, and what it can be judged by."""
     import numpy as np
 
-    from starhold.laws.catalogue import catalogue
-    from starhold.laws.station.interface import station_laws
     from starhold.report.flight import number_text
 
-    law = (catalogue() | station_laws())[design.law]
     console.print(f'[bold]{design.name}[/bold]: {law.card.title}, form "{design.form}"', highlight=False)
     for title, items, values in (
         ("from", law.fields(design.form), design.inputs),

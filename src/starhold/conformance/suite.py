@@ -5,85 +5,75 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Any, Literal, NamedTuple
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from starhold.algebra.quaternion import derivative, multiply, normalise, stretch, to_reference
 from starhold.algebra.structure import flatten, move
 from starhold.algebra.vector import ZERO
+from starhold.analysis.cost import call_costs
+from starhold.analysis.metrics import measure
+from starhold.analysis.trial import fly_claims
 from starhold.certification.certify import certify
 from starhold.conformance.bench import CRAFT, call, random_quaternions, random_seen, sample_loop
+from starhold.conformance.station import STATION_CHECKS
 from starhold.conformance.units import rescaled
+from starhold.conformance.verdicts import (
+    NonconformityError,
+    NotApplicableError,
+    Verdict,
+    declares_itself,
+    require,
+    run,
+)
 from starhold.errors import InputError
-from starhold.laws.catalogue import Law, adopted
-from starhold.laws.interface import Card, Seen, fields
+from starhold.laws.catalogue import Law, catalogue, from_file, read_module
+from starhold.laws.interface import Seen
+from starhold.laws.station.interface import StationLaw, station_laws
 from starhold.loop.kernels import fly_plainly
 from starhold.models.rigid_body import angular_acceleration
+from starhold.scenario.building import build
+from starhold.scenario.checking import nearest
 from starhold.scenario.reading import parse
 from starhold.scenario.writing import scenario_with
-from starhold.simulation.lane import fly
+from starhold.simulation.lane import fly, label
 from starhold.simulation.lanes import simulate_many
 
 STEPS = 40
+FEW = 16
+"""Flights that try a certificate."""
 ON_TARGET = Seen((1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.1)
 
 
-class NonconformityError(Exception):
-    """A law breaks the check; the text says how."""
-
-
-class NotApplicableError(Exception):
-    """The check says nothing about this law; the text says why."""
-
-
-class Verdict(NamedTuple):
-    """What a check found."""
-
-    name: str
-    outcome: Literal["passed", "failed", "does not apply"]
-    reason: str
-
-
 def examine(law: Law) -> Iterator[Verdict]:
-    """Run every check over a law, in order, going on after failures."""
-    for check in CHECKS:
-        name = (check.__doc__ or check.__name__).splitlines()[0].rstrip(".")
-        try:
-            check(law)
-        except NotApplicableError as reason:
-            yield Verdict(name, "does not apply", str(reason))
-        except Exception as reason:
-            kind = "" if isinstance(reason, (NonconformityError, InputError)) else f"{type(reason).__name__}: "
-            yield Verdict(name, "failed", kind + str(reason))
-        else:
-            yield Verdict(name, "passed", "")
+    """Run every check for laws of its kind over a law, in order, going on after failures."""
+    return run(STATION_CHECKS if isinstance(law, StationLaw) else CHECKS, law)
 
 
-def _require(condition: bool, reason: str) -> None:
-    if not condition:
-        raise NonconformityError(reason)
-
-
-def declares_itself(law: Law) -> None:
-    """The file declares a card, gains with units, and examples within their bounds."""
-    _require(isinstance(law.card, Card), "CARD is not a Card")
-    declared = fields(law.gains)
-    _require(bool(law.examples()), "examples() is empty")
-    for gains in law.examples():
-        _require(isinstance(gains, law.gains), f"the example {gains} is not a Gains")
-        for item, value in zip(declared, gains, strict=True):
-            shown = item.gain.choices[value] if item.gain.choices else value
-            _require(item.gain.check(shown) == value, f"the example's {item.name} = {value} changes when it is read")
-    if law.card.claims != "none":
-        _require(bool(law.card.assumptions), "a law that claims stability states its assumptions")
+def find_law(given: str) -> Law:
+    """The law that is installed under a name, or that a file holds, of either kind. InputError where there is none."""
+    installed: dict[str, Law] = {**catalogue(), **station_laws()}
+    path = Path(given)
+    if given in installed and not path.is_file():
+        return installed[given]
+    try:
+        station = hasattr(read_module(path), StationLaw.equation)
+        return from_file(path, station_laws(), StationLaw) if station else from_file(path, catalogue())
+    except FileNotFoundError:
+        allowed = f"a Python file that holds a law, or a law by name: {nearest(given, list(installed))}"
+        raise InputError(given, "", "no such file", allowed) from None
+    except (OSError, ValueError) as error:
+        found = error.strerror if isinstance(error, OSError) else ""
+        raise InputError(given, "", found or "", "a Python file that holds a law" if found else str(error)) from None
 
 
 def is_pure(law: Law) -> None:
     """The torque depends on nothing but its arguments."""
     for gains in law.examples():
         for seen in random_seen(10):
-            _require(call(law, seen, gains) == call(law, seen, gains), f"two calls differ at {seen}")
+            require(call(law, seen, gains) == call(law, seen, gains), f"two calls differ at {seen}")
 
 
 def reads_alike(law: Law) -> None:
@@ -95,8 +85,8 @@ def reads_alike(law: Law) -> None:
         for threads in (1, 2):
             batch = simulate_many(loop, starts, STEPS, threads=threads)
             same = all(batch.states[:, lane].tolist() == one for lane in (0, 2))
-            _require(same, f"a lane of a batch on {threads} threads differs from a single flight")
-        _require(flatten(fly_plainly(loop, STEPS).state) == one, "plain Python differs from the compiled kernel")
+            require(same, f"a lane of a batch on {threads} threads differs from a single flight")
+        require(flatten(fly_plainly(loop, STEPS).state) == one, "plain Python differs from the compiled kernel")
 
 
 def replace_rate(state: Any, factor: float) -> Any:
@@ -109,7 +99,7 @@ def rests_on_target(law: Law) -> None:
     for gains in law.examples():
         torque = call(law, ON_TARGET, gains)
         size = float(np.abs(torque).max())
-        _require(size <= law.card.rest_tolerance, f"torque {size:g} N m at rest on target")
+        require(size <= law.card.rest_tolerance, f"torque {size:g} N m at rest on target")
 
 
 def treats_double_cover_as_stated(law: Law) -> None:
@@ -120,9 +110,9 @@ def treats_double_cover_as_stated(law: Law) -> None:
             other = seen._replace(attitude=stretch(-1.0, seen.attitude))
             differences.append(float(np.abs(np.subtract(call(law, seen, gains), call(law, other, gains))).max()))
         if law.card.double_cover == "even":
-            _require(max(differences) < 1e-12, f"q and -q differ by {max(differences):g} N m, the card says they do not")
+            require(max(differences) < 1e-12, f"q and -q differ by {max(differences):g} N m, the card says they do not")
         else:
-            _require(max(differences) > 1e-12, "q and -q never differ, the card says they do")
+            require(max(differences) > 1e-12, "q and -q never differ, the card says they do")
 
 
 def ignores_inertial_frame(law: Law) -> None:
@@ -141,7 +131,7 @@ def ignores_inertial_frame(law: Law) -> None:
         other = replace(loop, start=turned, target=normalise(multiply(turn, goal)))
         rows = slice(13, 16)
         difference = np.abs(fly(loop, STEPS)[0][rows] - fly(other, STEPS)[0][rows]).max()
-        _require(difference <= 1e-9, f"the torque changes by {difference:g} N m")
+        require(difference <= 1e-9, f"the torque changes by {difference:g} N m")
 
 
 def stays_finite(law: Law) -> None:
@@ -151,20 +141,19 @@ def stays_finite(law: Law) -> None:
         for attitude in [(1.0, 0.0, 0.0, 0.0), (-1.0, 0.0, 0.0, 0.0), *halves]:
             for rate in (ZERO, (0.1, -0.2, 0.05)):
                 seen = ON_TARGET._replace(attitude=attitude, rate=rate, body_rate=rate)
-                _require(bool(np.isfinite(call(law, seen, gains)).all()), f"not finite at {attitude}, rate {rate}")
+                require(bool(np.isfinite(call(law, seen, gains)).all()), f"not finite at {attitude}, rate {rate}")
 
 
 def survives_toml(law: Law) -> None:
     """Gains written to a scenario file and read back are the same; unknown keys are refused."""
-    with adopted(law):
-        for gains in law.examples():
-            text = scenario_with(law, gains)
-            _require(parse(text, law.name).laws[0].gains == gains, "gains change on the way through TOML")
-            try:
-                parse(text + "no_such_key = 1\n", law.name)
-            except InputError:
-                continue
-            raise NonconformityError("an unknown key is accepted")
+    for gains in law.examples():
+        text = scenario_with(law, gains)
+        require(parse(text, law.name).laws[0].gains == gains, "gains change on the way through TOML")
+        try:
+            parse(text + "no_such_key = 1\n", law.name)
+        except InputError:
+            continue
+        raise NonconformityError("an unknown key is accepted")
 
 
 def keeps_units(law: Law) -> None:
@@ -177,7 +166,7 @@ def keeps_units(law: Law) -> None:
                 seen2, gains2, craft2, back = rescaled(law, seen, gains, CRAFT, factors)
                 other = np.array(call(law, seen2, gains2, craft2)) * back
                 error = float(np.abs(other - plain).max()) / size
-                _require(error < 1e-6, f"with kg, m, s scaled by {factors} the torque changes by {error:.1e} of itself")
+                require(error < 1e-6, f"with kg, m, s scaled by {factors} the torque changes by {error:.1e} of itself")
 
 
 def decreases_lyapunov(law: Law) -> None:
@@ -187,12 +176,12 @@ def decreases_lyapunov(law: Law) -> None:
     if law.card.claims == "none":
         raise NotApplicableError("the card claims nothing")
     for gains in law.examples():
-        _require(abs(law.lyapunov(ON_TARGET, gains, CRAFT)) < 1e-15, "V is not zero at rest on target")
+        require(abs(law.lyapunov(ON_TARGET, gains, CRAFT)) < 1e-15, "V is not zero at rest on target")
         for seen in random_seen(300, external=False):
             value = law.lyapunov(seen, gains, CRAFT)
-            _require(value > 0.0, f"V = {value:g} at {seen}")
+            require(value > 0.0, f"V = {value:g} at {seen}")
             slope = _slope(law, seen, gains)
-            _require(slope <= 1e-7 * value, f"dV/dt = {slope:g} at {seen}")
+            require(slope <= 1e-7 * value, f"dV/dt = {slope:g} at {seen}")
 
 
 def can_be_certified(law: Law) -> None:
@@ -201,11 +190,24 @@ def can_be_certified(law: Law) -> None:
         plain = sample_loop(law, gains)
         for loop in (plain, replace(plain, target="orbital"), replace(plain, limit="norm", cover="as_published")):
             certificate = certify(loop)
-            _require(certificate.outcome in ("proved", "refuted", "undecided"), f"outcome {certificate.outcome}")
+            require(certificate.outcome in ("proved", "refuted", "undecided"), f"outcome {certificate.outcome}")
             for claim in certificate.claims:
                 for obligation in claim.obligations:
                     told = obligation.outcome == "proved" or bool(obligation.evidence)
-                    _require(told, f"{claim.kind}: {obligation.name} is {obligation.outcome} without a reason")
+                    require(told, f"{claim.kind}: {obligation.name} is {obligation.outcome} without a reason")
+
+
+def flies_a_scenario(law: Law) -> None:
+    """It flies from a scenario file, is measured, timed and certified, and flights do not contradict what is proved."""
+    for gains in law.examples():
+        scenario = parse(scenario_with(law, gains), law.name)
+        loop = build(scenario, scenario.laws[0])
+        samples, carry = fly(loop, STEPS)
+        recording = label(loop, samples, carry, 1)
+        measured = measure(recording, 1e-3, 1e-3)
+        require(measured["diverged_at"] is None, f"the motion is lost after {measured['diverged_at']} s")
+        require(call_costs(loop, samples, calls=100)["cost_median"] >= 0.0, "a call cannot be timed")
+        fly_claims(loop, certify(loop, law.name), flights=FEW)
 
 
 def _slope(law: Law, seen: Seen, gains: Any) -> float:
@@ -235,4 +237,5 @@ CHECKS: tuple[Callable[[Law], None], ...] = (
     keeps_units,
     decreases_lyapunov,
     can_be_certified,
+    flies_a_scenario,
 )

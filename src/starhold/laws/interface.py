@@ -2,7 +2,7 @@
 
 A law file holds `CARD`, `class Gains(NamedTuple)`, the equation `torque(seen, gains, craft, memory) -> (torque, memory)`
 and `examples()`. It may add `lyapunov(seen, gains, craft)`, design forms (`FORMS` with `design(craft, spec)`,
-and `complete(spec, angle)` for inputs that the start of the run gives), `check(gains)` that refuses what cannot be stable,
+and `complete(spec, start)` for inputs that the scenario gives), `check(gains)` that refuses what cannot be stable,
 and `remember(gains, craft, period)` for a memory that is not empty.
 """
 
@@ -42,6 +42,25 @@ class Seen(NamedTuple):
 
 class NoMemory(NamedTuple):
     """The memory of a law that keeps nothing."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """What a scenario tells a design: turn from the target axes to the body axes and rate relative to the target (rad/s) at
+    the start; the torque (N m) and, of wheels, the angular momentum (N m s) that there is about every axis, infinite for no
+    limit; and the angle (rad) and rate (rad/s) at which the target counts as reached."""
+
+    attitude: Quaternion
+    rate: Vector
+    torque: float
+    momentum: float
+    attitude_tolerance: float
+    rate_tolerance: float
+
+    @property
+    def angle(self) -> float:
+        """The error angle (rad, 0..pi)."""
+        return 2.0 * float(np.arctan2(np.linalg.norm(self.attitude[1:]), abs(self.attitude[0])))
 
 
 Claim: TypeAlias = Literal["global", "almost-global", "local", "none"]

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Matrix, Vector, add, apply, cross, dot, scale, subtract, swing
-from starhold.laws.interface import Card, Gain, NoMemory, Seen
+from starhold.laws.interface import Card, Gain, NoMemory, Seen, Start
 from starhold.models.craft import Craft, tensor
 
 CARD = Card(
@@ -65,9 +65,9 @@ class Fit(NamedTuple):
 FORMS: dict[str, Any] = {"equal": Equal, "fit": Fit}
 
 
-def complete(spec: Equal | Fit, angle: Callable[[], float]) -> Equal | Fit:
+def complete(spec: Equal | Fit, start: Callable[[], Start]) -> Equal | Fit:
     """The inputs of a form with the error angle (rad) at the start of a run where they leave it out."""
-    return spec._replace(angle=angle()) if isinstance(spec, Fit) and spec.angle is None else spec
+    return spec._replace(angle=start().angle) if isinstance(spec, Fit) and spec.angle is None else spec
 
 
 def design(craft: Craft, spec: Equal | Fit) -> Gains:

@@ -9,7 +9,6 @@ from typing import Any, Literal, NamedTuple
 from starhold.algebra.scalar import both, is_finite, less, opposite, where
 from starhold.algebra.vector import ZERO, Vector, dot
 from starhold.algebra.words import number_of
-from starhold.laws.interface import NoMemory
 from starhold.laws.station.interface import SeenPoint, StationLaw
 from starhold.loop.closed_loop import LIMITS
 from starhold.loop.step import Step, runge_kutta
@@ -43,7 +42,7 @@ class StationCarry(NamedTuple):
     """What a trajectory carries from step to step; lost_at is the control step at which it was lost (-1: not lost)."""
 
     state: PointState
-    memory: NoMemory
+    memory: Any
     command: Vector
     lost_at: float
 
@@ -124,7 +123,8 @@ class StationLoop:
 
     def carry(self, start: PointState | None = None) -> StationCarry:
         """What a trajectory starts with."""
-        return StationCarry(self.start if start is None else start, NoMemory(), ZERO, -1.0)
+        memory = self.law.remember(self.gains, self.plant, self.period)
+        return StationCarry(self.start if start is None else start, memory, ZERO, -1.0)
 
     @property
     def craft(self) -> Libration:

@@ -203,6 +203,14 @@ def authority(wheels: Wheels) -> float:
     return min(used)
 
 
+def capacity(wheels: Wheels, momentum: Sequence[float]) -> float:
+    """The angular momentum (N m s) that wheels with these axial momenta (N m s) can take up about every axis, shared out by
+    least squares, before a motor fades; 0 where a wheel is there already."""
+    columns = zip(wheels.least, wheels.momentum_limit, momentum, strict=True)
+    rooms = [((1.0 - BAND) * limit - abs(held), math.sqrt(sum(x * x for x in row))) for row, limit, held in columns]
+    return max(0.0, min(room / share for room, share in rooms if share > 0.0))
+
+
 def relaxation(wheels: Wheels) -> float:
     """The fastest rate (1/s) at which friction brings a rotor to rest, that of Coulomb friction within CREEP included."""
     columns = zip(wheels.viscous, wheels.coulomb, wheels.inertia, strict=True)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.models.actuator import Dynamics
 from starhold.models.sensor import Noise
-from starhold.scenario.checking import check_substeps
+from starhold.scenario.checking import check_substeps, try_law
 from starhold.scenario.faults import make_events
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.scenario.start import start_of, target_of
@@ -40,8 +39,5 @@ def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
         events=make_events(scenario, entry) if table.fault else (),
     )
     check_substeps(loop, scenario.where)
-    try:
-        loop.carry()
-    except ValueError as error:
-        raise InputError(scenario.where, f"law {entry.name}", "", str(error)) from None
+    try_law(loop, scenario.where, f"law {entry.name}")
     return loop

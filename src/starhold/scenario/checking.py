@@ -5,13 +5,18 @@ from __future__ import annotations
 import difflib
 import math
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Generator, Iterable, Mapping
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, Generic, TypeVar, cast
 
 from pydantic import BaseModel, ValidationError
+from pydantic_core import PydanticCustomError
 
 from starhold.errors import InputError
-from starhold.laws.catalogue import Law
+from starhold.laws.catalogue import Law, from_file, told
+from starhold.loop.kernels import form, make_step
+from starhold.scenario.tables import check_name
 
 _Model = TypeVar("_Model", bound=BaseModel)
 _Law = TypeVar("_Law", bound=Law)
@@ -86,15 +91,16 @@ def numbered(laws: Any, where: str) -> list[tuple[str, Any]]:
     return [(f"law[{number}]", item) for number, item in enumerate(cast(list[Any], laws), 1)]
 
 
-def pick_law(data: Any, known: Mapping[str, _Law], where: str, key: str) -> tuple[dict[str, Any], _Law, str | None]:
-    """A law table, the law of its type, and its form."""
+def pick_law(
+    data: Any, known: Mapping[str, _Law], kind: type[_Law], folder: Path, where: str, key: str
+) -> tuple[dict[str, Any], _Law, str | None]:
+    """A law table with its type, the law of that type or in the `file` of the table, which is relative to a folder, and its
+    form."""
     if not isinstance(data, dict):
         raise InputError(where, key, show(data), "a [[law]] table")
     table = cast(dict[str, Any], data)
-    kind = table.get("type")
-    if not isinstance(kind, str) or kind not in known:
-        raise InputError(where, f"{key}.type", show(kind), nearest(str(kind), list(known)))
-    law = known[kind]
+    law = _law_of(table, known, where, key) if "file" not in table else _law_in(table, known, kind, folder, where, key)
+    table = {name: value for name, value in table.items() if name != "file"} | {"type": law.name}
     form = table.get("form")
     if form is not None and (not isinstance(form, str) or form not in law.forms):
         allowed = nearest(str(form), list(law.forms)) if law.forms else f"no form; {law.name} takes its gains"
@@ -102,12 +108,69 @@ def pick_law(data: Any, known: Mapping[str, _Law], where: str, key: str) -> tupl
     return table, law, form
 
 
+def _law_of(table: dict[str, Any], known: Mapping[str, _Law], where: str, key: str) -> _Law:
+    name = table.get("type")
+    if not isinstance(name, str) or name not in known:
+        allowed = nearest(str(name), list(known)) if isinstance(name, str) else f"{nearest('', list(known))}; or a file"
+        raise InputError(where, f"{key}.type", show(name) if name is not None else "nothing", allowed)
+    return known[name]
+
+
+def _law_in(table: dict[str, Any], known: Mapping[str, _Law], kind: type[_Law], folder: Path, where: str, key: str) -> _Law:
+    given, key = table["file"], f"{key}.file"
+    if not isinstance(given, str):
+        raise InputError(where, key, show(given), 'the name of a Python file, such as "mine.py"')
+    if "type" in table:
+        raise InputError(where, key, show(given), "either a type or a file, not both")
+    try:
+        law = from_file(folder / given, known, kind)
+    except OSError as error:
+        raise InputError(where, key, f"{show(given)}: {error.strerror}", "a Python file that holds a law") from None
+    except ValueError as error:
+        raise InputError(where, key, "", f"{show(given)}: {error}") from None
+    try:
+        check_name(law.name)
+    except PydanticCustomError as error:
+        raise InputError(where, key, show(given), f"a file named with {error.message()}") from None
+    return law
+
+
 def make_gains(law: Law, values: list[Any], spec: Any, craft: Any, where: str, key: str) -> Any:
     """The gains themselves, or those that a design gives from its inputs `spec`."""
-    try:
+    with refusing(law, where, key):
         return law.gains(*values) if spec is None else law.design(craft, spec)
-    except ValueError as error:
+
+
+@contextmanager
+def refusing(law: Law, where: str, key: str) -> Generator[None]:
+    """Make an InputError of what a law refuses by a ValueError, and of a law from a file whatever goes wrong in it."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        if law.file is not None and type(error) is not ValueError:
+            raise InputError(where, key, "", told(error, law.file)) from None
+        if not isinstance(error, ValueError):
+            raise
         raise InputError(where, key, "", str(error)) from None
+
+
+def try_law(loop: Any, where: str, key: str) -> None:
+    """InputError where the loop's law fails, told with the line of its file: it is called once, in plain Python, which goes
+    through all of it."""
+    law = loop.law
+    with refusing(law, where, key):
+        carry, setup = loop.carry(), loop.setup()
+        if law.file is None:
+            return
+        seen = make_step(loop.parts()).look(carry, 0, (0, 0), loop.craft, setup)
+        given = getattr(law.module, law.equation)(seen, loop.gains, loop.craft, carry.memory)
+        pair = given if isinstance(given, tuple) and len(cast(Any, given)) == 2 else (None, None)
+        if not isinstance(pair[0], tuple) or len(cast(Any, pair[0])) != 3:
+            raise ValueError(f"{law.file.name}: {law.equation} must return three numbers and the memory, not {show(given)}")
+        if form(pair[1]) != form(carry.memory):
+            raise ValueError(f"{law.file.name}: the memory that {law.equation} returns must be formed as it was given")
 
 
 def free_name(given: str | None, kind: str, taken: set[str], where: str, key: str) -> str:

@@ -22,13 +22,14 @@ from starhold.scenario.checking import (
     numbered,
     pick_law,
     read_toml,
+    refusing,
     show,
     validate,
 )
 from starhold.scenario.checking import nearest as nearest
 from starhold.scenario.rotors import make_rotors
 from starhold.scenario.schema import ScenarioTable, law_model
-from starhold.scenario.start import angle_at_start
+from starhold.scenario.start import told_to_design
 
 MARK = "libration"
 """The table by which a scenario of station keeping is known."""
@@ -146,10 +147,11 @@ def parse(text: str, where: str, folder: Path = Path(), allow_unstable: bool = F
 
 def _read_law(data: Any, scenario: Scenario, key: str, taken: set[str], allow_unstable: bool) -> LawEntry:
     where = scenario.where
-    table, law, form = pick_law(data, catalogue(), where, key)
-    read = validate(law_model(law, form), table, where, key, extra=["form"] if law.forms else [])
+    table, law, form = pick_law(data, catalogue(), Law, scenario.folder, where, key)
+    read = validate(law_model(law, form), table, where, key, extra=["file", *(["form"] if law.forms else [])])
     values = [getattr(read, item.name) for item in law.fields(form)]
-    spec = None if form is None else law.complete(law.forms[form](*values), lambda: angle_at_start(scenario))
+    with refusing(law, where, key):
+        spec = None if form is None else law.complete(law.forms[form](*values), lambda: told_to_design(scenario))
     gains = make_gains(law, values, spec, scenario.craft, where, key)
     try:
         if not allow_unstable:

@@ -318,6 +318,12 @@ def file_schema(whole: type[Table], laws: Iterable[Law], base: type[Any]) -> dic
         # TOML tables name their type, though pydantic has a default for it.
         table["required"] = sorted({"type", *table.get("required", [])} | ({"form"} & set(table["properties"])))
         tables.append(table)
+    shared = base.model_json_schema()
+    shared["properties"].pop("type")
+    file = {"type": "string", "description": "a Python file that holds a law, relative to this one; it is run"}
+    tables.append({"title": "LawFromFile", "type": "object", "properties": {"file": file, **shared["properties"]}})
+    tables[-1] |= {"required": ["file"], "not": {"required": ["type"]}}
+    schema.setdefault("$defs", {}).update(shared.get("$defs", {}))
     schema["properties"]["law"] = {"type": "array", "minItems": 1, "items": {"anyOf": tables}}
     schema["required"].append("law")
     return schema

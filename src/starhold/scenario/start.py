@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from starhold.algebra.cosines import from_angles
 from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise, relative, stretch, to_body
-from starhold.algebra.vector import ZERO, add
-from starhold.analysis.metrics import error_angle
+from starhold.algebra.vector import ZERO, add, subtract
 from starhold.errors import InputError
+from starhold.laws.interface import Start
 from starhold.models.rigid_body import State
 from starhold.models.target import Target, inertial, orbital, tabulate
 from starhold.models.wheeled_body import WheeledState
+from starhold.models.wheels import authority, capacity
 from starhold.scenario.history import read_history
 from starhold.scenario.rotors import start_momenta
 from starhold.scenario.schema import Pointing
@@ -78,9 +80,16 @@ def _target_at_start(goal: Any, position: Any, velocity: Any) -> Target:
     return inertial(goal, position, velocity, 0, None)
 
 
-def angle_at_start(scenario: Scenario) -> float:
-    """The error angle (rad) at the start of a run."""
-    goal = target_of(scenario)
-    start = start_of(scenario, goal)
-    held = _target_at_start(goal, start.position, start.velocity)
-    return float(error_angle(relative(held.attitude, start.attitude)))
+def told_to_design(scenario: Scenario) -> Start:
+    """What the designs of a scenario's laws may reckon with."""
+    table, goal = scenario.table, target_of(scenario)
+    begun = start_of(scenario, goal)
+    held = _target_at_start(goal, begun.position, begun.velocity)
+    error = relative(held.attitude, begun.attitude)
+    rate = subtract(begun.rate, to_body(error, held.rate))
+    body, momentum = table.spacecraft, math.inf
+    torque = math.inf if body.limit == "none" else body.torque_limit
+    if scenario.wheels is not None and isinstance(begun, WheeledState):
+        torque = min(torque, authority(scenario.wheels))
+        momentum = capacity(scenario.wheels, begun.momentum)
+    return Start(error, rate, torque, momentum, table.settling.attitude_tolerance, table.settling.rate_tolerance)

@@ -32,7 +32,8 @@ LONGEST_NAME = 100
 _RESULTS = (".json", ".html", ".nc", ".png", ".csv")
 
 
-def _check_name(name: str) -> str:
+def check_name(name: str) -> str:
+    """The name; an error where it could lead elsewhere, or be markup or a file of results."""
     sound = bool(name) and all(c.isalnum() or c in "-_. " for c in name) and name == name.strip(" .")
     if not sound or len(name) > LONGEST_NAME or name.lower().endswith(_RESULTS):
         allowed = "letters, digits and, between them, '-', '_', '.' and spaces"
@@ -40,5 +41,5 @@ def _check_name(name: str) -> str:
     return name
 
 
-Name: TypeAlias = Annotated[str, AfterValidator(_check_name)]
+Name: TypeAlias = Annotated[str, AfterValidator(check_name)]
 """What a scenario or a law is called: it names folders, and stands in tables and pages."""

@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from starhold.algebra.scalar import Scalar, less, maximum, sqrt, where
 from starhold.algebra.vector import Vector, dot, scale, subtract
 from starhold.laws import catalogue as laws
-from starhold.laws.interface import NoMemory
 from starhold.models.libration import Libration, linear, nonlinear
 from starhold.models.station import best_rate
 
@@ -34,7 +33,9 @@ class SeenPoint(NamedTuple):
 
 @dataclass(frozen=True)
 class StationLaw(laws.Law):
-    """A law file of this package as an object."""
+    """A law file for a libration point as an object."""
+
+    equation: ClassVar[str] = "control"
 
     @property
     def torque(self) -> Callable[..., Any]:
@@ -46,17 +47,12 @@ class StationLaw(laws.Law):
         """The equation of the control acceleration."""
         return self.module.control
 
-    def remember(self, gains: Any, craft: Any, period: float) -> NoMemory:
-        """Nothing."""
-        return NoMemory()
-
 
 @cache
 def station_laws() -> dict[str, StationLaw]:
-    """All station-keeping laws by name."""
-    return {
-        law.name: law for law in laws.found_in("starhold.laws.station", StationLaw, ("CARD", "Gains", "control", "examples"))
-    }
+    """All station-keeping laws that are installed, by name: modules of this package with a `CARD`, and those that the entry
+    points `starhold.laws` of other packages name and that have a `control`."""
+    return laws.installed("starhold.laws.station", StationLaw)
 
 
 def least_rate(plant: Libration) -> float:

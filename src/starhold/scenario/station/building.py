@@ -8,11 +8,10 @@ from starhold.algebra.scalar import is_finite
 from starhold.algebra.vector import ZERO, add, dot, norm
 from starhold.analysis.station import goal_of
 from starhold.errors import InputError
-from starhold.laws.interface import NoMemory
 from starhold.laws.station.interface import SeenPoint
 from starhold.loop.station import StationLoop
 from starhold.models.libration import PointState
-from starhold.scenario.checking import check_substeps
+from starhold.scenario.checking import check_substeps, try_law
 from starhold.scenario.station.reading import StationEntry, StationScenario
 
 NEAR = 0.4
@@ -37,13 +36,14 @@ def build(scenario: StationScenario, entry: StationEntry) -> StationLoop:
         far=table.simulation.lost_beyond or NEAR * nearer,
     )
     check_substeps(loop, scenario.where)
+    try_law(loop, scenario.where, f"law {entry.name}")
     away = norm(loop.start.position)
     if away >= loop.far:
         raise InputError(
             scenario.where, "initial.position", f"a start {away:.6g} away", f"less than lost_beyond, {loop.far:.6g}"
         )
     seen = SeenPoint(loop.start.position, loop.start.velocity, loop.period, loop.limit)
-    command, _ = entry.law.control(seen, entry.gains, plant, NoMemory())
+    command, _ = entry.law.control(seen, entry.gains, plant, loop.carry().memory)
     if not is_finite(dot(command, command)):
         allowed = "a limit, margin or deficit: this law takes as much control as there is"
         raise InputError(scenario.where, f"law {entry.name}", "no limit of the control", allowed)

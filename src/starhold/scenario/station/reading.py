@@ -65,14 +65,14 @@ def parse_station(text: str, where: str, folder: Path = Path()) -> StationScenar
     table = validate(StationTable, data, where, "", extra=["law"], context=point.units)
     entries: list[StationEntry] = []
     for key, item in numbered(laws, where):
-        entries.append(_read_law(item, table, where, key, {entry.name for entry in entries}))
+        entries.append(_read_law(item, table, where, folder, key, {entry.name for entry in entries}))
     return StationScenario(table, tuple(entries), text, where, folder)
 
 
-def _read_law(data: Any, table: StationTable, where: str, key: str, taken: set[str]) -> StationEntry:
-    found, law, form = pick_law(data, station_laws(), where, key)
+def _read_law(data: Any, table: StationTable, where: str, folder: Path, key: str, taken: set[str]) -> StationEntry:
+    found, law, form = pick_law(data, station_laws(), StationLaw, folder, where, key)
     units, plant = table.libration.units, table.libration.plant
-    extra = ["form"] if law.forms else []
+    extra = ["file", *(["form"] if law.forms else [])]
     read = validate(law_model(law, form, StationLawTable), found, where, key, extra, units)
     values = [getattr(read, item.name) for item in law.fields(form)]
     spec = None if form is None else law.forms[form](*values)

@@ -1,0 +1,98 @@
+"""The checks for laws that hold a place near a libration point."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from starhold.algebra.structure import flatten
+from starhold.algebra.vector import ZERO
+from starhold.analysis.station import goal_of, measure_station
+from starhold.certification.station import certify_station
+from starhold.conformance.verdicts import NonconformityError, declares_itself, require
+from starhold.errors import InputError
+from starhold.laws.station.interface import SeenPoint, StationLaw
+from starhold.loop.kernels import fly_plainly
+from starhold.loop.station import StationLoop
+from starhold.models.libration import PRIMARIES, PointState
+from starhold.scenario.station.building import build
+from starhold.scenario.station.reading import parse_station
+from starhold.scenario.writing import station_scenario_with
+from starhold.simulation.lane import fly
+from starhold.simulation.lanes import simulate_many
+from starhold.simulation.station import simulate_station
+
+STEPS = 40
+LIMIT = 4.0
+PLANT = PRIMARIES["sun-earth"].point("L2")
+
+
+def _loop(law: StationLaw, gains: Any) -> StationLoop:
+    start = PointState((0.01, 0.9, 0.1), (0.1, 0.0, 1.3), ZERO)
+    return StationLoop(PLANT, law, gains, start, 1e-3, model="nonlinear", limit=LIMIT, lag=0.0086)
+
+
+def _states(count: int) -> Any:
+    random = np.random.default_rng(1)
+    for _ in range(count):
+        x, v = random.normal(size=(2, 3)) * 10.0 ** random.uniform(-9.0, 1.0)
+        yield SeenPoint(tuple(x.tolist()), tuple(v.tolist()), 1e-3, LIMIT)
+
+
+def _call(law: Any, seen: SeenPoint, gains: Any) -> Any:
+    return law.control(seen, gains, PLANT, law.remember(gains, PLANT, seen.period))[0]
+
+
+def is_pure(law: StationLaw) -> None:
+    """The control depends on nothing but its arguments."""
+    for gains in law.examples():
+        for seen in _states(10):
+            require(_call(law, seen, gains) == _call(law, seen, gains), f"two calls differ at {seen}")
+
+
+def stays_finite(law: StationLaw) -> None:
+    """Finite control near the point and far away."""
+    rest = SeenPoint(ZERO, ZERO, 1e-3, LIMIT)
+    for gains in law.examples():
+        for seen in (rest, *_states(200)):
+            require(bool(np.isfinite(_call(law, seen, gains)).all()), f"not finite at {seen}")
+
+
+def reads_alike(law: StationLaw) -> None:
+    """Plain Python, one lane and every lane of a batch agree bit for bit."""
+    for gains in law.examples():
+        loop = _loop(law, gains)
+        one = flatten(fly(loop, STEPS)[1].state)
+        for threads in (1, 2):
+            batch = simulate_many(loop, [loop.start] * 3, STEPS, threads=threads)
+            same = all(batch.states[:, lane].tolist() == one for lane in range(3))
+            require(same, f"a lane of a batch on {threads} threads differs from a single flight")
+        require(flatten(fly_plainly(loop, STEPS).state) == one, "plain Python differs from the compiled kernel")
+
+
+def survives_toml(law: StationLaw) -> None:
+    """Gains written to a scenario file and read back are the same; unknown keys are refused."""
+    for gains in law.examples():
+        text = station_scenario_with(law, gains)
+        require(parse_station(text, law.name).laws[0].gains == gains, "gains change on the way through TOML")
+        try:
+            parse_station(text + "no_such_key = 1\n", law.name)
+        except InputError:
+            continue
+        raise NonconformityError("an unknown key is accepted")
+
+
+def flies_a_scenario(law: StationLaw) -> None:
+    """It flies from a scenario file, is measured and certified, or the certificate says what cannot be read."""
+    for gains in law.examples():
+        scenario = parse_station(station_scenario_with(law, gains), law.name)
+        loop = build(scenario, scenario.laws[0])
+        measure_station(simulate_station(loop, STEPS), scenario.units, goal_of(gains), scenario.table.settling.tolerance)
+        for claim in certify_station(loop, law.name).claims:
+            for obligation in claim.obligations:
+                told = obligation.outcome == "proved" or bool(obligation.evidence)
+                require(told, f"{claim.kind}: {obligation.name} is {obligation.outcome} without a reason")
+
+
+STATION_CHECKS = (declares_itself, is_pure, stays_finite, reads_alike, survives_toml, flies_a_scenario)

@@ -1,0 +1,251 @@
+"""Laws from files and from other packages: scenarios fly them, proofs read them, and what is wrong with one is one line."""
+
+import json
+import subprocess
+import sys
+from importlib.metadata import EntryPoint
+
+import numpy as np
+import pytest
+
+import starhold as sh
+from starhold.certification.checker import check_file, passed
+from starhold.conformance.suite import examine, find_law
+from starhold.laws import catalogue as catalogues
+from starhold.laws.catalogue import adopted, catalogue, from_file
+from starhold.laws.station.interface import StationLaw, station_laws
+
+LAW = '''"""Feedback."""
+
+from typing import Annotated, NamedTuple
+
+from starhold.algebra.quaternion import vector_part
+from starhold.algebra.scalar import Scalar
+from starhold.algebra.vector import add, apply, dot, scale
+from starhold.laws.interface import Card, Gain
+
+CARD = Card(title="Mine", summary="u = -k w - p q", sources=("mine",), assumptions=("rigid body",), claims="almost-global")
+
+
+class Gains(NamedTuple):
+    k: Annotated[float, Gain("N m s", above=0.0, text="damping")]
+    p: Annotated[float, Gain("N m", above=0.0, text="stiffness")] = 0.009
+
+
+def torque(seen, gains, craft, memory):
+    return scale(-1.0, add(scale(gains.k, seen.rate), scale(gains.p, vector_part(seen.attitude)))), memory
+
+
+def lyapunov(seen, gains, craft):
+    return 0.5 * dot(seen.rate, apply(craft.inertia, seen.rate)) + 2.0 * gains.p * (1.0 - seen.attitude[0])
+
+
+def examples():
+    return [Gains(0.09)]
+'''
+STATION = '''"""Feedback to the point."""
+
+from typing import Annotated, NamedTuple
+
+from starhold.algebra.scalar import clip
+from starhold.laws.interface import Card, Gain
+
+CARD = Card(title="Point", summary="u = -k x - d v - i", sources=("mine",), assumptions=("near",), claims="none")
+
+
+class Gains(NamedTuple):
+    k: Annotated[float, Gain(above=0.0, text="on the position")]
+    d: Annotated[float, Gain(above=0.0, text="on the velocity")]
+
+
+class Memory(NamedTuple):
+    sum: float
+
+
+def remember(gains, plant, period):
+    return Memory(0.0)
+
+
+def control(seen, gains, plant, memory):
+    whole = clip(memory.sum + seen.period * seen.position[1], 1.0)
+    held = tuple(-gains.k * x - gains.d * v for x, v in zip(seen.position, seen.velocity))
+    return (held[0], held[1] - whole, held[2]), Memory(whole)
+
+
+def examples():
+    return [Gains(30.0, 9.0)]
+'''
+BODY = """
+name = "own"
+[spacecraft]
+inertia = [2.0, 3.0, 4.0]
+torque_limit = 0.05
+[initial]
+angles = ["40 deg", 0, 0]
+[simulation]
+duration = 60.0
+control_period = 0.1
+"""
+POINT = 'name = "own"\n[libration]\n[initial]\nposition = [0.0, 0.5, 0.1]\n[simulation]\nduration = 1.0\n'
+OWN = '[[law]]\nfile = "laws/my_law.py"\nk = 0.09\n'
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "laws").mkdir()
+    (tmp_path / "laws" / "my_law.py").write_text(LAW)
+    (tmp_path / "laws" / "point.py").write_text(STATION)
+    (tmp_path / "own.toml").write_text(BODY + OWN + '[[law]]\ntype = "pd"\nk_rate = 0.09\nk_attitude = 0.009\n')
+    return tmp_path
+
+
+def test_a_law_beside_the_scenario_flies_as_the_same_law_of_starhold_does(folder):
+    scenario = sh.load(folder / "own.toml")
+    assert [entry.name for entry in scenario.laws] == ["my-law", "pd"]
+    mine, pd = (sh.simulate(scenario, law) for law in ("my-law", "pd"))
+    np.testing.assert_allclose(mine.attitude_error, pd.attitude_error, rtol=0.0, atol=1e-12)
+    flights = sh.compare(scenario)
+    assert [flight.law for flight in flights] == ["my-law", "pd"]
+    outcomes = [{claim.kind: claim.outcome for claim in flight.certificates[0].claims} for flight in flights]
+    assert outcomes[0] == outcomes[1]
+    assert outcomes[0]["convergence"] == "proved"
+
+
+def test_it_is_read_again_where_its_text_has_changed_and_only_then(folder):
+    first = sh.load(folder / "own.toml").laws[0].law
+    assert sh.load(folder / "own.toml").laws[0].law is not None
+    assert sh.load(folder / "own.toml").laws[0].law == first
+    (folder / "laws" / "my_law.py").write_text(LAW.replace("= 0.009", "= 0.018"))
+    assert sh.load(folder / "own.toml").laws[0].gains.p == 0.018
+    assert first.gains._field_defaults["p"] == 0.009
+
+
+def test_command_line_compares_it_and_checks_its_certificate(folder):
+    def starhold(*words):
+        return subprocess.run([sys.executable, "-m", "starhold", *words], cwd=folder, capture_output=True, text=True)
+
+    flown = starhold("compare", "own.toml", "-o", "out")
+    assert flown.returncode == 0, flown.stderr
+    told = json.loads((folder / "out" / "certificate.json").read_text())["certificates"]
+    assert [one["subject"]["law"] for one in told] == ["my-law", "pd"]
+    # The law is not run because a certificate names it.
+    bare = starhold("check", "out/certificate.json")
+    assert bare.returncode == 1
+    assert "there is no law my-law" in bare.stdout
+    checked = starhold("check", "out/certificate.json", "--law-file", "laws/my_law.py")
+    assert checked.returncode == 0, checked.stdout
+    good = starhold("check-law", "laws/my_law.py")
+    assert good.returncode == 0, good.stdout
+
+
+def test_its_certificate_fails_for_another_text_of_the_law(folder, tmp_path):
+    from starhold.certification.certificate import write
+
+    write(sh.certify(folder / "own.toml", "my-law"), "own", tmp_path / "c.json")
+    path = folder / "laws" / "my_law.py"
+    with adopted(from_file(path)):
+        assert passed(check_file(tmp_path / "c.json"))
+    path.write_text(LAW.replace("scale(-1.0,", "scale(-0.5,"))
+    with adopted(from_file(path)):
+        assert not passed(check_file(tmp_path / "c.json"))
+    assert "my-law" not in catalogue()
+
+
+def test_a_station_law_from_a_file_with_a_memory(folder):
+    (folder / "own.toml").write_text(POINT + '[[law]]\nfile = "laws/point.py"\nk = 30.0\nd = 9.0\n')
+    (flight,) = sh.compare(folder / "own.toml")
+    assert flight.law == "point"
+    assert float(np.abs(flight.run.position[-1]).max()) < 0.1
+    law = find_law(str(folder / "laws" / "point.py"))
+    assert isinstance(law, StationLaw)
+    verdicts = list(examine(law))
+    assert [v for v in verdicts if v.outcome == "failed"] == []
+    assert len(verdicts) == 6
+
+
+@pytest.mark.parametrize("name", sorted(station_laws()))
+def test_station_laws_of_starhold_conform(name):
+    assert [v for v in examine(station_laws()[name]) if v.outcome == "failed"] == []
+
+
+WRONG = {
+    "missing": ('file = "nope.py"', 'law[1].file: found "nope.py": No such file or directory; allowed: a Python file'),
+    "both": ('file = "my_law.py"\ntype = "pd"', "either a type or a file, not both"),
+    "a number": ("file = 3", "law[1].file: found 3; allowed: the name of a Python file"),
+    "unknown gain": ('file = "my_law.py"\nk = 1\nq = 2', "law[1].q: found an unknown key; allowed: one of"),
+    "bad gain": ('file = "my_law.py"\nk = -1', "law[1].k: found -1; allowed: above 0"),
+    "form": ('file = "my_law.py"\nform = "I"', "no form; my-law takes its gains"),
+    "nothing": ("k = 1", "law[1].type: found nothing; allowed: one of"),
+}
+
+
+@pytest.mark.parametrize("kind", WRONG)
+def test_what_is_wrong_with_a_law_table_is_one_line(kind, folder):
+    table, said = WRONG[kind]
+    path = folder / "laws" / "wrong.toml"
+    path.write_text(BODY + f"[[law]]\n{table}\n")
+    with pytest.raises(sh.InputError) as caught:
+        sh.load(path)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+BROKEN = {
+    "syntax": ("def torque(seen,", "def torque(seen", "my_law.py, line"),
+    "name": ("CARD = Card(", "CARD = Cards(", "my_law.py, line 10: NameError"),
+    "part missing": ("def torque", "def torques", "a law needs torque"),
+    "no unit": ('Annotated[float, Gain("N m s", above=0.0, text="damping")]', "float", "k declares no unit"),
+    "attribute": ("gains.k, seen.rate", "gains.k, seen.rates", "law my-law: my_law.py, line 19: AttributeError"),
+    "shape": (", memory\n", "\n", "torque must return three numbers and the memory"),
+    "memory": (", memory\n", ", (1.0,)\n", "the memory that torque returns must be formed as it was given"),
+    "exit": ("CARD = Card(", "raise SystemExit(3)\nCARD = Card(", "SystemExit"),
+    "not a card": ("CARD = Card(", "CARD = dict(", "CARD is not a Card"),
+}
+
+
+@pytest.mark.parametrize("kind", BROKEN)
+def test_what_is_wrong_in_a_law_file_is_one_line(kind, folder):
+    old, new, said = BROKEN[kind]
+    assert old in LAW
+    (folder / "laws" / "my_law.py").write_text(LAW.replace(old, new))
+    with pytest.raises(sh.InputError) as caught:
+        sh.simulate(folder / "own.toml")
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_with_the_name_of_another_law_is_refused_and_the_law_s_own_is_it(folder):
+    own = catalogue()["pd"].module.__file__
+    (folder / "laws" / "pd.py").write_text(LAW)
+    with pytest.raises(sh.InputError, match="a law named pd is installed already; rename the file"):
+        find_law(str(folder / "laws" / "pd.py"))
+    assert find_law(own) is find_law("pd") is catalogue()["pd"]
+    (folder / "own.toml").write_text(BODY + f"[[law]]\nfile = {json.dumps(own)}\nk_rate = 0.09\nk_attitude = 0.009\n")
+    assert sh.load(folder / "own.toml").laws[0].law is catalogue()["pd"]
+
+
+def test_laws_of_other_packages_of_both_kinds_are_found(folder, monkeypatch, recwarn):
+    monkeypatch.syspath_prepend(str(folder / "laws"))
+    points = [EntryPoint("a", "my_law", "starhold.laws"), EntryPoint("b", "point", "starhold.laws")]
+    monkeypatch.setattr(catalogues, "entry_points", lambda group: points)
+    turning, holding = catalogue.__wrapped__(), station_laws.__wrapped__()
+    assert set(turning) - set(catalogue()) == {"my-law"}
+    assert set(holding) - set(station_laws()) == {"point"}
+    assert not recwarn.list
+    monkeypatch.setattr("starhold.scenario.station.reading.station_laws", lambda: holding)
+    monkeypatch.setattr("starhold.scenario.reading.catalogue", lambda: turning)
+    monkeypatch.setattr("starhold.conformance.suite.catalogue", lambda: turning)
+    (folder / "own.toml").write_text(POINT + '[[law]]\ntype = "point"\nk = 30.0\nd = 9.0\n')
+    assert sh.simulate(folder / "own.toml").attrs["law"] == "point"
+    # A law that is installed is taken by its name and by its file.
+    assert find_law("my-law") is find_law(str(folder / "laws" / "my_law.py")) is turning["my-law"]
+    assert [v for v in examine(find_law("my-law")) if v.outcome == "failed"] == []
+
+
+def test_one_that_takes_the_name_of_another_is_left_out(monkeypatch, folder):
+    (folder / "laws" / "sliding.py").write_text(LAW)
+    monkeypatch.syspath_prepend(str(folder / "laws"))
+    monkeypatch.setattr(catalogues, "entry_points", lambda group: [EntryPoint("a", "sliding", "starhold.laws")])
+    with pytest.warns(UserWarning, match="the law sliding is left out: ValueError: a law named sliding exists already"):
+        found = catalogue.__wrapped__()
+    assert found["sliding"].module is catalogue()["sliding"].module
