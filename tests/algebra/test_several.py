@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 
 import pytest
-import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from starhold.algebra.several import choose, each, weighted
+from starhold.algebra.several import each, weighted
 from starhold.algebra.vector import add, dot, scale
 from starhold.trace.calling import Compiled
 from tests.algebra.readers import agree, numbers, same
@@ -75,29 +74,11 @@ def test_weighted_sums(count):
     check()
 
 
-@pytest.mark.parametrize("count", LENGTHS)
-def test_choose_takes_the_option_of_the_largest_score(count):
-    @settings(max_examples=30)
-    @given(row(count), vectors(count))
-    def check(scores, options):
-        assert same(choose, scores, options) == options[scores.index(max(scores))]
-
-    check()
-
-
-def test_choose_reads_symbols():
-    x, y = sympy.symbols("x y", real=True)
-    larger = choose((x, y), ((x,), (y,)))[0]
-    assert larger.subs({x: 2, y: 3}) == 3
-    assert larger.subs({x: 3, y: 2}) == 3
-
-
 @pytest.mark.parametrize(
     ("function", "arguments"),
     [
         (affine, ((1.0, 2.0), ((1.0, 2.0, 3.0),), 1.0, (0.0, 0.0, 0.0))),
         (weighted, ((1.0, 2.0), ((1.0, 2.0, 3.0),))),
-        (choose, ((1.0, 2.0), ((1.0,),))),
     ],
 )
 def test_tuples_of_different_lengths_are_refused(function, arguments):

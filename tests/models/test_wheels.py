@@ -18,12 +18,14 @@ from starhold.algebra.structure import flatten, leaves, move, unflatten
 from starhold.algebra.structured import Buffer, repeat
 from starhold.algebra.vector import add, apply, dot, inverse, scale, subtract, swing
 from starhold.models.craft import matrix
+from starhold.models.envelope import with_facets
 from starhold.models.wheel_units import WHEEL_UNITS
 from starhold.models.wheels import (
     BAND,
     CREEP,
     allocate,
     allocate_peak,
+    available,
     body_inertia,
     lose,
     make_wheels,
@@ -60,7 +62,7 @@ LAYOUTS = {
 
 
 def simple(axes, **more):
-    return make_wheels(axes, **{"inertia": 0.01, "torque_limit": 0.1, "momentum_limit": 5.0} | more)
+    return with_facets(make_wheels(axes, **{"inertia": 0.01, "torque_limit": 0.1, "momentum_limit": 5.0} | more))
 
 
 def random_axes(seed, count):
@@ -203,28 +205,30 @@ def test_compiled_lanes_give_the_same_bits():
     states = np.random.default_rng(3).normal(size=(10, 130))
     like = ((0.0,) * 3, (0.0,) * 4, (0.0,) * 3)
 
-    def shared(torque, momentum, rate):
-        h_rate = motor(allocate_peak(torque, wheels), momentum, rate, wheels)
+    def shared(torque, momentum, rate, facets):
+        h_rate = motor(allocate_peak(torque, wheels._replace(facets=facets)), momentum, rate, wheels)
         return on_body(h_rate, momentum, rate, wheels), h_rate
 
-    found = Compiled(shared, *like).over(states)
+    tables = np.repeat(np.array(wheels.facets.cells)[:, None], 130, axis=1)
+    found = Compiled(shared, *like, wheels.facets).over(np.vstack([states, tables]))
     for k in range(130):
-        assert tuple(found[:, k]) == tuple(leaves(shared(*unflatten(states[:, k], like))))
+        assert tuple(found[:, k]) == tuple(leaves(shared(*unflatten(states[:, k], like), wheels.facets)))
 
 
 @settings(max_examples=10)
 @given(torques, st.tuples(finite, finite, finite, finite), torques)
 def test_every_reader_agrees(torque, momentum, rate):
-    wheels = simple(pyramid(), viscous=1e-4, coulomb=2e-3)
+    wheels = make_wheels(pyramid(), 0.01, 0.1, 5.0, viscous=1e-4, coulomb=2e-3)
     agree(allocate, torque, wheels)
     agree(on_body, momentum, momentum, rate, wheels)
     agree(stored, momentum, wheels)
     agree(motor, momentum, momentum, rate, wheels)
-    same(allocate_peak, torque, wheels)
+    agree(available, momentum, momentum, wheels)
+    same(allocate_peak, torque, with_facets(wheels))
 
 
 def test_polynomials_read_motor_and_allocation():
-    wheels = constants(simple(three_orthogonal(), viscous=1e-4, coulomb=2e-3))
+    wheels = constants(simple(three_orthogonal(), viscous=1e-4, coulomb=2e-3)._replace(facets=()))
     names = ("u", "h", "w")
     values = {"u": fmpq(1, 20), "h": fmpq(2), "w": fmpq(1, 3)}
     u, h, w = (Polynomial.variable(name) for name in names)
@@ -378,7 +382,7 @@ def test_a_lost_wheel_takes_no_part():
     for torque in random_axes(5, 20):
         wanted = tuple(torque.tolist())
         for rule in (allocate, allocate_peak):
-            taus = rule(wanted, rest)
+            taus = rule(wanted, with_facets(rest))
             assert taus[1] == 0.0
             np.testing.assert_allclose(total(taus, rest), torque, atol=1e-14)
     h_rate = motor((1.0,) * 4, (1.0,) * 4, (0.0,) * 3, rest)

@@ -12,7 +12,7 @@ from starhold.errors import InputError
 from starhold.laws.interface import NoMemory, Seen
 from starhold.loop.kernels import make_step
 from starhold.models.craft import make_craft, tensor
-from starhold.models.wheels import authority
+from starhold.models.envelope import authority
 from starhold.report.certificates import certify_scenario
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, parse
@@ -155,7 +155,10 @@ def test_gains_follow_the_inertia_and_the_torque_left(action):
     struck, acted, changed, known = loop.events
     rows = [[float(x) for x in row.split(",")] for row in WHEELED.strip("[]").split("], [")]
     assert acted.gains == entry.law.design(scenario.craft_of(rows), spec)
-    assert struck.craft == acted.craft == acted.known == scenario.craft_of(rows)
+    body, left = scenario.craft_of(rows), scenario.torque_limit(acted.wheels)
+    assert left < scenario.craft.torque_limit
+    assert struck.craft == body
+    assert acted.craft == acted.known == body._replace(torque_limit=left)
     assert changed.gains == acted.gains
     # The torque left is not forgotten when only the body changes.
     assert known.gains == entry.law.design(scenario.craft_of([9.0, 8.0, 6.0]), spec)

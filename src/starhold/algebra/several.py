@@ -1,4 +1,4 @@
-"""Operations on tuples of any length: an equation applied to every element, a weighted sum, a choice by score.
+"""Operations on tuples of any length: an equation applied to every element, a weighted sum.
 
 Recorded, they are written out for the lengths of their arguments: a step with any number of wheels costs what one written by
 hand does. The elements may differ in shape from one to the next.
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from starhold.algebra.scalar import Scalar, less, where
+from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Vector, add, scale
 
 _Value = TypeVar("_Value")
@@ -27,13 +27,3 @@ def weighted(weights: tuple[Scalar, ...], vectors: tuple[Vector, ...]) -> Vector
     for weight, vector in zip(weights[1:], vectors[1:], strict=True):
         total = add(total, scale(weight, vector))
     return total
-
-
-def choose(scores: tuple[Scalar, ...], options: tuple[tuple[Scalar, ...], ...]) -> tuple[Scalar, ...]:
-    """The option of the largest score, the first of equals; options are tuples of numbers of one length."""
-    best, chosen = scores[0], options[0]
-    for score, option in zip(scores[1:], options[1:], strict=True):
-        better = less(best, score)
-        best = where(better, score, best)
-        chosen = tuple(where(better, new, old) for new, old in zip(option, chosen, strict=True))
-    return chosen

@@ -43,7 +43,7 @@ MEASURES: dict[str, Measure] = {
     "peak_acceleration": Measure("peak accel.", "deg/s²", "largest component of the rate's derivative", 180.0 / np.pi),
     "peak_torque": Measure("peak torque", "mN m", "largest torque component", 1e3),
     "effort": Measure("effort", "N m s", "integral of |u| over the run"),
-    "limit_share": Measure("on limit", "%", "share of the time with a torque on its limit", 100.0),
+    "limit_share": Measure("on limit", "%", "share of the time with a torque, or a wheel's motor, on its limit", 100.0),
     "chatter": Measure("chatter", "mN m", "mean change of torque between samples, last quarter of the run", 1e3),
     "final_attitude_error": Measure("final angle", "mdeg", "largest angle to the target, last quarter", 180e3 / np.pi),
     "final_rate_error": Measure("final rate", "mdeg/s", "largest relative rate, last quarter", 180e3 / np.pi),
@@ -109,7 +109,7 @@ def measure(run: Recording, attitude_tolerance: float, rate_tolerance: float) ->
         "peak_torque": float(np.abs(u).max()),
         "peak_torque_norm": float(np.linalg.norm(u, axis=1).max()),
         "effort": float(np.sum(np.linalg.norm(u[:-1], axis=1) * np.diff(times))),
-        "limit_share": limit_share(u, run.attrs["torque_limit"], run.attrs["limit"]),
+        "limit_share": _limit_share(run),
         "chatter": float(np.linalg.norm(np.diff(u[tail], axis=0), axis=1).mean()) if len(u[tail]) > 1 else 0.0,
         "final_attitude_error": None if lost is not None else float(angle[tail].max()),
         "final_rate_error": None if lost is not None else float(speed[tail].max()),
@@ -131,7 +131,22 @@ def _overshoot(q: NDArray[np.float64]) -> float:
 
 def limit_share(u: NDArray[np.float64], limit: float, kind: str) -> float:
     """Share of the samples (n, 3) that are on their limit."""
+    return float(_on_limit(u, limit, kind).mean())
+
+
+def _on_limit(u: NDArray[np.float64], limit: float, kind: str) -> NDArray[np.bool_]:
     if kind == "none" or not np.isfinite(limit):
-        return 0.0
+        return np.zeros(len(u), dtype=bool)
     size = np.linalg.norm(u, axis=1) if kind == "norm" else np.abs(u).max(axis=1)
-    return float((size >= limit * (1.0 - 1e-9)).mean())
+    return size >= limit * (1.0 - 1e-9)
+
+
+def _limit_share(run: Recording) -> float:
+    """Share of the samples in which the torque is on its limit; with wheels, what is asked of them together, or of a motor
+    all that it can give: less as its momentum fills up, and nothing once it is lost."""
+    limit, kind = run.attrs["torque_limit"], run.attrs["limit"]
+    if "wheel_command" not in run.arrays:
+        return limit_share(run["torque"], limit, kind)
+    asked = np.abs(run["wheel_command"])
+    motors = (asked > 0.0) & (asked >= run["wheel_available"] * (1.0 - 1e-9))
+    return float((_on_limit(run["command"], limit, kind) | motors.any(axis=1)).mean())

@@ -20,6 +20,7 @@ from starhold.laws.double_cover import COVERS
 from starhold.laws.interface import NoMemory
 from starhold.models import actuator, environment, rigid_body, sensor, target, wheeled_body
 from starhold.models.craft import Craft
+from starhold.models.envelope import with_facets
 from starhold.models.rigid_body import State
 from starhold.models.wheeled_body import WheeledState
 from starhold.models.wheels import Wheels, allocate, allocate_peak, relaxation
@@ -39,6 +40,7 @@ class Setup(NamedTuple):
     target: Any
     noise: sensor.Noise
     width: float
+    command_limit: float
     dynamics: actuator.Dynamics
     wheels: Any
 
@@ -59,7 +61,6 @@ class Parts(NamedTuple):
     with_torque: Callable[..., Any]
     rates: Callable[..., Any]
     stored: Callable[..., Any]
-    given: Callable[..., Any]
     record: Callable[..., Any]
     share: Callable[..., Any]
 
@@ -138,6 +139,9 @@ class ClosedLoop:
     target: Quaternion | Literal["orbital"] | NDArray[np.float64] = NO_TURN
     noise: sensor.Noise = sensor.SILENT
     limit: Limit = "axis"
+    command_limit: float | None = None
+    """Where the command is cut off, in the way of `limit` (N m); None: at the torque limit that the law sees, the craft's.
+    Beside wheels the law sees what they surely give together, and the wheels cut off what is more."""
     dynamics: actuator.Dynamics = actuator.IDEAL
     cover: Cover = "as_published"
     hysteresis_width: float = 0.5
@@ -175,7 +179,6 @@ class ClosedLoop:
             body.with_torque,
             body.rates,
             body.stored,
-            body.given,
             body.record,
             ALLOCATIONS[self.allocation],
         )
@@ -200,8 +203,11 @@ class ClosedLoop:
         if isinstance(goal, np.ndarray):
             goal = Buffer(goal.ravel().tolist())
         substep = self.period / self.substeps
-        wheels = NoMemory() if self.wheels is None else self.wheels
-        return Setup(self.period, substep, goal, self.noise, self.hysteresis_width, self.dynamics, wheels)
+        wheels: Any = NoMemory() if self.wheels is None else self.wheels
+        if self.wheels is not None and self.allocation == "least-peak":
+            wheels = with_facets(self.wheels)
+        cut = self.craft.torque_limit if self.command_limit is None else self.command_limit
+        return Setup(self.period, substep, goal, self.noise, self.hysteresis_width, cut, self.dynamics, wheels)
 
     def phases(self, steps: int) -> list[Phase]:
         """A run of so many control steps, cut where something changes."""

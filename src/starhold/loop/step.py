@@ -13,6 +13,7 @@ from starhold.algebra.vector import ZERO, Vector, add, cross, dot, subtract
 from starhold.algebra.words import number_of, word_of
 from starhold.laws.interface import Seen
 from starhold.loop.closed_loop import Carry, Parts
+from starhold.models.actuator import ideal
 from starhold.models.target import inertial, orbital
 
 
@@ -42,7 +43,7 @@ class Step(NamedTuple):
 def runge_kutta(slope: Callable[..., Any]) -> Callable[..., Any]:
     """The classical method of fourth order over a substep, for d(state)/dt = slope(state, begun, carry, craft, setup).
 
-    begun: what the actuators gave as it started.
+    begun: what the slope is told of the substep's start.
     """
 
     def advance(state, begun, carry, craft, setup):
@@ -59,7 +60,7 @@ def runge_kutta(slope: Callable[..., Any]) -> Callable[..., Any]:
 def attitude_step(parts: Parts) -> Step:
     """The equations of a control step made of these parts."""
     environment, target, sense, disturb, cover, law, limit, begin, response, *body = parts
-    tidy, with_torque, rates, stored, given, record, share = body
+    tidy, with_torque, rates, stored, record, share = body
 
     def look(carry, step, key, craft, setup):
         state = carry.state
@@ -97,22 +98,27 @@ def attitude_step(parts: Parts) -> Step:
         seen = see(carry, step, key, craft, setup)
         shown, h = cover(seen.attitude, carry.h, setup.width)
         command, memory = law(seen._replace(attitude=shown), gains, craft, carry.memory)
-        command = limit(command, craft.torque_limit)
+        command = limit(command, setup.command_limit)
         state = with_torque(carry.state, begin(carry.state.torque, command))
         disturbance = disturb(setup.noise, key, word_of(step))
         return Carry(state, memory, follow(carry, step, setup), h, command, disturbance, carry.lost_at)
 
     def slope(state, begun, carry, craft, setup):
         acceleration, external = environment(state.position, state.attitude, craft)
-        torque_rate = response(state.torque, carry.command, begun, setup.substep, setup.dynamics)
+        given, shared = begun
+        torque_rate = response(state.torque, carry.command, given, setup.substep, setup.dynamics)
         outside = add(carry.disturbance, external)
-        return rates(state, outside, acceleration, torque_rate, craft, setup.wheels, share)
+        split = share if shared is None else lambda torque, wheels: shared
+        return rates(state, outside, acceleration, torque_rate, craft, setup.wheels, split)
 
     advance = runge_kutta(slope)
 
     def hold(carry, craft, setup):
         """One substep."""
-        end = advance(carry.state, carry.state.torque, carry, craft, setup)
+        given = carry.state.torque
+        # What is held is shared out once.
+        shared = share(given, setup.wheels) if setup.wheels and response is ideal else None
+        end = advance(carry.state, (given, shared), carry, craft, setup)
         return carry._replace(state=tidy(end))
 
     def check(carry, step, setup):
@@ -128,8 +134,7 @@ def attitude_step(parts: Parts) -> Step:
         goal = target(setup.target, s.position, s.velocity, step, carry.goal)
         error = relative(goal.attitude, s.attitude)
         rate = subtract(s.rate, to_body(error, goal.rate))
-        torque = given(s, setup.wheels, share)
-        body = Sample(s.attitude, s.rate, s.position, s.velocity, torque, carry.command, error, rate)
+        body = Sample(s.attitude, s.rate, s.position, s.velocity, s.torque, carry.command, error, rate)
         return record(body, s, setup.wheels, share)
 
     return Step(see, decide, hold, check, sample)

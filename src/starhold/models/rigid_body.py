@@ -63,11 +63,6 @@ def stored(state: State, wheels: Any) -> Vector:
     return ZERO
 
 
-def given(state: State, wheels: Any, share: Any) -> Vector:
-    """The torque that the actuators give the body (N m)."""
-    return state.torque
-
-
 def record(body: Any, state: State, wheels: Any, share: Any) -> Any:
     """What is recorded: the body's sample."""
     return body

@@ -12,7 +12,7 @@ from starhold.algebra.several import weighted
 from starhold.algebra.vector import Vector, add, scale
 from starhold.models.craft import Craft
 from starhold.models.rigid_body import motion
-from starhold.models.wheels import Wheels, on_body
+from starhold.models.wheels import Wheels, available, on_body
 from starhold.models.wheels import motor as turn_rotors
 from starhold.models.wheels import stored as stored_momentum
 
@@ -30,10 +30,13 @@ class WheeledState(NamedTuple):
 
 
 class WheelSample(NamedTuple):
-    """What is recorded of the wheels beside the body: momenta (N m s), and their rates, the torques (N m)."""
+    """What is recorded of the wheels beside the body: momenta (N m s), and their rates, the torques (N m); the torque asked
+    of each motor, and the most that it gives in that direction (N m)."""
 
     momentum: tuple[float, ...]
     torque: tuple[float, ...]
+    command: tuple[float, ...]
+    available: tuple[float, ...]
 
 
 def tidy(state: WheeledState) -> WheeledState:
@@ -67,14 +70,10 @@ def stored(state: WheeledState, wheels: Wheels) -> Vector:
     return stored_momentum(state.momentum, wheels)
 
 
-def given(state: WheeledState, wheels: Wheels, share: Any) -> Vector:
-    """The torque that motors and friction of the wheels give the body (N m), less than what is asked where they are at
-    their limits or lost."""
-    rotors = turn_rotors(share(state.torque, wheels), state.momentum, state.rate, wheels)
-    return scale(-1.0, weighted(rotors, wheels.axes))
-
-
 def record(body: Any, state: WheeledState, wheels: Wheels, share: Any) -> Any:
-    """What is recorded: the body's sample and the wheels'."""
-    rotors = turn_rotors(share(state.torque, wheels), state.momentum, state.rate, wheels)
-    return (body, WheelSample(state.momentum, rotors))
+    """What is recorded: the body's sample, with the torque that motors and friction of the wheels give it (less than what
+    is asked where they are at their limits or lost), and the wheels'."""
+    command = share(state.torque, wheels)
+    rotors = turn_rotors(command, state.momentum, state.rate, wheels)
+    given = body._replace(torque=scale(-1.0, weighted(rotors, wheels.axes)))
+    return (given, WheelSample(state.momentum, rotors, command, available(command, state.momentum, wheels)))

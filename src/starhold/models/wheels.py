@@ -17,8 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.scalar import Scalar, absolute, clip, less, where
-from starhold.algebra.several import choose, each, weighted
+from starhold.algebra.scalar import Scalar, absolute, both, clip, either, less, less_equal, where
+from starhold.algebra.several import each, weighted
+from starhold.algebra.structured import Buffer, repeat
 from starhold.algebra.vector import Vector, add, cross, dot, scale
 from starhold.models.craft import check_inertia, vector
 
@@ -33,24 +34,18 @@ CREEP = 1.0
 """Below this relative speed (rad/s) Coulomb friction grows in proportion to the speed: a friction that jumps with the sign
 would make any integrator of fixed step chatter about standstill."""
 
-_COPLANAR = 1e-9
+MOST = 24
+"""Wheels of a craft: with least-peak allocation the work grows with the cube of their number."""
+COPLANAR = 1e-9
 """Sine of the angle below which axes count as parallel, or as lying in a plane."""
 _WORST_CONDITION = 1e3
-
-
-class Facet(NamedTuple):
-    """One facet of the set of torques that wheels of at most unit torque give. Torques in the cone above it cost the peak
-    |normal . torque|; its options are told apart by the largest |edge . torque|, and each gives the motor torques."""
-
-    normal: Vector
-    edges: tuple[Vector, ...]
-    options: tuple[Rows, ...]
 
 
 class Wheels(NamedTuple):
     """N wheels: unit spin axes (body), rotor inertias about them (kg m2), largest motor torques (N m; 0 for a lost wheel),
     largest axial momenta (N m s), viscous (N m s) and Coulomb friction (N m); and how to share out a torque, by least
-    squares (one row a wheel) or with the least peak."""
+    squares (one row a wheel, zero for one that takes no part) or with the least peak (see `envelope.with_facets`, without
+    which there is nothing to share it out with)."""
 
     axes: tuple[Vector, ...]
     inertia: Numbers
@@ -59,7 +54,10 @@ class Wheels(NamedTuple):
     viscous: Numbers
     coulomb: Numbers
     least: Rows
-    facets: tuple[Facet, ...]
+    facets: Buffer | tuple[()] = ()
+    """The pieces of `allocate_peak`, of 6 + 3 N numbers each: a normal, an edge, and a row for each wheel. Torques in the
+    cone above a facet of the envelope cost the peak |normal . torque|, and pieces of one facet are told apart by the
+    largest |edge . torque|."""
 
 
 def allocate(torque: Vector, wheels: Wheels) -> Numbers:
@@ -77,23 +75,23 @@ def allocate_peak(torque: Vector, wheels: Wheels) -> Numbers:
     normal to two of the axes: all other wheels give the peak, and the two follow from the torque (facets of a zonotope, the
     torque envelope; Markley, Reynolds, Liu, Lebsock 2010, Maximum Torque and Momentum Envelopes for Reaction-Wheel Arrays).
     """
-    return choose(each(_steepness, (wheels.facets,), torque), each(_within, (wheels.facets,), torque))
+    facets, width = wheels.facets, 6 + 3 * len(wheels.axes)
+    if not isinstance(facets, Buffer):
+        raise TypeError("these wheels have no facets: see models.envelope.with_facets")
 
+    def piece(k: Any) -> tuple[Any, ...]:
+        n0, n1, n2, e0, e1, e2, *rows = facets.row(k, width)
+        shared = each(dot, (tuple(zip(rows[::3], rows[1::3], rows[2::3], strict=True)),), torque)
+        return absolute(dot((n0, n1, n2), torque)), absolute(dot((e0, e1, e2), torque)), *shared
 
-def _steepness(facet: Facet, torque: Vector) -> Scalar:
-    return absolute(dot(facet.normal, torque))
+    def better(k: Any, *best: Scalar) -> tuple[Any, ...]:
+        found = piece(k + 1)
+        # Where two facets cost the same, both give the same torques.
+        inner = both(less_equal(best[0], found[0]), less(best[1], found[1]))
+        wins = either(less(best[0], found[0]), inner)
+        return tuple(where(wins, new, old) for new, old in zip(found, best, strict=True))
 
-
-def _within(facet: Facet, torque: Vector) -> Numbers:
-    return choose(each(_size, (facet.edges,), torque), each(_torques, (facet.options,), torque))
-
-
-def _size(edge: Vector, torque: Vector) -> Scalar:
-    return absolute(dot(edge, torque))
-
-
-def _torques(rows: Rows, torque: Vector) -> Numbers:
-    return each(dot, (rows,), torque)
+    return repeat(facets.size // width - 1, better, *piece(0))[2:]
 
 
 def motor(command: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels) -> Numbers:
@@ -125,11 +123,28 @@ def _motor(
     rate: Vector,
 ) -> Scalar:
     # Reciprocals of what does not change, which a compiler takes out of the loop over the lanes.
-    filled = momentum * (1.0 / momentum_limit)
-    above, below = _fraction((1.0 - filled) * (1.0 / BAND)), _fraction((1.0 + filled) * (1.0 / BAND))
-    room = where(less(0.0, command), above, below)
     speed = momentum * (1.0 / inertia) - dot(axis, rate)
-    return room * clip(command, torque_limit) - viscous * speed - coulomb * clip(speed * (1.0 / CREEP), 1.0)
+    given = _room(command, momentum, momentum_limit) * clip(command, torque_limit)
+    return given - viscous * speed - coulomb * clip(speed * (1.0 / CREEP), 1.0)
+
+
+def _room(command: Scalar, momentum: Scalar, limit: Scalar) -> Scalar:
+    """The share of its torque that the momentum leaves a motor, in the direction of the command."""
+    filled = momentum * (1.0 / limit)
+    above, below = _fraction((1.0 - filled) * (1.0 / BAND)), _fraction((1.0 + filled) * (1.0 / BAND))
+    return where(less(0.0, command), above, below)
+
+
+def available(command: Numbers, momentum: Numbers, wheels: Wheels) -> Numbers:
+    """The most that each motor gives now in the direction of its command (N m): its torque limit, faded out as its momentum
+    fills up."""
+    return each(_available, (command, momentum, wheels.torque_limit, wheels.momentum_limit))
+
+
+def _available(command: Scalar, momentum: Scalar, torque_limit: Scalar, momentum_limit: Scalar) -> Scalar:
+    room = _room(command, momentum, momentum_limit)
+    # No share of an unlimited torque is none.
+    return where(less(0.0, room), room * torque_limit, 0.0)
 
 
 def _fraction(x: Scalar) -> Scalar:
@@ -160,9 +175,9 @@ def make_wheels(
     (N m; 0 for a wheel that takes no part), momentum limit (N m s), viscous (N m s) and Coulomb friction (N m). Limits may
     be infinite.
 
-    Raises ValueError where a number is out of range, fewer than three working wheels have independent axes (it names the
-    body direction without authority), or they lie so close to a plane that the matrix of the axes has a condition number
-    above 1000.
+    Raises ValueError where a number is out of range, there are more than MOST wheels, fewer than three working wheels have
+    independent axes (it names the body direction without authority), or they lie so close to a plane that the matrix of the
+    axes has a condition number above 1000.
     """
     matrix = _unit_axes(axes)
     count = len(matrix)
@@ -175,7 +190,7 @@ def make_wheels(
     )
     working = [i for i in range(count) if columns[1][i] > 0.0]
     _check_authority(matrix[working], "the wheels give" if len(working) == count else "the working wheels give")
-    return Wheels(_rows(matrix), *columns, _least_squares(matrix, working), _facets(matrix, working))
+    return Wheels(_rows(matrix), *columns, _least_squares(matrix, working))
 
 
 def lose(wheels: Wheels, index: int) -> Wheels:
@@ -192,15 +207,7 @@ def lose(wheels: Wheels, index: int) -> Wheels:
     working = [i for i in range(count) if limits[i] > 0.0]
     matrix = np.array(wheels.axes)
     _check_authority(matrix[working], f"without wheel {index + 1} the others give")
-    return wheels._replace(torque_limit=limits, least=_least_squares(matrix, working), facets=_facets(matrix, working))
-
-
-def authority(wheels: Wheels) -> float:
-    """The torque (N m) that least-squares allocation can give about every axis within the limits of the wheels; 0 where a
-    wheel that it counts on has none."""
-    shares = [math.sqrt(sum(x * x for x in row)) for row in wheels.least]
-    used = [limit / share for limit, share in zip(wheels.torque_limit, shares, strict=True) if share > 0.0]
-    return min(used)
+    return wheels._replace(torque_limit=limits, least=_least_squares(matrix, working), facets=())
 
 
 def capacity(wheels: Wheels, momentum: Sequence[float]) -> float:
@@ -269,6 +276,8 @@ def _unit_axes(axes: Sequence[Sequence[float]]) -> NDArray[np.float64]:
     matrix = np.asarray(axes, dtype=float)
     if matrix.ndim != 2 or matrix.shape[1] != 3:
         raise ValueError(f"wheel axes must be vectors of three numbers, not an array of shape {matrix.shape}")
+    if len(matrix) > MOST:
+        raise ValueError(f"at most {MOST} wheels are taken, not {len(matrix)}")
     lengths = np.linalg.norm(matrix, axis=1)
     for i, length in enumerate(lengths.tolist()):
         if not 0.0 < length < math.inf:
@@ -298,7 +307,7 @@ def _check_authority(axes: NDArray[np.float64], who: str) -> None:
         raise ValueError(f"{who} no torque at all: none is left")
     directions, sizes, _ = np.linalg.svd(axes.T)
     sizes = np.append(sizes, np.zeros(3 - len(sizes)))
-    lacking = directions[:, sizes <= _COPLANAR * sizes[0]]
+    lacking = directions[:, sizes <= COPLANAR * sizes[0]]
     if lacking.shape[1]:
         shown = " and ".join(_shown(direction) for direction in lacking.T)
         raise ValueError(f"{who} no torque about the body direction {shown}: three independent axes are needed")
@@ -324,57 +333,3 @@ def _least_squares(axes: NDArray[np.float64], working: list[int]) -> Rows:
     rows = np.zeros_like(axes)
     rows[working] = -np.linalg.pinv(axes[working].T)
     return _rows(rows)
-
-
-def _facets(axes: NDArray[np.float64], working: list[int]) -> tuple[Facet, ...]:
-    """The pieces of `allocate_peak`. Parallel wheels act as one of several times the strength; the pairs of axes that lie in
-    one plane share a facet, within which the same problem is solved once more with the plane's axes alone."""
-    spread = _merge_parallel(axes, working)
-    strong = spread.T @ axes
-    unit = strong / np.linalg.norm(strong, axis=1)[:, None]
-    count = len(strong)
-    correction = np.linalg.pinv(strong.T)
-    facets: list[Facet] = []
-    seen: set[tuple[int, int]] = set()
-    for pair in ((i, j) for j in range(count) for i in range(j)):
-        if pair in seen:
-            continue
-        normal = np.cross(unit[pair[0]], unit[pair[1]])
-        normal /= np.linalg.norm(normal)
-        heights = strong @ normal
-        plane = [k for k in range(count) if k in pair or abs(unit[k] @ normal) < _COPLANAR]
-        seen.update((i, j) for j in plane for i in plane if i < j)
-        outside = np.sign(heights)
-        outside[plane] = 0.0
-        normal /= outside @ heights
-        peak = np.outer(outside, normal)
-        left = np.eye(3) - strong.T @ peak
-        edges: list[Vector] = []
-        options: list[Rows] = []
-        # Two axes leave no choice, so either of them tells it.
-        for free in plane if len(plane) > 2 else plane[:1]:
-            across = np.cross(normal, unit[free])
-            sides = np.where(np.isin(np.arange(count), plane), np.sign(strong @ across), 0.0)
-            sides[free] = 0.0
-            across /= sides @ (strong @ across)
-            torques = peak + np.outer(sides, across @ left)
-            torques[free] = strong[free] @ (np.eye(3) - strong.T @ torques) / (strong[free] @ strong[free])
-            torques += correction @ (np.eye(3) - strong.T @ torques)
-            edges.append(vector(across @ left))
-            options.append(_rows(-spread @ torques))
-        facets.append(Facet(vector(normal), tuple(edges), tuple(options)))
-    return tuple(facets)
-
-
-def _merge_parallel(axes: NDArray[np.float64], working: list[int]) -> NDArray[np.float64]:
-    """Signs (wheels, classes): the torque of wheel k is that of its class of parallel wheels times the sign."""
-    classes: list[NDArray[np.float64]] = []
-    leaders: list[NDArray[np.float64]] = []
-    for k in working:
-        parallel = [c for c, leader in enumerate(leaders) if np.linalg.norm(np.cross(leader, axes[k])) < _COPLANAR]
-        if not parallel:
-            leaders.append(axes[k])
-            classes.append(np.zeros(len(axes)))
-            parallel = [len(leaders) - 1]
-        classes[parallel[0]][k] = np.sign(leaders[parallel[0]] @ axes[k])
-    return np.array(classes).T

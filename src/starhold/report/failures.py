@@ -17,7 +17,8 @@ from starhold.analysis.metrics import measure
 from starhold.errors import InputError
 from starhold.laws.stability_degree import degree, scale
 from starhold.models.craft import tensor
-from starhold.models.wheels import Wheels, authority, lose
+from starhold.models.envelope import authority
+from starhold.models.wheels import Wheels, lose
 from starhold.report.certificates import certify_law
 from starhold.report.files import whole
 from starhold.scenario.building import build
@@ -216,7 +217,9 @@ def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
     faults = [
         FaultTable(time=0.0, wheel=wheel, lost=True, action="both" if retune else "reallocate") for wheel in failure.lost
     ]
-    loop = build(replace(scenario, table=table.model_copy(update={"fault": faults})), entry)
+    # What the law does about faults of the file is no matter here.
+    own = replace(entry, fault_action=None)
+    loop = build(replace(scenario, table=table.model_copy(update={"fault": faults})), own)
     gains = loop.events[-1].gains if loop.events else loop.gains
     period = _orbit_period(scenario)
     every, steps = table.simulation.record_every, _steps(scenario, loop, period)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -87,7 +88,7 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario | None = 
 
     rate_scale, rate_unit = _rate_unit(flights)
     torque_scale, torque_unit = _torque_unit(flights)
-    levels, dashed = _limit(flights, torque_scale, torque_unit)
+    levels, dashed = _limit(flights, torque_scale, torque_unit, scenario)
     rates = [Panel(f"{axis}, {rate_unit}", curves("rate_error", i, rate_scale)) for i, axis in enumerate("xyz")]
     torques = [
         Panel(f"{axis}, {torque_unit}", curves("torque", i, torque_scale), False, levels) for i, axis in enumerate("xyz")
@@ -245,12 +246,20 @@ def _torque_unit(flights: Sequence[Flight]) -> tuple[float, str]:
     return (1e3, "mN m") if peak >= 1e-3 or peak == 0.0 else (1e6, "µN m")
 
 
-def _limit(flights: Sequence[Flight], scale: float, unit: str) -> tuple[tuple[float, ...], str]:
+def _limit(flights: Sequence[Flight], scale: float, unit: str, scenario: Scenario | None) -> tuple[tuple[float, ...], str]:
+    """The limit of the torque that binds first, and what it is."""
     attrs: dict[Any, Any] = flights[0].recording.attrs
     limit, kind = float(attrs["torque_limit"]), attrs["limit"]
-    if kind == "none" or not np.isfinite(limit):
+    limit = math.inf if kind == "none" else limit
+    words = f"limit of {'each axis' if kind == 'axis' else 'the norm'}"
+    wheels = None if scenario is None else scenario.wheels
+    sure = math.inf if scenario is None or wheels is None else scenario.torque_limit(wheels)
+    if scenario is not None and sure < limit:
+        norm = scenario.table.spacecraft.limit == "norm"
+        limit, words = sure, f"what the wheels surely give {'in norm' if norm else 'about each axis at once'}"
+    if not np.isfinite(limit):
         return (), "no limit"
-    words = f"limit of {'each axis' if kind == 'axis' else 'the norm'}, {limit * scale:g} {unit}"
+    words = f"{words}, {limit * scale:g} {unit}"
     # A limit far above all torques would flatten them.
     if limit > OFF_SCALE * _peak(flights, "torque"):
         return (), f"{words}, off the scale"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.models.actuator import Dynamics
 from starhold.models.sensor import Noise
@@ -30,6 +31,7 @@ def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
         target=goal,
         noise=Noise(table.environment.torque_noise, table.sensor.attitude_noise, table.sensor.rate_noise),
         limit="none" if np.isinf(body.torque_limit) else body.limit,
+        command_limit=None if scenario.wheels is None else body.torque_limit,
         dynamics=Dynamics(body.actuator_lag, body.torque_rate_limit),
         cover=entry.double_cover,
         hysteresis_width=entry.hysteresis_width,
@@ -40,4 +42,10 @@ def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
     )
     check_substeps(loop, scenario.where)
     try_law(loop, scenario.where, f"law {entry.name}")
+    for event in loop.events:
+        try:
+            entry.law.remember(event.gains, event.known, loop.period)
+        except ValueError as error:
+            key = f"law {entry.name} from {event.step * loop.period:g} s"
+            raise InputError(scenario.where, key, "", f'{error}; fault_action = "none" flies on as before') from None
     return loop

@@ -9,7 +9,8 @@ import numpy as np
 from starhold.errors import InputError
 from starhold.loop.closed_loop import Event
 from starhold.models.craft import Craft
-from starhold.models.wheels import Wheels, authority, lose
+from starhold.models.envelope import authority
+from starhold.models.wheels import Wheels, lose
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.scenario.schema import FaultTable
 
@@ -25,14 +26,15 @@ def make_events(scenario: Scenario, entry: LawEntry) -> tuple[Event, ...]:
     for place, fault in enumerate(table.fault, 1):
         _check(scenario, place, fault)
         moments.append((fault.time, False, place))
-        if fault.action != "none":
+        if entry.action_on(fault) != "none":
             moments.append((fault.time + fault.delay, True, place))
     now = Event(0, scenario.wheels, entry.gains, scenario.craft, scenario.craft)
     begun = 0.0 if now.wheels is None else authority(now.wheels)
-    share, learnt = 1.0, (0.0, 0)
+    share, learnt, limit = 1.0, (0.0, 0), scenario.craft.torque_limit
     events: list[Event] = []
     for time, diagnosed, place in sorted(moments):
         fault = table.fault[place - 1]
+        action = entry.action_on(fault)
         body = _body(scenario, place, fault)
         if not diagnosed:
             wheels = None if now.wheels is None else _struck(now.wheels, fault)
@@ -43,11 +45,14 @@ def make_events(scenario: Scenario, entry: LawEntry) -> tuple[Event, ...]:
                 now, learnt = now._replace(known=body), (fault.time, place)
             if now.wheels is not None and fault.strikes_wheel:
                 left = _left(scenario, now.wheels, place, fault)
-                share = authority(left) / begun
-                now = now._replace(wheels=now.wheels if fault.action == "retune" else left)
-            if fault.action in ("retune", "both"):
+                share, limit = authority(left) / begun, scenario.torque_limit(left)
+                now = now._replace(wheels=now.wheels if action == "retune" else left)
+            # The law's limit is nothing that the body feels, so both crafts have it.
+            now = now._replace(known=now.known._replace(torque_limit=limit))
+            if action in ("retune", "both"):
                 now = now._replace(gains=_retuned(scenario, entry, now.known, share, place))
-        events.append(now._replace(step=round(time / period)))
+        now = now._replace(step=round(time / period), craft=now.craft._replace(torque_limit=limit))
+        events.append(now)
     return tuple(events)
 
 
@@ -95,7 +100,7 @@ def _struck(wheels: Wheels, fault: FaultTable) -> Wheels:
 def _left(scenario: Scenario, wheels: Wheels, place: int, fault: FaultTable) -> Wheels:
     """The wheels that a diagnosed fault leaves."""
     try:
-        return lose(wheels, _index(fault)) if fault.lost else wheels
+        return lose(wheels, _index(fault)) if wheels.torque_limit[_index(fault)] == 0.0 else wheels
     except ValueError as error:
         raise InputError(scenario.where, f"fault[{place}]", "", f'{error}; action = "none" flies on') from None
 
@@ -107,6 +112,7 @@ def _retuned(scenario: Scenario, entry: LawEntry, known: Craft, share: float, pl
     if not follows and (entry.form is None or not changed):
         allowed = 'a law with form = "degree-of-stability", whose gains follow the torque'
         allowed = "a law with a form, whose gains follow the inertia" if changed else allowed
+        allowed = f'{allowed}; or fault_action = "reallocate" in its [[law]] table'
         raise InputError(scenario.where, key, f"retune for law {entry.name}", allowed)
     if follows and (not np.isfinite(share) or share <= 0.0):
         raise InputError(scenario.where, key, "no torque left about some axis", 'action = "none"')

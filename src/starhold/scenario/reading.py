@@ -13,6 +13,7 @@ import numpy as np
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law, catalogue
 from starhold.models.craft import Craft, compact, make_craft
+from starhold.models.envelope import authority
 from starhold.models.wheels import Wheels, body_inertia
 from starhold.scenario.checking import (
     LONGEST_TEXT,
@@ -28,7 +29,7 @@ from starhold.scenario.checking import (
 )
 from starhold.scenario.checking import nearest as nearest
 from starhold.scenario.rotors import make_rotors
-from starhold.scenario.schema import ScenarioTable, law_model
+from starhold.scenario.schema import FaultTable, ScenarioTable, law_model
 from starhold.scenario.start import told_to_design
 
 MARK = "libration"
@@ -49,6 +50,12 @@ class LawEntry:
     form: str | None = None
     spec: Any = None
     """The design form that gave the gains, and its inputs; None where the file gives the gains themselves."""
+    fault_action: str | None = None
+    """What is done about any fault where this law flies; None: what the fault says."""
+
+    def action_on(self, fault: FaultTable) -> str:
+        """What is done about a fault where this law flies."""
+        return self.fault_action or fault.action
 
 
 @dataclass(frozen=True)
@@ -70,11 +77,21 @@ class Scenario(LawBook[LawEntry]):
     def craft_of(self, inertia: Any) -> Craft:
         """The same spacecraft with another inertia (3, 3; kg m2), its wheels included; ValueError where it cannot be."""
         gravity = {} if self.table.orbit is None else {"gravity": self.table.orbit.gravitational_parameter}
-        craft = make_craft(inertia, self.table.spacecraft.torque_limit, **gravity)
+        craft = make_craft(inertia, self.torque_limit(self.wheels), **gravity)
         if self.wheels is None:
             return craft
         rest = body_inertia(inertia, self.wheels)
         return craft._replace(inertia=compact(rest), inverse_inertia=compact(np.linalg.inv(rest)), with_rotors=craft.inertia)
+
+    def torque_limit(self, wheels: Wheels | None) -> float:
+        """The torque that a law may reckon with (N m): the limit of [spacecraft], or what these wheels surely give in its
+        way (in norm, else about each axis at once) where that is less."""
+        own, table = self.table.spacecraft, self.table.wheels
+        if wheels is None:
+            return own.torque_limit
+        peak = table is not None and table.allocation == "least-peak"
+        least = authority(wheels, "norm" if own.limit == "norm" else "axis", peak=peak)
+        return least if own.limit == "none" else min(own.torque_limit, least)
 
     @cached_property
     def wheels(self) -> Wheels | None:
@@ -84,8 +101,9 @@ class Scenario(LawBook[LawEntry]):
     @property
     def fault_times(self) -> tuple[float, ...]:
         """When faults happen and are acted on (s)."""
-        acted = [fault.time + fault.delay for fault in self.table.fault if fault.action != "none"]
-        return tuple(sorted({*(fault.time for fault in self.table.fault), *acted}))
+        faults = self.table.fault
+        acted = [f.time + f.delay for f in faults if any(law.action_on(f) != "none" for law in self.laws)]
+        return tuple(sorted({*(fault.time for fault in faults), *acted}))
 
 
 def not_turning(where: str) -> InputError:
@@ -159,4 +177,4 @@ def _read_law(data: Any, scenario: Scenario, key: str, taken: set[str], allow_un
     except ValueError as error:
         raise InputError(where, key, "", f"{error}; --allow-unstable takes it all the same") from None
     name = free_name(read.name, law.name, taken, where, key)
-    return LawEntry(name, law, gains, read.double_cover, read.hysteresis_width, form, spec)
+    return LawEntry(name, law, gains, read.double_cover, read.hysteresis_width, form, spec, read.fault_action)

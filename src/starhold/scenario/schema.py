@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from functools import cache
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import BeforeValidator, Field, create_model, model_validator
 
@@ -183,6 +183,9 @@ class WheelsTable(Rotor):
     ] = "least-squares"
 
 
+Action: TypeAlias = Literal["none", "reallocate", "retune", "both"]
+
+
 class FaultTable(Table):
     """What happens to a wheel, to the body or to both during the run, and what is done about it."""
 
@@ -196,7 +199,7 @@ class FaultTable(Table):
     inertia: Annotated[Any, *INERTIA] = None
     delay: Annotated[float, *quantity(Gain("s", at_least=0.0, text="until it is diagnosed and acted on"))] = 0.0
     action: Annotated[
-        Literal["none", "reallocate", "retune", "both"],
+        Action,
         Field(description="torque shared out among the other wheels, gains designed anew for what is left, or both"),
     ] = "both"
     """Unless it is "none", the law knows the new inertia from the diagnosis on."""
@@ -248,6 +251,7 @@ class LawTable(Table):
         Literal["as_published", "shortest", "hysteresis"], Field(description="which of q and -q is fed back")
     ] = "as_published"
     hysteresis_width: Annotated[float, *quantity(Gain("1", above=0.0, at_most=0.999, text="flips when h q0 < -width"))] = 0.5
+    fault_action: Annotated[Action | None, Field(description="what is done about faults, in place of their own")] = None
 
 
 class ScenarioTable(Table):

@@ -47,8 +47,14 @@ COLUMNS: dict[str, tuple[str, str, str]] = {
 WHEELS: dict[str, tuple[str, str, str]] = {
     "wheel_momentum": ("wheel", "N m s", "angular momentum of each rotor about its spin axis"),
     "wheel_torque": ("wheel", "N m", "rate of that momentum: the motor's torque and friction"),
+    "wheel_command": ("wheel", "N m", "torque asked of each motor"),
+    "wheel_available": (
+        "wheel",
+        "N m",
+        "most that the motor gives in that direction, as its momentum is",
+    ),
 }
-"""What is recorded of wheels, after the quantities of COLUMNS."""
+"""What is recorded of wheels, after the quantities of COLUMNS, in the order of `WheelSample`."""
 
 
 class Variable(NamedTuple):
@@ -190,13 +196,13 @@ def label(loop: ClosedLoop, samples: NDArray[np.float64], carry: Carry, record_e
         row += size
     if loop.wheels is not None:
         count = len(loop.wheels.axes)
-        arrays["wheel_momentum"] = samples[row : row + count].T
-        arrays["wheel_torque"] = samples[row + count : row + 2 * count].T
+        for place, name in enumerate(WHEELS):
+            arrays[name] = samples[row + place * count : row + (place + 1) * count].T
     attrs: dict[str, Any] = {
         "law": loop.law.name,
         "control_period": loop.period,
         "record_every": record_every,
-        "torque_limit": loop.craft.torque_limit,
+        "torque_limit": loop.craft.torque_limit if loop.command_limit is None else loop.command_limit,
         "limit": loop.limit,
     }
     if carry.lost_at >= 0.0:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from starhold.algebra.operations import TRUTH
 from starhold.algebra.scalar import where
 from starhold.algebra.structure import leaves, mapped
-from starhold.algebra.structured import repeat
+from starhold.algebra.structured import Buffer, repeat
 from starhold.trace.handles import Handle, kind_of
 from starhold.trace.machine import aligned, load
 from starhold.trace.program import Program
@@ -22,18 +22,19 @@ WIDTH = 8
 
 
 class Compiled:
-    """An equation for arguments shaped like the ones given: their floats are arguments, all else is a constant of it."""
+    """An equation for arguments shaped like the ones given: their floats, and those in buffers, are arguments, all else is a
+    constant of it."""
 
     def __init__(self, equation: Callable[..., Any], *like: Any) -> None:
         self.program, self._like = record_call(equation, like)
-        self._count = sum(isinstance(leaf, float) for leaf in leaves(like))
+        self._count = len(list(_floats(like)))
         self._leaves = list(leaves(self._like))
         self._one = load(self.program, 1)
         self._many: Callable[..., None] | None = None
 
     def __call__(self, *values: Any) -> Any:
         """What the equation gives."""
-        x = np.array([leaf for leaf in leaves(values) if isinstance(leaf, float)])
+        x = np.array(list(_floats(values)))
         y = np.empty(len(self._leaves))
         self._one(x.ctypes.data, y.ctypes.data, 1)
         source = iter(y.tolist())
@@ -66,7 +67,7 @@ def record_call(equation: Callable[..., Any], like: tuple[Any, ...]) -> tuple[Pr
     x = recorder.memory("x", lanes=True)
     y = recorder.memory("y", lanes=True, writable=True)
     count = recorder.input("count", "index")
-    size = sum(isinstance(leaf, float) for leaf in leaves(like))
+    size = len(list(_floats(like)))
     given: list[Any] = []
 
     def turn(k: Any) -> None:
@@ -82,6 +83,22 @@ def record_call(equation: Callable[..., Any], like: tuple[Any, ...]) -> tuple[Pr
 
 
 def bind(like: Any, cells: Cells, base: Any = 0) -> Any:
-    """The same structure with its floats read from memory, from `base` on, in order."""
-    places: Iterator[int] = iter(range(1 << 30))
-    return mapped(like, lambda leaf: cells[base + next(places)] if isinstance(leaf, float) else leaf)
+    """The same structure with its floats read from memory, from `base` on, in order; its buffers lie there too."""
+    place = 0
+
+    def leaf(value: Any) -> Any:
+        nonlocal place
+        here, place = place, place + (value.size if isinstance(value, Buffer) else int(isinstance(value, float)))
+        if isinstance(value, Buffer):
+            return Buffer(cells, base + here, value.size)
+        return cells[base + here] if isinstance(value, float) else value
+
+    return mapped(like, leaf)
+
+
+def _floats(values: Any) -> Iterator[float]:
+    for leaf in leaves(values):
+        if isinstance(leaf, Buffer):
+            yield from leaf.row(0, leaf.size)
+        elif isinstance(leaf, float):
+            yield leaf
