@@ -19,6 +19,7 @@ from starhold.certification.matrices import floats, number
 from starhold.certification.motion import Motion
 from starhold.certification.potential import Potential, Spring
 from starhold.certification.region import Shape
+from starhold.certification.sampling import stable_period
 from starhold.certification.sliding import take_surface
 from starhold.certification.subject import make_subject
 from starhold.laws.interface import Seen
@@ -34,6 +35,8 @@ LEGS = (1, 250, 250, 500)
 """Each flight is looked at after legs of so many control steps; the first shows the torque at the start."""
 SLACK = 1e-6
 """Relative rise of V between looks that the held torque and the integration may cause."""
+TURN = 0.05
+"""Radians that a body, or its momentum in body axes, turns in a step at most."""
 
 Array = NDArray[np.float64]
 
@@ -77,8 +80,7 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
     level = min(4.0 * number(frame.potential.top), math.inf if level is None else level)
     random = np.random.default_rng(seed)
     states = draw(flights, floats(frame.P), frame.potential, level, random)
-    if free.wheels is not None:
-        states = np.vstack([states, _rotors(free, certificate, states, random)])
+    free, states = _paced(free, certificate, states, random)
     value, floor = _value(free, frame, claim.witness["epsilon"]), 1e-15 * number(frame.potential.top)
     highest, torque = 0.0, 0.0
     for batch, share in _falling(free, certificate, claim, states, value, floor):
@@ -100,8 +102,7 @@ def _fly_region(loop: ClosedLoop, certificate: Certificate, claim: Claim, flight
         return shape.value(a, states[:4] * sign(states[0]), states[4:7])
 
     states = shape.draw(a, level, flights, np.random.default_rng(seed))
-    if free.wheels is not None:
-        states = np.vstack([states, _rotors(free, certificate, states, np.random.default_rng(seed + 1))])
+    free, states = _paced(free, certificate, states, np.random.default_rng(seed + 1))
     shares = [share for _, share in _falling(free, certificate, claim, states, value, 1e-15 * a * a)]
     return Trial(flights, level, max(shares), None)
 
@@ -140,7 +141,8 @@ def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, fl
     free = replace(_undisturbed(loop, certificate), cover="as_published")
     found = take_surface(Motion(make_subject(free)))
     reach, layer = np.array([number(g) for g in found.reach]), number(found.layer)
-    # |s| falls by at least reach/J a second; held torque makes it cross by one step's worth.
+    free = replace(free, period=_sliding_period(free.period, floats(found.K), reach, least, greatest))
+    # |s| falls by at least reach/J a second.
     level = 0.5 * least * (0.5 * sum(LEGS) * free.period * float(reach.min()) / greatest) ** 2
     level = min(level, math.inf if claim.numbers["start"] is None else claim.numbers["start"])
     states = draw(flights, J, Spring(1), 2.0 + level, np.random.default_rng(seed))
@@ -157,7 +159,10 @@ def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, fl
     states[4:7] = 0.0
     states[4:7] = wanted - s_of(states)
     s, highest, before = wanted, 0.0, np.einsum("ik,ij,jk->k", wanted, J, wanted) / 2.0
-    chatter = math.sqrt(3.0) * (2.0 * float(reach.max()) * free.period / least + layer)
+    # Held torque lets s.Js/2 rise where reach.|s| is at most half a period times reach.J^-1 reach, and by a step from there.
+    size = float(np.linalg.norm(reach))
+    step = free.period * size / least * (1.0 + 0.5 * size / float(reach.min()))
+    chatter = math.sqrt(greatest / least) * (math.sqrt(3.0) * layer + step)
     for steps in LEGS:
         batch = simulate_many(free, states, steps)
         states, s = batch.states, s_of(batch.states)
@@ -169,6 +174,18 @@ def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, fl
     if (np.linalg.norm(s, axis=0) > chatter).any():
         raise BrokenClaimError(_where(certificate, claim, states, int(np.argmax(before)), "has not reached the surface"))
     return Trial(flights, level, highest, None)
+
+
+def _sliding_period(longest: float, K: Array, reach: Array, least: float, greatest: float) -> float:
+    """A period in which the body turns little at the rates of flights to a surface, and in which the torque that holds it
+    there changes by a little of the switching torque."""
+    slope, most = float(np.linalg.norm(K, 2)), float(reach.max())
+    period = min(longest, TURN / max(slope, 5.0 * math.sqrt(most / least)))
+    while True:
+        rate = slope + 0.5 * sum(LEGS) * period * most / least
+        if greatest * period * rate * (rate + slope) ** 2 <= 0.1 * float(reach.min()):
+            return period
+        period *= 0.5
 
 
 def draw(count: int, P: Array, potential: Potential, level: float, random: np.random.Generator) -> Array:
@@ -194,6 +211,9 @@ def _undisturbed(loop: ClosedLoop, certificate: Certificate) -> ClosedLoop:
     """The loop as the claims assume it, with a torque that is renewed so often that it counts as continuous."""
     sampled = certificate.claim("sampling")
     longest = None if sampled is None else sampled.numbers["longest"]
+    if longest is None:
+        # The loop's own period may be one that the linear loop is unstable with.
+        longest = stable_period(Motion(make_subject(loop)))
     period = loop.period if longest is None else min(loop.period, longest / 400.0)
     return replace(
         loop,
@@ -210,6 +230,19 @@ def _undisturbed(loop: ClosedLoop, certificate: Certificate) -> ClosedLoop:
         dynamics=IDEAL,
         cover="shortest" if loop.cover == "hysteresis" else loop.cover,
     )
+
+
+def _paced(
+    loop: ClosedLoop, certificate: Certificate, states: Array, random: np.random.Generator
+) -> tuple[ClosedLoop, Array]:
+    """The loop with a period in which no flight turns far, and the states with the momenta of their rotors."""
+    fastest = float(np.linalg.norm(states[4:7], axis=0).max())
+    if loop.wheels is not None:
+        states = np.vstack([states, _rotors(loop, certificate, states, random)])
+        # The body's momentum is in both.
+        least = float(np.linalg.eigvalsh(tensor(loop.craft.inertia))[0])
+        fastest += certificate.subject["wheels"]["total_momentum"] / least
+    return replace(loop, period=min(loop.period, TURN / max(fastest, 1e-300))), states
 
 
 def _without_friction(wheels: Wheels) -> Wheels:

@@ -10,12 +10,12 @@ from starhold.algebra.polynomial import UnreadableError
 from starhold.certification.certificate import EXACT, Certificate, Claim, Obligation
 from starhold.certification.convergence import assumed, converge
 from starhold.certification.disturbance import disturbance
-from starhold.certification.inertia import inertia_box
+from starhold.certification.inertia import inertia_box, told
 from starhold.certification.limits import torque_limit
 from starhold.certification.motion import Motion
 from starhold.certification.region import region
 from starhold.certification.sampling import sampling
-from starhold.certification.saturation import saturation
+from starhold.certification.saturation import FREE, saturation
 from starhold.certification.sliding import surface_claim
 from starhold.certification.subject import Subject, described, make_subject
 from starhold.loop.closed_loop import ClosedLoop
@@ -107,4 +107,8 @@ def _unshown(subject: Subject, wanted: Wanted) -> list[Claim]:
 
 
 def _undecided(kind: str, numbers: dict[str, Any], subject: Subject, reason: str) -> Claim:
-    return Claim(kind, numbers, {}, assumed(subject), (Obligation("form", EXACT, "undecided", {"reason": reason}),))
+    limits = {"torque-limit": (), "wheels": FREE}
+    assumptions = assumed(subject, limits=limits[kind]) if kind in limits else assumed(subject)
+    if kind == "inertia":
+        assumptions = told(subject, numbers["tolerance"])
+    return Claim(kind, numbers, {}, assumptions, (Obligation("form", EXACT, "undecided", {"reason": reason}),))

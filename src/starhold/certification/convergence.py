@@ -15,7 +15,7 @@ from starhold.certification.frame import (
     Frame,
     contents,
     decrease,
-    known_torque_felt,
+    felt_share,
     margin,
     take_apart,
     take_cross,
@@ -134,12 +134,13 @@ def convergence(motion: Motion, rate: Any = "best") -> tuple[Claim, Basin | None
         return finish()
     slopes = cases(motion.along(motion.lyapunov or Polynomial.constant(0)))
 
-    def rising(limit: Any | None, reason: str) -> None:
-        evidence = rising_state(motion, slopes[0][1], limit)
+    def rising(reason: str) -> None:
+        # Of a claim up to a rate, a state that turns faster is no refutation.
+        evidence = rising_state(motion, slopes[0][1], None if rate in ("best", None) else exact(rate))
         found.add("descent", EXACT_SIGN, False if evidence else None, evidence or {"reason": reason})
 
     if not (definite(symmetric(frame.D)) if frame.whole else all(_falls(*piece) for piece in slopes)):
-        rising(None, "V' may be positive")
+        rising("V' may be positive")
         return finish()
     cross, epsilon, rho, bound = None, fmpq(0), fmpq(0), None
     if frame.exact:
@@ -148,7 +149,7 @@ def convergence(motion: Motion, rate: Any = "best") -> tuple[Claim, Basin | None
     else:
         strict = _strict(motion, frame)
         if strict is None:
-            rising(None, "no weight of the cross term was found for which V falls")
+            rising("no weight of the cross term was found for which V falls")
             return finish()
         cross, epsilon, rho, bound = strict
     level = _capped(None if bound is None else least(frame.P) * bound * bound / 2, motion, frame, rho)
@@ -158,7 +159,7 @@ def convergence(motion: Motion, rate: Any = "best") -> tuple[Claim, Basin | None
     reached_set = {"level": None if level is None else number(level), "start": None if start is None else number(start)}
     reached_set |= contents(start, frame.P, frame.potential)
     if rate != "best" and not _covers(reached_set, rate):
-        rising(None if rate is None else exact(rate), "not shown up to this rate")
+        rising("not shown up to this rate")
         return finish()
     numbers |= reached_set
     obligations, proof = reached(basin, level)
@@ -311,8 +312,7 @@ def _depends_on(motion: Motion, bounded: bool) -> str:
         return "how the target moves does not drop out"
     if "h" not in letters or bounded or not any(motion.subject.modelled):
         return ""
-    slopes = cases(motion.along(motion.lyapunov or Polynomial.constant(0)))
-    if not any(known_torque_felt(slope) for _, slope in slopes):
+    if not felt_share(at_rest(motion.along(motion.lyapunov or Polynomial.constant(0)))[1]):
         return "a torque that the law cancels may fill the wheels without end, and their momentum does not drop out"
     return ""
 

@@ -17,7 +17,7 @@ from starhold.certification.frame import (
     ShapeError,
     contents,
     decrease,
-    known_torque_felt,
+    felt_share,
     margin,
     take_cross,
 )
@@ -36,7 +36,7 @@ from starhold.certification.matrices import (
     spectral_norm_above,
     symmetric,
 )
-from starhold.certification.motion import cases
+from starhold.certification.motion import at_rest
 from starhold.certification.potential import turn_of
 from starhold.certification.subject import above, below
 
@@ -44,10 +44,9 @@ from starhold.certification.subject import above, below
 def disturbance(basin: Basin) -> Claim | None:
     """The claim with the smallest angle that was found; None where no torque from outside is known or given."""
     motion, frame = basin.motion, basin.frame
-    torque = motion.subject.disturbance
     slope = motion.along(motion.lyapunov)  # type: ignore[arg-type]
-    if any(known_torque_felt(value) for _, value in cases(slope)):
-        torque = torque + motion.subject.modelled_norm
+    felt = abs(felt_share(at_rest(slope)[1]))
+    torque = motion.subject.disturbance + felt * motion.subject.modelled_norm
     if torque == 0:
         return None
     torque = exact(above(torque))

@@ -90,6 +90,7 @@ def take_apart(motion: Motion) -> Frame:
     falling = motion.along(function)
     truths, slope = at_rest(falling)
     damping, cubic, mixed, work = parts_of_slope(slope)
+    felt_share(slope)
     P = scaled(matrix_of(function, RATE, RATE), 2)
     found = Frame(P, potential, scaled(damping, -1), cubic, mixed, work, _reach(truths), len(pieces(falling)) == 1)
     if potential.even and not (found.exact and found.whole):
@@ -119,9 +120,19 @@ def parts_of_slope(slope: Polynomial) -> tuple[Rows, Polynomial, Rows, Rows]:
     return quadratic, chosen["cubic"], mixed, outside
 
 
-def known_torque_felt(slope: Polynomial) -> bool:
-    """Whether the modelled torque works on V, thus is not cancelled by the law."""
-    return any(name.startswith("e") for name in slope.variables())
+def felt_share(slope: Polynomial) -> Any:
+    """The share of the modelled torque that works on V as any other torque does, and is not cancelled by the law; ShapeError
+    where it works otherwise."""
+    known, unknown = (
+        Polynomial(
+            {tuple(n.replace("e", "m") for n in m): c for m, c in slope.terms.items() if any(n[0] == kind for n in m)}
+        )
+        for kind in OUTSIDE
+    )
+    share = next((known.terms.get(m, fmpq(0)) / c for m, c in unknown.terms.items()), fmpq(0))
+    if (known - share * unknown).terms:
+        raise ShapeError(f"the law cancels the modelled torque about some axes: V' has the terms {known}")
+    return share
 
 
 def _reach(truths: Truths) -> Any | None:

@@ -28,9 +28,12 @@ from starhold.certification.matrices import (
 )
 from starhold.certification.motion import ATTITUDE, AXES, RATE, Truths
 from starhold.certification.refutation import rational_turn, state_evidence
+from starhold.certification.subject import above, upper
 
 DEPTH = 40
 TRIES = (1e-6, 1e-5, 1e-4, 1e-3)
+SLIGHTLY_MORE = 1 + fmpq(1, 2**40)
+"""For what is rounded down on the way from a turn to a level and back."""
 UNEQUAL = "the weights of the direction cosines differ, for which no bound of the torque is built"
 
 
@@ -91,9 +94,11 @@ def told_set(basin: Basin, level: Any | None, turn: float | None) -> dict[str, A
 def level_of_turn(basin: Basin, turn: float) -> tuple[Any, Any]:
     """V at rest after a turn (rad), and the level that motions from there stay below, both from above."""
     potential = basin.frame.potential
-    half = np.sin(0.5 * turn) ** 2 if potential.even else 1.0 - np.cos(0.5 * turn)
-    start = exact(number(potential.s) * float(half) * (1.0 + 1e-12))
-    return start, exact(number(start * (1 + basin.rho) / (1 - basin.rho)))
+    # Without cancellation: 1 - cos(turn/2) is twice the square of a sine.
+    sine = (arb(turn) / (2 if potential.even else 4)).sin()
+    size: Any = potential.s
+    start = exact(above(upper(size * (1 if potential.even else 2) * sine * sine) * SLIGHTLY_MORE))
+    return start, exact(above(start * (1 + basin.rho) / (1 - basin.rho) * SLIGHTLY_MORE))
 
 
 def _everywhere(pieces: list[tuple[Truths, list[Polynomial]]], limit: Any, kind: str) -> bool:

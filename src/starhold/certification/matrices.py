@@ -96,7 +96,10 @@ def definite(a: Rows) -> bool:
 
 
 def least(a: Rows) -> Any:
-    """A rational just below the smallest eigenvalue of a symmetric matrix."""
+    """A rational just below the smallest eigenvalue of a symmetric matrix; positive where the matrix is definite."""
+    if definite(a):
+        # A small one beside a large one would drown in the rounding of the large one.
+        return 1 / greatest(inverse(a))
     values = np.linalg.eigvalsh(floats(a))
     return _just_below(float(values[0]), float(np.abs(values).max()), a)
 

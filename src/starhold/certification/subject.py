@@ -60,6 +60,10 @@ def make_subject(loop: ClosedLoop, disturbance: float = 0.0, momentum: float | N
     axes, norm = (fmpq(0), fmpq(0), fmpq(0)), fmpq(0)
     if loop.gravity_gradient:
         axes, norm = _gravity_gradient_bounds(loop)
+    # The subject is what its file says.
+    axes, (norm, rate, acceleration) = (
+        tuple(exact(above(x)) for x in found) for found in (axes, (norm, rate, acceleration))
+    )
     total = fmpq(0)
     if loop.wheels is not None:
         total = exact(_momentum(loop, rate) if momentum is None else momentum)

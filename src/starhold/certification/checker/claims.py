@@ -11,7 +11,6 @@ from flint import arb, fmpq, fmpq_mat
 
 from starhold.certification.checker.even import EvenRegion
 from starhold.certification.checker.exact import (
-    ZERO,
     CheckError,
     Obligation,
     definite,
@@ -185,7 +184,7 @@ def disturbance(subject: Subject, claim: Numbers) -> list[Obligation]:
 
     def end() -> str:
         frame = region.frame
-        felt = subject.disturbance + (subject.modelled_norm if frame.felt else ZERO)
+        felt = subject.disturbance + subject.modelled_norm * max(frame.felt, region.crossed.felt)
         demand(torque >= felt, "the torque from outside may be larger")
         x, y = ball()
         demand(y < 1, "the ball reaches every attitude")
@@ -193,7 +192,7 @@ def disturbance(subject: Subject, claim: Numbers) -> list[Obligation]:
         demand(region.start is not None and level < region.start, "the end is no lower than the start")
         angle, rate = rational(numbers["angle"]), rational(numbers["rate"])
         demand(0 <= angle <= down(arb.pi()), "the angle is not between 0 and a half turn")
-        demand(down(arb(frame.s) * (1 - (arb(angle) / 2).cos())) >= level, "the angle may end larger")
+        demand(down(arb(frame.s) * 2 * (arb(angle) / 4).sin() ** 2) >= level, "the angle may end larger")
         demand(rate >= 0, "the rate is negative")
         held = plus(times(rate**2, frame.P), unit(3, 2 * level), -1)
         demand(definite(held, strictly=False), "the rate may end larger")

@@ -145,6 +145,11 @@ def greatest(a: Rows) -> Any:
     raise CheckError("no bound of an eigenvalue was found")
 
 
+def least(a: Rows) -> Any:
+    """A rational that no eigenvalue of a symmetric matrix falls below; positive where all of them are."""
+    return 1 / greatest(inverted(a)) if definite(a) else -greatest(times(-ONE, a))
+
+
 def radius_of(a: Rows) -> Any:
     """A rational that the modulus of no eigenvalue of a symmetric matrix exceeds."""
     return max(greatest(a), greatest(times(-ONE, a)), ZERO)

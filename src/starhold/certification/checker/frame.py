@@ -30,15 +30,16 @@ from starhold.certification.checker.subject import mixed, named, quadratic, vari
 
 @dataclass(frozen=True)
 class Frame:
-    """V = w.Pw/2 + (a function of the attitude), V' = -w.Dw + (at most kappa |w|3) + w.Wm + ...; felt: the modelled torque
-    acts as m does; tops: P is nowhere larger than the largest of these, for any inertia the loop may have."""
+    """V = w.Pw/2 + (a function of the attitude), V' = -w.Dw + (at most kappa |w|3) + w.Wm + ...; felt: the share of the
+    modelled torque that acts as m does; tops: P is nowhere larger than the largest of these, for any inertia the loop may
+    have."""
 
     P: Rows
     tops: list[Rows]
     D: Rows
     kappa: Any
     W: Rows
-    felt: bool
+    felt: Any
 
 
 @dataclass(frozen=True)
@@ -58,11 +59,12 @@ class EvenFrame(Frame):
 
 @dataclass(frozen=True)
 class Crossed:
-    """C = q.Jw, C' = -q.Aq - q.Bw + (at most sigma |w|2) + q.m."""
+    """C = q.Jw, C' = -q.Aq - q.Bw + (at most sigma |w|2) + q.m; felt as of V."""
 
     A: Rows
     B: Rows
     sigma: Any
+    felt: Any
 
 
 def is_even(loop: Loop) -> bool:
@@ -144,13 +146,13 @@ def crossed(loop: Loop) -> Crossed:
     demand(not strange, f"C' has the terms {', '.join(sorted(strange))}")
     terms = loop.plain(slope.only(lambda m: len(letters(m)) == 2))
     demand(mixed(terms, TURN, named("m")) == unit(3), "torque from outside acts on C in another way")
-    _felt(kinds, "q")
+    felt = _felt(kinds, "q")
     forms = loop.over(slope.only(lambda m: len(letters(m)) == 3))
     total = ZERO
     for name in ATTITUDE:
         # |(q0, q)| = 1, so that the sum of q_k w.F_k w is at most the root of the sum of squares.
         total += _largest(loop, {without(m, name): share for m, share in forms.items() if name in m}) ** 2
-    return Crossed(times(-1, quadratic(terms, TURN)), times(-1, mixed(terms, TURN, RATE)), root_up(total))
+    return Crossed(times(-1, quadratic(terms, TURN)), times(-1, mixed(terms, TURN, RATE)), root_up(total), felt)
 
 
 def _largest(loop: Loop, form: Mapping[Monomial, Polynomial]) -> Any:
@@ -166,11 +168,15 @@ def _largest(loop: Loop, form: Mapping[Monomial, Polynomial]) -> Any:
     return largest
 
 
-def _felt(kinds: Mapping[str, Polynomial], state: str) -> bool:
-    """Whether the modelled torque acts where the unknown one does; a CheckError where it is neither that nor cancelled."""
+def _felt(kinds: Mapping[str, Polynomial], state: str) -> Any:
+    """The share of the modelled torque that acts as the unknown one does, the rest being cancelled; a CheckError where it
+    acts in another way."""
     known, unknown = kinds.get(f"e{state}"), kinds.get(f"m{state}", Polynomial({}))
     if known is None:
-        return False
+        return ZERO
     as_unknown = replaced(known, dict(zip(named("e"), variables(named("m")), strict=True)))
-    demand(not (as_unknown - unknown).terms, "the modelled torque is cancelled in part")
-    return True
+    first = next(iter(as_unknown.terms))
+    demand(first in unknown.terms, "the modelled torque acts where no other does")
+    share = as_unknown.terms[first] / unknown.terms[first]
+    demand(not (as_unknown - share * unknown).terms, "the modelled torque is cancelled about some axes only")
+    return abs(share)

@@ -200,7 +200,7 @@ class ModalRegion:
         """Every rest turned up to the turn, and every rate up to the rate on target, is in {V <= level}."""
         turn, rate = rational(self.numbers["turn"]), rational(self.numbers["rate"])
         demand(0 <= turn <= down(2 * arb.pi()), "the turn is not between 0 and a full one")
-        most = up(1 - (arb(turn) / 2).cos())
+        most = up(2 * (arb(turn) / 4).sin() ** 2)
         ends = [most]
         if self.c2 < 0 and -self.p / (2 * self.c2) < most:
             ends.append(-self.p / (2 * self.c2))

@@ -55,7 +55,7 @@ class OddRegion(Region[OddFrame]):
 
     def holds_turn(self, turn: Any) -> bool:
         # What grows with the turn up to a full one.
-        return turn <= down(self.around) and up(arb(self.frame.s) * (1 - (arb(turn) / 2).cos())) <= self.start
+        return turn <= down(self.around) and up(arb(self.frame.s) * 2 * (arb(turn) / 4).sin() ** 2) <= self.start
 
     def positive(self) -> str:
         demand(definite(self.frame.P) and self.frame.s > 0, "V is not positive")

@@ -18,7 +18,7 @@ from starhold.certification.checker.exact import (
     definite,
     demand,
     even,
-    greatest,
+    least,
     plus,
     rational,
     root_up,
@@ -96,7 +96,7 @@ class Region(ABC, Generic[F]):
         """What |w| does not exceed on the level set: as the witness says, else as the least eigenvalue of P tells."""
         if self.given is not None or self.level is None or self.loop.shifted:
             return self.given
-        return root_up(2 * self.level / -greatest(times(-1, self.frame.P)))
+        return root_up(2 * self.level / least(self.frame.P))
 
     def form(self) -> str:
         """V and V' have the terms of a frame and no others."""

@@ -22,6 +22,7 @@ from starhold.certification.checker.exact import (
     even,
     greatest,
     intervals,
+    least,
     plus,
     rational,
     replaced,
@@ -128,14 +129,14 @@ class Sliding:
             inside = width > 0 and added <= (g - m) * width
             far = width * (m + root_up(m**2 + 4 * g * added / width)) / (2 * g) if inside else added / (g - m)
             square += far**2
-        moments = greatest(self.subject.inertia), -greatest(times(-1, self.subject.inertia))
+        moments = greatest(self.subject.inertia), least(self.subject.inertia)
         demand(self.size >= 0 and self.size**2 * moments[1] >= moments[0] * square, "|s| may stay larger")
         demand(definite(plus(even(self.K), unit(3, self.size), -1)), "the layer is too thick for the surface's slope")
         return "s.Js falls but where every |s_i| is small"
 
     def least(self) -> Any:
         """A rational not above the least eigenvalue of the symmetric part of K."""
-        return -greatest(times(-1, even(self.K)))
+        return least(even(self.K))
 
     def ends(self) -> str:
         """|q| <= |s|/K_min in the end, as the derivative of 2 (1 - q0) is at most |q| (|s| - K_min |q|); and w = s - Kq."""
@@ -159,7 +160,7 @@ class Sliding:
             return "the derivative of 1 - q0 is negative beside it"
         demand(not told["everything"] and told["start"] is not None and told["rate_start"] is not None, "there is no start")
         start, rate, J = rational(told["start"]), rational(told["rate_start"]), self.subject.inertia
-        slowest = -greatest(times(-1, J)) * self.least() ** 2
+        slowest = least(J) * self.least() ** 2
         demand(self.least() > 0 and 0 < 2 * start < slowest, "the double cover may switch on the way")
         demand(definite(plus(even(self.K), unit(3, self.size), -1)), "the layer lets the double cover switch")
         demand(rate >= 0 and 0 <= turn <= down(arb.pi()), "turn or rate is out of range")

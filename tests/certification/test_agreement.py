@@ -1,0 +1,121 @@
+"""Certifier, checker and flights say the same, also where numbers or scenarios are odd."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from flint import arb, fmpq
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from starhold.analysis.trial import fly_claims
+from starhold.certification.certificate import write
+from starhold.certification.certify import Wanted, certify
+from starhold.certification.checker import check_file, passed
+from starhold.certification.checker import exact as checking
+from starhold.certification.matrices import definite, identity, least, plus, rows
+from starhold.laws import pd, wheel
+from starhold.laws.catalogue import catalogue
+from starhold.models.craft import make_craft
+from tests.certification.hunt import fault_in, random_scenario
+from tests.certification.loops import free, loop_of, rotors
+
+
+def checked(certificate, tmp_path):
+    write([certificate], "made", tmp_path / "certificate.json")
+    return check_file(tmp_path / "certificate.json")
+
+
+FOUND = (8, 12, 15, 22, 28, 30, 42, 58, 66, 91, 98, 99, 111, 118, 128)
+"""Seeds of scenarios that certifier, checker or flights once did not agree on."""
+
+
+@pytest.mark.parametrize("seed", FOUND)
+def test_hunted_scenarios(seed, tmp_path):
+    text = random_scenario(np.random.default_rng(seed), tmp_path)
+    assert fault_in(text, tmp_path) == ""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(1000, 1400, 50))
+def test_many_random_scenarios(first, tmp_path):
+    for seed in range(first, first + 50):
+        text = random_scenario(np.random.default_rng(seed), tmp_path)
+        assert fault_in(text, tmp_path) == "", text
+
+
+# --- what is asked of laws without V --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("wheels", [False, True])
+@pytest.mark.parametrize("law", ["sliding", "modal"])
+def test_what_cannot_be_shown_is_undecided_for_the_checker_too(law, wheels, tmp_path):
+    wanted = Wanted(rate=math.inf, turn=1.0, inertia_tolerance=0.1)
+    gains = catalogue()[law].examples()[0]
+    certificate = certify(rotors(law, gains) if wheels else free(loop_of(law, gains)), law, wanted)
+    assert [claim.outcome for claim in certificate.claims].count("undecided") == 3
+    assert passed(checked(certificate, tmp_path))
+
+
+@pytest.mark.parametrize("compensation", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize("wheels", [False, True])
+def test_a_law_may_cancel_a_part_of_the_modelled_torque(compensation, wheels, tmp_path):
+    gains = wheel.Gains(0.09, (0.0045, 0.0045, 0.0045), compensation)
+    if wheels:
+        certificate = certify(rotors("wheel", gains, gravity_gradient=True, orbit=True), "wheel")
+    else:
+        certificate = certify(loop_of("wheel", gains), "wheel")
+    assert certificate.claim("convergence").outcome == "proved"
+    assert passed(checked(certificate, tmp_path))
+
+
+# --- numbers at the edge --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law", ["pd", "wheel"])
+@pytest.mark.parametrize("turn", [1e-100, 1e-12, 1e-8, 1e-4, 0.02, 1.0])
+def test_the_set_of_a_turn_holds_it(law, turn, tmp_path):
+    gains = {"pd": pd.Gains(0.09, 0.009), "wheel": wheel.Gains(0.09, (0.0045,) * 3)}[law]
+    certificate = certify(free(loop_of(law, gains)), law, Wanted(turn=turn))
+    claim = certificate.claim("torque-limit")
+    assert claim.outcome == "proved"
+    size = 0.018 * 2 * (arb(turn) / 4).sin() ** 2 if law == "pd" else 0.018 * (arb(turn) / 2).sin() ** 2
+    assert arb(claim.numbers["start"]) >= size * (1 - arb(2) ** -45)
+    # And hardly more.
+    assert claim.numbers["start"] <= float(size.mid()) * (1.0 + 1e-9)
+    assert passed(checked(certificate, tmp_path))
+
+
+@settings(max_examples=60)
+@given(st.floats(-18.0, 3.0), st.floats(-18.0, 3.0), st.floats(-18.0, 3.0), st.integers(0, 2**32 - 1), st.booleans())
+def test_the_least_eigenvalue_is_bounded_closely_from_below(a, b, c, seed, turned):
+    D = np.diag([10.0**a, 10.0**b, 10.0**c])
+    Q = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0] if turned else np.eye(3)
+    A = rows(((Q @ D @ Q.T) + (Q @ D @ Q.T).T) / 2.0)
+    for bound in (least(A), checking.least(A)):
+        assert checking.definite(plus(A, identity(3, bound), -1), strictly=False)
+        if definite(A):
+            assert bound > 0
+            assert not definite(plus(A, identity(3, bound * (1 + fmpq(1, 10**9))), -1))
+
+
+@pytest.mark.parametrize("moments", [[1e-14, 1.0, 1.0], [1e-20, 1.0, 1.0], [1e-14, 1e-14, 1e-14], [1e3, 1e3, 1e-12]])
+@pytest.mark.parametrize("law", ["pd", "lyapunov", "lqr", "sliding", "modal", "wheel"])
+def test_thin_bodies_have_certificates(law, moments, tmp_path):
+    for gains in catalogue()[law].examples()[: 1 if law == "modal" else None]:
+        certificate = certify(
+            free(loop_of(law, gains, make_craft(moments, torque_limit=0.05))), law, Wanted(disturbance=1e-6)
+        )
+        json.dumps([claim.numbers for claim in certificate.claims], allow_nan=False)
+        for claim in certificate.claims:
+            assert claim.outcome != "proved" or (claim.witness.get("rate_bound") or 1.0) > 0.0
+        assert passed(checked(certificate, tmp_path))
+
+
+def test_flights_do_not_hold_the_torque_for_a_period_that_is_too_long():
+    loop = free(loop_of("pd", pd.Gains(0.09, 0.009), period=45.0))
+    certificate = certify(loop, "pd")
+    assert certificate.claim("sampling").outcome == "refuted"
+    assert certificate.claim("convergence").outcome == "proved"
+    assert fly_claims(loop, certificate, flights=200).highest_share <= 1.0 + 1e-6
