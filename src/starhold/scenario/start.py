@@ -15,7 +15,7 @@ from starhold.laws.interface import Start
 from starhold.models.rigid_body import State
 from starhold.models.target import Target, inertial, orbital, tabulate
 from starhold.models.wheeled_body import WheeledState
-from starhold.models.wheels import authority, capacity
+from starhold.models.wheels import capacity
 from starhold.scenario.history import read_history
 from starhold.scenario.rotors import start_momenta
 from starhold.scenario.schema import Pointing
@@ -87,9 +87,8 @@ def told_to_design(scenario: Scenario) -> Start:
     held = _target_at_start(goal, begun.position, begun.velocity)
     error = relative(held.attitude, begun.attitude)
     rate = subtract(begun.rate, to_body(error, held.rate))
-    body, momentum = table.spacecraft, math.inf
-    torque = math.inf if body.limit == "none" else body.torque_limit
+    momentum, free = math.inf, table.spacecraft.limit == "none" and scenario.wheels is None
     if scenario.wheels is not None and isinstance(begun, WheeledState):
-        torque = min(torque, authority(scenario.wheels))
         momentum = capacity(scenario.wheels, begun.momentum)
+    torque = math.inf if free else scenario.torque_limit(scenario.wheels)
     return Start(error, rate, torque, momentum, table.settling.attitude_tolerance, table.settling.rate_tolerance)
