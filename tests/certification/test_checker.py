@@ -511,23 +511,6 @@ def test_what_is_refuted_or_undecided_is_not_claimed(tmp_path):
         assert not any(f.verdict == "holds" for f in found if f.claim in unproved)
 
 
-def test_a_refutation_must_be_one():
-    state = {"attitude": [1.0, 0.0, 0.0, 0.0], "rate": [1.0, 0.0, 0.0]}
-    claim = converging()
-    claim["outcome"] = "refuted"
-    for evidence in ({"state": state, "V'": 1.0}, {"state": state, "V": -1.0}, {"state": state}, {}):
-        claim["obligations"] = [{"name": "descent", "how": "exact inequality", "outcome": "refuted", "evidence": evidence}]
-        content = by_hand("pd", PD, [claim])
-        content["certificates"][0]["outcome"] = "refuted"
-        assert reasons(content)
-    rising = {"k_rate": -0.1, "k_attitude": 0.1}
-    claim["obligations"][0]["evidence"] = {"state": state, "V'": 0.1}
-    content = by_hand("matrix-pd", rising, [claim])
-    content["certificates"][0]["outcome"] = "refuted"
-    assert passed(check(content))
-    assert {f.verdict for f in check(content)} == {"not claimed"}
-
-
 # --- its mathematics --------------------------------------------------------------------------------------------------
 
 ROOTS = some.lists(some.complex_numbers(max_magnitude=3.0, allow_nan=False), min_size=1, max_size=3)

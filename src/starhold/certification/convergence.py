@@ -35,7 +35,7 @@ from starhold.certification.matrices import (
     transposed,
 )
 from starhold.certification.motion import AXES, RATE, Motion, ShapeError, at_rest, cases
-from starhold.certification.refutation import rising_state, state_evidence, unlike_positive
+from starhold.certification.refutation import rising_state, unlike_positive
 from starhold.certification.subject import Subject, below
 
 ASSUMPTIONS = (
@@ -129,14 +129,18 @@ def convergence(motion: Motion, rate: Any = "best") -> tuple[Claim, Basin | None
         return finish()
     found.add("form", EXACT, True)
     positive = definite(frame.P) and frame.potential.positive
-    found.add("positive", EXACT_SIGN, positive, {} if positive else unlike_positive(motion, frame))
     if not positive:
+        against = unlike_positive(frame)
+        found.add("positive", EXACT_SIGN, False if "state" in against else None, against)
         return finish()
+    found.add("positive", EXACT_SIGN, True)
     slopes = cases(motion.along(motion.lyapunov or Polynomial.constant(0)))
 
     def rising(reason: str) -> None:
-        # Of a claim up to a rate, a state that turns faster is no refutation.
-        evidence = rising_state(motion, slopes[0][1], None if rate in ("best", None) else exact(rate))
+        # Where no set is asked for, only a V that rises however near the target is refuted.
+        near = not (frame.exact and definite(symmetric(frame.D)))
+        limit = None if rate in ("best", None) else exact(rate)
+        evidence = rising_state(*slopes[0], limit) if rate != "best" or near else None
         found.add("descent", EXACT_SIGN, False if evidence else None, evidence or {"reason": reason})
 
     if not (definite(symmetric(frame.D)) if frame.whole else all(_falls(*piece) for piece in slopes)):
@@ -278,7 +282,8 @@ def _double_cover(motion: Motion, frame: Frame, stay: Any | None) -> tuple[str, 
         # V has no minimum there, and falls wherever the body turns.
         return "half turns repel", EXACT_SIGN, True, {}
     if loop.cover == "hysteresis":
-        return "jumps lower V", EXACT_SIGN, 0.0 < loop.hysteresis_width < 1.0, {}
+        narrow = 0.0 < loop.hysteresis_width < 1.0
+        return "jumps lower V", EXACT_SIGN, narrow or None, {} if narrow else {"reason": "the width is not between 0 and 1"}
     if loop.wheels is not None and frame.exact:
         # Whatever momentum the wheels store, by the same argument as for any inertia.
         stiffness = motion.linear(-1)[1]
@@ -297,7 +302,9 @@ def _repels(motion: Motion) -> tuple[bool | None, dict[str, Any]]:
     roots = characteristic_roots([*scaled(upper, -1), *lower])
     if any(root.real.contains(0) for root, _ in roots):
         return None, {"reason": "a root on the imaginary axis is not excluded"}
-    return any(root.real > 0 for root, _ in roots), {}
+    if any(root.real > 0 for root, _ in roots):
+        return True, {}
+    return None, {"reason": "no root on the right was found"}
 
 
 def _determinant(K: Rows) -> Any:
@@ -324,7 +331,4 @@ def _rests_only_there(motion: Motion) -> tuple[bool | None, dict[str, Any]]:
         own = at_rest(component)[1].only(lambda m: not any(name[0] in "wem" for name in m))
         if any(len(m) != 1 or m[0] not in AXES for m in own.terms):
             return None, {"reason": f"the acceleration at rest is {own}"}
-    if _determinant(K) != 0:
-        return True, {}
-    axis = np.linalg.svd(floats(K))[2][-1]
-    return False, state_evidence((0.0, *axis.tolist()), (0.0, 0.0, 0.0), "torque at rest", 0.0)
+    return (True, {}) if _determinant(K) != 0 else (None, {"reason": "the stiffness is singular"})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from flint import fmpq
 
 from starhold.algebra.polynomial import Polynomial, exact
 from starhold.certification.matrices import floats, number, symmetric
-from starhold.certification.motion import ATTITUDE, RATE, Motion
+from starhold.certification.motion import ATTITUDE, RATE, Truths
 from starhold.certification.potential import Cosines
 
 if TYPE_CHECKING:
@@ -34,8 +34,9 @@ def rational_turn(attitude: Sequence[float]) -> list[Any]:
     return [sign * (1 - square) / (1 + square), *(sign * 2 * x / (1 + square) for x in t)]
 
 
-def rising_state(motion: Motion, slope: Polynomial, rate: Any | None, tries: int = 200) -> dict[str, Any] | None:
-    """A state with |w| <= rate (None: any) at which V' > 0 without torque from outside, verified; None if none is found."""
+def rising_state(truths: Truths, slope: Polynomial, rate: Any | None, tries: int = 200) -> dict[str, Any] | None:
+    """A state with |w| <= rate (None: any) at which V' > 0 without torque from outside on a piece of it, verified; None if
+    none is found."""
     own = slope.only(lambda m: not any(name[0] in "emra" for name in m))
     names = [*ATTITUDE, *RATE]
     compiled = [([names.index(n) for n in m], number(c)) for m, c in own.terms.items()]
@@ -60,40 +61,37 @@ def rising_state(motion: Motion, slope: Polynomial, rate: Any | None, tries: int
             found = value(np.hstack([q, length * w]))
             place = int(np.argmax(found))
             if found[place] > 0.0:
-                verified = _verified(own, q[place], length * w[place], rate)
+                verified = _verified(truths, own, q[place], length * w[place], rate)
                 if verified is not None:
                     return verified
     return None
 
 
-def _verified(slope: Polynomial, attitude: Any, rate: Any, limit: Any | None) -> dict[str, Any] | None:
+def _verified(truths: Truths, slope: Polynomial, attitude: Any, rate: Any, limit: Any | None) -> dict[str, Any] | None:
     turn = rational_turn(attitude)
     w = [exact(float(f"{x:.6g}")) for x in rate]
     if limit is not None and sum((x * x for x in w), fmpq(0)) > limit * limit:
         return None
-    value = slope.at(dict(zip([*ATTITUDE, *RATE], [*turn, *w], strict=True)))
+    values: dict[str, Any] = dict(zip([*ATTITUDE, *RATE], [*turn, *w], strict=True))
+    conditions = [condition.positive for condition, _ in truths]
+    values |= dict.fromkeys({name for p in conditions for name in p.variables()} - set(values), fmpq(0))
+    if any((p.at(values) > 0) != truth for p, (_, truth) in zip(conditions, truths, strict=True)):
+        return None
+    value = slope.at(values)
     return state_evidence(turn, w, "V'", value) if value > 0 else None
 
 
-def unlike_positive(motion: Motion, frame: Frame) -> dict[str, Any]:
-    """A state at which V is not positive."""
-    if isinstance(frame.potential, Cosines) and not frame.potential.positive:
-        axis = np.linalg.eigh(floats(frame.potential.N))[1][:, 0]
-        q = rational_turn([0.0, *axis.tolist()])
-        return state_evidence(q, (0.0, 0.0, 0.0), "V", frame.potential.at(q))
-    if not frame.potential.positive:
-        return state_evidence((0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 0.0), "V", frame.s)
+def unlike_positive(frame: Frame) -> dict[str, Any]:
+    """A state at which V is not positive, or why none is told."""
+    still, on_target = (fmpq(0),) * 3, (fmpq(1), *(fmpq(0),) * 3)
     values, axes = np.linalg.eigh(floats(symmetric(frame.P)))
     w = [exact(float(f"{x:.9g}")) for x in axes[:, 0]]
-    value = sum((w[i] * frame.P[i][j] * w[j] for i in range(3) for j in range(3)), fmpq(0)) / 2
-    return (
-        state_evidence((1.0, 0.0, 0.0, 0.0), w, "V", value)
-        if value <= 0
-        else {"reason": f"P has the eigenvalue {values[0]:g}"}
-    )
-
-
-def exact_state(evidence: Mapping[str, Any]) -> dict[str, Any]:
-    """The variables of a state in evidence."""
-    state = evidence["state"]
-    return {name: exact(x) for name, x in zip([*ATTITUDE, *RATE], [*state["attitude"], *state["rate"]], strict=True)}
+    tried: list[tuple[Any, Any]] = [(on_target, w), ((fmpq(0), fmpq(1), *still[:2]), still)]
+    if isinstance(frame.potential, Cosines):
+        tried.append((rational_turn([0.0, *np.linalg.eigh(floats(frame.potential.N))[1][:, 0].tolist()]), still))
+    for q, rate in tried:
+        energy = sum((rate[i] * frame.P[i][j] * rate[j] for i in range(3) for j in range(3)), fmpq(0)) / 2
+        value = energy + frame.potential.at(q)
+        if value <= 0:
+            return state_evidence(q, rate, "V", value)
+    return {"reason": f"P has the eigenvalue {values[0]:g}, or the attitude's part of V is not positive"}

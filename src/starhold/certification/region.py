@@ -128,7 +128,10 @@ def region(subject: Subject) -> Claim | None:
     if shape == ENERGY:
         found.add("only rest", LASALLE, True)
     if subject.loop.cover == "hysteresis":
-        found.add("jumps lower V", EXACT_SIGN, 0.0 < subject.loop.hysteresis_width < 1.0)
+        narrow = 0.0 < subject.loop.hysteresis_width < 1.0
+        found.add(
+            "jumps lower V", EXACT_SIGN, narrow or None, {} if narrow else {"reason": "the width is not between 0 and 1"}
+        )
     else:
         found.add("single rest in the set", EXACT_SIGN, True)
     return finish()

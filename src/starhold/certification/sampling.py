@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from flint import arb
+from flint import arb, fmpq_mat
 
 from starhold.algebra.polynomial import exact
 from starhold.certification.certificate import EXACT_SIGN, Claim, Obligation
@@ -36,6 +36,9 @@ ASSUMPTIONS = (
 )
 STILL_WHEELS = "no stored momentum"
 ROOTS = "certified roots"
+MOST_BITS = 1_000
+"""Of the numbers of a characteristic polynomial whose roots are told apart: everyday ones have 500; of gains of 1e-300
+they have 4000, which takes minutes."""
 
 
 def sampling(motion: Motion) -> Claim | None:
@@ -49,12 +52,22 @@ def sampling(motion: Motion) -> Claim | None:
     if loop.wheels is not None:
         assumptions = (*(WHEELS if a == "torque not limited" else a for a in ASSUMPTIONS), STILL_WHEELS)
     J, period = motion.subject.inertia, exact(loop.period)
+    if _bits(stepped(J, rate, attitude, period)) > MOST_BITS:
+        numbers: dict[str, Any] = {"period": number(period), "longest": None, "every_shorter": False}
+        reason = "inertia, gains and period are too far apart in size for certified roots"
+        return Claim(
+            "sampling",
+            numbers,
+            {},
+            assumptions,
+            (Obligation("stable at the period", ROOTS, "undecided", {"reason": reason}),),
+        )
     roots = sampled_roots(J, rate, attitude, period)
     values = sorted(
         (complex(number(r.real), number(r.imag)) for r, n in roots for _ in range(n)), key=lambda z: (-abs(z), z.imag)
     )
     radius, stable = _radius(roots)
-    numbers: dict[str, Any] = {
+    numbers = {
         "period": number(period),
         "radius": radius,
         "eigenvalues": [[z.real, z.imag] for z in values],
@@ -77,14 +90,24 @@ def sampling(motion: Motion) -> Claim | None:
     return Claim("sampling", numbers, {}, assumptions, tuple(obligations))
 
 
-def sampled_roots(J: Rows, rate: Rows, attitude: Rows, period: Any) -> list[tuple[Any, int]]:
-    """Enclosures of the eigenvalues, with multiplicities, of w+ = w + h J^-1 u, q+ = q + h w/2 + h2 J^-1 u/4 with
-    u = -rate w - attitude q."""
+def stepped(J: Rows, rate: Rows, attitude: Rows, period: Any) -> Rows:
+    """The matrix of a step: w+ = w + h J^-1 u, q+ = q + h w/2 + h2 J^-1 u/4 with u = -rate w - attitude q."""
     turn = inverse(J)
     pull = [[*a, *b] for a, b in zip(product(turn, rate), product(turn, attitude), strict=True)]
     still = [[*a, *b] for a, b in zip(identity(3, period / 2), identity(3), strict=True)]
     turning = [[*a, *b] for a, b in zip(identity(3), scaled(identity(3), 0), strict=True)]
-    return characteristic_roots([*plus(turning, pull, -period), *plus(still, pull, -period * period / 4)])
+    return [*plus(turning, pull, -period), *plus(still, pull, -period * period / 4)]
+
+
+def sampled_roots(J: Rows, rate: Rows, attitude: Rows, period: Any) -> list[tuple[Any, int]]:
+    """Enclosures of the eigenvalues of a step, with multiplicities."""
+    return characteristic_roots(stepped(J, rate, attitude, period))
+
+
+def _bits(step: Rows) -> int:
+    """The length of the longest number of a matrix's characteristic polynomial."""
+    found: Any = fmpq_mat(step).charpoly()
+    return max(int(part).bit_length() for c in found.coeffs() for part in (c.p, c.q))
 
 
 def _radius(roots: list[tuple[Any, int]]) -> tuple[float, bool]:

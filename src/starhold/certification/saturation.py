@@ -21,7 +21,7 @@ from starhold.certification.limits import (
     told_set,
     within,
 )
-from starhold.certification.matrices import greatest, inverse, number, product, root_above
+from starhold.certification.matrices import greatest, inverse, least, number, product, root_above
 from starhold.certification.subject import above, below
 from starhold.models.wheeled_body import WheeledState
 from starhold.models.wheels import BAND, Wheels
@@ -47,6 +47,10 @@ def saturation(basin: Basin, turn: float | None = None) -> Claim | None:
         found = Obligation("torque", BALLS, "undecided", {"reason": reason})
         return Claim("wheels", numbers | asked, {}, assumed(basin.motion.subject, limits=FREE), (found,))
 
+    J = basin.motion.subject.inertia
+    stored = np.array(cast(WheeledState, loop.start).momentum) @ np.array(wheels.axes)
+    if numbers["momentum"] + float(np.linalg.norm(stored)) < number(least(J) * basin.motion.subject.target_rate):
+        return refused("nothing at rest on target has so little momentum")
     if loop.allocation != "least-squares":
         return refused("only for torque shared out by least squares")
     if basin.frame.s is None:

@@ -79,8 +79,13 @@ def surface_claim(subject: Subject) -> Claim | None:
     add("reach exceeds torque", EXACT_SIGN, "proved")
     if not definite(symmetric(found.K)):
         values, axes = np.linalg.eigh(np.array([[number(x) for x in row] for row in symmetric(found.K)]))
-        evidence = {"axis": axes[:, 0].tolist(), "q.Kq": float(values[0])}
-        add("surface holds the target", EXACT_SIGN, "refuted" if values[0] < 0.0 else "undecided", evidence)
+        axis = axes[:, 0].tolist()
+        form: Any = sum(
+            (exact(a) * exact(b) * k for a, row in zip(axis, found.K, strict=True) for b, k in zip(axis, row, strict=True)),
+            fmpq(0),
+        )
+        against = {"axis": axis, "q.Kq": number(form)} if form < 0 else {"reason": f"q.Kq has the eigenvalue {values[0]:g}"}
+        add("surface holds the target", EXACT_SIGN, "refuted" if form < 0 else "undecided", against)
         return finish()
     add("surface holds the target", EXACT_SIGN, "proved")
     size = _layer_bound(subject, found, torque)
@@ -189,8 +194,8 @@ def _layer_bound(subject: Subject, found: Surface, torque: list[Any]) -> Any:
 
 def _overpowered(subject: Subject, found: Surface, axis: int) -> tuple[str, dict[str, Any]]:
     """A place on the orbit and a state at which the torque pushes the surface variable away."""
-    loop = subject.loop
-    if subject.disturbance == 0 and loop.gravity_gradient:
+    loop, push, where = subject.loop, subject.disturbance, dict[str, Any]()
+    if loop.gravity_gradient:
         distance = number(exact(float(perigee(loop)[0].mid())))
         random = np.random.default_rng(0)
         directions = random.normal(size=(2000, 3))
@@ -198,14 +203,11 @@ def _overpowered(subject: Subject, found: Surface, axis: int) -> tuple[str, dict
         strength = 3.0 * loop.craft.gravity / distance**5
         pushed = [gravity_gradient(tuple(d), strength, loop.craft)[axis] for d in directions.tolist()]
         place = int(np.argmax(pushed))
-        if exact(pushed[place]) <= found.reach[axis]:
-            return "undecided", {
-                "reason": "the bound of the modelled torque exceeds the reach, no place on the orbit was found"
-            }
-        push = {"position": directions[place].tolist(), "torque": pushed[place]}
-    else:
-        push = {"torque": number(subject.disturbance + subject.modelled[axis])}
+        push, where = push + exact(pushed[place]), {"position": directions[place].tolist()}
+    # Floats told where.
+    if push * (1 - fmpq(1, 10**9)) <= found.reach[axis]:
+        return "undecided", {"reason": "the bound of the torque exceeds the reach, but no torque was found that does"}
     rate = [0.0, 0.0, 0.0]
     rate[axis] = 1e-3 + 2.0 * number(found.layer)
     state = {"attitude": [1.0, 0.0, 0.0, 0.0], "rate": rate}
-    return "refuted", {"axis": axis + 1, "reach": number(found.reach[axis]), **push, "state": state}
+    return "refuted", {"axis": axis + 1, "reach": number(found.reach[axis]), "torque": number(push), **where, "state": state}

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import Polynomial
 from starhold.certification.checker.exact import ONE, ZERO
+from starhold.certification.checker.reading import in_time
 
 Box: TypeAlias = Mapping[str, tuple[Any, Any]]
 """Ends of each variable's interval, rationals."""
@@ -38,6 +39,7 @@ def negative_where(fall: Polynomial, room: Polynomial, box: Box) -> bool:
     waiting = stacked((fall, room), box, degrees)
     seen = 0
     while len(waiting):
+        in_time()
         seen += len(waiting)
         if seen > MOST or _fails_at_a_corner(waiting):
             return False

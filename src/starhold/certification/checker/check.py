@@ -4,7 +4,6 @@ number and condition anew from the law's and the models' equations, by other met
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -18,11 +17,13 @@ from starhold.certification.checker.claims import CLAIMS
 from starhold.certification.checker.exact import CheckError, Obligation, Verdict, demand
 from starhold.certification.checker.invariant import FORMAT as INVARIANT
 from starhold.certification.checker.invariant import invariant_findings
+from starhold.certification.checker.reading import limited, read_file, shallow
 from starhold.certification.checker.refutation import refutation
 from starhold.certification.checker.shapes import (
     CERTIFICATE,
     CLAIM,
     FILE,
+    HOWS,
     NUMBERS,
     OBLIGATION,
     STATION,
@@ -32,7 +33,6 @@ from starhold.certification.checker.shapes import (
 )
 from starhold.certification.checker.station import STATION_CLAIMS, Station, read_station, station_refutation
 from starhold.certification.checker.subject import Subject, read_subject
-from starhold.errors import InputError
 
 FORMAT = "starhold certificate 1"
 BITS = 192
@@ -57,23 +57,7 @@ def passed(findings: Sequence[Finding]) -> bool:
 
 def check_file(path: Path | str) -> list[Finding]:
     """The findings about a certificate file; InputError where there is none that can be read."""
-    faults: list[str] = []
-
-    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        if len({key for key, _ in pairs}) < len(pairs):
-            faults.append("a key occurs twice in one object")
-        return dict(pairs)
-
-    def not_a_number(text: str) -> None:
-        faults.append(f"{text} is not a number")
-
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-        content = json.loads(text, object_pairs_hook=once, parse_constant=not_a_number)
-    except OSError as error:
-        raise InputError(str(path), "", "", f"cannot be read: {error.strerror}") from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(str(path), "", "", f"is not JSON: {error}") from None
+    content, faults = read_file(path)
     return [*(Finding("", "", "", "fails", fault) for fault in faults), *check(content)]
 
 
@@ -82,6 +66,7 @@ def check(content: Any) -> list[Finding]:
     # What overflows in a guess is caught where the guess is verified.
     with ctx.workprec(BITS), np.errstate(all="ignore"):
         try:
+            shallow(content)
             shaped(content, FILE, "the file")
             demand(content["format"] in (FORMAT, INVARIANT), f"the format is not {FORMAT!r} or {INVARIANT!r}")
             demand(len(content["certificates"]) > 0, "there are no certificates")
@@ -117,10 +102,11 @@ def _certificate(given: Mapping[str, Any]) -> Iterator[Finding]:
 def _guarded(work: Callable[[], Any]) -> tuple[Any, str]:
     """What a piece of work gives, or None and why it fails: whatever goes wrong in a check fails it."""
     try:
-        return work(), ""
+        with limited():
+            return work(), ""
     except CheckError as fault:
         return None, str(fault)
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+    except (ArithmeticError, AttributeError, LookupError, MemoryError, RecursionError, TypeError, ValueError) as error:
         return None, f"cannot be verified: {error}"
 
 
@@ -130,6 +116,8 @@ def _subject(given: Any) -> Subject | Station:
     shaped(given["subject"], STATION if station else SUBJECT, "the subject")
     outcomes = [claim.get("outcome") for claim in given["claims"]]
     demand(given["outcome"] == _follows(outcomes), "the outcome does not follow from the claims")
+    kinds = [str(claim.get("kind")) for claim in given["claims"]]
+    demand(len(set(kinds)) == len(kinds), "two claims are of one kind")
     return (read_station if station else read_subject)(given["subject"])
 
 
@@ -174,8 +162,16 @@ def _verdict(proof: Obligation) -> tuple[str, Verdict, str]:
 
 def _unproved(subject: Subject | Station, claim: Mapping[str, Any]) -> list[tuple[str, Verdict, str]]:
     """Nothing of such a claim counts as proved; a refutation must be one."""
-    demand(set(claim["numbers"]) <= set(NUMBERS[claim["kind"]]), "the numbers are not those of such a claim")
-    demand(set(claim["witness"]) <= set(WITNESS[claim["kind"]]), "the witness is not that of such a claim")
+    for part, shapes in (("numbers", NUMBERS), ("witness", WITNESS)):
+        shape, given = shapes[claim["kind"]], claim[part]
+        known = all(key in shape and (value is None or shape[key](value)) for key, value in given.items())
+        demand(known, f"the {part} are not those of such a claim")
+    names = [obligation["name"] for obligation in claim["obligations"]]
+    demand(len(set(names)) == len(names), "an obligation is told of twice")
+    for obligation in claim["obligations"]:
+        how, proved = HOWS.get(obligation["name"], ()), obligation["outcome"] == "proved"
+        demand(obligation["how"] in how, f"there is no obligation {obligation['name']} that is shown so")
+        demand(proved != bool(obligation["evidence"]), "what is proved has no evidence against it, and what is not has some")
     found: list[tuple[str, Verdict, str]] = []
     for obligation in claim["obligations"]:
         name, verdict, reason = obligation["name"], "not claimed", f"{obligation['outcome']}, the claim is not proved"
@@ -189,7 +185,7 @@ def _unproved(subject: Subject | Station, claim: Mapping[str, Any]) -> list[tupl
 def _refutes(subject: Subject | Station, claim: Mapping[str, Any], obligation: Mapping[str, Any]) -> str:
     if isinstance(subject, Station):
         return station_refutation(subject, claim, obligation)
-    return refutation(subject, claim, obligation["evidence"])
+    return refutation(subject, claim, obligation)
 
 
 def _follows(outcomes: Sequence[Any]) -> str:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from flint import arb, fmpq, fmpq_mat
+from flint import acb, acb_poly, arb, fmpq, fmpq_mat, fmpq_poly
 
 from starhold.certification.checker.even import EvenRegion
 from starhold.certification.checker.exact import (
+    ONE,
+    ZERO,
     CheckError,
     Obligation,
     definite,
@@ -35,7 +37,7 @@ from starhold.certification.checker.region import BALLS, EXACT, ROOTS, SIGN, Num
 from starhold.certification.checker.subject import Subject
 from starhold.certification.checker.surface import Sliding
 from starhold.certification.checker.torque import bounded, keeps_within
-from starhold.certification.checker.wheels import keeps_momenta
+from starhold.certification.checker.wheels import holds_target, keeps_momenta
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,8 @@ def _region(loop: Loop, level: Any | None, start: Any | None, witness: Numbers) 
     return (EvenRegion if is_even(loop) else OddRegion)(loop, level, start, witness)
 
 
-def _claimed(subject: Subject, claim: Numbers) -> OddRegion | EvenRegion:
+def claimed(subject: Subject, claim: Numbers) -> OddRegion | EvenRegion:
+    """The set that a claim speaks of, with its V."""
     numbers, witness = claim["numbers"], claim["witness"]
     return _region(Loop(subject, optional(witness["stiffness"])), numbers["level"], numbers["start"], witness)
 
@@ -92,13 +95,13 @@ def _converges(region: Region[Any], claim: Numbers, bounded: bool = False) -> li
 
 def convergence(subject: Subject, claim: Numbers) -> list[Obligation]:
     """Every motion from {V <= start} comes to rest on target."""
-    region = _claimed(subject, claim)
+    region = claimed(subject, claim)
     return [*_converges(region, claim), _told(region, claim["numbers"])]
 
 
 def torque_limit(subject: Subject, claim: Numbers) -> list[Obligation]:
     """Motions from {V <= start} keep the torque within the limit, and so come to rest on target as told."""
-    region, numbers = _claimed(subject, claim), claim["numbers"]
+    region, numbers = claimed(subject, claim), claim["numbers"]
 
     def torque() -> str:
         demand(numbers["kind"] == subject.limit, "the limit is of another kind than the loop's")
@@ -113,12 +116,13 @@ def torque_limit(subject: Subject, claim: Numbers) -> list[Obligation]:
 def wheels_limits(subject: Subject, claim: Numbers) -> list[Obligation]:
     """Motions from {V <= start} keep every motor's torque and every wheel's momentum within its limit, and so come to rest
     on target as told."""
-    region, numbers, wheels = _claimed(subject, claim), claim["numbers"], subject.wheels
+    region, numbers, wheels = claimed(subject, claim), claim["numbers"], subject.wheels
     if wheels is None:
         raise CheckError("there are no wheels")
     told: list[list[Any]] = [[rational(x) for x in numbers[key]] for key in ("motors", "stored")]
     demand(all(len(bounds) == len(wheels.axes) for bounds in told), "the bounds are not one for each wheel")
     demand(rational(numbers["momentum"]) == wheels.total, "the total momentum is not that of the loop")
+    holds_target(wheels, region.loop.inertia, subject.target_rate)
     demand(wheels.allocation == "least-squares", "the torque is shared out in another way")
     demand(subject.limit == "none" or subject.torque_limit is None, "another limit of the torque may act")
     demand(region.level is not None, "without a level nothing bounds torque and momentum")
@@ -164,7 +168,7 @@ def inertia(subject: Subject, claim: Numbers) -> list[Obligation]:
 
 def disturbance(subject: Subject, claim: Numbers) -> list[Obligation]:
     """With any torque from outside up to a bound, motions from {V <= start} end near the target."""
-    region, numbers, witness = _claimed(subject, claim), claim["numbers"], claim["witness"]
+    region, numbers, witness = claimed(subject, claim), claim["numbers"], claim["witness"]
     if isinstance(region, EvenRegion):
         raise CheckError("not for a V even in q")
     q_rate, q_attitude = rational(witness["q_rate"]), rational(witness["q_attitude"])
@@ -230,9 +234,7 @@ def sampling(subject: Subject, claim: Numbers) -> list[Obligation]:
         demand(0 < radius < 1, "the radius is not below 1")
         roots = stepped(loop, subject.period)
         demand(within_circle(roots, radius), "an eigenvalue may be larger than the radius")
-        for real, imaginary in numbers["eigenvalues"]:
-            near = has_root_near(roots, rational(real), rational(imaginary), fmpq(1, 10**6))
-            demand(near, f"no eigenvalue is near {real:g} {imaginary:+g}i")
+        eigenvalues_of(roots, numbers["eigenvalues"])
         return "by Routh's array, the circle taken to the half plane"
 
     def at_longest() -> str:
@@ -255,6 +257,20 @@ def sampling(subject: Subject, claim: Numbers) -> list[Obligation]:
 
     proofs: list[Obligation] = [("stable at the period", ROOTS, at_period), ("stable at the longest", ROOTS, at_longest)]
     return [*proofs, ("stable in between", SIGN, between)] if numbers["every_shorter"] else proofs
+
+
+def eigenvalues_of(coefficients: Sequence[Any], told: Sequence[Sequence[float]]) -> None:
+    """A CheckError unless eigenvalues that are told, each as often as it is one, are those of a polynomial: a root is near
+    each, and so is the polynomial that they make."""
+    product, sizes = acb_poly([1]), fmpq_poly([1])
+    for pair in told:
+        real, imaginary = map(rational, pair)
+        size = root_up(real**2 + imaginary**2)
+        near = has_root_near(coefficients, real, imaginary, max(ONE, size) / 10**6)
+        demand(near, f"no eigenvalue is near {pair[0]:g} {pair[1]:+g}i")
+        product, sizes = product * acb_poly([-acb(arb(real), arb(imaginary)), 1]), sizes * fmpq_poly([size, 1])
+    for c, found, size in zip(coefficients, product.coeffs(), sizes.coeffs(), strict=True):
+        demand(bool(abs(found - arb(c)) <= arb(size / 10**9)), "an eigenvalue is told too often, or left out")
 
 
 def stepped(loop: Loop, period: Any) -> list[Any]:

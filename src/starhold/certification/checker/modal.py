@@ -208,17 +208,6 @@ class ModalRegion:
         demand(rate >= 0 and rate**2 <= 2 * self.level, "the rate is not in it")
         return "turn and rate are in {V <= level}"
 
-    def rises(self, values: Mapping[str, Any]) -> str:
-        """That V' > 0 at a state of the level set."""
-        q, w = ([values[name] for name in names] for names in (named("q"), RATE))
-        y = sum((x * x for x in w), ZERO) / self.alpha**2
-        s = sum((x * v for x, v in zip(q, w, strict=True)), ZERO) / self.alpha
-        u = 1 - values[ATTITUDE[0]]
-        self.form()
-        demand(self.height(u, y, s) <= self.c, "the state is outside the level set")
-        demand(self.fall(u, y, s, Shares(y, s * s, s, u * (2 - u))) > 0, "V falls there")
-        return "V rises at the state"
-
 
 def _on_unit_quaternions(polynomial: Polynomial) -> Polynomial:
     """What is left of a polynomial, times a power of 1 + |q|2, where z (1 + |q|2) = 1 and q02 = 1 - |q|2: nothing of one

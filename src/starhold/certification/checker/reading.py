@@ -1,4 +1,5 @@
-"""The checker's own reading of a system that a certificate of an invariant set is about: texts to piecewise polynomials.
+"""The checker's own reading: of a file, and of a system that a certificate of an invariant set is about, texts to piecewise
+polynomials. What is larger than the limits below is refused, with its line.
 
 Only what stands here is read, nothing is run. Numbers stand for what is written. Nothing is shared with the certifier.
 """
@@ -6,17 +7,91 @@ Only what stands here is read, nothing is run. Numbers stand for what is written
 from __future__ import annotations
 
 import ast
-from collections.abc import Mapping, Sequence
+import json
+from collections.abc import Generator, Iterable, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from fractions import Fraction
-from typing import Any
+from pathlib import Path
+from time import monotonic
+from typing import Any, cast
 
 from starhold.algebra.polynomial import Polynomial, pieces
 from starhold.algebra.scalar import absolute, less, maximum, minimum, sign, where
 from starhold.certification.checker.exact import CheckError, demand
+from starhold.errors import InputError
 
+BYTES, DEEPEST, DIGITS, SECONDS = 2**26, 32, 1_000, 60.0
+"""Of a file, how deep its objects and lists may be in one another, of a number, and for the check of one claim."""
 LONGEST, PIECES, TERMS, POWER = 2_000, 64, 600, 24
 """Characters of a text, pieces and terms of what it stands for, and powers: what is larger is not read."""
 _ARGUMENTS = {"min": range(2, 9), "max": range(2, 9), "abs": [1], "clip": [2], "sat": [1, 2], "sign": [1], "where": [3]}
+
+
+_late: ContextVar[float] = ContextVar("late", default=float("inf"))
+
+
+def read_file(path: Path | str) -> tuple[Any, list[str]]:
+    """The content of a JSON file, and faults that its reading goes over; InputError where there is none that can be read."""
+    faults: list[str] = []
+
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        if len({key for key, _ in pairs}) < len(pairs):
+            faults.append("a key occurs twice in one object")
+        return dict(pairs)
+
+    def not_a_number(text: str) -> None:
+        faults.append(f"{text} is not a number")
+
+    def whole(text: str) -> int:
+        if len(text) > DIGITS:
+            raise InputError(str(path), "", "", f"holds a number of more than {DIGITS} digits")
+        return int(text)
+
+    try:
+        with open(path, "rb") as file:
+            raw = file.read(BYTES + 1)
+        if len(raw) > BYTES:
+            raise InputError(str(path), "", "", f"is larger than {BYTES // 2**20} MiB")
+        text = raw.decode("utf-8")
+        return json.loads(text, object_pairs_hook=once, parse_constant=not_a_number, parse_int=whole), faults
+    except OSError as error:
+        raise InputError(str(path), "", "", f"cannot be read: {error.strerror}") from None
+    except RecursionError:
+        raise InputError(str(path), "", "", f"is nested more than {DEEPEST} deep") from None
+    except ValueError as error:
+        raise InputError(str(path), "", "", f"is not JSON: {error}") from None
+
+
+def shallow(content: Any) -> None:
+    """A CheckError where objects and lists are in one another deeper than they may."""
+    inner: list[Any] = [content]
+    for _ in range(DEEPEST):
+        inner = [x for part in inner for x in _within(part)]
+        if not inner:
+            return
+    raise CheckError(f"the file is nested more than {DEEPEST} deep")
+
+
+def _within(part: Any) -> Iterable[Any]:
+    if isinstance(part, dict):
+        return cast(dict[Any, Any], part).values()
+    return cast(list[Any], part) if isinstance(part, list) else ()
+
+
+@contextmanager
+def limited(seconds: float = SECONDS) -> Generator[None]:
+    """What runs within is stopped by `in_time` after so many seconds, or when what it is part of is."""
+    before = _late.set(min(monotonic() + seconds, _late.get()))
+    try:
+        yield
+    finally:
+        _late.reset(before)
+
+
+def in_time() -> None:
+    """A CheckError where the check of a claim takes longer than it may. For loops to call."""
+    demand(monotonic() < _late.get(), f"the check takes longer than {SECONDS:g} s")
 
 
 def read_names(names: Sequence[str], define: Mapping[str, Any]) -> dict[str, Any]:
@@ -44,9 +119,18 @@ def read(text: Any, names: Mapping[str, Any]) -> Any:
 
 def number(text: Any) -> Fraction:
     """A number as it is written; none of so many digits that it could not be held."""
-    power = str(text).lower().partition("e")[2]
-    demand(len(power) <= 4 and len(str(text)) <= LONGEST, "a number has too many digits")
+    digits, _, power = str(text).lower().partition("e")
+    few = len(digits) <= DIGITS and len(power) <= 5 and abs(int(power or 0)) <= DIGITS
+    demand(few, f"a number has more than {DIGITS} digits")
     return Fraction(str(text))
+
+
+def _short(parts: Sequence[Any]) -> None:
+    """A CheckError where a coefficient of piecewise polynomials has too many digits."""
+    in_time()
+    numbers = (c for part in parts for c in part.value.terms.values())
+    short = all(max(int(c.p).bit_length(), int(c.q).bit_length()) < 4 * DIGITS for c in numbers)
+    demand(short, f"a number has more than {DIGITS} digits")
 
 
 class _Expression:
@@ -59,6 +143,7 @@ class _Expression:
         size = max((len(part.value.terms) for part in parts), default=0)
         degree = max((len(m) for part in parts for m in part.value.terms), default=0)
         demand(len(parts) <= PIECES and size <= TERMS and degree <= POWER, "an expression is too large")
+        _short(parts)
         return found
 
     def _value(self, node: ast.expr) -> Any:
@@ -86,7 +171,9 @@ class _Expression:
             total: Any = Polynomial.constant(1)
             for _ in range(int(str(power))):
                 total = total * a
-                demand(max(len(part.value.terms) for part in pieces(total)) <= TERMS, "a power is too large")
+                parts = pieces(total)
+                demand(len(parts) <= PIECES and max(len(p.value.terms) for p in parts) <= TERMS, "a power is too large")
+                _short(parts)
             return total
         b = self.value(node.right)
         if isinstance(node.op, ast.Add):

@@ -1,4 +1,8 @@
-"""That what is said to refute a claim does. Nothing here is shared with the certifier."""
+"""That what is said to refute a claim does. Nothing here is shared with the certifier.
+
+A refutation names the obligation that is false and has all that shows it, nothing else: a state of the set that is claimed,
+of the law's own V, at the loop's own limit. What is told of it beside must be what is found there.
+"""
 
 from __future__ import annotations
 
@@ -7,61 +11,78 @@ from typing import Any
 
 from flint import arb, fmpq
 
-from starhold.certification.checker.claims import stepped
+from starhold.algebra.polynomial import Polynomial
+from starhold.certification.checker.claims import claimed, eigenvalues_of, stepped, torque_limit
+from starhold.certification.checker.even import EvenRegion
 from starhold.certification.checker.exact import (
+    ONE,
     ZERO,
     CheckError,
+    Rows,
     chained,
     definite,
     demand,
-    determinant,
     even,
     rational,
+    turned,
+    unit,
+    up,
     within_circle,
 )
-from starhold.certification.checker.loop import ATTITUDE, RATE, Loop
-from starhold.certification.checker.modal import ModalRegion
+from starhold.certification.checker.frame import EvenFrame, OddFrame, even_frame, is_even, odd_frame
+from starhold.certification.checker.loop import ATTITUDE, RATE, TURN, Loop, W
+from starhold.certification.checker.odd import OddRegion
 from starhold.certification.checker.region import Numbers, optional
+from starhold.certification.checker.shapes import NUMBERS, WITNESS, shaped
 from starhold.certification.checker.subject import Subject, gradient, named
 from starhold.certification.checker.surface import Sliding
 
+CLOSE = fmpq(1, 10**9)
+"""How far a number that is told may be from what is found, as a share of the sizes that it is made of."""
 
-def refutation(subject: Subject, claim: Mapping[str, Any], evidence: Mapping[str, Any]) -> str:
-    """What evidence shows; a CheckError where it does not refute."""
-    kind, numbers, witness = (claim[key] for key in ("kind", "numbers", "witness"))
-    if "eigenvalue" in evidence:
-        roots = stepped(Loop(subject, quotient=True), subject.period)
-        demand(not within_circle(roots, fmpq(1)), "all eigenvalues are within the circle")
-        return "an eigenvalue is not within the circle"
-    if kind == "sliding":
-        return _surface(subject, numbers, evidence)
-    demand("state" in evidence, "there is no state")
-    if kind == "region":
-        return ModalRegion(subject, numbers, witness).rises(_state(evidence["state"]))
-    other = _inertia(subject, numbers, evidence) if "inertia" in evidence else None
-    loop = Loop(subject, optional(witness.get("stiffness")), other)
-    values = _state(evidence["state"])
-    V, torque = loop.lyapunov.value.at(values), _torque(loop, values)
-    if "V'" in evidence:
-        demand(loop.slope(torque).at(values) > 0, "V falls there")
-        bound = numbers.get("rate_everywhere")
-        square = sum((values[name] ** 2 for name in RATE), ZERO)
-        demand(bound is None or square <= rational(bound) ** 2, "the rate is larger than claimed")
-        return "V rises at the state"
-    if "torque at rest" in evidence:
-        demand(determinant(loop.linear()[1]) == 0, "no other attitude is at rest")
-        return "another attitude is at rest"
-    if "torque" in evidence:
-        found, level = [part.at(values) for part in torque.values()], numbers.get("level")
-        over = _motors_exceed(subject, found) if kind == "wheels" else _exceeds(found, numbers)
-        demand(over and (level is None or rational(level) >= V), "the torque is within its limit, or the state outside")
-        return "the torque exceeds its limit at the state"
-    demand("V" in evidence and V <= 0, "V is positive there")
-    return "V is not positive at the state"
+
+def refutation(subject: Subject, claim: Mapping[str, Any], obligation: Mapping[str, Any]) -> str:
+    """What the evidence of an obligation shows; a CheckError where it does not refute."""
+    name, evidence = obligation["name"], obligation["evidence"]
+    match claim["kind"], name:
+        case "convergence", "positive":
+            return _not_positive(subject, claim, evidence)
+        case "convergence", "descent":
+            return _rises(subject, claim, evidence)
+        case "torque-limit", "torque":
+            return _exceeds(subject, claim, evidence)
+        case "sampling", "stable at the period":
+            return _unstable(subject, claim["numbers"], evidence)
+        case "sliding", "reach exceeds torque":
+            return _overpowered(subject, claim["numbers"], evidence)
+        case "sliding", "surface holds the target":
+            return _leads_away(subject, claim["numbers"], evidence)
+        case _:
+            raise CheckError(f"nothing refutes {name}")
+
+
+def _has(given: Any, *keys: str) -> None:
+    demand(set(given) == set(keys), f"the evidence is not {', '.join(keys)}")
+
+
+def _told(told: Any, found: Any, size: Any) -> None:
+    """That a number is told as it is found, up to what rounding of the state changes it by."""
+    demand(abs(rational(told) - found) <= CLOSE * size, "the evidence tells another number than there is at the state")
+
+
+def _size(polynomial: Polynomial, values: Mapping[str, Any]) -> Any:
+    """The sum of the sizes of a polynomial's terms."""
+    total = ZERO
+    for monomial, c in polynomial.terms.items():
+        for name in monomial:
+            c = c * values[name]
+        total += abs(c)
+    return total
 
 
 def _state(given: Any) -> dict[str, Any]:
     """The state, its quaternion brought to exactly unit length; everything from outside and all momentum are zero."""
+    _has(given, "attitude", "rate")
     q, w = ([rational(x) for x in given[key]] for key in ("attitude", "rate"))
     demand(len(q) == 4 and len(w) == 3, "the state is no state")
     demand(abs(sum((x * x for x in q), ZERO) - 1) < fmpq(1, 10**9), "the attitude is not of unit length")
@@ -73,19 +94,6 @@ def _state(given: Any) -> dict[str, Any]:
     return outside | dict(zip((*ATTITUDE, *RATE), (*exact, *w), strict=True))
 
 
-def _exceeds(torque: Sequence[Any], numbers: Numbers) -> bool:
-    limit = rational(numbers["limit"])
-    if numbers["kind"] == "axis":
-        return any(abs(x) > limit for x in torque)
-    return sum((x * x for x in torque), ZERO) > limit**2
-
-
-def _motors_exceed(subject: Subject, torque: Sequence[Any]) -> bool:
-    wheels: Any = subject.wheels
-    limits = zip(wheels.torque_limit, chained(wheels.least, [[x] for x in torque]), strict=True)
-    return any(limit is not None and abs(motor) > limit for limit, (motor,) in limits)
-
-
 def _torque(loop: Loop, values: Mapping[str, Any]) -> Any:
     for truths, torque in loop.pieces:
         if all((condition.positive.at(values) > 0) == truth for condition, truth in truths):
@@ -93,30 +101,163 @@ def _torque(loop: Loop, values: Mapping[str, Any]) -> Any:
     raise CheckError("no piece of the law holds at the state")
 
 
-def _inertia(subject: Subject, numbers: Numbers, evidence: Mapping[str, Any]) -> list[list[Any]]:
-    """The inertia of evidence, if a claim is about it."""
-    found, J, tolerance = [[rational(x) for x in row] for row in evidence["inertia"]], subject.inertia, numbers["tolerance"]
-    demand(len(found) == 3 and all(len(row) == 3 for row in found) and definite(found), "the inertia is none")
-    for i in range(3):
-        for j in range(3):
-            far = (found[i][j] - J[i][j]) ** 2 - (0 if tolerance is None else rational(tolerance) ** 2 * J[i][i] * J[j][j])
-            demand(found[i][j] == found[j][i] and (tolerance is None or far <= 0), "the inertia is not within the tolerance")
-    return found
+# --- V ----------------------------------------------------------------------------------------------------------------
 
 
-def _surface(subject: Subject, numbers: Numbers, evidence: Mapping[str, Any]) -> str:
-    blank = {"surface": 0, "angle": 0, "rate": 0}
-    proof = Sliding(subject, {**blank, **numbers})
-    if "q.Kq" in evidence:
-        demand(not definite(even(proof.K)), "the surface leads to the target")
-        return "the surface does not lead to the target"
-    place: Any = evidence["axis"]
-    demand(place in (1, 2, 3), "there is no such axis")
-    push: Any = subject.disturbance
+def _asked(claim: Mapping[str, Any]) -> Any | None:
+    """The rate up to which convergence from every attitude is claimed, None for any; no V but the law's own."""
+    numbers = claim["numbers"]
+    demand(not claim["witness"], "a refuted V is the law's own")
+    demand(set(numbers) in (set(), {"rate_everywhere", "everything"}), "the set is not one that was asked for")
+    bound = optional(numbers.get("rate_everywhere"))
+    demand(numbers.get("everything", True) == (bound is None), "everything has no largest rate")
+    return bound
+
+
+def _frame(loop: Loop) -> EvenFrame | OddFrame:
+    return even_frame(loop) if is_even(loop) else odd_frame(loop)
+
+
+def _not_positive(subject: Subject, claim: Mapping[str, Any], evidence: Numbers) -> str:
+    """A form that is not positive somewhere is so however near the target: no set is left."""
+    _has(evidence, "state", "V")
+    _asked(claim)
+    loop, values = Loop(subject), _state(evidence["state"])
+    V = loop.lyapunov.value
+    _frame(loop)
+    on_target = not any(values[name] for name in (*TURN, *RATE)) and (values[ATTITUDE[0]] > 0 or is_even(loop))
+    demand(not on_target, "V has to be zero on target at rest")
+    demand(V.at(values) <= 0, "V is positive there")
+    _told(evidence["V"], V.at(values), _size(V, values))
+    return "V is not positive at the state"
+
+
+def _rises(subject: Subject, claim: Mapping[str, Any], evidence: Numbers) -> str:
+    """V rises at a state of the set; where none is told, at states as near the target as one likes."""
+    _has(evidence, "state", "V'")
+    bound, loop, values = _asked(claim), Loop(subject), _state(evidence["state"])
+    slope = loop.slope(_torque(loop, values))
+    demand(slope.at(values) > 0, "V falls there")
+    _told(evidence["V'"], slope.at(values), _size(slope, values))
+    square = sum((values[name] ** 2 for name in RATE), ZERO)
+    demand(bound is None or square <= bound**2, "the rate is larger than claimed")
+    if not claim["numbers"]:
+        frame = _frame(loop)
+        mixes = getattr(frame, "E", unit(3, ZERO)) != unit(3, ZERO)
+        demand(mixes or not definite(even(frame.D)), "V falls near the target")
+    return "V rises at the state"
+
+
+def _exceeds(subject: Subject, claim: Mapping[str, Any], evidence: Numbers) -> str:
+    """The torque exceeds the loop's own limit at a state of the set that holds the turn that was asked for, and no more;
+    what else is told of that set holds."""
+    _has(evidence, "state", "torque")
+    numbers = claim["numbers"]
+    shaped(numbers, NUMBERS["torque-limit"], "the numbers")
+    shaped(claim["witness"], WITNESS["torque-limit"], "the witness")
+    demand(numbers["kind"] == subject.limit, "the limit is of another kind than the loop's")
+    limit = rational(numbers["limit"])
+    demand(limit == subject.torque_limit, "a limit is refuted that is not the loop's")
+    region, proofs = claimed(subject, claim), torque_limit(subject, claim)
+    outcomes = {told["name"]: told["outcome"] for told in claim["obligations"]}
+    listed = [(told["name"], told["how"]) for told in claim["obligations"]]
+    demand(listed == [(name, how) for name, how, _ in proofs if how], "the obligations are not those of such a claim")
+    for name, _, verify in proofs:
+        if outcomes.get(name, "proved") == "proved":
+            verify()
+    demand(region.start is not None and region.start <= _height(region, numbers["turn"]), "the set holds more than the turn")
+    values = _state(evidence["state"])
+    parts = list(_torque(region.loop, values).values())
+    found = [part.at(values) for part in parts]
+    squares = [x * x for x in found]
+    demand(region.loop.lyapunov.value.at(values) <= region.start, "the state is outside the set")
+    over = [x for x in (squares if numbers["kind"] == "axis" else [sum(squares, ZERO)]) if x > limit**2]
+    demand(bool(over), "the torque is within its limit")
+    told, size = rational(evidence["torque"]), sum((_size(part, values) for part in parts), ZERO)
+    near = told > 0 and any(abs(told**2 - x) <= CLOSE * size**2 for x in over)
+    demand(near, "the evidence tells another torque than there is")
+    return "the torque exceeds its limit at the state"
+
+
+def _height(region: OddRegion | EvenRegion, turn: float) -> Any:
+    """V at rest after a turn, a little more for rounding."""
+    s = region.well()[0]
+    half = arb(rational(turn)) / 2
+    V = arb(s) * (half.sin() ** 2 if isinstance(region, EvenRegion) else 1 - half.cos())
+    return up(V * (1 + arb(CLOSE)))
+
+
+# --- a held torque ----------------------------------------------------------------------------------------------------
+
+
+def _unstable(subject: Subject, numbers: Numbers, evidence: Numbers) -> str:
+    _has(evidence, "eigenvalue")
+    demand(set(numbers) == set(NUMBERS["sampling"]), "the numbers are not those of such a claim")
+    demand(rational(numbers["period"]) == subject.period, "the period is not that of the loop")
+    demand(numbers["longest"] is None and not numbers["every_shorter"], "an unstable loop has no longest period")
+    roots = stepped(Loop(subject, quotient=True), subject.period)
+    demand(not within_circle(roots, ONE), "all eigenvalues are within the circle")
+    eigenvalues_of(roots, numbers["eigenvalues"])
+    demand(within_circle(roots, rational(numbers["radius"]) * (1 + CLOSE)), "an eigenvalue may be larger than the radius")
+    demand(evidence["eigenvalue"] in numbers["eigenvalues"], "the eigenvalue is none of those told")
+    real, imaginary = map(rational, evidence["eigenvalue"])
+    demand(real**2 + imaginary**2 >= 1, "the eigenvalue is within the circle")
+    return "an eigenvalue is not within the circle"
+
+
+# --- a surface --------------------------------------------------------------------------------------------------------
+
+
+def _surface(subject: Subject, numbers: Numbers) -> Sliding:
+    """The surface, against what the loop has to stand and no more."""
+    demand(set(numbers) == {"torque", "margin"}, "the numbers are not those of such a claim")
+    proof = Sliding(subject, {"surface": 0, "angle": 0, "rate": 0, **numbers})
+    felt = [modelled + subject.disturbance for modelled in subject.modelled]
+    demand(
+        all(m <= torque <= m * (1 + CLOSE) for m, torque in zip(felt, proof.torque, strict=True)),
+        "the torque from outside is another",
+    )
+    margin = min(g - m for g, m in zip(proof.reach, proof.torque, strict=True))
+    demand(rational(numbers["margin"]) <= margin, "the margin is another")
+    return proof
+
+
+def _overpowered(subject: Subject, numbers: Numbers, evidence: Numbers) -> str:
+    """The disturbance, with the gravity gradient at a place on the orbit, pushes s_i away from zero where it switches."""
+    _has(evidence, "axis", "reach", "torque", "state", *(["position"] if "position" in evidence else []))
+    proof, place = _surface(subject, numbers), evidence["axis"]
+    demand(type(place) is int and place in (1, 2, 3), "there is no such axis")
+    push: Any = arb(subject.disturbance)
     if "position" in evidence:
-        position: Sequence[Any] = [rational(x) for x in evidence["position"]]
-        square = sum((x * x for x in position), ZERO)
-        strength = 3 * arb(subject.gravity) / arb(square).sqrt() ** 5
-        push = strength * gradient(subject.whole)[place - 1].at(dict(zip(named("p"), position, strict=True)))
-    demand(bool(abs(push) > proof.reach[place - 1]), "the switching torque is larger, or only its bound is not")
+        push += _gravity(subject, evidence["position"], place)
+    reach = proof.reach[place - 1]
+    demand(bool(push > reach), "the switching torque is larger, or only its bound is not")
+    demand(bool(abs(push - rational(evidence["torque"])) <= push * arb(CLOSE)), "the evidence tells another torque")
+    _told(evidence["reach"], reach, reach)
+    values = _state(evidence["state"])
+    s = W[place - 1].at(values) + sum((c * values[name] for c, name in zip(proof.K[place - 1], TURN, strict=True)), ZERO)
+    demand(s > proof.width[place - 1], "the state is within the layer, or on the other side")
     return "the torque from outside exceeds the switching torque"
+
+
+def _gravity(subject: Subject, position: Sequence[float], place: int) -> Any:
+    """The gravity gradient about an axis for a direction in the body, no nearer than the orbit's perigee."""
+    p, perigee = [rational(x) for x in position], subject.perigee
+    square: Any = sum((x * x for x in p), ZERO)
+    if perigee is None or len(p) != 3:
+        raise CheckError("there is no such place on the orbit")
+    demand(bool(square * (1 + CLOSE) > perigee**2), "the place is nearer than the orbit")
+    distance = arb(square).sqrt().max(arb(perigee))
+    form = gradient(subject.whole)[place - 1].at(dict(zip(named("p"), p, strict=True)))
+    return 3 * arb(subject.gravity) * arb(form) / arb(square) / distance**3
+
+
+def _leads_away(subject: Subject, numbers: Numbers, evidence: Numbers) -> str:
+    _has(evidence, "axis", "q.Kq")
+    proof, axis = _surface(subject, numbers), [rational(x) for x in evidence["axis"]]
+    demand(len(axis) == 3, "there is no such axis")
+    form = chained(chained([axis], even(proof.K)), turned([axis]))[0][0]
+    demand(form < 0, "the surface leads to the target along this axis")
+    sizes: Rows = [[abs(x) for x in row] for row in even(proof.K)]
+    _told(evidence["q.Kq"], form, chained(chained([[abs(x) for x in axis]], sizes), turned([[abs(x) for x in axis]]))[0][0])
+    return "the surface does not lead to the target"

@@ -30,7 +30,8 @@ def _number(x: Any) -> bool:
 
 
 def _text(x: Any) -> bool:
-    return isinstance(x, str)
+    """Text of characters that can be written: no lone surrogates, none that steer a terminal."""
+    return isinstance(x, str) and x.isprintable()
 
 
 def _flag(x: Any) -> bool:
@@ -79,7 +80,12 @@ FILE: dict[str, Test] = {
     "versions": lambda x: _object(x) and all(map(_text, x.values())),
     "certificates": _list(_object),
 }
-CERTIFICATE: dict[str, Test] = {"name": _text, "outcome": _OUTCOME, "subject": _object, "claims": _list(_object)}
+CERTIFICATE: dict[str, Test] = {
+    "name": lambda x: _text(x) and len(x) <= 1_000,
+    "outcome": _OUTCOME,
+    "subject": _object,
+    "claims": _list(_object),
+}
 CLAIM: dict[str, Test] = {
     "kind": _text,
     "outcome": _OUTCOME,
@@ -94,6 +100,20 @@ OBLIGATION: dict[str, Test] = {
     "outcome": _OUTCOME,
     "evidence": lambda x: _object(x) and _plain(x),
 }
+_EXACT, _SIGN, _BALLS, _ROOTS = ("exact identity",), ("exact inequality",), ("ball arithmetic",), ("certified roots",)
+HOWS: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(("form", "target"), _EXACT),
+    "descent": _SIGN + _BALLS,
+    **dict.fromkeys(("only rest", "only the circle"), ("LaSalle",)),
+    **dict.fromkeys(("torque", "control", "stays", "nothing returns from beyond"), _BALLS),
+    "strict": _SIGN + _BALLS,
+    "other rest repels": _SIGN + _ROOTS,
+    **dict.fromkeys(("stable at the period", "stable at the longest"), _ROOTS),
+    **dict.fromkeys(("positive", "single rest in the set", "half turns repel", "jumps lower V", "momentum", "end"), _SIGN),
+    **dict.fromkeys(("start", "stable in between", "reach exceeds torque", "surface holds the target", "layer"), _SIGN),
+    **dict.fromkeys(("no switch of the double cover", "centre outside", "x returns", "each axis returns"), _SIGN),
+}
+"""How each obligation may be shown, whatever the claim."""
 _WHEELS: dict[str, Test] = {
     "axes": _list(_VECTOR),
     "torque_limit": _list(_MAYBE),

@@ -50,7 +50,7 @@ def variables(names: Sequence[str]) -> Any:
 @dataclass(frozen=True)
 class Subject:
     """The subject of a certificate, its numbers exact; `memory` is what the law starts with, `whole` the inertia with that
-    of rotors about their axes."""
+    of rotors about their axes, `perigee` the orbit's where the gravity gradient is felt."""
 
     law: Law
     gains: Any
@@ -70,6 +70,7 @@ class Subject:
     disturbance: Any
     period: Any
     wheels: Wheels | None
+    perigee: Any | None
 
 
 def read_subject(given: Mapping[str, Any]) -> Subject:
@@ -96,7 +97,7 @@ def read_subject(given: Mapping[str, Any]) -> Subject:
     for name in ("target_rate", "target_acceleration", "modelled_torque_norm", "disturbance", "hysteresis_width"):
         demand(given[name] >= 0, f"{name} is negative")
     memory = law.remember(gains, craft, given["control_period"])
-    _check_bounds(given, whole)
+    perigee = _check_bounds(given, whole)
     exact = {name: rational(given[name]) for name in ("target_rate", "target_acceleration", "disturbance")}
     return Subject(
         law=law,
@@ -114,6 +115,7 @@ def read_subject(given: Mapping[str, Any]) -> Subject:
         modelled_norm=rational(given["modelled_torque_norm"]),
         period=rational(given["control_period"]),
         wheels=wheels,
+        perigee=perigee,
         **exact,
     )
 
@@ -124,21 +126,23 @@ def gradient(whole: Rows) -> Any:
     return gravity_gradient(variables(named("p")), 1, Craft(inertia, inertia, 0.0, 0.0))  # pyright: ignore
 
 
-def _check_bounds(given: Mapping[str, Any], whole: Rows) -> None:
-    """That the bounds of the target's motion and of the modelled torque hold over the whole orbit."""
+def _check_bounds(given: Mapping[str, Any], whole: Rows) -> Any | None:
+    """That the bounds of the target's motion and of the modelled torque hold over the whole orbit; its least distance, from
+    above, where a gravity gradient is felt."""
     demand(min(given["modelled_torque"]) >= 0, "a bound of the modelled torque is negative")
     demand(
         given["orbit"] is not None or not (given["gravity_gradient"] or given["target"] == "orbital"), "there is no orbit"
     )
     if given["orbit"] is None:
-        return
+        return None
     r, v = ([arb(rational(x)) for x in given["orbit"][key]] for key in ("position", "velocity"))
     mu = arb(rational(given["orbit"]["gravitational_parameter"]))
     h = cross(tuple(r), tuple(v))  # pyright: ignore
     distance, momentum = arb(dot(r, r)).sqrt(), arb(dot(h, h))  # pyright: ignore
     # The eccentricity vector, v x h/mu - r/|r|; the perigee is at p/(1 + e) also of a parabola or hyperbola.
     apse = subtract(scale(1 / mu, cross(tuple(v), h)), scale(1 / distance, tuple(r)))  # pyright: ignore
-    eccentricity = arb(root_up(up(arb(dot(apse, apse)))))
+    square = arb(dot(apse, apse))  # pyright: ignore
+    eccentricity = arb(root_up(up(square)))
     perigee = arb(down(momentum / mu / (1 + eccentricity)))
     demand(bool(perigee > 0), "the orbit falls into the centre")
     if given["target"] == "orbital":
@@ -155,6 +159,8 @@ def _check_bounds(given: Mapping[str, Any], whole: Rows) -> None:
         moments = np.linalg.eigvalsh([[floating(x) for x in row] for row in whole])
         mean = rational(float(moments[0] + moments[2]) / 2)
         demand(radius_of(plus(whole, unit(3, mean), -ONE)) <= half, "the norm of the modelled torque is larger")
+        return up(momentum / mu / (1 + square.nonnegative_part().sqrt()))
+    return None
 
 
 def quadratic(terms: Mapping[Monomial, Any], names: Sequence[str]) -> Rows:

@@ -11,6 +11,7 @@ from typing import Any
 from flint import arb
 
 from starhold.certification.checker.exact import ONE, ZERO, demand
+from starhold.certification.checker.reading import in_time
 
 SHAPES = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
 """Powers of |q| and of the rate's bound z, by which the bound of a torque is sorted."""
@@ -49,6 +50,7 @@ def keeps_below(
     for _ in range(4096):
         if not waiting:
             return True
+        in_time()
         low, high = waiting.pop()
         tangents = _tangents((low + high) / 2, level, s, well)
         half = (high - low) / 2

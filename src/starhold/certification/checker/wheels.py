@@ -101,6 +101,16 @@ def _near(a: Rows, b: Rows, distance: Any) -> bool:
     return all(abs(x) <= distance for row in plus(a, b, -1) for x in row)
 
 
+def holds_target(wheels: Wheels, J: Rows, target_rate: Any) -> None:
+    """A CheckError where no craft with these wheels that is at rest on target has as little momentum as told: there it is
+    J r + n, n that of the wheels at the start."""
+    stored = chained([wheels.momentum], wheels.axes)[0]
+    most = root_up(sum((n * n for n in stored), ZERO)) + wheels.total
+    demand(
+        most >= -greatest(times(-1, J)) * target_rate, "nothing at rest on target has so little momentum: the claim is empty"
+    )
+
+
 def keeps_momenta(wheels: Wheels, told: Sequence[Any], J: Rows, P: Rows, level: Any, target_rate: Any) -> None:
     """A CheckError unless no wheel's momentum exceeds what is told and its limit, while w.Pw <= 2 level and the momentum of
     the whole is at most as told.
