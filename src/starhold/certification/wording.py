@@ -60,10 +60,14 @@ OBLIGATIONS = {
 
 
 def shown(value: float, unit: str = "", up: bool = False) -> str:
-    """A number with four digits, rounded down, or up where it bounds from above, so as not to say more than is proved;
-    a part in 1e9 is forgiven, else 60 would show as 59.99 for its last bit."""
-    rounding, nudge = (ROUND_CEILING, 1.0 - 1e-9) if up else (ROUND_FLOOR, 1.0 + 1e-9)
-    return f"{float(Context(prec=4, rounding=rounding).create_decimal(Decimal(value * nudge))):g}{unit}"
+    """A number as it was written, where that takes no more than seven digits; else with four, rounded down, or up where it
+    bounds from above, so as not to say more than is proved."""
+    written = Decimal(f"{value:.15g}")
+    if len(written.normalize().as_tuple().digits) <= 7:
+        # A unit that was changed costs the last bits.
+        return f"{float(written):.7g}{unit}"
+    rounding = ROUND_CEILING if up else ROUND_FLOOR
+    return f"{float(Context(prec=4, rounding=rounding).create_decimal(Decimal(value))):g}{unit}"
 
 
 def angle(radians: float, up: bool = False) -> str:
@@ -77,52 +81,71 @@ def speed(rate: float, up: bool = False) -> str:
 
 
 def sentence(claim: Claim, subject: Mapping[str, Any]) -> str:
-    """What a claim says, whether or not it is proved."""
-    return _SENTENCES[claim.kind](claim.numbers, subject)
+    """What a claim says, whether or not it is proved. What is refuted is rounded to say no less."""
+    return _SENTENCES[claim.kind]({**claim.numbers, "refuted": claim.outcome == "refuted"}, subject)
 
 
-def place(numbers: Mapping[str, Any]) -> str:
+def place(numbers: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     """The set that a motion starts from."""
+    more = bool(numbers.get("refuted"))
     if numbers.get("everything"):
         return "from every attitude and rate"
     rate = numbers.get("rate_everywhere")
     if rate is not None:
-        return "from every attitude and rate" if math.isinf(rate) else f"from every attitude at up to {speed(rate)}"
+        return "from every attitude and rate" if math.isinf(rate) else f"from every attitude at up to {speed(rate, more)}"
     turn, on_target = numbers.get("turn"), numbers.get("rate_start", numbers.get("rate"))
     if turn is None:
         return ""
-    held = "rest at every attitude" if turn >= math.pi else f"rest at up to {angle(turn)}"
-    held += f" and, on target, {speed(on_target)} about any axis" if on_target else ""
+    held = _rests(turn, subject, more)
+    held += f" and, on target, {speed(on_target, more)} about any axis" if on_target else ""
     return f"from the level set of V that holds {held},"
 
 
-def _cover(numbers: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
+def _rests(turn: float, subject: Mapping[str, Any], more: bool) -> str:
+    """The rests turned up to an angle; an attitude has two quaternions, of which the other is turned by 360° less."""
+    if turn < math.pi:
+        return f"rest at up to {angle(turn, more)}"
+    most = {"shortest": math.pi, "hysteresis": 2.0 * math.acos(-min(subject["hysteresis_width"], 1.0)) * (1.0 + 1e-15)}
+    if _even(subject) or turn >= most.get(subject["double_cover"], 2.0 * math.pi):
+        return "rest at every attitude"
+    return (
+        f"rest at every attitude told by the shorter of its quaternions, and by the longer up to {angle(turn, more)} of 360°"
+    )
+
+
+def _even(subject: Mapping[str, Any]) -> bool:
+    """Whether the law takes both quaternions of an attitude for the same."""
     law = known_law(subject.get("law", ""))
-    if law is not None and law.card.double_cover == "even":
-        everywhere = numbers.get("everything") or numbers.get("rate_everywhere") is not None
+    return law is not None and law.card.double_cover == "even"
+
+
+def _cover(numbers: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
+    everywhere = numbers.get("everything") or numbers.get("rate_everywhere") is not None
+    if _even(subject):
         return ", almost always: it could also rest at half turns, which are unstable" if everywhere else ""
     if subject["double_cover"] == "hysteresis":
-        return ", whichever quaternion it starts with: global on rotations, and robust by its hysteresis"
+        whole = ", whichever quaternion it starts with: global on rotations, and robust by its hysteresis"
+        return whole if everywhere else ", robust by its hysteresis"
     if subject["double_cover"] == "shortest":
         return " by the shorter way; at half a turn the feedback switches, and noise may hold it there"
-    if numbers.get("everything") or numbers.get("rate_everywhere") is not None:
+    if everywhere:
         return ", almost always at q0 = 1; it may turn the long way to get there (unwinding)"
     return ""
 
 
 def _convergence(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
-    return f"{place(n)} the body comes to rest on target{_cover(n, subject)}".strip()
+    return f"{place(n, subject)} the body comes to rest on target{_cover(n, subject)}".strip()
 
 
 def _region(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
-    where = place(n) or "from a level set of V"
+    where = place(n, subject) or "from a level set of V"
     either = ", from either quaternion of an attitude" if subject["double_cover"] == "hysteresis" else ""
     return f"{where} the body comes to rest on target without leaving the set{either}; the set is the same for every inertia"
 
 
 def _torque_limit(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     kind = "on every axis" if n["kind"] == "axis" else "in norm"
-    return f"{place(n)} the torque never exceeds {n['limit']:.4g} N m {kind}"
+    return f"{place(n, subject)} the torque never exceeds {shown(n['limit'], ' N m', up=not n['refuted'])} {kind}"
 
 
 def _wheels(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
@@ -130,27 +153,29 @@ def _wheels(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
         return "no motor of a wheel reaches its limit"
     torque, stored = (shown(max(n[name]), unit, up=True) for name, unit in (("motors", " N m"), ("stored", " N m s")))
     while_ = f"while the total momentum is at most {shown(n['momentum'], ' N m s')}"
-    return f"{place(n)} {while_}, no motor gives more than {torque} and no wheel stores more than {stored}"
+    return f"{place(n, subject)} {while_}, no motor gives more than {torque} and no wheel stores more than {stored}"
 
 
 def _inertia(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if n["tolerance"] is None:
-        return f"{place(n)} it converges whatever the inertia of the body really is"
+        return f"{place(n, subject)} it converges whatever the inertia of the body really is"
     share = shown(100.0 * n["tolerance"], " %")
-    return f"{place(n)} it converges with every entry of the inertia off by up to {share} of sqrt(J_ii J_jj)".strip()
+    return (
+        f"{place(n, subject)} it converges with every entry of the inertia off by up to {share} of sqrt(J_ii J_jj)".strip()
+    )
 
 
 def _disturbance(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if "angle" not in n:
-        return f"a torque from outside of up to {n['torque']:.3g} N m leaves the body near the target"
+        return f"a torque from outside of up to {shown(n['torque'], ' N m')} leaves the body near the target"
     return (
-        f"{place(n)} against any torque from outside of up to {shown(n['torque'], ' N m')}, it ends within "
+        f"{place(n, subject)} against any torque from outside of up to {shown(n['torque'], ' N m')}, it ends within "
         f"{angle(n['angle'], up=True)} and {speed(n['rate'], up=True)}"
     )
 
 
 def _sampling(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
-    text = f"the linear loop is stable with the torque held for {n['period']:g} s"
+    text = f"the linear loop is stable with the torque held for {n['period']:.12g} s"
     if n["longest"] is None:
         return text
     longest = shown(n["longest"], " s")
@@ -161,14 +186,14 @@ def _sampling(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 
 def _sliding(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     most = max(n["torque"])
-    against = (
-        f"against any torque from outside of up to {most:.3g} N m on an axis" if most else "without torque from outside"
-    )
+    against = f"against any torque from outside of up to {shown(most, ' N m', n['refuted'])} on an axis"
+    if not most:
+        against = "without torque from outside"
     if "angle" not in n:
         return f"the surface is reached {against}"
-    where = place(n)
+    where = place(n, subject)
     if not n["everything"]:
-        where = place({**n, "rate_everywhere": None}).replace("level set of V", "level set of s.Js")
+        where = place({**n, "rate_everywhere": None}, subject).replace("level set of V", "level set of s.Js")
     end = "slides to rest on target"
     if n["surface"]:
         end = f"ends within {angle(n['angle'], True)} and {speed(n['rate'], True)} of the target, at either quaternion of it"
@@ -189,7 +214,8 @@ def _circle(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 
 def _control_limit(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     kind = "on every axis" if n["kind"] == "axis" else "in norm"
-    return f"{_circles(n)} with x = 0, the control never exceeds {n['limit']:.4g} (scaled) {kind}".strip()
+    limit = shown(n["limit"], " (scaled)", up=not n["refuted"])
+    return f"{_circles(n)} with x = 0, the control never exceeds {limit} {kind}".strip()
 
 
 def _rest(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
@@ -197,10 +223,10 @@ def _rest(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 
 
 def _saturated_axis(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
-    where = f"with Y and Z held and the control along X within {n['limit']:.4g} (scaled)"
+    where = f"with Y and Z held and the control along X within {n['limit']:.12g} (scaled)"
     if "width" not in n:
         return f"{where}, x returns"
-    share = f"{100.0 * n['width'] / n['boundary']:.4g} % of the true bound"
+    share = f"{shown(100.0 * n['width'] / n['boundary'], ' %')} of the true bound"
     return (
         f"{where}, x returns from |x + x'/s| up to {shown(n['width'])}, {share}, and |x| up to {shown(n['reach'])}; "
         f"from |x + x'/s| = {shown(n['boundary'], up=True)} on nothing returns"
@@ -228,8 +254,15 @@ def eigenvalues(claim: Claim) -> str:
     shown_once: list[str] = []
     for real, imaginary in claim.numbers.get("eigenvalues", []):
         if imaginary >= 0.0:
-            shown_once.append(f"{real:.6g}" + (f" ± {imaginary:.6g} i" if imaginary else ""))
+            digits = _telling(complex(real, imaginary))
+            shown_once.append(f"{real:.{digits}g}" + (f" ± {imaginary:.{digits}g} i" if imaginary else ""))
     return ", ".join(dict.fromkeys(shown_once))
+
+
+def _telling(z: complex) -> int:
+    """So many digits of an eigenvalue that it is seen on which side of the unit circle it lies."""
+    cut = (abs(complex(float(f"{z.real:.{n}g}"), float(f"{z.imag:.{n}g}"))) >= 1.0 for n in range(6, 17))
+    return next((n for n, outside in enumerate(cut, 6) if outside == (abs(z) >= 1.0)), 17)
 
 
 def evidence(obligation: Obligation) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from rich.markup import escape
 from rich.table import Table
 
 from starhold.certification.certificate import Certificate, Claim
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from starhold.certification.checker import Finding
     from starhold.report.certificates import Tried
 
+LONGEST = 1_000
+"""Characters of a file that are printed at a time."""
 COLOURS = {
     "proved": "green",
     "refuted": "red",
@@ -29,7 +32,7 @@ COLOURS = {
 def print_certificate(tried: Tried) -> None:
     """Claims with their outcomes, why those that are not proved are not, the assumptions, and the flights."""
     certificate, trial, inside = tried
-    console.print(f"[bold]{certificate.name}[/bold]: {_coloured(certificate.outcome)}", highlight=False)
+    console.print(f"[bold]{_safe(certificate.name)}[/bold]: {_coloured(certificate.outcome)}", highlight=False)
     if not certificate.claims:
         console.print(
             "  no claim: proofs are for laws with a Lyapunov function, one root, or a surface and no wheels",
@@ -39,12 +42,12 @@ def print_certificate(tried: Tried) -> None:
     for _ in range(3):
         table.add_column(overflow="fold")
     for claim in certificate.claims:
-        told = sentence(claim, certificate.subject)
+        told = _safe(sentence(claim, certificate.subject))
         table.add_row(f"  {_coloured(claim.outcome)}", HEADINGS[claim.kind], f"{told} [dim]({methods(claim)})[/dim]")
         if "eigenvalues" in claim.numbers:
             table.add_row("", "", f"[dim]eigenvalues {eigenvalues(claim)}[/dim]")
         for line in reasons(claim):
-            table.add_row("", "", line)
+            table.add_row("", "", _safe(line))
     if certificate.claims:
         console.print(table, highlight=False)
         console.print(f"  [dim]assuming: {assumptions(certificate)}[/dim]", highlight=False)
@@ -65,9 +68,9 @@ def print_proved(certificates: Sequence[Certificate]) -> None:
     for _ in range(3):
         table.add_column(overflow="fold")
     for certificate in certificates:
-        name = certificate.name
+        name = _safe(certificate.name)
         for claim in certificate.claims:
-            table.add_row(f"  {name}", _coloured(claim.outcome), sentence(claim, certificate.subject))
+            table.add_row(f"  {name}", _coloured(claim.outcome), _safe(sentence(claim, certificate.subject)))
             name = ""
         if not certificate.claims:
             table.add_row(f"  {name}", _coloured("undecided"), "no claim")
@@ -108,20 +111,30 @@ def print_findings(findings: Sequence[Finding]) -> None:
     for (name, claim), group in groups.items():
         verdicts = {finding.verdict for finding in group}
         worst = next(v for v in ("fails", "not checked", "not claimed", "holds") if v in verdicts)
-        table.add_row(name, claim, ", ".join(f.obligation for f in group if f.obligation), _coloured(worst))
+        obligations = ", ".join(f.obligation for f in group if f.obligation)
+        table.add_row(_safe(name), _safe(claim), _safe(obligations), _coloured(worst))
     console.print(table)
     failed = [finding for finding in findings if finding.verdict == "fails"]
     for f in failed:
-        where = " / ".join(part for part in (f.certificate, f.claim, f.obligation) if part)
-        console.print(f"[red]fails[/red]  {where}: {f.reason}", highlight=False)
+        console.print(f"[red]fails[/red]  {_where(f)}", highlight=False)
     left = [finding for finding in findings if finding.verdict == "not checked"]
     for f in left:
-        where = " / ".join(part for part in (f.certificate, f.claim, f.obligation) if part)
-        console.print(f"[yellow]not checked[/yellow]  {where}: {f.reason}", highlight=False)
+        console.print(f"[yellow]not checked[/yellow]  {_where(f)}", highlight=False)
     claimed = sum(finding.verdict == "holds" for finding in findings)
     console.print(
         f"{claimed} obligations hold, {len(failed)} fail{f', {len(left)} are not checked' if left else ''}.", highlight=False
     )
+
+
+def _where(finding: Finding) -> str:
+    parts = (finding.certificate, finding.claim, finding.obligation)
+    return _safe(f"{' / '.join(part for part in parts if part)}: {finding.reason}")
+
+
+def _safe(text: str) -> str:
+    """Text from a file as one that can be printed: no markup, nothing that steers a terminal, no half of a character."""
+    plain = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+    return escape(plain if len(plain) <= LONGEST else f"{plain[:LONGEST]} …")
 
 
 def _coloured(outcome: str) -> str:

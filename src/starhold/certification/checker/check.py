@@ -171,7 +171,7 @@ def _unproved(subject: Subject | Station, claim: Mapping[str, Any]) -> list[tupl
     for obligation in claim["obligations"]:
         how, proved = HOWS.get(obligation["name"], ()), obligation["outcome"] == "proved"
         demand(obligation["how"] in how, f"there is no obligation {obligation['name']} that is shown so")
-        demand(proved != bool(obligation["evidence"]), "what is proved has no evidence against it, and what is not has some")
+        demand(not (proved and obligation["evidence"]), "what is proved has no evidence against it")
     found: list[tuple[str, Verdict, str]] = []
     for obligation in claim["obligations"]:
         name, verdict, reason = obligation["name"], "not claimed", f"{obligation['outcome']}, the claim is not proved"

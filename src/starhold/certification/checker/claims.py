@@ -12,7 +12,6 @@ from flint import acb, acb_poly, arb, fmpq, fmpq_mat, fmpq_poly
 from starhold.certification.checker.even import EvenRegion
 from starhold.certification.checker.exact import (
     ONE,
-    ZERO,
     CheckError,
     Obligation,
     definite,

@@ -12,7 +12,6 @@ there the target is no longer a point but a side of the box, and the quotients h
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from flint import arb, fmpq
@@ -34,7 +33,7 @@ from starhold.certification.checker.exact import (
     root_up,
     up,
 )
-from starhold.certification.checker.loop import ATTITUDE, QUOTIENT, RATE, Loop, W
+from starhold.certification.checker.loop import ATTITUDE, QUOTIENT, Loop, W
 from starhold.certification.checker.region import BALLS, EXACT, LASALLE, SIGN, Numbers
 from starhold.certification.checker.subject import Subject, named, variables
 
