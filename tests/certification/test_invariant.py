@@ -221,7 +221,9 @@ def test_sliding_to_rest():
     found = claim(("-sign(x) + y/4", "-y"), "region", ROUND, ((-1.0, 1.0), (-1.0, 1.0)), ORIGIN)
     assert found.outcome == "proved"
     assert outcomes(found)["switching"] == "proved"
-    assert "motions in the sense of Filippov where the right-hand side jumps" in found.assumptions
+    assert any("in the sense of Filippov" in assumption for assumption in found.assumptions)
+    assert "all motions, in Filippov's sense, that start in" in sentence(found)
+    assert "Filippov" not in sentence(claim(DAMPED, "attracts", ROUND, rest=ORIGIN))
 
 
 def test_v_may_fall_on_both_sides_and_rise_in_between():
@@ -261,7 +263,11 @@ def test_examples_are_proved(name):
 def test_published_example_with_the_function_as_it_is_printed():
     # Without a factor of four the two halves do not meet, but at (0, 0) and (2, 0).
     below, above = "(2*x + y)**2 - 8*(x + y)", "(x - 1)**2 + y**2 - 1"
-    rates = ("y", "-2*x - 3*y if y <= 0 else 1 - x")
+    circle = "(x**2 + y**2 - 2*x)"
+    rates = (
+        f"y if y <= 0 else 2*x*y if {circle} <= 0 else (x**2 + y**2)*y",
+        f"-2*x - 3*y if y <= 0 else y**2 - x**2 if {circle} <= 0 else (x**2 + y**2)*(1 - x)",
+    )
     box = ((-4.0, 7.0), (-9.0, 4.0))
     printed = claim(rates, "region", f"max({below} if y <= 0 else {above}, 0)", box, escape="4*x + y - x*y")
     assert outcomes(printed) == {"continuous": "refuted"}

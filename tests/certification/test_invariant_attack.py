@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
 
 from starhold.report.invariant_picture import sketch
-from tests.certification.invariants import claim, proved
+from tests.certification.invariants import claim, outcomes, proved
 
 VDP = (
     *((0.41201, 2, 0), (-0.41629, 1, 1), (0.2336, 0, 2)),
@@ -21,8 +21,15 @@ def sextic(x):
 
 
 def switching(x):
-    lower = x[1] <= 0.0
-    return np.array([x[1], np.where(lower, -2.0 * x[0] - 3.0 * x[1], 1.0 - x[0])])
+    """As it is published, which the built-in one is multiplied by what is positive of."""
+    inside = x[0] ** 2 + x[1] ** 2 <= 2.0 * x[0]
+    upper = np.where(inside, (x[1] ** 2 - x[0] ** 2) / (2.0 * np.where(inside & (x[0] > 0.0), x[0], 1.0)), 1.0 - x[0])
+    return np.array([x[1], np.where(x[1] <= 0.0, -2.0 * x[0] - 3.0 * x[1], upper)])
+
+
+def loop(x):
+    """What does not change along a motion inside of the set of loops: half the width of its loop."""
+    return np.where(x[1] > 0.0, (x[0] ** 2 + x[1] ** 2) / (2.0 * x[0]), (2.0 * x[0] + x[1]) ** 2 / (8.0 * (x[0] + x[1])))
 
 
 def halves(x):
@@ -58,6 +65,11 @@ SYSTEMS = {
     ),
     "circle": (ring, lambda x: (x[0] ** 2 + x[1] ** 2 - 1.0) ** 2, 40.0),
     "orbit": (held, held_by, 300.0),
+    "dead-zone": (
+        lambda x: np.array([x[1], -x[1] - (x[0] + x[1]) + np.clip(x[0] + x[1], -1.0, 1.0)]),
+        lambda x: np.maximum(0.0, np.maximum((x[0] + x[1]) ** 2 - 1.0, x[0] ** 2 - 1.44)),
+        40.0,
+    ),
 }
 
 
@@ -169,11 +181,38 @@ def test_states_beyond_the_limit_cycle_escape():
 
 def test_the_unstable_rest_of_the_switching_system_attracts():
     """Which no claim says: motions inside of the set go out from the rest's neighbourhood and come back to it."""
-    start = np.array([1e-3, 1e-3])
-    flown = solve_ivp(lambda t, s: switching(s), (0.0, 40.0), start, rtol=1e-9, atol=1e-12, max_step=0.01)
-    assert np.abs(flown.y).max() > 0.5
-    assert np.abs(flown.y[:, -1]).max() < 1e-6
-    assert halves(flown.y).max() < 1e-2
+    flown = turned(0.25, 1e-3)
+    assert flown[0].max() == pytest.approx(0.5, rel=1e-3)
+    assert np.abs(flown[:, -1]).max() < 1e-6
+    assert halves(flown).max() < 1e-9
+
+
+def turned(c, near):
+    """The motion (2, n) along a loop that starts on its upper half, near the origin."""
+    start = np.array([c * (1.0 - np.cos(near)), c * np.sin(near)])
+    times = np.linspace(0.0, 40.0, 2001)
+    flown = solve_ivp(lambda t, s: switching(s), (0.0, 40.0), start, "DOP853", times, rtol=1e-9, atol=1e-13, max_step=0.1)
+    before = np.abs(flown.y).max(axis=0) > 1e-4
+    assert loop(flown.y[:, before]) == pytest.approx(c, rel=1e-3)
+    return flown.y
+
+
+@pytest.mark.parametrize("c", [0.05, 0.4])
+def test_no_strict_subset_of_the_loops_is_stable(c):
+    """Which the paper says. Each {loop <= c} holds the origin, however near which motions along all wider loops start:
+    they go as far from the set as these are wide, and end in it. So it attracts and is not stable, as the origin alone."""
+    for near in (1e-1, 1e-3):
+        flown = turned(0.9, near)
+        assert np.linalg.norm(flown[:, 0]) < near
+        far = flown[:, np.argmax(flown[0])]
+        # {loop <= c} lies within 3c of the origin.
+        assert np.linalg.norm(far) > 1.79 > 3.0 * c + 0.5
+        assert np.linalg.norm(flown[:, -1]) < 1e-6
+    below, above = f"(2*x + y)**2 - {8 * c}*(x + y)", f"4*(x**2 + y**2 - {2 * c}*x)"
+    rates = [str(proved("switching")[1].subject["rates"][name]).replace("circle", "(x**2 + y**2 - 2*x)") for name in "xy"]
+    indicator = f"max({below} if y <= 0 else {above}, 0)"
+    found = claim(rates, "stable", indicator, ((-4.0, 7.0), (-9.0, 4.0)), level=1.0)
+    assert outcomes(found)["falls"] == "refuted"
 
 
 KINKS = (

@@ -79,7 +79,7 @@ def test_examples_are_shown_again(name, made):
 @pytest.mark.parametrize("name", builtin_names())
 def test_a_level_above_what_is_true_fails(name, made):
     for place, claim in enumerate(made[name]["certificates"][0]["claims"]):
-        if "level" not in claim["numbers"]:
+        if "refuted_level" not in claim["numbers"]:
             continue
 
         def raised(subject, claims, place=place):
@@ -108,8 +108,10 @@ def test_a_level_above_what_is_true_fails(name, made):
         ("circle", "x", "-y + x*f"),
         ("saturated-axis", "v", "x + sat(-s/2)"),
         ("saturated-strip", "s", "s + sat(2*s)"),
-        ("switching", "y", "-2*x - 3*y if y <= 0 else 1 + x"),
-        ("switching", "y", "-2*x + 3*y if y <= 0 else 1 - x"),
+        ("switching", "y", "-2*x - 3*y if y <= 0 else y**2 - x**2 if circle <= 0 else (x**2 + y**2)*(1 + x)"),
+        ("switching", "y", "-2*x + 3*y if y <= 0 else y**2 - x**2 if circle <= 0 else (x**2 + y**2)*(1 - x)"),
+        ("spin", "q", "p*r + p**2"),
+        ("dead-zone", "v", "-v - (s - sat(s)) + x"),
         ("orbit", "vy", "-w*vz - 2*f1*y + f2"),
     ],
 )
@@ -127,6 +129,8 @@ def test_another_system_does_not_pass(name, key, value, made):
         ("saturated-axis", "max(s**2, x**2/8)"),
         ("switching", "max(below if y <= 0 else above/4, 0)"),
         ("switching", "max(below if y <= 0 else above - 1, 0)"),
+        ("spin", "energy + (momentum - 8)**2/9"),
+        ("spin", "energy + p"),
     ],
 )
 def test_another_function_does_not_pass(name, V, made):

@@ -84,7 +84,7 @@ def test_user_errors_are_one_line(tmp_path, words, said):
 def test_systems_that_come_with_it_are_listed(tmp_path):
     done = starhold("invariant", cwd=tmp_path)
     assert done.returncode == 0
-    for name in ("switching", "van-der-pol", "saturated-axis", "saturated-strip", "circle", "orbit"):
+    for name in ("switching", "van-der-pol", "saturated-axis", "saturated-strip", "circle", "orbit", "spin", "dead-zone"):
         assert name in done.stdout
 
 

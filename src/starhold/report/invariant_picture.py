@@ -34,8 +34,9 @@ AHEAD = 60.0
 class Sketch:
     """What one panel shows, over the first two variables, parameters in the middle of their intervals.
 
-    x, y: (n,); V: (n, n), by y, then x, with more variables the least over these; u, v: the same shape, None with more;
-    orbit: (2, points), the border of the true region, with its area; marks: states that refute. One variable: no arrays."""
+    x, y: (n,); V: (n, n), by y, then x, with more variables the least (unstable: greatest) over them; u, v: the same shape,
+    None with more; orbit: (2, points), the border of the true region, with its area; marks: states that refute. One
+    variable: no arrays."""
 
     claim: Claim
     names: tuple[str, ...]
@@ -68,7 +69,9 @@ def _sketch(problem: Problem, wanted: Wanted, claim: Claim, start: tuple[float, 
     values = Values(what, points)
     shape = (len(y), len(x))
     u, v = (rate.reshape(shape) for rate in _rates(what, values)[:2]) if flat else (None, None)
-    V = (values.V if flat else _least(what, points, len(problem.system.variables))).reshape(shape)
+    # Of what is left, all of which some motions start from.
+    sign = -1.0 if wanted.theorem == "unstable" else 1.0
+    V = (values.V if flat else sign * _least(what, points, len(problem.system.variables), sign)).reshape(shape)
     marks = [
         o.evidence[key]
         for o in claim.obligations
@@ -83,8 +86,8 @@ def _sketch(problem: Problem, wanted: Wanted, claim: Claim, start: tuple[float, 
     return Sketch(claim, names, x, y, V, u, v, orbit, area, marked, rest)
 
 
-def _least(what: Candidate, points: Any, moving: int) -> Any:
-    """V at points (n, N), the least over the variables from the third on, by grids that shrink around what is best."""
+def _least(what: Candidate, points: Any, moving: int, sign: float) -> Any:
+    """sign V at points (n, N), the least over the variables from the third on, by grids that shrink around what is best."""
     best, values = points.copy(), np.full(points.shape[1], np.inf)
     width = np.array([0.5 * (high - low) for low, high in what.box[2:moving]])
     for step in range(STEPS):
@@ -93,7 +96,7 @@ def _least(what: Candidate, points: Any, moving: int) -> Any:
         for offset in np.array(np.meshgrid(*[side] * len(width))).reshape(len(width), -1).T:
             tried = centre.copy()
             tried[2:moving] += (offset * width)[:, None]
-            found = Values(what, tried).V
+            found = sign * Values(what, tried).V
             better = found < values
             values[better], best[:, better] = found[better], tried[:, better]
         width = width * (0.25 if step == 0 else 0.6)

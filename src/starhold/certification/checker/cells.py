@@ -24,23 +24,28 @@ FEW = 2_000
 
 @dataclass(frozen=True)
 class Cell:
-    """Where surfaces times their signs are not negative."""
+    """Where surfaces times their signs are not negative, and those in `on`, of a thin cell, are zero."""
 
     sides: Sequence[tuple[Poly, int]]
     rates: tuple[Poly, ...]
     V: Poly
+    on: Sequence[Poly] = ()
 
     @property
     def guards(self) -> list[Poly]:
-        return [surface * side for surface, side in self.sides]
+        return [*(surface * side for surface, side in self.sides), *self.on, *(-surface for surface in self.on)]
 
     def slope(self, function: Poly) -> Poly:
         """Its derivative along the motion."""
         return sum((function.derivative(k) * rate for k, rate in enumerate(self.rates)), function * 0)
 
     def between(self, other: Cell) -> list[Poly]:
-        """The surfaces that part two cells."""
-        return [p for p, side in self.sides if any(p == q and side * way < 0 for q, way in other.sides)]
+        """The surfaces that part two cells: all that both have, when closed, lies in each of them."""
+        return [
+            *(p for p, side in self.sides if any(p == q and side * way < 0 for q, way in other.sides)),
+            *self.on,
+            *other.on,
+        ]
 
 
 @dataclass(frozen=True)
@@ -68,13 +73,25 @@ class Chart:
 
 @dataclass(frozen=True)
 class Pieces:
-    """All cells. `rest`: coordinates, None for parameters; None if M is {V <= 0}."""
+    """All cells, those with an inside and thin ones. `rest`: coordinates, None for parameters; None if M is {V <= 0}."""
 
     names: tuple[str, ...]
     moving: int
     box: tuple[tuple[Any, Any], ...]
     cells: tuple[Cell, ...]
     rest: tuple[Any, ...] | None
+    thin: tuple[Cell, ...] = ()
+
+    @property
+    def every(self) -> tuple[Cell, ...]:
+        return (*self.cells, *self.thin)
+
+    @property
+    def pairs(self) -> Iterator[tuple[Cell, Cell]]:
+        """Cells with each other, and thin ones with all of them."""
+        for place, one in enumerate(self.every):
+            for other in self.cells[place + 1 :] if place < len(self.cells) else self.cells:
+                yield one, other
 
     @property
     def generators(self) -> tuple[Poly, ...]:
@@ -89,7 +106,7 @@ class Pieces:
 
     def around(self, state: Sequence[Any]) -> list[Cell]:
         """The closed cells that hold a state."""
-        return [cell for cell in self.cells if all(guard(*state) >= 0 for guard in cell.guards)]
+        return [cell for cell in self.every if all(guard(*state) >= 0 for guard in cell.guards)]
 
     def value(self, state: Sequence[Any]) -> Any:
         """V at a state; all cells have to agree."""
@@ -147,7 +164,7 @@ class Pieces:
         for surface in one.between(other):
             if all(divides(surface, gap) for gap in gaps):
                 return True
-            steps = self._eliminated([surface])[0]
+            steps = self._eliminated([surface, *one.on, *other.on])[0]
             left, mine, yours = ([_on(surface, p, steps) for p in ps] for ps in (gaps, one.guards, other.guards))
             if all(gap.is_zero() for gap in left):
                 return True
@@ -166,26 +183,27 @@ def _on(surface: Poly, p: Poly, steps: tuple[Sequence[Poly], ...]) -> Poly:
 
 
 def split(names: Sequence[str], moving: int, box: Any, rest: Any, rates: Sequence[Any], V: Any) -> Pieces:
-    """The cells of rates and V. Sets without an inside are left out: what is closed fills their place."""
+    """The cells of rates and V; what holds on a surface alone (neither p > 0 nor -p > 0) is a thin one."""
     ring = fmpq_mpoly_ctx.get(tuple(names), Ordering.degrevlex)
     cells: list[Cell] = []
+    thin: list[Cell] = []
     still = [Polynomial({}) for _ in names[moving:]]
     for truths, values in jointly([*rates, *still, V]):
-        sides: list[tuple[Poly, int]] = []
+        asked: dict[str, tuple[Poly, set[tuple[int, bool]]]] = {}
         for condition, truth in truths:
             surface = polynomial(ring, names, condition.positive)
             lead = surface.leading_coefficient()
-            surface, side = surface / lead, 1 if (lead > 0) == truth else -1
-            known = next((way for p, way in sides if p == surface), None)
-            if known is None:
-                sides.append((surface, side))
-            elif known != side:
-                break
-        else:
-            own = [polynomial(ring, names, value) for value in values]
-            cells.append(Cell(sides, tuple(own[:-1]), own[-1]))
+            side = 1 if (lead > 0) == truth else -1
+            asked.setdefault(str(surface / lead), (surface / lead, set()))[1].add((side, truth))
+        both = [len({side for side, _ in ways}) == 2 for _, ways in asked.values()]
+        if any(torn and any(strictly for _, strictly in ways) for torn, (_, ways) in zip(both, asked.values(), strict=True)):
+            continue
+        sides = [(p, next(iter(ways))[0]) for torn, (p, ways) in zip(both, asked.values(), strict=True) if not torn]
+        on = [p for torn, (p, _) in zip(both, asked.values(), strict=True) if torn]
+        own = [polynomial(ring, names, value) for value in values]
+        (thin if on else cells).append(Cell(sides, tuple(own[:-1]), own[-1], on))
     demand(bool(cells), "a system has no cells")
-    return Pieces(tuple(names), moving, tuple(box), tuple(cells), rest)
+    return Pieces(tuple(names), moving, tuple(box), tuple(cells), rest, tuple(thin))
 
 
 def polynomial(ring: Any, names: Sequence[str], p: Any) -> Poly:
@@ -219,11 +237,39 @@ def negative_multiple(a: Poly, b: Poly) -> bool:
     return bool(c < 0) and a == b * c
 
 
-def signed_like(q: Poly, V: Poly) -> list[Poly]:
-    """Polynomials each of which, where it and V are positive, shows that q is: q itself, and what is left of q V without the
-    square of their common factor."""
+def one_sign(p: Poly, guards: Sequence[Poly]) -> int:
+    """1 if a polynomial is a product of guards and squares, nowhere negative in the cell, -1 if its negative is; else 0."""
+    constant, factors = p.factor()
+    found = (constant > 0) - (constant < 0)
+    for factor, power in factors:
+        if int(power) % 2 == 1:
+            found *= any(negative_multiple(-factor, g) for g in guards) - any(negative_multiple(factor, g) for g in guards)
+    return found
+
+
+def vanishes_at_once(p: Poly, V: Poly) -> bool:
+    """Whether p >= 0 is zero only where all its variables are, by its even powers, and V is not positive there."""
+    names, terms = p.context().names(), [(tuple(map(int, powers)), c) for powers, c in p.to_dict().items()]
+    inside = [k for k in range(len(names)) if any(powers[k] for powers, _ in terms)]
+    alone = {k for powers, _ in terms for k in inside if sum(powers) == powers[k] > 0}
+    even = all(c > 0 and any(powers) and all(power % 2 == 0 for power in powers) for powers, c in terms)
+    if not inside or not even or alone != set(inside):
+        return False
+    left = V.compose(*(g * 0 if k in inside else g for k, g in enumerate(p.context().gens())))
+    return left.is_zero() or (left.is_constant() and bool(left.leading_coefficient() < 0))
+
+
+def signed_like(q: Poly, V: Poly, guards: Sequence[Poly] = ()) -> list[Poly]:
+    """Polynomials each of which, where it and V are positive in a cell, shows that q is: q less factors of one sign there,
+    and what is left of q V without the square of their common factor."""
     if q.is_zero() or V.is_zero():
         return [q]
+    constant, factors = q.factor()
+    q = q * 0 + constant
+    for factor, power in factors:
+        shared = divides(factor, V)
+        sign = one_sign(factor, guards) if shared else next((s for s in (1, -1) if vanishes_at_once(factor * s, V)), 0)
+        q = q * (sign or factor if int(power) % 2 else 1 if shared or sign else factor**power)
     common = q.gcd(V)
     if common.is_constant():
         return [q]

@@ -11,7 +11,7 @@ from typing import Any
 
 from flint import fmpq_mat
 
-from starhold.certification.checker.cells import Cell, Pieces, negative_multiple, signed_like
+from starhold.certification.checker.cells import Cell, Pieces, one_sign, signed_like
 from starhold.certification.checker.cover import Options, Poly, Question, answer
 from starhold.certification.checker.exact import CheckError, NotCheckedError, demand
 
@@ -43,11 +43,11 @@ class Indicator:
         for chart in self.pieces.charts(zeros):
             V = chart.of(cells[0].V)
             guards = [chart.of(guard) for cell in cells for guard in cell.guards]
-            if V.is_zero() or any(negative_multiple(V, guard) for guard in guards):
+            if V.is_zero() or one_sign(V, guards) < 0:
                 continue
             inside = [] if self.level is None else [chart.of(self.level - cells[0].V)]
             rooms = [*chart.rooms[: chart.strict], V, *chart.rooms[chart.strict :], *guards, *inside]
-            options = wanted(lambda p, chart=chart, V=V: signed_like(chart.of(p), V))
+            options = wanted(lambda p, V=V, of=chart.of, guards=guards: signed_like(of(p), V, guards))
             here = answer(Question(chart.box, rooms, options, chart.strict + 1))
             if here is False:
                 return False
@@ -68,7 +68,7 @@ class Indicator:
 
     def _at_rest(self) -> list[Cell]:
         found: list[Cell] = []
-        for cell in self.pieces.cells:
+        for cell in self.pieces.every:
             sides = [self.pieces.at_rest(guard) for guard in cell.guards]
             if any(not side.is_constant() for side in sides):
                 raise NotCheckedError("which cells hold the rest depends on a parameter")
@@ -78,12 +78,10 @@ class Indicator:
 
     def continuous(self) -> str:
         """That V is one function."""
-        cells = self.pieces.cells
-        for place, one in enumerate(cells):
-            for other in cells[place + 1 :]:
-                if not self.pieces.same(one, other, [one.V - other.V]):
-                    raise NotCheckedError("V is not shown to be the same from both sides of a surface")
-        return f"the same from all sides in {len(cells)} cells"
+        for one, other in self.pieces.pairs:
+            if not self.pieces.same(one, other, [one.V - other.V]):
+                raise NotCheckedError("V is not shown to be the same from both sides of a surface")
+        return f"the same from all sides in {len(self.pieces.every)} cells"
 
     def set(self, evidence: Mapping[str, Any]) -> str:
         """That V is zero at the rest; that there is a state with V at most the level, for stability and instability 0."""
@@ -143,9 +141,22 @@ class Indicator:
                     found.append(answer(Question(box, rooms)))
         return _told(found, "on every side of the box", "V does not exceed the level all over the border")
 
-    @cached_property
+    @property
     def _weak(self) -> list[tuple[Cell, tuple[Poly, ...]]]:
         """Cells in which V' is shown only not to have the wrong sign, and what vanishes with it; else a CheckError."""
+        if isinstance(self._looked, CheckError):
+            raise self._looked
+        return self._looked
+
+    @cached_property
+    def _looked(self) -> list[tuple[Cell, tuple[Poly, ...]]] | CheckError:
+        """The same, or the error, so that nothing is looked for twice."""
+        try:
+            return self._look()
+        except CheckError as fault:
+            return fault
+
+    def _look(self) -> list[tuple[Cell, tuple[Poly, ...]]]:
         weak: list[tuple[Cell, tuple[Poly, ...]]] = []
         may = self.theorem in ("stable", "attracts", "region", "intersection")
         for cell in self.pieces.cells:
@@ -216,11 +227,9 @@ class Indicator:
     @cached_property
     def jumps(self) -> list[tuple[Cell, Cell]]:
         """Pairs of cells whose rates are not shown to agree where they meet."""
-        cells = self.pieces.cells
         return [
             (one, other)
-            for place, one in enumerate(cells)
-            for other in cells[place + 1 :]
+            for one, other in self.pieces.pairs
             if not self.pieces.same(one, other, [a - b for a, b in zip(one.rates, other.rates, strict=True)])
         ]
 
@@ -241,7 +250,7 @@ class Indicator:
                 crossed = self.ask(
                     [one, other],
                     lambda goal, pair=pair: [[goal(q * way) for q in pair] for way in (1, -1)],
-                    [surface],
+                    [surface, *one.on, *other.on],
                 )
                 if not crossed:
                     raise NotCheckedError("a surface where the rates jump is not shown to be crossed")

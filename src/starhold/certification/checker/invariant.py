@@ -22,7 +22,11 @@ from starhold.certification.checker.shapes import CERTIFICATE, CLAIM, OBLIGATION
 FORMAT = "starhold invariant certificate 1"
 THEOREMS = ("stable", "attracts", "region", "unstable", "intersection")
 HOW = ("exact identity", "exact inequality", "interval arithmetic")
-ASSUMED = ["the equations exactly as given", "motions in the sense of Filippov where the right-hand side jumps"]
+ASSUMED = [
+    "the equations exactly as given",
+    "where the right-hand side jumps, motions in the sense of Filippov: x' is any mean of what it is on the sides and on "
+    "the surface",
+]
 MOST = 6
 NAMES = (
     "rest",

@@ -18,8 +18,8 @@ def continuous(what: Candidate) -> tuple[str, bool | None, dict[str, Any]]:
     """How it was shown, whether V is continuous in the box (None: not known), and the state that refutes it or a reason."""
     how = EXACT
     cells = what.guarded
-    for place, one in enumerate(cells):
-        for other in cells[place + 1 :]:
+    for place, one in enumerate((*cells, *what.thin)):
+        for other in cells[place + 1 :] if place < len(cells) else cells:
             between = one.cell.apart(other.cell)
             if what.pieces.agree(one.cell, other.cell, [(one.cell.V, other.cell.V)]):
                 continue
@@ -48,11 +48,12 @@ def _apart(what: Candidate, one: Guarded, other: Guarded, between: Sequence[int]
 
 def _jump(what: Candidate, one: Guarded, other: Guarded, between: Sequence[int]) -> dict[str, Any] | None:
     """A state of both closed cells at which their V differ, verified; looked for on linear surfaces."""
-    solved = solve(what.pieces.surfaces[between[0]])
+    linear = ((surface, solve(surface)) for surface in (what.pieces.surfaces[k] for k in between))
+    surface, solved = next((found for found in linear if found[1] is not None), (None, None))
     if solved is None:
         return None
     place, instead = solved
-    onto = [what.pieces.surfaces[between[0]]]
+    onto = [surface]
     points = search.grid([(0.0, 0.0) if k == place else side for k, side in enumerate(what.box)], 41)
     gaps = np.abs(Form(what.pieces.reduced(one.cell.V - other.cell.V, onto)).at(points))
     for k in np.argsort(-gaps, kind="stable"):

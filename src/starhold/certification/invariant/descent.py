@@ -1,10 +1,10 @@
 """What has to be shown on {0 < V <= level} in a box, by branch and bound over the cells of a piecewise polynomial system.
 
-Motions are those in the sense of Filippov: where the right-hand side jumps, x' is any mean of what it is on the sides.
-V(x(t)) has a derivative almost always. Inside a cell it is the cell's V'. The times on a surface across which the rates
-agree need nothing of their own: x' is the same from both sides, and so falls V. Of the other surfaces each place has to be
-crossed (all sides lead through it to the same side, so that only single times are spent there), or V of one side has to
-fall for the rates of all sides, and thus for each mean of them.
+Motions are those in the sense of Filippov, and more: where the right-hand side jumps, x' is any mean of what it is on the
+sides and on the surface itself. V(x(t)) has a derivative almost always. Inside a cell it is the cell's V'. The times on a
+surface across which the rates agree need nothing of their own: x' is the same from both sides, and so falls V. Of the other
+surfaces each place has to be crossed (all rates there lead through it to the same side, so that only single times are spent
+there), or V of one side has to fall for all of these rates, and thus for each mean of them.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ import numpy as np
 
 from starhold.algebra.intervals import Intervals
 from starhold.certification.invariant.enclosure import Boxes, Form, Mask, determinant, everywhere
-from starhold.certification.invariant.signs import Positive, is_sum, squares
-from starhold.certification.invariant.system import Cell, Pieces, Poly, System, along, opposite, plain, solve, split
+from starhold.certification.invariant.signs import Positive, is_sum, sign_between, squares
+from starhold.certification.invariant.system import Cell, Pieces, Poly, System, along, plain, solve, split
 from starhold.certification.matrices import number
 
 FEW = 4_000
@@ -51,6 +51,11 @@ class Candidate:
         """The cells, ready to be enclosed."""
         return tuple(Guarded.of(cell, self.pieces) for cell in self.pieces.cells)
 
+    @cached_property
+    def thin(self) -> tuple[Guarded, ...]:
+        """The thin cells."""
+        return tuple(Guarded.of(cell, self.pieces) for cell in self.pieces.thin)
+
 
 @dataclass(frozen=True)
 class Guarded:
@@ -66,7 +71,7 @@ class Guarded:
         """Of a cell; its part where polynomials vanish."""
         guards = pieces.guards(cell, onto)
         V = pieces.reduced(cell.V, onto)
-        never = V.is_zero() or any(opposite(V, guard) for guard in guards)
+        never = V.is_zero() or sign_between(V, guards) < 0
         return cls(cell, tuple(Form(guard) for guard in guards), Form(V), never)
 
     @property
@@ -175,8 +180,8 @@ def jumps(pieces: Pieces) -> list[int]:
     """Surfaces across which the rates are not shown to agree."""
     found: set[int] = set()
     several: list[set[int]] = []
-    for place, one in enumerate(pieces.cells):
-        for other in pieces.cells[place + 1 :]:
+    for place, one in enumerate((*pieces.cells, *pieces.thin)):
+        for other in pieces.cells[place + 1 :] if place < len(pieces.cells) else pieces.cells:
             between = one.apart(other)
             if pieces.agree(one, other, list(zip(one.rates, other.rates, strict=True))):
                 continue
@@ -208,8 +213,13 @@ def _switch(what: Candidate, place: int, level: float, sense: int) -> bool:
     solved = solve(surface)
     onto = [surface]
     rest = _rest_on(what, onto)
-    cells = [Guarded.of(cell, pieces, onto) for cell in pieces.cells]
-    sides = [cell.cell.signs[place] for cell in cells]
+    cells = [Guarded.of(cell, pieces, onto) for cell in (*pieces.cells, *pieces.thin)]
+    whole = range(len(pieces.cells))
+    # The cells of one side fill it near the surface; where this may have a side only, those of all sides are looked at.
+    sides = [[i for i in whole if cells[i].cell.signs[place] != -side] for side in (1, -1)]
+    lying = [k for k, cell in enumerate(cells) if place in cell.cell.on]
+    sides.append(list(whole))
+    gradient = [Form(surface.derivative(k)) for k in range(len(pieces.names))]
 
     def test(q: Poly, cell: Guarded) -> Positive:
         return Positive(pieces.reduced(q, onto), cell.V.polynomial, rest, cell.known)
@@ -217,14 +227,20 @@ def _switch(what: Candidate, place: int, level: float, sense: int) -> bool:
     through = [along(surface, cell.cell.rates) for cell in cells]
     ways = [[test(q * way, cell) for q, cell in zip(through, cells, strict=True)] for way in (1, -1)]
     # For each V of a side the rates of every cell.
-    falling = [[test(along(own.cell.V, other.cell.rates) * -sense, own) for other in cells] for own in cells]
+    falling = [[test(along(cells[i].cell.V, c.cell.rates) * -sense, cells[i]) for c in cells] for i in whole]
+
+    def two_sided(boxes: Boxes) -> Mask:
+        return np.any([_not_zero(slope.on(boxes)) for slope in gradient], axis=0)
+
     eliminated = None if solved is None else (Form(solved[1]), what.box[solved[0]])
 
     def shown(boxes: Boxes) -> Mask:
         active = [cell.active(boxes, level) for cell in cells]
         both = np.ones(boxes.count, dtype=bool)
         for side in (1, -1):
-            both &= np.any([a for a, s in zip(active, sides, strict=True) if s == side], axis=0)
+            both &= np.any([active[i] for i in whole if cells[i].cell.signs[place] == side], axis=0)
+        for k in lying:
+            both |= active[k]
         if eliminated is None:
             values = Form(surface).on(boxes)
             both &= (values.low <= 0.0) & (values.high >= 0.0)
@@ -235,14 +251,10 @@ def _switch(what: Candidate, place: int, level: float, sense: int) -> bool:
         for tests in ways:
             if not done.all():
                 done |= _all(~a | t.on(boxes) for a, t in zip(active, tests, strict=True))
-        for side in (1, -1):
+        for own in sides:
             if not done.all():
-                done |= _all(
-                    ~active[i] | ~active[j] | falling[i][j].on(boxes)
-                    for i in range(len(cells))
-                    for j in range(len(cells))
-                    if sides[i] == side
-                )
+                falls = _all(~active[i] | ~active[j] | q.on(boxes) for i in own for j, q in enumerate(falling[i]))
+                done |= falls if len(own) == len(whole) else falls & two_sided(boxes)
         return done
 
     box = [(0.0, 0.0) if solved is not None and k == solved[0] else side for k, side in enumerate(what.box)]

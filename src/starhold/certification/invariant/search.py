@@ -105,16 +105,16 @@ def stuck(what: Candidate) -> list[Array]:
     return found
 
 
-def ceiling(what: Candidate, sense: int = 1) -> float:
+def ceiling(what: Candidate, rests: bool = True) -> float:
     """The least V that points of a grid give for a state that no set may hold: on the border of the box, where V rises, or
-    at rest. Infinite if there is none."""
+    (if `rests`) at rest. Infinite if there is none."""
     least = math.inf
     for k in range(what.pieces.moving):
         for end in what.box[k]:
             face = [(end, end) if j == k else side for j, side in enumerate(what.box)]
             count = POINTS.get(len(face) - 1, 9)
             least = min(least, float(np.nanmin(Values(what, grid(face, count)).V)))
-    states = [*wrong(what, sense, 3), *stuck(what)]
+    states = [*wrong(what, 1, 3), *(stuck(what) if rests else ())]
     return min([least, *(float(Values(what, x[:, None]).V[0]) for x in states)])
 
 
@@ -143,9 +143,10 @@ def cell_of(what: Candidate, state: Sequence[Any]) -> Cell | None:
 
 
 def closed_cells(what: Candidate, state: Sequence[Any]) -> list[Cell]:
-    """All the cells whose closures hold an exact state."""
+    """All the cells, thin ones too, whose closures hold an exact state."""
     sides = [surface(*state) for surface in what.pieces.surfaces]
-    return [c for c in what.pieces.cells if all(s * v >= 0 for s, v in zip(c.signs, sides, strict=True))]
+    cells = [c for c in (*what.pieces.cells, *what.pieces.thin) if all(sides[k] == 0 for k in c.on)]
+    return [c for c in cells if all(s * v >= 0 for s, v in zip(c.signs, sides, strict=True))]
 
 
 def at(polynomial: Poly, rest: Sequence[Any]) -> Poly:
@@ -155,9 +156,9 @@ def at(polynomial: Poly, rest: Sequence[Any]) -> Poly:
 
 
 def cells_at(what: Candidate, rest: Sequence[Any]) -> list[Cell]:
-    """The cells whose closures hold a rest for some of the parameters."""
+    """The cells, thin ones too, whose closures hold a rest for some of the parameters."""
     found: list[Cell] = []
-    for cell in what.pieces.cells:
+    for cell in (*what.pieces.cells, *what.pieces.thin):
         sides = [at(guard, rest) for guard in what.pieces.guards(cell)]
         if not any(side.is_constant() and not side.is_zero() and side.leading_coefficient() < 0 for side in sides):
             found.append(cell)

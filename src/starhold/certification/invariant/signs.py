@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
 from starhold.certification.invariant.enclosure import Boxes, Form, Mask, definite
-from starhold.certification.invariant.system import Poly, solve
+from starhold.certification.invariant.system import Poly, opposite, solve
 from starhold.certification.matrices import number
 
 
@@ -24,9 +24,13 @@ class Positive:
       both have to an odd power have, together with what is left of V, a sign. So what is left of q V has to be positive;
     * q is definite about a rest (`Definite`).
 
+    Before, q is divided by what is positive where V is: factors of V that do not change sign in the cell, and sums of even
+    powers that vanish at one point only, where V <= 0.
+
     `rest`: the point, coordinates of all variables, None for parameters; `guards`: what is not negative in the cell."""
 
     def __init__(self, q: Poly, V: Poly, rest: Sequence[Any] | None = None, guards: Sequence[Poly] = ()) -> None:
+        q = _divided(q, V, guards)
         self._direct = Form(q)
         self._relative: list[Form] = [] if q.is_zero() or V.is_zero() else [Form(part) for part in _without_common(q, V)]
         self._definite = None if rest is None or q.is_zero() else Definite(q, rest, guards)
@@ -127,6 +131,39 @@ def to_rest(context: Any, rest: Sequence[Any]) -> list[Poly]:
 def lowest(q: Poly, moving: Sequence[int]) -> int:
     """The lowest degree in the moving variables among a polynomial's terms."""
     return min((sum(powers[k] for k in moving) for powers in q.to_dict()), default=0)
+
+
+def sign_between(p: Poly, guards: Sequence[Poly]) -> int:
+    """1 or -1 where this is the only sign that a polynomial may have in the cell, being a product of guards; else 0."""
+    constant, factors = p.factor()
+    sign = 0 if constant == 0 else 1 if constant > 0 else -1
+    for factor, power in factors:
+        if int(power) % 2:
+            sign *= next((way for g in guards for way in (1, -1) if opposite(factor * -way, g)), 0)
+    return sign
+
+
+def _divided(q: Poly, V: Poly, guards: Sequence[Poly]) -> Poly:
+    """q without factors that are positive where V is, or negative with the sign turned."""
+    if q.is_zero() or V.is_zero():
+        return q
+    constant, factors = q.factor()
+    left = q * 0 + constant
+    for factor, power in factors:
+        shared = divmod(V, factor)[1].is_zero()
+        sign = sign_between(factor, guards) if shared else _sign_but_where_none_is_left(factor, V)
+        left = left * (sign ** int(power) if sign else factor**power)
+    return left
+
+
+def _sign_but_where_none_is_left(p: Poly, V: Poly) -> int:
+    """The sign of a sum of even powers which vanishes where all its variables do, if V is not positive there; else 0."""
+    sign = 1 if p.leading_coefficient() > 0 else -1
+    used = [k for k in range(len(p.context().gens())) if not p.derivative(k).is_zero()]
+    generators = p.context().gens()
+    there = V.compose(*(g * 0 if k in used else g for k, g in enumerate(generators)))
+    holds = there.is_zero() or (there.is_constant() and there.leading_coefficient() < 0)
+    return sign if used and holds and _even_powers(p * sign, used) else 0
 
 
 def _without_common(q: Poly, V: Poly) -> list[Poly]:

@@ -1,7 +1,8 @@
 """A system of few variables as cells: on each, its right-hand sides and V are polynomials with rational coefficients.
 
 Where equations compare (`where`, `clip`, `min` and so on) the space splits along the surfaces on which what is compared is
-equal. A cell is what certain sides of certain surfaces have in common; the cells leave nothing out.
+equal. A cell is what certain sides of certain surfaces have in common; the cells leave nothing out. Where comparisons
+single out a surface (`sign` gives 0 on one) that is a thin cell, whose V and rates count beside those of the sides.
 """
 
 from __future__ import annotations
@@ -50,11 +51,13 @@ class System:
 @dataclass(frozen=True)
 class Cell:
     """`signs`: which side of each surface, 0 where it does not matter. The closed cell is where surfaces times signs are
-    not negative; rates (of parameters too, zero) and V are polynomials on it, `slope` is V'."""
+    not negative; rates (of parameters too, zero) and V are polynomials on it, `slope` is V'. `on`: surfaces in which it
+    lies, if it is a thin one."""
 
     signs: tuple[int, ...]
     rates: tuple[Poly, ...]
     V: Poly
+    on: tuple[int, ...] = ()
 
     @property
     def slope(self) -> Poly:
@@ -62,8 +65,9 @@ class Cell:
         return along(self.V, self.rates)
 
     def apart(self, other: Cell) -> list[int]:
-        """The surfaces between two cells."""
-        return [k for k, (a, b) in enumerate(zip(self.signs, other.signs, strict=True)) if a * b < 0]
+        """The surfaces between two cells: in all of them lie the states that both have, when closed."""
+        signs = enumerate(zip(self.signs, other.signs, strict=True))
+        return [k for k, (a, b) in signs if a * b < 0 or k in self.on or k in other.on]
 
 
 def along(function: Poly, rates: Sequence[Poly]) -> Poly:
@@ -76,12 +80,13 @@ def along(function: Poly, rates: Sequence[Poly]) -> Poly:
 
 @dataclass(frozen=True)
 class Pieces:
-    """All cells of a system together with a function V."""
+    """All cells of a system together with a function V; those that lie in surfaces are `thin`."""
 
     names: tuple[str, ...]
     moving: int
     surfaces: tuple[Poly, ...]
     cells: tuple[Cell, ...]
+    thin: tuple[Cell, ...] = ()
 
     @property
     def context(self) -> Any:
@@ -118,13 +123,17 @@ class Pieces:
             # They do not meet.
             return True
         zeros = [z for z in zeros if not z.is_zero()]
-        gaps = [_modulo(self.reduced(a - b, onto), curved) for a, b in pairs]
-        return all(gap.is_zero() or any(divmod(gap, z)[1].is_zero() for z in zeros) for gap in gaps)
+        gaps = [self.reduced(a - b, onto) for a, b in pairs]
+        return all(
+            left.is_zero() or any(divmod(value, z)[1].is_zero() for z in zeros for value in (left, gap))
+            for gap, left in zip(gaps, (_modulo(gap, curved) for gap in gaps), strict=True)
+        )
 
     def guards(self, cell: Cell, onto: Sequence[Poly] = ()) -> list[Poly]:
         """What is not negative in a closed cell, where the polynomials `onto` vanish."""
-        sided = [(s, side) for s, side in zip(self.surfaces, cell.signs, strict=True) if side and s not in onto]
-        return [self.reduced(surface, onto) * side for surface, side in sided]
+        sided = list(zip(self.surfaces, cell.signs, strict=True))
+        sided += [(self.surfaces[k], way) for k in cell.on for way in (1, -1)]
+        return [self.reduced(surface, onto) * side for surface, side in sided if side and surface not in onto]
 
 
 def _modulo(value: Poly, zeros: Sequence[Poly]) -> Poly:
@@ -153,8 +162,7 @@ def solve(surface: Poly) -> tuple[int, Poly] | None:
 
 
 def split(system: System, V: Any) -> Pieces:
-    """The cells of a system and a function, polynomial or piecewise. Sets without interior are left out: a function is
-    what it is on the closures of its cells."""
+    """The cells of a system and a function, polynomial or piecewise."""
     names = system.names
     ring = fmpq_mpoly_ctx.get(names, Ordering.degrevlex)
     zero = Polynomial({})
@@ -165,16 +173,24 @@ def split(system: System, V: Any) -> Pieces:
         if sides is not None:
             found.append((sides, [_poly(value, ring, names) for value in values]))
     cells = [
-        Cell(tuple(sides.get(k, 0) for k in range(len(surfaces))), tuple(polys[:-1]), polys[-1]) for sides, polys in found
+        Cell(
+            tuple(sides.get(k, 0) for k in range(len(surfaces))),
+            tuple(polys[:-1]),
+            polys[-1],
+            tuple(k for k, side in sides.items() if side == 0),
+        )
+        for sides, polys in found
     ]
-    return Pieces(names, len(system.variables), tuple(surfaces), tuple(cells))
+    whole, thin = ([cell for cell in cells if bool(cell.on) == lies] for lies in (False, True))
+    return Pieces(names, len(system.variables), tuple(surfaces), tuple(whole), tuple(thin))
 
 
 def _sides(
     truths: Sequence[tuple[Condition, bool]], surfaces: list[Poly], ring: Any, names: tuple[str, ...]
 ) -> dict[int, int] | None:
-    """The side of each surface, None where two are asked for; new surfaces are added."""
+    """The side of each surface, 0 for states on it; None where nothing is; new surfaces are added."""
     sides: dict[int, int] = {}
+    strictly: set[int] = set()
     for condition, truth in truths:
         polynomial = _poly(condition.positive, ring, names)
         leading = polynomial.leading_coefficient()
@@ -183,7 +199,12 @@ def _sides(
         if place == len(surfaces):
             surfaces.append(polynomial)
         if sides.setdefault(place, side) != side:
-            return None
+            # Not positive and not negative: zero.
+            if truth or place in strictly:
+                return None
+            sides[place] = 0
+        if truth:
+            strictly.add(place)
     return sides
 
 

@@ -35,7 +35,11 @@ PATIENCE = 4
 """Levels at which V falls that are tried for the rest of what has to be shown."""
 SLIDES = "a motion may slide on a surface where the right-hand side jumps, and V is not shown to change there as it must"
 STAYS = "no function is shown to grow where V' = 0: try another `escape`"
-ASSUMPTIONS = ("the equations exactly as given", "motions in the sense of Filippov where the right-hand side jumps")
+ASSUMPTIONS = (
+    "the equations exactly as given",
+    "where the right-hand side jumps, motions in the sense of Filippov: x' is any mean of what it is on the sides and on "
+    "the surface",
+)
 
 
 @dataclass(frozen=True)
@@ -254,7 +258,8 @@ def _at(proof: _Proof, level: float) -> _Shown | None:
 
 def _largest(proof: _Proof) -> _Shown | None:
     """At the largest level that is tried and shows all; else at the largest that shows that V falls."""
-    guess, first, others = search.ceiling(proof.what), None, 0
+    # Where the set has to be stable only, motions may stay in it anywhere.
+    guess, first, others = search.ceiling(proof.what, proof.wanted.theorem != "stable"), None, 0
     for less in LESS:
         shown = _at(proof, guess * (1.0 - less)) if guess > 0.0 else None
         if shown is not None and shown.crossed and shown.left is not False:

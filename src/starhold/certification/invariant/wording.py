@@ -24,7 +24,7 @@ OBLIGATIONS = {
     "bounded": "V is above the level all over the border of the box, so that the set is compact and inside",
     "falls": "V never rises on the set, and falls but where told",
     "grows": "V grows wherever it is positive in the box",
-    "switching": "where the right-hand side jumps, motions cross, or V changes as it must for every mean of both sides",
+    "switching": "where the right-hand side jumps, motions cross, or V changes as it must for every mean there",
     "leaves": "no motion stays where V does not fall, but in M",
     "invariant": "no motion leaves M",
 }
@@ -36,13 +36,14 @@ def sentence(claim: Claim) -> str:
     theorem, level = n["theorem"], n.get("level")
     where = "a level set of V" if level is None else f"{{V <= {down(level)}}}"
     M = "the rest" if any(o.name == "rest" for o in claim.obligations) else "M"
+    sense = ", in Filippov's sense," if len(claim.assumptions) > 1 else ""
     if theorem == "unstable":
-        return f"{M} is unstable: every motion that starts in the box where V > 0 leaves the box"
+        return f"{M} is unstable: every motion{sense} that starts in the box where V > 0 leaves the box"
     if theorem == "stable":
-        return f"{M} is stable: no motion leaves {where}, nor any smaller level set"
+        return f"{M} is stable: no motion{sense} leaves {where}, nor any smaller level set"
     if theorem == "attracts":
-        return f"{M} is asymptotically stable: all motions that start in {where} stay there and come to it"
-    return f"all motions that start in {where} stay there and come to {M}"
+        return f"{M} is asymptotically stable: all motions{sense} that start in {where} stay there and come to it"
+    return f"all motions{sense} that start in {where} stay there and come to {M}"
 
 
 def size(numbers: Mapping[str, Any], orbit: float | None = None) -> str:
