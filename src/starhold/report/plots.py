@@ -257,6 +257,8 @@ def _limit(flights: Sequence[Flight], scale: float, unit: str, scenario: Scenari
     if scenario is not None and sure < limit:
         norm = scenario.table.spacecraft.limit == "norm"
         limit, words = sure, f"what the wheels surely give {'in norm' if norm else 'about each axis at once'}"
+        if any(fault.strikes_wheel for fault in scenario.table.fault):
+            words += " before a fault"
     if not np.isfinite(limit):
         return (), "no limit"
     words = f"{words}, {limit * scale:g} {unit}"
