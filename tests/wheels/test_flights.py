@@ -212,9 +212,7 @@ def test_faults_out_of_time_and_out_of_wheels():
     with pytest.raises(InputError, match=r"fault\[1\]: found no wheels"):
         flight(plain + STRUCK, steps=1)
     text = BUILTIN + '\n[[law]]\ntype = "lyapunov"\nk_rate = 0.6\nk_attitude = 0.06\n' + STRUCK
-    with pytest.raises(
-        InputError, match=r"law lyapunov.*or fault_action = .reallocate. in its \[\[law\]\] table$"
-    ):
+    with pytest.raises(InputError, match=r"law lyapunov.*or fault_action = .reallocate. in its \[\[law\]\] table$"):
         flight(text, law=2, steps=1)
 
 
