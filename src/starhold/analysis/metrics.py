@@ -16,7 +16,7 @@ DECADES = range(1, 7)
 LAST = 0.25
 """Share of the run over which chatter and the final error are measured."""
 KEPT = 0.1
-"""Share of the run at its end in which nothing counts as settled any more: a motion that goes to and fro, or that a longer run
+"""Share of the run at its end in which nothing counts as settled: a motion that goes to and fro, or that a longer run
 would show to leave again, is within its bounds there by chance."""
 
 

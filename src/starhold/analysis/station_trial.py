@@ -3,17 +3,15 @@ Tells whether a start lies in certified sets."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.analysis.station_departure import circle_value, outside
 from starhold.analysis.trial import FLIGHTS, LEGS, SLACK, BrokenClaimError, Trial
-from starhold.certification.certificate import Certificate, Claim
-from starhold.laws.station import l2_circle
-from starhold.laws.station.interface import SeenPoint
+from starhold.certification.certificate import Certificate
 from starhold.loop.station import StationLoop
 from starhold.simulation.lanes import simulate_many
 
@@ -69,26 +67,13 @@ def station_start_inside(certificate: Certificate, loop: StationLoop) -> dict[st
     found: dict[str, bool] = {}
     for claim in certificate.claims:
         if claim.outcome == "proved" and claim.kind in ("circle", "control-limit", "saturated-axis"):
-            found[claim.kind] = _holds(claim, loop)
+            start = np.array(loop.start.position)[:, None], np.array(loop.start.velocity)[:, None]
+            found[claim.kind] = not outside(claim, loop, *start)[0]
     return found
 
 
-def _holds(claim: Claim, loop: StationLoop) -> bool:
-    position, velocity = loop.start.position, loop.start.velocity
-    if claim.kind == "saturated-axis":
-        steep = math.sqrt(loop.plant.rate**2 + 2.0 * loop.plant.stiffness)
-        sigma = abs(position[0] + velocity[0] / steep)
-        at_rest = position[1:] == (loop.gains.y, loop.gains.z) and velocity[1:] == (0.0, 0.0)
-        return at_rest and sigma <= claim.numbers["width"] and abs(position[0]) <= claim.numbers["reach"]
-    plane = claim.kind == "circle" or (position[0] == 0.0 and velocity[0] == 0.0)
-    states = np.array([*position, *velocity])[:, None]
-    return plane and bool(_value(loop.gains, states)[0] <= claim.numbers["level"])
-
-
 def _value(gains: Any, states: Array) -> Array:
-    seen: Any = SeenPoint(tuple(states[:3]), tuple(states[3:6]), 0.0, math.inf)
-    f1, f2, f3 = l2_circle.errors(seen, gains)
-    return np.asarray(0.5 * (gains.alpha * f1 * f1 + f2 * f2 + f3 * f3))
+    return circle_value(gains, states[:3], states[3:6])
 
 
 def _size(control: Array, kind: str) -> Array:

@@ -21,6 +21,8 @@ FILE = "certificate.json"
 Outcome = Literal["proved", "refuted", "undecided"]
 EXACT, BALLS, LASALLE = "exact identity", "ball arithmetic", "LaSalle"
 EXACT_SIGN = "exact inequality"
+WHEELS = "neither torque nor wheels limited, wheels without friction"
+"""What claims about loops with wheels assume in place of torque that is not limited."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,10 @@ class Claim:
         return next((o for o in self.obligations if o.outcome == "refuted"), None)
 
 
+ENDS = ("convergence", "region", "sliding", "circle", "rest")
+"""Kinds of claims that say where the motion itself ends; without one a certificate proves nothing of it."""
+
+
 @dataclass(frozen=True)
 class Certificate:
     """Claims about one closed loop; `subject` holds all that the claims speak of, as plain numbers and names."""
@@ -69,11 +75,12 @@ class Certificate:
 
     @property
     def outcome(self) -> Outcome:
-        """Refuted if a claim is, undecided if one is or none is made."""
+        """Refuted if a claim is, undecided if one is or none is made of where the motion ends."""
         found = {claim.outcome for claim in self.claims}
         if "refuted" in found:
             return "refuted"
-        return "proved" if found == {"proved"} else "undecided"
+        ends = any(claim.kind in ENDS for claim in self.claims)
+        return "proved" if ends and found == {"proved"} else "undecided"
 
     def claim(self, kind: str) -> Claim | None:
         """The claim of a kind, where one is made."""

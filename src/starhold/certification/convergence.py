@@ -9,7 +9,7 @@ import numpy as np
 from flint import fmpq, fmpq_mat
 
 from starhold.algebra.polynomial import Polynomial, exact, pieces
-from starhold.certification.certificate import EXACT, EXACT_SIGN, LASALLE, Claim, Obligation
+from starhold.certification.certificate import EXACT, EXACT_SIGN, LASALLE, WHEELS, Claim, Obligation
 from starhold.certification.frame import (
     Cross,
     Frame,
@@ -46,7 +46,6 @@ ASSUMPTIONS = (
     "torque not limited",
     "no torque from outside but what the law cancels",
 )
-WHEELS = "neither torque nor wheels limited, wheels without friction"
 ALMOST = fmpq(2**20 - 1, 2**20)
 """How much of a bound that must not be reached is used."""
 

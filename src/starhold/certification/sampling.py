@@ -8,8 +8,7 @@ import numpy as np
 from flint import arb, fmpq_mat
 
 from starhold.algebra.polynomial import exact
-from starhold.certification.certificate import EXACT_SIGN, Claim, Obligation
-from starhold.certification.convergence import WHEELS
+from starhold.certification.certificate import EXACT_SIGN, WHEELS, Claim, Obligation
 from starhold.certification.matrices import (
     Rows,
     characteristic_roots,

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from typing import Any, cast
 
-from starhold.certification.certificate import Certificate, Claim, Obligation
+from starhold.certification.certificate import WHEELS, Certificate, Claim, Obligation
 from starhold.laws.catalogue import known_law
 
 HEADINGS = {
@@ -81,8 +81,24 @@ def speed(rate: float, up: bool = False) -> str:
 
 
 def sentence(claim: Claim, subject: Mapping[str, Any]) -> str:
-    """What a claim says, whether or not it is proved. What is refuted is rounded to say no less."""
-    return _SENTENCES[claim.kind]({**claim.numbers, "refuted": claim.outcome == "refuted"}, subject)
+    """What a claim says, whether or not it is proved, with the assumption about the loop's limits that decides it. What is
+    refuted is rounded to say no less."""
+    told = _SENTENCES[claim.kind]({**claim.numbers, "refuted": claim.outcome == "refuted"}, subject)
+    return f"{_unlimited(claim, subject)}{told}"
+
+
+def _unlimited(claim: Claim, subject: Mapping[str, Any]) -> str:
+    """What a claim about where motions end takes away from the loop; empty where that has no limits."""
+    if claim.kind == "sampling":
+        return ""
+    if WHEELS in claim.assumptions:
+        return "with wheels that have neither limits nor friction, "
+    limited = subject.get("limit", "none") != "none"
+    if "torque not limited" in claim.assumptions and limited and subject.get("torque_limit") is not None:
+        return "with unlimited torque, "
+    if "control not limited" in claim.assumptions and limited and subject.get("control_limit") is not None:
+        return "with unlimited control, "
+    return ""
 
 
 def place(numbers: Mapping[str, Any], subject: Mapping[str, Any]) -> str:

@@ -64,11 +64,10 @@ def print_outcome(flights: Sequence[Flight]) -> None:
 
             said, kept = told(flight), flight.metrics["limits_kept"]
             console.print(f"{flight.name}: {said}", style=None if kept else "yellow", markup=False, highlight=False)
-    certificates = [certificate for flight in flights for certificate in flight.certificates]
-    if certificates:
+    if any(flight.certificates for flight in flights):
         from starhold.cli.show_certificates import print_proved
 
-        print_proved(certificates)
+        print_proved(flights)
 
 
 def _step_text(flight: Flight) -> str:

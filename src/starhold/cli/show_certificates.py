@@ -15,6 +15,7 @@ from starhold.cli.show import console
 if TYPE_CHECKING:
     from starhold.certification.checker import Finding
     from starhold.report.certificates import Tried
+    from starhold.report.flight import Flight
 
 LONGEST = 1_000
 """Characters of a file that are printed at a time."""
@@ -61,19 +62,24 @@ def print_certificate(tried: Tried) -> None:
     console.print()
 
 
-def print_proved(certificates: Sequence[Certificate]) -> None:
-    """One line for each claim of several laws."""
+def print_proved(flights: Sequence[Flight]) -> None:
+    """One line for each claim of several laws, and how their flights leave what is proved."""
     console.print("\nCertified on this spacecraft (starhold certify tells how):", highlight=False)
     table = Table(show_edge=False, pad_edge=False, box=None, show_header=False)
     for _ in range(3):
         table.add_column(overflow="fold")
-    for certificate in certificates:
-        name = _safe(certificate.name)
-        for claim in certificate.claims:
-            table.add_row(f"  {name}", _coloured(claim.outcome), _safe(sentence(claim, certificate.subject)))
-            name = ""
-        if not certificate.claims:
-            table.add_row(f"  {name}", _coloured("undecided"), "no claim")
+    for flight in flights:
+        for place, certificate in enumerate(flight.certificates):
+            name, texts = _safe(certificate.name), dict[str, list[str]]()
+            for claim in certificate.claims:
+                table.add_row(f"  {name}", _coloured(claim.outcome), _safe(sentence(claim, certificate.subject)))
+                name = ""
+                texts.setdefault(flight.left_text(place, claim.kind), []).append(HEADINGS[claim.kind])
+            if not certificate.claims:
+                table.add_row(f"  {name}", _coloured("undecided"), "no claim")
+            for text, kinds in texts.items():
+                if text:
+                    table.add_row("", "[yellow]left[/yellow]", f"by this flight, {', '.join(kinds)}: {text}")
     console.print(table, highlight=False)
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
+from starhold.analysis.departure import Departure, departures
 from starhold.certification.certificate import Certificate
 from starhold.certification.certify import Wanted, certify
 from starhold.certification.region import Shape
@@ -14,6 +15,7 @@ from starhold.laws.double_cover import COVERS
 from starhold.loop.kernels import make_step
 from starhold.models.craft import tensor
 from starhold.models.rigid_body import kinetic_energy
+from starhold.models.sensor import SILENT
 from starhold.models.wheels import gives_what_is_asked
 from starhold.scenario.building import build
 from starhold.simulation.lane import fly
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from starhold.analysis.trial import Trial
     from starhold.loop.closed_loop import ClosedLoop
     from starhold.scenario.reading import LawEntry, Scenario
+    from starhold.simulation.lane import Recording
 
 
 class Tried(NamedTuple):
@@ -34,10 +37,11 @@ class Tried(NamedTuple):
 
 
 class Issued(NamedTuple):
-    """A certificate and the loop, without faults to come, that it speaks of."""
+    """A certificate, the loop, without faults to come, that it speaks of, and the control step from which on that flies."""
 
     certificate: Certificate
     loop: ClosedLoop
+    step: int
 
 
 def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[Issued]:
@@ -48,7 +52,7 @@ def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[I
     found: list[Issued] = []
     for step, now in _known(loop, scenario.table.simulation.steps):
         name = f"{entry.name} from {step * loop.period:g} s" if step else entry.name
-        found.append(Issued(certify(now, name, wanted), now))
+        found.append(Issued(certify(now, name, wanted), now, step))
     return found
 
 
@@ -75,6 +79,13 @@ def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:
     return found
 
 
+def departures_of(issued: Issued, loop: ClosedLoop, run: Recording) -> dict[str, tuple[Departure, ...]]:
+    """How the run of a loop leaves the claims of one of its certificates, which ends where the loop changes next."""
+    last = min((event.step for event in loop.events if event.step > issued.step), default=None)
+    within = last is not None and last * loop.period <= float(run["time"][-1])
+    return departures(issued.certificate, issued.loop, run, issued.step, last if within else None)
+
+
 def certify_scenario(scenario: Scenario, law: str | None = None) -> list[Tried]:
     """Certificates of all laws of a scenario, or of one. Raises `BrokenClaimError` where a flight contradicts one."""
     entries = scenario.laws if law is None else (scenario.pick(law),)
@@ -84,13 +95,17 @@ def certify_scenario(scenario: Scenario, law: str | None = None) -> list[Tried]:
     # All of them before the first proof, so that what is wrong with the last is said at once.
     loops = [build(scenario, entry) for entry in entries]
     issued = [found for entry, loop in zip(entries, loops, strict=True) for found in certify_law(scenario, entry, loop)]
-    return [Tried(found.certificate, fly_claims(found.loop, found.certificate), start_inside(*found)) for found in issued]
+    return [
+        Tried(found.certificate, fly_claims(found.loop, found.certificate), start_inside(*found[:2])) for found in issued
+    ]
 
 
 def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
     """Whether the loop's start lies in the sets of the proved claims that are about a level of V."""
     if loop.remembers:
         return {}
+    # The true start, whatever the sensors make of it.
+    loop = replace(loop, noise=SILENT)
     seen = make_step(loop.parts()).look(loop.carry(), 0, 0, loop.craft, loop.setup())
     shown = seen._replace(attitude=COVERS[loop.cover](seen.attitude, loop.carry().h, loop.hysteresis_width)[0])
     total = tensor(loop.craft.inertia) @ seen.body_rate + np.array(seen.stored)

@@ -12,7 +12,7 @@ from starhold.analysis.metrics import measure
 from starhold.certification.certificate import FILE
 from starhold.certification.certificate import write as write_certificates
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.report.certificates import certify_law
+from starhold.report.certificates import certify_law, departures_of
 from starhold.report.certificates import certify_scenario as certify_scenario
 from starhold.report.figures import sketch as sketch
 from starhold.report.files import whole
@@ -46,8 +46,10 @@ def timed(loop: ClosedLoop, flight: Flight) -> Flight:
 
 
 def prove(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, flight: Flight) -> Flight:
-    """The flight with the certificates of its law."""
-    return replace(flight, certificates=tuple(issued.certificate for issued in certify_law(scenario, entry, loop)))
+    """The flight with the certificates of its law, and how it leaves their claims."""
+    found = certify_law(scenario, entry, loop)
+    left = tuple(departures_of(issued, loop, flight.recording) for issued in found)
+    return replace(flight, certificates=tuple(issued.certificate for issued in found), departures=left)
 
 
 def record(scenario: Scenario, loop: ClosedLoop, progress: Progress | None = None) -> Recording:
@@ -68,7 +70,7 @@ def write(scenario: Scenario, flights: Sequence[Flight], folder: Path) -> Path:
     flown, by `write_run`, and the pictures by a `Painter`."""
     from starhold.report.page import write_page
 
-    write_summary(scenario, {flight.name: flight.metrics for flight in flights}, folder / SUMMARY)
+    write_summary(scenario, {flight.name: flight.results() for flight in flights}, folder / SUMMARY)
     write_proved(scenario.name, flights, folder)
     page = folder / "report.html"
     with whole(page) as hidden:

@@ -11,8 +11,11 @@ import numpy as np
 from starhold.analysis.ranking import ATTITUDE, Board
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     import xarray as xr
 
+    from starhold.analysis.departure import Departure
     from starhold.certification.certificate import Certificate
     from starhold.laws.interface import Field
     from starhold.simulation.lane import Recording
@@ -33,6 +36,8 @@ class Flight:
     gains: dict[str, str]
     certificates: tuple[Certificate, ...] = ()
     """What is proved of the law on this spacecraft: as it starts, and after faults."""
+    departures: tuple[Mapping[str, tuple[Departure, ...]], ...] = ()
+    """Of each certificate how this flight leaves the proved claims, by their kinds."""
     board: Board = ATTITUDE
     """How the metrics are told and ranked."""
 
@@ -48,12 +53,42 @@ class Flight:
 
     def lost_text(self, digits: int = 6) -> str:
         """The same for reading."""
-        return "" if self.lost is None else f"{self.lost / self.board.tick:.{digits}g} {self.board.clock}"
+        return "" if self.lost is None else self._when(self.lost, digits)
+
+    def left_text(self, certificate: int, kind: str) -> str:
+        """How this flight leaves a claim of a certificate, for reading; empty where it does not."""
+        left = self._left(certificate, kind)
+        groups = {time: listed([one.how for one in left if one.time == time]) for time in (one.time for one in left)}
+        return "; ".join(
+            f"{'from the start' if time == 0.0 else f'at {self._when(time, 4)}'} {how}" for time, how in groups.items()
+        )
+
+    def _when(self, time: float, digits: int) -> str:
+        return f"{time / self.board.tick:.{digits}g} {self.board.clock}"
+
+    def _left(self, certificate: int, kind: str) -> tuple[Departure, ...]:
+        return self.departures[certificate].get(kind, ()) if self.departures else ()
+
+    def results(self) -> dict[str, Any]:
+        """What a summary holds: the metrics and, of a certified law, each claim with its outcome, the time (s) from which on
+        this flight is not what it speaks of (None: it is throughout), and what happens then and later."""
+        claims: list[dict[str, Any]] = []
+        for number, certificate in enumerate(self.certificates):
+            for claim in certificate.claims:
+                left = [one._asdict() for one in self._left(number, claim.kind)]
+                told = {"certificate": certificate.name, "claim": claim.kind, "outcome": claim.outcome}
+                claims.append(told | {"left_at": left[0]["time"] if left else None, "left": left})
+        return self.metrics | ({"claims": claims} if self.certificates else {})
 
 
 def colour(number: int) -> str:
     """The colour of the law at this place of a comparison, the same in every picture."""
     return COLOURS[number % len(COLOURS)]
+
+
+def listed(parts: Sequence[str]) -> str:
+    """Some things in a row, as a sentence has them."""
+    return " and ".join(filter(None, (", ".join(parts[:-1]), parts[-1])))
 
 
 def number_text(value: Any, digits: int = 6) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-from starhold.certification.certificate import FILE, Certificate, Claim, Obligation
+from starhold.certification.certificate import FILE, Claim, Obligation
 from starhold.certification.wording import HEADINGS, OBLIGATIONS, evidence, methods, sentence
 from starhold.report.flight import Flight, colour, number_text
 
@@ -14,8 +14,9 @@ NOTE = (
     "Proved means shown by a computation without rounding: identities and inequalities in exact rational numbers, the rest "
     "in ball arithmetic, which carries a bound of its own error. No claim rests on samples or on flights. Refuted: "
     "something that the proof needs is false at the state shown; the argument then fails, and the law itself may or may "
-    "not. Undecided: neither was shown. A claim speaks of motions that meet its assumptions, listed inside, which a "
-    "flight with limits, lag, noise or held torque need not. "
+    "not. Undecided: neither was shown. A claim speaks of motions that meet its assumptions, listed inside; where the "
+    "flight on this page does not, the page says so and from when on. Of torque held between samples it does so only where "
+    "that is refuted. "
 )
 RECHECK = f"The proofs are in {FILE} beside this page; <code>starhold check {FILE}</code> goes through them again."
 
@@ -53,15 +54,16 @@ def swatch(number: int) -> str:
 
 def section(flights: Sequence[Flight]) -> str:
     """The section as HTML; nothing where no flight has a certificate."""
-    told = [_law(certificate, number) for number, flight in enumerate(flights) for certificate in flight.certificates]
+    told = [_law(flight, number, i) for number, flight in enumerate(flights) for i in range(len(flight.certificates))]
     if not told:
         return ""
     return f'<h2>What is proved</h2>\n<p class="note">{NOTE}{RECHECK}</p>\n<div class="laws">{"".join(told)}</div>'
 
 
-def _law(certificate: Certificate, number: int) -> str:
+def _law(flight: Flight, number: int, place: int) -> str:
+    certificate = flight.certificates[place]
     head = f"<h3>{swatch(number)}{escape(certificate.name)}</h3>"
-    claims = "".join(_claim(claim, certificate.subject) for claim in certificate.claims)
+    claims = "".join(_claim(claim, certificate.subject, flight.left_text(place, claim.kind)) for claim in certificate.claims)
     if not claims:
         claims = (
             '<p class="note">Nothing is claimed, so nothing is proved: this law comes without a Lyapunov function or a '
@@ -70,13 +72,15 @@ def _law(certificate: Certificate, number: int) -> str:
     return f'<section class="law">{head}{claims}</section>\n'
 
 
-def _claim(claim: Claim, subject: Mapping[str, Any]) -> str:
+def _claim(claim: Claim, subject: Mapping[str, Any], left: str) -> str:
     told = sentence(claim, subject)
     why = "".join(
         f'<span class="why">{escape(f"Needed, but {o.outcome}: {OBLIGATIONS[o.name]}.")} <b>{escape(evidence(o))}</b></span>'
         for o in claim.obligations
         if o.outcome != "proved"
     )
+    if left:
+        why += f'<span class="why left">This flight leaves the claim: <b>{escape(left)}.</b></span>'
     rows = "".join(_obligation(o) for o in claim.obligations)
     return (
         f'<details class="claim"><summary>{_outcome(claim.outcome)}<span class="what">'

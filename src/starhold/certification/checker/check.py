@@ -35,6 +35,8 @@ from starhold.certification.checker.station import STATION_CLAIMS, Station, read
 from starhold.certification.checker.subject import Subject, read_subject
 
 FORMAT = "starhold certificate 1"
+ENDS = ("convergence", "region", "sliding", "circle", "rest")
+"""Kinds of claims about where the motion ends, one of which a certificate that counts as proved must hold."""
 BITS = 192
 """Precision of balls: enough that they are far narrower than the margins of a certificate."""
 
@@ -115,8 +117,11 @@ def _subject(given: Any) -> Subject | Station:
     station = "plant" in given["subject"]
     shaped(given["subject"], STATION if station else SUBJECT, "the subject")
     outcomes = [claim.get("outcome") for claim in given["claims"]]
-    demand(given["outcome"] == _follows(outcomes), "the outcome does not follow from the claims")
+    follows = _follows(outcomes)
     kinds = [str(claim.get("kind")) for claim in given["claims"]]
+    if follows == "proved" and not set(kinds) & set(ENDS):
+        follows = "undecided"
+    demand(given["outcome"] == follows, "the outcome does not follow from the claims")
     demand(len(set(kinds)) == len(kinds), "two claims are of one kind")
     return (read_station if station else read_subject)(given["subject"])
 

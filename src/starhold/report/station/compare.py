@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from starhold.analysis.station import BOARD, goal_of, measure_station
+from starhold.analysis.station_departure import station_departures
 from starhold.analysis.station_trial import fly_station, station_start_inside
 from starhold.certification.station import certify_station
 from starhold.loop.station import StationLoop
@@ -38,8 +39,10 @@ def timed(loop: StationLoop, flight: Flight) -> Flight:
 
 
 def prove(scenario: StationScenario, entry: StationEntry, loop: StationLoop, flight: Flight) -> Flight:
-    """The flight with the certificate of its law."""
-    return replace(flight, certificates=(certify_station(loop, entry.name),))
+    """The flight with the certificate of its law, and how it leaves its claims."""
+    certificate = certify_station(loop, entry.name)
+    left = station_departures(certificate, loop, flight.recording, scenario.units.time)
+    return replace(flight, certificates=(certificate,), departures=(left,))
 
 
 def certify_scenario(scenario: StationScenario, law: str | None = None) -> list[Tried]:
@@ -71,7 +74,7 @@ def write(scenario: StationScenario, flights: Sequence[Flight], folder: Path) ->
     """Summary, certificates and page into an existing folder; returns the page's path."""
     from starhold.report.station.page import write_page
 
-    write_summary(scenario, {flight.name: flight.metrics for flight in flights}, folder / SUMMARY)
+    write_summary(scenario, {flight.name: flight.results() for flight in flights}, folder / SUMMARY)
     write_proved(scenario.name, flights, folder)
     page = folder / "report.html"
     with whole(page) as hidden:

@@ -1,0 +1,259 @@
+"""When and how a flight leaves what is claimed of its law, which is about motions from a set that meet its assumptions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.scalar import side
+from starhold.algebra.vector import ZERO
+from starhold.certification.certificate import WHEELS
+from starhold.certification.region import Shape
+from starhold.laws.double_cover import COVERS
+from starhold.laws.interface import Seen
+from starhold.loop.kernels import make_step
+from starhold.models.craft import tensor
+from starhold.models.rigid_body import kinetic_energy
+from starhold.models.sensor import SILENT
+from starhold.models.wheels import BAND, Wheels
+
+if TYPE_CHECKING:
+    from starhold.certification.certificate import Certificate, Claim
+    from starhold.loop.closed_loop import ClosedLoop
+    from starhold.simulation.lane import Recording
+
+Array: TypeAlias = NDArray[np.float64]
+ALMOST = 1.0 - 1e-9
+"""A share of a limit from which on it counts as reached."""
+
+
+class Departure(NamedTuple):
+    """From `time` (s) on a flight is not what a claim speaks of; `how` is a sentence without its end that says why."""
+
+    time: float
+    how: str
+
+
+class Span:
+    """A recorded run between two control steps, and the loop that flies it."""
+
+    def __init__(self, loop: ClosedLoop, run: Recording, first: int, last: int | None) -> None:
+        every = run.attrs["record_every"]
+        part = slice(-(-first // every), None if last is None else -(-last // every))
+        self.loop, self.arrays = loop, {name: values[part] for name, values in run.arrays.items()}
+        self.changes = None if last is None else last * loop.period
+
+    def __getitem__(self, name: str) -> Array:
+        return self.arrays[name]
+
+    @property
+    def begun(self) -> float:
+        """The time of the first sample (s)."""
+        return float(self["time"][0])
+
+    def first(self, held: Any, how: str) -> list[Departure]:
+        """A departure at the first sample at which something holds (n,)."""
+        places = np.flatnonzero(held)
+        return [Departure(float(self["time"][places[0]]), how)] if len(places) else []
+
+    def always(self, how: str, holds: bool = True) -> list[Departure]:
+        """A departure from the start on."""
+        return [Departure(self.begun, how)] if holds else []
+
+
+def departures(
+    certificate: Certificate, loop: ClosedLoop, run: Recording, first: int = 0, last: int | None = None
+) -> dict[str, tuple[Departure, ...]]:
+    """For each proved kind of claim about motions how a run leaves it, in order of time; empty where it does not.
+
+    loop: what the certificate speaks of, flown from control step `first` until it changes at `last` (None: it does not).
+    That torque is held between samples counts only where it is refuted that it may be.
+    """
+    span = Span(loop, run, first, last)
+    if not len(span["time"]):
+        return {}
+    sampled = certificate.claim("sampling")
+    common = _changes(span)
+    if sampled is not None and sampled.outcome == "refuted":
+        common += span.always(f"the torque is held for {loop.period:g} s, with which not even the linear loop is stable")
+    found: dict[str, tuple[Departure, ...]] = {}
+    for claim in certificate.claims:
+        if claim.outcome == "proved" and claim.kind != "sampling":
+            own = [one for assumed in claim.assumptions for one in MET[assumed](span)]
+            found[claim.kind] = tuple(sorted({*common, *own, *_set(claim, span)}))
+    return found
+
+
+def _changes(span: Span) -> list[Departure]:
+    return [] if span.changes is None else [Departure(span.changes, "what flies, or what the law knows of it, changes")]
+
+
+# --- assumptions ------------------------------------------------------------------------------------------------------
+
+
+def _kept(span: Span) -> list[Departure]:
+    return []
+
+
+def _exact(span: Span) -> list[Departure]:
+    noise, actuators = span.loop.noise, span.loop.dynamics
+    return [
+        *span.always("the sensors are noisy", noise.attitude > 0.0 or noise.rate > 0.0),
+        *span.always("the actuators lag", actuators.lag > 0.0),
+        *span.always("the torque's rate is limited", math.isfinite(actuators.rate_limit)),
+    ]
+
+
+def _unlimited(span: Span) -> list[Departure]:
+    kind, limit = span.loop.limit, span.loop.craft.torque_limit
+    if kind == "none" or not math.isfinite(limit):
+        return []
+    return span.first(size(span["command"], kind) >= limit * ALMOST, "the torque reaches its limit")
+
+
+def _wheels_unlimited(span: Span) -> list[Departure]:
+    wheels = cast(Wheels, span.loop.wheels)
+    working = np.array(wheels.torque_limit) > 0.0
+    torque, momentum = np.abs(span["wheel_torque"]), np.abs(span["wheel_momentum"])
+    strong = (torque >= np.array(wheels.torque_limit) * ALMOST)[:, working].any(axis=1)
+    full = (momentum > np.array(wheels.momentum_limit) * (1.0 - BAND))[:, working].any(axis=1)
+    reached = [*span.first(strong, "a motor reaches its limit"), *span.first(full, "a wheel is full")]
+    return [*_friction(span), *_unlimited(span), *reached]
+
+
+def _friction(span: Span) -> list[Departure]:
+    wheels = cast(Wheels, span.loop.wheels)
+    return span.always("the wheels have friction", any((*wheels.viscous, *wheels.coulomb)))
+
+
+def _momentum(span: Span) -> list[Departure]:
+    # The claim's own number stands in no assumption; `_set` looks at it.
+    return []
+
+
+def _random(span: Span) -> list[Departure]:
+    return span.always("a random torque acts", span.loop.noise.torque > 0.0)
+
+
+def _cancelled(span: Span) -> list[Departure]:
+    gravity = span.loop.gravity_gradient and not cancels(span.loop)
+    return [*_random(span), *span.always("the law does not cancel the gravity gradient", gravity)]
+
+
+def _alone(span: Span) -> list[Departure]:
+    return [*_random(span), *span.always("the gravity gradient acts", span.loop.gravity_gradient)]
+
+
+def _still(span: Span) -> list[Departure]:
+    return span.always("the target turns", not isinstance(span.loop.target, tuple))
+
+
+MET: Mapping[str, Callable[[Span], list[Departure]]] = {
+    "rigid body": _kept,
+    "inertia exactly as given": _kept,
+    "inertia within the tolerance": _kept,
+    "torque applied continuously": _kept,
+    "exact measurement and ideal actuators": _exact,
+    "torque not limited": _unlimited,
+    WHEELS: _wheels_unlimited,
+    "wheels without friction": _friction,
+    "total momentum at most as told": _momentum,
+    "no torque from outside but what the law cancels": _cancelled,
+    "no torque from outside": _alone,
+    "torque from outside bounded in norm": _random,
+    "torque from outside bounded on each axis": _random,
+    "target at rest": _still,
+}
+"""For each assumption of a claim about motions how a flight departs from it. The first four a simulation meets, but for what
+`departures` says of held torque and of changes."""
+
+
+def size(torque: Array, kind: str) -> Array:
+    """What a limit of a kind is about, of each torque or control (n, 3)."""
+    return np.linalg.norm(torque, axis=1) if kind == "norm" else np.abs(torque).max(axis=1)
+
+
+def cancels(loop: ClosedLoop) -> bool:
+    """Whether the law takes the torque that the models know from what it commands: at the start, whatever that is."""
+    loop = replace(loop, noise=SILENT)
+    seen = make_step(loop.parts()).look(loop.carry(), 0, 0, loop.craft, loop.setup())
+    memory = loop.law.remember(loop.gains, loop.craft, loop.period)
+    more = 0.01 * loop.craft.torque_limit if math.isfinite(loop.craft.torque_limit) else 1.0
+    # From rest on target, where clipped and switching laws are farthest from their limits.
+    seen = seen._replace(attitude=(1.0, 0.0, 0.0, 0.0), rate=ZERO)
+    torques = [
+        np.array(loop.law.torque(seen._replace(external_torque=(x, x, x)), loop.gains, loop.craft, memory)[0])
+        for x in (0.0, more)
+    ]
+    return bool(np.allclose(torques[0] - torques[1], more, rtol=1e-6))
+
+
+# --- sets -------------------------------------------------------------------------------------------------------------
+
+
+def _set(claim: Claim, span: Span) -> list[Departure]:
+    """Whether a flight starts outside of the claim's set, and when it leaves that."""
+    found: list[Departure] = []
+    momentum = claim.numbers.get("momentum")
+    if momentum is not None:
+        rigid = span["rate"] @ tensor(span.loop.craft.inertia)
+        total = np.linalg.norm(rigid + _stored(span), axis=1)
+        found += span.first(total > momentum * (1.0 + 1e-9), "the total momentum is more than told")
+    value = _function(claim, span)
+    if value is None:
+        return found
+    start, level = _levels(claim)
+    assert start is not None
+    assert level is not None
+    if value[0] > start:
+        return [*found, *span.always("it is outside the set")]
+    # The integration lets V of a motion along the border rise by its own error.
+    return [*found, *span.first(value > level * (1.0 + 1e-6), "it leaves the set")]
+
+
+def _function(claim: Claim, span: Span) -> Array | None:
+    """V over time; None for a claim about every state."""
+    loop = span.loop
+    if None in _levels(claim):
+        return None
+    q, rate = fed_back(loop, span["attitude_error"]).T, tuple(span["rate_error"].T)
+    if claim.kind == "region":
+        return Shape(**claim.witness).value(loop.law.module.single_root(loop.gains)[0], q, rate)
+    stiffness, function = claim.witness.get("stiffness"), loop.law.lyapunov
+    if stiffness is not None:
+        return np.asarray(kinetic_energy(cast(Any, rate), loop.craft) + 2.0 * stiffness * (1.0 - q[0]))
+    # What has been read as a polynomial takes whole columns at once.
+    columns: Any = [tuple(x.T) for x in (span["rate"], span["rate"] - span["rate_error"], _stored(span))]
+    seen = Seen(tuple(q), cast(Any, rate), columns[0], columns[1], ZERO, ZERO, ZERO, loop.period, columns[2])
+    if claim.kind == "sliding":
+        return np.asarray(kinetic_energy(loop.law.module.surface(seen, loop.gains), loop.craft))
+    return None if function is None else np.asarray(function(seen, loop.gains, loop.craft))
+
+
+def _levels(claim: Claim) -> tuple[float | None, float | None]:
+    """V at most at the start, and from then on; None for no bound."""
+    start = claim.numbers.get("start", claim.numbers.get("level"))
+    return start, claim.numbers.get("level", start)
+
+
+def _stored(span: Span) -> Array:
+    wheels = span.loop.wheels
+    return np.zeros_like(span["rate"]) if wheels is None else span["wheel_momentum"] @ np.array(wheels.axes)
+
+
+def fed_back(loop: ClosedLoop, error: Array) -> Array:
+    """The quaternions (n, 4) that the law is shown without noise, of the true errors (n, 4)."""
+    if loop.cover == "as_published":
+        return error
+    if loop.cover == "shortest":
+        return np.where(error[:, :1] < 0.0, -error, error)
+    h, shown = side(float(error[0, 0])), np.empty(len(error))
+    for place, q0 in enumerate(error[:, 0].tolist()):
+        h = COVERS["hysteresis"]((q0, 0.0, 0.0, 0.0), h, loop.hysteresis_width)[1]
+        shown[place] = h
+    return error * shown[:, None]

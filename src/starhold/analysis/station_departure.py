@@ -1,0 +1,81 @@
+"""When and how a flight of station keeping leaves what is claimed of its law."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.analysis.departure import ALMOST, Departure, size
+from starhold.laws.station import l2_circle
+from starhold.laws.station.interface import SeenPoint
+
+if TYPE_CHECKING:
+    from starhold.certification.certificate import Certificate, Claim
+    from starhold.loop.station import StationLoop
+    from starhold.simulation.lane import Recording
+
+SLACK = 1e-6
+"""Of V, and of scaled distances and velocities: what the integration makes of a motion along a border."""
+
+
+def station_departures(
+    certificate: Certificate, loop: StationLoop, run: Recording, unit: float
+) -> dict[str, tuple[Departure, ...]]:
+    """For each proved kind of claim how a run leaves it, in order of time; empty where it does not. unit: of time, in s."""
+
+    def first(held: Any, how: str) -> list[Departure]:
+        places = np.flatnonzero(held)
+        return [Departure(float(run["time"][places[0]]) * unit, how)] if len(places) else []
+
+    found: dict[str, tuple[Departure, ...]] = {}
+    for claim in certificate.claims:
+        if claim.outcome == "proved":
+            lags = [Departure(0.0, "the control lags")] if loop.lag > 0.0 else []
+            own = [one for held, how in _conditions(claim, loop, run) for one in first(held, how)]
+            left = outside(claim, loop, run["position"].T, run["velocity"].T, SLACK)
+            sets = first(left, "it leaves the set")
+            if len(left) and left[0]:
+                sets = [Departure(0.0, "it is outside the set")]
+            found[claim.kind] = tuple(sorted({*lags, *own, *sets}))
+    return found
+
+
+def _conditions(claim: Claim, loop: StationLoop, run: Recording) -> list[tuple[Any, str]]:
+    """What the claim assumes not to be, (n,), beside lag and its set."""
+    command, limit = run["command"], loop.limit * ALMOST
+    if loop.limit_kind == "none" or not math.isfinite(limit):
+        return []
+    if claim.kind in ("circle", "rest"):
+        return [(size(command, loop.limit_kind) >= limit, "the control reaches its limit")]
+    if claim.kind == "saturated-axis":
+        return [(np.abs(command[:, 1:]).max(axis=1) >= limit, "the control along Y or Z reaches its limit")]
+    return []
+
+
+def outside(
+    claim: Claim, loop: StationLoop, position: NDArray[np.float64], velocity: NDArray[np.float64], slack: float = 0.0
+) -> Any:
+    """Which states, (3, n) each, lie outside a claim's set by more than a slack, (n,); none of a claim about all states."""
+    if claim.kind == "saturated-axis":
+        steep = math.sqrt(loop.plant.rate**2 + 2.0 * loop.plant.stiffness)
+        far = np.abs(position[0] + velocity[0] / steep) > claim.numbers["width"] * (1.0 + slack)
+        far |= np.abs(position[0]) > claim.numbers["reach"] * (1.0 + slack)
+        # The claim takes Y and Z as held; where a flight starts otherwise it is none of those that it speaks of.
+        away = abs(position[1:, 0] - (loop.gains.y, loop.gains.z)).max() + abs(velocity[1:, 0]).max()
+        return far | (away > slack)
+    if "level" not in claim.numbers:
+        return np.zeros(position.shape[1], dtype=bool)
+    beyond = circle_value(loop.gains, position, velocity) > claim.numbers["level"] * (1.0 + slack)
+    if claim.kind == "control-limit":
+        beyond |= np.maximum(np.abs(position[0]), np.abs(velocity[0])) > slack
+    return beyond
+
+
+def circle_value(gains: Any, position: NDArray[np.float64], velocity: NDArray[np.float64]) -> NDArray[np.float64]:
+    """V of the circle at many states, (3, n) each."""
+    seen: Any = SeenPoint(tuple(position), tuple(velocity), 0.0, math.inf)
+    f1, f2, f3 = l2_circle.errors(seen, gains)
+    return np.asarray(0.5 * (gains.alpha * f1 * f1 + f2 * f2 + f3 * f3))

@@ -1,0 +1,223 @@
+"""When flights leave what is claimed of their laws."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from starhold.algebra.scalar import side
+from starhold.analysis.departure import MET, departures, fed_back
+from starhold.certification.certificate import Certificate, Claim, Obligation, write
+from starhold.certification.certify import certify
+from starhold.certification.checker import check_file, passed
+from starhold.certification.checker.claims import CLAIMS
+from starhold.certification.wording import sentence
+from starhold.laws.double_cover import COVERS
+from starhold.report.certificates import certify_scenario
+from starhold.report.compare import fly_law, prove
+from starhold.report.kinds import kind_of
+from starhold.report.proved import section
+from starhold.scenario.building import build
+from starhold.scenario.opening import open_scenario
+from starhold.scenario.reading import builtin_text, parse
+
+BASE = builtin_text("three-laws").split("[[law]]")[0].replace("duration = 2000.0", "duration = 60.0")
+LAW = '\n[[law]]\ntype = "lyapunov"\nk_rate = 0.09\nk_attitude = 0.009\n'
+
+
+def flown(text):
+    """The loop, its certificate and flight, with what the flight leaves."""
+    scenario = parse(text, "here")
+    entry = scenario.laws[0]
+    loop = build(scenario, entry)
+    flight = prove(scenario, entry, loop, fly_law(scenario, entry, loop))
+    return loop, flight.certificates[0], flight, flight.departures[0]
+
+
+def test_every_assumption_of_a_claim_about_motions_is_looked_at():
+    told = {
+        assumed for kind in CLAIMS if kind != "sampling" for wheels in (False, True) for assumed in assumptions(kind, wheels)
+    }
+    assert told == set(MET)
+
+
+def assumptions(kind, wheels):
+    if CLAIMS[kind].wheels not in (None, wheels):
+        return []
+    return CLAIMS[kind].assumptions({"tolerance": 0.1}, wheels)
+
+
+def test_a_flight_that_keeps_to_the_assumptions_leaves_nothing():
+    text = BASE.replace("attitude = [0, 1, 1, 1]", "attitude = [1, 0.1, 0.1, 0.1]").replace(
+        "rate = [0.04, 0.03", "rate = [0.004, 0.003"
+    )
+    _, certificate, flight, left = flown(text.replace("gravity_gradient = true", "gravity_gradient = false") + LAW)
+    assert {claim.kind for claim in certificate.claims} == {"convergence", "torque-limit", "inertia", "sampling"}
+    assert left == {"convergence": (), "torque-limit": (), "inertia": ()}
+    assert "leaves the claim" not in section([flight])
+    assert all(claim["left_at"] is None for claim in flight.results()["claims"])
+
+
+def test_the_first_time_on_the_limit_ends_a_claim_about_unlimited_torque():
+    weak = BASE.replace('"0.01 N m"', '"0.004 N m"').replace("attitude = [0, 1, 1, 1]", "attitude = [1, 0.05, 0, 0]")
+    text = weak.replace("rate = [0.04, 0.03, 0.02]", "rate = [0.0, 0.0, 0.02]").replace(
+        "gravity_gradient = true", "gravity_gradient = false"
+    )
+    loop, certificate, flight, left = flown(text + LAW.replace("k_rate = 0.09", "k_rate = 0.02").replace("0.009", "0.03"))
+    command = np.abs(flight.recording["command"]).max(axis=1)
+    on = np.flatnonzero(command >= 0.004)
+    assert 0 < on[0] < len(command) - 1
+    assert [(one.time, one.how) for one in left["convergence"]] == [
+        (pytest.approx(on[0] * loop.period), "the torque reaches its limit")
+    ]
+    assert "with unlimited torque, " in sentence(certificate.claim("convergence"), certificate.subject)
+    assert f"at {on[0] * 0.1:.4g} s the torque reaches its limit" in section([flight])
+    told = next(claim for claim in flight.results()["claims"] if claim["claim"] == "convergence")
+    assert (told["outcome"], told["left_at"]) == ("proved", left["convergence"][0].time)
+    assert json.loads(json.dumps(told)) == told
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "how"),
+    [
+        ("[sensor]", "", None),
+        ("torque_limit", 'actuator_lag = "0.5 s"\ntorque_limit', "the actuators lag"),
+        ("gravity_gradient = true", "gravity_gradient = true\ntorque_noise = 1e-5", "a random torque acts"),
+        ("[simulation]", "[sensor]\nrate_noise = 1e-5\n[simulation]", "the sensors are noisy"),
+    ],
+)
+def test_what_acts_all_the_time_is_told_from_the_start(old, new, how):
+    _, _, _, left = flown(BASE.replace(old, new, 1) + LAW)
+    assert [one.how for one in left["convergence"] if one.time == 0.0] == ([] if how is None else [how])
+    # This start is outside the set of small torques, whatever else.
+    assert "it is outside the set" in [one.how for one in left["torque-limit"]]
+
+
+def test_only_a_law_that_does_not_cancel_gravity_leaves_by_it():
+    plain = LAW.replace('"lyapunov"', '"pd"')
+    assert "the law does not cancel the gravity gradient" in [one.how for one in flown(BASE + plain)[3]["convergence"]]
+    assert flown(BASE + LAW)[3]["convergence"] == ()
+
+
+def test_a_flight_that_is_driven_out_of_its_set_is_told_when():
+    """Held for longer than the linear loop bears, V of a motion that starts inside rises through the level."""
+    start = BASE.replace("attitude = [0, 1, 1, 1]", "attitude = [1, 0.02, 0.02, 0.02]").replace(
+        "rate = [0.04, 0.03, 0.02]", "rate = [0, 0, 0]"
+    )
+    text = start.replace("control_period = 0.1", "control_period = 50.0").replace("duration = 60.0", "duration = 1000.0")
+    loop, certificate, flight, left = flown(
+        text.replace('limit = "axis"', 'limit = "none"')
+        + LAW.replace("lyapunov", "modal")
+        .replace("k_rate = 0.09 ", "a = -0.428")
+        .replace("k_rate = 0.09\nk_attitude = 0.009", 'form = "equal"\na = -0.428')
+    )
+    assert certificate.claim("sampling").outcome == "refuted"
+    (kind,) = left
+    assert kind == "region"
+    hows = [one.how for one in left[kind]]
+    assert "not even the linear loop is stable" in hows[0]
+    assert hows[-1] == "it leaves the set"
+    assert 0.0 < left[kind][-1].time <= flight.recording["time"][-1]
+    assert certificate.outcome == "refuted"
+
+
+def test_a_fault_ends_the_claims_of_the_first_certificate():
+    scenario = open_scenario("wheels-orbital")
+    text = (
+        scenario.text.replace('duration = "10 min"', "duration = 30.0")
+        + '\n[[fault]]\ntime = 10\nwheel = 2\nlost = true\naction = "both"\n'
+    )
+    scenario = parse(text, "here")
+    entry = scenario.laws[0]
+    loop = build(scenario, entry)
+    flight = prove(scenario, entry, loop, fly_law(scenario, entry, loop))
+    assert len(flight.certificates) == 2
+    first, second = (left["convergence"] for left in flight.departures)
+    assert (first[-1].time, first[-1].how) == (10.0, "what flies, or what the law knows of it, changes")
+    assert all(one.time >= 10.0 for one in second)
+
+
+@given(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=60), st.floats(0.05, 0.9))
+@settings(deadline=None, max_examples=60)
+def test_the_quaternion_that_is_fed_back_is_that_of_the_loop(cosines, width):
+    loop = build(
+        parse(BASE + LAW + f'double_cover = "hysteresis"\nhysteresis_width = {width}\n', "here"),
+        parse(BASE + LAW, "here").laws[0],
+    )
+    errors = np.array([(q0, np.sqrt(max(0.0, 1.0 - q0 * q0)), 0.0, 0.0) for q0 in cosines])
+    h, expected = side(cosines[0]), []
+    for error in errors:
+        shown, h = COVERS["hysteresis"](tuple(error), h, loop.hysteresis_width)
+        expected.append(shown)
+    if loop.cover == "hysteresis":
+        assert np.array_equal(fed_back(loop, errors), np.array(expected))
+
+
+# --- station keeping --------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def deficit():
+    scenario = open_scenario("l2-deficit")
+    entry = scenario.pick("2.786 as printed")
+    kind = kind_of(scenario)
+    loop = kind.build(scenario, entry)
+    return kind.prove(scenario, entry, loop, kind.fly_law(scenario, entry, loop))
+
+
+def test_a_lost_flight_first_leaves_the_claim_that_it_ends_on_the_circle(deficit):
+    left = deficit.departures[0]["circle"]
+    assert [one.how for one in left] == ["the control reaches its limit", "it leaves the set"]
+    assert 0.0 < left[0].time < left[1].time < deficit.lost
+    assert "With unlimited control, from the level set" in section([deficit])
+    assert "This flight leaves the claim" in section([deficit])
+    (circle,) = (claim for claim in deficit.results()["claims"] if claim["claim"] == "circle")
+    assert circle["left_at"] == left[0].time
+
+
+def test_no_limit_no_word_of_it():
+    scenario = open_scenario("l2-circle")
+    entry = scenario.pick("smooth")
+    loop = kind_of(scenario).build(scenario, entry)
+    claim = Claim("circle", {}, {}, ("control not limited",), ())
+    assert sentence(claim, {"limit": "none", "control_limit": None}) == "the motion ends on the circle"
+    assert (
+        sentence(claim, {"limit": "norm", "control_limit": loop.limit})
+        == "with unlimited control, the motion ends on the circle"
+    )
+
+
+# --- a certificate as a whole -----------------------------------------------------------------------------------------
+
+
+def test_the_linear_loop_alone_proves_no_certificate(tmp_path):
+    """A law of which nothing but the sampling claim is made: the checker, too, refuses that to be called proved."""
+    text = BASE + LAW
+    scenario = parse(text, "here")
+    whole = certify(build(scenario, scenario.laws[0]), "lyapunov")
+    assert whole.outcome == "proved"
+    alone = Certificate(whole.name, whole.subject, tuple(claim for claim in whole.claims if claim.kind == "sampling"))
+    assert alone.claims[0].outcome == "proved"
+    assert alone.outcome == "undecided"
+    path = tmp_path / "certificate.json"
+    write([alone], "here", path)
+    assert passed(check_file(path))
+    path.write_text(path.read_text().replace('"outcome": "undecided"', '"outcome": "proved"', 1))
+    assert "does not follow" in " ".join(finding.reason for finding in check_file(path) if finding.verdict == "fails")
+
+
+def test_noisy_sensors_do_not_keep_a_start_from_being_judged():
+    text = BASE + "\n[sensor]\nrate_noise = 1e-5\n" + LAW
+    (tried,) = certify_scenario(parse(text, "here"))
+    assert tried.start_inside["torque-limit"] is False
+
+
+def test_a_claim_that_is_not_proved_is_left_by_nothing():
+    loop, certificate, flight, _ = flown(BASE + LAW)
+    open_claim = Claim("convergence", {}, {}, (), (Obligation("form", "exact identity", "undecided", {"reason": "none"}),))
+    assert departures(Certificate("x", {}, (open_claim,)), loop, flight.recording) == {}
+    assert certificate.outcome == "proved"
