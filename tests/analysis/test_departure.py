@@ -25,6 +25,7 @@ from starhold.report.proved import section
 from starhold.scenario.building import build
 from starhold.scenario.opening import open_scenario
 from starhold.scenario.reading import builtin_text, parse
+from starhold.simulation.lane import Recording
 
 BASE = builtin_text("three-laws").split("[[law]]")[0].replace("duration = 2000.0", "duration = 60.0")
 LAW = '\n[[law]]\ntype = "lyapunov"\nk_rate = 0.09\nk_attitude = 0.009\n'
@@ -104,25 +105,39 @@ def test_only_a_law_that_does_not_cancel_gravity_leaves_by_it():
     assert flown(BASE + LAW)[3]["convergence"] == ()
 
 
-def test_a_flight_that_is_driven_out_of_its_set_is_told_when():
-    """Held for longer than the linear loop bears, V of a motion that starts inside rises through the level."""
-    text = BASE.replace("attitude = [0, 1, 1, 1]", "attitude = [1, 0.02, 0.02, 0.02]")
-    for old, new in {
-        "rate = [0.04, 0.03, 0.02]": "rate = [0, 0, 0]",
-        "control_period = 0.1": "control_period = 5.0",
-        "duration = 60.0": "duration = 1000.0",
-        'limit = "axis"': 'limit = "none"',
-    }.items():
+QUIET = {
+    "attitude = [0, 1, 1, 1]": "attitude = [1, 0.02, 0.02, 0.02]",
+    "rate = [0.04, 0.03, 0.02]": "rate = [0, 0, 0]",
+    "gravity_gradient = true": "gravity_gradient = false",
+}
+
+
+def quiet(text, **more):
+    for old, new in (QUIET | more).items():
         text = text.replace(old, new)
-    _, certificate, flight, left = flown(text + '[[law]]\ntype = "modal"\nform = "equal"\na = -0.428\n')
-    assert certificate.claim("sampling").outcome == "refuted"
-    (kind,) = left
-    assert kind == "region"
-    hows = [one.how for one in left[kind]]
-    assert "not even the linear loop is stable" in hows[0]
-    assert hows[-1] == "it leaves the set"
-    assert 0.0 < left[kind][-1].time <= flight.recording["time"][-1]
-    assert certificate.outcome == "refuted"
+    return text
+
+
+def test_a_flight_that_is_driven_out_of_its_set_is_told_when():
+    loop, certificate, flight, left = flown(quiet(BASE) + LAW)
+    assert left["torque-limit"] == ()
+    run = flight.recording
+    pushed = run["rate_error"].copy()
+    pushed[200:] += 0.1
+    struck = Recording(run.arrays | {"rate_error": pushed}, run.attrs)
+    (gone,) = departures(certificate, loop, struck)["torque-limit"]
+    assert (gone.time, gone.how) == (pytest.approx(20.0), "it leaves the set")
+    # A claim about every state is left by none.
+    assert departures(certificate, loop, struck)["convergence"] == ()
+
+
+def test_torque_held_for_too_long_ends_every_claim_about_the_motion():
+    text = quiet(BASE, **{"control_period = 0.1": "control_period = 5.0", 'limit = "axis"': 'limit = "none"'})
+    _, certificate, _, left = flown(text + '[[law]]\ntype = "modal"\nform = "equal"\na = -0.428\n')
+    assert certificate.claim("sampling").outcome == certificate.outcome == "refuted"
+    assert list(left) == ["region"]
+    assert left["region"][0].time == 0.0
+    assert "not even the linear loop is stable" in left["region"][0].how
 
 
 def test_a_fault_ends_the_claims_of_the_first_certificate():
