@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from starhold.algebra.cosines import to_angles
 from starhold.report.figures import draw
-from starhold.report.flight import COLOURS, colour
-from starhold.report.plots import collect, thin, thin_times
+from starhold.report.flight import COLOURS, Flight, colour, number_text
+from starhold.report.plots import collect, early, roll_pitch_yaw, thin, thin_times, until
 from starhold.simulation.lane import Recording
 from tests.report import flown
 
-NAMES = ["scalar", "attitude", "rate", "torque", "angle", "accuracy"]
+NAMES = ["scalar", "attitude", "rate", "torque", "angle", "roll-pitch-yaw", "accuracy"]
 
 
 def pixels(path: Path) -> np.ndarray:
@@ -67,17 +70,73 @@ def test_a_lost_run_does_not_flatten_the_others() -> None:
 
 
 def test_a_law_keeps_its_colour_and_many_laws_have_one() -> None:
-    assert len(set(COLOURS)) == len(COLOURS)
-    assert [colour(i) for i in range(2 * len(COLOURS))] == [*COLOURS, *COLOURS]
+    colours = [colour(i) for i in range(40)]
+    assert colours[: len(COLOURS)] == list(COLOURS)
+    assert all(re.fullmatch("#[0-9A-F]{6}", one) for one in colours)
+    # No two are alike, and the first are far apart: in squares of the largest distance along a channel.
+    assert len(set(colours)) == 40
+    parts = np.array([[int(one[i : i + 2], 16) for i in (1, 3, 5)] for one in colours[: len(COLOURS)]])
+    apart = np.linalg.norm(parts[:, None] - parts[None], axis=2) + 1e9 * np.eye(len(parts))
+    assert apart.min() > 50.0
 
 
 def test_a_limit_is_shown_where_it_matters() -> None:
-    assert collect(flown.flights(), 2000).torque.panels[0].levels == (-10.0, 10.0)
+    assert collect(flown.flights(), 2000).torque.panels[0].levels == (-0.01, 0.01)
     first = flown.flights()[0]
     far = Recording(first.recording.arrays, first.recording.attrs | {"torque_limit": 5.0})
     plot = collect([type(first)(first.name, first.law, far, first.metrics, {})], 2000).torque
     assert plot.panels[0].levels == ()
     assert "off the scale" in plot.dashed
+
+
+def test_roll_pitch_and_yaw_are_those_of_the_algebra() -> None:
+    q = np.random.default_rng(3).normal(size=(50, 4))
+    q /= np.linalg.norm(q, axis=1, keepdims=True)
+    expected = [np.degrees(to_angles(tuple(row)))[::-1] for row in q]
+    assert roll_pitch_yaw(q) == pytest.approx(np.array(expected), abs=1e-9)
+    # A small turn about one axis is that angle alone.
+    small = np.radians(0.2)
+    assert roll_pitch_yaw(np.array([[np.cos(small / 2), 0.0, np.sin(small / 2), 0.0]]))[0] == pytest.approx([0.0, 0.2, 0.0])
+    panels = collect(flown.flights(), 2000).roll_pitch_yaw.panels
+    assert [panel.label for panel in panels] == ["roll, deg", "pitch, deg", "yaw, deg"]
+
+
+def stretched(flight: Flight, rate: float, count: int = 4001) -> Flight:
+    """A flight of 400 s whose errors fall at a rate (1/s)."""
+    times = 0.1 * np.arange(count)
+    fall = np.exp(-rate * times)
+    half = 0.5 * fall
+    arrays = {
+        "time": times,
+        "attitude_error": np.column_stack([np.cos(half), np.sin(half), 0.0 * half, 0.0 * half]),
+        "rate_error": np.column_stack([fall, 0.0 * fall, 0.0 * fall]),
+        "torque": np.column_stack([fall, 0.0 * fall, 0.0 * fall]),
+    }
+    return replace(flight, recording=Recording(arrays, flight.recording.attrs))
+
+
+def test_the_transient_of_a_long_run_is_drawn_by_itself(tmp_path: Path) -> None:
+    first = flown.flights()[0]
+    flights = [stretched(first, 0.2), stretched(first, 0.1)]
+    end = early(flights)
+    # The slower one is at 2 % after ln 50/0.1 s.
+    assert end == pytest.approx(1.2 * np.log(50.0) / 0.1, abs=0.2)
+    assert {len(one.recording["time"]) for one in until(flights, end)} == {len(np.flatnonzero(0.1 * np.arange(4001) <= end))}
+    drawn = {path.stem for path in draw(flights, tmp_path)}
+    assert drawn == {*NAMES, "angle-transient", "torque-transient"}
+    # Nothing of it where the transient is most of the run, and none where nothing comes near.
+    assert early([stretched(first, 0.01)]) is None
+    assert early([stretched(first, 0.02)]) is None
+    assert early([stretched(first, 0.0)]) is None
+    assert early([flown.lost()]) is None
+
+
+def test_rounding_in_gains_reads_as_nothing() -> None:
+    assert number_text([[0.5, 2.85e-20, 0.0], [2.85e-20, 0.25, 0.0], [0.0, 0.0, 0.125]]) == "diag(0.5, 0.25, 0.125)"
+    assert number_text([[0.5, 1e-9], [1e-9, 0.25]]) == "[[0.5, 1e-09], [1e-09, 0.25]]"
+    assert number_text((1.0, -3e-17, 1e-12)) == "[1, 0, 1e-12]"
+    assert number_text(2.85e-20) == "2.85e-20"
+    assert number_text([0.0, 0.0, 0.0]) == "[0, 0, 0]"
 
 
 @pytest.mark.parametrize("factor", [2, 3, 8])

@@ -15,7 +15,7 @@ import numpy as np
 from starhold.analysis.metrics import DECADES
 from starhold.report.files import whole
 from starhold.report.flight import Flight, colour
-from starhold.report.plots import ACCURACIES, Plot, Plots, back_to_front, collect, steps_within
+from starhold.report.plots import ACCURACIES, Plot, Plots, back_to_front, collect, early, steps_within, until
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -41,14 +41,19 @@ class Sketch(NamedTuple):
     plots: Plots
     flights: list[Flight]
     name: str
+    transient: Plots | None = None
 
     def makers(self) -> dict[str, Callable[[], Any]]:
-        """The plots over time, and the steps to an accuracy."""
-        plots, flights, name = self
-        drawn = (plots.scalar, plots.attitude, plots.rate, plots.torque, plots.angle, *plots.further)
+        """The plots over time, the steps to an accuracy, and angle and torque of the transient alone where it is short."""
+        plots, flights, name, first = self
+        drawn = (plots.scalar, plots.attitude, plots.rate, plots.torque, plots.angle, plots.roll_pitch_yaw, *plots.further)
         makers: dict[str, Callable[[], Any]] = {
             plot.name: partial(over_time, plot, plots.times, plots.marks, flights, name) for plot in drawn
         }
+        if first is not None:
+            for plot in (first.angle, first.torque):
+                cut = replace(plot, title=f"{plot.title}, transient")
+                makers[f"{plot.name}-transient"] = partial(over_time, cut, first.times, first.marks, flights, name)
         return makers | {"accuracy": partial(_accuracy, flights, name)}
 
 
@@ -62,7 +67,9 @@ def draw(flights: Sequence[Flight], folder: Path, scenario: Scenario | None = No
 
 def sketch(flights: Sequence[Flight], scenario: Scenario | None = None) -> Sketch:
     """What `paint` needs."""
-    return Sketch(collect(flights, POINTS, scenario), without_runs(flights), "" if scenario is None else scenario.name)
+    end, name = early(flights), "" if scenario is None else scenario.name
+    transient = None if end is None else collect(until(flights, end), POINTS, scenario, end)
+    return Sketch(collect(flights, POINTS, scenario), without_runs(flights), name, transient)
 
 
 def without_runs(flights: Sequence[Flight]) -> list[Flight]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from colorsys import hls_to_rgb
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -20,8 +21,18 @@ if TYPE_CHECKING:
     from starhold.laws.interface import Field
     from starhold.simulation.lane import Recording
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8A8A8A")
-"""Okabe and Ito's palette, distinct to colour-blind readers, without what white or black paper swallows."""
+COLOURS = (
+    *("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8A8A8A"),
+    *("#7B3FA0", "#A6761D", "#E7298A", "#66A61E", "#4D5BD6", "#B3001B", "#2F8F9D"),
+)
+"""Okabe and Ito's palette, distinct to colour-blind readers, without what white or black paper swallows; then seven
+more that differ from these and from one another."""
+GOLDEN = 0.5 * (3.0 - 5.0**0.5)
+"""Of a full turn: hues that are such a step apart fill the circle evenly, however many they are."""
+
+
+ROUNDING = 1e-13
+"""Share of a matrix's largest entry below which another is taken for what rounding left."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +94,11 @@ class Flight:
 
 def colour(number: int) -> str:
     """The colour of the law at this place of a comparison, the same in every picture."""
-    return COLOURS[number % len(COLOURS)]
+    if number < len(COLOURS):
+        return COLOURS[number]
+    extra = number - len(COLOURS)
+    red, green, blue = hls_to_rgb(GOLDEN * extra % 1.0, (0.38, 0.58)[extra % 2], 0.62)
+    return "#" + "".join(f"{round(255.0 * part):02X}" for part in (red, green, blue))
 
 
 def listed(parts: Sequence[str]) -> str:
@@ -92,8 +107,11 @@ def listed(parts: Sequence[str]) -> str:
 
 
 def number_text(value: Any, digits: int = 6) -> str:
-    """A number, vector or matrix for reading; of a diagonal matrix the diagonal, of equal numbers one."""
+    """A number, vector or matrix for reading; of a diagonal matrix the diagonal, of equal numbers one. An entry that is
+    nothing beside the largest but the rounding of a computation reads as 0."""
     array = np.asarray(value, dtype=float)
+    if array.ndim:
+        array = np.where(np.abs(array) < ROUNDING * np.abs(array).max(initial=0.0), 0.0, array)
     if array.ndim == 0:
         return f"{array:.{digits}g}"
     if array.ndim == 1 and len(array) == 3 and array[0] and (array == array[0]).all():

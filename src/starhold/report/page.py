@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from starhold.algebra.quaternion import conjugate, multiply, to_body
 from starhold.analysis.metrics import DECADES
-from starhold.models.craft import whole
+from starhold.models.craft import EARTH, whole
 from starhold.report.flight import Flight
 from starhold.report.page_parts import (
-    OVER_TIME,
     POINTS,
     columns_list,
     document,
@@ -21,6 +21,7 @@ from starhold.report.page_parts import (
     laws_table,
     lost_alarm,
     over_time,
+    over_time_heading,
     panel_data,
     plot_box,
     ranking,
@@ -29,7 +30,7 @@ from starhold.report.page_parts import (
     versions,
     views,
 )
-from starhold.report.plots import ACCURACIES, Panel, Plot, collect, steps_within
+from starhold.report.plots import ACCURACIES, Panel, Plot, Plots, collect, early, steps_within, until
 from starhold.report.proved import section as proved
 from starhold.report.transients import section as transients
 
@@ -38,14 +39,21 @@ if TYPE_CHECKING:
 
 FRAMES = 180
 """Attitudes of the turning body; the page turns it smoothly from one to the next."""
+EARLY_POINTS = 900
+"""Samples of a curve of the transient alone."""
 EARLY = 1.6
-"""Frame k of n shows the time T (k/n)^EARLY: most of the motion is at the start."""
+"""Frame k of n shows the time T (k/n)^EARLY: most of the motion is at the start. Of a run that is long beside its transient
+half of the frames show that."""
 SECONDS = 14.0
 """How long the animation plays."""
 
 _VIEWS = (
     "Seen in the axes of the target (dashed, x* y* z*); solid axes are the body's, and the angle "
     "is what is left to turn. The outline is that of the uniform box with this inertia."
+)
+_ORBITAL = (
+    " Of the orbital frame x* leads along the motion, y* against the orbit's normal, and z* to the centre of attraction, "
+    "which is down in the picture."
 )
 
 
@@ -63,8 +71,8 @@ def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
         transients(flights),
         proved(flights),
         "<h2>The turning body</h2>",
-        views(flights, len(data["scene"]["times"]), "Attitude", _VIEWS),
-        OVER_TIME,
+        views(flights, len(data["scene"]["times"]), "Attitude", _told(data["scene"])),
+        over_time_heading(early(flights)),
         *(plot_box(plot) for plot in data["plots"]),
         laws_table(flights),
         settings(scenario, "Spacecraft and settings"),
@@ -74,17 +82,32 @@ def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
     return document(scenario, sections, data, ("space.js", "body.js"), footer)
 
 
+def _told(scene: Mapping[str, Any]) -> str:
+    arrow = "" if scene["earth"] is None else f" The arrow leads to the {scene['centre']}."
+    return _VIEWS + (_ORBITAL if scene["down"] else "") + arrow
+
+
 def _data(scenario: Scenario, flights: Sequence[Flight]) -> dict[str, Any]:
     """What the scripts of the page read."""
     plots = collect(flights, POINTS, scenario)
-    quaternion = Plot("quaternion", "error quaternion", [*plots.scalar.panels, *plots.attitude.panels])
-    drawn = (plots.angle, quaternion, plots.rate, plots.torque, *plots.further)
-    return {
+    found: dict[str, Any] = {
         "laws": law_data(flights),
         "times": rounded(plots.times),
-        "plots": [*(over_time(plot, flights, plots.marks) for plot in drawn), _accuracy(flights)],
+        "plots": [*_drawn(plots, flights), _accuracy(flights)],
         "scene": _scene(scenario, flights),
     }
+    end = early(flights)
+    if end is not None:
+        first = collect(until(flights, end), EARLY_POINTS, scenario, end)
+        found["transient"] = {"times": rounded(first.times), "plots": {one["name"]: one for one in _drawn(first, flights)}}
+    return found
+
+
+def _drawn(plots: Plots, flights: Sequence[Flight]) -> list[dict[str, Any]]:
+    """The plots over time for the script."""
+    quaternion = Plot("quaternion", "error quaternion", [*plots.scalar.panels, *plots.attitude.panels])
+    drawn = (plots.angle, plots.roll_pitch_yaw, quaternion, plots.rate, plots.torque, *plots.further)
+    return [over_time(plot, flights, plots.marks) for plot in drawn]
 
 
 def _accuracy(flights: Sequence[Flight]) -> dict[str, Any]:
@@ -109,7 +132,9 @@ def _accuracy(flights: Sequence[Flight]) -> dict[str, Any]:
 def _scene(scenario: Scenario, flights: Sequence[Flight]) -> dict[str, Any]:
     longest = max((flight.recording["time"] for flight in flights), key=len)
     # Some frames of a short run would be equal; each sample shows once.
-    places = np.unique(np.rint((len(longest) - 1) * np.linspace(0.0, 1.0, FRAMES + 1) ** EARLY).astype(int))
+    end = early(flights)
+    power = EARLY if end is None else max(EARLY, math.log(end / float(longest[-1])) / math.log(0.5))
+    places = np.unique(np.rint((len(longest) - 1) * np.linspace(0.0, 1.0, FRAMES + 1) ** power).astype(int))
     attitudes: list[list[list[float | None]]] = []
     for flight in flights:
         q = flight.recording["attitude_error"]
@@ -122,8 +147,20 @@ def _scene(scenario: Scenario, flights: Sequence[Flight]) -> dict[str, Any]:
         "attitudes": attitudes,
         "size": rounded(size, 4),
         "axes": [rounded(row) for row in axes],
+        "earth": None if scenario.table.orbit is None else _earth(flights, places),
+        "centre": "Earth" if abs(scenario.craft.gravity - EARTH) < 1e-3 * EARTH else "planet",
+        "down": scenario.table.target.mode == "orbital",
         "seconds": SECONDS,
     }
+
+
+def _earth(flights: Sequence[Flight], places: Any) -> list[list[float | None]]:
+    """Where the centre of attraction is at these samples of the longest run, in the axes of the target, as unit vectors."""
+    run = max((flight.recording for flight in flights), key=lambda found: len(found["time"]))
+    attitude, error, position = (run[name][places].T for name in ("attitude", "attitude_error", "position"))
+    goal = multiply(tuple(attitude), conjugate(tuple(error)))
+    toward = to_body(goal, tuple(-position / np.linalg.norm(position, axis=0)))
+    return [rounded(row, 4) for row in np.transpose(toward)]
 
 
 def _box(inertia: Any) -> tuple[Any, Any]:

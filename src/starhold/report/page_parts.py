@@ -55,7 +55,7 @@ def document(
             *(part for part in body if part),
             f'<script type="application/json" id="data">{embedded}</script>',
             f"<script>{get_plotlyjs()}</script>",
-            f"<script>\n{_asset('plots.js')}</script>",
+            f"<script>\n{_asset('plots.js')}{_asset('tables.js')}</script>",
             f"<script>\n{''.join(_asset(name) for name in scripts)}</script>",
             "</body></html>\n",
         ]
@@ -92,6 +92,16 @@ OVER_TIME = (
     '<p class="note">Click a law in the legend to hide it, double-click to see it alone; drag to zoom, '
     "double-click to zoom out.</p>"
 )
+
+
+def over_time_heading(transient: float | None) -> str:
+    """The heading of the plots over time, with a switch to the transient (s) where there is one."""
+    if transient is None:
+        return OVER_TIME
+    return (
+        f'{OVER_TIME}\n<p class="switch"><button id="whole" type="button" aria-pressed="true">Whole run</button>'
+        f'<button id="transient-only" type="button" aria-pressed="false">Transient, first {transient:.3g} s</button></p>'
+    )
 
 
 def over_time(plot: Plot, flights: Sequence[Flight], marks: Sequence[float] = ()) -> dict[str, Any]:
@@ -145,7 +155,7 @@ def ranking(flights: Sequence[Flight]) -> str:
     order = ", then ".join(board.headings(results))
     late = f" {board.late(results)}".rstrip()
     return (
-        '<h2>Ranking</h2>\n<div class="wide"><table><thead><tr><th scope="col">#</th>'
+        '<h2>Ranking</h2>\n<div class="wide"><table class="ranking"><thead><tr><th scope="col">#</th>'
         f'<th scope="col" style="text-align:left">law</th>{head}</tr></thead>\n'
         f"<tbody>{''.join(rows)}</tbody></table></div>\n"
         f'<p class="note">Ordered by {escape(order)}; less is better in every column, and the best value is marked. '

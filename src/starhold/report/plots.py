@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.analysis.metrics import DECADES, acceleration, error_angle
+from starhold.analysis.metrics import DECADES, acceleration, error_angle, stays_within
 from starhold.report.flight import Flight
 
 if TYPE_CHECKING:
@@ -22,6 +22,8 @@ ACCURACIES = (("", "attitude, |q| ≤ 10⁻ᵏ"), ("rate_", "rate, |ω| ≤ 10�
 """What the steps to an accuracy are counted for: the prefix of the metric, and the heading."""
 
 
+NEAR = 0.02
+"""Share of the largest error that counts as near the target."""
 OFF_SCALE = 5.0
 """Limits so many times above all curves are not drawn."""
 
@@ -72,14 +74,15 @@ class Plots:
     rate: Plot
     torque: Plot
     angle: Plot
+    roll_pitch_yaw: Plot
     further: tuple[Plot, ...] = ()
     """Rate and acceleration against their limits, momenta and torques of reaction wheels, where there are any."""
     marks: tuple[float, ...] = ()
     """When faults happen and are acted on (s)."""
 
 
-def collect(flights: Sequence[Flight], points: int, scenario: Scenario | None = None) -> Plots:
-    """The plots of a comparison, each curve thinned to about `points` samples."""
+def collect(flights: Sequence[Flight], points: int, scenario: Scenario | None = None, end: float = math.inf) -> Plots:
+    """The plots of a comparison, each curve thinned to about `points` samples; marks up to `end` (s)."""
     longest = max((flight.recording["time"] for flight in flights), key=len)
     factor = 1 if len(longest) <= points else int(np.ceil(2 * len(longest) / points))
 
@@ -87,12 +90,9 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario | None = 
         return [thin(flight.recording[name][:, column] * scale, factor) for flight in flights]
 
     rate_scale, rate_unit = _rate_unit(flights)
-    torque_scale, torque_unit = _torque_unit(flights)
-    levels, dashed = _limit(flights, torque_scale, torque_unit, scenario)
+    levels, dashed = _limit(flights, 1.0, "N m", scenario)
     rates = [Panel(f"{axis}, {rate_unit}", curves("rate_error", i, rate_scale)) for i, axis in enumerate("xyz")]
-    torques = [
-        Panel(f"{axis}, {torque_unit}", curves("torque", i, torque_scale), False, levels) for i, axis in enumerate("xyz")
-    ]
+    torques = [Panel(f"{axis}, N m", curves("torque", i), False, levels) for i, axis in enumerate("xyz")]
     scalar = Panel("q₀", curves("attitude_error", 0))
     vector = [Panel(f"q{'₁₂₃'[i]}", curves("attitude_error", i + 1)) for i in range(3)]
     return Plots(
@@ -102,8 +102,9 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario | None = 
         Plot("rate", "angular velocity relative to the target", [sound(panel, flights) for panel in rates]),
         Plot("torque", "torque applied", torques, dashed, True),
         _angle(flights, factor, scenario),
+        _roll_pitch_yaw(flights, factor),
         (*_transient(flights, factor, scenario), *_wheels(flights, factor, scenario)),
-        () if scenario is None else scenario.fault_times,
+        () if scenario is None else tuple(time for time in scenario.fault_times if time <= end),
     )
 
 
@@ -161,6 +162,56 @@ def _angle(flights: Sequence[Flight], factor: int, scenario: Scenario | None) ->
     slow = () if settling is None else (settling.rate_tolerance * degrees,)
     panels = [positive("angle, deg", angles, within), sound(positive("rate, deg/s", speeds, slow), flights)]
     return Plot("angle", "error angle and relative rate", panels, "tolerance" if settling else "")
+
+
+def _roll_pitch_yaw(flights: Sequence[Flight], factor: int) -> Plot:
+    errors = [roll_pitch_yaw(flight.recording["attitude_error"]) for flight in flights]
+    panels = [
+        Panel(f"{name}, deg", [_unwrapped(thin(own[:, i], factor)) for own in errors])
+        for i, name in enumerate(("roll", "pitch", "yaw"))
+    ]
+    return Plot("roll-pitch-yaw", "roll, pitch and yaw error", panels)
+
+
+def roll_pitch_yaw(q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Turns (deg) about the first, the new second and the new third axis that, taken from the last to the first, make up
+    each quaternion (n, 4); (n, 3). The same as `algebra.cosines.to_angles`, of many."""
+    q0, q1, q2, q3 = q.T
+    roll = np.arctan2(2.0 * (q2 * q3 + q0 * q1), 1.0 - 2.0 * (q1 * q1 + q2 * q2))
+    pitch = np.arcsin(np.clip(2.0 * (q0 * q2 - q1 * q3), -1.0, 1.0))
+    yaw = np.arctan2(2.0 * (q1 * q2 + q0 * q3), 1.0 - 2.0 * (q2 * q2 + q3 * q3))
+    return np.degrees(np.column_stack([roll, pitch, yaw]))
+
+
+def _unwrapped(angles: Curve) -> Curve:
+    """Angles (deg) with gaps where they jump from one end of their range to the other."""
+    broken = angles.copy()
+    broken[1:][np.abs(np.diff(angles)) > 180.0] = np.nan
+    return broken
+
+
+def early(flights: Sequence[Flight]) -> float | None:
+    """The time (s) by which the motions that come near the target are near it, with a little to spare; None where that is
+    most of the run, or none does."""
+    longest, ends = max(float(flight.recording["time"][-1]) for flight in flights), list[float]()
+    for flight in flights:
+        run = flight.recording
+        errors = error_angle(run["attitude_error"]), np.linalg.norm(run["rate_error"], axis=1)
+        within = [stays_within(values, NEAR * float(values.max(initial=0.0))) for values in errors]
+        if flight.lost is None and None not in within:
+            ends.append(float(run["time"][max(place for place in within if place is not None)]))
+    end = 1.2 * max(ends, default=math.inf)
+    return end if 0.0 < end <= 0.5 * longest else None
+
+
+def until(flights: Sequence[Flight], end: float) -> list[Flight]:
+    """The same flights with what was recorded up to a time (s)."""
+    short: list[Flight] = []
+    for flight in flights:
+        count = int(np.searchsorted(flight.recording["time"], end * (1.0 + 1e-9), side="right"))
+        arrays = {name: values[: max(1, count)] for name, values in flight.recording.arrays.items()}
+        short.append(replace(flight, recording=replace(flight.recording, arrays=arrays)))
+    return short
 
 
 def _transient(flights: Sequence[Flight], factor: int, scenario: Scenario | None) -> tuple[Plot, ...]:
@@ -237,13 +288,6 @@ def _peak(flights: Sequence[Flight], name: str) -> float:
 def _rate_unit(flights: Sequence[Flight]) -> tuple[float, str]:
     degrees = 180.0 / np.pi
     return (degrees, "deg/s") if _peak(flights, "rate_error") * degrees >= 0.1 else (degrees * 1e3, "mdeg/s")
-
-
-def _torque_unit(flights: Sequence[Flight]) -> tuple[float, str]:
-    peak = _peak(flights, "torque")
-    if peak >= 1.0:
-        return 1.0, "N m"
-    return (1e3, "mN m") if peak >= 1e-3 or peak == 0.0 else (1e6, "µN m")
 
 
 def _limit(flights: Sequence[Flight], scale: float, unit: str, scenario: Scenario | None) -> tuple[tuple[float, ...], str]:

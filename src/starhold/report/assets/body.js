@@ -67,6 +67,19 @@ const model = craft();
 // Principal axes are the columns of scene.axes.
 const toBody = (p) => [0, 1, 2].map((i) => dot(scene.axes[i], p));
 
+// Where the Earth is at a frame, in the axes of the target.
+function toEarth(where) {
+  const k = Math.min(Math.floor(where), scene.earth.length - 1);
+  const b = scene.earth[Math.min(k + 1, scene.earth.length - 1)];
+  const mixed = scene.earth[k].map((c, i) => c + (where - k) * (b[i] - c));
+  const size = Math.hypot(...mixed) || 1;
+  return mixed.map((c) => c / size);
+}
+
+// The third axis of the orbital frame leads to the Earth, so down: all is seen turned by half a turn about the first.
+const upright = (view) => (scene.down
+  ? Object.fromEntries(Object.entries(view).map(([name, v]) => [name, [v[0], -v[1], -v[2]]])) : view);
+
 function shade(colour, light) {
   const n = parseInt(colour.slice(1), 16);
   return `rgb(${[n >> 16, (n >> 8) & 255, n & 255].map((c) => Math.round(Math.min(255, c * light))).join(",")})`;
@@ -79,11 +92,11 @@ function paint(view, where) {
   view.angle.textContent = `${(2 * Math.atan2(Math.hypot(q[1], q[2], q[3]), Math.abs(q[0])) * 180 / Math.PI).toPrecision(3)}°`
     + (where > frames.length - 1 ? " diverged" : "");
 
-  const { away, right, up } = stance();
+  const { away, right, up } = upright(stance());
   const lamp = plus(plus(away, up, 0.6), right, -0.5).map((c) => c / 1.27);
-  const scale = Math.min(width, 0.95 * height) * 0.385;
-  // Below the middle, for the target's axes have only upper halves.
-  const flat = (p) => [width / 2 + scale * dot(p, right), 0.56 * height - scale * dot(p, up)];
+  const scale = Math.min(width, 0.95 * height) * (scene.down ? 0.33 : scene.earth ? 0.31 : 0.385);
+  // Off the middle, for the target's axes have only one half each; the Earth may be anywhere.
+  const flat = (p) => [width / 2 + scale * dot(p, right), (scene.down ? 0.37 : scene.earth ? 0.51 : 0.56) * height - scale * dot(p, up)];
 
   function line(from, to, colour, thick, dash) {
     pen.beginPath();
@@ -127,6 +140,8 @@ function paint(view, where) {
     }
   });
 
+  const earth = scene.earth && toEarth(where);
+  if (earth && dot(earth, away) <= 0) drawEarth();
   drawAxes(false);
   const along = turn(q, toBody(unit[model.long]));
   // Planes separate the parts, so that their order along the view is exact.
@@ -150,7 +165,32 @@ function paint(view, where) {
     }
   }
   drawAxes(true);
+  if (earth && dot(earth, away) > 0) drawEarth();
   unit.forEach((e, i) => label(e.map((c) => 1.24 * c), `${names[i]}*`, colours[i], "italic"));
+
+  // An arrow from the edge of the picture's middle outwards, longer than the axes, which it may run along.
+  function drawEarth() {
+    const colour = css("--soft");
+    line(earth.map((c) => 1.5 * c), earth.map((c) => 1.66 * c), colour, 2, []);
+    const [x1, y1] = flat(earth.map((c) => 1.5 * c));
+    const [x2, y2] = flat(earth.map((c) => 1.66 * c));
+    const long = Math.hypot(x2 - x1, y2 - y1);
+    const [ux, uy] = long > 0 ? [(x2 - x1) / long, (y2 - y1) / long] : [0, 1];
+    if (long > 4) {
+      pen.beginPath();
+      pen.moveTo(x2 + 6 * ux, y2 + 6 * uy);
+      pen.lineTo(x2 - 4 * uy, y2 + 4 * ux);
+      pen.lineTo(x2 + 4 * uy, y2 - 4 * ux);
+      pen.closePath();
+      pen.fillStyle = colour;
+      pen.fill();
+    }
+    pen.font = "13px system-ui, sans-serif";
+    pen.textAlign = "center";
+    pen.textBaseline = "middle";
+    pen.fillStyle = colour;
+    pen.fillText(scene.centre, x2 + 28 * ux, y2 + 15 * uy);
+  }
 
   // Solar cells, five along the panel and three across.
   function cells(c, face, part) {

@@ -20,12 +20,17 @@ function look() {
   };
 }
 
+// Of a run that is long beside its transient both can be seen; the page has a switch.
+let transient = false;
+const shownNow = (plot) => (transient && report.transient && report.transient.plots[plot.name]) || plot;
+const timesOf = (plot) => plot.x || (transient && report.transient ? report.transient.times : report.times);
+
 function lines(panel, k, plot) {
   return panel.order.map((number) => {
     const law = report.laws[number];
     return {
       type: "scatter", mode: plot.markers ? "lines+markers" : "lines",
-      x: plot.x || report.times, y: panel.curves[number], yaxis: k ? `y${k + 1}` : "y", xaxis: plot.split && k ? `x${k + 1}` : "x",
+      x: timesOf(plot), y: panel.curves[number], yaxis: k ? `y${k + 1}` : "y", xaxis: plot.split && k ? `x${k + 1}` : "x",
       name: plain(law.name), legendgroup: `law${number}`, legendrank: number + 1, showlegend: k === 0,
       line: { color: law.colour, width: panel.widths[number] }, marker: { size: 8 },
       hovertemplate: `%{y:${panel.log ? ".3~e" : ".4~g"}}<extra>${plain(law.name)}${plot.panels.length > 1 ? ", " + plain(panel.label) : ""}</extra>`,
@@ -78,7 +83,16 @@ function draw(plot) {
 }
 
 function drawAll() {
-  report.plots.filter((plot) => !plot.planes).forEach(draw);
+  report.plots.filter((plot) => !plot.planes).map(shownNow).forEach(draw);
+}
+
+if (report.transient) {
+  const buttons = [document.getElementById("whole"), document.getElementById("transient-only")];
+  buttons.forEach((button, one) => button.addEventListener("click", () => {
+    transient = one === 1;
+    buttons.forEach((other) => other.setAttribute("aria-pressed", String(other === button)));
+    drawAll();
+  }));
 }
 
 drawAll();
