@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,9 @@ from starhold.analysis.metrics import MEASURES
 from starhold.analysis.ranking import ATTITUDE
 from starhold.models.craft import check_inertia
 from starhold.report.page import _box, render, write_page
+from starhold.scenario.building import build
+from starhold.scenario.reading import parse
+from starhold.simulation.lane import Recording, fly, label
 from tests.report import flown
 
 
@@ -95,7 +99,14 @@ def test_every_law_and_every_metric_is_there(reader: Reader) -> None:
 def test_the_data_is_json_and_small(reader: Reader) -> None:
     data = reader.data()
     assert [law["name"] for law in data["laws"]] == [flight.name for flight in flown.flights()]
-    assert [plot["name"] for plot in data["plots"]] == ["angle", "quaternion", "rate", "torque", "accuracy"]
+    assert [plot["name"] for plot in data["plots"]] == [
+        "angle",
+        "roll-pitch-yaw",
+        "quaternion",
+        "rate",
+        "torque",
+        "accuracy",
+    ]
     ids = {attrs.get("id") for _, attrs in reader.tags}
     assert {plot["name"] for plot in data["plots"]} <= ids
     for plot in data["plots"][:-1]:
@@ -115,6 +126,64 @@ def test_the_views_show_the_recorded_attitudes(reader: Reader) -> None:
     recorded = run["attitude_error"].sel(time=np.array(scene["times"]), method="nearest").values
     np.testing.assert_allclose(shown_attitudes, recorded, atol=2e-4)
     assert sum(tag == "canvas" for tag, _ in reader.tags) == len(flown.flights())
+
+
+def test_the_earth_is_where_the_orbit_has_it(reader: Reader) -> None:
+    scene = reader.data()["scene"]
+    run = flown.flights()[0].run
+    position = run["position"].sel(time=np.array(scene["times"]), method="nearest").values
+    # The target's axes are inertial, and not turned, here.
+    toward = -position / np.linalg.norm(position, axis=1, keepdims=True)
+    np.testing.assert_allclose(np.array(scene["earth"]), toward, atol=2e-4)
+    assert (scene["down"], scene["centre"]) == (False, "Earth")
+    assert "The arrow leads to the Earth." in reader.text
+
+
+def test_the_orbital_frame_has_the_earth_below() -> None:
+    text = flown.text().replace('mode = "inertial"\nattitude = [1, 0, 0, 0]', 'mode = "orbital"')
+    scenario = parse(
+        text.replace("velocity = [0, 7550, 0]", "velocity = [0, 7550, 0]\ngravitational_parameter = 4.9e14"), "here"
+    )
+    (entry, _) = scenario.laws
+    loop = build(scenario, entry)
+    flight = replace(flown.flights()[0], recording=label(loop, *fly(loop, 100), 1))
+    found = Reader(render(scenario, [flight]))
+    scene = found.data()["scene"]
+    np.testing.assert_allclose(np.array(scene["earth"]), np.tile([0.0, 0.0, 1.0], (len(scene["earth"]), 1)), atol=1e-4)
+    assert (scene["down"], scene["centre"]) == (True, "planet")
+    assert "which is down in the picture. The arrow leads to the planet." in found.text
+    plain = parse(
+        flown.text().split("[orbit]")[0]
+        + "[initial]"
+        + flown.text().split("[initial]")[1].replace("gravity_gradient = true", ""),
+        "here",
+    )
+    still = Reader(render(plain, flown.flights()))
+    assert still.data()["scene"]["earth"] is None
+    assert "The arrow leads" not in still.text
+
+
+def test_a_long_run_has_a_switch_to_its_transient(reader: Reader) -> None:
+    assert "transient" not in reader.data()
+    assert not any(attrs.get("id") == "transient-only" for _, attrs in reader.tags)
+    first = flown.flights()[0]
+    arrays = {name: np.repeat(values[-1:], 4001, axis=0) for name, values in first.recording.arrays.items()}
+    arrays["time"] = 0.1 * np.arange(4001)
+    half = 0.5 * np.exp(-0.1 * arrays["time"])
+    arrays["attitude_error"] = np.column_stack([np.cos(half), np.sin(half), 0.0 * half, 0.0 * half])
+    arrays["rate_error"] = np.column_stack([half, 0.0 * half, 0.0 * half])
+    long = Reader(render(flown.scenario(), [replace(first, recording=Recording(arrays, first.recording.attrs))]))
+    data = long.data()
+    assert {attrs.get("id") for tag, attrs in long.tags if tag == "button"} == {"play", "whole", "transient-only"}
+    assert set(data["transient"]["plots"]) == {plot["name"] for plot in data["plots"]} - {"accuracy"}
+    end = data["transient"]["times"][-1]
+    assert end == pytest.approx(1.2 * 10.0 * np.log(50.0), abs=0.3)
+    assert f"first {end:.3g} s" in long.text
+    for plot in data["transient"]["plots"].values():
+        assert all(len(curve) == len(data["transient"]["times"]) for panel in plot["panels"] for curve in panel["curves"])
+    # About half of the animation shows the transient; frames that would be equal are left out.
+    times = np.array(data["scene"]["times"])
+    assert 0.4 < (times <= end).mean() < 0.6
 
 
 def test_names_from_files_are_no_markup() -> None:
