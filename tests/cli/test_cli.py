@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
+from starhold.errors import InputError
 from starhold.laws.catalogue import catalogue
+from starhold.report.results import open_folder
 from starhold.scenario.reading import builtin_text
 
 SHORT = builtin_text("three-laws").replace("duration = 2000.0", "duration = 20.0")
@@ -24,6 +26,7 @@ def starhold(*words, cwd, **options):
 @pytest.fixture
 def short(tmp_path):
     (tmp_path / "short.toml").write_text(SHORT)
+    (tmp_path / "folder.toml").mkdir()
     (tmp_path / "huge.toml").write_text(SHORT.replace("duration = 20.0", "duration = 1e10"))
     return tmp_path
 
@@ -111,12 +114,20 @@ def test_a_craft_that_is_lost_at_once_is_said_so(short):
         (("new", "no/such/folder/x.toml"), "cannot write there"),
         (("check-law", "short.toml"), "short.toml"),
         (("check-law", "absent.py"), "no such file"),
+        (("new", "."), "a folder"),
+        (("new", "folder.toml", "--force"), "a folder"),
+        (("new", 5000 * "x"), "File name too long"),
+        (("run", 5000 * "x"), "File name too long"),
+        (("run", "short.toml", "-o", 5000 * "x"), "cannot write there: File name too long"),
+        (("sail", "-o", 5000 * "x"), "File name too long"),
+        (("sail", "--radius", "9**9**9 m"), "--radius"),
     ],
 )
 def test_user_errors_are_one_line_and_exit_code_2(words, said, short):
     done = starhold(*words, cwd=short)
     assert done.returncode == 2
     assert said in done.stderr
+    assert len(done.stderr) < 1000
     assert done.stderr.count("\n") == 1
     assert "Traceback" not in done.stderr + done.stdout
 
@@ -168,6 +179,70 @@ def test_check_law_passes_a_good_law_and_fails_a_bad_one(tmp_path):
     assert "failed" in bad.stdout
 
 
+HOLDER = """
+import sys
+from pathlib import Path
+from starhold.report.results import open_folder
+open_folder(Path("shared"), force=True)
+print("claimed", flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.mark.xdist_group("cli")
+def test_a_folder_that_another_process_writes_is_refused_until_that_ends(tmp_path):
+    words = [sys.executable, "-c", HOLDER]
+    holder = subprocess.Popen(words, cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert holder.stdout is not None
+    assert holder.stdout.readline() == "claimed\n"
+    with pytest.raises(InputError, match="another starhold"):
+        open_folder(tmp_path / "shared", force=True)
+    other = starhold("certify", "three-laws", "--law", "lyapunov", "-o", "shared", "--force", cwd=tmp_path)
+    assert other.returncode == 2
+    assert "another starhold" in other.stderr
+    assert other.stderr.count("\n") == 1
+    # Not even a crash leaves the claim behind.
+    holder.kill()
+    holder.communicate()
+    open_folder(tmp_path / "shared", force=False)
+    open_folder(tmp_path / "shared", force=False)
+    assert not list((tmp_path / "shared").iterdir())
+
+
+@pytest.mark.xdist_group("cli")
+def test_warnings_and_failures_of_the_system_are_single_lines(short):
+    falling = SHORT.replace("velocity = [0, 7550, 0]", "velocity = [0, 6000, 0]")
+    (short / "falling.toml").write_text(falling)
+    warned = starhold("run", "falling.toml", "-o", "falling", "--no-certify", cwd=short)
+    assert warned.returncode == 0, warned.stderr
+    assert warned.stderr.startswith("starhold: warning: orbit.velocity: the orbit meets the Earth's surface")
+    assert warned.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("failure", "said"),
+    [
+        (MemoryError(), "starhold: not enough memory; simulation.record_every"),
+        (OSError(28, "No space left on device", "out/run.nc"), "starhold: out/run.nc: No space left on device"),
+    ],
+)
+def test_what_the_system_refuses_is_one_line(failure, said, monkeypatch, capsys):
+    from starhold.cli import main
+
+    def fail(standalone_mode):
+        raise failure
+
+    monkeypatch.setattr(main, "app", fail)
+    monkeypatch.setattr(main.signal, "signal", lambda *_: None)
+    monkeypatch.setattr(main.gc, "set_threshold", lambda *_: None)
+    monkeypatch.setattr(main.warnings, "formatwarning", main.warnings.formatwarning)
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")
+    assert main._run_command() == 2
+    error = capsys.readouterr().err
+    assert error.startswith(said)
+    assert error.count("\n") == 1
+
+
 @pytest.mark.xdist_group("cli")
 def test_interrupt_leaves_no_half_written_file(short):
     (short / "long.toml").write_text(SHORT.replace("duration = 20.0", "duration = 20000000.0\nrecord_every = 10000"))
@@ -196,6 +271,8 @@ def test_python_interface_mirrors_the_commands(short):
     scenario = sh.load(short / "short.toml")
     run = sh.simulate(scenario, law="sliding")
     assert run.attrs["law"] == "sliding"
+    assert (run.attrs["scenario"], run.attrs["seed"]) == (SHORT, 1)
+    assert run.attrs["starhold_version"] == sh.__version__
     flights = sh.compare(scenario)
     assert [flight.name for flight in flights] == ["lyapunov", "sliding", "mpc"]
     assert flights[1].run.equals(run)

@@ -211,6 +211,19 @@ def test_each_kind_is_refused_where_the_other_is_needed():
         parse_station(BASE.replace("[control]", "[spacecraft]\n[control]"), "my.toml")
 
 
+def test_unstable_gains_are_refused_unless_they_are_allowed(tmp_path):
+    head = BASE.split("[[law]]")[0]
+    circle = 'type = "l2-circle"\nradius = 1\nrate = 1.4\nalpha = 1\nk = 1\nk_x = {}\nk_velocity = 6'
+    rest = 'type = "l2-rest"\nlimit = 1.0\ny = 0\nz = 0\nk_x = {}\nk_velocity = [6.0, {}, 4.0]'
+    for law in (circle.format(8.8), rest.format(8.8, 3.4), rest.format(17.8, 0.0)):
+        (tmp_path / "my.toml").write_text(f"{head}[[law]]\n{law}")
+        with pytest.raises(InputError, match=r"law\[1\]: .*--allow-unstable"):
+            open_scenario(tmp_path / "my.toml")
+        assert open_scenario(tmp_path / "my.toml", allow_unstable=True).laws
+    for law in (circle.format(8.9), rest.format(8.9, 3.4)):
+        assert parse_station(f"{head}[[law]]\n{law}", "my.toml").laws
+
+
 def test_every_station_law_has_a_goal():
     for law in station_laws().values():
         for gains in law.examples():

@@ -33,7 +33,7 @@ def test_a_run_longer_than_a_block_is_written_whole(tmp_path):
     entry = scenario.laws[0]
     samples, carry = lane.fly(build(scenario, entry), BLOCK + 100)
     run = lane.label(build(scenario, entry), samples, carry, 1)
-    write_run(run, scenario, tmp_path / "run.nc")
+    write_run(run, tmp_path / "run.nc")
     with xr.open_dataset(tmp_path / "run.nc", engine="h5netcdf") as written:
         for name in ("attitude", "torque"):
             assert np.array_equal(written[name], run[name])

@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 import traceback
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from threading import Event
@@ -117,7 +118,7 @@ def _fly(
                 flights.append(kind.fly_law(scenario, entry, loop, notice))
                 if entry is entries[-1]:
                     painter.start(kind.sketch(flights, scenario), folder)
-                write_run(flights[-1].recording, scenario, (folder / entry.name if nested else folder) / "run.nc")
+                write_run(flights[-1].recording, (folder / entry.name if nested else folder) / "run.nc")
         # While the pictures are drawn.
         if check_step:
             flights = [_step_checked(kind, scenario, *pair) for pair in zip(loops, flights, strict=True)]
@@ -240,6 +241,8 @@ def new(
     if start is not None and start not in builtin_names():
         raise InputError("new", "--from", start, nearest(start, builtin_names()))
     text = template_text(libration) if start is None else builtin_text(start)
+    if not path.name or path.is_dir():
+        raise InputError(str(path), "", "a folder", "the name of a file to write")
     beside = path.with_name("starhold.schema.json")
     if schema:
         text = f"#:schema ./{beside.name}\n{text}"
@@ -333,6 +336,7 @@ def _run_command() -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _interrupt)
+    warnings.formatwarning = _as_line
     # A command loads much and lives briefly: looking for garbage at every step of that is time lost.
     gc.set_threshold(200_000)
     try:
@@ -345,7 +349,20 @@ def _run_command() -> int:
     except InterruptedByUserError as interrupt:
         print("starhold: interrupted; files already written are whole", file=sys.stderr)
         return 128 + interrupt.args[0]
+    except OSError as error:
+        # A name that is too long, a full disk: what the system refuses is no fault of the program.
+        print(f"starhold: {str(error.filename or '')[-100:]}: {error.strerror or error}", file=sys.stderr)
+        return USER_ERROR
+    except MemoryError:
+        print("starhold: not enough memory; simulation.record_every makes a run's record smaller", file=sys.stderr)
+        return USER_ERROR
     except Exception:
         traceback.print_exc()
         return INTERNAL_ERROR
     return 0
+
+
+def _as_line(message: Warning | str, category: type[Warning], filename: str, number: int, line: str | None = None) -> str:
+    """A warning as a line of its own; of those that are not for users the place too."""
+    place = "" if category is UserWarning else f"{category.__name__} at {filename}:{number}: "
+    return f"starhold: warning: {place}{message}\n"

@@ -17,7 +17,7 @@ from starhold.report.certificates import certify_scenario as certify_scenario
 from starhold.report.figures import sketch as sketch
 from starhold.report.files import whole
 from starhold.report.flight import Flight, gain_text
-from starhold.report.results import SUMMARY, write_summary
+from starhold.report.results import SUMMARY, signed, write_summary
 from starhold.report.transients import against_limits
 from starhold.scenario.building import build
 from starhold.scenario.reading import LawEntry, Scenario
@@ -32,7 +32,7 @@ def fly_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, notice: Notic
     simulation, settling = scenario.table.simulation, scenario.table.settling
     progress = None if notice is None else lambda done, total: notice(entry.name, done, total)
     samples, carry = fly(loop, simulation.steps, simulation.record_every, progress=progress)
-    recording = label(loop, samples, carry, simulation.record_every)
+    recording = signed(label(loop, samples, carry, simulation.record_every), scenario)
     metrics = measure(recording, settling.attitude_tolerance, settling.rate_tolerance)
     metrics |= against_limits(recording, scenario.table.transient, metrics["cut_off"])
     metrics |= _law_counters(entry, carry.memory)
@@ -56,7 +56,7 @@ def record(scenario: Scenario, loop: ClosedLoop, progress: Progress | None = Non
     """The run of a loop."""
     simulation = scenario.table.simulation
     samples, carry = fly(loop, simulation.steps, simulation.record_every, progress=progress)
-    return label(loop, samples, carry, simulation.record_every)
+    return signed(label(loop, samples, carry, simulation.record_every), scenario)
 
 
 def compare(scenario: Scenario, notice: Notice | None = None) -> list[Flight]:

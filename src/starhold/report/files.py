@@ -1,4 +1,4 @@
-"""Files that appear under their names only when they are whole."""
+"""Files that appear under their names only when they are whole, and folders that one process at a time writes into."""
 
 from __future__ import annotations
 
@@ -10,6 +10,35 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from starhold.errors import InputError
+
+_claimed: dict[tuple[int, int], int] = {}
+"""Open handles of the folders that this process has claimed, by device and inode."""
+
+
+def claim(folder: Path) -> None:
+    """Make this process the only one that writes results into a folder, until it ends.
+
+    Raises BlockingIOError where another one does. The system drops the claim with the process, however that ends.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    status = os.fstat(handle)
+    place = (status.st_dev, status.st_ino)
+    try:
+        if place not in _claimed:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _claimed[place] = handle
+    except BlockingIOError:
+        raise
+    except OSError:
+        # A file system without locks.
+        pass
+    finally:
+        if _claimed.get(place) != handle:
+            os.close(handle)
 
 
 @contextmanager

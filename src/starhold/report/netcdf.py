@@ -38,8 +38,8 @@ class _Sink(io.FileIO):
             return size or 0
 
 
-def write_netcdf(run: Recording, attrs: dict[str, Any], path: Path) -> None:
-    """A run with these attributes as a new file. OSError where it cannot be written."""
+def write_netcdf(run: Recording, path: Path) -> None:
+    """A run as a new file. OSError where it cannot be written."""
     # Loaded here, where alone it is needed; and not xarray, which takes longer to load than most flights.
     import h5netcdf
     import h5py
@@ -58,6 +58,6 @@ def write_netcdf(run: Recording, attrs: dict[str, Any], path: Path) -> None:
                     part = data[first : first + BLOCK]
                     made[first : first + len(part)] = part.astype(object) if text else part
                 made.attrs.update(values.attrs)
-            file.attrs.update(attrs)
+            file.attrs.update(run.attrs)
         if sink.failure is not None:
             raise sink.failure

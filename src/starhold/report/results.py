@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import json
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import starhold
 from starhold.certification.certificate import FILE as CERTIFICATES
 from starhold.errors import InputError
-from starhold.report.files import whole
+from starhold.report.files import claim, whole
 from starhold.report.netcdf import write_netcdf
+from starhold.scenario.checking import cut
 from starhold.scenario.opening import AnyScenario
-from starhold.scenario.reading import Scenario
+from starhold.scenario.reading import LONGEST_PATH, Scenario
 
 if TYPE_CHECKING:
     from starhold.simulation.lane import Recording
@@ -27,15 +29,20 @@ MARKS = (SUMMARY, "run.nc", "report.html", CERTIFICATES, "invariant.png", *FAILU
 
 def open_folder(folder: Path, force: bool) -> Path:
     """Create the folder for results. One that holds results is refused unless `force`, which clears those results alone."""
-    held = [mark for mark in MARKS if (folder / mark).exists()]
-    if held and not force:
-        raise InputError(str(folder), "", f"results already there ({held[0]})", "another folder with -o, or --force")
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        claim(folder)
+        # Looked for once nobody else writes them.
+        held = [mark for mark in MARKS if (folder / mark).exists()]
+        if held and not force:
+            raise InputError(str(folder), "", f"results already there ({held[0]})", "another folder with -o, or --force")
         with tempfile.NamedTemporaryFile(dir=folder):
             pass
+    except BlockingIOError:
+        raise InputError(str(folder), "", "another starhold that writes there", "another folder with -o") from None
     except OSError as error:
-        raise InputError(str(folder), "", f"cannot write there: {error.strerror}", "a folder you may write to") from None
+        shown = cut(str(folder), LONGEST_PATH)
+        raise InputError(shown, "", f"cannot write there: {error.strerror}", "a folder you may write to") from None
     if held:
         _clear(folder)
     return folder
@@ -55,14 +62,19 @@ def _clear(folder: Path) -> None:
         (folder / mark).unlink(missing_ok=True)
 
 
-def write_run(run: Recording, scenario: AnyScenario, path: Path) -> None:
-    """A run as netCDF-4, with the scenario's text, the version and the seed among its attributes."""
+def signed(run: Recording, scenario: AnyScenario) -> Recording:
+    """The run with the scenario's text, the version and the seed among its attributes."""
     attrs = {"scenario": scenario.text, "starhold_version": starhold.__version__, **run.attrs}
     if isinstance(scenario, Scenario):
         attrs["seed"] = scenario.table.simulation.seed
+    return replace(run, attrs=attrs)
+
+
+def write_run(run: Recording, path: Path) -> None:
+    """A run as netCDF-4."""
     path.parent.mkdir(exist_ok=True)
     with whole(path) as hidden:
-        write_netcdf(run, attrs, hidden)
+        write_netcdf(run, hidden)
 
 
 def write_summary(scenario: AnyScenario, results: dict[str, dict[str, Any]], path: Path) -> None:

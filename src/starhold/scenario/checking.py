@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 import tomllib
-from collections.abc import Generator, Iterable, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Generic, TypeVar, cast
@@ -57,7 +57,7 @@ def read_toml(text: str, where: str) -> dict[str, Any]:
     try:
         tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError(where, "", f"not TOML: {_cut(str(error), 200)}", "a TOML file") from None
+        raise InputError(where, "", f"not TOML: {cut(str(error), 200)}", "a TOML file") from None
     except RecursionError:
         raise InputError(where, "", "tables or lists too deep", f"at most {DEEPEST} within one another") from None
     except ValueError:
@@ -73,7 +73,7 @@ def _check_sizes(tables: dict[str, Any], where: str) -> None:
     while left:
         depth, key, value = left.pop()
         if depth > DEEPEST:
-            raise InputError(where, _cut(key), "tables or lists too deep", f"at most {DEEPEST} within one another")
+            raise InputError(where, cut(key), "tables or lists too deep", f"at most {DEEPEST} within one another")
         if isinstance(value, dict):
             named = cast(dict[str, Any], value)
             left += [(depth + 1, f"{key}.{name}" if key else name, item) for name, item in named.items()]
@@ -173,6 +173,14 @@ def try_law(loop: Any, where: str, key: str) -> None:
             raise ValueError(f"{law.file.name}: the memory that {law.equation} returns must be formed as it was given")
 
 
+def refuse_unstable(check: Callable[[], None], where: str, key: str) -> None:
+    """InputError where a law's own check tells its gains to be unstable."""
+    try:
+        check()
+    except ValueError as error:
+        raise InputError(where, key, "", f"{error}; --allow-unstable takes it all the same") from None
+
+
 def free_name(given: str | None, kind: str, taken: set[str], where: str, key: str) -> str:
     """The name of a law, its type if none is given; names of a file differ."""
     if given is None:
@@ -221,7 +229,7 @@ def _translate(
     context: dict[str, Any] = fault.get("ctx", {})
     if fault["type"] == "quantity_at":
         place.append(context["key"])
-    key = _cut(".".join(part for part in [prefix, *place] if part).replace(".[", "["), 200)
+    key = cut(".".join(part for part in [prefix, *place] if part).replace(".[", "["), 200)
     found = show(context.get("found", fault.get("input")))
     if fault["type"] == "extra_forbidden":
         known = list(_model_at(model, place[:-1]).model_fields) + (extra if len(place) == 1 else [])
@@ -250,10 +258,11 @@ def _plain(message: str) -> str:
 
 def show(value: Any) -> str:
     """What was found, short enough for one line."""
-    return _cut(f'"{value}"' if isinstance(value, str) else str(value))
+    return cut(f'"{value}"' if isinstance(value, str) else str(value))
 
 
-def _cut(text: str, most: int = 60) -> str:
+def cut(text: str, most: int = 60) -> str:
+    """The beginning of a text that is too long for a line."""
     return text if len(text) <= most else text[: most - 3] + "..."
 
 

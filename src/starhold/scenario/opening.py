@@ -18,7 +18,7 @@ def open_scenario(source: str | Path, allow_unstable: bool = False) -> AnyScenar
     """The scenario in a file, or the built-in one of that name, of whichever kind. InputError says what is wrong with it."""
     text, where, folder = read_text(source)
     if MARK in read_toml(text, where):
-        return parse_station(text, where, folder)
+        return parse_station(text, where, folder, allow_unstable)
     return parse(text, where, folder, allow_unstable)
 
 

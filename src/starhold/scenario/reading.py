@@ -18,13 +18,14 @@ from starhold.models.wheels import Wheels, body_inertia
 from starhold.scenario.checking import (
     LONGEST_TEXT,
     LawBook,
+    cut,
     free_name,
     make_gains,
     numbered,
     pick_law,
     read_toml,
+    refuse_unstable,
     refusing,
-    show,
     validate,
 )
 from starhold.scenario.checking import nearest as nearest
@@ -34,7 +35,7 @@ from starhold.scenario.start import told_to_design
 
 MARK = "libration"
 """The table by which a scenario of station keeping is known."""
-LONGEST_PATH = 500
+LONGEST_PATH = 200
 """Characters of a path that errors show whole."""
 
 
@@ -130,7 +131,7 @@ def load(source: str | Path, allow_unstable: bool = False) -> Scenario:
 
 def read_text(source: str | Path) -> tuple[str, str, Path]:
     """The text of a file or of a built-in scenario, what errors call it, and its folder."""
-    path, where = Path(source), show(Path(source).name) if len(str(source)) > LONGEST_PATH else str(source)
+    path, where = Path(source), cut(str(source), LONGEST_PATH)
     try:
         if not path.is_file() and str(source) in builtin_names():
             return builtin_text(str(source)), str(source), Path()
@@ -171,10 +172,7 @@ def _read_law(data: Any, scenario: Scenario, key: str, taken: set[str], allow_un
     with refusing(law, where, key):
         spec = None if form is None else law.complete(law.forms[form](*values), lambda: told_to_design(scenario))
     gains = make_gains(law, values, spec, scenario.craft, where, key)
-    try:
-        if not allow_unstable:
-            law.check(gains)
-    except ValueError as error:
-        raise InputError(where, key, "", f"{error}; --allow-unstable takes it all the same") from None
+    if not allow_unstable:
+        refuse_unstable(lambda: law.check(gains), where, key)
     name = free_name(read.name, law.name, taken, where, key)
     return LawEntry(name, law, gains, read.double_cover, read.hysteresis_width, form, spec, read.fault_action)

@@ -47,6 +47,12 @@ class StationLaw(laws.Law):
         """The equation of the control acceleration."""
         return self.module.control
 
+    def check(self, gains: Any, plant: Libration | None = None) -> None:
+        """ValueError where gains, each within its bounds, make a loop about this point that cannot be stable."""
+        teller = getattr(self.module, "check", None)
+        if teller is not None:
+            teller(gains, plant)
+
 
 @cache
 def station_laws() -> dict[str, StationLaw]:
@@ -66,6 +72,13 @@ def bend(seen: SeenPoint, plant: Libration, model: Scalar) -> Vector:
     """What the full problem adds to the linear acceleration here, where `model` asks for it, else zero."""
     more = subtract(nonlinear(seen.position, seen.velocity, plant), linear(seen.position, seen.velocity, plant))
     return (model * more[0], model * more[1], model * more[2])
+
+
+def check_x(k_position: float, k_velocity: float, plant: Libration) -> None:
+    """ValueError where the feedback of `hold_x` leaves the motion along X unstable, x'' = (Omega^2 + 2 C) x + control."""
+    steep = plant.rate**2 + 2.0 * plant.stiffness
+    if k_position <= steep or k_velocity <= 0.0:
+        raise ValueError(f"k_x must be above {steep:.6g} and the velocity along X fed back, or X is unstable")
 
 
 def hold_x(seen: SeenPoint, k_position: Scalar, k_velocity: Scalar, plant: Libration) -> Scalar:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple
 from starhold.algebra.scalar import Scalar, less, where
 from starhold.algebra.vector import Vector, scale, subtract
 from starhold.laws.interface import Card, Gain, NoMemory
-from starhold.laws.station.interface import MODELS, SeenPoint, along, bend, hold_x, least_rate
+from starhold.laws.station.interface import MODELS, SeenPoint, along, bend, check_x, hold_x, least_rate
 from starhold.models.libration import Libration
 from starhold.models.station import demand
 
@@ -59,6 +59,11 @@ def design(plant: Libration, spec: Best) -> Gains:
     rate, steep = least_rate(plant), plant.rate**2 + 2.0 * plant.stiffness
     x = (2.0 * steep, 2.0 * math.sqrt(steep))
     return Gains(spec.radius, rate, spec.alpha, spec.k, *x, spec.feedback, spec.layer, spec.model)
+
+
+def check(gains: Gains, plant: Libration) -> None:
+    """ValueError where X is unstable."""
+    check_x(gains.k_x, gains.k_velocity, plant)
 
 
 def explain(plant: Libration, spec: Best) -> list[tuple[str, Any]]:

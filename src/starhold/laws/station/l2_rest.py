@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.vector import Vector, subtract
 from starhold.laws.interface import Card, Gain, NoMemory
-from starhold.laws.station.interface import MODELS, SeenPoint, bend, hold_x
+from starhold.laws.station.interface import MODELS, SeenPoint, bend, check_x, hold_x
 from starhold.models.libration import Libration
 
 CARD = Card(
@@ -47,6 +47,13 @@ def design(plant: Libration, spec: Degree) -> Gains:
     slow, out = plant.stiffness - square, plant.stiffness
     velocity = (2.0 * math.sqrt(steep), 2.0 * math.sqrt(slow), 2.0 * math.sqrt(out))
     return Gains(spec.y, spec.z, 2.0 * steep, velocity, spec.model)
+
+
+def check(gains: Gains, plant: Libration) -> None:
+    """ValueError where X is unstable, or the velocity along Y or Z is not fed back."""
+    check_x(gains.k_x, gains.k_velocity[0], plant)
+    if min(gains.k_velocity) <= 0.0:
+        raise ValueError("k_velocity must be above 0 on every axis, or motion along it does not die out")
 
 
 def feedback(seen: SeenPoint, gains: Gains, plant: Libration) -> Vector:

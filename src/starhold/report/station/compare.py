@@ -15,7 +15,7 @@ from starhold.report.certificates import Tried
 from starhold.report.compare import Notice, write_proved
 from starhold.report.files import whole
 from starhold.report.flight import Flight, gain_text, number_text
-from starhold.report.results import SUMMARY, write_summary
+from starhold.report.results import SUMMARY, signed, write_summary
 from starhold.report.station.figures import sketch as sketch
 from starhold.scenario.station.building import build as build
 from starhold.scenario.station.reading import StationEntry, StationScenario
@@ -61,7 +61,7 @@ def record(scenario: StationScenario, loop: StationLoop, progress: Progress | No
     run = simulate_station(loop, timing.steps, timing.record_every, progress)
     worth = {"length_unit_m": units.length, "time_unit_s": units.time}
     worth |= {"velocity_unit_m_per_s": units.velocity, "acceleration_unit_m_per_s2": units.acceleration}
-    return replace(run, attrs=run.attrs | worth)
+    return signed(replace(run, attrs=run.attrs | worth), scenario)
 
 
 def compare(scenario: StationScenario, notice: Notice | None = None) -> list[Flight]:

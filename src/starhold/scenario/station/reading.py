@@ -12,7 +12,17 @@ from starhold.errors import InputError
 from starhold.laws.station.interface import StationLaw, station_laws
 from starhold.laws.station.l2_circle import peak_demand
 from starhold.models.libration import Libration, Units
-from starhold.scenario.checking import LawBook, free_name, make_gains, numbered, pick_law, read_toml, show, validate
+from starhold.scenario.checking import (
+    LawBook,
+    free_name,
+    make_gains,
+    numbered,
+    pick_law,
+    read_toml,
+    refuse_unstable,
+    show,
+    validate,
+)
 from starhold.scenario.reading import MARK
 from starhold.scenario.schema import law_model
 from starhold.scenario.station.schema import LibrationTable, Resources, StationLawTable, StationTable
@@ -56,7 +66,7 @@ class StationScenario(LawBook[StationEntry]):
         return goal_of(self.pick(name).gains)
 
 
-def parse_station(text: str, where: str, folder: Path = Path()) -> StationScenario:
+def parse_station(text: str, where: str, folder: Path = Path(), allow_unstable: bool = False) -> StationScenario:
     """The scenario of a TOML text; `where` names it in errors."""
     data = read_toml(text, where)
     laws = data.pop("law", None)
@@ -65,11 +75,14 @@ def parse_station(text: str, where: str, folder: Path = Path()) -> StationScenar
     table = validate(StationTable, data, where, "", extra=["law"], context=point.units)
     entries: list[StationEntry] = []
     for key, item in numbered(laws, where):
-        entries.append(_read_law(item, table, where, folder, key, {entry.name for entry in entries}))
+        taken = {entry.name for entry in entries}
+        entries.append(_read_law(item, table, where, folder, key, taken, allow_unstable))
     return StationScenario(table, tuple(entries), text, where, folder)
 
 
-def _read_law(data: Any, table: StationTable, where: str, folder: Path, key: str, taken: set[str]) -> StationEntry:
+def _read_law(
+    data: Any, table: StationTable, where: str, folder: Path, key: str, taken: set[str], allow_unstable: bool
+) -> StationEntry:
     found, law, form = pick_law(data, station_laws(), StationLaw, folder, where, key)
     units, plant = table.libration.units, table.libration.plant
     extra = ["file", *(["form"] if law.forms else [])]
@@ -77,6 +90,8 @@ def _read_law(data: Any, table: StationTable, where: str, folder: Path, key: str
     values = [getattr(read, item.name) for item in law.fields(form)]
     spec = None if form is None else law.forms[form](*values)
     gains = make_gains(law, values, spec, plant, where, key)
+    if not allow_unstable:
+        refuse_unstable(lambda: law.check(gains, plant), where, key)
     limit = _limit(table, read, gains, plant, where, key)
     lag = table.control.lag if read.lag is None else read.lag
     return StationEntry(free_name(read.name, law.name, taken, where, key), law, gains, limit, lag or 0.0, form, spec)
