@@ -166,12 +166,13 @@ def make_kernel(kind: Callable[..., Program], parts: AnyParts, width: int, *argu
 
 
 def one(step: Step, carry: Any, numbers: Numbers, substeps: int) -> Program:
-    """The flight of one lane, recorded: `groups` times `each` control steps from `first` on, with a sample of the step
-    number `place` of every group, written to the row `row` and those after it. It stops where the motion is lost; what is
-    carried on stays in `carry`."""
+    """The flight of one lane, or of a vector of lanes that draw the same random numbers, recorded: `groups` times `each`
+    control steps from `first` on, with a sample of the step number `place` of every group, written to the row `row` and
+    those after it. A lane stops where its motion is lost; what is carried on stays in `carry`."""
     recorder = Recorder()
     with recorder.recording():
-        cells, record = recorder.memory("carry", lanes=True, writable=True), recorder.memory("record", writable=True)
+        cells = recorder.memory("carry", lanes=True, writable=True)
+        record = recorder.memory("record", lanes=True, writable=True)
         counts = [recorder.input(name, "index") for name in ("first", "groups", "each", "place", "row")]
         first, groups, each, place, row = counts
         key = (recorder.input("seed", "word"), recorder.input("run", "word"))

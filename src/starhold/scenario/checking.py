@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Generic, TypeVar, cast
+from typing import Any, Generic, Self, TypeVar, cast
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import PydanticCustomError
@@ -37,6 +37,19 @@ class LawBook(Generic[_Entry]):
     def name(self) -> str:
         """The scenario's name."""
         return self.table.name
+
+    def __repr__(self) -> str:
+        names = ", ".join(cast(Any, entry).name for entry in self.laws)
+        return f"<{type(self).__name__} {self.name}: {names}; {self.table.simulation.steps} control steps>"
+
+    def with_(self, changes: Mapping[str, Any]) -> Self:
+        """The scenario with other values at some keys: {"spacecraft.inertia": [2, 3, 4], "law.pd.k_rate": "0.1 N m s"}; the
+        key of a law's table is its name, or "law[1]" by its place; None takes away what is there. InputError as of a
+        file."""
+        # Loaded here, for it opens scenarios of all kinds.
+        from starhold.scenario.making import changed
+
+        return cast(Any, changed(cast(Any, self), changes))
 
     def pick(self, name: str) -> _Entry:
         """The law of this name; InputError names the nearest when there is none."""

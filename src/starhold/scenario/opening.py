@@ -16,7 +16,11 @@ AnyScenario: TypeAlias = Scenario | StationScenario
 
 def open_scenario(source: str | Path, allow_unstable: bool = False) -> AnyScenario:
     """The scenario in a file, or the built-in one of that name, of whichever kind. InputError says what is wrong with it."""
-    text, where, folder = read_text(source)
+    return open_text(*read_text(source), allow_unstable)
+
+
+def open_text(text: str, where: str, folder: Path = Path(), allow_unstable: bool = False) -> AnyScenario:
+    """The scenario of a TOML text, of whichever kind; `where` names it in errors."""
     if MARK in read_toml(text, where):
         return parse_station(text, where, folder, allow_unstable)
     return parse(text, where, folder, allow_unstable)

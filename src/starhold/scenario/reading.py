@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
@@ -59,16 +59,18 @@ class LawEntry:
         return self.fault_action or fault.action
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Scenario(LawBook[LawEntry]):
     """A scenario file read and checked: its tables, its laws with their gains, its text, what errors call it, and the
     folder that file names in it are relative to."""
 
     table: ScenarioTable
     laws: tuple[LawEntry, ...]
-    text: str = field(repr=False)
+    text: str
     where: str = ""
     folder: Path = Path()
+    allow_unstable: bool = False
+    """Whether gains that a law tells to be unstable are taken."""
 
     @cached_property
     def craft(self) -> Craft:
@@ -161,7 +163,7 @@ def parse(text: str, where: str, folder: Path = Path(), allow_unstable: bool = F
     entries: list[LawEntry] = []
     for key, item in numbered(laws, where):
         entries.append(_read_law(item, scenario, key, {entry.name for entry in entries}, allow_unstable))
-    return Scenario(table, tuple(entries), text, where, folder)
+    return Scenario(table, tuple(entries), text, where, folder, allow_unstable)
 
 
 def _read_law(data: Any, scenario: Scenario, key: str, taken: set[str], allow_unstable: bool) -> LawEntry:

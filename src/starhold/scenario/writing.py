@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
+from collections.abc import Mapping
 from typing import Any
 
+from starhold.errors import InputError
 from starhold.laws.catalogue import Law
 
 _BODY = """\
@@ -16,6 +19,44 @@ torque_limit = 0.05
 duration = 1.0
 control_period = 0.1
 """
+
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def toml_text(tables: Mapping[str, Any]) -> str:
+    """Tables as TOML that reads back as the same; InputError where a text holds half a character."""
+    lines = [f"{_key(name)} = {_value(item)}" for name, item in tables.items() if not _is_table(item)]
+    for name, item in tables.items():
+        if _is_table(item):
+            head = f"[{_key(name)}]" if isinstance(item, dict) else f"[[{_key(name)}]]"
+            for table in [item] if isinstance(item, dict) else item:
+                lines += ["", head, *(f"{_key(key)} = {_value(value)}" for key, value in table.items())]
+    return "\n".join(lines) + "\n"
+
+
+def _is_table(item: Any) -> bool:
+    return isinstance(item, dict) or (isinstance(item, list) and bool(item) and all(isinstance(x, dict) for x in item))
+
+
+def _key(name: str) -> str:
+    return name if _BARE.fullmatch(name) else _value(name)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, str):
+        try:
+            value.encode()
+        except UnicodeEncodeError:
+            raise InputError("", "", json.dumps(value), "text of whole characters") from None
+        # JSON's strings are TOML's, but for a character that JSON leaves as it is.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_key(name)} = {_value(item)}" for name, item in value.items()) + "}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_value, value))}]"
+    # Finite floats, infinity and NaN are written alike in both languages but for capitals.
+    return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
 def law_table(law: Law, gains: Any) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -41,15 +41,16 @@ class StationEntry:
     spec: Any = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class StationScenario(LawBook[StationEntry]):
     """A scenario of station keeping, read and checked."""
 
     table: StationTable
     laws: tuple[StationEntry, ...]
-    text: str = field(repr=False)
+    text: str
     where: str = ""
     folder: Path = Path()
+    allow_unstable: bool = False
 
     @property
     def units(self) -> Units:

@@ -1,0 +1,103 @@
+"""Scenarios made in Python, and changed ones: written as TOML and read as a file is, so that both mean the same."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from starhold.errors import InputError
+from starhold.scenario.checking import nearest, read_toml, show
+from starhold.scenario.opening import AnyScenario, open_text
+from starhold.scenario.writing import toml_text
+
+WHERE = "scenario"
+"""What errors call one that comes from no file."""
+_PART = re.compile(r"([^.\[\]]+)(?:\[(\d+)\])?")
+
+
+def make_scenario(tables: Mapping[str, Any], folder: str | Path = ".", allow_unstable: bool = False) -> AnyScenario:
+    """The scenario of tables as a file would hold them: of strings, numbers, truths, lists and tables; tuples and arrays of
+    NumPy count as lists, and what is None as left out. `folder`: what file names in it are relative to."""
+    return open_text(toml_text(_plain(tables, WHERE, "")), WHERE, Path(folder), allow_unstable)
+
+
+def changed(scenario: AnyScenario, changes: Mapping[str, Any]) -> AnyScenario:
+    """The scenario with other values at these keys, which are told as errors tell them, "spacecraft.inertia" or
+    "law[2].k_rate", and of laws by their names too, "law.pd.k_rate"; None takes a key, a table or a law away."""
+    where = scenario.where
+    tables = read_toml(scenario.text, where)
+    names = [entry.name for entry in scenario.laws]
+    for key, value in changes.items():
+        _put(tables, _path(key, names, where), value, where)
+    text = toml_text(_plain(tables, where, ""))
+    return open_text(text, where, scenario.folder, scenario.allow_unstable)
+
+
+def _path(key: Any, names: Sequence[str], where: str) -> list[str | int]:
+    """Names of tables and keys, and places in lists from 0."""
+    if not isinstance(key, str):
+        raise InputError(where, show(key), "a key that is no string", 'keys such as "spacecraft.inertia"')
+    if key.startswith("law."):
+        rest = key.removeprefix("law.")
+        # The longest first: names may hold dots.
+        for name in sorted(names, key=len, reverse=True):
+            if rest == name or rest.startswith(f"{name}."):
+                after = rest[len(name) + 1 :]
+                return ["law", names.index(name), *(_path(after, (), where) if after else [])]
+        raise InputError(where, key, show(rest.partition(".")[0]), f"a law by its name: {nearest(rest, list(names))}")
+    path: list[str | int] = []
+    for part in key.split("."):
+        match = _PART.fullmatch(part)
+        if match is None:
+            raise InputError(where, show(key), "not a key", 'keys such as "spacecraft.inertia" or "wheel[2].torque_limit"')
+        path += [match[1]] if match[2] is None else [match[1], int(match[2]) - 1]
+    return path
+
+
+def _put(tables: Any, path: Sequence[str | int], value: Any, where: str) -> None:
+    here, seen = tables, ""
+    for part, after in zip(path, [*path[1:], None], strict=True):
+        last = after is None
+        if isinstance(part, int):
+            if not isinstance(here, list) or not 0 <= part < len(cast(list[Any], here)):
+                count = len(cast(list[Any], here)) if isinstance(here, list) else 0
+                raise InputError(
+                    where, f"{seen}[{part + 1}]", "no such table", f"1 to {count}" if count else "no list there"
+                )
+            seen = f"{seen}[{part + 1}]"
+        else:
+            seen = f"{seen}.{part}".lstrip(".")
+            if not isinstance(here, dict):
+                raise InputError(where, seen, "a value that is no table", "keys of tables")
+            if not last:
+                cast(dict[str, Any], here).setdefault(part, [] if isinstance(after, int) else {})
+        if last:
+            here[part] = value
+        else:
+            here = here[part]
+
+
+def _plain(value: Any, where: str, key: str) -> Any:
+    """The value in what TOML has; InputError where it is nothing of that."""
+    if isinstance(value, np.generic | np.ndarray):
+        value = cast(Any, value).tolist()
+    if isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, Mapping):
+        found: dict[str, Any] = {}
+        for name, item in cast(Mapping[Any, Any], value).items():
+            if not isinstance(name, str):
+                raise InputError(where, key, f"the key {show(name)}", "keys that are strings")
+            if item is not None:
+                found[name] = _plain(item, where, f"{key}.{name}".lstrip("."))
+        return found
+    if isinstance(value, list | tuple):
+        items = list(cast(Sequence[Any], value))
+        return [_plain(item, where, f"{key}[{n}]") for n, item in enumerate(items, 1) if item is not None]
+    raise InputError(where, key, show(value), "numbers, strings, truths, and lists and tables of them")

@@ -1,0 +1,175 @@
+"""Flies loops that differ in numbers side by side, a vector of lanes at a time, and records each as `fly` does."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.structure import flatten, leaves, mapped
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.loop.kernels import Arguments, Kernel, Numbers, form, make_kernel, make_step, numbers_of, one, state_of
+from starhold.loop.station import StationLoop
+from starhold.simulation.lane import Progress, fly
+from starhold.trace.machine import aligned, widest
+
+FEW = 3
+"""So many loops fly one after another sooner than a kernel for lanes is compiled."""
+MOST = 2**26
+"""Numbers that the samples of lanes abreast may have; longer flights are flown one by one."""
+
+
+class Flying(NamedTuple):
+    """A loop, its control steps, and the control steps a sample."""
+
+    loop: ClosedLoop | StationLoop
+    steps: int
+    record_every: int
+
+
+def fly_abreast(
+    flights: Sequence[Flying],
+    use: Callable[[int, NDArray[np.float64], Any], Any],
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> list[Any]:
+    """What `use(number, samples, carry)` makes of each flight, in order: samples (number, sample) and carry as `fly` gives
+    them, the same bits. Loops of one form fly together, whatever numbers they differ in; the others one by one."""
+    groups: dict[Any, list[int]] = {}
+    for number, flight in enumerate(flights):
+        groups.setdefault(_key(flight), []).append(number)
+    jobs: list[Callable[[], list[tuple[int, Any]]]] = []
+    for numbers in groups.values():
+        group = [flights[number] for number in numbers]
+        jobs += (_together if len(group) > FEW else _one_by_one)(group, numbers, use)
+    found: list[Any] = [None] * len(flights)
+    done = 0
+    with ThreadPoolExecutor(max_workers=threads or os.cpu_count() or 1) as pool:
+        try:
+            for results in pool.map(lambda job: job(), jobs):
+                for number, result in results:
+                    found[number] = result
+                done += len(results)
+                if progress is not None:
+                    progress(done, len(flights))
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+    return found
+
+
+def _key(flight: Flying) -> Any:
+    """Equal for flights that one kernel serves, with the same tables."""
+    loop: Any = flight.loop
+    phases = [(p.first, p.last, form((p.gains, p.known, p.craft, p.setup))) for p in loop.phases(flight.steps)]
+    table = loop.target.tobytes() if isinstance(getattr(loop, "target", None), np.ndarray) else b""
+    return (loop.parts(), loop.substeps, loop.seed, form(loop.carry()), tuple(phases), table, *flight[1:])
+
+
+def _one_by_one(group: Sequence[Flying], numbers: Sequence[int], use: Callable[..., Any]) -> list[Callable[[], Any]]:
+    def alone(flight: Flying, number: int) -> list[tuple[int, Any]]:
+        return [(number, use(number, *fly(*flight)))]
+
+    return [partial(alone, *pair) for pair in zip(group, numbers, strict=True)]
+
+
+def _together(group: Sequence[Flying], numbers: Sequence[int], use: Callable[..., Any]) -> list[Callable[[], Any]]:
+    loop: Any
+    loop, steps, every = group[0]
+    size = len(flatten(make_step(loop.parts()).sample(loop.carry(), 0, loop.setup())))
+    width = widest(len(numbers_of(loop.carry())))
+    if (steps // every + 1) * size * width > MOST:
+        return _one_by_one(group, numbers, use)
+    phases = [flight.loop.phases(steps) for flight in group]
+    # Of all lanes at once, so that one kernel flies every block of them.
+    whole = [_spread([own[k] for own in phases]) for k in range(len(phases[0]))]
+    kernels = [make_kernel(one, loop.parts(), width, loop.carry(), values, loop.substeps) for values in whole]
+
+    def block(first: int) -> list[tuple[int, Any]]:
+        lanes = [min(first + k, len(group) - 1) for k in range(width)]
+        vector = _Vector([group[lane] for lane in lanes], [phases[lane] for lane in lanes], kernels, size)
+        values = [mapped(part, lambda leaf: leaf[lanes] if isinstance(leaf, np.ndarray) else leaf) for part in whole]
+        flown = vector.fly([Numbers(*part) for part in values])
+        return [(numbers[first + k], use(numbers[first + k], *flown(k))) for k in range(min(width, len(group) - first))]
+
+    return [partial(block, first) for first in range(0, len(group), width)]
+
+
+def _spread(phases: Sequence[Any]) -> Numbers:
+    """The numbers of a phase for many lanes: those that differ become arrays (lanes,)."""
+    values = [Numbers(phase.gains, phase.known, phase.craft, phase.setup) for phase in phases]
+    columns = zip(*(leaves(value) for value in values), strict=True)
+
+    def leaf(first: Any) -> Any:
+        column = next(columns)
+        alike = not isinstance(first, float) or all(number == first for number in column)
+        return first if alike else np.array(column)
+
+    return mapped(values[0], leaf)
+
+
+class _Vector:
+    """A vector of lanes on their way."""
+
+    def __init__(self, flights: Sequence[Flying], phases: Sequence[Any], kernels: Sequence[Kernel], size: int) -> None:
+        self.phases, self.kernels, self.size, self.width = phases, kernels, size, len(flights)
+        loop, self.steps, self.every = flights[0]
+        self.seed, self.like, self.step = loop.seed, loop.carry(), make_step(loop.parts())
+        self.begun: list[Any] = [flight.loop.carry() for flight in flights]
+        self.setups = [flight.loop.setup() for flight in flights]
+        self.carry = aligned(len(numbers_of(self.like)), self.width)
+        for lane, carry in enumerate(self.begun):
+            self.carry[:, lane] = numbers_of(carry)
+        self.samples = aligned((self.steps // self.every + 1) * size, self.width)
+        self.samples[:] = np.nan
+        self.lost_row = len(flatten(self.like)) - 1
+
+    def fly(self, numbers: Sequence[Numbers]) -> Callable[[int], tuple[NDArray[np.float64], Any]]:
+        """Fly to the end; returns what gives samples and carry of a lane."""
+        for place, values in enumerate(numbers):
+            now = self.phases[0][place]
+            for lane in range(self.width):
+                if not self.carry[self.lost_row, lane] >= 0.0:
+                    entered = self.phases[lane][place].entered(state_of(self.carry[:, lane], self.begun[lane]))
+                    self.carry[:, lane] = numbers_of(entered)
+            memories = self._memories(values)
+            done = now.first
+            while done < now.last:
+                done += self._some(self.kernels[place], memories, done, now.last - done)
+        ends = self.carry.copy()
+        if self.steps % self.every == 0 and numbers:
+            self._some(self.kernels[-1], self._memories(numbers[-1]), self.steps, 1)
+        table = self.samples.reshape(-1, self.size, self.width)
+
+        def of_lane(lane: int) -> tuple[NDArray[np.float64], Any]:
+            carry = state_of(ends[:, lane], self.begun[lane])
+            rows, lost_at = np.ascontiguousarray(table[:, :, lane]), carry.lost_at
+            if lost_at == 0.0:
+                rows[0] = flatten(self.step.sample(self.begun[lane], 0, self.setups[lane]))
+            if lost_at >= 0.0:
+                rows = rows[: max(1, int(np.ceil(lost_at / self.every)))]
+            return rows.T, carry
+
+        return of_lane
+
+    def _memories(self, numbers: Numbers) -> dict[str, NDArray[np.float64]]:
+        arguments = Arguments(*numbers)
+        own = aligned(len(arguments.own), self.width)
+        own[:] = arguments.rows(self.width)
+        memories = {"carry": self.carry, "record": self.samples, "own": own}
+        return memories | {"shared": arguments.shared, "tables": arguments.tables}
+
+    def _some(self, kernel: Kernel, memories: Any, first: int, count: int) -> int:
+        """Fly up to `count` control steps from `first` on: to the next sample, or by whole groups between samples."""
+        into = first % self.every
+        if into or count < self.every:
+            groups, each, place = 1, min(count, self.every - into), 0 if into == 0 else -1
+        else:
+            groups, each, place = count // self.every, self.every, 0
+        kernel(memories, first, groups, each, place, -(-first // self.every), self.seed, 0)
+        return groups * each
