@@ -2,9 +2,12 @@
 
 import starhold as sh
 
-scenario = sh.load("three-laws")
+scenario = sh.load("three-laws")                 # or sh.scenario({...}), and scenario.with_({"law.lyapunov.k_rate": 0.1})
 run = sh.simulate(scenario, law="lyapunov")      # an xarray Dataset
 flights = sh.compare(scenario)                   # runs and metrics of every law
+numbers = sh.metrics(run)                        # settling time, overshoot, effort and all the others, in SI
+table = sh.sweep(scenario, {"law.lyapunov.k_rate": gains})    # a DataFrame, a row for each flight
+frame = sh.to_pandas(flights)                    # runs, flights, certificates and designs as tidy tables
 certificates = sh.certify(scenario)              # what is proved of every law
 designs = sh.design("my.toml")                   # gains that formulas give, and figures to judge them by
 certificate = sh.invariant("van-der-pol")        # what is proved of an invariant set of any small system
@@ -16,7 +19,21 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from starhold.api import certify, compare, design, failures, invariant, load, modal_roots, place, simulate
+    from starhold.api import (
+        certify,
+        compare,
+        design,
+        failures,
+        invariant,
+        load,
+        metrics,
+        modal_roots,
+        place,
+        simulate,
+        sweep,
+        to_pandas,
+    )
+    from starhold.api import make_scenario as scenario
     from starhold.errors import InputError
 
 __version__ = "0.1.0"
@@ -29,9 +46,13 @@ __all__ = [
     "failures",
     "invariant",
     "load",
+    "metrics",
     "modal_roots",
     "place",
+    "scenario",
     "simulate",
+    "sweep",
+    "to_pandas",
 ]
 
 
@@ -41,6 +62,9 @@ def __getattr__(name: str) -> Any:
 
     if name == "InputError":
         return import_module("starhold.errors").InputError
+    if name == "scenario":
+        # The package of that name, which can be called.
+        return import_module("starhold.scenario")
     if name in __all__:
         return getattr(import_module("starhold.api"), name)
     raise AttributeError(f"module 'starhold' has no attribute {name!r}")

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 from starhold.laws.pole_placement import place as place
-from starhold.report.kinds import kind_of
+from starhold.report.kinds import kind_module, kind_of
 from starhold.scenario import designing, opening, reading
+from starhold.scenario.making import make_scenario as make_scenario
+from starhold.simulation.lane import Recording
 
 if TYPE_CHECKING:
     import xarray as xr
+    from pandas import DataFrame
 
     from starhold.certification.certificate import Certificate
     from starhold.certification.invariant import Problem
@@ -30,11 +33,53 @@ def simulate(
     law: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
-    """Fly one law of a scenario, the first if `law` is None. Returns the Dataset that `starhold run` writes to run.nc;
-    `attrs["diverged_at"]` (s) is there only when the motion was lost."""
+    """Fly one law of a scenario, the first if `law` is None. Returns the Dataset that `starhold run` writes to run.nc, with
+    the same attributes; `attrs["diverged_at"]` (s) is there only when the motion was lost."""
     opened = _opened(scenario)
     kind, entry = kind_of(opened), opened.laws[0] if law is None else opened.pick(law)
     return kind.record(opened, kind.build(opened, entry), progress).dataset()
+
+
+def metrics(run: xr.Dataset | Flight) -> dict[str, Any]:
+    """The numbers that say how well a run went, SI units, None where there is none: of what `simulate` returns or `run.nc`
+    holds, by the tolerances of its scenario; of a Flight those that it has. Neither flown nor timed again, so that only a
+    Flight tells what the law's calls cost. ValueError for a Dataset that is no run."""
+    if not hasattr(run, "data_vars"):
+        return dict(cast("Flight", run).metrics)
+    dataset = cast("xr.Dataset", run)
+    if not {"control_period", "record_every"} <= set(dataset.attrs) or "time" not in dataset:
+        raise ValueError("not a run: a Dataset of `simulate`, or of a run.nc, is wanted")
+    arrays = {str(name): dataset[name].to_numpy() for name in ("time", *dataset.data_vars)}
+    recording = Recording(arrays, dict(dataset.attrs))
+    return kind_module("length_unit_m" not in dataset.attrs).metrics_of(recording)
+
+
+def sweep(
+    scenario: opening.AnyScenario | str | Path,
+    changes: Mapping[str, Iterable[Any]] | Iterable[Mapping[str, Any]],
+    law: str | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> DataFrame:
+    """Fly a scenario with other values and measure each run: a row each, with the changed keys, `law` and the `metrics`.
+
+    changes: for some keys their values, {"law.pd.k_rate": [0.1, 0.2], "spacecraft.inertia": [...]}, of which every
+    combination is flown; or a list of changes as a scenario's `with_` takes them. law: the one that flies; if None those
+    that the keys name, else all. Each row is what `compare` measures of the changed scenario, but for the cost of calls;
+    nothing is certified. Runs that differ only in numbers fly side by side on the lanes of a vector. InputError before the
+    first flight where one of the scenarios cannot be.
+    """
+    from starhold.report.sweeping import sweep as fly_sweep
+
+    return fly_sweep(_opened(scenario), changes, law, threads, progress)
+
+
+def to_pandas(results: Any) -> DataFrame:
+    """Results as a tidy table: a run with a row a sample and a column a component (`rate_x`), flights with a row a law,
+    certificates with a row a claim, designs with a row a law. TypeError for anything else."""
+    from starhold.report.frames import to_pandas as table_of
+
+    return table_of(results)
 
 
 def design(scenario: opening.AnyScenario | str | Path, law: str | None = None) -> list[designing.Design]:

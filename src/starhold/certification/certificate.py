@@ -37,7 +37,7 @@ class Obligation:
     evidence: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Claim:
     """`kind` says what is claimed, `numbers` how much, in SI units; None among them means without bound. `witness`:
     numbers that make the proof, and that a checker needs."""
@@ -47,6 +47,9 @@ class Claim:
     witness: dict[str, Any]
     assumptions: tuple[str, ...]
     obligations: tuple[Obligation, ...]
+
+    def __repr__(self) -> str:
+        return f"<Claim {self.kind}: {self.outcome}; {len(self.obligations)} obligations>"
 
     @property
     def outcome(self) -> Outcome:
@@ -65,13 +68,17 @@ ENDS = ("convergence", "region", "sliding", "circle", "rest")
 """Kinds of claims that say where the motion itself ends; without one a certificate proves nothing of it."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Certificate:
     """Claims about one closed loop; `subject` holds all that the claims speak of, as plain numbers and names."""
 
     name: str
     subject: dict[str, Any]
     claims: tuple[Claim, ...]
+
+    def __repr__(self) -> str:
+        claims = ", ".join(f"{claim.kind} {claim.outcome}" for claim in self.claims)
+        return f"<Certificate {self.name}: {claims or 'no claims'}>"
 
     @property
     def outcome(self) -> Outcome:

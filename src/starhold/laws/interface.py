@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Annotated, Any, Literal, NamedTuple, TypeAlias, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -154,6 +155,7 @@ class Field:
     default: Any = field(default=None)
 
 
+@cache
 def fields(cls: Any) -> list[Field]:
     """The declared gains of a `Gains` class (or of a design form), in order."""
     found: list[Field] = []

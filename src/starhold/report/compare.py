@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from types import SimpleNamespace
+from typing import Any, TypeAlias, cast
 
 from starhold.analysis.cost import call_costs, recorded_states
 from starhold.analysis.metrics import measure
@@ -23,18 +24,18 @@ from starhold.scenario.building import build
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.simulation.lane import Progress, Recording, fly, label
 
+TRANSIENT = ("rate_limit", "acceleration_limit", "angle_end", "rate_end")
 Notice: TypeAlias = Callable[[str, int, int], None]
 """Called with a law's name, the control steps done and those in all."""
 
 
 def fly_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, notice: Notice | None = None) -> Flight:
     """One law of the scenario, with the loop that `build` gives for it, flown and measured."""
-    simulation, settling = scenario.table.simulation, scenario.table.settling
+    simulation = scenario.table.simulation
     progress = None if notice is None else lambda done, total: notice(entry.name, done, total)
     samples, carry = fly(loop, simulation.steps, simulation.record_every, progress=progress)
-    recording = signed(label(loop, samples, carry, simulation.record_every), scenario)
-    metrics = measure(recording, settling.attitude_tolerance, settling.rate_tolerance)
-    metrics |= against_limits(recording, scenario.table.transient, metrics["cut_off"])
+    recording = name_samples(scenario, loop, samples, carry)
+    metrics = metrics_of(recording)
     metrics |= _law_counters(entry, carry.memory)
     gains = {item.name: gain_text(item, value) for item, value in zip(entry.law.fields(), entry.gains, strict=True)}
     return Flight(entry.name, entry.law.name, recording, metrics, gains)
@@ -55,8 +56,25 @@ def prove(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, flight: Flight)
 def record(scenario: Scenario, loop: ClosedLoop, progress: Progress | None = None) -> Recording:
     """The run of a loop."""
     simulation = scenario.table.simulation
-    samples, carry = fly(loop, simulation.steps, simulation.record_every, progress=progress)
-    return signed(label(loop, samples, carry, simulation.record_every), scenario)
+    return name_samples(scenario, loop, *fly(loop, simulation.steps, simulation.record_every, progress=progress))
+
+
+def name_samples(scenario: Scenario, loop: ClosedLoop, samples: Any, carry: Any) -> Recording:
+    """The samples of `fly` under their names, with what they are measured by among the attributes."""
+    settling, transient = scenario.table.settling, scenario.table.transient
+    told = {f"settling_{name}": getattr(settling, name) for name in ("attitude_tolerance", "rate_tolerance")}
+    if transient is not None:
+        told |= {f"transient_{name}": getattr(transient, name) for name in TRANSIENT}
+    run = label(loop, samples, carry, scenario.table.simulation.record_every)
+    return signed(replace(run, attrs=run.attrs | told), scenario)
+
+
+def metrics_of(run: Recording) -> dict[str, Any]:
+    """The metrics of a recorded run, but for those of the law's calls."""
+    told = run.attrs
+    found = measure(run, told["settling_attitude_tolerance"], told["settling_rate_tolerance"])
+    limits = SimpleNamespace(**{name: told.get(f"transient_{name}") for name in TRANSIENT})
+    return found | against_limits(run, None if limits.angle_end is None else cast(Any, limits), found["cut_off"])
 
 
 def compare(scenario: Scenario, notice: Notice | None = None) -> list[Flight]:

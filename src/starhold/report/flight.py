@@ -35,7 +35,7 @@ ROUNDING = 1e-13
 """Share of a matrix's largest entry below which another is taken for what rounding left."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Flight:
     """One law's run of a scenario: the name the scenario gives the law, the law's type, what was recorded,
     its metrics as `measure` gives them, its gains, field name to text with unit, and its certificates."""
@@ -51,6 +51,15 @@ class Flight:
     """Of each certificate how this flight leaves the proved claims, by their kinds."""
     board: Board = ATTITUDE
     """How the metrics are told and ranked."""
+
+    def __repr__(self) -> str:
+        board = self.board
+        told = [
+            f"{board.measures[name].heading} {board.shown(name, self.metrics.get(name))} {board.measures[name].unit}"
+            for name in board.order
+        ]
+        fate = ", ".join(told) if self.lost is None else f"diverged at {self.lost_text()}"
+        return f"<Flight {self.name}: {fate}>"
 
     @cached_property
     def run(self) -> xr.Dataset:

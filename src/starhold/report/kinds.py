@@ -1,5 +1,5 @@
-"""What flies, draws and writes each kind of scenario: modules with `build`, `record`, `fly_law`,
-`timed`, `prove`, `compare`, `certify_scenario`, `sketch` and `write`."""
+"""What flies, draws and writes each kind of scenario: modules with `build`, `record`, `name_samples`, `metrics_of`,
+`fly_law`, `timed`, `prove`, `compare`, `certify_scenario`, `sketch` and `write`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,12 @@ from starhold.scenario.reading import Scenario
 
 def kind_of(scenario: AnyScenario) -> ModuleType:
     """The module for scenarios of this kind."""
-    if isinstance(scenario, Scenario):
+    return kind_module(isinstance(scenario, Scenario))
+
+
+def kind_module(turning: bool) -> ModuleType:
+    """The module for scenarios of bodies that turn, or of station keeping."""
+    if turning:
         from starhold.report import compare
 
         return compare

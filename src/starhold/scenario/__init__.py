@@ -1,0 +1,17 @@
+"""Scenario files, and scenarios made in Python: called, this package is `make_scenario`, for `sh.scenario({...})`."""
+
+from __future__ import annotations
+
+import sys
+from types import ModuleType
+from typing import Any
+
+
+class _Making(ModuleType):
+    def __call__(self, *args: Any, **keywords: Any) -> Any:
+        from starhold.scenario.making import make_scenario
+
+        return make_scenario(*args, **keywords)
+
+
+sys.modules[__name__].__class__ = _Making

@@ -25,6 +25,14 @@ MOST_SUBSTEPS = 10**6
 """Of a control period, which is over before an interrupt is heeded."""
 
 
+class Named:
+    """What entries for laws of all kinds are shown as."""
+
+    def __repr__(self) -> str:
+        entry = cast(Any, self)
+        return f"<law {entry.name}: {entry.law.name}, {entry.gains}>"
+
+
 class LawBook(Generic[_Entry]):
     """What scenarios of all kinds share: a table with a name, and laws with names of their own."""
 

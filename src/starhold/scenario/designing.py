@@ -13,7 +13,7 @@ from starhold.laws.interface import Field
 from starhold.scenario.opening import AnyScenario
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Design:
     """One designed law: the name the scenario gives it, its type, its form, the form's inputs and the gains it gives (SI, by
     the names that files and `starhold laws` use; a diagonal matrix as the three numbers on its diagonal), and figures by
@@ -25,6 +25,13 @@ class Design:
     inputs: dict[str, Any]
     gains: dict[str, Any]
     figures: dict[str, Any]
+
+    def __repr__(self) -> str:
+        gains = ", ".join(
+            f"{name} = {value:.6g}" if isinstance(value, float) else f"{name} = {value}"
+            for name, value in self.gains.items()
+        )
+        return f"<Design {self.name}: {self.law} {self.form}; {gains}>"
 
 
 def design(scenario: AnyScenario, law: str | None = None) -> list[Design]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from copy import deepcopy
 from pathlib import Path
 from typing import Any, cast
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from starhold.errors import InputError
 from starhold.scenario.checking import nearest, read_toml, show
-from starhold.scenario.opening import AnyScenario, open_text
+from starhold.scenario.opening import AnyScenario, open_tables
 from starhold.scenario.writing import toml_text
 
 WHERE = "scenario"
@@ -20,21 +21,30 @@ _PART = re.compile(r"([^.\[\]]+)(?:\[(\d+)\])?")
 
 
 def make_scenario(tables: Mapping[str, Any], folder: str | Path = ".", allow_unstable: bool = False) -> AnyScenario:
-    """The scenario of tables as a file would hold them: of strings, numbers, truths, lists and tables; tuples and arrays of
-    NumPy count as lists, and what is None as left out. `folder`: what file names in it are relative to."""
-    return open_text(toml_text(_plain(tables, WHERE, "")), WHERE, Path(folder), allow_unstable)
+    """The scenario of tables as a file would hold them, {"name": "mine", "spacecraft": {"inertia": [2, 3, 4]}, ..., "law":
+    [{"type": "pd", ...}]}: strings, numbers, truths, lists and tables; tuples and NumPy arrays count as lists, and what is
+    None as left out. `folder`: what file names in it are relative to. InputError says what is wrong, as of a file. A
+    scenario's `with_` gives others like it, and its `text` is the file."""
+    plain = _plain(tables, WHERE, "")
+    return open_tables(plain, toml_text(plain), WHERE, Path(folder), allow_unstable)
 
 
 def changed(scenario: AnyScenario, changes: Mapping[str, Any]) -> AnyScenario:
     """The scenario with other values at these keys, which are told as errors tell them, "spacecraft.inertia" or
     "law[2].k_rate", and of laws by their names too, "law.pd.k_rate"; None takes a key, a table or a law away."""
-    where = scenario.where
+    return next(variants(scenario, [changes]))
+
+
+def variants(scenario: AnyScenario, changes: Iterable[Mapping[str, Any]]) -> Iterator[AnyScenario]:
+    """The scenario changed in one way after the other."""
+    where, names = scenario.where, [entry.name for entry in scenario.laws]
     tables = read_toml(scenario.text, where)
-    names = [entry.name for entry in scenario.laws]
-    for key, value in changes.items():
-        _put(tables, _path(key, names, where), value, where)
-    text = toml_text(_plain(tables, where, ""))
-    return open_text(text, where, scenario.folder, scenario.allow_unstable)
+    for change in changes:
+        other = deepcopy(tables)
+        for key, value in change.items():
+            _put(other, _path(key, names, where), value, where)
+        plain = _plain(other, where, "")
+        yield open_tables(plain, toml_text(plain), where, scenario.folder, scenario.allow_unstable)
 
 
 def _path(key: Any, names: Sequence[str], where: str) -> list[str | int]:
@@ -48,7 +58,8 @@ def _path(key: Any, names: Sequence[str], where: str) -> list[str | int]:
             if rest == name or rest.startswith(f"{name}."):
                 after = rest[len(name) + 1 :]
                 return ["law", names.index(name), *(_path(after, (), where) if after else [])]
-        raise InputError(where, key, show(rest.partition(".")[0]), f"a law by its name: {nearest(rest, list(names))}")
+        given = rest.partition(".")[0]
+        raise InputError(where, key, show(given), nearest(given, list(names)))
     path: list[str | int] = []
     for part in key.split("."):
         match = _PART.fullmatch(part)
@@ -59,7 +70,8 @@ def _path(key: Any, names: Sequence[str], where: str) -> list[str | int]:
 
 
 def _put(tables: Any, path: Sequence[str | int], value: Any, where: str) -> None:
-    here, seen = tables, ""
+    here: Any = tables
+    seen = ""
     for part, after in zip(path, [*path[1:], None], strict=True):
         last = after is None
         if isinstance(part, int):
@@ -76,9 +88,9 @@ def _put(tables: Any, path: Sequence[str | int], value: Any, where: str) -> None
             if not last:
                 cast(dict[str, Any], here).setdefault(part, [] if isinstance(after, int) else {})
         if last:
-            here[part] = value
+            cast(Any, here)[part] = value
         else:
-            here = here[part]
+            here = cast(Any, here)[part]
 
 
 def _plain(value: Any, where: str, key: str) -> Any:

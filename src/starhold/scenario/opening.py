@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from starhold.scenario.checking import read_toml
-from starhold.scenario.reading import MARK, Scenario, parse, read_text
+from starhold.scenario.reading import MARK, Scenario, read_attitude, read_text
 from starhold.scenario.schema import attitude_schema
-from starhold.scenario.station.reading import StationScenario, parse_station
+from starhold.scenario.station.reading import StationScenario, read_station
 from starhold.scenario.station.schema import station_schema
 
 AnyScenario: TypeAlias = Scenario | StationScenario
@@ -21,9 +21,14 @@ def open_scenario(source: str | Path, allow_unstable: bool = False) -> AnyScenar
 
 def open_text(text: str, where: str, folder: Path = Path(), allow_unstable: bool = False) -> AnyScenario:
     """The scenario of a TOML text, of whichever kind; `where` names it in errors."""
-    if MARK in read_toml(text, where):
-        return parse_station(text, where, folder, allow_unstable)
-    return parse(text, where, folder, allow_unstable)
+    return open_tables(read_toml(text, where), text, where, folder, allow_unstable)
+
+
+def open_tables(data: dict[str, Any], text: str, where: str, folder: Path, allow_unstable: bool) -> AnyScenario:
+    """The same of the tables that a text holds."""
+    if MARK in data:
+        return read_station(data, text, where, folder, allow_unstable)
+    return read_attitude(data, text, where, folder, allow_unstable)
 
 
 def json_schema() -> dict[str, Any]:

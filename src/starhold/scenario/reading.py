@@ -18,6 +18,7 @@ from starhold.models.wheels import Wheels, body_inertia
 from starhold.scenario.checking import (
     LONGEST_TEXT,
     LawBook,
+    Named,
     cut,
     free_name,
     make_gains,
@@ -39,8 +40,8 @@ LONGEST_PATH = 200
 """Characters of a path that errors show whole."""
 
 
-@dataclass(frozen=True)
-class LawEntry:
+@dataclass(frozen=True, repr=False)
+class LawEntry(Named):
     """A law with its gains, under the name the file gives it."""
 
     name: str
@@ -150,11 +151,16 @@ def read_text(source: str | Path) -> tuple[str, str, Path]:
 
 def parse(text: str, where: str, folder: Path = Path(), allow_unstable: bool = False) -> Scenario:
     """The scenario of a TOML text; `where` names it in errors."""
-    data = read_toml(text, where)
+    return read_attitude(read_toml(text, where), text, where, folder, allow_unstable)
+
+
+def read_attitude(data: dict[str, Any], text: str, where: str, folder: Path, allow_unstable: bool) -> Scenario:
+    """The same of the tables that a text holds."""
     if MARK in data:
         raise not_turning(where)
-    laws = data.pop("law", None)
-    table = validate(ScenarioTable, data, where, "", extra=["law"])
+    laws = data.get("law")
+    rest = {key: value for key, value in data.items() if key != "law"}
+    table = validate(ScenarioTable, rest, where, "", extra=["law"])
     scenario = Scenario(table, (), text, where, folder)
     try:
         _ = scenario.craft

@@ -12,9 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.structure import flatten, leaves, mapped
-from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import Arguments, Kernel, Numbers, form, make_kernel, make_step, numbers_of, one, state_of
-from starhold.loop.station import StationLoop
 from starhold.simulation.lane import Progress, fly
 from starhold.trace.machine import aligned, widest
 
@@ -27,7 +25,8 @@ MOST = 2**26
 class Flying(NamedTuple):
     """A loop, its control steps, and the control steps a sample."""
 
-    loop: ClosedLoop | StationLoop
+    loop: Any
+    """A `ClosedLoop` or a `StationLoop`."""
     steps: int
     record_every: int
 
@@ -65,7 +64,7 @@ def fly_abreast(
 
 def _key(flight: Flying) -> Any:
     """Equal for flights that one kernel serves, with the same tables."""
-    loop: Any = flight.loop
+    loop = flight.loop
     phases = [(p.first, p.last, form((p.gains, p.known, p.craft, p.setup))) for p in loop.phases(flight.steps)]
     table = loop.target.tobytes() if isinstance(getattr(loop, "target", None), np.ndarray) else b""
     return (loop.parts(), loop.substeps, loop.seed, form(loop.carry()), tuple(phases), table, *flight[1:])
@@ -79,7 +78,6 @@ def _one_by_one(group: Sequence[Flying], numbers: Sequence[int], use: Callable[.
 
 
 def _together(group: Sequence[Flying], numbers: Sequence[int], use: Callable[..., Any]) -> list[Callable[[], Any]]:
-    loop: Any
     loop, steps, every = group[0]
     size = len(flatten(make_step(loop.parts()).sample(loop.carry(), 0, loop.setup())))
     width = widest(len(numbers_of(loop.carry())))

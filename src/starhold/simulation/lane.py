@@ -65,7 +65,7 @@ class Variable(NamedTuple):
     attrs: dict[str, str]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Recording:
     """A trajectory as arrays: `time` (n,) and the quantities of `columns`; of an attitude loop in SI those of COLUMNS,
     (n, 4) or (n, 3), and of WHEELS."""
@@ -74,6 +74,9 @@ class Recording:
     attrs: dict[str, Any]
     columns: dict[str, tuple[str, str, str]] = field(default_factory=lambda: COLUMNS | WHEELS)
     time_unit: str = "s"
+
+    def __repr__(self) -> str:
+        return f"<Recording {self.attrs.get('law')}: {len(self['time'])} samples of {', '.join(self.arrays)}>"
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         return self.arrays[name]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from starhold.loop.station import StationLoop, StationSample
+from starhold.loop.station import StationCarry, StationLoop, StationSample
 from starhold.simulation.lane import Progress, Recording, fly
 
 COLUMNS: dict[str, tuple[str, str, str]] = {
@@ -21,7 +22,11 @@ def simulate_station(loop: StationLoop, steps: int, record_every: int = 1, progr
 
     A motion that was lost ends the samples, and its time stands in `attrs["diverged_at"]`; else that is absent.
     """
-    samples, carry = fly(loop, steps, record_every, progress=progress)
+    return label_station(loop, *fly(loop, steps, record_every, progress=progress), record_every)
+
+
+def label_station(loop: StationLoop, samples: NDArray[np.float64], carry: StationCarry, record_every: int) -> Recording:
+    """The samples of `fly` under their names."""
     arrays = {"time": np.arange(samples.shape[1]) * (loop.period * record_every)}
     for place, name in enumerate(StationSample._fields):
         arrays[name] = samples[3 * place : 3 * place + 3].T

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from starhold.analysis.station import BOARD, goal_of, measure_station
+from starhold.analysis.station import BOARD, Circle, Rest, goal_of, measure_station
 from starhold.analysis.station_departure import station_departures
 from starhold.analysis.station_trial import fly_station, station_start_inside
 from starhold.certification.station import certify_station
 from starhold.loop.station import StationLoop
+from starhold.models.craft import vector
+from starhold.models.libration import Units
 from starhold.report.certificates import Tried
 from starhold.report.compare import Notice, write_proved
 from starhold.report.files import whole
@@ -19,15 +22,15 @@ from starhold.report.results import SUMMARY, signed, write_summary
 from starhold.report.station.figures import sketch as sketch
 from starhold.scenario.station.building import build as build
 from starhold.scenario.station.reading import StationEntry, StationScenario
-from starhold.simulation.lane import Progress, Recording
-from starhold.simulation.station import simulate_station
+from starhold.simulation.lane import Progress, Recording, fly
+from starhold.simulation.station import label_station
 
 
 def fly_law(scenario: StationScenario, entry: StationEntry, loop: StationLoop, notice: Notice | None = None) -> Flight:
     """One law of the scenario, with the loop that `build` gives for it, flown and measured."""
     progress = None if notice is None else lambda done, total: notice(entry.name, done, total)
     run = record(scenario, loop, progress)
-    metrics = measure_station(run, scenario.units, goal_of(entry.gains), scenario.table.settling.tolerance)
+    metrics = metrics_of(run)
     gains = {item.name: gain_text(item, value) for item, value in zip(entry.law.fields(), entry.gains, strict=True)}
     gains |= {"limit": number_text(entry.limit)} | ({"lag": number_text(entry.lag)} if entry.lag else {})
     return Flight(entry.name, entry.law.name, run, metrics, gains, board=BOARD)
@@ -57,11 +60,27 @@ def certify_scenario(scenario: StationScenario, law: str | None = None) -> list[
 
 def record(scenario: StationScenario, loop: StationLoop, progress: Progress | None = None) -> Recording:
     """The run of a loop, scaled, with what its units are worth among its attributes."""
-    timing, units = scenario.table.simulation, scenario.units
-    run = simulate_station(loop, timing.steps, timing.record_every, progress)
-    worth = {"length_unit_m": units.length, "time_unit_s": units.time}
+    timing = scenario.table.simulation
+    return name_samples(scenario, loop, *fly(loop, timing.steps, timing.record_every, progress=progress))
+
+
+def name_samples(scenario: StationScenario, loop: StationLoop, samples: Any, carry: Any) -> Recording:
+    """The samples of `fly` under their names, with what they are worth and measured by among the attributes."""
+    units, goal = scenario.units, goal_of(loop.gains)
+    run = label_station(loop, samples, carry, scenario.table.simulation.record_every)
+    worth = {"length_unit_m": units.length, "time_unit_s": units.time, "rate_unit_rad_per_s": units.rate}
     worth |= {"velocity_unit_m_per_s": units.velocity, "acceleration_unit_m_per_s2": units.acceleration}
+    worth |= {"settling_tolerance": scenario.table.settling.tolerance}
+    worth |= {"circle": [*goal]} if isinstance(goal, Circle) else {"rest": [*goal.place]}
     return signed(replace(run, attrs=run.attrs | worth), scenario)
+
+
+def metrics_of(run: Recording) -> dict[str, Any]:
+    """The metrics of a recorded run."""
+    told = run.attrs
+    units = Units(float(told["length_unit_m"]), float(told["rate_unit_rad_per_s"]))
+    goal = Circle(*map(float, told["circle"])) if "circle" in told else Rest(vector(told["rest"]))
+    return measure_station(run, units, goal, float(told["settling_tolerance"]))
 
 
 def compare(scenario: StationScenario, notice: Notice | None = None) -> list[Flight]:

@@ -14,6 +14,7 @@ from starhold.laws.station.l2_circle import peak_demand
 from starhold.models.libration import Libration, Units
 from starhold.scenario.checking import (
     LawBook,
+    Named,
     free_name,
     make_gains,
     numbered,
@@ -28,8 +29,8 @@ from starhold.scenario.schema import law_model
 from starhold.scenario.station.schema import LibrationTable, Resources, StationLawTable, StationTable
 
 
-@dataclass(frozen=True)
-class StationEntry:
+@dataclass(frozen=True, repr=False)
+class StationEntry(Named):
     """A law with its gains and the control it has: the limit and the lag (scaled)."""
 
     name: str
@@ -69,16 +70,21 @@ class StationScenario(LawBook[StationEntry]):
 
 def parse_station(text: str, where: str, folder: Path = Path(), allow_unstable: bool = False) -> StationScenario:
     """The scenario of a TOML text; `where` names it in errors."""
-    data = read_toml(text, where)
-    laws = data.pop("law", None)
+    return read_station(read_toml(text, where), text, where, folder, allow_unstable)
+
+
+def read_station(data: dict[str, Any], text: str, where: str, folder: Path, allow_unstable: bool = False) -> StationScenario:
+    """The same of the tables that a text holds."""
+    laws = data.get("law")
     # First of all, for it says what the numbers of the other tables are worth.
     point = validate(LibrationTable, data.get(MARK), where, MARK)
-    table = validate(StationTable, data, where, "", extra=["law"], context=point.units)
+    rest = {key: value for key, value in data.items() if key != "law"}
+    table = validate(StationTable, rest, where, "", extra=["law"], context=point.units)
     entries: list[StationEntry] = []
     for key, item in numbered(laws, where):
         taken = {entry.name for entry in entries}
         entries.append(_read_law(item, table, where, folder, key, taken, allow_unstable))
-    return StationScenario(table, tuple(entries), text, where, folder)
+    return StationScenario(table, tuple(entries), text, where, folder, allow_unstable)
 
 
 def _read_law(

@@ -1,0 +1,149 @@
+"""Scenarios made in Python and changed by key are what a file would be."""
+
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import starhold as sh
+from starhold.scenario.reading import builtin_names, builtin_text
+from starhold.scenario.writing import toml_text
+
+BODY = {
+    "name": "made",
+    "spacecraft": {"inertia": [2.0, 3.0, 4.0], "torque_limit": "10 mN m"},
+    "initial": {"angles": ["90 deg", 0, 0]},
+    "simulation": {"duration": 20.0, "control_period": 0.1},
+    "law": [
+        {"type": "pd", "k_rate": 0.09, "k_attitude": 0.009},
+        {"type": "lqr", "name": "form 2.1", "form": "II", "q": [1, 1, 1, 0.2, 0.2, 0.2], "r": 50},
+    ],
+}
+TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=8)
+NUMBERS = st.booleans() | st.integers(-(2**70), 2**70) | st.floats(allow_nan=False)
+LEAVES = st.recursive(
+    NUMBERS | TEXT, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(TEXT, inner, max_size=3), max_leaves=6
+)
+
+
+@given(st.dictionaries(TEXT, LEAVES | st.lists(st.dictionaries(TEXT, LEAVES, max_size=2), max_size=2), max_size=4))
+def test_what_is_written_reads_back(tables):
+    read = tomllib.loads(toml_text(tables))
+    assert read == tables
+    assert repr(read) == repr({key: read[key] for key in read})
+
+
+@pytest.mark.parametrize("name", builtin_names())
+def test_the_tables_of_a_file_make_its_scenario(name):
+    made, loaded = sh.scenario(tomllib.loads(builtin_text(name))), sh.load(name)
+    assert repr(made.table) == repr(loaded.table)
+    assert made.laws == loaded.laws
+    assert tomllib.loads(made.text) == tomllib.loads(loaded.text)
+
+
+def test_it_flies_as_the_file_of_its_text(tmp_path):
+    made = sh.scenario(BODY)
+    (tmp_path / "made.toml").write_text(made.text)
+    assert sh.simulate(made).identical(sh.simulate(tmp_path / "made.toml"))
+
+
+def test_arrays_tuples_paths_and_none_are_taken(tmp_path):
+    (tmp_path / "h.csv").write_text("0,1,0,0,0\n10,1,0,0,0\n20,1,0,0,0\n30,1,0,0,0\n")
+    given = BODY | {
+        "spacecraft": {"inertia": np.diag([2.0, 3.0, 4.0]), "torque_limit": np.float64(0.01), "limit": None},
+        "initial": {"attitude": (1.0, 0.1, 0.0, 0.0)},
+        "target": {"mode": "history", "file": Path("h.csv")},
+        "orbit": None,
+    }
+    made = sh.scenario(given, folder=tmp_path)
+    assert made.craft.inertia == (2.0, 3.0, 4.0)
+    assert made.table.orbit is None
+    assert sh.simulate(made).sizes["time"] == 201
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"spacecraft.inertai": [1, 1, 1]}, "spacecraft.inertai: found an unknown key; did you mean inertia?"),
+        ({"spacecraft.inertia": [1, 1, 9]}, "no body has these principal moments"),
+        ({"law.pd.k_rate": -1.0}, "law[1].k_rate: found -1.0; allowed: above 0"),
+        ({"law.form 2.1.k_rate": 1.0}, "law[2].k_rate: found an unknown key"),
+        ({"law.ppd.k_rate": 1.0}, 'law.ppd.k_rate: found "ppd"; did you mean pd?'),
+        ({"law[3].k_rate": 1.0}, "law[3]: found no such table; allowed: 1 to 2"),
+        ({"wheel[1].axis": [1, 0, 0]}, "wheel[1]: found no such table; allowed: no list there"),
+        ({"name.first": 1}, "name.first: found a value that is no table"),
+        ({"spacecraft..inertia": 1}, "not a key"),
+        ({3: 1}, "a key that is no string"),
+        ({"spacecraft.inertia": {1, 2}}, "allowed: numbers, strings, truths, and lists and tables of them"),
+        ({"initial": {3: 1}}, "the key 3"),
+        ({"law": None}, "law: found no law"),
+        ({"simulation": None}, "simulation: found nothing; allowed: this key is required"),
+        ({"description": "half \ud800"}, "whole characters"),
+    ],
+)
+def test_what_cannot_be_is_told_as_of_a_file(changes, said):
+    with pytest.raises(sh.InputError) as caught:
+        sh.scenario(BODY).with_(changes)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_keys_of_tables_lists_and_laws_by_name_or_place():
+    made = sh.scenario(BODY)
+    other = made.with_(
+        {"law.pd.k_rate": "0.2 N m s", "law[2].r": 40, "law.form 2.1.q": [2] * 6, "simulation.duration": "1 min"}
+    )
+    assert other.laws[0].gains.k_rate == 0.2
+    assert other.laws[1].spec.r == (40.0,) * 3
+    assert other.laws[1].spec.q == (2.0,) * 6
+    assert other.table.simulation.steps == 600
+    assert made.table.simulation.steps == 200
+    assert made.with_({}).laws == made.laws
+    assert [entry.name for entry in made.with_({"law.pd": None}).laws] == ["form 2.1"]
+    fault = [{"time": 3.0, "wheel": 1, "lost": True}]
+    wheels = sh.load("wheels-orbital").with_({"fault": fault, "wheels.momentum": 0.01})
+    assert wheels.with_({"fault[1].time": "5 s"}).table.fault[0].time == 5.0
+
+
+def test_station_keeping_is_made_and_changed_alike():
+    tables = {
+        "name": "made",
+        "libration": {},
+        "initial": {"position": [0, 0.5, 0.1]},
+        "simulation": {"duration": 1.0},
+        "law": [{"type": "l2-rest", "form": "degree"}],
+    }
+    made = sh.scenario(tables).with_({"libration.point": "L1", "control.limit": 4.0})
+    assert made.laws[0].limit == 4.0
+    assert made.craft.from_smaller < 0.0
+    assert sh.simulate(made).attrs["model"] == "linear"
+
+
+def test_gains_known_to_be_unstable_stay_allowed():
+    tables = BODY | {"law": [{"type": "modal", "form": "equal", "a": 0.1}]}
+    with pytest.raises(sh.InputError, match="not stable"):
+        sh.scenario(tables)
+    made = sh.scenario(tables, allow_unstable=True)
+    assert made.with_({"law.modal.a": 0.2}).laws[0].spec.a == 0.2
+
+
+def test_what_notebooks_show_is_short():
+    made = sh.scenario(BODY)
+    assert repr(made) == "<Scenario made: pd, form 2.1; 200 control steps>"
+    (flight, _) = sh.compare(made)
+    for shown in (made, *made.laws, flight, flight.recording, flight.certificates[0], *flight.certificates[0].claims):
+        assert len(repr(shown)) < 250
+    assert repr(flight).startswith("<Flight pd: settling")
+    assert repr(sh.design(made)[0]).startswith("<Design form 2.1: lqr II; k_rate")
+
+
+@pytest.mark.parametrize("before", ["", "import starhold.scenario.reading", "import starhold as sh; sh.load('three-laws')"])
+def test_the_package_of_scenarios_is_called_whatever_is_imported_first(before):
+    code = f"{before}\nimport starhold as sh\nfrom starhold.scenario.reading import parse\nprint(sh.scenario({BODY!r}).name)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout == "made\n", done.stderr
