@@ -11,13 +11,18 @@ from flint import arb, fmpq
 from starhold.algebra.polynomial import Polynomial, constants, exact
 from starhold.algebra.vector import Matrix, Vector
 from starhold.certification.matrices import Rows, greatest, inverse, least, matrix_of, number, plus, rows, scaled
+from starhold.certification.spline import spline_bounds
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.models.craft import Craft, tensor
 from starhold.models.environment import gravity_gradient
+from starhold.models.target import Knots
 from starhold.models.wheeled_body import WheeledState
 from starhold.models.wheels import Wheels
+
+SPLINE = "rotation spline"
+"""What a tabulated target follows between its knots, see `models.target.Knots`."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +84,8 @@ def described(subject: Subject) -> dict[str, Any]:
         "velocity": list(loop.start.velocity),
         "gravitational_parameter": loop.craft.gravity,
     }
-    kind = loop.target if isinstance(loop.target, str) else "history" if isinstance(loop.target, np.ndarray) else "inertial"
+    knots = followed(loop)
+    kind = loop.target if isinstance(loop.target, str) else "inertial" if knots is None else "history"
     return {
         "law": loop.law.name,
         "gains": described_gains(loop.law, loop.gains),
@@ -91,6 +97,7 @@ def described(subject: Subject) -> dict[str, Any]:
         "orbit": orbit if loop.orbit else None,
         "gravity_gradient": loop.gravity_gradient,
         "target": kind,
+        "history": None if knots is None else {"interpolant": SPLINE} | {n: x.tolist() for n, x in knots._asdict().items()},
         "target_rate": above(subject.target_rate),
         "target_acceleration": above(subject.target_acceleration),
         "modelled_torque": [above(m) for m in subject.modelled],
@@ -99,6 +106,14 @@ def described(subject: Subject) -> dict[str, Any]:
         "control_period": loop.period,
         "wheels": None if loop.wheels is None else _described_wheels(subject, loop.wheels),
     }
+
+
+def followed(loop: ClosedLoop) -> Knots | None:
+    """The knots of the spline that a tabulated target follows; of a table that comes without, its rows are the knots."""
+    table = loop.target
+    if not isinstance(table, np.ndarray):
+        return None
+    return loop.knots or Knots(np.arange(len(table), dtype=float) * loop.period, table[:, :4], table[:, 4:7])
 
 
 def described_gains(law: Law, gains: Any) -> dict[str, Any]:
@@ -222,9 +237,12 @@ def upper(ball: arb) -> Any:
 
 
 def _target_bounds(loop: ClosedLoop) -> tuple[Any, Any]:
-    if isinstance(loop.target, np.ndarray):
-        rate, acceleration = (float(np.linalg.norm(loop.target[:, c : c + 3], axis=1).max()) for c in (4, 7))
-        return exact(rate * (1 + 1e-12)), exact(acceleration * (1 + 1e-12))
+    knots = followed(loop)
+    if knots is not None:
+        try:
+            return spline_bounds(knots)
+        except ArithmeticError as reason:
+            raise InputError("target", "history", str(reason), "attitudes closer together") from None
     if not isinstance(loop.target, str):
         return fmpq(0), fmpq(0)
     nearest, momentum, eccentricity, gravity = perigee(loop)

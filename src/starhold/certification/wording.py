@@ -149,6 +149,12 @@ def _cover(numbers: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     return ""
 
 
+def _followed(subject: Mapping[str, Any]) -> str:
+    """What a bound that depends on the target's motion assumes of it between the rows of its history."""
+    followed = subject["target"] == "history" and subject["target_rate"]
+    return ", while the target follows the rotation spline through its history" if followed else ""
+
+
 def _convergence(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     return f"{place(n, subject)} the body comes to rest on target{_cover(n, subject)}".strip()
 
@@ -161,7 +167,8 @@ def _region(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 
 def _torque_limit(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     kind = "on every axis" if n["kind"] == "axis" else "in norm"
-    return f"{place(n, subject)} the torque never exceeds {shown(n['limit'], ' N m', up=not n['refuted'])} {kind}"
+    most = shown(n["limit"], " N m", up=not n["refuted"])
+    return f"{place(n, subject)} the torque never exceeds {most} {kind}{_followed(subject)}"
 
 
 def _wheels(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
@@ -169,7 +176,8 @@ def _wheels(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
         return "no motor of a wheel reaches its limit"
     torque, stored = (shown(max(n[name]), unit, up=True) for name, unit in (("motors", " N m"), ("stored", " N m s")))
     while_ = f"while the total momentum is at most {shown(n['momentum'], ' N m s')}"
-    return f"{place(n, subject)} {while_}, no motor gives more than {torque} and no wheel stores more than {stored}"
+    most = f"no motor gives more than {torque} and no wheel stores more than {stored}"
+    return f"{place(n, subject)} {while_}, {most}{_followed(subject)}"
 
 
 def _inertia(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:

@@ -125,7 +125,8 @@ class ClosedLoop:
     """One law on one spacecraft in one setting; SI units and radians.
 
     target: a quaternion (inertial to target axes), "orbital", or a table of `models.target.tabulate` with a row for each
-    control step and one more. noise adds to what the sensors say and to the torque.
+    control step and one more; knots: of the spline that the table was taken from. noise adds to what the sensors say and to
+    the torque.
     """
 
     craft: Craft
@@ -137,6 +138,7 @@ class ClosedLoop:
     orbit: bool = False
     gravity_gradient: bool = False
     target: Quaternion | Literal["orbital"] | NDArray[np.float64] = NO_TURN
+    knots: target.Knots | None = None
     noise: sensor.Noise = sensor.SILENT
     limit: Limit = "axis"
     command_limit: float | None = None

@@ -24,6 +24,20 @@ class Target(NamedTuple):
     acceleration: Vector
 
 
+HALF_TURN, SWING = 1e-6, 10.0
+"""How near to a half turn, as the cosine of half of it, neighbours in a history may be, and how far (rad) the spline may
+swing between them."""
+
+
+class Knots(NamedTuple):
+    """What makes a rotation spline: times (n,) in s, attitudes (n, 4) and rates (n, 3; rad/s, target axes) at them. From a
+    knot to the next the rotation vector is the cubic in time that has the attitudes and rates of both."""
+
+    times: NDArray[np.float64]
+    attitudes: NDArray[np.float64]
+    rates: NDArray[np.float64]
+
+
 def inertial(fixed: Quaternion, position: Vector, velocity: Vector, step: int, before: Any) -> Target:
     """A constant attitude."""
     return Target(fixed, ZERO, ZERO)
@@ -56,18 +70,35 @@ def tabulate(times: Any, attitudes: Any, sample_times: Any) -> NDArray[np.float6
     times: (n,) s, increasing; attitudes: (n, 4) quaternions, scalar first; sample times within [times[0], times[-1]].
     Raises ValueError when they are not. Target axes are the body axes to be followed.
     """
-    # Loaded here because few runs need it, and by name because its types are too loose for a strict checker.
-    transform: Any = import_module("scipy.spatial.transform")
-
     times, samples = np.asarray(times, dtype=float), np.asarray(sample_times, dtype=float)
     first, last = samples.min(), samples.max()
     if not (times[0] <= first and last <= times[-1]):
         raise ValueError(f"the target history covers {times[0]:g} to {times[-1]:g} s, the run needs {first:g} to {last:g} s")
-    spline = transform.RotationSpline(
-        times, transform.Rotation.from_quat(np.asarray(attitudes, dtype=float), scalar_first=True)
-    )
+    spline = _spline(times, attitudes)
     q: NDArray[np.float64] = spline(samples).as_quat(scalar_first=True)
     flips = np.cumprod(np.where(np.sum(q[1:] * q[:-1], axis=1) < 0.0, -1.0, 1.0))
     q[1:] *= flips[:, None]
     # The spline's rates are in the moving axes, which is the convention of this module.
     return np.ascontiguousarray(np.hstack([q, spline(samples, 1), spline(samples, 2)]))
+
+
+def knots_of(times: Any, attitudes: Any, last: float) -> Knots:
+    """The knots, of the spline of `tabulate`, that a run from 0 to `last` (s) is between. ValueError where two neighbours
+    leave open which way the turn between them goes, or the spline swings far between them."""
+    times, attitudes = np.asarray(times, dtype=float), np.asarray(attitudes, dtype=float)
+    rates: NDArray[np.float64] = _spline(times, attitudes)(times, 1)
+    unclear = np.abs(np.sum(attitudes[1:] * attitudes[:-1], axis=1)) < HALF_TURN
+    speeds = np.linalg.norm(rates, axis=1)
+    far = np.maximum(speeds[1:], speeds[:-1]) * np.diff(times) > 3.0 * SWING
+    for k in np.flatnonzero(unclear | far):
+        why = "a half turn, which could go either way" if unclear[k] else "the spline between them swings far off"
+        raise ValueError(f"from {times[k]:g} to {times[k + 1]:g} s {why}")
+    first, end = np.searchsorted(times, 0.0, "right") - 1, np.searchsorted(times, last, "left") + 1
+    return Knots(*(array[max(first, 0) : end] for array in (times, attitudes, rates)))
+
+
+def _spline(times: Any, attitudes: Any) -> Any:
+    # Loaded here because few runs need it, and by name because its types are too loose for a strict checker.
+    transform: Any = import_module("scipy.spatial.transform")
+    turns = transform.Rotation.from_quat(np.asarray(attitudes, dtype=float), scalar_first=True)
+    return transform.RotationSpline(times, turns)

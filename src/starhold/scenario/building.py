@@ -11,7 +11,7 @@ from starhold.models.sensor import Noise
 from starhold.scenario.checking import check_substeps, try_law
 from starhold.scenario.faults import make_events
 from starhold.scenario.reading import LawEntry, Scenario
-from starhold.scenario.start import start_of, target_of
+from starhold.scenario.start import knots_for, start_of, target_of
 
 
 def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
@@ -29,6 +29,7 @@ def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
         orbit=table.orbit is not None,
         gravity_gradient=table.environment.gravity_gradient,
         target=goal,
+        knots=knots_for(scenario),
         noise=Noise(table.environment.torque_noise, table.sensor.attitude_noise, table.sensor.rate_noise),
         limit="none" if np.isinf(body.torque_limit) else body.limit,
         command_limit=None if scenario.wheels is None else body.torque_limit,

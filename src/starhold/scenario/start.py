@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from starhold.algebra.vector import ZERO, add, subtract
 from starhold.errors import InputError
 from starhold.laws.interface import Start
 from starhold.models.rigid_body import State
-from starhold.models.target import Target, inertial, orbital, tabulate
+from starhold.models.target import Knots, Target, inertial, knots_of, orbital, tabulate
 from starhold.models.wheeled_body import WheeledState
 from starhold.models.wheels import capacity
 from starhold.scenario.history import read_history
@@ -38,16 +39,32 @@ def target_of(scenario: Scenario) -> Any:
     table = scenario.table.target
     if table.mode == "orbital":
         return "orbital"
-    return _attitude(table) if table.mode == "inertial" else _history(scenario)
+    return _attitude(table) if table.mode == "inertial" else _table(scenario)
 
 
-def _history(scenario: Scenario) -> Any:
+def knots_for(scenario: Scenario) -> Knots | None:
+    """The knots of the spline that a target with a history follows; None for other targets."""
     simulation = scenario.table.simulation
+    last = simulation.steps * simulation.control_period
+    return (
+        _history(scenario, lambda times, rows: knots_of(times, rows, last))
+        if scenario.table.target.mode == "history"
+        else None
+    )
+
+
+def _table(scenario: Scenario) -> Any:
+    simulation = scenario.table.simulation
+    samples = np.arange(simulation.steps + 1) * simulation.control_period
+    return _history(scenario, lambda times, rows: tabulate(times, rows, samples))
+
+
+def _history(scenario: Scenario, use: Callable[..., Any]) -> Any:
+    """What is made of the times and attitudes in the file of a history."""
     path = scenario.folder / str(scenario.table.target.file)
     allowed = "a CSV file of columns time,q0,q1,q2,q3 (in another order if named), unit quaternions, times that increase"
     try:
-        known, attitudes = read_history(path)
-        return tabulate(known, attitudes, np.arange(simulation.steps + 1) * simulation.control_period)
+        return use(*read_history(path))
     except OSError as error:
         raise InputError(scenario.where, "target.file", f"{path}: {error.strerror}", allowed) from None
     except ValueError as error:

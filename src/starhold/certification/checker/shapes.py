@@ -124,6 +124,12 @@ _WHEELS: dict[str, Test] = {
     "allocation": _one("least-squares", "least-peak"),
     "total_momentum": _number,
 }
+_HISTORY: dict[str, Test] = {
+    "interpolant": _one("rotation spline"),
+    "times": _list(_number),
+    "attitudes": _list(_list(_number, 4)),
+    "rates": _list(_VECTOR),
+}
 SUBJECT: dict[str, Test] = {
     "law": _text,
     "gains": lambda x: _object(x) and all(map(_gain, x.values())),
@@ -135,6 +141,7 @@ SUBJECT: dict[str, Test] = {
     "orbit": _or_none(_within({"position": _VECTOR, "velocity": _VECTOR, "gravitational_parameter": _number})),
     "gravity_gradient": _flag,
     "target": _one("inertial", "orbital", "history"),
+    "history": _or_none(_within(_HISTORY)),
     "target_rate": _number,
     "target_acceleration": _number,
     "modelled_torque": _VECTOR,

@@ -31,6 +31,7 @@ from starhold.certification.checker.exact import (
     unit,
     up,
 )
+from starhold.certification.checker.spline import moves_within
 from starhold.certification.checker.wheels import Wheels, read_wheels
 from starhold.laws.catalogue import Law, catalogue
 from starhold.models.craft import EARTH, Craft, check_inertia, compact
@@ -110,7 +111,7 @@ def read_subject(given: Mapping[str, Any]) -> Subject:
         limit=given["limit"],
         torque_limit=None if limit is None else rational(limit),
         gravity=rational(gravity),
-        moving=given["target"] != "inertial",
+        moving=given["target_rate"] > 0 or given["target_acceleration"] > 0,
         modelled=[rational(x) for x in given["modelled_torque"]],
         modelled_norm=rational(given["modelled_torque_norm"]),
         period=rational(given["control_period"]),
@@ -133,6 +134,14 @@ def _check_bounds(given: Mapping[str, Any], whole: Rows) -> Any | None:
     demand(
         given["orbit"] is not None or not (given["gravity_gradient"] or given["target"] == "orbital"), "there is no orbit"
     )
+    demand((given["history"] is not None) == (given["target"] == "history"), "a history is for a target that follows one")
+    motion = [rational(given[name]) for name in ("target_rate", "target_acceleration")]
+    if given["target"] == "inertial":
+        demand(not any(motion), "a target at rest has no rate")
+    if given["history"] is not None:
+        moves_within(given["history"], *motion)
+    if not given["gravity_gradient"]:
+        demand(not any([*given["modelled_torque"], given["modelled_torque_norm"]]), "nothing models a torque")
     if given["orbit"] is None:
         return None
     r, v = ([arb(rational(x)) for x in given["orbit"][key]] for key in ("position", "velocity"))
