@@ -6,6 +6,7 @@ import json
 import math
 from functools import cache
 from pathlib import Path
+from time import monotonic
 
 import numpy as np
 import pytest
@@ -18,9 +19,11 @@ from starhold.certification.certificate import write
 from starhold.certification.certify import Wanted, certify
 from starhold.certification.checker import check, check_file, passed
 from starhold.certification.checker import exact as checking
+from starhold.certification.checker.reading import in_time, limited
 from starhold.certification.checker.subject import variables
 from starhold.certification.checker.torque import SHAPES, keeps_below
 from starhold.errors import InputError
+from starhold.laws import pd
 from starhold.laws.sliding import Gains as Sliding
 from tests.certification.loops import FULL, LOPSIDED, PRINCIPAL, loop_of, textbook
 
@@ -491,6 +494,52 @@ def test_a_readable_file_with_a_fault_fails(tmp_path, made):
     for text in [*texts, plain.replace("certificate 1", "certificate 2"), "[]", "null", '"x"']:
         path.write_text(text, encoding="utf-8")
         assert not passed(check_file(path)), text[:60]
+
+
+def test_limits_of_a_file_are_refused_each_with_its_line(tmp_path, made):
+    path = tmp_path / "c.json"
+    plain = made("pd-0")
+    deep = inner = []
+    for _ in range(900):
+        inner.append([])
+        inner = inner[0]
+    for part in ("numbers", "witness"):
+        (reason,) = reasons(edited(plain, ("convergence", part, "level"), deep))
+        assert reason == "the file is nested more than 32 deep"
+    for text, told in (("[" * 100_000, "nested more than 32 deep"), ('{"x": ' + "1" * 5000 + "}", "more than 1000 digits")):
+        path.write_text(text, encoding="utf-8")
+        with pytest.raises(InputError, match=told):
+            check_file(path)
+    with pytest.raises(InputError, match="is larger than 64 MiB"):
+        check_file("/dev/zero")
+
+
+@pytest.mark.parametrize("name", ["\ud800", "a\x1b[31mb", "a\nb", "x" * 1001])
+def test_a_name_that_cannot_be_written_fails(made, name):
+    content = made("pd-0")
+    content["certificates"][0]["name"] = name
+    assert reasons(content) == ["the certificate has something else than it may under name"]
+
+
+def test_a_check_that_takes_too_long_is_given_up():
+    loads, half = [[fmpq(1)] * len(SHAPES)], fmpq(1, 2)
+    assert keeps_below(loads, [fmpq(0)] * len(SHAPES), fmpq(100), half, half)
+    with limited(0.0), pytest.raises(checking.CheckError, match="takes longer than"):
+        keeps_below(loads, [fmpq(0)] * len(SHAPES), fmpq(100), half, half)
+    # What is part of something gets no more time than that.
+    with limited(0.0), limited(60.0), pytest.raises(checking.CheckError):
+        in_time()
+    in_time()
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e-30, 1e30, 1e104])
+def test_gains_of_any_size_are_certified_and_checked_in_time(tmp_path, size):
+    loop = loop_of("pd", pd.Gains(0.09 * size, 0.009 * size), FULL)
+    begun = monotonic()
+    write([certify(loop)], "made", tmp_path / "c.json")
+    assert passed(check_file(tmp_path / "c.json")), [f for f in check_file(tmp_path / "c.json") if f.verdict == "fails"]
+    # It takes a second; without a limit of the digits the roots of the sampled loop alone took minutes.
+    assert monotonic() - begun < 20.0
 
 
 # --- refuted and undecided --------------------------------------------------------------------------------------------

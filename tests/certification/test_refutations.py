@@ -3,6 +3,8 @@
 import copy
 import json
 import math
+from dataclasses import replace
+from time import process_time
 
 import numpy as np
 import pytest
@@ -11,9 +13,21 @@ from starhold.certification.certificate import write
 from starhold.certification.certify import Wanted, certify
 from starhold.certification.checker import check, check_file, passed
 from starhold.laws import lqr, matrix_pd, pd, sliding
+from starhold.laws.catalogue import catalogue
 from starhold.laws.sliding import Gains as Sliding
-from tests.certification.loops import FULL, LOPSIDED, PRINCIPAL, UNEVEN, loop_of, textbook
-from tests.certification.test_checker import alone, by_hand, claims_of, converging, edited, proved_by_hand, reasons, spots
+from tests.certification.loops import FULL, LOPSIDED, PRINCIPAL, UNEVEN, loop_of, rotors, textbook
+from tests.certification.test_checker import (
+    alone,
+    by_hand,
+    claims_of,
+    content_at,
+    converging,
+    edited,
+    proved_by_hand,
+    reasons,
+    replaced,
+    spots,
+)
 
 SKEWED = ((0.01, 0.02, 0.0), (0.02, 0.01, 0.0), (0.0, 0.0, 0.01))
 CASES = {
@@ -204,3 +218,78 @@ def test_no_surface_is_overpowered_by_a_bound_alone(tmp_path):
     between = certify(loop, "", Wanted(disturbance=5e-3 - 0.4 * modelled))
     write([between], "made", tmp_path / "c.json")
     assert passed(check_file(tmp_path / "c.json")), [f for f in check_file(tmp_path / "c.json") if f.verdict == "fails"]
+
+
+def test_no_claim_is_about_less_momentum_than_is_had_on_target(tmp_path):
+    """A body that follows the orbit at rest on target has momentum; one with none is told of by nobody."""
+    loop = rotors("wheel", catalogue()["wheel"].examples()[0], target="orbital")
+    loop = replace(loop, start=loop.start._replace(momentum=(0.0,) * 4))
+    whole = certify(loop)
+    assert whole.claim("wheels").outcome == "proved"
+    write([whole], "made", tmp_path / "c.json")
+    content = alone(json.loads((tmp_path / "c.json").read_text(encoding="utf-8")), "wheels")
+    assert passed(check(content))
+    empty = edited(edited(content, ("wheels", "numbers", "momentum"), 0.0), ("", "wheels", "total_momentum"), 0.0)
+    assert any("the claim is empty" in reason for reason in reasons(empty))
+    asked = certify(loop, "", Wanted(momentum=0.0)).claim("wheels")
+    assert asked.outcome == "undecided"
+    assert "so little momentum" in asked.obligations[0].evidence["reason"]
+    # At rest on a target that is at rest a body has none.
+    still = rotors("wheel", catalogue()["wheel"].examples()[0])
+    still = replace(still, start=still.start._replace(momentum=(0.0,) * 4))
+    write([certify(still, "", Wanted(momentum=0.0))], "made", tmp_path / "s.json")
+    assert passed(check_file(tmp_path / "s.json"))
+    assert certify(still, "", Wanted(momentum=0.0)).claim("wheels").outcome == "proved"
+
+
+# --- mutations --------------------------------------------------------------------------------------------------------
+
+JUNK = (
+    None,
+    True,
+    0,
+    -1,
+    5e-324,
+    1e-104,
+    1e104,
+    1.7e308,
+    10**400,
+    math.nan,
+    "x",
+    "[/red]",
+    "\ud800",
+    [],
+    {},
+    [[]],
+    [0.0] * 6,
+)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_mutations_neither_stumble_nor_pass_for_what_they_are_not(refuted, proofs, seed):
+    """Anything in a file changed, taken away, doubled or put elsewhere: a verdict, and none better than before."""
+    random = np.random.default_rng(seed)
+    names = random.choice(list(CASES), 2, replace=False)
+    pool = [refuted(name)[0] for name in names]
+    for name in random.choice(list(proofs), 2, replace=False):
+        pool.append(alone(proofs[name], random.choice(list(claims_of(proofs[name])))))
+    for content in pool:
+        paths = [path for path in spots(content) if "versions" not in path]
+        for _ in range(12):
+            path, other = (paths[k] for k in random.integers(len(paths), size=2))
+            value, change = content_at(content, path), random.integers(4)
+            if change == 0 and type(value) is float:
+                new = math.nextafter(value, math.inf) if random.integers(2) else value * 10.0 ** random.uniform(-9.0, 9.0)
+            else:
+                new = content_at(content, other) if change == 1 else JUNK[random.integers(len(JUNK))]
+            if change == 2:
+                mutant = replaced(content, path, lambda spot, key: spot.pop(key))
+            else:
+                mutant = replaced(content, path, lambda spot, key, new=new: spot.__setitem__(key, new))
+            begun = process_time()
+            found = check(mutant)
+            assert process_time() - begun < 20.0, path
+            for verdict, outcomes in (("holds", ["proved"]), ("not claimed", ["refuted", "undecided", None])):
+                kinds = {f.claim for f in found if f.verdict == verdict}
+                were = {c["kind"] for c in content["certificates"][0]["claims"] if c["outcome"] in outcomes}
+                assert kinds <= were or not passed(found) or kinds == {""}, path

@@ -80,9 +80,10 @@ def _by_lyapunov(subject: Subject, wanted: Wanted) -> list[Claim]:
         return [main]
     # The law's own V, where it serves, gives the larger sets.
     basin = own or found
-    limit = torque_limit(basin, wanted.turn) if subject.loop.wheels is None else saturation(basin, wanted.turn)
+    wheeled = subject.loop.wheels is not None
+    limit = saturation(basin, wanted.turn) if wheeled else torque_limit(basin, wanted.turn)
     more = (
-        (limit, wanted.turn),
+        (limit, wanted.turn or (wheeled and wanted.momentum is not None)),
         (disturbance(basin), wanted.disturbance),
         (inertia_box(basin, wanted.inertia_tolerance), wanted.inertia_tolerance),
     )

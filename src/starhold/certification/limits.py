@@ -253,7 +253,7 @@ def largest_level(basin: Basin, carried: list[Load], cap: Any | None = None, tri
     low, high = 0.0, number(basin.frame.s) * 1e-6
     caps = [number(bound) * (1.0 - 1e-12) for bound in (basin.stay, cap) if bound is not None]
     top = min(caps, default=np.inf)
-    while high < top and guess(high):
+    while high < min(top, 1e300) and guess(high):
         low, high = high, 2.0 * high
     if high >= top and guess(top):
         low = top

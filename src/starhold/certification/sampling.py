@@ -74,8 +74,8 @@ def sampling(motion: Motion) -> Claim | None:
     if not stable:
         worst = (
             {"eigenvalue": [values[0].real, values[0].imag]}
-            if abs(values[0]) >= 1.0
-            else {"reason": "a root on the unit circle"}
+            if any(arb(abs(root)) >= 1 for root, _ in roots)
+            else {"reason": "a root on the unit circle is not excluded"}
         )
         outcome = "refuted" if "eigenvalue" in worst else "undecided"
         refused = Obligation("stable at the period", ROOTS, outcome, worst)

@@ -58,7 +58,7 @@ def surface_claim(subject: Subject) -> Claim | None:
     def add(name: str, how: str, outcome: Any, evidence: dict[str, Any] | None = None) -> None:
         obligations.append(Obligation(name, how, outcome, evidence or {}))
 
-    torque = [exact(above(m + subject.disturbance)) for m in subject.modelled]
+    torque = [exact(above(exact(above(m)) + subject.disturbance)) for m in subject.modelled]
     numbers: dict[str, Any] = {"torque": [number(m) for m in torque]}
 
     def finish() -> Claim:

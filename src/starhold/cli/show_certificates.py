@@ -133,8 +133,8 @@ def print_findings(findings: Sequence[Finding]) -> None:
 
 
 def _where(finding: Finding) -> str:
-    parts = (finding.certificate, finding.claim, finding.obligation)
-    return _safe(f"{' / '.join(part for part in parts if part)}: {finding.reason}")
+    place = " / ".join(part for part in (finding.certificate, finding.claim, finding.obligation) if part)
+    return _safe(": ".join(part for part in (place, finding.reason) if part))
 
 
 def _safe(text: str) -> str:

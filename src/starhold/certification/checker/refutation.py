@@ -201,7 +201,7 @@ def _unstable(subject: Subject, numbers: Numbers, evidence: Numbers) -> str:
     demand(within_circle(roots, rational(numbers["radius"]) * (1 + CLOSE)), "an eigenvalue may be larger than the radius")
     demand(evidence["eigenvalue"] in numbers["eigenvalues"], "the eigenvalue is none of those told")
     real, imaginary = map(rational, evidence["eigenvalue"])
-    demand(real**2 + imaginary**2 >= 1, "the eigenvalue is within the circle")
+    demand(real**2 + imaginary**2 >= 1 - CLOSE, "the eigenvalue is within the circle")
     return "an eigenvalue is not within the circle"
 
 
