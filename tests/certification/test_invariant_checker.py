@@ -129,7 +129,6 @@ def test_another_system_does_not_pass(name, key, value, made):
         ("saturated-axis", "max(s**2, x**2/8)"),
         ("switching", "max(below if y <= 0 else above/4, 0)"),
         ("switching", "max(below if y <= 0 else above - 1, 0)"),
-        ("spin", "energy + (momentum - 8)**2/9"),
         ("spin", "energy + p"),
     ],
 )
@@ -265,6 +264,12 @@ def test_the_command_tells_what_is_not_checked(tmp_path, made):
     left = checked(changed(made["circle"], lambda subject, claims: subject.pop("V")))
     assert left.returncode == 1
     assert "2 are not checked" in left.stdout
+
+
+def test_more_cells_than_can_be_looked_at_fail_in_one_line(made):
+    six = [" + ".join(f"abs(x - {k + 6 * j}*y)" for k in range(6)) for j in range(2)]
+    found = failing(changed(made["circle"], lambda subject, claims: subject.update(rates={"x": six[0], "y": six[1]})))
+    assert {f.reason for f in found} == {"the system is too large: 4096 cells, more than 64"}
 
 
 # --- what it decides with -----------------------------------------------------------------------------------------------

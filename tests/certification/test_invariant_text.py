@@ -140,6 +140,12 @@ def test_numbers_are_taken_as_written():
         ("(" * 400 + "x" + ")" * 400, "", "an expression"),
         ("-" * 1900 + "x", "", "nested less deeply"),
         ("abs(x+abs(y+abs(x+abs(y+abs(x+abs(y+abs(x-y)))))))", "", ""),
+        ("(((1e9999**24)**24)**24)**24", "1e9999", "a power of ten"),
+        ("(((1e999**24)**24)**24)**24", "a number that is too long", "1000 digits"),
+        ("(x/1e-300)**24", "a number that is too long", "1000 digits"),
+        ("max(" + ", ".join(f"abs(x + {k}*y)" for k in range(8)) + ")", "pieces", "at most 64"),
+        ("1 if " + " and ".join(f"abs(x + {k}*y) < abs(y)" for k in range(40)) + " else 0", "pieces", "at most 64"),
+        ("+".join(f"(x+y+{k})**12*(x-y+x*y+{k})**12" for k in range(40)), "too large", ""),
         ("x\0y", "", "an expression"),
     ],
 )
@@ -151,6 +157,7 @@ def test_what_is_not_allowed_is_said(text, found, allowed):
     assert "\n" not in str(said.value)
 
 
+SIX = [" + ".join(f"abs(x - {k + 6 * j}*y)" for k in range(6)) for j in range(2)]
 GOOD = """
 name = "small"
 variables = ["x", "y"]
@@ -199,6 +206,16 @@ def test_a_small_file_is_read():
         ('name = "small"', 'name = "../up"', "name", "letters, digits"),
         ("[rates]", "[rates", "", "not TOML"),
         ('"region"', '"intersection"', "claim[1].V", "a list of expressions"),
+        ('y = "-y"', 'y = "-y - abs(x-2*y)*abs(x-3*y)*abs(x-y)*sign(x)*sign(y)"', "rates.y", "72 pieces"),
+        ('x = "-x"\ny = "-y"', f'x = "{SIX[0]}"\ny = "{SIX[1]}"', "claim[1].V", "4096 cells"),
+        ("x = [-1, 1]", "x = [-1e200, 1]", "box.x", "within 1e+100"),
+        ("x = [-1, 1]", "x = [-1, 0x" + "f" * 5000 + "]", "box.x", "within 1e+100"),
+        ('x = "-x"', "x = 0x" + "f" * 5000, "rates.x", "1000 digits"),
+        ('x = "-x"', "x = " + "9" * 5000, "", "not TOML"),
+        ('V = "x**2 + y**2"', "V = " + "[" * 400 + "]" * 400, "", "claim[1].V"),
+        ("rest = { x = 0, y = 0 }", "level = 1e300", "claim[1].level", "at most 1e+100"),
+        ("rest = { x = 0, y = 0 }", f'name = "{"n" * 300}"', "claim[1].name", "at most 100 characters"),
+        ('name = "small"', f'name = "{"n" * 300}"', "name", "at most 100 characters"),
     ],
 )
 def test_what_is_wrong_with_a_file_is_one_line(old, new, key, said):

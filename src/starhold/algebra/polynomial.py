@@ -248,8 +248,11 @@ def pieces(value: Any) -> tuple[Case, ...]:
     return value.pieces if isinstance(value, Cases) else (Case((), _polynomial(value)),)
 
 
-def jointly(values: Iterable[Any]) -> list[tuple[tuple[tuple[Condition, bool], ...], list[Polynomial]]]:
-    """The cases of several piecewise polynomials at once: conditions and one polynomial for each value."""
+def jointly(
+    values: Iterable[Any], most: int | None = None
+) -> list[tuple[tuple[tuple[Condition, bool], ...], list[Polynomial]]]:
+    """The cases of several piecewise polynomials at once: conditions and one polynomial for each value. ValueError for more
+    than `most` cases."""
     found: list[tuple[tuple[tuple[Condition, bool], ...], list[Polynomial]]] = [((), [])]
     for value in values:
         found = [
@@ -258,6 +261,8 @@ def jointly(values: Iterable[Any]) -> list[tuple[tuple[tuple[Condition, bool], .
             for piece in pieces(value)
             if (truths := _merged(held, piece.truths)) is not None
         ]
+        if most is not None and len(found) > most:
+            raise ValueError(f"{len(found)} cells, more than {most}")
     return found
 
 

@@ -51,6 +51,7 @@ def invariant(file: SystemFile = None, output: Output = None, force: Force = Fal
 
 def _print(certificate: Certificate, sketches: list[Sketch]) -> None:
     """Each claim with its outcome, how it was shown and what it lacks."""
+    from rich.markup import escape
     from rich.table import Table
 
     from starhold.certification.invariant.wording import HEADINGS, OBLIGATIONS, evidence, limit, sentence, size
@@ -63,17 +64,17 @@ def _print(certificate: Certificate, sketches: list[Sketch]) -> None:
         table.add_column(head, overflow="fold")
     for claim, drawn in zip(certificate.claims, sketches, strict=True):
         heading = HEADINGS[claim.numbers["theorem"]]
-        name = claim.witness["name"]
+        name = escape(claim.witness["name"])
         table.add_row(
             f"{name}\n[dim]{heading}[/dim]" if name else heading,
             f"[{COLOURS[claim.outcome]}]{claim.outcome}[/{COLOURS[claim.outcome]}]",
-            sentence(claim),
+            escape(sentence(claim)),
         )
         for line in filter(None, (size(claim.numbers, drawn.orbit_area), limit(claim.numbers))):
             table.add_row("", "", f"[dim]{line}[/dim]")
         for o in claim.obligations:
             if o.outcome != "proved":
-                table.add_row("", "", f"needed, but {o.outcome}: {OBLIGATIONS[o.name]}; {evidence(o)}")
+                table.add_row("", "", f"needed, but {o.outcome}: {OBLIGATIONS[o.name]}; {escape(evidence(o))}")
         if claim.outcome == "proved":
             table.add_row("", "", f"[dim]by {', '.join(dict.fromkeys(o.how for o in claim.obligations))}[/dim]")
     console.print(table, highlight=False)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import comb
 from typing import Any
 
 from flint import Ordering, fmpq_mpoly_ctx
@@ -18,6 +19,8 @@ from starhold.algebra.polynomial import Polynomial, jointly
 from starhold.certification.checker.cover import Poly, Question, answer
 from starhold.certification.checker.exact import ONE, ZERO, CheckError, demand
 
+MOST, TERMS = 64, 50_000
+"""Cells, and terms that V' may have."""
 FEW = 2_000
 """Parts of a box that are looked at for whether two cells meet at all."""
 
@@ -188,7 +191,11 @@ def split(names: Sequence[str], moving: int, box: Any, rest: Any, rates: Sequenc
     cells: list[Cell] = []
     thin: list[Cell] = []
     still = [Polynomial({}) for _ in names[moving:]]
-    for truths, values in jointly([*rates, *still, V]):
+    try:
+        joined = jointly([*rates, *still, V], MOST)
+    except ValueError as error:
+        raise CheckError(f"the system is too large: {error}") from None
+    for truths, values in joined:
         asked: dict[str, tuple[Poly, set[tuple[int, bool]]]] = {}
         for condition, truth in truths:
             surface = polynomial(ring, names, condition.positive)
@@ -203,6 +210,8 @@ def split(names: Sequence[str], moving: int, box: Any, rest: Any, rates: Sequenc
         own = [polynomial(ring, names, value) for value in values]
         (thin if on else cells).append(Cell(sides, tuple(own[:-1]), own[-1], on))
     demand(bool(cells), "a system has no cells")
+    degree = max(0, *(cell.V.total_degree() + rate.total_degree() for cell in (*cells, *thin) for rate in cell.rates))
+    demand(comb(len(names) + degree, degree) <= TERMS, "the system is too large: V' has too many terms")
     return Pieces(tuple(names), moving, tuple(box), tuple(cells), rest, tuple(thin))
 
 

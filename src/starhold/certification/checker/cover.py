@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import prod
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -21,7 +22,8 @@ from starhold.certification.checker.exact import CheckError
 Poly: TypeAlias = Any
 """`fmpq_mpoly`."""
 Options: TypeAlias = Sequence[Sequence[Sequence[Poly]]]
-MOST, BLOCK, LOOKED_AT = 100_000, 4_096, 400
+MOST, BLOCK, LOOKED_AT, LARGEST = 100_000, 4_096, 400, 1_000_000
+"""Parts that are looked at, at once so many; states that are tried; coefficients of a part."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,10 @@ def answer(asked: Question) -> bool | None:
         return False
     if not {name for p in stack for name in p.variables()} <= set(box):
         raise CheckError("a polynomial depends on what the box does not hold")
-    first = stacked(stack, box, highest(stack, box))
+    degrees = highest(stack, box)
+    if len(stack) * prod(degree + 1 for degree in degrees) > LARGEST:
+        return None
+    first = stacked(stack, box, degrees)
     corner, width = np.zeros((1, len(box))), np.ones((1, len(box)))
     waiting = [(first, corner, width)]
     seen = tried = 0

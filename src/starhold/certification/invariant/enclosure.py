@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cached_property
 from typing import Any
 
@@ -97,8 +99,8 @@ class Boxes:
         return half * self.sides[place] if power % 2 else half
 
 
-MOST = 250_000
-"""Boxes that one proof may take: a few seconds."""
+MOST, ALL = 250_000, 5_000_000
+"""Boxes that one proof may take, a few seconds, and all proofs of a claim together."""
 LEAST = 1e-7
 """As a share of the whole: boxes below it that are not shown yet lie around a point or a line where nothing can be shown."""
 CHUNK = 4_096
@@ -115,8 +117,21 @@ def part(sides: Sides, start: int) -> Sides:
     return tuple(Intervals(s.low[start : start + CHUNK], s.high[start : start + CHUNK]) for s in sides)
 
 
+_left: ContextVar[list[int] | None] = ContextVar("left", default=None)
+
+
+@contextmanager
+def allowed(boxes: int) -> Generator[None]:
+    """Within, no more boxes are looked at, in all: then nothing more is shown."""
+    before = _left.set([boxes])
+    try:
+        yield
+    finally:
+        _left.reset(before)
+
+
 class _AgainstError(Exception):
-    """A point or a small box tells that a proof will not end well."""
+    """A point, a small box or the number of boxes tells that a proof will not end well."""
 
 
 def everywhere(
@@ -132,7 +147,13 @@ def everywhere(
 
     widths = [high - low if high > low else 1.0 for low, high in box]
 
+    left_over = _left.get()
+
     def told(sides: Sides) -> Mask:
+        if left_over:
+            left_over[0] -= len(sides[0].low)
+            if left_over[0] < 0:
+                raise _AgainstError
         return np.concatenate([some(part(sides, k)) for k in starts(sides)])
 
     def some(sides: Sides) -> Mask:

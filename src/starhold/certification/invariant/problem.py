@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import json
 import keyword
-import math
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -17,14 +16,15 @@ from typing import Any, cast
 from starhold.algebra.polynomial import Polynomial, exact, pieces
 from starhold.certification.certificate import Certificate
 from starhold.certification.certificate import write as write_certificates
-from starhold.certification.invariant.system import System
-from starhold.certification.invariant.text import RESERVED, ExpressionError, as_written, read
-from starhold.certification.invariant.theorems import THEOREMS, Wanted, prove
+from starhold.certification.invariant.system import System, split
+from starhold.certification.invariant.text import MOST_DIGITS, RESERVED, ExpressionError, as_written, read
+from starhold.certification.invariant.theorems import THEOREMS, Wanted, indicator, prove
 from starhold.errors import InputError
 
 FORMAT = "starhold invariant certificate 1"
-MOST = 6
-"""Variables and parameters together: beyond, branch and bound would not end."""
+MOST, LARGEST, LONGEST = 6, 1e100, 100
+"""Variables and parameters together, beyond which branch and bound would not end; numbers of a box, of which floats hold
+the powers; characters of a name."""
 _KEYS = ("name", "description", "variables", "parameters", "define", "rates", "box", "claim")
 _CLAIM = ("name", "theorem", "V", "box", "rest", "level", "escape", "squares", "known", "orbit")
 
@@ -90,7 +90,8 @@ def parse(text: str, where: str) -> Problem:
     """The problem of a TOML text; `where` names it in errors."""
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:
+        # Also of whole numbers of too many digits, and of lists too deep in one another.
         raise InputError(where, "", f"not TOML: {error}", "a TOML file") from None
     return _File(where, data).problem()
 
@@ -119,7 +120,7 @@ class _File:
         if not isinstance(claims, list) or not claims:
             raise InputError(self.where, "claim", _show(claims), "at least one [[claim]] table")
         tables = [self._table(item, f"claim[{k}]") for k, item in enumerate(cast(list[Any], claims), 1)]
-        wanted = [self._claim(table, f"claim[{k}]") for k, table in enumerate(tables, 1)]
+        wanted = [self._claim(table, f"claim[{k}]", system) for k, table in enumerate(tables, 1)]
         written: dict[str, Any] = {name: self.data[name] for name in ("define", "rates") if name in self.data}
         written["V"] = [table["V"] for table in tables]
         # Whatever a claim is made of, so that it can be checked from the certificate alone.
@@ -153,7 +154,7 @@ class _File:
         self.variables = tuple(cast(list[str], names))
         self.parameters = {name: self._interval(value, f"parameters.{name}") for name, value in parameters.items()}
 
-    def _claim(self, table: dict[str, Any], key: str) -> tuple[Wanted, tuple[float, ...] | None]:
+    def _claim(self, table: dict[str, Any], key: str, system: System) -> tuple[Wanted, tuple[float, ...] | None]:
         self._known(table, _CLAIM, key)
         theorem = self._required(table, "theorem", key)
         if theorem not in THEOREMS:
@@ -167,7 +168,12 @@ class _File:
         orbit = tuple(float(x) for x in self._state(table["orbit"], f"{key}.orbit")) if "orbit" in table else None
         exactly = None if rest is None else tuple(exact(x) for x in rest)
         name = self._text(table, "name", key, "")
-        return Wanted(theorem, V, self._box(table, key), exactly, level, escape, squares, known, name), orbit
+        wanted = Wanted(theorem, V, self._box(table, key), exactly, level, escape, squares, known, name)
+        try:
+            split(system, indicator(wanted))
+        except ValueError as error:
+            raise InputError(self.where, f"{key}.V", str(error), "fewer comparisons, or lower powers") from None
+        return wanted, orbit
 
     def _indicator(self, value: Any, theorem: str, key: str) -> Any:
         if theorem != "intersection":
@@ -211,21 +217,21 @@ class _File:
 
     def _interval(self, value: Any, key: str) -> tuple[float, float]:
         ends = cast(list[Any], value) if isinstance(value, list) else []
-        if len(ends) == 2 and all(type(x) in (int, float) and math.isfinite(x) for x in ends) and ends[0] < ends[1]:
+        if len(ends) == 2 and all(type(x) in (int, float) and abs(x) <= LARGEST for x in ends) and ends[0] < ends[1]:
             return float(ends[0]), float(ends[1])
-        raise InputError(self.where, key, _show(value), "two numbers [low, high], low < high")
+        raise InputError(self.where, key, _show(value), f"two numbers [low, high], low < high, within {LARGEST:g}")
 
     def _positive(self, table: dict[str, Any], name: str, key: str) -> float | None:
         value = table.get(name)
-        if value is None or (type(value) in (int, float) and 0.0 < value < math.inf):
+        if value is None or (type(value) in (int, float) and 0.0 < value <= LARGEST):
             return None if value is None else float(value)
-        raise InputError(self.where, f"{key}.{name}", _show(value), "a positive number")
+        raise InputError(self.where, f"{key}.{name}", _show(value), f"a positive number, at most {LARGEST:g}")
 
     def _expression(self, value: Any, key: str) -> Any:
         if isinstance(value, bool) or not isinstance(value, (str, int, float)):
             raise InputError(self.where, key, _show(value), "an expression in quotes")
         try:
-            return read(str(value), self.names)
+            return read(_written(value), self.names)
         except ExpressionError as error:
             raise InputError(self.where, key, error.found, error.allowed) from None
 
@@ -257,8 +263,8 @@ class _File:
 
     def _text(self, table: dict[str, Any], name: str, key: str, default: str) -> str:
         value = table.get(name, default)
-        if not isinstance(value, str) or (name == "name" and not key and not _file_name(value)):
-            allowed = "letters, digits, '-', '_', '.' and spaces"
+        if not isinstance(value, str) or (name == "name" and (len(value) > LONGEST or not (key or _file_name(value)))):
+            allowed = f"at most {LONGEST} characters" + ("" if key else ": letters, digits, '-', '_', '.' and spaces")
             raise InputError(self.where, f"{key}.{name}".lstrip("."), _show(value), allowed)
         return value
 
@@ -267,8 +273,19 @@ def _file_name(text: str) -> bool:
     return bool(text) and all(c.isalnum() or c in "-_. " for c in text) and not text.startswith(".")
 
 
+def _written(value: Any) -> str:
+    try:
+        return str(value)
+    except ValueError:
+        raise ExpressionError("a number that is too long", f"at most {MOST_DIGITS} digits") from None
+
+
 def _show(value: Any) -> str:
-    text = f'"{value}"' if isinstance(value, str) else str(value)
+    try:
+        text = f'"{value}"' if isinstance(value, str) else str(value)
+    except (ValueError, RecursionError):
+        text = "what is too long to show"
+    text = " ".join(text.split())
     return text if len(text) <= 60 else text[:57] + "..."
 
 

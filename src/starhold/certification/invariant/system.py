@@ -7,6 +7,7 @@ single out a surface (`sign` gives 0 on one) that is a thin cell, whose V and ra
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -15,6 +16,8 @@ from flint import Ordering, fmpq_mpoly_ctx
 
 from starhold.algebra.polynomial import Condition, Polynomial, jointly
 
+MOST_CELLS, MOST_TERMS = 64, 50_000
+"""Cells, and terms that V' may have: beyond these a proof would not end."""
 Poly: TypeAlias = Any
 """A polynomial of python-flint (`fmpq_mpoly`): exact, with division and factors."""
 
@@ -162,13 +165,13 @@ def solve(surface: Poly) -> tuple[int, Poly] | None:
 
 
 def split(system: System, V: Any) -> Pieces:
-    """The cells of a system and a function, polynomial or piecewise."""
+    """The cells of a system and a function, polynomial or piecewise. ValueError where they are too many or too large."""
     names = system.names
     ring = fmpq_mpoly_ctx.get(names, Ordering.degrevlex)
     zero = Polynomial({})
     surfaces: list[Poly] = []
     found: list[tuple[dict[int, int], list[Poly]]] = []
-    for truths, values in jointly([*system.rates, *(zero for _ in system.parameters), V]):
+    for truths, values in jointly([*system.rates, *(zero for _ in system.parameters), V], MOST_CELLS):
         sides = _sides(truths, surfaces, ring, names)
         if sides is not None:
             found.append((sides, [_poly(value, ring, names) for value in values]))
@@ -181,6 +184,9 @@ def split(system: System, V: Any) -> Pieces:
         )
         for sides, polys in found
     ]
+    degree = max(0, *(cell.V.total_degree() + rate.total_degree() for cell in cells for rate in cell.rates))
+    if math.comb(len(names) + degree, degree) > MOST_TERMS:
+        raise ValueError(f"V' of degree {degree} in {len(names)} variables")
     whole, thin = ([cell for cell in cells if bool(cell.on) == lies] for lies in (False, True))
     return Pieces(names, len(system.variables), tuple(surfaces), tuple(whole), tuple(thin))
 

@@ -7,8 +7,10 @@ coefficients. A number stands for what is written: 0.1 is one tenth.
 from __future__ import annotations
 
 import ast
+import math
 from collections.abc import Callable, Mapping
 from fractions import Fraction
+from functools import reduce
 from typing import Any
 
 from starhold.algebra.polynomial import Cases, Polynomial, pieces
@@ -18,8 +20,11 @@ LONGEST = 2_000
 """Characters of an expression."""
 DIGITS = 3
 """Of a power of ten: floats have no more."""
-MOST_TERMS, MOST_CASES, HIGHEST = 600, 64, 24
-"""Terms of a polynomial, cases of a piecewise one, and the degree: beyond these a proof would not end anyway."""
+MOST_DIGITS = 1_000
+"""Of a number, of what numbers make together too."""
+MOST_TERMS, MOST_CASES, HIGHEST, WORK, COMPARED = 600, 64, 24, 2_000_000, 10
+"""Terms of a polynomial, cases of a piecewise one, the degree, and pairs of terms that are multiplied on the way to an
+expression, a pair of cases that are compared counted as so many: beyond these a proof would not end anyway."""
 ALLOWED = "numbers, variables, + - * / **, comparisons, 'a if b else c', and where, min, max, abs, clip, sat, sign"
 
 
@@ -42,18 +47,9 @@ def _sat(x: Any, limit: Any = 1) -> Any:
     return minimum(maximum(x, -limit), limit)
 
 
-def _extreme(pick: Callable[[Any, Any], Any]) -> Callable[..., Any]:
-    def several(first: Any, *others: Any) -> Any:
-        for other in others:
-            first = pick(first, other)
-        return first
-
-    return several
-
-
 _FUNCTIONS: dict[str, tuple[Callable[..., Any], int, int]] = {
-    "min": (_extreme(minimum), 2, 8),
-    "max": (_extreme(maximum), 2, 8),
+    "min": (minimum, 2, 8),
+    "max": (maximum, 2, 8),
     "abs": (absolute, 1, 1),
     "clip": (_sat, 2, 2),
     "sat": (_sat, 1, 2),
@@ -81,21 +77,19 @@ def read(text: str, names: Mapping[str, Any]) -> Any:
         raise ExpressionError(f"{_short(text)} ({error})", "an expression") from None
 
 
+def _size(value: Any) -> int:
+    return sum(len(piece.value.terms) + 1 for piece in pieces(value))
+
+
 class _Reader:
     """Goes down the tree; `number` and `_choose` know all the nodes there may be."""
 
     def __init__(self, text: str, names: Mapping[str, Any]) -> None:
-        self._text, self._names = text, names
+        self._text, self._names, self._work = text, names, 0
 
     def number(self, node: ast.expr) -> Any:
         """The value of an expression."""
-        found = self._number(node)
-        if isinstance(found, Cases) and len(found.pieces) > MOST_CASES:
-            raise ExpressionError(f"{len(found.pieces)} pieces", f"at most {MOST_CASES}")
-        for piece in pieces(found):
-            if len(piece.value.terms) > MOST_TERMS or max(map(len, piece.value.terms), default=0) > HIGHEST:
-                raise ExpressionError("a polynomial that is too large", f"degree {HIGHEST} and {MOST_TERMS} terms")
-        return found
+        return self._sized(self._number(node))
 
     def _number(self, node: ast.expr) -> Any:
         match node:
@@ -121,6 +115,7 @@ class _Reader:
         if isinstance(node.op, ast.Pow):
             return self._power(self.number(node.left), node.right)
         a, b = self.number(node.left), self.number(node.right)
+        self._spend(_size(a), _size(b))
         match node.op:
             case ast.Add():
                 return a + b
@@ -142,13 +137,29 @@ class _Reader:
             raise ExpressionError(f"the power {self._shown(node)}", f"a whole number from 0 to {HIGHEST}")
         found: Any = Polynomial.constant(1)
         for _ in range(node.value):
-            found = found * base
-            self._sized(found)
+            self._spend(_size(found), _size(base))
+            found = self._sized(found * base)
         return found
 
-    def _sized(self, found: Any) -> None:
-        if max(len(piece.value.terms) for piece in pieces(found)) > MOST_TERMS:
-            raise ExpressionError("a polynomial that is too large", f"degree {HIGHEST} and {MOST_TERMS} terms")
+    def _sized(self, found: Any) -> Any:
+        """The same, if it is not too large."""
+        parts = pieces(found)
+        if len(parts) > MOST_CASES:
+            raise ExpressionError(f"{len(parts)} pieces", f"at most {MOST_CASES}")
+        for piece in parts:
+            terms = piece.value.terms
+            if len(terms) > MOST_TERMS or max(map(len, terms), default=0) > HIGHEST:
+                raise ExpressionError("a polynomial that is too large", f"degree {HIGHEST} and {MOST_TERMS} terms")
+            for number in (part for c in terms.values() for part in (int(c.p), int(c.q))):
+                if number.bit_length() > MOST_DIGITS * 10 // 3:
+                    raise ExpressionError("a number that is too long", f"at most {MOST_DIGITS} digits")
+        return found
+
+    def _spend(self, *factors: int) -> None:
+        """Count a product of numbers of terms or pieces as work."""
+        self._work += math.prod(factors)
+        if self._work > WORK:
+            raise ExpressionError("an expression that is too large on the way", "fewer pieces and terms")
 
     def _call(self, name: str, arguments: list[ast.expr]) -> Any:
         if name == "where" and len(arguments) == 3:
@@ -158,7 +169,15 @@ class _Reader:
         function, least, most = _FUNCTIONS[name]
         if not least <= len(arguments) <= most:
             raise ExpressionError(f"{name} with {len(arguments)} arguments", f"{least} to {most}")
-        return function(*(self.number(argument) for argument in arguments))
+        values = [self.number(argument) for argument in arguments]
+        if name in ("min", "max"):
+            return reduce(lambda one, other: self._sized(self._applied(function, one, other)), values)
+        return self._applied(function, *values)
+
+    def _applied(self, function: Callable[..., Any], *values: Any) -> Any:
+        counts = [len(pieces(value)) for value in values]
+        self._spend(COMPARED, math.prod(counts), sum(counts))
+        return function(*values)
 
     def _choose(self, test: ast.expr, a: Any, b: Any) -> Any:
         """a where the test holds, else b."""
@@ -182,6 +201,10 @@ class _Reader:
                 raise ExpressionError(self._shown(test), "a comparison, or several with and, or, not")
 
     def _compared(self, operation: ast.cmpop, one: Any, other: Any, a: Any, b: Any, test: ast.expr) -> Any:
+        self._spend(COMPARED, *(len(pieces(value)) for value in (one, other)), len(pieces(a)) + len(pieces(b)))
+        return self._sized(self._chosen(operation, one, other, a, b, test))
+
+    def _chosen(self, operation: ast.cmpop, one: Any, other: Any, a: Any, b: Any, test: ast.expr) -> Any:
         match operation:
             case ast.Lt():
                 return where(less(one, other), a, b)

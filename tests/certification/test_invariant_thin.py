@@ -1,0 +1,234 @@
+"""What a system and V are on a surface alone counts: in proofs, in the checker, and against motions of random systems."""
+
+import copy
+import json
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from starhold.algebra.polynomial import exact
+from starhold.certification.checker import check, cover, passed
+from starhold.certification.invariant import Problem, System, Wanted, certify, enclosure, parse, write
+from starhold.certification.invariant.descent import Candidate, jumps, switches
+from starhold.certification.invariant.search import closed_cells
+from tests.certification.invariants import SQUARE, claim, expression, fractions, outcomes, system
+
+ORIGIN, ROUND = (0, 0), "x**2 + y**2"
+FILE = """
+variables = ["x", "y"]
+[rates]
+x = "{x}"
+y = "{y}"
+[box]
+x = [-1.5, 1.5]
+y = [-1.5, 1.5]
+[[claim]]
+theorem = "{theorem}"
+V = "{V}"
+{rest}
+"""
+ON = (
+    "(1 if {0} <= 0 and {0} >= 0 else 0)",
+    "(1 if {0} <= 0 <= {0} else 0)",
+    "(1 if not ({0} < 0 or 0 < {0}) else 0)",
+    "(1 - abs(sign({0})))",
+    "(1 - sign({0})**2)",
+    "where(2*({0}) <= 0, where(-3*({0}) <= 0, 1, 0), 0)",
+    "(1 if ({0})**2 <= 0 else 0)",
+    "(1 if abs({0}) <= 0 else 0)",
+    "(1 if max({0}, -({0})) <= 0 else 0)",
+)
+"""Texts for what is 1 where something is zero, else 0."""
+
+
+def written(folder, x="-x", y="-y", V=ROUND, theorem="region", rest="rest = { x = 0, y = 0 }"):
+    """A certificate, as the file holds it."""
+    found = certify(parse(FILE.format(x=x, y=y, V=V, theorem=theorem, rest=rest), "mine.toml"))
+    write(found, folder / "c.json")
+    return found, json.loads((folder / "c.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture
+def impatient(monkeypatch):
+    """Few boxes, for what is not shown with any number of them."""
+    monkeypatch.setattr(enclosure, "MOST", 3_000)
+    monkeypatch.setattr(cover, "MOST", 2_000)
+
+
+@pytest.fixture(scope="module")
+def smooth(tmp_path_factory):
+    """A certificate without anything thin."""
+    found, content = written(tmp_path_factory.mktemp("smooth"))
+    assert found.outcome == "proved"
+    assert passed(check(content))
+    return content
+
+
+def forged(content, x="-x", y="-y", V=ROUND):
+    """The certificate of another system."""
+    content = copy.deepcopy(content)
+    content["certificates"][0]["subject"].update(rates={"x": x, "y": y}, V=[V])
+    return content
+
+
+@pytest.mark.parametrize("on", ON)
+@pytest.mark.parametrize("surface", ["x", "x - y", "y - x**2"])
+def test_a_function_that_is_another_on_a_surface_is_not_continuous(on, surface, tmp_path, smooth):
+    V = f"{ROUND} - 5*{on.format(surface)}"
+    found, content = written(tmp_path, V=V)
+    assert outcomes(found.claims[0])["continuous"] != "proved"
+    if surface != "y - x**2" and ")**2 <= 0" not in on:
+        s = fractions(found.claims[0].refutation().evidence["state"])
+        assert eval(surface, dict(s)) == 0
+        assert any(f.reason == "refuted: V jumps at a state" for f in check(content))
+    assert not passed(check(forged(smooth, V=V)))
+
+
+@pytest.mark.parametrize("on", ON)
+@pytest.mark.usefixtures("impatient")
+def test_rates_that_are_others_on_a_surface_count(on, tmp_path, smooth):
+    """(0, y) stays on x = 0 and grows there."""
+    y = f"-y + 5*y*{on.format('x')}"
+    found, _ = written(tmp_path, y=y)
+    assert found.outcome != "proved"
+    assert not passed(check(forged(smooth, y=y)))
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "V"),
+    [
+        ("-x*sign(x)**2", "-y", ROUND),
+        ("-x", "-y", "max(x, -x)*abs(x) + y*sign(y)*abs(y)"),
+        ("-x - x*(1 - abs(sign(x)))", "-y", ROUND),
+        ("-x", "-y - 3*(1 - abs(sign(x)))*y", ROUND),
+        ("-x - sign(x)/4", "-y", ROUND),
+    ],
+)
+def test_what_is_no_worse_on_a_surface_is_proved(x, y, V, tmp_path):
+    assert written(tmp_path, x, y, V)[0].outcome == "proved"
+
+
+def test_the_checker_shows_what_is_the_same_on_a_surface(tmp_path):
+    found, content = written(tmp_path, x="-x*sign(x)**2", V=f"{ROUND} + x*(1 - abs(sign(x)))")
+    assert found.outcome == "proved"
+    assert passed(check(content)), check(content)
+
+
+def test_a_rest_may_be_one_on_its_surface_only():
+    found = claim(("-sign(x) - x", "-y"), "region", ROUND, rest=ORIGIN)
+    assert outcomes(found)["rest"] == "proved"
+    still = claim(("1 - 2*where(x < 0, 0, 1) + (1 if x <= 0 <= x else 0)", "-y"), "region", ROUND, rest=ORIGIN)
+    assert outcomes(still)["rest"] == "proved"
+
+
+def test_rates_on_a_surface_have_to_lead_through_it_too():
+    # From both sides to the right; on it, to the left, upward, where V rises.
+    through = ("1", "0")
+    against = ("1 - 2*(1 if x <= 0 <= x else 0)", "(1 if x <= 0 <= x else 0)")
+    for rates, crossed in ((through, True), (against, False)):
+        what = Candidate(system(rates), expression("3 - x + y"), SQUARE)
+        assert bool(jumps(what.pieces)) != crossed
+        assert switches(what, 10.0) == crossed
+
+
+def test_surfaces_that_have_one_side_only():
+    """x^2 + y^2 is negative nowhere: no cell of the other side falls for it."""
+    at_once = "(1 if x**2 + y**2 <= 0 else 0)"
+    what = Candidate(system((f"-x + {at_once}", "-y")), expression("x + 2"), SQUARE)
+    assert not switches(what, 10.0)
+
+
+def test_every_state_is_in_a_cell_that_is_what_the_text_says():
+    """Also states of surfaces, and where several meet."""
+    V = "sign(x)*2 + sign(y)*3 + sign(x - y)*5 + (7 if x <= 0 and x >= 0 and y <= 0 and y >= 0 else 0)"
+    what = Candidate(system(("-x", "-y")), expression(V), SQUARE)
+    for state in [(a, b) for a in (-1, 0, 1) for b in (-1, 0, 1)]:
+        x, y = (Fraction(n) for n in state)
+        sign = lambda n: (n > 0) - (n < 0)  # noqa: E731
+        wanted = exact(eval(V, {"sign": sign, "x": x, "y": y}))
+        cells = closed_cells(what, [exact(n) for n in state])
+        assert wanted in [cell.V(*map(exact, state)) for cell in cells]
+
+
+def test_a_python_function_may_have_them_too():
+    from starhold.algebra.scalar import sign
+
+    jumping = System.of(("x", "y"), lambda x, y: (-1.0 * x, -1.0 * y + 5.0 * (1.0 - sign(x) * sign(x)) * y))
+    wanted = Wanted("region", jumping.function(lambda x, y: x * x + y * y), SQUARE, ORIGIN)
+    assert certify(Problem("thin", jumping, (wanted,))).outcome != "proved"
+
+
+# --- random systems against motions -------------------------------------------------------------------------------------
+
+LINES = ("x", "y", "x - y", "x + y", "x + 1/2", "y - 1/2", "x**2 + y**2 - 1", "x - y**2")
+THICK = (
+    "sat({0})",
+    "abs({0})",
+    "max({0}, {1})",
+    "sign({0})/4",
+    "({0} if {1} > 0 else 0)",
+    "sign({0})*sign({1})/8",
+    "min(0, {0})",
+)
+FORMS = (ROUND, "2*x**2 + x*y + y**2", "max(abs(x), abs(y))", "abs(x) + y**2", "x**2 + 2*y**2 - 1/4", "max(x**2, y**2)")
+PYTHON = {"abs": abs, "max": max, "min": min, "sign": lambda n: int(n > 0) - int(n < 0), "sat": lambda n: max(-1, min(1, n))}
+PYTHON["where"] = lambda c, a, b: a if c else b
+
+
+def made(random):
+    """Rates, V, theorem and rest, with something thin in one of them."""
+
+    def one(texts):
+        return texts[random.integers(len(texts))]
+
+    thin = f"{random.integers(-9, 10)}*{one(('x', 'y', '1', '(x + y)'))}*{one(ON).format(one(LINES))}"
+    turn = random.integers(-4, 5) / 4
+    rates = [f"{turn}*y - {random.integers(0, 3)}*x", f"{-turn}*x - {random.integers(0, 3)}*y"]
+    V, place = one(FORMS), random.integers(3)
+    rates[random.integers(2)] += f" - {one(THICK).format(one(LINES), one(LINES))}" if random.random() < 0.6 else ""
+    if place == 2:
+        V += f" + {thin}"
+    else:
+        rates[place] += f" + {thin}"
+    theorem = one(("region", "stable", "attracts", "unstable"))
+    if theorem == "unstable":
+        rates = [f"-({rate})" for rate in rates]
+    return rates, V, theorem, "rest = { x = 0, y = 0 }" if random.random() < 0.6 else ""
+
+
+def on_lines(random):
+    """Exact states, most of them on the lines where something may be thin."""
+    found = [tuple(Fraction(int(n), 100) for n in random.integers(-150, 151, size=2)) for _ in range(30)]
+    for n in (Fraction(int(n), 100) for n in random.integers(-150, 151, size=8)):
+        found += [(Fraction(0), n), (n, Fraction(0)), (n, n), (n, -n), (Fraction(-1, 2), n), (n, Fraction(1, 2)), (n * n, n)]
+    return [*found, (Fraction(3, 5), Fraction(4, 5)), (Fraction(5, 13), Fraction(-12, 13)), (Fraction(-1), Fraction(0))]
+
+
+@pytest.mark.parametrize("seed", [*range(8), *(pytest.param(k, marks=pytest.mark.slow) for k in range(8, 60))])
+@pytest.mark.usefixtures("impatient")
+def test_what_is_proved_holds_on_surfaces_too(seed, tmp_path):
+    """By exact values of the texts, and by motions that keep to a line while the rates there point along it."""
+    random = np.random.default_rng(seed)
+    rates, V, theorem, rest = made(random)
+    found, content = written(tmp_path, *rates, V, theorem, rest)
+    verdicts = {f.verdict for f in check(content)}
+    assert "fails" not in verdicts
+    assert found.outcome == "proved" or verdicts <= {"not claimed", "not checked"}
+    codes = [compile(text, "text", "eval") for text in (*rates, V)]
+
+    def at(x, y):
+        return [eval(code, PYTHON, {"x": x, "y": y}) for code in codes]
+
+    level, sense = found.claims[0].numbers.get("level", 1e9), -1 if theorem == "unstable" else 1
+    for x, y in on_lines(random) if found.outcome == "proved" else []:
+        u, v, value = at(x, y)
+        for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+            near = at(x + dx * Fraction(1, 10**9), y + dy * Fraction(1, 10**9))[2]
+            assert abs(near - value) < Fraction(1, 10**6)
+        if not 0 < value <= level or (u, v) == (0, 0):
+            continue
+        step = Fraction(1, 10**6)
+        after = at(x + step * u, y + step * v)
+        if u * after[1] == v * after[0]:
+            assert sense * (after[2] - value) / step < Fraction(1, 10**3)
