@@ -125,10 +125,9 @@ def attack(loop, claim, function, states):
             p = claim.numbers["torque"] * p / np.maximum(np.linalg.norm(p, axis=0), 1e-300)
             slope, size = function.slope(x, moved(loop, x, p))
             n, w = claim.numbers, claim.witness
-            # Only outside the ball that the proof leaves out.
-            a, b = np.linalg.norm(x[4:7], axis=0), np.linalg.norm(x[1:4], axis=0)
-            W = np.linalg.norm(floats(function.frame.W), 2)
-            inside = w["q_rate"] * a**2 + w["q_attitude"] * b**2 <= n["torque"] * (W * a + w["epsilon"] * b) * (1 + 1e-9)
+            # Only where the function is larger than in the ball that the proof leaves out.
+            value = function.value(x) + w["epsilon"] * np.einsum("ik,ij,jk->k", x[1:4], function.J, x[4:7])
+            inside = value <= n["torque"] ** 2 / (4.0 * w["tau"] * w["beta"]) * (1 + 1e-9)
             return np.where(inside, -1.0, slope / size)
     else:
 
@@ -149,7 +148,7 @@ def attack(loop, claim, function, states):
         ("torque-limit", {"level": 10.0}, {}),
         ("convergence", {}, {"stiffness": 3.0}),
         ("convergence", {}, {"epsilon": 300.0}),
-        ("disturbance", {}, {"q_rate": 1e3, "q_attitude": 1e3}),
+        ("disturbance", {}, {"beta": 10.0}),
     ],
 )
 def test_the_attack_breaks_what_is_false(kind, numbers, witness):

@@ -267,7 +267,7 @@ def test_a_bound_that_is_dropped_or_a_witness_that_is_not_one_fails(made, name):
                 for key in keys:
                     if claim[part].get(key) is not None:
                         assert not passed(check(edited(content, (kind, part, key), None))), (kind, key)
-            for key in ("epsilon", "rho", "q_rate", "q_attitude"):
+            for key in ("epsilon", "rho", "tau", "beta"):
                 if claim["witness"].get(key):
                     for value in (0.0, -claim["witness"][key], 1e9 * claim["witness"][key]):
                         assert not passed(check(edited(content, (kind, "witness", key), value))), (kind, key)

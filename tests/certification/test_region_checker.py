@@ -258,7 +258,7 @@ OTHERS = {
     "disturbance": (
         ("descent", "strict", "end", "start"),
         END | {"rate_everywhere": None},
-        PROOF | {"epsilon": 1e-3, "rho": 0.5, "q_rate": 1e-3, "q_attitude": 1e-3},
+        PROOF | {"epsilon": 1e-3, "rho": 0.5, "tau": 1e-3, "beta": 1e-3, "shift": None, "steps": []},
         [*TEXTBOOK[:5], "torque from outside bounded in norm"],
     ),
     "sliding": (

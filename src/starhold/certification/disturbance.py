@@ -1,16 +1,25 @@
-"""The claim that a bounded torque from outside moves the end of every motion no further than a bound."""
+"""The claim that a bounded torque from outside moves the end of every motion no further than a bound.
+
+Where the torque is M at most, V + epsilon C falls outside {x.(Q - tau R)x <= M2/(4 tau)}, x = (w, q), for it does work of
+at most tau x.Rx + M2/(4 tau). The largest V + epsilon C on that set bounds rate and attitude, and from there on smaller
+ellipsoids do.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
-from flint import fmpq
+from flint import arb, fmpq
+from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
 from starhold.certification.certificate import EXACT_SIGN, Claim, Obligation
 from starhold.certification.convergence import ALMOST, Basin, assumed
+from starhold.certification.ending import Nearby, Step
 from starhold.certification.frame import (
     Cross,
     Frame,
@@ -28,17 +37,35 @@ from starhold.certification.matrices import (
     floats,
     greatest,
     identity,
+    inverse,
     least,
     number,
     plus,
+    product,
     root_above,
+    root_below,
     scaled,
-    spectral_norm_above,
     symmetric,
+    transposed,
 )
 from starhold.certification.motion import at_rest
-from starhold.certification.potential import turn_of
 from starhold.certification.subject import above, below
+
+WIDE = 2.0
+"""How many times the smallest angle that of a ball may be, for motions to start in a larger set, if steps then shrink it."""
+
+
+@dataclass(frozen=True)
+class Ball:
+    """What the first bound is made of, and what |w| and |q| do not exceed in the end."""
+
+    epsilon: Any
+    rho: Any
+    tau: Any
+    beta: Any
+    told: dict[str, Any]
+    rate: Any
+    turn: Any
 
 
 def disturbance(basin: Basin) -> Claim | None:
@@ -52,66 +79,143 @@ def disturbance(basin: Basin) -> Claim | None:
     torque = exact(above(torque))
     assumptions = assumed(motion.subject, outside=("torque from outside bounded in norm",))
     numbers: dict[str, Any] = {"torque": number(torque)}
+
+    def refused(name: str, reason: str) -> Claim:
+        return Claim(
+            "disturbance", numbers, {}, assumptions, (Obligation(name, EXACT_SIGN, "undecided", {"reason": reason}),)
+        )
+
+    if frame.potential.even:
+        return refused("descent", "V is even in q, for which no bound against torque is built")
     try:
-        if frame.potential.even:
-            raise ShapeError("V is even in q, for which no bound against torque is built")
         cross = take_cross(motion)
     except ShapeError as reason:
-        refused = Obligation("descent", EXACT_SIGN, "undecided", {"reason": str(reason)})
-        return Claim("disturbance", numbers, {}, assumptions, (refused,))
-    best: Claim | None = None
-    for epsilon, rho in _tries(frame, cross):
-        found = _claim(basin, cross, torque, epsilon, rho, numbers, assumptions)
-        if found is not None and (best is None or found.numbers["angle"] < best.numbers["angle"]):
-            best = found
-    if best is None:
-        refused = Obligation("end", EXACT_SIGN, "undecided", {"reason": "this torque is too large for the bound"})
-        return Claim("disturbance", numbers, {}, assumptions, (refused,))
-    return best
+        return refused("descent", str(reason))
+    rate_bound = _rate_bound(frame)
+    near = Nearby(motion, torque)
+    end: End | None = None
+    for guesses in _guesses(frame, cross, rate_bound):
+        balls = (_ball(basin, cross, torque, rate_bound, *guess) for guess in guesses)
+        ball = next((found for found in balls if found is not None), None)
+        if ball is not None:
+            end = _shrunk(near, ball)
+            if end.steps:
+                break
+    if end is None:
+        return refused("end", "this torque is too large for the bound")
+    ball, steps, rate, turn = end
+    angle = float((2 * arb(turn).asin()).upper().mid()) * (1.0 + 1e-15)
+    stiffness = motion.stiffness
+    witness = {
+        "stiffness": None if stiffness is None else number(stiffness),
+        "epsilon": number(ball.epsilon),
+        "rho": number(ball.rho),
+        "rate_bound": None if rate_bound is None else number(rate_bound),
+        "tau": number(ball.tau),
+        "beta": number(ball.beta),
+        "shift": None if not steps or near.swing.shift is None else number(near.swing.shift),
+        "steps": [{"form": floats(s.S).tolist(), "decay": number(s.decay), "spread": number(s.spread)} for s in steps],
+    }
+    proved = tuple(Obligation(name, EXACT_SIGN, "proved") for name in ("descent", "strict", "end", "start"))
+    told = {**ball.told, "angle": angle, "rate": above(rate)}
+    return Claim("disturbance", numbers | told, witness, assumptions, proved)
 
 
-def _tries(frame: Frame, cross: Cross) -> list[tuple[Any, Any]]:
-    """Weights of the cross term, and what they cost in the comparison with V."""
-    size = math.sqrt(number(least(frame.P) * frame.s)) / float(np.linalg.norm(floats(cross.J), 2))
-    chosen = [exact(float(f"{share:.3g}")) for share in np.geomspace(1e-4, 0.6, 25)]
-    return [(exact(float(f"{number(rho) * size * 0.999:.6g}")), rho) for rho in chosen]
+class End(NamedTuple):
+    """A ball, the steps that make it smaller, and the bounds of |w| and |q| that they leave."""
+
+    ball: Ball
+    steps: list[Step]
+    rate: Any
+    turn: Any
 
 
-def _claim(
-    basin: Basin, cross: Cross, torque: Any, epsilon: Any, rho: Any, numbers: dict[str, Any], assumptions: tuple[str, ...]
-) -> Claim | None:
-    frame, loop = basin.frame, basin.motion.subject.loop
+def _shrunk(near: Nearby, ball: Ball) -> End:
+    try:
+        return End(ball, *near.steps(ball.rate, ball.turn))
+    except ShapeError:
+        # The ball is all there is.
+        return End(ball, [], ball.rate, ball.turn)
+
+
+def _rate_bound(frame: Frame) -> Any | None:
+    """The rate up to which V' has the form that is used and keeps half of its damping."""
     bound = frame.reach
     if frame.K.terms:
         cubic = least(symmetric(frame.D)) / 2 / frame.cubic
         bound = cubic if bound is None else min(bound, cubic)
-    bound = None if bound is None else exact(below(bound))
-    Q = decrease(frame, cross, epsilon, bound)
-    if not (definite(Q) and definite(margin(frame, cross, epsilon, rho))):
+    return None if bound is None else exact(below(bound))
+
+
+def _push(frame: Frame, epsilon: Any) -> Rows:
+    """R with |W'w + epsilon q|2 = x.Rx, W'w + epsilon q being what a torque from outside does work on."""
+    W = frame.W
+    return blocks(product(W, transposed(W)), scaled(W, epsilon), identity(3, epsilon * epsilon))
+
+
+def _size(frame: Frame, cross: Cross, epsilon: Any, share: Any) -> Rows:
+    """H with x.Hx = w.Pw/2 + epsilon q.Jw + share s q2."""
+    return blocks(scaled(frame.P, fmpq(1, 2)), scaled(transposed(cross.J), epsilon / 2), identity(3, share * frame.s))
+
+
+def _guesses(frame: Frame, cross: Cross, bound: Any | None) -> Iterator[list[tuple[Any, Any, Any]]]:
+    """epsilon, rho and tau of balls in floats: those with small rho, from which much is started, but an angle of at most
+    `WIDE` times the smallest; then all by their angles."""
+    size = math.sqrt(number(frame.s)) / float(
+        np.linalg.norm(np.linalg.solve(np.linalg.cholesky(floats(frame.P)), floats(cross.J)), 2)
+    )
+    found: list[tuple[float, tuple[Any, Any, Any]]] = []
+    for share in np.geomspace(1e-4, 0.6, 33):
+        rho = exact(float(f"{share:.3g}"))
+        epsilon = exact(float(f"{number(rho) * size * 0.999:.6g}"))
+        Q, R = floats(decrease(frame, cross, epsilon, bound)), floats(_push(frame, epsilon))
+        H = floats(_size(frame, cross, epsilon, fmpq(1, 2)))
+        if np.linalg.eigvalsh(Q)[0] <= 0.0:
+            continue
+        most = 1.0 / float(_relative(R, Q)[-1])
+        tries = [(float(_relative(Q - tau * R, H)[0]) * tau, tau) for tau in most * np.linspace(0.05, 0.95, 19)]
+        fall, tau = max(tries)
+        if fall > 0.0:
+            # The square of the angle, up to a factor.
+            angle = 1.0 / (fall * (1.0 - share * share))
+            found.append((angle, (epsilon, rho, exact(float(f"{tau:.6g}")))))
+    smallest = min((angle for angle, _ in found), default=0.0)
+    yield [guess for angle, guess in found if angle <= WIDE**2 * smallest]
+    yield [guess for _, guess in sorted(found, key=lambda pair: pair[0])]
+
+
+def _ball(basin: Basin, cross: Cross, torque: Any, bound: Any | None, epsilon: Any, rho: Any, tau: Any) -> Ball | None:
+    """What these numbers show, if anything."""
+    frame, loop = basin.frame, basin.motion.subject.loop
+    left = plus(decrease(frame, cross, epsilon, bound), _push(frame, epsilon), -tau)
+    if not (definite(left) and definite(margin(frame, cross, epsilon, rho))):
         return None
-    q_rate, q_attitude = _shares(Q)
-    W = spectral_norm_above(frame.W)
-    rest = torque * torque * (W * W / (4 * q_rate) + epsilon * epsilon / (4 * q_attitude))
-    rate = torque * W / (2 * q_rate) + root_above(rest / q_rate)
-    turn = torque * epsilon / (2 * q_attitude) + root_above(rest / q_attitude)
-    if turn >= 1:
+    # All of |q| that V + epsilon C may rise at.
+    room = torque * torque / (4 * tau)
+    turn = root_above(room * greatest([row[3:] for row in inverse(left)[3:]]))
+    width = exact(loop.hysteresis_width)
+    if turn >= 1 or (loop.cover == "hysteresis" and turn * turn >= 1 - width * width):
         return None
-    end = (1 + rho) / (1 - rho) * (greatest(frame.P) * rate * rate / 2 + frame.s * turn * turn)
+    # There s (1 - q0) = s q2/(1 + q0), for q0 < 0 is outside the level set.
+    H = _size(frame, cross, epsilon, 1 / (1 + root_below(1 - turn * turn)))
+    beta = _share(left, H)
+    if beta is None:
+        return None
+    end = room / beta
     stay = None if bound is None else least(frame.P) * bound * bound / 2
     caps = {
         "shortest": frame.s * ALMOST,
         "as_published": frame.s * (2 - turn * turn) * ALMOST,
-        "hysteresis": (1 + rho) * frame.s * exact(loop.hysteresis_width) / rho * ALMOST,
+        "hysteresis": (1 + rho) * frame.s * width / rho * ALMOST,
     }
-    stay = caps[loop.cover] if stay is None else min(stay, caps[loop.cover])
-    width = exact(loop.hysteresis_width)
-    if loop.cover == "hysteresis" and turn * turn >= 1 - width * width:
-        return None
-    level = exact(below(stay))
+    level = exact(below(caps[loop.cover] if stay is None else min(stay, caps[loop.cover])))
     start = exact(below(level * (1 - rho) / (1 + rho)))
-    if end >= start or end >= frame.s:
+    # What V + epsilon C is at least: over every w (spring)(1 - q0), and over every q w.(lean)w/2.
+    J, square = cross.J, epsilon * epsilon
+    spring = frame.s - square * greatest(product(product(J, inverse(frame.P)), transposed(J)))
+    lean = least(plus(frame.P, scaled(product(transposed(J), J), square / frame.s), -1))
+    if end >= (1 + rho) * start or end >= spring or lean <= 0:
         return None
-    angle = float(turn_of(end / frame.s).upper().mid()) * (1.0 + 1e-15)
     held = contents(start, frame.P, frame.potential)
     told = {
         "level": number(level),
@@ -119,34 +223,22 @@ def _claim(
         "turn": held["turn"],
         "rate_start": held["rate"],
         "rate_everywhere": held["rate_everywhere"],
-        "angle": angle,
-        "rate": above(root_above(2 * end / least(frame.P))),
     }
-    stiffness = basin.motion.stiffness
-    witness = {
-        "stiffness": None if stiffness is None else number(stiffness),
-        "epsilon": number(epsilon),
-        "rho": number(rho),
-        "rate_bound": None if bound is None else number(bound),
-        "q_rate": number(q_rate),
-        "q_attitude": number(q_attitude),
-    }
-    proved = tuple(Obligation(name, EXACT_SIGN, "proved") for name in ("descent", "strict", "end", "start"))
-    return Claim("disturbance", numbers | told, witness, assumptions, proved)
+    cosine = 1 - end / spring
+    return Ball(epsilon, rho, tau, beta, told, root_above(2 * end / lean), root_above(1 - cosine * cosine))
 
 
-def _shares(Q: Rows) -> tuple[Any, Any]:
-    """Large q_rate and q_attitude with Q - diag(q_rate I, q_attitude I) positive definite, in equal shares of the most
-    that each block could give alone."""
-    full = floats(Q)
-    upper, side, lower = full[:3, :3], full[:3, 3:], full[3:, 3:]
-    most_rate = float(np.linalg.eigvalsh(upper - side @ np.linalg.solve(lower, side.T))[0])
-    most_attitude = float(np.linalg.eigvalsh(lower - side.T @ np.linalg.solve(upper, side))[0])
-    zero = scaled(identity(3), 0)
-    share = 1.0
-    while True:
-        share *= 0.9
-        q_rate, q_attitude = exact(share * most_rate), exact(share * most_attitude)
-        taken = blocks(identity(3, q_rate), zero, identity(3, q_attitude))
-        if definite(plus(Q, taken, fmpq(-1))):
-            return q_rate, q_attitude
+def _share(left: Rows, H: Rows) -> Any | None:
+    """Nearly the largest beta with left - beta H positive definite; None where it is not positive."""
+    guess = float(_relative(floats(left), floats(H))[0])
+    for less in (1e-12, 1e-10, 1e-8, 1e-6, 1e-3):
+        beta = exact(guess * (1.0 - less))
+        if beta > 0 and definite(plus(left, H, -beta)):
+            return beta
+    return None
+
+
+def _relative(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[Any]:
+    """The eigenvalues of b^-1 a, b being positive definite."""
+    root = np.linalg.inv(np.linalg.cholesky(b))
+    return np.linalg.eigvalsh(root @ a @ root.T)

@@ -9,6 +9,7 @@ from typing import Any
 
 from flint import acb, acb_poly, arb, fmpq, fmpq_mat, fmpq_poly
 
+from starhold.certification.checker.disturbed import Disturbed
 from starhold.certification.checker.even import EvenRegion
 from starhold.certification.checker.exact import (
     ONE,
@@ -16,14 +17,11 @@ from starhold.certification.checker.exact import (
     Obligation,
     definite,
     demand,
-    down,
-    greatest,
     has_root_near,
     inverted,
     plus,
     rational,
     root_up,
-    times,
     turned,
     unit,
     within_circle,
@@ -170,55 +168,12 @@ def disturbance(subject: Subject, claim: Numbers) -> list[Obligation]:
     region, numbers, witness = claimed(subject, claim), claim["numbers"], claim["witness"]
     if isinstance(region, EvenRegion):
         raise CheckError("not for a V even in q")
-    q_rate, q_attitude = rational(witness["q_rate"]), rational(witness["q_attitude"])
-    torque, epsilon, rho = rational(numbers["torque"]), region.epsilon, region.rho
-
-    def descent() -> str:
-        demand(q_rate > 0 and q_attitude > 0 and epsilon > 0, "a share of the fall is not positive")
-        region.target()
-        return region.descent(q_rate, q_attitude)
-
-    def ball() -> tuple[Any, Any]:
-        """The largest |w| and |q| where V + epsilon C may rise: within an ellipse."""
-        push = root_up(greatest((fmpq_mat(turned(region.frame.W)) * fmpq_mat(region.frame.W)).tolist()))
-        square = torque**2 * (push**2 / (4 * q_rate) + epsilon**2 / (4 * q_attitude))
-        x = torque * push / (2 * q_rate) + root_up(square / q_rate)
-        return x, torque * epsilon / (2 * q_attitude) + root_up(square / q_attitude)
-
-    def end() -> str:
-        frame = region.frame
-        felt = subject.disturbance + subject.modelled_norm * max(frame.felt, region.crossed.felt)
-        demand(torque >= felt, "the torque from outside may be larger")
-        x, y = ball()
-        demand(y < 1, "the ball reaches every attitude")
-        level = (1 + rho) / (1 - rho) * (greatest(frame.P) * x**2 / 2 + frame.s * y**2)
-        demand(region.start is not None and level < region.start, "the end is no lower than the start")
-        angle, rate = rational(numbers["angle"]), rational(numbers["rate"])
-        demand(0 <= angle <= down(arb.pi()), "the angle is not between 0 and a half turn")
-        demand(down(arb(frame.s) * 2 * (arb(angle) / 4).sin() ** 2) >= level, "the angle may end larger")
-        demand(rate >= 0, "the rate is negative")
-        held = plus(times(rate**2, frame.P), unit(3, 2 * level), -1)
-        demand(definite(held, strictly=False), "the rate may end larger")
-        return "V + epsilon C falls outside an ellipse that is within the end"
-
-    def start() -> str:
-        region.strict()
-        s, cover, y = region.frame.s, subject.cover, ball()[1]
-        if cover == "shortest":
-            region.single()
-        elif cover == "hysteresis":
-            region.jumps()
-            demand(y**2 < 1 - subject.width**2, "the ball around the other rest may be reached")
-        else:
-            # Near the other rest, |q| <= y and q0 < 0, V is at least s (1 + sqrt(1 - y2)).
-            demand(region.level is not None and region.level < s * (2 - y**2), "the ball around the other rest may be met")
-        return "the level set holds one ball only"
-
+    proof = Disturbed(subject, region, numbers, witness)
     return [
-        ("descent", SIGN, descent),
+        ("descent", SIGN, proof.descent),
         ("strict", SIGN, region.strict),
-        ("end", SIGN, end),
-        ("start", SIGN, start),
+        ("end", SIGN, proof.end),
+        ("start", SIGN, proof.start),
         _told(region, numbers, "rate_start"),
     ]
 

@@ -11,6 +11,7 @@ from flint import arb, fmpq, fmpq_mat
 from starhold.certification.checker.exact import (
     ZERO,
     Obligation,
+    Rows,
     bordered,
     definite,
     demand,
@@ -61,12 +62,12 @@ class OddRegion(Region[OddFrame]):
         demand(definite(self.frame.P) and self.frame.s > 0, "V is not positive")
         return "the minors of P are positive, so is s"
 
-    def descent(self, q_rate: Any = ZERO, q_attitude: Any = ZERO) -> str:
-        """On the level set V, or V + epsilon C, falls, the latter by q_rate |w|2 + q_attitude |q|2 at least."""
+    def descent(self) -> str:
+        """On the level set V, or V + epsilon C, falls."""
         loop, frame = self.loop, self.frame
         self.positive()
-        damping = self.damping()
         if self.epsilon == 0:
+            damping = self.damping()
             demand(unit(3, ZERO) == frame.E, "V' mixes rate and attitude")
             if len(loop.pieces) > 1:
                 demand(loop.falls, "V' may be positive on a piece of the law")
@@ -74,14 +75,17 @@ class OddRegion(Region[OddFrame]):
                 demand(definite(damping), "V' may be positive")
             return "definite by its minors"
         demand(self.epsilon > 0, "epsilon is negative")
+        demand(definite(self.fall()), "V + epsilon C may rise")
+        return "definite by its minors"
+
+    def fall(self) -> Rows:
+        """Q of (V + epsilon C)' <= -(w, q).Q(w, q) on the level set."""
+        loop, frame, cross = self.loop, self.frame, self.crossed
         if len(loop.pieces) > 1 and loop.reach is not None:
             demand(self.bound is not None and self.bound <= loop.reach, "the law clips within the level set")
-        cross = self.crossed
-        damping = plus(damping, unit(3, self.epsilon * cross.sigma + q_rate), -1)
+        damping = plus(self.damping(), unit(3, self.epsilon * cross.sigma), -1)
         mixing = times(fmpq(1, 2), plus(times(self.epsilon, turned(cross.B)), frame.E, -1))
-        stiffness = plus(times(self.epsilon, even(cross.A)), unit(3, q_attitude), -1)
-        demand(definite(bordered(damping, mixing, stiffness)), "V + epsilon C may rise")
-        return "definite by its minors"
+        return bordered(damping, mixing, times(self.epsilon, even(cross.A)))
 
     def settles(self) -> Obligation:
         if self.epsilon == 0:

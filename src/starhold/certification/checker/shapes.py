@@ -201,13 +201,21 @@ NUMBERS: dict[str, dict[str, Test]] = {
     "rest": {},
     "saturated-axis": dict.fromkeys(("limit", "width", "reach", "boundary"), _number),
 }
+STEP: dict[str, Test] = {"form": _list(_list(_number, 6), 6), "decay": _number, "spread": _number}
+"""Of the proof where a torque from outside lets motions end."""
 _PROOF: dict[str, Test] = {"stiffness": _MAYBE, "epsilon": _number, "rho": _number}
 WITNESS: dict[str, dict[str, Test]] = {
     "convergence": {**_PROOF, "rate_bound": _MAYBE},
     "torque-limit": {**_PROOF, "rate_bound": _MAYBE},
     "wheels": {**_PROOF, "rate_bound": _MAYBE},
     "inertia": {**_PROOF, "level": _MAYBE},
-    "disturbance": {**_PROOF, "rate_bound": _MAYBE, "q_rate": _number, "q_attitude": _number},
+    "disturbance": {
+        **_PROOF,
+        "rate_bound": _MAYBE,
+        "shift": _MAYBE,
+        **dict.fromkeys(("tau", "beta"), _number),
+        "steps": _list(_object),
+    },
     "sampling": {},
     "sliding": {},
     "region": dict.fromkeys(("p", "c2", "g", "m"), _number),
