@@ -91,6 +91,7 @@ def by_hand(law, gains, claims, **changes):
         "orbit": None,
         "gravity_gradient": False,
         "target": "inertial",
+        "history": None,
         "target_rate": 0.0,
         "target_acceleration": 0.0,
         "modelled_torque": [0.0, 0.0, 0.0],

@@ -189,8 +189,9 @@ def test_half_turns_and_wild_swings_are_refused():
     with pytest.raises(ValueError, match="from 1 to 2 s a half turn"):
         knots_of([0.0, 1.0, 2.0], [[1, 0, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0]], 2.0)
     quick = Rotation.from_rotvec([[0, 0, 0], [0, 0, 1.0], [0, 0, 2.0], [0, 0, 2.0]]).as_quat(scalar_first=True)
-    with pytest.raises(ValueError, match="swings far off"):
-        knots_of([0.0, 0.01, 0.02, 60.0], quick, 60.0)
+    for use in (lambda *rows: knots_of(*rows, 60.0), lambda *rows: tabulate(*rows, [0.0, 60.0])):
+        with pytest.raises(ValueError, match="swings far off"):
+            use([0.0, 0.01, 0.02, 60.0], quick)
 
 
 def test_a_certificate_of_rows_half_a_turn_apart_is_refused_in_one_line():

@@ -201,7 +201,7 @@ def draw(count: int, P: Array, potential: Potential, level: float, random: np.ra
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     rates = np.sqrt(2.0 * left)[:, None] * (directions @ turned.T)
     states = np.zeros((16, count))
-    states[0], states[1:4] = q0, (np.sqrt(np.maximum(1.0 - q0 * q0, 0.0))[:, None] * axes).T
+    states[0], states[1:4] = q0, (potential.length(t, axes)[:, None] * axes).T
     states[:4] /= np.linalg.norm(states[:4], axis=0)
     states[4:7] = rates.T
     return states

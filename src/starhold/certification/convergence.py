@@ -136,10 +136,12 @@ def convergence(motion: Motion, rate: Any = "best") -> tuple[Claim, Basin | None
     slopes = cases(motion.along(motion.lyapunov or Polynomial.constant(0)))
 
     def rising(reason: str) -> None:
-        # Where no set is asked for, only a V that rises however near the target is refuted.
+        # Where no set is asked for, only a V that rises however near the target is refuted; of a claim up to a rate, a state
+        # that turns faster is no refutation.
         near = not (frame.exact and definite(symmetric(frame.D)))
-        limit = None if rate in ("best", None) else exact(rate)
-        evidence = rising_state(*slopes[0], limit) if rate != "best" or near else None
+        most, tries = None if rate in ("best", None) else exact(rate), max(200 // len(slopes), 10)
+        states = (rising_state(*piece, most, tries) for piece in slopes if rate != "best" or near)
+        evidence = next((state for state in states if state is not None), None)
         found.add("descent", EXACT_SIGN, False if evidence else None, evidence or {"reason": reason})
 
     if not (definite(symmetric(frame.D)) if frame.whole else all(_falls(*piece) for piece in slopes)):

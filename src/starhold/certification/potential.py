@@ -54,7 +54,9 @@ class Spring:
 
     def of(self, q: Array) -> Array:
         """In floats its values at the quaternions in the columns of an array."""
-        return number(self.s) * (1.0 - q[0])
+        # Without cancellation near the target.
+        square: Array = q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
+        return number(self.s) * np.where(q[0] > 0.0, square / (1.0 + np.abs(q[0])), 1.0 - q[0])
 
     def sizes(self, first: Any, last: Any) -> tuple[arb, arb]:
         """Bounds of the length of the `linear` monomials and of |q| where it is between two rationals."""
@@ -71,6 +73,10 @@ class Spring:
     def cosine(self, t: Any, axes: Array) -> Any:
         """q0 of the turns about axes (n, 3) that have the values t."""
         return 1.0 - t / number(self.s)
+
+    def length(self, t: Any, axes: Array) -> Any:
+        """|q| of the same turns."""
+        return self.grid(t)[1]
 
     def tops(self, axes: Array) -> Array:
         """Its largest value for turns about each of some axes (n, 3)."""
@@ -131,6 +137,10 @@ class Cosines:
     def cosine(self, t: Any, axes: Array) -> Any:
         """q0 of the turns about axes (n, 3) that have the values t."""
         return np.sqrt(np.maximum(1.0 - t / self.tops(axes), 0.0))
+
+    def length(self, t: Any, axes: Array) -> Any:
+        """|q| of the same turns."""
+        return np.sqrt(t / self.tops(axes))
 
     def tops(self, axes: Array) -> Array:
         """Its largest value for turns about each of some axes (n, 3)."""

@@ -68,13 +68,14 @@ def tabulate(times: Any, attitudes: Any, sample_times: Any) -> NDArray[np.float6
     """Rows (attitude, rate, acceleration) at the sample times, through a twice differentiable rotation spline.
 
     times: (n,) s, increasing; attitudes: (n, 4) quaternions, scalar first; sample times within [times[0], times[-1]].
-    Raises ValueError when they are not. Target axes are the body axes to be followed.
+    Raises ValueError when they are not, where neighbours leave open which way the turn between them goes, and where the
+    spline swings far off between them. Target axes are the body axes to be followed.
     """
     times, samples = np.asarray(times, dtype=float), np.asarray(sample_times, dtype=float)
     first, last = samples.min(), samples.max()
     if not (times[0] <= first and last <= times[-1]):
         raise ValueError(f"the target history covers {times[0]:g} to {times[-1]:g} s, the run needs {first:g} to {last:g} s")
-    spline = _spline(times, attitudes)
+    spline = _spline(times, np.asarray(attitudes, dtype=float))
     q: NDArray[np.float64] = spline(samples).as_quat(scalar_first=True)
     flips = np.cumprod(np.where(np.sum(q[1:] * q[:-1], axis=1) < 0.0, -1.0, 1.0))
     q[1:] *= flips[:, None]
@@ -83,22 +84,24 @@ def tabulate(times: Any, attitudes: Any, sample_times: Any) -> NDArray[np.float6
 
 
 def knots_of(times: Any, attitudes: Any, last: float) -> Knots:
-    """The knots, of the spline of `tabulate`, that a run from 0 to `last` (s) is between. ValueError where two neighbours
-    leave open which way the turn between them goes, or the spline swings far between them."""
+    """The knots, of the spline of `tabulate`, that a run from 0 to `last` (s) is between. Raises ValueError as that does."""
     times, attitudes = np.asarray(times, dtype=float), np.asarray(attitudes, dtype=float)
     rates: NDArray[np.float64] = _spline(times, attitudes)(times, 1)
-    unclear = np.abs(np.sum(attitudes[1:] * attitudes[:-1], axis=1)) < HALF_TURN
-    speeds = np.linalg.norm(rates, axis=1)
-    far = np.maximum(speeds[1:], speeds[:-1]) * np.diff(times) > 3.0 * SWING
-    for k in np.flatnonzero(unclear | far):
-        why = "a half turn, which could go either way" if unclear[k] else "the spline between them swings far off"
-        raise ValueError(f"from {times[k]:g} to {times[k + 1]:g} s {why}")
     first, end = np.searchsorted(times, 0.0, "right") - 1, np.searchsorted(times, last, "left") + 1
     return Knots(*(array[max(first, 0) : end] for array in (times, attitudes, rates)))
 
 
-def _spline(times: Any, attitudes: Any) -> Any:
+def _spline(times: NDArray[np.float64], attitudes: NDArray[np.float64]) -> Any:
+    """The spline; ValueError where neighbours leave open which way the turn between them goes, or it swings far off."""
     # Loaded here because few runs need it, and by name because its types are too loose for a strict checker.
     transform: Any = import_module("scipy.spatial.transform")
-    turns = transform.Rotation.from_quat(np.asarray(attitudes, dtype=float), scalar_first=True)
-    return transform.RotationSpline(times, turns)
+    unclear = np.abs(np.sum(attitudes[1:] * attitudes[:-1], axis=1)) < HALF_TURN
+    # Its iteration may fail where turns are large and times far from even.
+    with np.errstate(all="ignore"):
+        spline = transform.RotationSpline(times, transform.Rotation.from_quat(attitudes, scalar_first=True))
+        speeds = np.linalg.norm(spline(times, 1), axis=1)
+        far = ~(np.maximum(speeds[1:], speeds[:-1]) * np.diff(times) <= 3.0 * SWING)
+    for k in np.flatnonzero(unclear | far):
+        why = "a half turn, which could go either way" if unclear[k] else "the spline between them swings far off"
+        raise ValueError(f"from {times[k]:g} to {times[k + 1]:g} s {why}")
+    return spline
