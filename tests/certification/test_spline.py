@@ -11,18 +11,26 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, RotationSpline
 
+from starhold.algebra.polynomial import exact
+from starhold.algebra.quaternion import to_body
+from starhold.algebra.vector import ZERO, add, cross, subtract
+from starhold.analysis.trial import draw
 from starhold.certification.certificate import write
 from starhold.certification.certify import certify
 from starhold.certification.checker import check_file, passed
 from starhold.certification.checker.exact import CheckError
 from starhold.certification.checker.spline import moves_within
-from starhold.certification.matrices import number
+from starhold.certification.matrices import floats, number
+from starhold.certification.matrices import rows as rows_of
+from starhold.certification.potential import Spring
 from starhold.certification.spline import spline_bounds
 from starhold.certification.wording import sentence
 from starhold.errors import InputError
 from starhold.laws import pd, wheel
+from starhold.laws.interface import NoMemory, Seen
+from starhold.models.craft import tensor
 from starhold.models.target import Knots, knots_of, tabulate
-from tests.certification.loops import free, loop_of
+from tests.certification.loops import FULL, free, loop_of
 
 
 def history(seed, count, step, spread=0.4):
@@ -220,3 +228,30 @@ def test_knots_are_plain_arrays():
     knots = knots_of(times.tolist(), attitudes.tolist(), times[-1])
     assert isinstance(knots, Knots)
     assert all(isinstance(array, np.ndarray) for array in knots)
+
+
+def test_no_state_of_the_set_needs_more_torque_than_told_anywhere_on_the_spline():
+    times, attitudes = history(11, 6, 0.1)
+    knots = knots_of(times, attitudes, times[-1])
+    rows = tabulate(times, attitudes, [0.0, times[-1]])
+    craft = FULL._replace(torque_limit=6.0)
+    loop = free(loop_of("pd", pd.Gains(0.09, 0.009), craft, target=rows, knots=knots, period=times[-1]))
+    claim = certify(loop, "pd").claim("torque-limit")
+    assert claim.outcome == "proved"
+    random, count = np.random.default_rng(1), 4000
+    states = draw(count, floats(rows_of(tensor(FULL.inertia))), Spring(exact(0.018)), claim.numbers["start"], random)
+    spline, t = (
+        RotationSpline(times, Rotation.from_quat(attitudes, scalar_first=True)),
+        random.uniform(0.0, times[-1], count),
+    )
+    # Where the target turns and swings most, too.
+    grid = np.linspace(0.0, times[-1], 5001)
+    for order in (1, 2):
+        t[random.uniform(size=count) < 0.3] = grid[np.argmax(np.linalg.norm(spline(grid, order), axis=1))]
+    largest = 0.0
+    for state, rate, acceleration in zip(states.T, spline(t, 1), spline(t, 2), strict=True):
+        q, w = tuple(state[:4]), tuple(state[4:7])
+        turning, spinning = to_body(q, tuple(rate)), to_body(q, tuple(acceleration))
+        seen = Seen(q, w, add(w, turning), turning, subtract(spinning, cross(w, turning)), ZERO, ZERO, 1.0, ZERO)
+        largest = max(largest, *map(abs, loop.law.torque(seen, loop.gains, craft, NoMemory())[0]))
+    assert 2.0 < largest <= 6.0

@@ -151,6 +151,9 @@ def convergence(motion: Motion, rate: Any = "best") -> tuple[Claim, Basin | None
     if frame.exact:
         if frame.K.terms:
             bound = exact(below(least(symmetric(frame.D)) * ALMOST / frame.cubic))
+            if bound <= 0:
+                rising("the damping around rest is not definite, or too weak for what is cubic in the rate")
+                return finish()
     else:
         strict = _strict(motion, frame)
         if strict is None:
@@ -244,6 +247,8 @@ def _strict(motion: Motion, frame: Frame) -> tuple[Cross, Any, Any, Any | None] 
         return None
     most = np.linalg.norm(np.linalg.solve(np.linalg.cholesky(floats(frame.P)), floats(cross.J)), 2)
     bound = exact(below(least(symmetric(frame.D)) / 2 / frame.cubic)) if frame.K.terms else None
+    if bound is not None and bound <= 0:
+        return None
     for rho in (*(fmpq(1, 2**power) for power in range(20, 0, -1)), fmpq(3, 4), fmpq(9, 10)):
         for share in (0.5, 0.99):
             epsilon = exact(float(f"{share * number(rho) * number(frame.s) ** 0.5 / most:.6g}"))

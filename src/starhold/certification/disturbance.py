@@ -92,6 +92,8 @@ def disturbance(basin: Basin) -> Claim | None:
     except ShapeError as reason:
         return refused("descent", str(reason))
     rate_bound = _rate_bound(frame)
+    if rate_bound is not None and rate_bound <= 0:
+        return refused("descent", "V' keeps its form at no rate that floats tell from none")
     near = Nearby(motion, torque)
     end: End | None = None
     for guesses in _guesses(frame, cross, rate_bound):

@@ -54,9 +54,8 @@ class Spring:
 
     def of(self, q: Array) -> Array:
         """In floats its values at the quaternions in the columns of an array."""
-        # Without cancellation near the target.
-        square: Array = q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
-        return number(self.s) * np.where(q[0] > 0.0, square / (1.0 + np.abs(q[0])), 1.0 - q[0])
+        # Half of |q - q_target|2, without cancellation near the target.
+        return 0.5 * float(number(self.s)) * ((1.0 - q[0]) ** 2 + np.sum(q[1:] ** 2, axis=0))
 
     def sizes(self, first: Any, last: Any) -> tuple[arb, arb]:
         """Bounds of the length of the `linear` monomials and of |q| where it is between two rationals."""
