@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from math import isfinite, isinf
 from typing import Any
 
+import numpy as np
+
 from starhold.algebra.polynomial import UnreadableError
 from starhold.certification.certificate import EXACT, Certificate, Claim, Obligation
 from starhold.certification.convergence import assumed, converge
@@ -14,7 +16,7 @@ from starhold.certification.inertia import inertia_box, told
 from starhold.certification.limits import torque_limit
 from starhold.certification.motion import Motion
 from starhold.certification.region import region
-from starhold.certification.sampling import sampling
+from starhold.certification.sampling import APART, sampling
 from starhold.certification.saturation import FREE, saturation
 from starhold.certification.sliding import surface_claim
 from starhold.certification.subject import Subject, described, make_subject
@@ -45,13 +47,18 @@ def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certific
     """The certificate of a closed loop as it starts, whatever happens to it later. A law that keeps a memory or declares
     neither V nor a surface nor a single root gets one without claims, which is undecided; so does a surface with wheels, and
     a loop that counts on a lost wheel. Of a law that polynomials cannot follow the one claim is undecided, and names the
-    operation and its line."""
+    operation and its line; so it is where numbers are too far apart in size for floats to guess with."""
     subject = make_subject(loop, wanted.disturbance, wanted.momentum)
+    everywhere = {"rate_everywhere": None, "everything": True}
     try:
-        claims = _claims(subject, wanted)
+        # What overflows in a guess is caught where the guess is verified.
+        with np.errstate(all="ignore"):
+            claims = _claims(subject, wanted)
     except UnreadableError as reason:
         # Nothing is known of such a law, whatever else was asked for.
-        claims = [_undecided("convergence", {"rate_everywhere": None, "everything": True}, subject, str(reason))]
+        claims = [_undecided("convergence", everywhere, subject, str(reason))]
+    except (OverflowError, ZeroDivisionError, np.linalg.LinAlgError) as reason:
+        claims = [_undecided("convergence", everywhere, subject, f"{APART}: {reason}")]
     return Certificate(name or loop.law.name, described(subject), tuple(claims))
 
 

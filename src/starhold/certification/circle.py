@@ -34,6 +34,7 @@ from starhold.models.libration import linear
 
 IN_PLANE = "starts in the plane x = 0 without a rate along X"
 MOST = 400_000
+TOO_NEAR = "a relay without a layer holds other circles, but no float tells one from this one"
 LESS = (1e-2, 0.03, 0.1, 0.2, 0.4, 0.7)
 """How far below the level that points of a grid suggest a proof is tried."""
 
@@ -72,12 +73,17 @@ def attracts(loop: StationLoop) -> Claim:
     found.add("form", EXACT, True)
     g = circle.gains
     if g.feedback == 1 and g.layer == 0:
-        found.add("only the circle", LASALLE, False, _held_circle(circle))
+        held = _held_circle(circle)
+        apart = held["radius"] != number(g.radius) and held["needs"] <= number(g.k)
+        found.add("only the circle", LASALLE, False if apart else None, held if apart else {"reason": TOO_NEAR})
         return finish()
     found.add("descent", EXACT_SIGN, g.k > 0)
     found.add("only the circle", LASALLE, g.rate != 0 or None, {} if g.rate != 0 else {"reason": "the rate is zero"})
     level = below(circle.centre * ALMOST)
-    found.add("centre outside", EXACT_SIGN, exact(level) < circle.centre)
+    below_it = 0 < exact(level) < circle.centre
+    found.add(
+        "centre outside", EXACT_SIGN, below_it or None, {} if below_it else {"reason": "no float is between V and zero"}
+    )
     steep = circle.plant.rate**2 + 2 * circle.plant.stiffness
     found.add("x returns", EXACT_SIGN, g.k_x > steep and g.k_velocity > 0)
     told.update(_told(circle, level))
@@ -155,8 +161,8 @@ def _held_circle(circle: Circle) -> dict[str, Any]:
     # Half of what the relay could hold near the circle, where f1 is 2 radius (r - radius).
     radius = number(g.radius)
     r = radius + min(0.1 * radius, number(g.k) / (8.0 * number(g.alpha) * radius * radius))
-    held = 2.0 * number(g.alpha) * (r * r - radius * radius) * r
-    return {"radius": r, "needs": held, "of": number(g.k)}
+    held = 2 * g.alpha * (exact(r) ** 2 - g.radius**2) * exact(r)
+    return {"radius": r, "needs": number(held), "of": number(g.k)}
 
 
 def _on_circle(circle: Circle, kind: str) -> tuple[Any, float]:

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from starhold.algebra.polynomial import Polynomial, exact
 
 Rows: TypeAlias = list[list[Any]]
+NEAR = 16
+"""Steps from a root in floats to a bound of the exact one, at most; it takes one or two."""
 
 
 def rows(array: Any) -> Rows:
@@ -136,9 +138,11 @@ def _root(x: Any, nudge: float) -> Any:
     if x == 0:
         return fmpq(0)
     found = exact(math.sqrt(number(x)))
-    while (found * found < x) if nudge > 1.0 else (found * found > x):
+    for _ in range(NEAR):
+        if (found * found >= x) if nudge > 1.0 else (found * found <= x):
+            return found
         found *= exact(nudge)
-    return found
+    raise OverflowError("a root is no float of normal size")
 
 
 def matrix_of(polynomial: Polynomial, first: Sequence[str], second: Sequence[str]) -> Rows:
@@ -170,6 +174,8 @@ def spectral_norm_above(a: Rows) -> Any:
 def root_float(square: Any, up: bool = False) -> float:
     """The float next to the square root of a rational that is not above it, or, up, not below it."""
     root, toward = math.sqrt(number(square)), math.inf if up else 0.0
-    while (exact(root) ** 2 < square) if up else (exact(root) ** 2 > square):
+    for _ in range(NEAR):
+        if (exact(root) ** 2 >= square) if up else (exact(root) ** 2 <= square):
+            return root
         root = math.nextafter(root, toward)
-    return root
+    raise OverflowError("a root is no float of normal size")

@@ -35,6 +35,7 @@ ASSUMPTIONS = (
 )
 STILL_WHEELS = "no stored momentum"
 ROOTS = "certified roots"
+APART = "inertia, gains and period are too far apart in size"
 MOST_BITS = 1_000
 """Of the numbers of a characteristic polynomial whose roots are told apart: everyday ones have 500; of gains of 1e-300
 they have 4000, which takes minutes."""
@@ -53,7 +54,7 @@ def sampling(motion: Motion) -> Claim | None:
     J, period = motion.subject.inertia, exact(loop.period)
     if _bits(stepped(J, rate, attitude, period)) > MOST_BITS:
         numbers: dict[str, Any] = {"period": number(period), "longest": None, "every_shorter": False}
-        reason = "inertia, gains and period are too far apart in size for certified roots"
+        reason = f"{APART} for certified roots"
         return Claim(
             "sampling",
             numbers,

@@ -5,15 +5,32 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from starhold.certification.certificate import Certificate, Claim
+import numpy as np
+
+from starhold.certification.certificate import EXACT, Certificate, Claim, Obligation
 from starhold.certification.circle import attracts, control_limit
 from starhold.certification.rest import rests, saturated_axis
+from starhold.certification.station_terms import UNLIMITED, assumed
 from starhold.certification.subject import described_gains
 from starhold.loop.station import StationLoop
 
 
 def certify_station(loop: StationLoop, name: str = "") -> Certificate:
     """The certificate of a station-keeping loop; without claims, which is undecided, for a law that none are made about."""
+    # What overflows in a guess is caught where the guess is verified.
+    with np.errstate(all="ignore"):
+        try:
+            claims = _claims(loop)
+        except (OverflowError, ZeroDivisionError) as reason:
+            refused = Obligation(
+                "form", EXACT, "undecided", {"reason": f"gains and plant are too far apart in size: {reason}"}
+            )
+            kind = "circle" if loop.law.name == "l2-circle" else "rest"
+            claims = [Claim(kind, {}, {}, assumed(loop, UNLIMITED), (refused,))]
+    return Certificate(name or loop.law.name, described_station(loop), tuple(claims))
+
+
+def _claims(loop: StationLoop) -> list[Claim]:
     claims: list[Claim] = []
     limited = loop.limit_kind != "none" and math.isfinite(loop.limit)
     if loop.law.name == "l2-circle":
@@ -24,7 +41,7 @@ def certify_station(loop: StationLoop, name: str = "") -> Certificate:
         claims.append(rests(loop))
         if limited and loop.limit_kind == "axis" and loop.model == "linear" and claims[0].outcome == "proved":
             claims.append(saturated_axis(loop))
-    return Certificate(name or loop.law.name, described_station(loop), tuple(claims))
+    return claims
 
 
 def described_station(loop: StationLoop) -> dict[str, Any]:
