@@ -324,3 +324,19 @@ def test_what_does_not_return_along_x_is_refuted(made):
         wrong = changed(other, (*CLAIM, "obligations", spot, "outcome"), "refuted")
         wrong["certificates"][0]["outcome"] = wrong["certificates"][0]["claims"][0]["outcome"] = "refuted"
         assert [f.obligation for f in check(wrong) if f.verdict == "fails"] == [name]
+
+
+@pytest.mark.parametrize(
+    ("gains", "change"),
+    [
+        (RELAY, {"radius": 1000.0}),
+        (RELAY, {"k": 3e-51}),
+        (RELAY, {"radius": 1e-150, "k": 3e199}),
+        (BEST, {"radius": 1e-150}),
+        (BEST, {"radius": 1e200}),
+        (SOFT, {"k": 1e-300}),
+    ],
+)
+def test_gains_of_any_size_end_in_what_the_checker_takes(tmp_path, gains, change):
+    write([certify_station(loop_of(gains._replace(**change), 1.0))], "made", tmp_path / "c.json")
+    assert [f for f in check_file(tmp_path / "c.json") if f.verdict == "fails"] == []

@@ -74,7 +74,7 @@ def attracts(loop: StationLoop) -> Claim:
     g = circle.gains
     if g.feedback == 1 and g.layer == 0:
         held = _held_circle(circle)
-        apart = held["radius"] != number(g.radius) and held["needs"] <= number(g.k)
+        apart = held["radius"] != number(g.radius) and 0.0 < held["needs"] <= number(g.k)
         found.add("only the circle", LASALLE, False if apart else None, held if apart else {"reason": TOO_NEAR})
         return finish()
     found.add("descent", EXACT_SIGN, g.k > 0)
