@@ -163,15 +163,15 @@ def test_a_python_function_may_have_them_too():
 
 LINES = ("x", "y", "x - y", "x + y", "x + 1/2", "y - 1/2", "x**2 + y**2 - 1", "x - y**2")
 THICK = (
-    "sat({0})",
-    "abs({0})",
-    "max({0}, {1})",
-    "sign({0})/4",
-    "({0} if {1} > 0 else 0)",
-    "sign({0})*sign({1})/8",
-    "min(0, {0})",
+    "sat(2*x)",
+    "abs(x)/2",
+    "sign(x)/4",
+    "sign({0})*x/4",
+    "(x if {0} > 0 else x/2)",
+    "sign({0})*sign({1})*y/8",
+    "sat({0})*x",
 )
-FORMS = (ROUND, "2*x**2 + x*y + y**2", "max(abs(x), abs(y))", "abs(x) + y**2", "x**2 + 2*y**2 - 1/4", "max(x**2, y**2)")
+FORMS = (ROUND, "2*x**2 + x*y + y**2", "x**2 + 2*y**2 - 1/4", "max(x**2 + y**2 - 1/4, 0)", "x**2 + y**2 + max(x, 0)*x")
 PYTHON = {"abs": abs, "max": max, "min": min, "sign": lambda n: int(n > 0) - int(n < 0), "sat": lambda n: max(-1, min(1, n))}
 PYTHON["where"] = lambda c, a, b: a if c else b
 
@@ -182,9 +182,10 @@ def made(random):
     def one(texts):
         return texts[random.integers(len(texts))]
 
-    thin = f"{random.integers(-9, 10)}*{one(('x', 'y', '1', '(x + y)'))}*{one(ON).format(one(LINES))}"
-    turn = random.integers(-4, 5) / 4
-    rates = [f"{turn}*y - {random.integers(0, 3)}*x", f"{-turn}*x - {random.integers(0, 3)}*y"]
+    line = one(LINES)
+    thin = f"{random.integers(-4, 5)}*{one(('x', 'y', '1', 'abs(x)', f'({line})'))}*{one(ON).format(line)}"
+    turn = random.integers(-2, 3) / 2
+    rates = [f"{turn}*y - {random.integers(1, 4)}*x", f"{-turn}*x - {random.integers(1, 4)}*y"]
     V, place = one(FORMS), random.integers(3)
     rates[random.integers(2)] += f" - {one(THICK).format(one(LINES), one(LINES))}" if random.random() < 0.6 else ""
     if place == 2:
