@@ -207,7 +207,8 @@ def test_a_clipped_damping_must_leave_the_stiffness_its_torque():
     names = [(n, HOWS[n]) for n in ("form", "positive", "descent", "target", "only rest", "other rest repels")]
     numbers = {**converging()["numbers"], "limit": 0.05, "kind": "axis"}
     told = [a for a in TEXTBOOK if a != "torque not limited"]
-    claim = proved_by_hand("torque-limit", [*names, ("torque", "ball arithmetic")], numbers, converging()["witness"], told)
+    witness = {**converging()["witness"], "shift": None, "weight": None}
+    claim = proved_by_hand("torque-limit", [*names, ("torque", "ball arithmetic")], numbers, witness, told)
     assert passed(check(by_hand("pd", clipped, [converging(), claim], torque_limit=0.05)))
     assert reasons(by_hand("pd", PD, [converging(), claim], torque_limit=0.05))
     assert reasons(by_hand("pd", clipped, [converging(), claim], torque_limit=0.05, limit="norm"))
@@ -631,8 +632,8 @@ def test_tangents_bound_the_torque_closely(numbers, level, s):
     assume(most > 1e-3)
     common, *others = [[checking.rational(x) for x in load] for load in loads]
     bounds = checking.rational(level), checking.rational(s)
-    assert keeps_below(others, common, checking.rational(most * (1.0 + 1e-5)), *bounds)
-    assert not keeps_below(others, common, checking.rational(most * (1.0 - 1e-9)), *bounds)
+    assert keeps_below([others], common, checking.rational(most * (1.0 + 1e-5)), *bounds)
+    assert not keeps_below([others], common, checking.rational(most * (1.0 - 1e-9)), *bounds)
 
 
 @given(some.integers(-9, 9), some.integers(-9, 9), some.tuples(some.integers(-9, 9), some.integers(-9, 9)))

@@ -102,7 +102,6 @@ def test_torque_limit_is_sharp(name, kind):
     P, s, level = floats(frame.P), number(frame.s), claim.numbers["level"]
     worst = max(largest_torque(loop, P, s, level, axis) for axis in range(3 if kind == "axis" else 1))
     assert worst <= 0.05 * (1.0 + 1e-9)
-    # Bounds of single monomials cost something where the gyroscopic torque is cancelled.
     if name in ("pd-0", "lqr-III") and (kind == "axis" or name == "pd-0"):
         assert worst >= 0.05 * (1.0 - 1e-3)
 

@@ -246,7 +246,7 @@ OTHERS = {
     "torque-limit": (
         (*CONVERGES, "torque"),
         CONTENTS | {"level": 0.01, "limit": 0.1, "kind": "axis"},
-        PROOF,
+        PROOF | {"shift": None, "weight": None},
         [a for a in TEXTBOOK if a != TEXTBOOK[4]],
     ),
     "inertia": (

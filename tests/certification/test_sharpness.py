@@ -1,14 +1,22 @@
 """How near proved bounds are to the worst that a search finds: never beneath it, and not far above."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as some
 from scipy.linalg import expm
 
+from starhold.algebra.polynomial import Polynomial
 from starhold.algebra.quaternion import derivative
-from starhold.algebra.vector import ZERO, add
+from starhold.algebra.vector import ZERO, add, apply, cross
 from starhold.certification.certify import Wanted, certify
-from starhold.certification.matrices import floats
-from starhold.certification.motion import Motion
+from starhold.certification.frame import take_apart
+from starhold.certification.gyroscopic import crossed, swing
+from starhold.certification.matrices import floats, identity, number, plus, rows
+from starhold.certification.motion import RATE, Motion
 from starhold.certification.subject import make_subject
 from starhold.laws.interface import NoMemory, Seen
 from starhold.models.rigid_body import angular_acceleration
@@ -90,3 +98,94 @@ def test_ends_against_the_worst_disturbance_found(name, torque, angle, rate):
     found = worst_ends(loop, torque)
     assert 1.0 <= claim.numbers["angle"] / found[0] <= angle
     assert 1.0 <= claim.numbers["rate"] / found[1] <= rate
+
+
+def largest_torque(loop, level, kind):
+    """The largest torque in norm, or on an axis, that a search by random steps finds on {V <= level}."""
+    frame = take_apart(Motion(make_subject(loop)))
+    root, potential = np.linalg.inv(np.linalg.cholesky(floats(frame.P))).T, frame.potential
+    random = np.random.default_rng(2)
+
+    def command(q, w):
+        return loop.law.torque(Seen(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.1, ZERO), loop.gains, loop.craft, NoMemory())[0]
+
+    torque = Compiled(command, (1.0, 0.0, 0.0, 0.0), ZERO)
+
+    def size(x):
+        axes, turning = (part / np.linalg.norm(part, axis=0) for part in (x[:3], x[3:6]))
+        t = np.minimum(level, number(potential.top)) * 0.5 * (1.0 + np.sin(x[6]))
+        q0 = potential.cosine(t, axes.T)
+        q = np.sqrt(np.maximum(1.0 - q0 * q0, 0.0)) * axes
+        u = torque.over(np.vstack([q0, q, np.sqrt(2.0 * np.maximum(level - t, 0.0)) * (root @ turning)]))
+        return np.linalg.norm(u, axis=0) if kind == "norm" else np.abs(u).max(axis=0)
+
+    x = random.normal(size=(7, 20_000))
+    x = x[:, np.argsort(size(x))[-64:]]
+    best = size(x)
+    for _ in range(400):
+        tried = x + random.normal(size=x.shape) * 10.0 ** random.uniform(-3.5, -0.5, size=x.shape[1])
+        sizes = size(tried)
+        x, best = np.where(sizes > best, tried, x), np.maximum(best, sizes)
+    return float(best.max())
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "share"),
+    [
+        ("lyapunov-0", "norm", 0.96),
+        ("lyapunov-0", "axis", 0.72),
+        ("lyapunov-1", "norm", 0.98),
+        ("lyapunov-1", "axis", 0.9),
+        ("wheel-0", "norm", 0.96),
+        ("lqr-I", "norm", 0.98),
+        ("lqr-I", "axis", 0.89),
+        ("pd-0", "norm", 0.998),
+        ("matrix-pd-inertial", "norm", 0.87),
+    ],
+)
+def test_the_level_under_a_torque_limit_against_the_largest_that_is_safe(name, kind, share):
+    """No state within the level needs more torque than the limit, and one within level/share does."""
+    loop = replace(free(LOOPS[name]), limit=kind)
+    claim = certify(loop, name).claim("torque-limit")
+    assert claim.outcome == "proved"
+    limit, level = claim.numbers["limit"], claim.numbers["level"]
+    assert largest_torque(loop, level, kind) <= limit * (1.0 + 1e-12)
+    assert largest_torque(loop, level / share, kind) > limit
+
+
+MOMENTS = some.tuples(*[some.floats(0.5, 1.5)] * 3)
+
+
+def gyroscopic(A):
+    w = tuple(Polynomial.variable(name) for name in RATE)
+    return list(cross(w, apply(tuple(map(tuple, A)), w)))
+
+
+@settings(max_examples=20)
+@given(MOMENTS)
+def test_the_bound_of_the_gyroscopic_torque_is_sharp(moments):
+    """Half the range of the moments over |w|2, and (J3 - J1)/(2 sqrt(J1 J3)) over w.Jw (Kantorovich)."""
+    J = rows(np.diag(moments))
+    low, high = min(moments), max(moments)
+    found = [swing(gyroscopic(J), metric) for metric in (identity(3), J)]
+    sharp = (high - low) / 2.0, (high - low) / (2.0 * math.sqrt(low * high))
+    for bound, least in zip(found, sharp, strict=True):
+        assert least * (1.0 - 1e-12) <= number(bound.most) <= least * (1.0 + 1e-5) + 1e-9
+
+
+@settings(max_examples=20)
+@given(some.lists(some.integers(-3, 3), min_size=18, max_size=18), MOMENTS)
+def test_no_rate_exceeds_the_bound_of_quadratic_forms(entries, moments):
+    """For forms of any kind, and for w x Aw with any A, from which A comes back up to a multiple of the unit matrix."""
+    names = [(a, b) for k, a in enumerate(RATE) for b in RATE[k:]]
+    own = [Polynomial({m: c for m, c in zip(names, entries[k : k + 6], strict=True) if c}) for k in (0, 6, 12)]
+    A = rows(np.reshape(np.array(entries[:9], dtype=float), (3, 3)))
+    P = rows(np.diag(moments))
+    w = np.random.default_rng(0).normal(size=(3, 2000))
+    w /= np.sqrt(np.array(moments) @ w**2)
+    for parts in (own, gyroscopic(A)):
+        values = dict(zip(RATE, w, strict=True))
+        sizes = [sum((number(c) * values[a] * values[b] for (a, b), c in p.terms.items()), 0.0 * w[0]) for p in parts]
+        assert np.linalg.norm(sizes, axis=0).max() <= number(swing(parts, P).most) * (1.0 + 1e-12)
+    forms = [[[part.slope(a).slope(b).at({}) / 2 for b in RATE] for a in RATE] for part in gyroscopic(A)]
+    assert crossed(forms) == plus(A, identity(3, A[0][0]), -1)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from flint import fmpq
 
-from starhold.algebra.polynomial import Polynomial, exact
+from starhold.algebra.polynomial import Monomial, Polynomial, exact
 from starhold.certification.matrices import (
     Rows,
     definite,
@@ -44,7 +44,7 @@ def swing(parts: Sequence[Polynomial], P: Rows) -> Swing:
     at most most w.Pw if (A + p)'(A + p) + c2 <= 2 c most P. Of w x Jw this is sharp: half the range of the moments for
     P = 1, (J3 - J1)/(2 sqrt(J1 J3)) for P = J.
     """
-    forms = [matrix_of(part.only(lambda m: len(m) == 2 and set(m) <= set(RATE)), RATE, RATE) for part in parts]
+    forms = [matrix_of(part.only(is_swing), RATE, RATE) for part in parts]
     each = [max(relative_greatest(scaled(form, sign), P) for sign in (1, -1)) for form in forms]
     found = Swing(each[0] if len(each) == 1 else root_above(sum((x * x for x in each), fmpq(0))))
     A = crossed(forms)
@@ -69,6 +69,11 @@ def swing(parts: Sequence[Polynomial], P: Rows) -> Swing:
     p, c = float(best[0] * size), float(size * np.exp(best[1]))
     other = relative_greatest(both(p, c), P) / (2 * exact(c))
     return found if found.most <= other else Swing(other, exact(p), exact(c))
+
+
+def is_swing(monomial: Monomial) -> bool:
+    """Whether a monomial is quadratic in the rate and holds nothing else."""
+    return len(monomial) == 2 and set(monomial) <= set(RATE)
 
 
 def crossed(forms: Sequence[Rows]) -> Rows | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from flint import arb, fmpq
@@ -14,18 +14,8 @@ from starhold.algebra.polynomial import Polynomial, exact, jointly
 from starhold.certification.certificate import BALLS, Claim, Obligation
 from starhold.certification.convergence import Basin, assumed, reached
 from starhold.certification.frame import contents
-from starhold.certification.matrices import (
-    Rows,
-    definite,
-    floats,
-    inverse,
-    number,
-    plus,
-    product,
-    root_above,
-    scaled,
-    transposed,
-)
+from starhold.certification.gyroscopic import Swing, is_swing, swing
+from starhold.certification.matrices import Rows, floats, greatest, inverse, number, product, root_above, transposed
 from starhold.certification.motion import ATTITUDE, AXES, RATE, Truths
 from starhold.certification.refutation import rational_turn, state_evidence
 from starhold.certification.subject import above, upper
@@ -37,15 +27,21 @@ SLIGHTLY_MORE = 1 + fmpq(1, 2**40)
 UNEQUAL = "the weights of the direction cosines differ, for which no bound of the torque is built"
 
 
+Terms: TypeAlias = tuple[tuple[tuple[int, int, int], int, Any], ...]
+
+
 @dataclass(frozen=True)
 class Load:
-    """What bounds one axis of the torque (or its norm, or a motor's): squares of the greatest linear part of the rate for
-    w.Pw = 1 and of the attitude, and the other monomials as (powers of |w_j|, power of |q|, size). `limit`: what it has
-    to keep below."""
+    """What bounds one axis of the torque (or its norm, or a motor's). Of its part Bw, linear in the rate, the square of the
+    greatest norm for w.Pw = 1; `swing` of the part G(w) that is quadratic, and `mixed`, what |Bw.G(w)| does not exceed: so
+    |Bw + G(w)|2 <= rate z2 + 2 mixed z3 + swing2 z4 for w.Pw = z2. Of what is linear in the attitude the square; of each
+    component the other monomials as (powers of |w_j|, power of |q|, size). `limit`: what it has to keep below."""
 
     rate: Any
     attitude: Any
-    rest: tuple[tuple[tuple[int, int, int], int, Any], ...]
+    swing: Swing
+    mixed: Any
+    rest: tuple[Terms, ...]
     limit: Any
 
 
@@ -57,12 +53,15 @@ def torque_limit(basin: Basin, turn: float | None = None) -> Claim | None:
         return None
     pieces = jointly(basin.motion.torque)
     numbers: dict[str, Any] = {"limit": limit, "kind": kind}
+    shown_by = Swing(fmpq(0))
 
     def claim(level: Any | None, holds: bool, evidence: dict[str, Any] | None = None) -> Claim:
         told = told_set(basin, level, turn)
         outcome = "proved" if holds else "refuted" if evidence and "state" in evidence else "undecided"
         torque = Obligation("torque", BALLS, outcome, {} if holds or evidence is None else evidence)
         before, witness = reached(basin, level)
+        for name, value in (("shift", shown_by.shift), ("weight", shown_by.weight)):
+            witness[name] = None if value is None else number(value)
         return Claim("torque-limit", numbers | told, witness, assumed(subject, limits=()), (*before, torque))
 
     if len(pieces) > 1:
@@ -72,6 +71,8 @@ def torque_limit(basin: Basin, turn: float | None = None) -> Claim | None:
         return claim(fmpq(0), False, {"reason": UNEQUAL})
     parts = pieces[0][1]
     carried = loads(basin, parts, kind, exact(limit))
+    if kind == "norm":
+        shown_by = carried[0].swing
     if turn is None:
         level = largest_level(basin, carried)
         return claim(fmpq(0), False, {"reason": "no level is small enough"}) if level is None else claim(level, True)
@@ -139,20 +140,29 @@ def _root_above_sum(linear: Polynomial) -> Any:
 
 def loads(basin: Basin, parts: list[Polynomial], kind: str, limit: Any) -> list[Load]:
     """The loads of each axis, or of the norm, with their common limit."""
-    if kind == "axis":
-        return [axis_load(basin, part, limit) for part in parts]
+    return [load_of(basin, group, limit) for group in ([[part] for part in parts] if kind == "axis" else [parts])]
+
+
+def load_of(basin: Basin, parts: list[Polynomial], limit: Any) -> Load:
+    """The load of one component, or of the norm of several."""
     rows = [_linear(basin, part) for part in parts]
     rates, attitudes = [row[0] for row in rows], [row[1] for row in rows]
-    rate = _relative_greatest(product(transposed(rates), rates), basin.frame.P)
-    attitude = _relative_greatest(product(transposed(attitudes), attitudes), _unit())
-    return [Load(rate, attitude, tuple(item for part in parts for item in _rest(basin, part)), limit)]
+    inverse_of = inverse(basin.frame.P)
+    rate = greatest(product(product(rates, inverse_of), transposed(rates)))
+    attitude = greatest(product(attitudes, transposed(attitudes)))
+    turning = swing(parts, basin.frame.P)
+    mixed = min(_mixed(parts, rates, inverse_of), root_above(rate) * turning.most)
+    return Load(rate, attitude, turning, mixed, tuple(_rest(basin, part) for part in parts), limit)
 
 
-def axis_load(basin: Basin, part: Polynomial, limit: Any) -> Load:
-    """The load of one component."""
-    rate, attitude = _linear(basin, part)
-    square = sum((c * c for c in attitude), fmpq(0))
-    return Load(_square(rate, inverse(basin.frame.P)), square, _rest(basin, part), limit)
+def _mixed(parts: list[Polynomial], rates: Rows, inverse_of: Rows) -> Any:
+    """A bound of |Bw.G(w)| for w.Pw = 1, monomial by monomial: exactly zero where G only turns Bw."""
+    total: Any = Polynomial.constant(0)
+    for part, row in zip(parts, rates, strict=True):
+        linear = Polynomial({(name,): c for name, c in zip(RATE, row, strict=True) if c != 0})
+        total = total + linear * part.only(is_swing)
+    sizes = {name: root_above(inverse_of[j][j]) for j, name in enumerate(RATE)}
+    return sum((abs(c) * sizes[m[0]] * sizes[m[1]] * sizes[m[2]] for m, c in total.terms.items()), fmpq(0))
 
 
 def _linear(basin: Basin, part: Polynomial) -> tuple[list[Any], list[Any]]:
@@ -160,26 +170,7 @@ def _linear(basin: Basin, part: Polynomial) -> tuple[list[Any], list[Any]]:
     return rate, [part.terms.get(monomial, fmpq(0)) for monomial in basin.frame.potential.linear]
 
 
-def _unit() -> Rows:
-    return [[fmpq(int(i == j)) for j in range(3)] for i in range(3)]
-
-
-def _square(row: list[Any], form: Rows) -> Any:
-    return sum((row[i] * form[i][j] * row[j] for i in range(3) for j in range(3)), fmpq(0))
-
-
-def _relative_greatest(a: Rows, b: Rows) -> Any:
-    """A rational mu with mu b - a positive definite, just above the smallest."""
-    size = floats(b)
-    guess = float(np.linalg.eigvals(np.linalg.solve(size, floats(a))).real.max())
-    for step in (1e-13, 1e-11, 1e-9, 1e-6, 1e-3, 1.0):
-        mu = exact(max(guess, 1e-300) * (1.0 + step))
-        if definite(plus(scaled(b, mu), a, -1)):
-            return mu
-    raise ArithmeticError("no bound of the damping was found")
-
-
-def _rest(basin: Basin, component: Polynomial) -> tuple[tuple[tuple[int, int, int], int, Any], ...]:
+def _rest(basin: Basin, component: Polynomial) -> Terms:
     subject = basin.motion.subject
     sizes = {
         "r": subject.target_rate,
@@ -189,7 +180,7 @@ def _rest(basin: Basin, component: Polynomial) -> tuple[tuple[tuple[int, int, in
     }
     found: list[tuple[tuple[int, int, int], int, Any]] = []
     for monomial, c in component.terms.items():
-        if monomial in basin.frame.potential.linear or (len(monomial) == 1 and monomial[0] in RATE):
+        if monomial in basin.frame.potential.linear or (len(monomial) == 1 and monomial[0] in RATE) or is_swing(monomial):
             continue
         size, attitude = abs(c), 0
         for name in monomial:
@@ -210,20 +201,25 @@ class Bound:
     def __init__(self, load: Load, basin: Basin, level: Any) -> None:
         turned = inverse(basin.frame.P)
         self.load, self.potential, self.level = load, basin.frame.potential, arb(level)
-        self.rate, self.attitude = arb(load.rate).sqrt(), arb(load.attitude).sqrt()
+        self.rate, self.attitude, self.mixed = arb(load.rate), arb(load.attitude).sqrt(), 2 * arb(load.mixed)
+        self.square = arb(load.swing.most) ** 2
         self.axes = [arb(turned[j][j]).sqrt() for j in range(3)]
 
     def between(self, first: Any, last: Any) -> arb:
         """An enclosure of an upper bound for t between two rationals."""
         energy = (2 * (self.level - arb(first))).nonnegative_part().sqrt()
         linear, turned = self.potential.sizes(first, last)
-        total = self.rate * energy + self.attitude * linear
-        for powers, attitude, size in self.load.rest:
-            term = arb(size) * turned**attitude
-            for axis, power in zip(self.axes, powers, strict=True):
-                term = term * (axis * energy) ** power
-            total = total + term
-        return total
+        moving = energy * (self.rate + self.mixed * energy + self.square * energy**2).sqrt()
+        squares = arb(0)
+        for terms in self.load.rest:
+            total = arb(0)
+            for powers, attitude, size in terms:
+                term = arb(size) * turned**attitude
+                for axis, power in zip(self.axes, powers, strict=True):
+                    term = term * (axis * energy) ** power
+                total = total + term
+            squares = squares + total**2
+        return moving + self.attitude * linear + squares.sqrt()
 
     def below(self, limit: Any, first: Any, last: Any, depth: int = 0) -> bool:
         """Whether it is at most a rational for t between two others, by branch and bound."""
@@ -273,21 +269,21 @@ def guesser(basin: Basin, carried: list[Load]) -> Callable[[float], NDArray[np.f
     top = number(potential.top)
     grid = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, 801)))
     axes = np.sqrt(np.diagonal(floats(inverse(basin.frame.P))))
-    plain = [
-        (float(np.sqrt(number(c.rate))), float(np.sqrt(number(c.attitude))), [(p, a, number(size)) for p, a, size in c.rest])
-        for c in carried
-    ]
+
+    def size(terms: Terms, turned: Any, energy: Any) -> Any:
+        shares = [(axes ** np.array(powers)).prod() * energy ** sum(powers) for powers, _, _ in terms]
+        return sum((number(c) * turned**a * share for (_, a, c), share in zip(terms, shares, strict=True)), 0.0 * energy)
 
     def sizes(level: float) -> NDArray[np.float64]:
         t = min(level, top) * grid
         energy = np.sqrt(2.0 * np.maximum(level - t, 0.0))
         linear, turned = potential.grid(t)
         found: list[float] = []
-        for rate, attitude, rest in plain:
-            total = rate * energy + attitude * linear
-            for powers, degree, size in rest:
-                total = total + size * turned**degree * float(np.prod(axes ** np.array(powers))) * energy ** sum(powers)
-            found.append(float(total.max()))
+        for load in carried:
+            rate, attitude, mixed, most = (number(x) for x in (load.rate, load.attitude, load.mixed, load.swing.most))
+            moving = energy * np.sqrt(rate + 2.0 * mixed * energy + (most * energy) ** 2)
+            rest = np.sqrt(sum((size(terms, turned, energy) ** 2 for terms in load.rest), 0.0 * energy))
+            found.append(float((moving + np.sqrt(attitude) * linear + rest).max()))
         return np.array(found)
 
     return sizes

@@ -14,10 +14,10 @@ from starhold.certification.limits import (
     UNEQUAL,
     Bound,
     Load,
-    axis_load,
     guesser,
     largest_level,
     level_of_turn,
+    load_of,
     told_set,
     within,
 )
@@ -89,7 +89,7 @@ def _load(basin: Basin, torque: list[Polynomial], wheels: Wheels, i: int) -> Loa
     total: Any = Polynomial.constant(0)
     for c, component in zip(wheels.least[i], torque, strict=True):
         total = total + exact(c) * component
-    return axis_load(basin, total, exact(min(limit, 1e300)))
+    return load_of(basin, [total], exact(min(limit, 1e300)))
 
 
 def _needs(basin: Basin, carried: list[Load | None], level: Any) -> list[float]:

@@ -104,7 +104,8 @@ def torque_limit(subject: Subject, claim: Numbers) -> list[Obligation]:
         demand(numbers["kind"] == subject.limit, "the limit is of another kind than the loop's")
         limit = rational(numbers["limit"])
         demand(subject.torque_limit is not None and limit <= subject.torque_limit, "the loop's limit is lower")
-        demand(keeps_within(region, limit, numbers["kind"] == "axis"), "the torque may exceed the limit")
+        how = [optional(claim["witness"][name]) for name in ("shift", "weight")]
+        demand(keeps_within(region, limit, numbers["kind"] == "axis", *how), "the torque may exceed the limit")
         return "bounded by tangents of a concave function, or on each piece of the law"
 
     return [*_converges(region, claim), ("torque", BALLS, torque), _told(region, numbers)]

@@ -206,7 +206,7 @@ STEP: dict[str, Test] = {"form": _list(_list(_number, 6), 6), "decay": _number, 
 _PROOF: dict[str, Test] = {"stiffness": _MAYBE, "epsilon": _number, "rho": _number}
 WITNESS: dict[str, dict[str, Test]] = {
     "convergence": {**_PROOF, "rate_bound": _MAYBE},
-    "torque-limit": {**_PROOF, "rate_bound": _MAYBE},
+    "torque-limit": {**_PROOF, **dict.fromkeys(("rate_bound", "shift", "weight"), _MAYBE)},
     "wheels": {**_PROOF, "rate_bound": _MAYBE},
     "inertia": {**_PROOF, "level": _MAYBE},
     "disturbance": {

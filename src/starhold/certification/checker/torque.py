@@ -4,6 +4,7 @@ shared with the certifier."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import prod
 from typing import Any
 
 from starhold.algebra.polynomial import Monomial, Polynomial
@@ -19,16 +20,17 @@ from starhold.certification.checker.exact import (
     root_up,
     turned,
 )
-from starhold.certification.checker.loop import RATE, TURN, Loop, W
+from starhold.certification.checker.loop import RATE, TURN, Loop, W, letters
 from starhold.certification.checker.region import Region
+from starhold.certification.checker.swing import swung
 from starhold.certification.checker.well import SHAPES, keeps_below
 
 __all__ = ["SHAPES", "bounded", "keeps_below", "keeps_within"]
 
 
-def keeps_within(region: Region[Any], limit: Any, each_axis: bool) -> bool:
+def keeps_within(region: Region[Any], limit: Any, each_axis: bool, shift: Any | None, weight: Any | None) -> bool:
     """Whether each axis of the torque, or its norm, keeps within a limit on the region's level set (without one, and for a
-    law of several pieces: everywhere)."""
+    law of several pieces: everywhere). `shift`, `weight`: what bounds the part of the norm that is quadratic in the rate."""
     loop = region.loop
     if region.level is None or len(loop.pieces) > 1:
         return all(
@@ -37,23 +39,43 @@ def keeps_within(region: Region[Any], limit: Any, each_axis: bool) -> bool:
             if (found := intervals(truths, W)) is not None
         )
     parts = list(loop.pieces[0][1].values())
-    return all(bounded(region, group, limit) for group in ([[part] for part in parts] if each_axis else [parts]))
+    if each_axis:
+        return all(bounded(region, [part], limit) for part in parts)
+    return bounded(region, parts, limit, shift, weight)
 
 
-def bounded(region: Region[Any], parts: Sequence[Polynomial], limit: Any) -> bool:
+def bounded(
+    region: Region[Any], parts: Sequence[Polynomial], limit: Any, shift: Any | None = None, weight: Any | None = None
+) -> bool:
     """Whether the norm of polynomials in the state keeps within a limit on the region's level set."""
     s, well = region.well()
-    inverse = inverted(region.frame.P)
+    P = region.frame.P
+    inverse = inverted(P)
     springs = [(*well.beside, name) for name in TURN]
     dampers = [(name,) for name in RATE]
     stiffness, damping = ([[p.terms.get(m, ZERO) for m in own] for p in parts] for own in (springs, dampers))
-    rest = [p.only(lambda m: m not in springs and m not in dampers) for p in parts]
-    # The greatest |Aq| for |q| = 1, and the greatest |Bw| for w.Pw = 1.
-    common = [ZERO] * len(well.shapes)
+    rest = [p.only(lambda m: m not in springs and m not in dampers and letters(m) != "ww") for p in parts]
+    # The greatest |Aq| for |q| = 1, and for w.Pw = z2 the greatest |Bw + G(w)|, G quadratic, of which the square is at most
+    # damped2 z2 + 2 mixed z3 + swing2 z4 = (swing z2 + along z)2 + (damped2 - along2) z2.
+    common: list[Any] = [ZERO] * len(well.shapes)
     common[well.spring] = root_up(greatest(chained(stiffness, turned(stiffness))))
-    common[SHAPES.index((0, 1))] = root_up(greatest(chained(chained(damping, inverse), turned(damping))))
+    damped, swing = greatest(chained(chained(damping, inverse), turned(damping))), swung(parts, P, shift, weight)
+    along = ZERO if swing == 0 else min(_mixed(parts, damping, inverse) / swing, root_up(damped))
+    moving: list[list[Any]] = [[ZERO] * len(well.shapes) for _ in range(2)]
+    moving[0][SHAPES.index((0, 2))], moving[0][SHAPES.index((0, 1))] = swing, along
+    moving[1][SHAPES.index((0, 1))] = root_up(max(damped - along**2, ZERO))
     loads = [_load(region.loop, p.terms, inverse, len(well.shapes)) for p in rest]
-    return keeps_below(loads, common, limit, region.level, s, well)
+    return keeps_below((moving, loads), common, limit, region.level, s, well)
+
+
+def _mixed(parts: Sequence[Polynomial], damping: Rows, inverse: Rows) -> Any:
+    """What |Bw.G(w)| does not exceed where w.Pw = 1, its monomials bounded one by one."""
+    product = Polynomial({})
+    for part, row in zip(parts, damping, strict=True):
+        linear: Any = sum((c * w for c, w in zip(row, W, strict=True)), Polynomial({}))
+        product = product + linear * part.only(lambda m: letters(m) == "ww")
+    most = {name: root_up(inverse[k][k]) for k, name in enumerate(RATE)}
+    return sum((abs(c) * prod(most[name] for name in m) for m, c in product.terms.items()), ZERO)
 
 
 def _load(loop: Loop, terms: Mapping[Monomial, Any], inverse: Rows, count: int) -> list[Any]:

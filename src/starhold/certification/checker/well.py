@@ -37,10 +37,10 @@ EVEN = Well((*((p, r, 0) for p, r in SHAPES), (1, 0, 1)), ("q0",), len(SHAPES), 
 
 
 def keeps_below(
-    loads: Sequence[Sequence[Any]], common: Sequence[Any], limit: Any, level: Any, s: Any, well: Well = ODD
+    groups: Sequence[Sequence[Sequence[Any]]], common: Sequence[Any], limit: Any, level: Any, s: Any, well: Well = ODD
 ) -> bool:
-    """Whether sum_k common_k f_k(t) + |(sum_k loads_ik f_k(t))_i| <= limit for 0 <= t <= min(level, s most), the f_k being
-    the products of a well's shapes, with z2 = 2 (level - t).
+    """Whether sum_k common_k f_k(t) and, of each group of loads, |(sum_k loads_ik f_k(t))_i| together are at most limit for
+    0 <= t <= min(level, s most), the f_k being the products of a well's shapes, with z2 = 2 (level - t).
 
     Each f_k is concave in t, being the root of at most two factors that are concave and not negative. So it lies under its
     tangents, and over a tangent the whole is convex: no more than at the ends of the piece.
@@ -57,14 +57,18 @@ def keeps_below(
         sizes: list[Any] = []
         for step in (ZERO, -half, half):
             heights = [height + slope * step for height, slope in tangents]
-            sums = [sum((c * h for c, h in zip(load, heights, strict=True)), arb(0)) for load in (common, *loads)]
-            sizes.append(sums[0] + sum((x * x for x in sums[1:]), arb(0)).nonnegative_part().sqrt())
+            squares = [sum((_sum(load, heights) ** 2 for load in loads), arb(0)) for loads in groups]
+            sizes.append(sum((square.nonnegative_part().sqrt() for square in squares), _sum(common, heights)))
         if sizes[0] > limit:
             # At the middle the tangents touch.
             return False
         if not (sizes[1] <= limit and sizes[2] <= limit):
             waiting += [(low, low + half), (low + half, high)]
     return False
+
+
+def _sum(load: Sequence[Any], heights: Sequence[Any]) -> Any:
+    return sum((c * h for c, h in zip(load, heights, strict=True)), arb(0))
 
 
 def _tangents(at: Any, level: Any, s: Any, well: Well) -> list[tuple[Any, Any]]:
