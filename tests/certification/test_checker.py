@@ -278,6 +278,38 @@ def test_a_bound_that_is_dropped_or_a_witness_that_is_not_one_fails(made, name):
                 assert not passed(check(edited(content, (kind, "numbers", "everything"), flag))), kind
 
 
+def test_every_step_towards_the_end_is_needed_and_checked(made):
+    content = alone(made("pd-0", disturbance=1e-4), "disturbance")
+    steps = claims_of(content)["disturbance"]["witness"]["steps"]
+    assert passed(check(content))
+    assert len(steps) > 2
+    for place in range(len(steps)):
+        assert not passed(check(edited(content, ("disturbance", "witness", "steps"), steps[:place] + steps[place + 1 :])))
+    path, step = ("disturbance", "witness", "steps", 1), steps[1]
+    for key in ("decay", "spread"):
+        for factor in (0.0, -1.0, 0.5, 2.0):
+            assert not passed(check(edited(content, (*path, key), step[key] * factor))), key
+    for factor in (-1.0, 1.0 - 1e-4, 1.0 + 1e-4):
+        assert not passed(check(edited(content, (*path, "form"), [[x * factor for x in row] for row in step["form"]])))
+    skew = copy.deepcopy(step["form"])
+    skew[0][1] += 1e-9 * abs(skew[0][0])
+    assert not passed(check(edited(content, (*path, "form"), skew)))
+    # Without any shift the gyroscopic torque is bounded too widely, with another one wider still.
+    for shift in (None, 0.0, 1e3):
+        assert not passed(check(edited(content, ("disturbance", "witness", "shift"), shift)))
+
+
+def test_the_bound_of_the_gyroscopic_torque_is_checked(tmp_path):
+    loop = LOOPS["lyapunov-0"]
+    write([certify(loop_of("lyapunov", loop.gains, loop.craft, limit="norm"))], "made", tmp_path / "c.json")
+    content = alone(json.loads((tmp_path / "c.json").read_text(encoding="utf-8")), "torque-limit")
+    witness = claims_of(content)["torque-limit"]["witness"]
+    assert passed(check(content))
+    for key, values in (("shift", (None, 0.0, 1.0)), ("weight", (None, 0.0, -witness["weight"], 1e3))):
+        for value in values:
+            assert not passed(check(edited(content, ("torque-limit", "witness", key), value))), (key, value)
+
+
 def edited(content, place, value):
     changed = copy.deepcopy(content)
     kind, *path = place

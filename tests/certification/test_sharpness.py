@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 from scipy.linalg import expm
 
-from starhold.algebra.polynomial import Polynomial
+from starhold.algebra.polynomial import Polynomial, exact
 from starhold.algebra.quaternion import derivative
 from starhold.algebra.vector import ZERO, add, apply, cross
 from starhold.certification.certify import Wanted, certify
@@ -178,7 +178,7 @@ def test_the_bound_of_the_gyroscopic_torque_is_sharp(moments):
 def test_no_rate_exceeds_the_bound_of_quadratic_forms(entries, moments):
     """For forms of any kind, and for w x Aw with any A, from which A comes back up to a multiple of the unit matrix."""
     names = [(a, b) for k, a in enumerate(RATE) for b in RATE[k:]]
-    own = [Polynomial({m: c for m, c in zip(names, entries[k : k + 6], strict=True) if c}) for k in (0, 6, 12)]
+    own = [Polynomial({m: exact(c) for m, c in zip(names, entries[k : k + 6], strict=True) if c}) for k in (0, 6, 12)]
     A = rows(np.reshape(np.array(entries[:9], dtype=float), (3, 3)))
     P = rows(np.diag(moments))
     w = np.random.default_rng(0).normal(size=(3, 2000))

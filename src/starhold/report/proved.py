@@ -36,6 +36,7 @@ SYMBOLS = {
     "tau": ("τ: a torque M does work of at most τ |Wᵀω + εq|² + M²/(4τ)", ""),
     "beta": ("β: share of V + ε q·Jω that is left of the fall", "1/s"),
     "shift": ("p in |ω × Jω| ≤ |ω| |(J + p)ω|", ""),
+    "weight": ("c in |ω| |(J + p)ω| ≤ (c |ω|² + |(J + p)ω|²/c)/2", ""),
     "momentum": ("total angular momentum, at most", "N m s"),
     "motors": ("torque of each motor, at most", "N m"),
     "stored": ("momentum of each wheel, at most", "N m s"),
