@@ -664,8 +664,8 @@ def test_tangents_bound_the_torque_closely(numbers, level, s):
     assume(most > 1e-3)
     common, *others = [[checking.rational(x) for x in load] for load in loads]
     bounds = checking.rational(level), checking.rational(s)
-    assert keeps_below([others], common, checking.rational(most * (1.0 + 1e-5)), *bounds)
-    assert not keeps_below([others], common, checking.rational(most * (1.0 - 1e-9)), *bounds)
+    assert keeps_below([([others], common)], checking.rational(most * (1.0 + 1e-5)), *bounds)
+    assert not keeps_below([([others], common)], checking.rational(most * (1.0 - 1e-9)), *bounds)
 
 
 @given(some.integers(-9, 9), some.integers(-9, 9), some.tuples(some.integers(-9, 9), some.integers(-9, 9)))

@@ -218,7 +218,7 @@ def test_flights_keep_within_the_wheels_and_catch_what_does_not():
 
 def test_a_torque_limit_of_the_wheel_law_without_wheels():
     """Where other actuators give the torque the limit is the craft's, and the claim a set of turns up to a half."""
-    loop = loop_of("wheel", wheel.Gains(0.05, (0.01, 0.01, 0.01)), make_craft(tensor(FULL.inertia), torque_limit=0.06))
+    loop = loop_of("wheel", wheel.Gains(0.05, (0.01, 0.01, 0.01)), make_craft(tensor(FULL.inertia), torque_limit=0.04))
     claim = certify(free(loop)).claim("torque-limit")
     assert claim.outcome == "proved"
     assert math.radians(100.0) < claim.numbers["turn"] < math.pi

@@ -15,7 +15,19 @@ from starhold.certification.certificate import BALLS, Claim, Obligation
 from starhold.certification.convergence import Basin, assumed, reached
 from starhold.certification.frame import contents
 from starhold.certification.gyroscopic import Swing, is_swing, swing
-from starhold.certification.matrices import Rows, floats, greatest, inverse, number, product, root_above, transposed
+from starhold.certification.matrices import (
+    Rows,
+    floats,
+    greatest,
+    inverse,
+    matrix_of,
+    number,
+    plus,
+    product,
+    root_above,
+    scaled,
+    transposed,
+)
 from starhold.certification.motion import ATTITUDE, AXES, RATE, Truths
 from starhold.certification.refutation import rational_turn, state_evidence
 from starhold.certification.subject import above, upper
@@ -24,6 +36,7 @@ DEPTH = 40
 TRIES = (1e-6, 1e-5, 1e-4, 1e-3)
 SLIGHTLY_MORE = 1 + fmpq(1, 2**40)
 """For what is rounded down on the way from a turn to a level and back."""
+LINES = range(-8, 15)
 UNEQUAL = "the weights of the direction cosines differ, for which no bound of the torque is built"
 
 
@@ -35,12 +48,14 @@ class Load:
     """What bounds one axis of the torque (or its norm, or a motor's). Of its part Bw, linear in the rate, the square of the
     greatest norm for w.Pw = 1; `swing` of the part G(w) that is quadratic, and `mixed`, what |Bw.G(w)| does not exceed: so
     |Bw + G(w)|2 <= rate z2 + 2 mixed z3 + swing2 z4 for w.Pw = z2. Of what is linear in the attitude the square; of each
-    component the other monomials as (powers of |w_j|, power of |q|, size). `limit`: what it has to keep below."""
+    component the other monomials as (powers of |w_j|, power of |q|, size). `lines`: of a single component pairs l, r with
+    |Bw + G(w)| <= l z2 + r too. `limit`: what it has to keep below."""
 
     rate: Any
     attitude: Any
     swing: Swing
     mixed: Any
+    lines: tuple[tuple[Any, Any], ...]
     rest: tuple[Terms, ...]
     limit: Any
 
@@ -152,7 +167,21 @@ def load_of(basin: Basin, parts: list[Polynomial], limit: Any) -> Load:
     attitude = greatest(product(attitudes, transposed(attitudes)))
     turning = swing(parts, basin.frame.P)
     mixed = min(_mixed(parts, rates, inverse_of), root_above(rate) * turning.most)
-    return Load(rate, attitude, turning, mixed, tuple(_rest(basin, part) for part in parts), limit)
+    lines = _lines(parts[0], rates[0], basin.frame.P, turning.most) if len(parts) == 1 else ()
+    return Load(rate, attitude, turning, mixed, lines, tuple(_rest(basin, part) for part in parts), limit)
+
+
+def _lines(part: Polynomial, row: list[Any], P: Rows, most: Any) -> tuple[tuple[Any, Any], ...]:
+    """Of b.w + w.Fw, |w.Fw| <= most w.Pw, for some l above most: as l P - F and l P + F are positive definite, its size
+    exceeds l w.Pw by b.(l P -+ F)^-1 b/4 at most. The least over all l is its maximum on w.Pw = z2 (S-procedure)."""
+    if most == 0 or not any(row):
+        return ()
+    F, found = matrix_of(part.only(is_swing), RATE, RATE), list[tuple[Any, Any]]()
+    for k in LINES:
+        slope = most * (1 + exact(2.0 ** (k / 2)))
+        turned = [inverse(plus(scaled(P, slope), F, sign)) for sign in (1, -1)]
+        found.append((slope, max(product(product([row], form), transposed([row]))[0][0] for form in turned) / 4))
+    return tuple(found)
 
 
 def _mixed(parts: list[Polynomial], rates: Rows, inverse_of: Rows) -> Any:
@@ -210,6 +239,8 @@ class Bound:
         energy = (2 * (self.level - arb(first))).nonnegative_part().sqrt()
         linear, turned = self.potential.sizes(first, last)
         moving = energy * (self.rate + self.mixed * energy + self.square * energy**2).sqrt()
+        for slope, offset in self.load.lines:
+            moving = moving.min(arb(slope) * energy**2 + arb(offset))
         squares = arb(0)
         for terms in self.load.rest:
             total = arb(0)
@@ -282,6 +313,8 @@ def guesser(basin: Basin, carried: list[Load]) -> Callable[[float], NDArray[np.f
         for load in carried:
             rate, attitude, mixed, most = (number(x) for x in (load.rate, load.attitude, load.mixed, load.swing.most))
             moving = energy * np.sqrt(rate + 2.0 * mixed * energy + (most * energy) ** 2)
+            for slope, offset in load.lines:
+                moving = np.minimum(moving, number(slope) * energy**2 + number(offset))
             rest = np.sqrt(sum((size(terms, turned, energy) ** 2 for terms in load.rest), 0.0 * energy))
             found.append(float((moving + np.sqrt(attitude) * linear + rest).max()))
         return np.array(found)

@@ -3,7 +3,7 @@ shared with the certifier."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import prod
 from typing import Any
 
@@ -13,15 +13,20 @@ from starhold.certification.checker.exact import (
     Interval,
     Rows,
     chained,
+    definite,
     demand,
     greatest,
     intervals,
     inverted,
+    plus,
+    rational,
     root_up,
+    times,
     turned,
 )
 from starhold.certification.checker.loop import RATE, TURN, Loop, W, letters
 from starhold.certification.checker.region import Region
+from starhold.certification.checker.subject import quadratic
 from starhold.certification.checker.swing import swung
 from starhold.certification.checker.well import SHAPES, keeps_below
 
@@ -65,7 +70,24 @@ def bounded(
     moving[0][SHAPES.index((0, 2))], moving[0][SHAPES.index((0, 1))] = swing, along
     moving[1][SHAPES.index((0, 1))] = root_up(max(damped - along**2, ZERO))
     loads = [_load(region.loop, p.terms, inverse, len(well.shapes)) for p in rest]
-    return keeps_below((moving, loads), common, limit, region.level, s, well)
+    ways: list[Any] = [((moving, loads), common)]
+    if len(parts) == 1 and swing > 0:
+        for slope, offset in _lines(
+            quadratic(parts[0].only(lambda m: letters(m) == "ww").terms, RATE), damping[0], P, swing
+        ):
+            line = list(common)
+            line[SHAPES.index((0, 2))], line[SHAPES.index((0, 0))] = slope, offset
+            ways.append(((loads,), line))
+    return keeps_below(ways, limit, region.level, s, well)
+
+
+def _lines(F: Rows, b: list[Any], P: Rows, swing: Any) -> Iterator[tuple[Any, Any]]:
+    """l and r with |b.w + w.Fw| <= l w.Pw + r: where [[l P -+ F, -+ b/2], [., r]] is nowhere negative."""
+    for k in range(-8, 15):
+        slope = swing * (1 + rational(2.0 ** (k / 2)))
+        forms = [plus(times(slope, P), F, sign) for sign in (1, -1)]
+        demand(all(definite(form) for form in forms), "a form of the rate is not positive")
+        yield slope, max(chained(chained([b], inverted(form)), turned([b]))[0][0] for form in forms) / 4
 
 
 def _mixed(parts: Sequence[Polynomial], damping: Rows, inverse: Rows) -> Any:

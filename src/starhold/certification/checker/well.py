@@ -37,10 +37,15 @@ EVEN = Well((*((p, r, 0) for p, r in SHAPES), (1, 0, 1)), ("q0",), len(SHAPES), 
 
 
 def keeps_below(
-    groups: Sequence[Sequence[Sequence[Any]]], common: Sequence[Any], limit: Any, level: Any, s: Any, well: Well = ODD
+    ways: Sequence[tuple[Sequence[Sequence[Sequence[Any]]], Sequence[Any]]],
+    limit: Any,
+    level: Any,
+    s: Any,
+    well: Well = ODD,
 ) -> bool:
-    """Whether sum_k common_k f_k(t) and, of each group of loads, |(sum_k loads_ik f_k(t))_i| together are at most limit for
-    0 <= t <= min(level, s most), the f_k being the products of a well's shapes, with z2 = 2 (level - t).
+    """Whether at each t, 0 <= t <= min(level, s most), in one of several ways sum_k common_k f_k(t) and, of each group of
+    loads, |(sum_k loads_ik f_k(t))_i| together are at most limit. A way is (groups, common), and the f_k are the products of
+    a well's shapes, with z2 = 2 (level - t).
 
     Each f_k is concave in t, being the root of at most two factors that are concave and not negative. So it lies under its
     tangents, and over a tangent the whole is convex: no more than at the ends of the piece.
@@ -54,17 +59,20 @@ def keeps_below(
         low, high = waiting.pop()
         tangents = _tangents((low + high) / 2, level, s, well)
         half = (high - low) / 2
-        sizes: list[Any] = []
-        for step in (ZERO, -half, half):
-            heights = [height + slope * step for height, slope in tangents]
-            squares = [sum((_sum(load, heights) ** 2 for load in loads), arb(0)) for loads in groups]
-            sizes.append(sum((square.nonnegative_part().sqrt() for square in squares), _sum(common, heights)))
-        if sizes[0] > limit:
-            # At the middle the tangents touch.
+        heights = [[height + slope * step for height, slope in tangents] for step in (ZERO, -half, half)]
+        # At the middle the tangents touch.
+        left = [way for way in ways if not _size(way, heights[0]) > limit]
+        if not left:
             return False
-        if not (sizes[1] <= limit and sizes[2] <= limit):
+        if not any(all(_size(way, ends) <= limit for ends in heights[1:]) for way in left):
             waiting += [(low, low + half), (low + half, high)]
     return False
+
+
+def _size(way: tuple[Sequence[Sequence[Sequence[Any]]], Sequence[Any]], heights: Sequence[Any]) -> Any:
+    groups, common = way
+    squares = [sum((_sum(load, heights) ** 2 for load in loads), arb(0)) for loads in groups]
+    return sum((square.nonnegative_part().sqrt() for square in squares), _sum(common, heights))
 
 
 def _sum(load: Sequence[Any], heights: Sequence[Any]) -> Any:
