@@ -174,9 +174,13 @@ def _guesses(frame: Frame, cross: Cross, bound: Any | None) -> Iterator[list[tup
         H = floats(_size(frame, cross, epsilon, fmpq(1, 2)))
         if np.linalg.eigvalsh(Q)[0] <= 0.0:
             continue
-        most = 1.0 / float(_relative(R, Q)[-1])
-        tries = [(float(_relative(Q - tau * R, H)[0]) * tau, tau) for tau in most * np.linspace(0.05, 0.95, 19)]
-        fall, tau = max(tries)
+        try:
+            most = 1.0 / float(_relative(R, Q)[-1])
+            tries = [(float(_relative(Q - tau * R, H)[0]) * tau, tau) for tau in most * np.linspace(0.05, 0.95, 19)]
+            fall, tau = max(tries)
+        except np.linalg.LinAlgError:
+            # Definite, but not in floats.
+            continue
         if fall > 0.0:
             # The square of the angle, up to a factor.
             angle = 1.0 / (fall * (1.0 - share * share))

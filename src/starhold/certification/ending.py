@@ -121,7 +121,11 @@ class Nearby:
         def shrink(place: slice) -> None:
             nonlocal rate, turn
             push, lost = (number(x) * HELD for x in self.outside(rate, turn))
-            step = _guess(A, push * push * turned, lost, place)
+            try:
+                step = _guess(A, push * push * turned, lost, place)
+            except ValueError:
+                # A matrix is singular or not finite in floats.
+                step = None
             if step is not None and self.holds(step, rate, turn):
                 inner = inverse(step.S)
                 sizes = [root_above(greatest([row[i : i + 3] for row in inner[i : i + 3]])) for i in (0, 3)]

@@ -50,7 +50,11 @@ def swing(parts: Sequence[Polynomial], P: Rows) -> Swing:
     A = crossed(forms)
     if A is None or found.most == 0:
         return found
-    root = np.linalg.inv(np.linalg.cholesky(floats(P)))
+    try:
+        root = np.linalg.inv(np.linalg.cholesky(floats(P)))
+    except np.linalg.LinAlgError:
+        # Definite, but not in floats.
+        return found
     size, full = float(np.linalg.norm(floats(A), 2)), floats(A)
 
     def both(p: float, c: float) -> Rows:
