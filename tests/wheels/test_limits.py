@@ -8,8 +8,10 @@ import pytest
 
 from starhold.analysis.metrics import measure
 from starhold.errors import InputError
-from starhold.models.envelope import authority
-from starhold.models.wheels import MOST
+from starhold.loop.kernels import fly_plainly
+from starhold.loop.step import attitude_step
+from starhold.models.envelope import authority, with_facets
+from starhold.models.wheels import MOST, allocate_peak
 from starhold.report.flight import Flight
 from starhold.report.plots import collect
 from starhold.scenario.building import build
@@ -138,6 +140,26 @@ def test_lanes_keep_to_the_limit_that_a_loss_leaves():
     batch = simulate_many(loop, starts, 300)
     for lane, own in enumerate(starts):
         assert batch.state(lane) == fly(replace(loop, start=own), 300)[1].state
+
+
+def test_a_lagging_torque_is_shared_out_as_it_changes():
+    _, loop = made(STIFF, limit="actuator_lag = 0.3", allocation="least-peak")
+    end = fly_plainly(loop, 12)
+    assert fly(loop, 12)[1].state == end.state
+    # A tenth of a second after the command, wheels have what the lag let through by then, not what is given at its end.
+    first = fly_plainly(loop, 1)
+    reached = allocate_peak(first.state.torque, with_facets(loop.wheels))
+    assert np.abs(first.state.momentum).max() < 0.7 * 0.1 * np.abs(reached).max()
+
+
+@pytest.mark.parametrize("allocation", ["least-squares", "least-peak"])
+def test_a_held_torque_shared_out_once_is_that_shared_out_at_every_stage(allocation):
+    _, loop = made(STIFF, allocation=allocation)
+    once = attitude_step(loop.parts())
+    always = attitude_step(loop.parts()._replace(response=lambda *_: None))
+    setup = loop.setup()
+    carry = once.decide(loop.carry(), 0, (1, 0), loop.gains, loop.craft, setup)
+    assert once.hold(carry, loop.craft, setup) == always.hold(carry, loop.craft, setup)
 
 
 def test_pictures_draw_the_limit_that_binds_first():

@@ -17,8 +17,9 @@ EARTH = 3.986e14
 class Craft(NamedTuple):
     """A rigid spacecraft: inertia about the centre of mass in body axes (kg m2; three moments when these are principal
     axes, else a matrix: `apply` and `swing` take both), its inverse, the torque limit that a law may reckon with (N m, per
-    axis or in norm; infinite for none; beside wheels at most what they surely give), the gravitational parameter of the body it orbits (m3/s2), and, for a craft with wheels, whose inertia is
-    without the rotors' moments about their axes, the inertia with them (kg m2; () for one without wheels)."""
+    axis or in norm; infinite for none; with wheels at most what they surely give), the gravitational parameter of the body
+    it orbits (m3/s2), and, for a craft with wheels, whose inertia is without the rotors' moments about their axes, the
+    inertia with them (kg m2; () for one without wheels)."""
 
     inertia: Matrix | Vector
     inverse_inertia: Matrix | Vector
