@@ -222,3 +222,12 @@ def test_too_many_wheels_are_refused_in_one_line():
     text = CRAFT.format(limit="", layout="", momentum=4.0, allocation="least-peak").replace('layout = ""\n', "")
     with pytest.raises(InputError, match=rf"^here: wheel: at most {MOST} wheels are taken, not {MOST + 1}$"):
         parse(text + axes + STIFF, "here")
+
+
+@pytest.mark.parametrize("slow", ["actuator_lag = 0.3", "torque_rate_limit = 0.02"])
+def test_a_command_on_the_limit_counts_though_the_actuator_lags_behind(slow):
+    text = CRAFT.split("[wheels]", maxsplit=1)[0].format(limit=f"torque_limit = 0.01\n{slow}")
+    scenario = parse(text + "[simulation]\nduration = 60\n" + STIFF, "here")
+    run = flown(build(scenario, scenario.laws[0]))
+    at = (np.abs(run["command"]) == 0.01).any(axis=1)
+    assert share_on_limit(run) == at.mean() > 0.1

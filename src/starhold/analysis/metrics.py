@@ -43,7 +43,7 @@ MEASURES: dict[str, Measure] = {
     "peak_acceleration": Measure("peak accel.", "deg/s²", "largest component of the rate's derivative", 180.0 / np.pi),
     "peak_torque": Measure("peak torque", "N m", "largest torque component"),
     "effort": Measure("effort", "N m s", "integral of |u| over the run"),
-    "limit_share": Measure("on limit", "%", "share of the time with a torque, or a wheel's motor, on its limit", 100.0),
+    "limit_share": Measure("on limit", "%", "share of the time with the command, or a wheel's motor, on its limit", 100.0),
     "chatter": Measure("chatter", "N m", "mean change of torque between samples, last quarter of the run"),
     "final_attitude_error": Measure("final angle", "mdeg", "largest angle to the target, last quarter", 180e3 / np.pi),
     "final_rate_error": Measure("final rate", "mdeg/s", "largest relative rate, last quarter", 180e3 / np.pi),
@@ -142,11 +142,10 @@ def _on_limit(u: NDArray[np.float64], limit: float, kind: str) -> NDArray[np.boo
 
 
 def _limit_share(run: Recording) -> float:
-    """Share of the samples in which the torque is on its limit; with wheels, what is asked of them together, or of a motor
-    all that it can give: less as its momentum fills up, and nothing once it is lost."""
-    limit, kind = run.attrs["torque_limit"], run.attrs["limit"]
-    if "wheel_command" not in run.arrays:
-        return limit_share(run["torque"], limit, kind)
-    asked = np.abs(run["wheel_command"])
-    motors = (asked > 0.0) & (asked >= run["wheel_available"] * (1.0 - 1e-9))
-    return float((_on_limit(run["command"], limit, kind) | motors.any(axis=1)).mean())
+    """Share of the samples in which the command, which an actuator may lag behind, is on its limit, or a wheel's motor is
+    asked for all that it can give: less as its momentum fills up, and nothing once it is lost."""
+    on_limit = _on_limit(run["command"], run.attrs["torque_limit"], run.attrs["limit"])
+    if "wheel_command" in run.arrays:
+        asked = np.abs(run["wheel_command"])
+        on_limit |= ((asked > 0.0) & (asked >= run["wheel_available"] * (1.0 - 1e-9))).any(axis=1)
+    return float(on_limit.mean())
