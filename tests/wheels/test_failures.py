@@ -4,6 +4,7 @@ import csv
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -11,12 +12,14 @@ import pytest
 from scipy.optimize import linprog
 
 from starhold.analysis.metrics import measure
+from starhold.cli.failing import print_failures
 from starhold.errors import InputError
 from starhold.models.wheels import lose, make_wheels, pyramid
 from starhold.report.failures import (
     FULL,
     Failure,
     _flown,
+    _left,
     directions_lacking,
     saturation,
     study,
@@ -272,3 +275,16 @@ def test_what_cannot_be_is_said_in_one_line(words, tmp_path):
     assert done.stderr.startswith("starhold: ")
     assert done.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+def test_names_among_the_gains_are_told_as_they_are_written(tmp_path, capsys):
+    law = '\n[[law]]\ntype = "mpc"\nq_attitude = 0.2\nq_rate = 0.2\nr = 50.0\nlimit = "norm"\n'
+    scenario = parse(BUILTIN + law, "here")
+    entry, table = scenario.laws[-1], scenario.table.simulation.model_copy(update={"duration": 0.2})
+    short = replace(scenario, table=scenario.table.model_copy(update={"simulation": table}))
+    found = [_flown(short, entry, _left(short.wheels, lost, 0.02)) for lost in ((), (1,))]
+    print_failures(found)
+    assert "The gains are the same in all of them." in capsys.readouterr().out
+    write_table(found, entry, tmp_path / "table.csv")
+    with (tmp_path / "table.csv").open(encoding="utf-8") as file:
+        assert [row["limit (1)"] for row in csv.DictReader(file)] == ["norm", "norm"]

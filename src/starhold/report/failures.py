@@ -166,8 +166,8 @@ def _cells(failure: Failure) -> dict[str, str]:
 
 
 def _numbers(value: Any) -> str:
-    if value is None:
-        return ""
+    if value is None or isinstance(value, str):
+        return value or ""
     return " ".join(repr(number) for number in np.asarray(value).ravel().tolist())
 
 

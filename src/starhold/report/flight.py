@@ -116,8 +116,10 @@ def listed(parts: Sequence[str]) -> str:
 
 
 def number_text(value: Any, digits: int = 6) -> str:
-    """A number, vector or matrix for reading; of a diagonal matrix the diagonal, of equal numbers one. An entry that is
-    nothing beside the largest but the rounding of a computation reads as 0."""
+    """A number, vector or matrix for reading; of a diagonal matrix the diagonal, of equal numbers one; a name as it is. An
+    entry that is nothing beside the largest but the rounding of a computation reads as 0."""
+    if isinstance(value, str):
+        return value
     array = np.asarray(value, dtype=float)
     if array.ndim:
         array = np.where(np.abs(array) < ROUNDING * np.abs(array).max(initial=0.0), 0.0, array)
