@@ -288,3 +288,24 @@ def test_names_among_the_gains_are_told_as_they_are_written(tmp_path, capsys):
     write_table(found, entry, tmp_path / "table.csv")
     with (tmp_path / "table.csv").open(encoding="utf-8") as file:
         assert [row["limit (1)"] for row in csv.DictReader(file)] == ["norm", "norm"]
+
+
+def test_a_law_that_what_is_left_does_not_suit_leaves_the_rest_of_the_study(tmp_path, capsys):
+    law = '\n[[law]]\ntype = "pd"\nk_rate = 0.3\nk_attitude = 0.013\nlimit = "axis"\n'
+    scenario = parse(BUILTIN + law, "here")
+    entry, table = scenario.laws[-1], scenario.table.simulation.model_copy(update={"duration": 0.2})
+    short = replace(scenario, table=scenario.table.model_copy(update={"simulation": table}))
+    intact, struck = (_flown(short, entry, _left(short.wheels, lost, 0.02)) for lost in ((), (1,)))
+    assert intact.gains is not None
+    assert intact.refused == ""
+    assert struck.gains is None
+    assert struck.authority > 0.0
+    print_failures([intact, struck])
+    said = " ".join(capsys.readouterr().out.split())
+    assert (
+        'without 1 not flown: limit = "axis" needs k_attitude below the torque limit of 0.011547 N m, not 0.013 N m' in said
+    )
+    write_table([intact, struck], entry, tmp_path / "table.csv")
+    with (tmp_path / "table.csv").open(encoding="utf-8") as file:
+        assert [bool(row["not flown because"]) for row in csv.DictReader(file)] == [False, True]
+    assert draw([intact, struck], tmp_path / "picture.png", "one").is_file()

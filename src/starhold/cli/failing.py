@@ -70,6 +70,9 @@ def print_failures(found: Sequence[Failure]) -> None:
     console.print(table)
     if any(not failure.controllable for failure in found):
         console.print("not (x, y, z): no torque is left about this body direction.", highlight=False)
+    for failure in found:
+        if failure.refused:
+            console.print(f"without {failure.name} not flown: {failure.refused}", highlight=False, markup=False)
     if any(failure.certified is not None for failure in found):
         console.print("certified: turns from rest on which no motor or wheel is proved to meet its limit.", highlight=False)
     if not retuned:

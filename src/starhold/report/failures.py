@@ -64,7 +64,8 @@ class Failure:
     certified: the largest turn from rest (rad), and the largest rate on target (rad/s), from which no motor and no wheel is
     proved to meet its limit on the way to the target; None where that is not proved.
     momentum_share: largest |h| over its limit among working wheels during the flight. flown: length of the flight (s).
-    orbit: its period (s), None without one.
+    orbit: its period (s), None without one. refused: why the law cannot fly with what is left; then nothing
+    is told of a flight.
     """
 
     lost: tuple[int, ...]
@@ -82,6 +83,7 @@ class Failure:
     momentum_share: float | None = None
     flown: float | None = None
     orbit: float | None = None
+    refused: str = ""
 
     @property
     def name(self) -> str:
@@ -162,6 +164,7 @@ def _cells(failure: Failure) -> dict[str, str]:
         "window of momentum growth (s)": _numbers(known.window),
         "largest share of momentum limit": _numbers(failure.momentum_share),
         "time flown (s)": _numbers(failure.flown),
+        "not flown because": failure.refused,
     }
 
 
@@ -219,7 +222,12 @@ def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
     ]
     # What the law does about faults of the file is no matter here.
     own = replace(entry, fault_action=None)
-    loop = build(replace(scenario, table=table.model_copy(update={"fault": faults})), own)
+    try:
+        loop = build(replace(scenario, table=table.model_copy(update={"fault": faults})), own)
+    except InputError as error:
+        if not faults:
+            raise
+        return replace(failure, refused=error.allowed)
     gains = loop.events[-1].gains if loop.events else loop.gains
     period = _orbit_period(scenario)
     every, steps = table.simulation.record_every, _steps(scenario, loop, period)

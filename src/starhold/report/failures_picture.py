@@ -55,6 +55,7 @@ def draw(found: Sequence[Failure], path: Path, title: str) -> Path:
         axis.locator_params(axis="x", nbins=4, prune="upper")
         for place, failure in enumerate(found):
             missing = "not proved" if name.startswith("certified") else "not settled"
+            missing = "not flown" if failure.refused else missing
             _mark(axis, place, failure, values[place], number, missing)
         axis.set_xlabel(name, fontsize=9)
         axis.grid(True, axis="x", color="0.9", linewidth=0.6)

@@ -47,6 +47,6 @@ def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
         try:
             entry.law.remember(event.gains, event.known, loop.period)
         except ValueError as error:
-            key = f"law {entry.name} from {event.step * loop.period:g} s"
-            raise InputError(scenario.where, key, "", f'{error}; fault_action = "none" flies on as before') from None
+            key = f'law {entry.name} from {event.step * loop.period:g} s (fault_action = "none" flies on as before)'
+            raise InputError(scenario.where, key, "", str(error)) from None
     return loop
