@@ -130,3 +130,20 @@ def test_wheels_without_facets_say_so():
 def test_too_many_wheels_are_refused():
     with pytest.raises(ValueError, match=f"at most {MOST} wheels are taken, not {MOST + 1}"):
         wheels_of(np.random.default_rng(0).normal(size=(MOST + 1, 3)))
+
+
+@pytest.mark.parametrize(
+    ("layout", "lost", "told"),
+    [
+        ("orthogonal", None, (1.0, 1.0, 1.0, 1.0)),
+        ("pyramid", None, (0.770, 1.155, 1.333, 1.633)),
+        ("pyramid", 2, (0.577, 0.577, 0.816, 0.816)),
+        ("nasa", None, (0.857, 1.0, 1.155, 1.414)),
+        ("nasa", 0, (0.5, 0.5, 0.577, 0.577)),
+    ],
+)
+def test_the_table_of_the_documentation(layout, lost, told):
+    wheels = wheels_of(LAYOUTS[layout], 1.0)
+    left = wheels if lost is None else lose(wheels, lost)
+    found = [authority(left, kind, peak=peak) for kind in ("axis", "norm") for peak in (False, True)]
+    assert found == pytest.approx(told, abs=6e-4)
