@@ -1,11 +1,23 @@
 """What the documents show is run."""
 
+import os
 import re
+import shlex
+import subprocess
+import sys
 from pathlib import Path
 
+import pytest
+import typer
+
+from starhold.certification.certify import certify
+from starhold.certification.wording import HEADINGS, sentence
+from starhold.cli.main import app
 from starhold.conformance.suite import examine
 from starhold.laws.catalogue import catalogue, from_file
 from starhold.laws.station.interface import station_laws
+from starhold.scenario.building import build
+from starhold.scenario.reading import load
 
 ROOT = Path(__file__).parents[1]
 
@@ -40,10 +52,85 @@ def test_files_stay_short():
         assert len(path.read_text(encoding="utf-8").splitlines()) <= 400, path
 
 
+def commands():
+    """What README lists, as printed, without what follows the sign of a comment."""
+    listed = re.search(
+        r"puts it on the path:\n\n```\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.DOTALL
+    )
+    assert listed is not None
+    return [line.split(" # ")[0].strip() for line in listed[1].splitlines()]
+
+
+def test_commands_of_the_readme_are_commands():
+    """Every printed command has the arguments and options that its line gives; `test_commands_of_the_readme_run` runs them."""
+    known = typer.main.get_command(app).commands
+    lines = [shlex.split(line) for line in commands()]
+    assert len(lines) >= 15
+    for start, name, *words in lines:
+        assert start == "starhold"
+        known[name].make_context(name, words)
+    # All but those that lists or schemas come from.
+    assert set(known) - {name for _, name, *_ in lines} <= {"schema", "wheels"}
+
+
+@pytest.mark.slow
+def test_commands_of_the_readme_run_from_top_to_bottom(tmp_path):
+    (tmp_path / "src").symlink_to(ROOT / "src")
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    for line in commands():
+        done = subprocess.run(
+            line, shell=True, cwd=tmp_path, env={**os.environ, "PATH": path}, capture_output=True, text=True
+        )
+        # Certificates of what they fly hold undecided claims, which they say by their exit code.
+        undecided = line.startswith(("starhold certify", "starhold invariant"))
+        assert done.returncode in ((0, 4) if undecided else (0,)), (line, done.stderr)
+        assert "Traceback" not in done.stderr, line
+
+
+def test_readme_quotes_the_certificate():
+    text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    scenario = load("three-laws")
+    certificate = certify(build(scenario, scenario.pick("lyapunov")), "lyapunov")
+    assert [claim.kind for claim in certificate.claims] == ["convergence", "torque-limit", "inertia", "sampling"]
+    for claim in certificate.claims:
+        assert f"{claim.outcome} {HEADINGS[claim.kind]} {sentence(claim, certificate.subject)}" in text
+
+
+def pages():
+    return [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md")), ROOT / "benchmarks" / "README.md"]
+
+
+@pytest.mark.parametrize("page", pages(), ids=lambda page: page.name)
+def test_every_link_leads_somewhere_in_the_clone(page):
+    kept = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True).stdout.splitlines()
+    text = re.sub(r"```.*?```|`[^`]*`", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    for link in re.findall(r"\]\(([^)]+)\)", text):
+        if link.startswith(("https://", "http://")):
+            continue
+        name, _, anchor = link.partition("#")
+        found = page if not name else (page.parent / name).resolve()
+        assert found.is_relative_to(ROOT), link
+        if kept:
+            assert str(found.relative_to(ROOT)) in kept, link
+        assert found.is_file(), link
+        if anchor:
+            headings = re.findall(r"^#+ (.+)$", found.read_text(encoding="utf-8"), flags=re.MULTILINE)
+            assert anchor in {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}, link
+
+
+@pytest.mark.parametrize("name", ["run", "compare", "certify", "failures", "modal-roots", "invariant"])
+def test_help_says_where_results_go(name):
+    known = typer.main.get_command(app).commands[name]
+    (output,) = (option for option in known.params if option.name == "output")
+    assert "else results/" in output.help
+
+
 def test_generated_page_of_laws():
     import runpy
 
     page = runpy.run_path(str(ROOT / "docs" / "generate.py"))["page"]()
+    kept = (ROOT / "docs" / "laws.md").read_text(encoding="utf-8")
+    assert page == kept, "docs/laws.md is not what the laws say; write it anew: python docs/generate.py"
     for law in catalogue() | station_laws():
         assert f"## {law}: " in page
     assert "-k_attitude*q_1 - k_rate*w_1" in page

@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 USER_ERROR, DIVERGED, FAILED_CHECK, REFUTED, UNDECIDED, INTERNAL_ERROR = 2, 1, 1, 3, 4, 70
 
 ScenarioFile = Annotated[str, typer.Argument(metavar="FILE", help="a scenario file or the name of a built-in scenario")]
-Output = Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="folder for results, created")]
+
+
+def _results(where: str) -> Any:
+    return typer.Option("-o", "--output", metavar="DIR", help=f"folder for results, created; else results/{where}")
+
+
+RunOutput = Annotated[Path | None, _results("SCENARIO-LAW")]
+Output = Annotated[Path | None, _results("SCENARIO")]
+CertifyOutput = Annotated[Path | None, _results("SCENARIO-certificate")]
+FailuresOutput = Annotated[Path | None, _results("SCENARIO-failures")]
+RootsOutput = Annotated[Path | None, _results("SCENARIO-roots")]
+InvariantOutput = Annotated[Path | None, _results("SYSTEM-invariant")]
 Force = Annotated[bool, typer.Option("--force", help="replace results that are already there")]
 Unstable = Annotated[bool, typer.Option("--allow-unstable", help="take gains that are known to be unstable")]
 Certified = Annotated[bool, typer.Option("--certify/--no-certify", help="prove what the laws guarantee, or fly alone")]

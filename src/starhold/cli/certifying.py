@@ -7,13 +7,13 @@ from typing import Annotated
 
 import typer
 
-from starhold.cli.arguments import FAILED_CHECK, REFUTED, UNDECIDED, Force, OneLaw, Output, ScenarioFile, Unstable
+from starhold.cli.arguments import FAILED_CHECK, REFUTED, UNDECIDED, CertifyOutput, Force, OneLaw, ScenarioFile, Unstable
 
 
 def certify(
     file: ScenarioFile,
     law: OneLaw = None,
-    output: Output = None,
+    output: CertifyOutput = None,
     force: Force = False,
     allow_unstable: Unstable = False,
 ) -> None:

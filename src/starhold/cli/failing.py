@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from starhold.cli.arguments import Force, Output, ScenarioFile
+from starhold.cli.arguments import FailuresOutput, Force, ScenarioFile
 
 if TYPE_CHECKING:
     from starhold.report.failures import Failure
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def failures(
     file: ScenarioFile,
     law: Annotated[str | None, typer.Option(help="which law of the file; the first if not given")] = None,
-    output: Output = None,
+    output: FailuresOutput = None,
     force: Force = False,
 ) -> None:
     """What is left after the loss of any one or two wheels: a table, failures.csv and failures.png."""

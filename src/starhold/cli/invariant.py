@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from starhold.cli.arguments import REFUTED, UNDECIDED, Force, Output
+from starhold.cli.arguments import REFUTED, UNDECIDED, Force, InvariantOutput
 
 if TYPE_CHECKING:
     from starhold.certification.certificate import Certificate
@@ -18,7 +18,7 @@ SystemFile = Annotated[
 ]
 
 
-def invariant(file: SystemFile = None, output: Output = None, force: Force = False) -> None:
+def invariant(file: SystemFile = None, output: InvariantOutput = None, force: Force = False) -> None:
     """Prove what functions V say of an invariant set of any small system: a table, certificate.json and a picture.
 
     Exit code 0: all that is claimed is proved; 3: something is refuted, with the state that does; 4: not decided.

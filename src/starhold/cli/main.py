@@ -26,6 +26,7 @@ from starhold.cli.arguments import (
     CheckStep,
     Force,
     Output,
+    RunOutput,
     ScenarioFile,
     Unstable,
 )
@@ -53,7 +54,7 @@ DEFAULT = "three-laws"
 def run(
     file: ScenarioFile = DEFAULT,
     law: Annotated[str | None, typer.Option(help="which law of the file; the first if not given")] = None,
-    output: Output = None,
+    output: RunOutput = None,
     force: Force = False,
     allow_unstable: Unstable = False,
     certify: Certified = True,

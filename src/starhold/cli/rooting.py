@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from starhold.cli.arguments import Force, Output, ScenarioFile, Unstable
+from starhold.cli.arguments import Force, RootsOutput, ScenarioFile, Unstable
 
 if TYPE_CHECKING:
     from starhold.report.modal_roots import Study
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def modal_roots(
     file: ScenarioFile,
     law: Annotated[str | None, typer.Option(help="which modal law of the file; the first if not given")] = None,
-    output: Output = None,
+    output: RootsOutput = None,
     force: Force = False,
     allow_unstable: Unstable = False,
 ) -> None:
