@@ -62,7 +62,7 @@ def commands():
 
 
 def test_commands_of_the_readme_are_commands():
-    """Every printed command has the arguments and options that its line gives; `test_commands_of_the_readme_run` runs them."""
+    """Every printed command has the arguments and options that its line gives; a slow test runs them."""
     known = typer.main.get_command(app).commands
     lines = [shlex.split(line) for line in commands()]
     assert len(lines) >= 15
