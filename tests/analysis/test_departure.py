@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -18,14 +19,14 @@ from starhold.certification.checker import check_file, passed
 from starhold.certification.checker.claims import CLAIMS
 from starhold.certification.wording import sentence
 from starhold.laws.double_cover import COVERS
-from starhold.report.certificates import certify_scenario
+from starhold.report.certificates import certify_scenario, start_inside
 from starhold.report.compare import fly_law, prove
 from starhold.report.kinds import kind_of
 from starhold.report.proved import section
 from starhold.scenario.building import build
 from starhold.scenario.opening import open_scenario
 from starhold.scenario.reading import builtin_text, parse
-from starhold.simulation.lane import Recording
+from starhold.simulation.lane import Recording, fly, label
 
 BASE = builtin_text("three-laws").split("[[law]]")[0].replace("duration = 2000.0", "duration = 60.0")
 LAW = '\n[[law]]\ntype = "lyapunov"\nk_rate = 0.09\nk_attitude = 0.009\n'
@@ -129,6 +130,29 @@ def test_a_flight_that_is_driven_out_of_its_set_is_told_when():
     assert (gone.time, gone.how) == (pytest.approx(20.0), "it leaves the set")
     # A claim about every state is left by none.
     assert departures(certificate, loop, struck)["convergence"] == ()
+
+
+@given(st.tuples(*[st.floats(-1.0, 1.0)] * 3), st.tuples(*[st.floats(-0.06, 0.06)] * 3))
+@settings(deadline=None, max_examples=30)
+def test_the_limit_is_kept_by_every_flight_that_does_not_leave_the_claim(turn, rate):
+    """The theorem: from inside the set and under the assumptions nothing is left, and no torque reaches the limit."""
+    loop, certificate = kept_loop()
+    half = np.array([1.0, *turn]) / np.linalg.norm([1.0, *turn])
+    flying = replace(loop, start=loop.start._replace(attitude=tuple(half.tolist()), rate=rate))
+    run = label(flying, *fly(flying, 300), 1)
+    left = departures(certificate, flying, run)
+    inside = start_inside(certificate, flying)["torque-limit"]
+    assert (left["torque-limit"] == ()) == inside
+    if inside:
+        assert np.abs(run["command"]).max() <= loop.craft.torque_limit
+        assert left["convergence"] == ()
+
+
+@cache
+def kept_loop():
+    scenario = parse(quiet(BASE) + LAW, "here")
+    loop = build(scenario, scenario.laws[0])
+    return loop, certify(loop, "lyapunov")
 
 
 def test_torque_held_for_too_long_ends_every_claim_about_the_motion():
