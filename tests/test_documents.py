@@ -42,6 +42,7 @@ def test_readme_names_every_law():
 
 def test_law_of_the_contributing_page_conforms(tmp_path):
     (example,) = blocks("CONTRIBUTING.md", "python")
+    assert example == (ROOT / "examples" / "rate_damping.py").read_text(encoding="utf-8")
     path = tmp_path / "rate_damping.py"
     path.write_text(example, encoding="utf-8")
     assert [v for v in examine(from_file(path)) if v.outcome == "failed"] == []
@@ -75,7 +76,7 @@ def test_commands_of_the_readme_are_commands():
 
 @pytest.mark.slow
 def test_commands_of_the_readme_run_from_top_to_bottom(tmp_path):
-    (tmp_path / "src").symlink_to(ROOT / "src")
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     for line in commands():
         done = subprocess.run(
