@@ -5,7 +5,6 @@ from typing import Annotated, NamedTuple
 from starhold.algebra.vector import scale
 from starhold.laws.interface import Card, Gain
 
-
 CARD = Card(
     title="Rate damping",
     summary="u = -k w",
