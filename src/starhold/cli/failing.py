@@ -59,7 +59,7 @@ def print_failures(found: Sequence[Failure]) -> None:
     retuned = [name for name in flown[0] if any(number_text(g[name]) != number_text(flown[0][name]) for g in flown)]
     designed = found[0].eta is not None
     table = Table(show_edge=False, pad_edge=False)
-    heads = ["axes", "cond.", "authority\n[dim]mN m[/dim]", "share\n[dim]%[/dim]", *retuned]
+    heads = ["axes", "cond.", "authority\n[dim]N m[/dim]", "share\n[dim]%[/dim]", *retuned]
     heads += ["stability\n[dim]1/s, before → after[/dim]"] * designed
     heads += ["certified\n[dim]turn, °[/dim]", "settling\n[dim]s[/dim]", "wheel full\n[dim]min[/dim]"]
     for head in ("lost", *heads):
@@ -87,7 +87,7 @@ def _row(failure: Failure, retuned: Sequence[str], designed: bool) -> list[str]:
     from starhold.report.flight import number_text
 
     axes = "three" if failure.controllable else f"[red]not {direction_text(failure)}[/red]"
-    begun = [axes, f"{failure.condition:.3g}", f"{1e3 * failure.authority:.4g}", f"{100.0 * failure.share:.1f}"]
+    begun = [axes, f"{failure.condition:.3g}", f"{failure.authority:.4g}", f"{100.0 * failure.share:.1f}"]
     if failure.gains is None:
         return [*begun, *["—"] * (len(retuned) + designed + 3)]
     eta = [f"{failure.eta_intact:.4g} → {failure.eta:.4g}"] if designed else []
