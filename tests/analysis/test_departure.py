@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from starhold.algebra.scalar import side
-from starhold.analysis.departure import MET, departures, fed_back
+from starhold.analysis.departure import LOST, MET, departures, fed_back
 from starhold.certification.certificate import Certificate, Claim, Obligation, write
 from starhold.certification.certify import certify
 from starhold.certification.checker import check_file, passed
@@ -164,6 +164,12 @@ def test_torque_held_for_too_long_ends_every_claim_about_the_motion():
     assert "not even the linear loop is stable" in left["region"][0].how
 
 
+def test_a_craft_too_fast_to_be_followed_leaves_even_a_claim_about_every_state():
+    _, _, flight, left = flown(BASE.replace("rate = [0.04", "rate = [100.04") + LAW)
+    assert flight.lost == 0.0
+    assert left["convergence"] == ((0.0, LOST),)
+
+
 def test_a_fault_ends_the_claims_of_the_first_certificate():
     scenario = open_scenario("wheels-orbital")
     text = (
@@ -207,8 +213,8 @@ def deficit():
 
 def test_a_lost_flight_first_leaves_the_claim_that_it_ends_on_the_circle(deficit):
     left = deficit.departures[0]["circle"]
-    assert [one.how for one in left] == ["the control reaches its limit", "it leaves the set"]
-    assert 0.0 < left[0].time < left[1].time < deficit.lost
+    assert [one.how for one in left] == ["the control reaches its limit", "it leaves the set", LOST]
+    assert 0.0 < left[0].time < left[1].time < left[2].time == deficit.lost
     assert "With unlimited control, from the level set" in section([deficit])
     assert "This flight leaves the claim" in section([deficit])
     (circle,) = (claim for claim in deficit.results()["claims"] if claim["claim"] == "circle")

@@ -32,6 +32,10 @@ ALMOST = 1.0 - 1e-9
 """A share of a limit from which on it counts as reached."""
 
 
+LOST = "the simulation loses the motion"
+"""Which no proof speaks of: it is too fast for the integration, or farther away than a scenario follows it."""
+
+
 class Departure(NamedTuple):
     """From `time` (s) on a flight is not what a claim speaks of; `how` is a sentence without its end that says why."""
 
@@ -81,6 +85,8 @@ def departures(
     common = _changes(span)
     if sampled is not None and sampled.outcome == "refuted":
         common += span.always(f"the torque is held for {loop.period:g} s, with which not even the linear loop is stable")
+    if run.attrs.get("diverged_at") is not None:
+        common.append(Departure(run.attrs["diverged_at"], LOST))
     found: dict[str, tuple[Departure, ...]] = {}
     for claim in certificate.claims:
         if claim.outcome == "proved" and claim.kind != "sampling":

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.analysis.departure import ALMOST, Departure, size
+from starhold.analysis.departure import ALMOST, LOST, Departure, size
 from starhold.laws.station import l2_circle
 from starhold.laws.station.interface import SeenPoint
 
@@ -30,16 +30,19 @@ def station_departures(
         places = np.flatnonzero(held)
         return [Departure(float(run["time"][places[0]]) * unit, how)] if len(places) else []
 
+    at = run.attrs.get("diverged_at")
+    common = [] if at is None else [Departure(at * unit, LOST)]
+    if loop.lag > 0.0:
+        common.append(Departure(0.0, "the control lags"))
     found: dict[str, tuple[Departure, ...]] = {}
     for claim in certificate.claims:
         if claim.outcome == "proved":
-            lags = [Departure(0.0, "the control lags")] if loop.lag > 0.0 else []
             own = [one for held, how in _conditions(claim, loop, run) for one in first(held, how)]
             left = outside(claim, loop, run["position"].T, run["velocity"].T, SLACK)
             sets = first(left, "it leaves the set")
             if len(left) and left[0]:
                 sets = [Departure(0.0, "it is outside the set")]
-            found[claim.kind] = tuple(sorted({*lags, *own, *sets}))
+            found[claim.kind] = tuple(sorted({*common, *own, *sets}))
     return found
 
 
