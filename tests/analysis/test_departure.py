@@ -13,11 +13,12 @@ from hypothesis import strategies as st
 
 from starhold.algebra.scalar import side
 from starhold.analysis.departure import LOST, MET, departures, fed_back
-from starhold.certification.certificate import Certificate, Claim, Obligation, write
+from starhold.certification.certificate import BESIDE, Certificate, Claim, Obligation, write
 from starhold.certification.certify import certify
 from starhold.certification.checker import check_file, passed
+from starhold.certification.checker.check import ENDS
 from starhold.certification.checker.claims import CLAIMS
-from starhold.certification.wording import sentence
+from starhold.certification.wording import HEADINGS, sentence
 from starhold.laws.double_cover import COVERS
 from starhold.report.certificates import certify_scenario, start_inside
 from starhold.report.compare import fly_law, prove
@@ -244,6 +245,7 @@ def test_the_linear_loop_alone_proves_no_certificate(tmp_path):
     assert whole.outcome == "proved"
     alone = Certificate(whole.name, whole.subject, tuple(claim for claim in whole.claims if claim.kind == "sampling"))
     assert alone.claims[0].outcome == "proved"
+    assert {kind for kind in HEADINGS if kind not in BESIDE} == set(ENDS)
     assert alone.outcome == "undecided"
     path = tmp_path / "certificate.json"
     write([alone], "here", path)

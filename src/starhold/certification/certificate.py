@@ -64,8 +64,8 @@ class Claim:
         return next((o for o in self.obligations if o.outcome == "refuted"), None)
 
 
-ENDS = ("convergence", "region", "sliding", "circle", "rest")
-"""Kinds of claims that say where the motion itself ends; without one a certificate proves nothing of it."""
+BESIDE = ("torque-limit", "inertia", "wheels", "disturbance", "sampling", "control-limit", "saturated-axis")
+"""Kinds of claims about a control loop that go with one that says where its motion ends, and alone prove nothing of that."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -86,7 +86,7 @@ class Certificate:
         found = {claim.outcome for claim in self.claims}
         if "refuted" in found:
             return "refuted"
-        ends = any(claim.kind in ENDS for claim in self.claims)
+        ends = any(claim.kind not in BESIDE for claim in self.claims)
         return "proved" if ends and found == {"proved"} else "undecided"
 
     def claim(self, kind: str) -> Claim | None:
