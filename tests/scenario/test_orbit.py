@@ -188,3 +188,5 @@ def test_an_orbit_that_comes_down_after_the_run_is_warned_of():
         orbit(FALLING, "20.0")
     with pytest.raises(InputError, match="surface"):
         orbit(FALLING, "6000.0")
+    with pytest.warns(UserWarning, match=r"orbit\.velocity: 708 times the speed of escape"):
+        orbit('position = ["7000 km", 0, 0]\nvelocity = [0, "7557 km/s", 0]')

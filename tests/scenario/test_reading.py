@@ -83,7 +83,7 @@ FAULTS = {
     "degrees without a unit": (
         "attitude = [0, 1, 1, 1]",
         "angles = [120, 20, 0]",
-        ["initial.angles", "[120, 20, 0]", '"120 deg"', "in rad"],
+        ["initial.angles", "[120, 20, 0]", '"120 deg"', "is in rad"],
     ),
     "noise in degrees without a unit": (
         "gravity_gradient = true",
@@ -124,7 +124,9 @@ FAULTS = {
         "duration = " + 50 * "{a=" + "1" + 50 * "}",
         ["simulation.duration.a", "too deep"],
     ),
-    "a key of 20000 parts": ("[orbit]", f"[{'.'.join(20000 * ['a'])}]\n[orbit]", ["a.a.a", "too deep"]),
+    "a key of 20000 parts": ("[orbit]", f"[{'.'.join(20000 * ['a'])}]\n[orbit]", ["dotted key", "at most 16"]),
+    "quoted parts": ("[orbit]", " . ".join(20000 * ['"a"']) + " = 1\n[orbit]", ["dotted key", "at most 16"]),
+    "a key of 30 parts": ("[orbit]", f"[{'.'.join(30 * ['a'])}]\n[orbit]", ["a.a.a", "too deep"]),
     "a long key": ("torque_limit =", f"{5000 * 'a'} =", ["spacecraft.aaa", "unknown key"]),
     "a key of two lines": ("torque_limit =", '"a\\nb" =', ["spacecraft.a\\nb", "unknown key"]),
     "nan": ("rate = [0.04", "rate = [nan", ["initial.rate", "finite"]),

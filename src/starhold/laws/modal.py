@@ -77,7 +77,10 @@ def design(craft: Craft, spec: Equal | Fit) -> Gains:
     elif spec.angle is None:
         raise ValueError("the fit needs the error angle at the start of the run")
     else:
-        a = float(fitted(spec.angle, spec.below, spec.above, spec.split))
+        with np.errstate(all="ignore"):
+            a = float(fitted(spec.angle, spec.below, spec.above, spec.split))
+        if not math.isfinite(a):
+            raise ValueError("c exp(d angle) + e is too large at this angle")
     return Gains((a, a, a), (a, a, a), spec.b)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import re
 import tomllib
 from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import contextmanager
@@ -69,12 +70,17 @@ class LawBook(Generic[_Entry]):
 
 LONGEST_TEXT, DEEPEST, MOST_DIGITS = 2**22, 16, 60
 """Characters of a file, tables and lists within one another, and digits of a whole number."""
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{50}}")
+"""A dotted key so long that the time to read it, which grows with its square, tells."""
 
 
 def read_toml(text: str, where: str) -> dict[str, Any]:
     """The tables of a TOML text; `where` names it in errors."""
     if len(text) > LONGEST_TEXT:
         raise InputError(where, "", f"more than {LONGEST_TEXT} characters", "a shorter file")
+    if _LONG_KEY.search(text):
+        raise InputError(where, "", "a dotted key of more than 50 parts", f"at most {DEEPEST} tables within one another")
     try:
         tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -274,7 +280,9 @@ def _model_at(model: Any, place: list[str]) -> Any:
 
 def _plain(message: str) -> str:
     text = message.removeprefix("Input should be ").removeprefix("a valid ")
-    return text.replace("dictionary or instance of", "table of").replace("boolean", "true or false")
+    if text.startswith("dictionary or instance of"):
+        return "a table"
+    return text.replace("boolean", "true or false")
 
 
 def show(value: Any) -> str:

@@ -17,6 +17,8 @@ from starhold.scenario.tables import Table, at_key
 
 DENSEST = 1e6
 """Mean density (kg/m3) of what is closer to a centre of attraction than a craft can be; planets have less than 6000."""
+FASTEST = 10.0
+"""Speed over that of escape from the Sun, a planet or the Moon beyond which a unit is taken to be wrong."""
 STRAIGHT = 1e-9
 """Sine of the angle between position and velocity at which a path is taken for one through the centre."""
 ANGLE_UP = Gain("rad", at_least=0.0, at_most=math.pi, text="of the orbit's plane against the first two axes")
@@ -124,6 +126,10 @@ class Orbit(Table):
         """An error where the spacecraft comes down to the body's surface during a run; a warning where it would later."""
         position, velocity = self.start
         gravity, surface = self.gravitational_parameter, self.surface
+        escape = math.sqrt(2.0 * gravity / norm(position))
+        if body_of(gravity) is not None and norm(velocity) > FASTEST * escape:
+            said = f"{norm(velocity) / escape:.3g} times the speed of escape; plain numbers are in m/s"
+            warnings.warn(f"orbit.velocity: {said}", stacklevel=2)
         if surface is None or lowest(position, velocity, gravity) >= surface:
             return
         key, found = ("velocity", list(velocity)) if self.position is not None else ("semi_major_axis", self.semi_major_axis)

@@ -87,7 +87,7 @@ def _to_numbers(value: Any, gain: Gain, worth: float) -> Any:
     if gain.whole and abs(value) > MOST_WHOLE:
         raise ValueError("at most 2^53")
     if gain.unit == "rad" and abs(value) > math.tau:
-        raise ValueError(f'a plain number in rad, within 2 pi; degrees are "{value:g} deg", and "{value:g} rad" is taken')
+        raise ValueError(f'a plain number is in rad, within 2 pi; with a unit it is "{value:g} deg" or "{value:g} rad"')
     return value
 
 

@@ -101,8 +101,8 @@ def _convert(value: float, powers: dict[str, int], unit: str) -> float:
         if not _angle_fits(given, wanted):
             raise ValueError(f"a quantity in {unit}")
         return float(registry.convert(value, given, wanted))
-    except pint.UndefinedUnitError:
-        raise ValueError(_allowed(unit)) from None
+    except pint.UndefinedUnitError as error:
+        raise ValueError(f"a quantity in {shown(unit)}; {error.unit_names} is no unit that is known") from None
     except (pint.PintError, OverflowError, ZeroDivisionError):
         raise ValueError(f"a quantity in {shown(unit)}") from None
 

@@ -1,0 +1,31 @@
+"""Scenarios changed at random are read and built, or refused in one line."""
+
+import warnings
+
+import pytest
+
+from starhold.errors import InputError
+from starhold.report.kinds import kind_of
+from starhold.scenario.opening import open_scenario
+from tests.scenario.mutants import mutant
+
+EACH = 60
+
+
+@pytest.mark.parametrize("block", range(5))
+def test_a_mutant_is_built_or_refused_in_one_line(block, tmp_path):
+    said = []
+    for seed in range(block * EACH, (block + 1) * EACH):
+        path = tmp_path / "mutant.toml"
+        path.write_text(mutant(seed), encoding="utf-8")
+        with warnings.catch_warnings():
+            # An orbit that comes down after the run is not refused.
+            warnings.simplefilter("ignore", UserWarning)
+            try:
+                scenario = open_scenario(path, allow_unstable=seed % 2 == 0)
+                for entry in scenario.laws:
+                    kind_of(scenario).build(scenario, entry)
+            except InputError as error:
+                said.append(str(error))
+    assert 10 < len(said) < EACH
+    assert all("\n" not in line and len(line) < 700 for line in said)
