@@ -213,6 +213,14 @@ def test_wheels_and_craft_are_made_once_and_anew_for_a_changed_scenario():
     assert scenario.craft.with_rotors == (6.0, 8.0, 5.0)
 
 
+def test_a_fit_beyond_all_numbers_is_refused():
+    law = '[[law]]\ntype = "modal"\nform = "fit"\nangle = 3.0\nbelow = [-1, -1, -1]\nabove = [-1, {}, -1]\n'
+    head = BASE[: BASE.index("[[law]]")]
+    assert parse(head + law.format(-1), "my.toml").laws
+    with pytest.raises(InputError, match=r"law\[1\]: c exp\(d angle\) \+ e is too large"):
+        parse(head + law.format(900), "my.toml")
+
+
 def test_names_must_differ():
     text = BASE.replace('type = "lyapunov"', 'type = "lyapunov"\nname = "a"').replace(
         'type = "sliding"', 'type = "sliding"\nname = "a"'
