@@ -47,12 +47,14 @@ class NoMemory(NamedTuple):
 
 @dataclass(frozen=True)
 class Start:
-    """What a scenario tells a design: turn from the target axes to the body axes and rate relative to the target (rad/s) at
-    the start; the torque (N m) and, of wheels, the angular momentum (N m s) that there is about every axis, infinite for no
-    limit; and the angle (rad) and rate (rad/s) at which the target counts as reached."""
+    """What a scenario tells a design: turn from the target axes to the body axes, rate relative to the target (rad/s) and
+    what wheels store (N m s, body axes; None for a craft without) at the start; the torque (N m) and, of wheels, the angular
+    momentum (N m s) that there is about every axis, infinite for no limit; and the angle (rad) and rate (rad/s) at which the
+    target counts as reached."""
 
     attitude: Quaternion
     rate: Vector
+    stored: Vector | None
     torque: float
     momentum: float
     attitude_tolerance: float

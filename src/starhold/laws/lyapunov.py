@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+from functools import partial
+from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quaternion import vector_part
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Vector, add, apply, dot, scale, subtract, swing
+from starhold.laws import response
 from starhold.laws.interface import Card, Gain, NoMemory, Seen
+from starhold.laws.response import Bandwidth, Settling, Turn, explained, fastest, feedback, settle, told
 from starhold.models.craft import Craft
 
 CARD = Card(
@@ -24,6 +27,32 @@ class Gains(NamedTuple):
 
     k_rate: Annotated[float, Gain("N m s", above=0.0, text="damping")]
     k_attitude: Annotated[float, Gain("N m", above=0.0, text="stiffness against the quaternion's vector part")]
+
+
+FORMS: dict[str, Any] = {"bandwidth": Bandwidth, "settling": Settling}
+complete = response.complete
+
+
+def design(craft: Craft, spec: Bandwidth | Settling) -> Gains:
+    """Gains of this bandwidth and damping, or the lowest that settle in time; ValueError where the torque allows none."""
+    if isinstance(spec, Bandwidth):
+        return Gains(*feedback(craft, spec.bandwidth, spec.damping))
+    return _settled(craft, spec)[0]
+
+
+def _settled(craft: Craft, spec: Settling) -> tuple[Gains, Turn]:
+    def gains_of(x: float) -> Gains:
+        return Gains(*feedback(craft, x, spec.damping))
+
+    return settle(torque, gains_of, partial(fastest, craft), craft, spec)
+
+
+def explain(craft: Craft, spec: Bandwidth | Settling) -> list[tuple[str, Any]]:
+    """The linear loop's frequency and damping about each principal axis, and how the turn goes."""
+    if isinstance(spec, Bandwidth):
+        return explained(craft, *design(craft, spec))
+    gains, turn = _settled(craft, spec)
+    return told(turn) + explained(craft, *gains)
 
 
 def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:

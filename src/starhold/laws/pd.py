@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, NamedTuple
+from functools import partial
+from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quaternion import vector_part
 from starhold.algebra.scalar import Scalar, less, where
 from starhold.algebra.vector import Vector, add, apply, clip_axes, dot, scale, subtract
+from starhold.laws import response
 from starhold.laws.interface import Card, Gain, NoMemory, Seen, tracking_torque
+from starhold.laws.response import Bandwidth, Settling, Turn, explained, fastest, feedback, settle, told
 from starhold.models.craft import Craft
 
 CARD = Card(
@@ -29,6 +32,32 @@ class Gains(NamedTuple):
     k_rate: Annotated[float, Gain("N m s", above=0.0, text="damping")]
     k_attitude: Annotated[float, Gain("N m", above=0.0, text="stiffness against the quaternion's vector part")]
     limit: Annotated[int, Gain(choices=("none", "axis"), text="axis: damping clipped to what k_attitude leaves")] = 0
+
+
+FORMS: dict[str, Any] = {"bandwidth": Bandwidth, "settling": Settling}
+complete = response.complete
+
+
+def design(craft: Craft, spec: Bandwidth | Settling) -> Gains:
+    """Gains of this bandwidth and damping, or the lowest that settle in time; ValueError where the torque allows none."""
+    if isinstance(spec, Bandwidth):
+        return Gains(*feedback(craft, spec.bandwidth, spec.damping))
+    return _settled(craft, spec)[0]
+
+
+def _settled(craft: Craft, spec: Settling) -> tuple[Gains, Turn]:
+    def gains_of(x: float) -> Gains:
+        return Gains(*feedback(craft, x, spec.damping))
+
+    return settle(torque, gains_of, partial(fastest, craft), craft, spec)
+
+
+def explain(craft: Craft, spec: Bandwidth | Settling) -> list[tuple[str, Any]]:
+    """The linear loop's frequency and damping about each principal axis, and how the turn goes."""
+    if isinstance(spec, Bandwidth):
+        return explained(craft, *design(craft, spec)[:2])
+    gains, turn = _settled(craft, spec)
+    return told(turn) + explained(craft, gains.k_rate, gains.k_attitude)
 
 
 def remember(gains: Gains, craft: Craft, period: float) -> NoMemory:

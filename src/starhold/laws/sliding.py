@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+import math
+from collections.abc import Callable
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
 
 from starhold.algebra.quaternion import vector_part
 from starhold.algebra.scalar import Scalar, clip, less, maximum, sign, where
 from starhold.algebra.vector import Matrix, Vector, add, apply, cross, scale, subtract, swing, times
-from starhold.laws.interface import Card, Gain, NoMemory, Seen
-from starhold.models.craft import Craft
+from starhold.laws import response
+from starhold.laws.interface import Card, Gain, NoMemory, Seen, Start
+from starhold.laws.response import Turn, largest_moment, settle, told
+from starhold.models.craft import Craft, tensor, vector
 
 CARD = Card(
     title="Sliding mode",
@@ -36,6 +42,102 @@ class Gains(NamedTuple):
     ]
     reach: Annotated[Vector, Gain("N m", above=0.0, shape=(3,), text="switching torque, above the disturbance")]
     layer: Annotated[float, Gain("rad/s", at_least=0.0, text="boundary layer; 0 switches by sign")] = 0.0
+
+
+class Layered(NamedTuple):
+    """Natural frequency and damping of the linear loop within a boundary layer: two real roots, those of the surface and of
+    the layer. Exact about every axis for a diagonal inertia, whose reaching torques are in proportion to the moments; else
+    exact about the axis of the largest moment, and faster about the others."""
+
+    bandwidth: Annotated[float, Gain("rad/s", above=0.0, text="natural frequency, the least of all axes")]
+    reach: Annotated[float, Gain("N m", above=0.0, text="switching torque about the axis of the largest moment")]
+    damping: Annotated[float, Gain("1", at_least=1.0, text="damping ratio; 1: a double root")] = 1.0
+
+
+class Settling(NamedTuple):
+    """The least slope that settles in time, within the torque that there is, found by integrating the turn: towards a target
+    at rest, without torque from outside."""
+
+    time: Annotated[float, Gain("s", above=0.0, text="after which angle and rate stay within their tolerances")]
+    reach: Annotated[
+        float | None, Gain("N m", above=0.0, text="switching torque; the torque over 2 sqrt 3, half of it, if absent")
+    ] = None
+    layer: Annotated[float, Gain("rad/s", at_least=0.0, text="boundary layer; 0 switches by sign")] = 0.0
+    torque: Annotated[float | None, Gain("N m", above=0.0, text="largest norm of the torque; what there is if absent")] = (
+        None
+    )
+    momentum: Annotated[float | None, Gain("N m s", above=0.0, text="that wheels can store; what there is if absent")] = None
+    attitude: Annotated[
+        Any,
+        Gain("1", shape=(4,), spread=False, text="turn from the target to the body at the start; the scenario's if absent"),
+    ] = None
+    rate: Annotated[Any, Gain("rad/s", shape=(3,), spread=False, text="relative rate then; the scenario's if absent")] = None
+    stored: Annotated[
+        Any, Gain("N m s", shape=(3,), spread=False, text="by wheels then, body axes; the scenario's if absent")
+    ] = None
+    attitude_tolerance: Annotated[float | None, Gain("rad", above=0.0, text="that of [settling] if absent")] = None
+    rate_tolerance: Annotated[float | None, Gain("rad/s", above=0.0, text="that of [settling] if absent")] = None
+
+
+FORMS: dict[str, Any] = {"bandwidth": Layered, "settling": Settling}
+
+
+def complete(spec: Layered | Settling, start: Callable[[], Start]) -> Layered | Settling:
+    """The inputs of a form that settles in time, with what they leave to the scenario."""
+    spec = response.complete(spec, start)
+    if isinstance(spec, Layered) or spec.reach is not None:
+        return spec
+    if spec.torque is None or math.isinf(spec.torque):
+        raise ValueError("reach must be given where the torque is not limited")
+    return spec._replace(reach=spec.torque / (2.0 * math.sqrt(3.0)))
+
+
+def design(craft: Craft, spec: Layered | Settling) -> Gains:
+    """Gains of this bandwidth and damping, or the least slope that settles in time; ValueError where the torque does not
+    allow it."""
+    if isinstance(spec, Settling):
+        return _settled(craft, spec)[0]
+    apart = spec.damping + math.sqrt(spec.damping**2 - 1.0)
+    slope, moments = 2.0 * spec.bandwidth / apart, tensor(craft.inertia)
+    most = largest_moment(craft)
+    layer = spec.reach / (spec.bandwidth * apart * most)
+    reach = (spec.reach, spec.reach, spec.reach)
+    if np.count_nonzero(moments - np.diag(np.diagonal(moments))) == 0:
+        reach = vector(spec.reach * np.diagonal(moments) / most)
+    if not (0.0 < layer < math.inf and math.isfinite(slope) and min(reach) > 0.0):
+        raise ValueError("the gains leave the range of numbers")
+    return Gains((slope, slope, slope), reach, layer)
+
+
+def _settled(craft: Craft, spec: Settling) -> tuple[Gains, Turn]:
+    reach = spec.reach
+    if reach is None:
+        raise ValueError("reach must be given")
+    least = float(np.linalg.eigvalsh(tensor(craft.inertia))[0])
+
+    def gains_of(x: float) -> Gains:
+        return Gains((x, x, x), (reach, reach, reach), spec.layer)
+
+    def fastest(gains: Gains) -> float:
+        return float(tensor(gains.slope)[0, 0]) + (reach / (spec.layer * least) if spec.layer > 0.0 else 0.0)
+
+    return settle(torque, gains_of, fastest, craft, spec)
+
+
+def explain(craft: Craft, spec: Layered | Settling) -> list[tuple[str, Any]]:
+    """How the turn goes; of a boundary layer, the eigenvalues of the linear loop within it, and else on the surface."""
+    found: list[tuple[str, Any]] = []
+    if isinstance(spec, Settling):
+        gains, turn = _settled(craft, spec)
+        found = told(turn)
+    else:
+        gains = design(craft, spec)
+    slope, inertia = tensor(gains.slope), tensor(craft.inertia)
+    if gains.layer == 0.0:
+        return [*found, ("eigenvalues on the surface (1/s)", np.linalg.eigvals(-0.5 * slope))]
+    hold = np.linalg.solve(inertia, np.diag(gains.reach)) / gains.layer
+    loop = np.block([[np.zeros((3, 3)), np.eye(3)], [-0.5 * hold @ slope, -0.5 * slope - hold]])
+    return [*found, ("eigenvalues of the linear loop in the layer (1/s)", np.linalg.eigvals(loop))]
 
 
 def surface(seen: Seen, gains: Gains) -> Vector:

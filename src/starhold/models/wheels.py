@@ -211,10 +211,12 @@ def lose(wheels: Wheels, index: int) -> Wheels:
 
 
 def capacity(wheels: Wheels, momentum: Sequence[float]) -> float:
-    """The angular momentum (N m s) that wheels with these axial momenta (N m s) can take up about every axis, shared out by
-    least squares, before a motor fades; 0 where a wheel is there already."""
+    """The norm (N m s) of the momentum that wheels with these axial momenta (N m s) at the start can store before a motor
+    fades, whatever its direction, with least-squares allocation; 0 where one is there already."""
+    total = stored(tuple(momentum), wheels)
     columns = zip(wheels.least, wheels.momentum_limit, momentum, strict=True)
-    rooms = [((1.0 - BAND) * limit - abs(held), math.sqrt(sum(x * x for x in row))) for row, limit, held in columns]
+    # What moves no momentum to the body stays in the rotors.
+    rooms = [((1.0 - BAND) * limit - abs(held + dot(row, total)), math.sqrt(dot(row, row))) for row, limit, held in columns]
     return max(0.0, min(room / share for room, share in rooms if share > 0.0))
 
 

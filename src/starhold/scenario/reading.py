@@ -178,7 +178,11 @@ def _read_law(data: Any, scenario: Scenario, key: str, taken: set[str], allow_un
     read = validate(law_model(law, form), table, where, key, extra=["file", *(["form"] if law.forms else [])])
     values = [getattr(read, item.name) for item in law.fields(form)]
     with refusing(law, where, key):
-        spec = None if form is None else law.complete(law.forms[form](*values), lambda: told_to_design(scenario))
+        spec = (
+            None
+            if form is None
+            else law.complete(law.forms[form](*values), lambda: told_to_design(scenario, read.double_cover))
+        )
     gains = make_gains(law, values, spec, scenario.craft, where, key)
     if not allow_unstable:
         refuse_unstable(lambda: law.check(gains), where, key)

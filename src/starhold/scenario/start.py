@@ -10,13 +10,14 @@ import numpy as np
 
 from starhold.algebra.cosines import from_angles
 from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise, relative, stretch, to_body
+from starhold.algebra.scalar import side
 from starhold.algebra.vector import ZERO, add, subtract
 from starhold.errors import InputError
 from starhold.laws.interface import Start
 from starhold.models.rigid_body import State
 from starhold.models.target import Knots, Target, inertial, knots_of, orbital, tabulate
 from starhold.models.wheeled_body import WheeledState
-from starhold.models.wheels import capacity
+from starhold.models.wheels import capacity, stored
 from starhold.scenario.history import read_history
 from starhold.scenario.rotors import start_momenta
 from starhold.scenario.schema import Pointing
@@ -97,15 +98,18 @@ def _target_at_start(goal: Any, position: Any, velocity: Any) -> Target:
     return inertial(goal, position, velocity, 0, None)
 
 
-def told_to_design(scenario: Scenario) -> Start:
-    """What the designs of a scenario's laws may reckon with."""
+def told_to_design(scenario: Scenario, cover: str) -> Start:
+    """What the design of a law of a scenario may reckon with; `cover`: which of q and -q is fed back."""
     table, goal = scenario.table, target_of(scenario)
     begun = start_of(scenario, goal)
     held = _target_at_start(goal, begun.position, begun.velocity)
     error = relative(held.attitude, begun.attitude)
+    error = error if cover == "as_published" else stretch(side(error[0]), error)
     rate = subtract(begun.rate, to_body(error, held.rate))
-    momentum, free = math.inf, table.spacecraft.limit == "none" and scenario.wheels is None
-    if scenario.wheels is not None and isinstance(begun, WheeledState):
-        momentum = capacity(scenario.wheels, begun.momentum)
+    momentum, held_by_wheels = math.inf, None
+    free = table.spacecraft.limit == "none" and scenario.wheels is None
     torque = math.inf if free else scenario.torque_limit(scenario.wheels)
-    return Start(error, rate, torque, momentum, table.settling.attitude_tolerance, table.settling.rate_tolerance)
+    if scenario.wheels is not None and isinstance(begun, WheeledState):
+        held_by_wheels, momentum = stored(begun.momentum, scenario.wheels), capacity(scenario.wheels, begun.momentum)
+    tolerances = table.settling
+    return Start(error, rate, held_by_wheels, torque, momentum, tolerances.attitude_tolerance, tolerances.rate_tolerance)
