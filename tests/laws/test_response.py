@@ -150,7 +150,7 @@ def test_wheels_bound_torque_and_momentum():
     assert float(np.abs(run.wheel_torque).max()) < 0.02
     assert float(np.abs(run.wheel_momentum).max()) < 0.99 * 0.2
     with pytest.raises(sh.InputError, match="N m s that the wheels can store allow about"):
-        sh.scenario(tables | {"wheels": wheels | {"momentum_limit": 0.08}, "law": [asked("lyapunov", 200)]})
+        sh.scenario(tables | {"wheels": wheels | {"momentum_limit": 0.05}, "law": [asked("lyapunov", 200)]})
     with pytest.raises(sh.InputError, match="N m of torque allow about"):
         sh.scenario(tables | {"wheels": wheels | {"momentum_limit": 50.0}, "law": [asked("lyapunov", 40)]})
 
