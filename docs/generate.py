@@ -1,16 +1,27 @@
-"""Writes docs/laws.md from the laws' own files: cards, gains, and the torque as SymPy reads it."""
+"""Writes docs/laws.md from the laws' own files: cards, gains, and the torque as SymPy reads it; and the tables of
+docs/law-authors.md from the code that they describe."""
 
 from __future__ import annotations
 
+import ast
+import inspect
+import re
+from itertools import pairwise
 from pathlib import Path
+from textwrap import dedent
+from types import ModuleType
 from typing import Any
 
 import sympy
 
+from starhold.algebra import quaternion, scalar, several, structured
+from starhold.algebra import vector as vectors
+from starhold.algebra.quantity import quantities
 from starhold.laws.catalogue import Law, catalogue
-from starhold.laws.interface import NoMemory, Seen
-from starhold.laws.station.interface import station_laws
+from starhold.laws.interface import Card, Gain, NoMemory, Seen, Start
+from starhold.laws.station.interface import SeenPoint, station_laws
 from starhold.models.craft import Craft, make_craft
+from starhold.models.libration import Libration
 
 CRAFT = make_craft([2.0, 3.0, 4.0])
 
@@ -72,5 +83,91 @@ def page() -> str:
     return "\n".join(lines)
 
 
+OPERATORS = ("plus", "minus", "product", "negative", "select")
+"""Functions of the scalars that are written as operators, or that `where` stands for."""
+
+
+def table(heads: list[str], rows: list[list[str]]) -> str:
+    """A table in Markdown."""
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "\n".join(
+        "| " + " | ".join(cell.replace("|", "\\|").replace("*", "\\*") for cell in line) + " |" for line in lines
+    )
+
+
+def fields_table(cls: Any) -> str:
+    """The fields of a state that are annotated with their quantities."""
+    return table(["field", "unit", "meaning"], [[f"`{name}`", q.unit, q.text] for name, q in quantities(cls).items()])
+
+
+def attributes_table(cls: Any) -> str:
+    """The fields of a dataclass, each told by the docstring that follows it."""
+    body = ast.parse(dedent(inspect.getsource(cls))).body[0].body  # type: ignore[attr-defined]
+    rows: list[list[str]] = []
+    for statement, told in pairwise(body):
+        if isinstance(statement, ast.AnnAssign):
+            default = "required" if statement.value is None else f"`{ast.unparse(statement.value)}`"
+            rows.append([f"`{ast.unparse(statement.target)}`", default, " ".join(told.value.value.split())])
+    return table(["keyword", "default", "meaning"], rows)
+
+
+def functions_table(module: ModuleType) -> str:
+    """The functions that a module defines, and its classes with their methods."""
+    rows: list[list[str]] = []
+    for name, item in vars(module).items():
+        if name.startswith("_") or getattr(item, "__module__", "") != module.__name__ or name in OPERATORS:
+            continue
+        if inspect.isfunction(item):
+            rows.append([f"`{name}({_parameters(item)})`", _first(item)])
+        elif inspect.isclass(item):
+            own = [f for n, f in vars(item).items() if inspect.isfunction(f) and not n.startswith("_")]
+            methods = "; ".join(f"`.{f.__name__}({_parameters(f)})`: {_first(f)}" for f in own)
+            rows.append([f"`{name}`", f"{_first(item)} {methods}"])
+    return table(["function", "meaning"], rows)
+
+
+def _parameters(function: Any) -> str:
+    shown = [str(p).partition(":")[0] for p in inspect.signature(function).parameters.values()]
+    return ", ".join(name for name in shown if name != "self")
+
+
+def _first(item: Any) -> str:
+    """The docstring's first sentence."""
+    text = " ".join((item.__doc__ or "").split())
+    return re.split(r"(?<=\.)\s", text)[0]
+
+
+def _start_table() -> str:
+    """What a design form may ask for, from the sentence that tells it."""
+    return (
+        " ".join((Start.__doc__ or "").split())
+        + f" Fields: {', '.join(f'`{n}`' for n in (*Start.__annotations__, 'angle'))}."
+    )
+
+
+TABLES = {
+    "card": lambda: attributes_table(Card),
+    "seen": lambda: fields_table(Seen),
+    "craft": lambda: fields_table(Craft),
+    "scalar": lambda: functions_table(scalar),
+    "vector": lambda: functions_table(vectors),
+    "quaternion": lambda: functions_table(quaternion),
+    "structured": lambda: functions_table(structured),
+    "several": lambda: functions_table(several),
+    "gain": lambda: attributes_table(Gain),
+    "start": _start_table,
+    "seen point": lambda: fields_table(SeenPoint),
+    "plant": lambda: fields_table(Libration),
+}
+MARK = re.compile(r"(<!-- written by docs/generate.py: (.*?) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+def filled(text: str) -> str:
+    """A page with its tables written anew."""
+    return MARK.sub(lambda match: f"{match[1]}\n{TABLES[match[2]]()}\n\n{match[3]}", text)
+
+
 if __name__ == "__main__":
     Path(__file__).with_name("laws.md").write_text(page(), encoding="utf-8")
+    authors = Path(__file__).with_name("law-authors.md")
+    authors.write_text(filled(authors.read_text(encoding="utf-8")), encoding="utf-8")

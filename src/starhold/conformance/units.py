@@ -5,12 +5,10 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
+from starhold.algebra.quantity import quantities
 from starhold.laws.catalogue import Law
 from starhold.laws.interface import Seen
 from starhold.models.craft import Craft
-
-SEEN_UNITS = ("1", "1/s", "1/s", "1/s", "1/s^2", "N m", "m", "s", "N m s")
-CRAFT_UNITS = ("kg m^2", "1/(kg m^2)", "N m", "m^3/s^2", "kg m^2")
 
 
 def rescaled(
@@ -25,11 +23,16 @@ def rescaled(
     gain_units = [None if item.gain.choices or item.gain.whole else item.gain.unit for item in law.fields()]
     own = [v if unit is None else _times(v, _factor(unit, factors)) for v, unit in zip(gains, gain_units, strict=True)]
     return (
-        Seen(*scaled(seen, SEEN_UNITS)),
+        Seen(*scaled(seen, _units(Seen))),
         law.gains(*own),
-        Craft(*scaled(craft, CRAFT_UNITS)),
+        Craft(*scaled(craft, _units(Craft))),
         1.0 / _factor("N m", factors),
     )
+
+
+@cache
+def _units(cls: Any) -> list[str]:
+    return [told.unit for told in quantities(cls).values()]
 
 
 def _times(value: Any, factor: float) -> Any:

@@ -15,30 +15,24 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeAlias, get_args, get
 
 import numpy as np
 
+from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import Quaternion
 from starhold.algebra.vector import ZERO, Vector, add, apply, subtract, swing
 from starhold.models.craft import Craft, compact
 
 
 class Seen(NamedTuple):
-    """What a law is told at a control instant.
+    """What a law is told at a control instant; vectors are in body axes."""
 
-    attitude: turn from the target axes to the body axes (scalar first); rate: angular velocity relative to the target
-    (rad/s); body_rate: absolute angular velocity; target_rate: the target's (rad/s); target_acceleration: the derivative
-    of target_rate as the turning body sees it (rad/s2); external_torque: the modelled torque at this attitude (N m);
-    position: from the centre of attraction (m); period: for which the torque will be held (s); stored: the angular momentum
-    of the body's wheels (N m s). Vectors are in body axes.
-    """
-
-    attitude: Quaternion
-    rate: Vector
-    body_rate: Vector
-    target_rate: Vector
-    target_acceleration: Vector
-    external_torque: Vector
-    position: Vector
-    period: float
-    stored: Vector = ZERO
+    attitude: Annotated[Quaternion, Quantity("1", "turn from the target axes to the body axes, scalar first")]
+    rate: Annotated[Vector, Quantity("rad/s", "angular velocity relative to the target")]
+    body_rate: Annotated[Vector, Quantity("rad/s", "absolute angular velocity")]
+    target_rate: Annotated[Vector, Quantity("rad/s", "the target's angular velocity")]
+    target_acceleration: Annotated[Vector, Quantity("rad/s^2", "derivative of target_rate as the turning body sees it")]
+    external_torque: Annotated[Vector, Quantity("N m", "modelled torque from outside at this attitude")]
+    position: Annotated[Vector, Quantity("m", "from the centre of attraction")]
+    period: Annotated[float, Quantity("s", "for which the torque will be held")]
+    stored: Annotated[Vector, Quantity("N m s", "angular momentum of the body's wheels")] = ZERO
 
 
 class NoMemory(NamedTuple):
@@ -74,10 +68,15 @@ class Card:
     """What a law is: title, sources, assumptions, the stability it claims, and what its readers must know."""
 
     title: str
+    """A few words."""
     summary: str
+    """One line: the control as a formula."""
     sources: tuple[str, ...]
+    """Where it comes from."""
     assumptions: tuple[str, ...]
+    """What its claim takes for granted; not empty where it claims something."""
     claims: Claim
+    """The stability that is claimed: global, almost-global, local or none."""
     double_cover: Literal["odd", "even"] = "odd"
     """odd: feeding back -q in place of q changes the torque; even: it does not."""
     rest_tolerance: float = 0.0
@@ -86,18 +85,25 @@ class Card:
 
 @dataclass(frozen=True)
 class Gain:
-    """Unit and bounds of one gain, as an annotation. `shape`: () a number, (3,) a vector, (3, 3) a matrix, for which a
-    number stands for that multiple of the identity and a vector for a diagonal. A law gets a diagonal matrix as the vector
-    of its diagonal; `apply` and `solve` take both forms."""
+    """Unit, bounds and shape of one gain, as an annotation."""
 
     unit: str = "1"
+    """In which plain numbers count: "N m s", "1/s^2"; "1" for none."""
     above: float | None = None
+    """Every number is greater."""
     at_least: float | None = None
+    """No number is less."""
     at_most: float | None = None
+    """No number is greater."""
     shape: tuple[int, ...] = ()
+    """() a number, (3,) a vector, (3, 3) a matrix, for which a number stands for that multiple of the identity and a vector
+    for a diagonal. A law gets a diagonal matrix as the vector of its diagonal; `apply` and `solve` take both forms."""
     whole: bool = False
+    """A whole number, which is a constant of the law while it is recorded: Python's `if` and `range` may use it."""
     choices: tuple[str, ...] = ()
+    """Words, of which the law gets the place of the one that is chosen: 0, 1, ...; a constant as well."""
     text: str = ""
+    """What it means, for listings and pages."""
     spread: bool = True
     """Whether a number stands for a vector of equal numbers."""
     dimension: Literal["", "length", "velocity", "acceleration", "time", "rate"] = ""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra.quantity import Quantity
 from starhold.algebra.vector import Matrix, Vector
 
 EARTH = 3.986e14
@@ -15,17 +16,21 @@ EARTH = 3.986e14
 
 
 class Craft(NamedTuple):
-    """A rigid spacecraft: inertia about the centre of mass in body axes (kg m2; three moments when these are principal
-    axes, else a matrix: `apply` and `swing` take both), its inverse, the torque limit that a law may reckon with (N m, per
-    axis or in norm; infinite for none; with wheels at most what they surely give), the gravitational parameter of the body
-    it orbits (m3/s2), and, for a craft with wheels, whose inertia is without the rotors' moments about their axes, the
-    inertia with them (kg m2; () for one without wheels)."""
+    """A rigid spacecraft. The inertia, about the centre of mass in body axes, is three moments where these are principal,
+    else a matrix: `apply` and `swing` take both."""
 
-    inertia: Matrix | Vector
-    inverse_inertia: Matrix | Vector
-    torque_limit: float
-    gravity: float
-    with_rotors: Matrix | Vector | tuple[()] = ()
+    inertia: Annotated[Matrix | Vector, Quantity("kg m^2", "of a craft with wheels without their rotors' about their axes")]
+    inverse_inertia: Annotated[Matrix | Vector, Quantity("1/(kg m^2)", "its inverse")]
+    torque_limit: Annotated[
+        float,
+        Quantity(
+            "N m", "that a law may reckon with, per axis or in norm; infinite for none; with wheels at most what they give"
+        ),
+    ]
+    gravity: Annotated[float, Quantity("m^3/s^2", "gravitational parameter of the body that it orbits")]
+    with_rotors: Annotated[
+        Matrix | Vector | tuple[()], Quantity("kg m^2", "inertia with the rotors; () without wheels")
+    ] = ()
 
 
 def whole(craft: Craft) -> Matrix | Vector:

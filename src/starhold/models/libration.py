@@ -9,9 +9,10 @@ revolution of the two bodies takes 2 pi; the unit of length is the caller's, by 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from starhold.algebra.halving import rising
+from starhold.algebra.quantity import Quantity
 from starhold.algebra.scalar import Scalar, sqrt
 from starhold.algebra.vector import Vector, add, dot
 
@@ -22,16 +23,14 @@ POINTS = ("L1", "L2", "L3")
 
 
 class Libration(NamedTuple):
-    """The numbers of a libration point in scaled units: the rate Omega at which the axes turn (1), the stiffness C of the
-    linear model (Omega2; the c2 of the literature), where the point lies along X as seen from the larger and from the
-    smaller body (lengths, with sign), and GM/distance3 of either at the point (Omega2), whose sum is C."""
+    """The numbers of a libration point in scaled units; the pulls add up to the stiffness."""
 
-    rate: float
-    stiffness: float
-    from_larger: float
-    from_smaller: float
-    pull_larger: float
-    pull_smaller: float
+    rate: Annotated[float, Quantity("Omega", "at which the axes turn: 1")]
+    stiffness: Annotated[float, Quantity("Omega^2", "C of the linear model; the c2 of the literature")]
+    from_larger: Annotated[float, Quantity("length", "where the point lies along X as seen from the larger body, with sign")]
+    from_smaller: Annotated[float, Quantity("length", "the same from the smaller body")]
+    pull_larger: Annotated[float, Quantity("Omega^2", "GM/distance^3 of the larger body at the point")]
+    pull_smaller: Annotated[float, Quantity("Omega^2", "the same of the smaller body")]
 
 
 class PointState(NamedTuple):

@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
+from starhold.algebra.quantity import Quantity
 from starhold.algebra.scalar import Scalar, less, maximum, sqrt, where
 from starhold.algebra.vector import Vector, dot, scale, subtract
 from starhold.laws import catalogue as laws
@@ -22,13 +23,12 @@ MODELS = ("linear", "nonlinear")
 
 
 class SeenPoint(NamedTuple):
-    """What a law is told at a control instant: position and velocity in the rotating axes from the libration point, the
-    period for which the control will be held, and the limit of its norm or axes; scaled."""
+    """What a law is told at a control instant; scaled."""
 
-    position: Vector
-    velocity: Vector
-    period: float
-    limit: float
+    position: Annotated[Vector, Quantity("length", "from the libration point, turning axes")]
+    velocity: Annotated[Vector, Quantity("length Omega", "relative to the turning axes")]
+    period: Annotated[float, Quantity("1/Omega", "for which the control will be held")]
+    limit: Annotated[float, Quantity("length Omega^2", "of the control's norm or of each axis; infinite for none")]
 
 
 @dataclass(frozen=True)

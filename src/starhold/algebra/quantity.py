@@ -1,0 +1,18 @@
+"""What the fields of a state or of an argument mean, as annotations that tables and checks read."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, get_args, get_type_hints
+
+
+class Quantity(NamedTuple):
+    """The unit and the meaning of a field."""
+
+    unit: str
+    text: str
+
+
+def quantities(cls: Any) -> dict[str, Quantity]:
+    """The quantities of a NamedTuple whose fields are all annotated with one, by name, in order."""
+    hints = get_type_hints(cls, include_extras=True)
+    return {name: next(a for a in get_args(hints[name]) if isinstance(a, Quantity)) for name in cls._fields}
