@@ -34,6 +34,18 @@ def test_readme_example_runs(capsys):
     assert "mpc" in said
 
 
+def test_python_page_runs(monkeypatch, capsys):
+    drawn = []
+    monkeypatch.setattr("pandas.DataFrame.plot", lambda table, **how: drawn.append((table.columns, how)))
+    (example,) = blocks("docs/python.md", "python")
+    exec(compile(example, "python.md", "exec"), {})
+    said = capsys.readouterr().out
+    settled = float(said.partition(" ")[0])
+    assert 110.0 < settled <= 120.0
+    assert "<Scenario cubesat: pd, lyapunov; 3000 control steps> [<Flight pd: settling" in said
+    assert set(drawn[0][1]["y"]) < set(drawn[0][0])
+
+
 def test_readme_names_every_law():
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     for name in catalogue() | station_laws():
