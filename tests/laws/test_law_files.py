@@ -3,10 +3,12 @@
 import json
 import subprocess
 import sys
+import tomllib
 from importlib.metadata import EntryPoint
 
 import numpy as np
 import pytest
+from jsonschema import ValidationError, validate
 
 import starhold as sh
 from starhold.certification.checker import check_file, passed
@@ -14,6 +16,7 @@ from starhold.conformance.suite import examine, find_law
 from starhold.laws import catalogue as catalogues
 from starhold.laws.catalogue import adopted, catalogue, from_file
 from starhold.laws.station.interface import StationLaw, station_laws
+from starhold.scenario.opening import json_schema
 
 LAW = '''"""Feedback."""
 
@@ -134,6 +137,10 @@ def test_command_line_compares_it_and_checks_its_certificate(folder):
     assert "there is no law my-law" in bare.stdout
     checked = starhold("check", "out/certificate.json", "--law-file", "laws/my_law.py")
     assert checked.returncode == 0, checked.stdout
+    assert "stiffness" in starhold("laws", "laws/my_law.py").stdout
+    (folder / "point.toml").write_text(POINT + '[[law]]\nfile = "laws/point.py"\nk = 30.0\nd = 9.0\n')
+    held = starhold("compare", "point.toml", "-o", "held")
+    assert held.returncode == 0, held.stderr
     good = starhold("check-law", "laws/my_law.py")
     assert good.returncode == 0, good.stdout
 
@@ -161,6 +168,16 @@ def test_a_station_law_from_a_file_with_a_memory(folder):
     verdicts = list(examine(law))
     assert [v for v in verdicts if v.outcome == "failed"] == []
     assert len(verdicts) == 6
+
+
+def test_the_schema_of_scenario_files_takes_it(folder):
+    schema = json_schema()
+    read = tomllib.loads((folder / "own.toml").read_text())
+    validate(read, schema)
+    with pytest.raises(ValidationError):
+        validate(read | {"law": [{"file": "my_law.py", "type": "pd"}]}, schema)
+    with pytest.raises(ValidationError):
+        validate(read | {"law": [{"k": 0.1}]}, schema)
 
 
 @pytest.mark.parametrize("name", sorted(station_laws()))

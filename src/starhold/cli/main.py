@@ -177,9 +177,10 @@ app.command()(sailing.sail)
 
 
 @app.command()
-def laws(name: Annotated[str | None, typer.Argument(help="show this law's card and gains")] = None) -> None:
+def laws(name: Annotated[str | None, typer.Argument(help="show this law's card and gains; or a file's")] = None) -> None:
     """List the control laws, or describe one."""
     from starhold.cli.show import print_law, print_laws
+    from starhold.conformance.suite import find_law
     from starhold.laws.catalogue import catalogue
     from starhold.laws.station.interface import station_laws
     from starhold.scenario.checking import nearest
@@ -188,6 +189,8 @@ def laws(name: Annotated[str | None, typer.Argument(help="show this law's card a
     if name is None:
         print_laws("attitude", catalogue())
         print_laws("station keeping", station_laws())
+    elif name.endswith(".py"):
+        print_law(find_law(name))
     elif name not in known:
         raise InputError("laws", "", name, nearest(name, list(known)))
     else:

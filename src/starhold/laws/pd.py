@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import partial
+from functools import lru_cache, partial
 from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quaternion import vector_part
@@ -45,6 +45,7 @@ def design(craft: Craft, spec: Bandwidth | Settling) -> Gains:
     return _settled(craft, spec)[0]
 
 
+@lru_cache(maxsize=64)
 def _settled(craft: Craft, spec: Settling) -> tuple[Gains, Turn]:
     def gains_of(x: float) -> Gains:
         return Gains(*feedback(craft, x, spec.damping))

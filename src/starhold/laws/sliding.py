@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -109,6 +110,7 @@ def design(craft: Craft, spec: Layered | Settling) -> Gains:
     return Gains((slope, slope, slope), reach, layer)
 
 
+@lru_cache(maxsize=64)
 def _settled(craft: Craft, spec: Settling) -> tuple[Gains, Turn]:
     reach = spec.reach
     if reach is None:

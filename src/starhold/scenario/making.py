@@ -36,15 +36,22 @@ def changed(scenario: AnyScenario, changes: Mapping[str, Any]) -> AnyScenario:
 
 
 def variants(scenario: AnyScenario, changes: Iterable[Mapping[str, Any]]) -> Iterator[AnyScenario]:
-    """The scenario changed in one way after the other."""
-    where, names = scenario.where, [entry.name for entry in scenario.laws]
-    tables = read_toml(scenario.text, where)
+    """The scenario changed in one way after the other; errors tell which."""
+    names = [entry.name for entry in scenario.laws]
+    tables = read_toml(scenario.text, scenario.where)
     for change in changes:
-        other = deepcopy(tables)
-        for key, value in change.items():
-            _put(other, _path(key, names, where), value, where)
-        plain = _plain(other, where, "")
-        yield open_tables(plain, toml_text(plain), where, scenario.folder, scenario.allow_unstable)
+        # As short as one line allows: of many changes the first.
+        told = ", ".join(f"{key} = {show(value)}" for key, value in list(change.items())[:4])
+        told = " ".join(told.split()).encode(errors="backslashreplace").decode()
+        where = f"{scenario.where} with {told}" if told else scenario.where
+        try:
+            other = deepcopy(tables)
+            for key, value in change.items():
+                _put(other, _path(key, names, where), value, where)
+            plain = _plain(other, where, "")
+            yield open_tables(plain, toml_text(plain), scenario.where, scenario.folder, scenario.allow_unstable)
+        except InputError as error:
+            raise InputError(where, error.key, error.found, error.allowed) from None
 
 
 def _path(key: Any, names: Sequence[str], where: str) -> list[str | int]:
