@@ -206,7 +206,9 @@ def flies_a_scenario(law: Law) -> None:
         recording = label(loop, samples, carry, 1)
         measured = measure(recording, 1e-3, 1e-3)
         require(measured["diverged_at"] is None, f"the motion is lost after {measured['diverged_at']} s")
-        require(call_costs(loop, samples, calls=100)["cost_median"] >= 0.0, "a call cannot be timed")
+        # What is timed has a kernel of its own.
+        if gains == law.examples()[0]:
+            require(call_costs(loop, samples, calls=100)["cost_median"] >= 0.0, "a call cannot be timed")
         fly_claims(loop, certify(loop, law.name), flights=FEW)
 
 
