@@ -111,7 +111,7 @@ def test_a_craft_that_is_lost_at_once_is_said_so(short):
         (("new", "short.toml"), "exists"),
         (("run", "huge.toml"), "simulation.record_every: found 1,"),
         (("new", "x.toml", "--from", "cubesat"), "cubesat-slew"),
-        (("new", "no/such/folder/x.toml"), "cannot write there"),
+        (("new", "no/such/folder/x.toml"), "cannot be written: No such file or directory"),
         (("check-law", "short.toml"), "short.toml"),
         (("check-law", "absent.py"), "no such file"),
         (("new", "."), "a folder"),

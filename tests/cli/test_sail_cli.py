@@ -59,7 +59,7 @@ def test_another_pair_and_point(tmp_path):
         (("--diffuse", "0.5"), "must add up to more than 0 and at most 1, not 1.5"),
         (("--mass", "heavy"), "--mass: found heavy; allowed: a number"),
         (("--area", "nan"), "--area: found nan; allowed: must be finite"),
-        (("-o", "no/such/folder.csv"), "cannot write there"),
+        (("-o", "no/such/folder.csv"), "cannot be written: No such file or directory"),
     ],
 )
 def test_user_errors_are_one_line_and_exit_code_2(words, said, tmp_path):

@@ -252,14 +252,11 @@ def new(
         text = f"#:schema ./{beside.name}\n{text}"
     if path.exists() and not force:
         raise InputError(str(path), "", "a file that exists", "another name, or --force")
-    try:
-        with whole(path) as hidden:
-            hidden.write_text(text, encoding="utf-8")
-        if schema:
-            with whole(beside) as hidden:
-                hidden.write_text(_schema_text(), encoding="utf-8")
-    except OSError as error:
-        raise InputError(str(path), "", f"cannot write there: {error.strerror}", "a file you may write") from None
+    with whole(path) as hidden:
+        hidden.write_text(text, encoding="utf-8")
+    if schema:
+        with whole(beside) as hidden:
+            hidden.write_text(_schema_text(), encoding="utf-8")
     console.print(f"Wrote {path}. Try: starhold compare {path}", soft_wrap=True)
 
 

@@ -103,10 +103,7 @@ def _write(station: Station, path: Path) -> None:
     from starhold.cli.show import console
     from starhold.report.sail_table import write_table
 
-    try:
-        write_table(station, path)
-    except OSError as error:
-        raise InputError(str(path), "", f"cannot write there: {error.strerror}", "a file you may write") from None
+    write_table(station, path)
     console.print(f"Table: {path}", soft_wrap=True)
 
 

@@ -11,6 +11,8 @@ from pathlib import Path
 
 from starhold.errors import InputError
 
+UNFINISHED = ".writing-"
+"""How names of folders begin in which files are being written."""
 _claimed: dict[tuple[int, int], int] = {}
 """Open handles of the folders that this process has claimed, by device and inode."""
 
@@ -41,13 +43,19 @@ def claim(folder: Path) -> None:
             os.close(handle)
 
 
+def clear_unfinished(folder: Path) -> None:
+    """Remove what processes that were killed left half written in a folder and in those in it."""
+    for left in (*folder.glob(f"{UNFINISHED}*"), *folder.glob(f"*/{UNFINISHED}*")):
+        shutil.rmtree(left, ignore_errors=True)
+
+
 @contextmanager
 def whole(path: Path) -> Generator[Path]:
     """A path to write to, in a hidden folder beside `path`, renamed to it on success and removed on failure. InputError
     where it cannot be written."""
     hidden: Path | None = None
     try:
-        hidden = Path(tempfile.mkdtemp(prefix=".writing-", dir=path.parent))
+        hidden = Path(tempfile.mkdtemp(prefix=UNFINISHED, dir=path.parent))
         yield hidden / path.name
         os.replace(hidden / path.name, path)
     except OSError as error:

@@ -14,6 +14,7 @@ from threading import Thread
 from typing import TYPE_CHECKING
 
 from starhold.errors import InputError
+from starhold.report.files import clear_unfinished
 
 if TYPE_CHECKING:
     from starhold.report.figures import Picture
@@ -27,6 +28,7 @@ class Painter:
 
     def __init__(self) -> None:
         self._sender: Thread | None = None
+        self._folder: Path | None = None
         self._process = subprocess.Popen(
             [sys.executable, "-m", "starhold.report.painter"], stdin=subprocess.PIPE, stderr=subprocess.PIPE
         )
@@ -35,13 +37,17 @@ class Painter:
         return self
 
     def __exit__(self, *failure: object) -> None:
-        if self._process.poll() is None:
+        killed = self._process.poll() is None
+        if killed:
             self._process.kill()
         self._sent()
         self._process.communicate()
+        if killed and self._folder is not None:
+            clear_unfinished(self._folder)
 
     def start(self, picture: Picture, folder: Path) -> None:
         """Let it draw into `folder`, which exists."""
+        self._folder = folder
         # On a thread, for it may not listen yet.
         self._sender = Thread(target=self._send, args=((picture, folder.absolute()),))
         self._sender.start()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import starhold
 from starhold.certification.certificate import FILE as CERTIFICATES
 from starhold.errors import InputError
-from starhold.report.files import claim, whole
+from starhold.report.files import claim, clear_unfinished, whole
 from starhold.report.netcdf import write_netcdf
 from starhold.scenario.checking import cut
 from starhold.scenario.opening import AnyScenario
@@ -32,6 +32,7 @@ def open_folder(folder: Path, force: bool) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         claim(folder)
+        clear_unfinished(folder)
         # Looked for once nobody else writes them.
         held = [mark for mark in MARKS if (folder / mark).exists()]
         if held and not force:
