@@ -63,7 +63,9 @@ def alone(content, kind):
     """The same with one claim, which is enough to see whether that claim fails."""
     certificate = content["certificates"][0]
     claim = claims_of(content)[kind]
-    return {**content, "certificates": [{**certificate, "outcome": claim["outcome"], "claims": [claim]}]}
+    # The linear loop alone proves nothing of where the motion ends.
+    outcome = "undecided" if (kind, claim["outcome"]) == ("sampling", "proved") else claim["outcome"]
+    return {**content, "certificates": [{**certificate, "outcome": outcome, "claims": [claim]}]}
 
 
 def proved_by_hand(kind, names, numbers, witness, assumptions=TEXTBOOK):
@@ -101,7 +103,8 @@ def by_hand(law, gains, claims, **changes):
         "wheels": None,
         **changes,
     }
-    certificate = {"name": law, "outcome": "proved", "subject": subject, "claims": claims}
+    outcome = "undecided" if [claim["kind"] for claim in claims] == ["sampling"] else "proved"
+    certificate = {"name": law, "outcome": outcome, "subject": subject, "claims": claims}
     return {"format": "starhold certificate 1", "scenario": "hand", "versions": {}, "certificates": [certificate]}
 
 
@@ -557,9 +560,10 @@ def test_a_name_that_cannot_be_written_fails(made, name):
 
 def test_a_check_that_takes_too_long_is_given_up():
     loads, half = [[fmpq(1)] * len(SHAPES)], fmpq(1, 2)
-    assert keeps_below(loads, [fmpq(0)] * len(SHAPES), fmpq(100), half, half)
+    ways = [([loads], [fmpq(0)] * len(SHAPES))]
+    assert keeps_below(ways, fmpq(100), half, half)
     with limited(0.0), pytest.raises(checking.CheckError, match="takes longer than"):
-        keeps_below(loads, [fmpq(0)] * len(SHAPES), fmpq(100), half, half)
+        keeps_below(ways, fmpq(100), half, half)
     # What is part of something gets no more time than that.
     with limited(0.0), limited(60.0), pytest.raises(checking.CheckError):
         in_time()

@@ -71,9 +71,10 @@ def failing(given):
 @pytest.mark.parametrize("name", builtin_names())
 def test_examples_are_shown_again(name, made):
     found = check(made[name])
-    assert {f.verdict for f in found} == {"holds"}, [f for f in found if f.verdict != "holds"]
+    # How large the true region is comes from elsewhere, and no claim is made of it.
+    assert {f.verdict for f in found if f.obligation != "known"} == {"holds"}, [f for f in found if f.verdict != "holds"]
     told = [o["name"] for claim in made[name]["certificates"][0]["claims"] for o in claim["obligations"]]
-    assert [f.obligation for f in found if f.obligation not in ("limit", "size")] == told
+    assert [f.obligation for f in found if f.obligation not in ("limit", "size", "known")] == told
 
 
 @pytest.mark.parametrize("name", builtin_names())

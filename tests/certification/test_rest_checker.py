@@ -250,6 +250,7 @@ def test_the_limited_axis_of_the_full_problem_is_not_claimed(made):
     content["certificates"][0]["subject"]["gains"]["model"] = "nonlinear"
     content["certificates"][0]["claims"][1]["assumptions"][0] = "motion exactly as modelled"
     content["certificates"][0]["claims"].pop(0)
+    content["certificates"][0]["outcome"] = "undecided"
     assert faults(content) == {("saturated-axis", ""): "the limited control is read for the linear model alone"}
 
 

@@ -87,7 +87,7 @@ def test_its_laws_fly_from_scenarios_beside_them(folder):
     bad = {"file": "filtered_pid.py", "k_rate": -1.0, "k_attitude": 0.02}
     with pytest.raises(sh.InputError, match=r"k_rate must be positive definite; --allow-unstable"):
         sh.scenario(BODY | {"law": [bad]}, folder=folder)
-    held = sh.simulate(sh.scenario(POINT | {"law": [{"file": "hold_point.py", "k": 20, "d": 9}]}, folder=folder))
+    held = sh.simulate(sh.scenario(POINT | {"law": [{"file": "hold_point.py", "k": 20, "lead": 0.45}]}, folder=folder))
     assert float(abs(held.position[-1]).max()) < 0.1
 
 

@@ -149,7 +149,7 @@ def test_form_ii_of_a_full_inertia_and_equal_moments_of_one():
 
 def test_numbers_at_the_end_of_the_range_are_one_line_or_gains():
     said = set()
-    values = ("1e308", "1e-308", "5e-324", "1e200", "1e-200")
+    values = ("1e31", "1e30", "1e-30", "1e20", "1e-20")
     forms = {"I": ("a", "b"), "II": ("q", "r"), "III": ("q", "r"), "numeric": ("q", "r")}
     for form, keys in forms.items():
         for first in (*values, "1"):
@@ -163,7 +163,7 @@ def test_numbers_at_the_end_of_the_range_are_one_line_or_gains():
                     else:
                         assert all(np.isfinite(np.array(gain)).all() for gain in gains)
                         assert np.diagonal(lqr.tensor(gains.k_attitude)).min() > 0.0
-    assert any("too large or too small" in message for message in said)
+    assert any("between 1e-30 and 1e+30 in size" in message for message in said)
     assert not any("\n" in message for message in said)
 
 

@@ -29,9 +29,9 @@ hyperbolas = st.builds(
 )
 
 
-def orbit(text, duration="600.0"):
+def orbit(text, duration="2000.0"):
     assert STATE in BASE
-    return parse(BASE.replace(STATE, text).replace("600.0", duration), "my.toml").table.orbit
+    return parse(BASE.replace(STATE, text).replace("2000.0", duration), "my.toml").table.orbit
 
 
 @given(st.one_of(ellipses, hyperbolas))

@@ -166,13 +166,13 @@ def test_pictures_draw_the_limit_that_binds_first():
     scenario, loop = made(STIFF)
     run = flown(loop)
     plots = collect([Flight("one", "lyapunov", run, measure(run, 1e-3, 1e-3), {})], 1000, scenario)
-    sure = 1e3 * scenario.craft.torque_limit
-    assert plots.torque.dashed == f"what the wheels surely give about each axis at once, {sure:g} mN m"
+    sure = scenario.craft.torque_limit
+    assert plots.torque.dashed == f"what the wheels surely give about each axis at once, {sure:g} N m"
     assert plots.torque.panels[0].levels == (-sure, sure)
     scenario, loop = made(STIFF, limit="torque_limit = 0.01")
     run = flown(loop)
     plots = collect([Flight("one", "lyapunov", run, measure(run, 1e-3, 1e-3), {})], 1000, scenario)
-    assert plots.torque.dashed == "limit of each axis, 10 mN m"
+    assert plots.torque.dashed == "limit of each axis, 0.01 N m"
     scenario, loop = made(LOST, GENTLE + 'fault_action = "none"\n', limit='limit = "norm"')
     run = flown(loop)
     words = collect([Flight("one", "lyapunov", run, measure(run, 1e-3, 1e-3), {})], 1000, scenario).torque.dashed

@@ -64,8 +64,8 @@ class Claim:
         return next((o for o in self.obligations if o.outcome == "refuted"), None)
 
 
-BESIDE = ("torque-limit", "inertia", "wheels", "disturbance", "sampling", "control-limit", "saturated-axis")
-"""Kinds of claims about a control loop that go with one that says where its motion ends, and alone prove nothing of that."""
+BESIDE = ("sampling", "control-limit", "saturated-axis")
+"""Kinds of claims about a control loop that say nothing of where its motion ends, and go with one that does."""
 
 
 @dataclass(frozen=True, repr=False)

@@ -14,6 +14,7 @@ and attitude end in the ellipsoid all the same.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -154,16 +155,22 @@ def _guess(A: Array, pushed: Array, lost: float, place: slice) -> Step | None:
     # SciPy takes a while to load, and not every command certifies.
     solve: Callable[..., Array] = import_module("scipy.linalg").solve_continuous_lyapunov
 
+    def solved(moved: Array, fed: Array) -> Array:
+        with warnings.catch_warnings():
+            # Where it is near singular; whether a step holds is shown in rationals.
+            warnings.simplefilter("ignore", RuntimeWarning)
+            return solve(moved, fed)
+
     def inner(a: float, rounds: int) -> tuple[float, float, Array]:
         """The largest |w|2 or |q|2 in the ellipsoid, c, and the inverse of S, by iteration."""
         moved, c = A + 0.5 * a * np.eye(6), 1.0
         fed[:3, :3], fed[3:, 3:] = pushed / a, 0.0
-        inside = solve(moved, -fed)
+        inside = solved(moved, -fed)
         size = first = _size(inside, place)
         for _ in range(rounds):
             c = math.sqrt(0.5 * lost * _size(inside, RATES) * _size(inside, TURNS))
             fed[3:, 3:] = c * np.eye(3)
-            inside = solve(moved, -fed - lost / (2.0 * c) * inside[:, RATES] @ inside[RATES])
+            inside = solved(moved, -fed - lost / (2.0 * c) * inside[:, RATES] @ inside[RATES])
             last, size = size, _size(inside, place)
             if not size < 100.0 * first:
                 return math.inf, c, inside

@@ -151,7 +151,7 @@ def _cover(numbers: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 
 def _followed(subject: Mapping[str, Any]) -> str:
     """What a bound that depends on the target's motion assumes of it between the rows of its history."""
-    followed = subject["target"] == "history" and subject["target_rate"]
+    followed = subject.get("target") == "history" and subject["target_rate"]
     return ", while the target follows the rotation spline through its history" if followed else ""
 
 

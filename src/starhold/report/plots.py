@@ -90,7 +90,7 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario | None = 
         return [thin(flight.recording[name][:, column] * scale, factor) for flight in flights]
 
     rate_scale, rate_unit = _rate_unit(flights)
-    levels, dashed = _limit(flights, 1.0, "N m", scenario)
+    levels, dashed = _limit(flights, scenario)
     rates = [Panel(f"{axis}, {rate_unit}", curves("rate_error", i, rate_scale)) for i, axis in enumerate("xyz")]
     torques = [Panel(f"{axis}, N m", curves("torque", i), False, levels) for i, axis in enumerate("xyz")]
     scalar = Panel("q₀", curves("attitude_error", 0))
@@ -290,8 +290,8 @@ def _rate_unit(flights: Sequence[Flight]) -> tuple[float, str]:
     return (degrees, "deg/s") if _peak(flights, "rate_error") * degrees >= 0.1 else (degrees * 1e3, "mdeg/s")
 
 
-def _limit(flights: Sequence[Flight], scale: float, unit: str, scenario: Scenario | None) -> tuple[tuple[float, ...], str]:
-    """The limit of the torque that binds first, and what it is."""
+def _limit(flights: Sequence[Flight], scenario: Scenario | None) -> tuple[tuple[float, ...], str]:
+    """The limit of the torque (N m) that binds first, and what it is."""
     attrs: dict[Any, Any] = flights[0].recording.attrs
     limit, kind = float(attrs["torque_limit"]), attrs["limit"]
     limit = math.inf if kind == "none" else limit
@@ -305,8 +305,8 @@ def _limit(flights: Sequence[Flight], scale: float, unit: str, scenario: Scenari
             words += " before a fault"
     if not np.isfinite(limit):
         return (), "no limit"
-    words = f"{words}, {limit * scale:g} {unit}"
+    words = f"{words}, {limit:g} N m"
     # A limit far above all torques would flatten them.
     if limit > OFF_SCALE * _peak(flights, "torque"):
         return (), f"{words}, off the scale"
-    return (-limit * scale, limit * scale), words
+    return (-limit, limit), words

@@ -35,7 +35,7 @@ from starhold.certification.checker.station import STATION_CLAIMS, Station, read
 from starhold.certification.checker.subject import Subject, read_subject
 
 FORMAT = "starhold certificate 1"
-ENDS = ("convergence", "region", "sliding", "circle", "rest")
+ENDS = ("convergence", "region", "torque-limit", "wheels", "inertia", "disturbance", "sliding", "circle", "rest")
 """Kinds of claims about where the motion ends, one of which a certificate that counts as proved must hold."""
 BITS = 192
 """Precision of balls: enough that they are far narrower than the margins of a certificate."""
