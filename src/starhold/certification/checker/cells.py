@@ -18,6 +18,7 @@ from flint import Ordering, fmpq_mpoly_ctx
 from starhold.algebra.polynomial import Polynomial, jointly
 from starhold.certification.checker.cover import Poly, Question, answer
 from starhold.certification.checker.exact import ONE, ZERO, CheckError, demand
+from starhold.certification.checker.reading import in_time
 
 MOST, TERMS = 64, 50_000
 """Cells, and terms that V' may have."""
@@ -94,6 +95,7 @@ class Pieces:
         """Cells with each other, and thin ones with all of them."""
         for place, one in enumerate(self.every):
             for other in self.cells[place + 1 :] if place < len(self.cells) else self.cells:
+                in_time()
                 yield one, other
 
     @property

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from starhold.algebra.polynomial import Polynomial
 from starhold.certification.checker.bernstein import CLEAR, decided, halves, stacked, steepest
 from starhold.certification.checker.exact import CheckError
+from starhold.certification.checker.reading import in_time
 
 Poly: TypeAlias = Any
 """`fmpq_mpoly`."""
@@ -58,6 +59,7 @@ def answer(asked: Question) -> bool | None:
     waiting = [(first, corner, width)]
     seen = tried = 0
     while waiting:
+        in_time()
         boxes, corner, width = waiting.pop()
         seen += len(boxes)
         left = ~_done(boxes, len(asked.rooms), options)

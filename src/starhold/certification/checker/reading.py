@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from fractions import Fraction
 from pathlib import Path
-from time import monotonic
+from time import thread_time
 from typing import Any, cast
 
 from starhold.algebra.polynomial import Polynomial, pieces
@@ -81,8 +81,8 @@ def _within(part: Any) -> Iterable[Any]:
 
 @contextmanager
 def limited(seconds: float = SECONDS) -> Generator[None]:
-    """What runs within is stopped by `in_time` after so many seconds, or when what it is part of is."""
-    before = _late.set(min(monotonic() + seconds, _late.get()))
+    """What runs within is stopped by `in_time` after so many seconds of processor time, or when what it is part of is."""
+    before = _late.set(min(thread_time() + seconds, _late.get()))
     try:
         yield
     finally:
@@ -91,7 +91,7 @@ def limited(seconds: float = SECONDS) -> Generator[None]:
 
 def in_time() -> None:
     """A CheckError where the check of a claim takes longer than it may. For loops to call."""
-    demand(monotonic() < _late.get(), f"the check takes longer than {SECONDS:g} s")
+    demand(thread_time() < _late.get(), f"the check takes longer than {SECONDS:g} s of processor time")
 
 
 def read_names(names: Sequence[str], define: Mapping[str, Any]) -> dict[str, Any]:
