@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from functools import lru_cache, partial
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from starhold.algebra.quaternion import vector_part
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Vector, add, apply, dot, scale, subtract, swing
 from starhold.laws import response
 from starhold.laws.interface import Card, Gain, NoMemory, Seen
-from starhold.laws.response import Bandwidth, Settling, Turn, explained, fastest, feedback, settle, told
 from starhold.models.craft import Craft
 
 CARD = Card(
@@ -29,39 +27,17 @@ class Gains(NamedTuple):
     k_attitude: Annotated[float, Gain("N m", above=0.0, text="stiffness against the quaternion's vector part")]
 
 
-FORMS: dict[str, Any] = {"bandwidth": Bandwidth, "settling": Settling}
-complete = response.complete
-
-
-def design(craft: Craft, spec: Bandwidth | Settling) -> Gains:
-    """Gains of this bandwidth and damping, or the lowest that settle in time; ValueError where the torque allows none."""
-    if isinstance(spec, Bandwidth):
-        return Gains(*feedback(craft, spec.bandwidth, spec.damping))
-    return _settled(craft, spec)[0]
-
-
-@lru_cache(maxsize=64)
-def _settled(craft: Craft, spec: Settling) -> tuple[Gains, Turn]:
-    def gains_of(x: float) -> Gains:
-        return Gains(*feedback(craft, x, spec.damping))
-
-    return settle(torque, gains_of, partial(fastest, craft), craft, spec)
-
-
-def explain(craft: Craft, spec: Bandwidth | Settling) -> list[tuple[str, Any]]:
-    """The linear loop's frequency and damping about each principal axis, and how the turn goes."""
-    if isinstance(spec, Bandwidth):
-        return explained(craft, *design(craft, spec))
-    gains, turn = _settled(craft, spec)
-    return told(turn) + explained(craft, *gains)
-
-
 def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Control torque (N m, body)."""
     feedback = add(scale(-gains.k_rate, seen.rate), scale(-gains.k_attitude, vector_part(seen.attitude)))
     gyroscopic = swing(craft.inertia, seen.body_rate)
     model = add(subtract(gyroscopic, seen.external_torque), apply(craft.inertia, seen.target_acceleration))
     return add(feedback, model), memory
+
+
+FORMS = response.FORMS
+complete = response.complete
+design, explain = response.designs(Gains, torque)
 
 
 def lyapunov(seen: Seen, gains: Gains, craft: Craft) -> Scalar:

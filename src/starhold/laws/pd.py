@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache, partial
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from starhold.algebra.quaternion import vector_part
 from starhold.algebra.scalar import Scalar, less, where
 from starhold.algebra.vector import Vector, add, apply, clip_axes, dot, scale, subtract
 from starhold.laws import response
 from starhold.laws.interface import Card, Gain, NoMemory, Seen, tracking_torque
-from starhold.laws.response import Bandwidth, Settling, Turn, explained, fastest, feedback, settle, told
 from starhold.models.craft import Craft
 
 CARD = Card(
@@ -34,33 +32,6 @@ class Gains(NamedTuple):
     limit: Annotated[int, Gain(choices=("none", "axis"), text="axis: damping clipped to what k_attitude leaves")] = 0
 
 
-FORMS: dict[str, Any] = {"bandwidth": Bandwidth, "settling": Settling}
-complete = response.complete
-
-
-def design(craft: Craft, spec: Bandwidth | Settling) -> Gains:
-    """Gains of this bandwidth and damping, or the lowest that settle in time; ValueError where the torque allows none."""
-    if isinstance(spec, Bandwidth):
-        return Gains(*feedback(craft, spec.bandwidth, spec.damping))
-    return _settled(craft, spec)[0]
-
-
-@lru_cache(maxsize=64)
-def _settled(craft: Craft, spec: Settling) -> tuple[Gains, Turn]:
-    def gains_of(x: float) -> Gains:
-        return Gains(*feedback(craft, x, spec.damping))
-
-    return settle(torque, gains_of, partial(fastest, craft), craft, spec)
-
-
-def explain(craft: Craft, spec: Bandwidth | Settling) -> list[tuple[str, Any]]:
-    """The linear loop's frequency and damping about each principal axis, and how the turn goes."""
-    if isinstance(spec, Bandwidth):
-        return explained(craft, *design(craft, spec)[:2])
-    gains, turn = _settled(craft, spec)
-    return told(turn) + explained(craft, gains.k_rate, gains.k_attitude)
-
-
 def remember(gains: Gains, craft: Craft, period: float) -> NoMemory:
     """Nothing; ValueError where stiffness leaves no torque for the damping."""
     if gains.limit and not gains.k_attitude < craft.torque_limit < math.inf:
@@ -81,6 +52,11 @@ def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Ve
     )
     feedback = add(damping, scale(gains.k_attitude, vector_part(seen.attitude)))
     return subtract(tracking_torque(seen, craft), feedback), memory
+
+
+FORMS = response.FORMS
+complete = response.complete
+design, explain = response.designs(Gains, torque)
 
 
 def lyapunov(seen: Seen, gains: Gains, craft: Craft) -> Scalar:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache
+from functools import cache, lru_cache, partial
 from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -67,6 +67,7 @@ class Settling(NamedTuple):
     rate_tolerance: Annotated[float | None, Gain("rad/s", above=0.0, text="that of [settling] if absent")] = None
 
 
+FORMS: dict[str, Any] = {"bandwidth": Bandwidth, "settling": Settling}
 Spec = TypeVar("Spec", bound=NamedTuple)
 
 
@@ -257,6 +258,31 @@ def _flight(torque: Callable[..., Any], count: int, wheels: bool, like: _Like) -
         return there, most, momentum
 
     return Compiled(whole, *like.values, ((1.0, 0.0, 0.0, 0.0), ZERO, ZERO), 1.0, (1.0, 1.0))
+
+
+def designs(
+    make: Callable[[float, float], Any], torque: Callable[..., Any]
+) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """`design` and `explain` of a law with these two forms: `make` gives its gains of damping and stiffness (N m s, N m)."""
+
+    @lru_cache(maxsize=64)
+    def settled(craft: Craft, spec: Settling) -> tuple[Any, Turn]:
+        def gains_of(x: float) -> Any:
+            return make(*feedback(craft, x, spec.damping))
+
+        return settle(torque, gains_of, partial(fastest, craft), craft, spec)
+
+    def design(craft: Craft, spec: Bandwidth | Settling) -> Any:
+        if isinstance(spec, Bandwidth):
+            return make(*feedback(craft, spec.bandwidth, spec.damping))
+        return settled(craft, spec)[0]
+
+    def explain(craft: Craft, spec: Bandwidth | Settling) -> list[tuple[str, Any]]:
+        found = design(craft, spec)
+        turned = told(settled(craft, spec)[1]) if isinstance(spec, Settling) else []
+        return turned + explained(craft, found.k_rate, found.k_attitude)
+
+    return design, explain
 
 
 def explained(craft: Craft, k_rate: float, k_attitude: float) -> list[tuple[str, Any]]:
