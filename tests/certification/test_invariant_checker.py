@@ -2,8 +2,6 @@
 
 import copy
 import json
-import subprocess
-import sys
 
 import pytest
 from flint import Ordering, fmpq, fmpq_mpoly_ctx
@@ -15,6 +13,7 @@ from starhold.certification.checker.exact import CheckError
 from starhold.certification.checker.reading import read, read_names
 from starhold.certification.invariant import builtin_names, certify, parse, write
 from tests.certification.invariants import proved
+from tests.running import starhold
 
 FILE = """
 name = "{name}"
@@ -258,8 +257,7 @@ def test_a_way_on_which_v_rises_is_checked(tmp_path):
 def test_the_command_tells_what_is_not_checked(tmp_path, made):
     def checked(given):
         (tmp_path / "c.json").write_text(json.dumps(given), encoding="utf-8")
-        words = [sys.executable, "-m", "starhold", "check", "c.json"]
-        return subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
+        return starhold("check", "c.json", cwd=tmp_path)
 
     assert checked(made["circle"]).returncode == 0
     left = checked(changed(made["circle"], lambda subject, claims: subject.pop("V")))

@@ -1,18 +1,13 @@
 """Certificates as a user meets them: what is printed, what is written, the exit codes."""
 
 import json
-import subprocess
-import sys
 
 import pytest
 
+from tests.running import starhold
 from tests.small import CRAFT, MPC, PD, WEAK
 
 pytestmark = pytest.mark.xdist_group("cli")
-
-
-def starhold(*words, cwd):
-    return subprocess.run([sys.executable, "-m", "starhold", *words], cwd=cwd, capture_output=True, text=True)
 
 
 @pytest.fixture(scope="module")

@@ -15,12 +15,9 @@ from starhold.errors import InputError
 from starhold.laws.catalogue import catalogue
 from starhold.report.results import open_folder
 from starhold.scenario.reading import builtin_text
+from tests.running import starhold
 
 SHORT = builtin_text("three-laws").replace("duration = 2000.0", "duration = 20.0")
-
-
-def starhold(*words, cwd, **options):
-    return subprocess.run([sys.executable, "-m", "starhold", *words], cwd=cwd, capture_output=True, text=True, **options)
 
 
 @pytest.fixture
@@ -237,7 +234,7 @@ def test_what_the_system_refuses_is_one_line(failure, said, monkeypatch, capsys)
     monkeypatch.setattr(main.gc, "set_threshold", lambda *_: None)
     monkeypatch.setattr(main.warnings, "formatwarning", main.warnings.formatwarning)
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")
-    assert main._run_command() == 2
+    assert main.run_command() == 2
     error = capsys.readouterr().err
     assert error.startswith(said)
     assert error.count("\n") == 1

@@ -6,7 +6,7 @@ import pytest
 
 import starhold as sh
 from starhold.certification.invariant.problem import FORMAT
-from tests.cli.test_certify_cli import starhold
+from tests.running import starhold
 
 pytestmark = pytest.mark.xdist_group("cli")
 

@@ -2,19 +2,14 @@
 
 import json
 import math
-import subprocess
-import sys
 import tomllib
 
 import pytest
 
 from starhold.scenario.reading import builtin_text, parse
+from tests.running import starhold
 
 COARSE = builtin_text("landing-limits").replace('step = "5 deg"', 'step = "30 deg"').replace("step = 0.001", "step = 0.05")
-
-
-def starhold(*words, cwd):
-    return subprocess.run([sys.executable, "-m", "starhold", *words], cwd=cwd, capture_output=True, text=True)
 
 
 @pytest.fixture

@@ -1,14 +1,10 @@
 """The design of a sail as a user meets it."""
 
 import csv
-import subprocess
-import sys
 
 import pytest
 
-
-def starhold(*words, cwd):
-    return subprocess.run([sys.executable, "-m", "starhold", *words], cwd=cwd, capture_output=True, text=True)
+from tests.running import starhold
 
 
 def test_sail_prints_the_design_and_writes_the_table(tmp_path):

@@ -7,7 +7,7 @@ import xarray as xr
 
 from starhold.laws.station.interface import station_laws
 from starhold.scenario.reading import builtin_text
-from tests.cli.test_cli import starhold
+from tests.running import starhold
 
 SHORT = builtin_text("l2-deficit").replace('"4 yr"', '"1 yr"')
 

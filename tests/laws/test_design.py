@@ -1,7 +1,5 @@
 """`sh.design` and `starhold design` tell the same."""
 
-import subprocess
-import sys
 from dataclasses import FrozenInstanceError
 
 import numpy as np
@@ -10,6 +8,7 @@ import pytest
 import starhold as sh
 from starhold.laws import lqr
 from starhold.scenario.reading import builtin_text
+from tests.running import starhold
 
 TEXT = (
     builtin_text("three-laws").split("[[law]]")[0]
@@ -88,8 +87,7 @@ def test_figures_that_overflow_are_one_line(file, monkeypatch):
 @pytest.mark.xdist_group("cli")
 def test_the_command_prints_what_the_function_returns(file):
     def told(*words):
-        command = [sys.executable, "-m", "starhold", "design", file.name, *words]
-        return subprocess.run(command, cwd=file.parent, capture_output=True, text=True)
+        return starhold("design", file.name, *words, cwd=file.parent)
 
     done = told()
     assert done.returncode == 0, done.stderr

@@ -1,8 +1,6 @@
 """Laws from files and from other packages: scenarios fly them, proofs read them, and what is wrong with one is one line."""
 
 import json
-import subprocess
-import sys
 import tomllib
 from importlib.metadata import EntryPoint
 
@@ -17,6 +15,7 @@ from starhold.laws import catalogue as catalogues
 from starhold.laws.catalogue import adopted, catalogue, from_file
 from starhold.laws.station.interface import StationLaw, station_laws
 from starhold.scenario.opening import json_schema
+from tests.running import starhold
 
 LAW = '''"""Feedback."""
 
@@ -124,24 +123,21 @@ def test_it_is_read_again_where_its_text_has_changed_and_only_then(folder):
 
 
 def test_command_line_compares_it_and_checks_its_certificate(folder):
-    def starhold(*words):
-        return subprocess.run([sys.executable, "-m", "starhold", *words], cwd=folder, capture_output=True, text=True)
-
-    flown = starhold("compare", "own.toml", "-o", "out")
+    flown = starhold("compare", "own.toml", "-o", "out", cwd=folder)
     assert flown.returncode == 0, flown.stderr
     told = json.loads((folder / "out" / "certificate.json").read_text())["certificates"]
     assert [one["subject"]["law"] for one in told] == ["my-law", "pd"]
     # The law is not run because a certificate names it.
-    bare = starhold("check", "out/certificate.json")
+    bare = starhold("check", "out/certificate.json", cwd=folder)
     assert bare.returncode == 1
     assert "there is no law my-law" in bare.stdout
-    checked = starhold("check", "out/certificate.json", "--law-file", "laws/my_law.py")
+    checked = starhold("check", "out/certificate.json", "--law-file", "laws/my_law.py", cwd=folder)
     assert checked.returncode == 0, checked.stdout
-    assert "stiffness" in starhold("laws", "laws/my_law.py").stdout
+    assert "stiffness" in starhold("laws", "laws/my_law.py", cwd=folder).stdout
     (folder / "point.toml").write_text(POINT + '[[law]]\nfile = "laws/point.py"\nk = 30.0\nd = 9.0\n')
-    held = starhold("compare", "point.toml", "-o", "held")
+    held = starhold("compare", "point.toml", "-o", "held", cwd=folder)
     assert held.returncode == 0, held.stderr
-    good = starhold("check-law", "laws/my_law.py")
+    good = starhold("check-law", "laws/my_law.py", cwd=folder)
     assert good.returncode == 0, good.stdout
 
 

@@ -1,8 +1,5 @@
 """Weights that no regulator is made of end in one line that names them."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
@@ -10,6 +7,7 @@ from starhold.errors import InputError
 from starhold.laws import lqr
 from starhold.models.craft import make_craft
 from starhold.scenario.reading import builtin_text, parse
+from tests.running import starhold
 
 HEAD = builtin_text("three-laws").split("[[law]]")[0]
 FULL = HEAD.replace("[2.0, 3.0, 4.0]", "[[2.0, 0.1, 0], [0.1, 3.0, 0], [0, 0, 4.0]]")
@@ -188,8 +186,7 @@ def test_weights_from_python_are_checked_too(spec, said):
 @pytest.mark.parametrize("command", ["design", "run"])
 def test_the_command_line_says_one_line(tmp_path, command):
     (tmp_path / "wide.toml").write_text(HEAD + law(form='"II"', q="[1, 1e13, 1, 1, 1, 1]", r=1))
-    words = [sys.executable, "-m", "starhold", command, "wide.toml"]
-    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
+    done = starhold(command, "wide.toml", cwd=tmp_path)
     assert done.returncode == 2
     assert done.stdout == ""
     assert done.stderr.startswith("starhold: wide.toml: law[1]: q: the weights of the rate differ by a factor of 1e+13")

@@ -2,8 +2,6 @@
 
 import csv
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from itertools import combinations
 
@@ -30,6 +28,7 @@ from starhold.report.results import open_folder
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import fly, label
+from tests.running import starhold
 
 BUILTIN = builtin_text("wheels-orbital")
 
@@ -50,10 +49,6 @@ def changed(*pairs):
         assert old in text
         text = text.replace(old, new)
     return parse(text, "here")
-
-
-def starhold(*words, cwd):
-    return subprocess.run([sys.executable, "-m", "starhold", *words], cwd=cwd, capture_output=True, text=True)
 
 
 @pytest.mark.xdist_group("failures")

@@ -323,7 +323,7 @@ def _heed_interrupt() -> None:
 def main() -> None:
     """Entry point: user errors become one line and exit code 2, an interrupt 130."""
     open_outlets()
-    code = _run_command()
+    code = run_command()
     sys.stdout.flush()
     unsaid = cast(Outlet, sys.stdout).failure
     if unsaid is not None and not isinstance(unsaid, BrokenPipeError):
@@ -332,7 +332,8 @@ def main() -> None:
     sys.exit(code)
 
 
-def _run_command() -> int:
+def run_command() -> int:
+    """Run the command that stands in `sys.argv`, and return its exit code."""
     # Before NumPy loads: on matrices as small as a law's, its library's threads only wait for one another.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for number in (signal.SIGINT, signal.SIGTERM):
