@@ -4,13 +4,17 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet -c constraints.txt
 
-.PHONY: demo test test-all check bench docs clean
+.PHONY: demo test test-fast test-all check bench docs clean
 
 demo: $(VENV)/.run
 	$(BIN)/starhold compare three-laws -o demo --force
 
 test: check
 	$(BIN)/python -m pytest -n 2 --dist loadgroup
+
+# A part of the tests for the time between two changes: under a minute.
+test-fast: $(VENV)/.test
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -q tests/algebra tests/analysis tests/loop tests/models tests/scenario --ignore tests/models/test_wheels.py
 
 test-all: check
 	$(BIN)/python -m pytest -n 2 --dist loadgroup -m ""

@@ -108,7 +108,12 @@ def test_a_level_above_what_is_true_fails(name, made):
         ("circle", "x", "-y + x*f"),
         ("saturated-axis", "v", "x + sat(-s/2)"),
         ("saturated-strip", "s", "s + sat(2*s)"),
-        ("switching", "y", "-2*x - 3*y if y <= 0 else y**2 - x**2 if circle <= 0 else (x**2 + y**2)*(1 + x)"),
+        pytest.param(
+            "switching",
+            "y",
+            "-2*x - 3*y if y <= 0 else y**2 - x**2 if circle <= 0 else (x**2 + y**2)*(1 + x)",
+            marks=pytest.mark.slow,
+        ),
         ("switching", "y", "-2*x + 3*y if y <= 0 else y**2 - x**2 if circle <= 0 else (x**2 + y**2)*(1 - x)"),
         ("spin", "q", "p*r + p**2"),
         ("dead-zone", "v", "-v - (s - sat(s)) + x"),

@@ -124,7 +124,7 @@ def compare(results: list[Any]) -> None:
     ("compiler", "level"),
     [
         ("gcc", LEVELS[0]),
-        ("clang", LEVELS[1]),
+        pytest.param("clang", LEVELS[1], marks=SLOW),
         pytest.param("gcc", LEVELS[1], marks=SLOW),
         pytest.param("clang", LEVELS[0], marks=SLOW),
     ],
