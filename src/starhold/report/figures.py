@@ -107,6 +107,10 @@ def over_time(plot: Plot, times: Any, marks: Sequence[float], flights: Sequence[
             # Ticks are what drawing spends its time on.
             if panel.decades() > 2.0:
                 axis.minorticks_off()
+        else:
+            # Digits of small numbers would push the labels out of the figure.
+            axis.ticklabel_format(axis="y", style="sci", scilimits=(-2, 4), useMathText=True)
+            axis.yaxis.get_offset_text().set_size(8.5)
         for level in panel.levels:
             axis.axhline(level, color="0.35", linewidth=0.9, dashes=(5, 3))
         for mark in marks:
