@@ -148,3 +148,10 @@ def test_a_state_refutes_only_where_its_piece_of_the_law_holds():
         if evidence is not None:
             state = dict(zip(("w1", "w2", "w3"), map(exact, evidence["state"]["rate"]), strict=True))
             assert all((condition.positive.at(state) > 0) == truth for condition, truth in truths)
+
+
+@pytest.mark.parametrize(("rate", "attitude"), [(1e25, 1e26), (1e30, 1e30), (1e-25, 1e-20), (1e-30, 1e30), (1e30, 1e-30)])
+def test_gains_that_floats_cannot_fly_are_certified_all_the_same(rate, attitude, tmp_path):
+    text = 'name = "far"\n[spacecraft]\ninertia = [2, 3, 4]\n[simulation]\nduration = 10\n'
+    for law in ("lyapunov", "pd"):
+        assert fault_in(f'{text}[[law]]\ntype = "{law}"\nk_rate = {rate}\nk_attitude = {attitude}\n', tmp_path) == ""
