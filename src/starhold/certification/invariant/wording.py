@@ -64,7 +64,7 @@ def limit(numbers: Mapping[str, Any]) -> str:
     if "refuted_level" not in numbers:
         return ""
     why = {"V rises": "where V does not fall", "border": "on the border of the box"}[numbers["limited_by"]]
-    return f"no level reaches {numbers['refuted_level']:.6g}: there is a state {why}"
+    return f"no level reaches {_up(numbers['refuted_level'])}: there is a state {why}"
 
 
 def evidence(obligation: Obligation) -> str:
