@@ -1,4 +1,4 @@
-"""What the fields of a state or of an argument mean, as annotations that tables and checks read."""
+"""Annotations tell what the fields of a state or of an argument mean; tables and checks read them."""
 
 from __future__ import annotations
 

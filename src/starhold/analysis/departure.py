@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.scalar import side
 from starhold.algebra.vector import ZERO
+from starhold.analysis.metrics import ALMOST, on_limit
 from starhold.certification.certificate import WHEELS
 from starhold.certification.region import Shape
 from starhold.laws.double_cover import COVERS
@@ -28,10 +29,6 @@ if TYPE_CHECKING:
     from starhold.simulation.lane import Recording
 
 Array: TypeAlias = NDArray[np.float64]
-ALMOST = 1.0 - 1e-9
-"""A share of a limit from which on it counts as reached."""
-
-
 LOST = "the simulation loses the motion"
 """Which no proof speaks of: it is too fast for the integration, or farther away than a scenario follows it."""
 
@@ -116,10 +113,8 @@ def _exact(span: Span) -> list[Departure]:
 
 
 def _unlimited(span: Span) -> list[Departure]:
-    kind, limit = span.loop.limit, span.loop.craft.torque_limit
-    if kind == "none" or not math.isfinite(limit):
-        return []
-    return span.first(size(span["command"], kind) >= limit * ALMOST, "the torque reaches its limit")
+    bound = on_limit(span["command"], span.loop.craft.torque_limit, span.loop.limit)
+    return span.first(bound, "the torque reaches its limit")
 
 
 def _wheels_unlimited(span: Span) -> list[Departure]:
@@ -135,11 +130,6 @@ def _wheels_unlimited(span: Span) -> list[Departure]:
 def _friction(span: Span) -> list[Departure]:
     wheels = cast(Wheels, span.loop.wheels)
     return span.always("the wheels have friction", any((*wheels.viscous, *wheels.coulomb)))
-
-
-def _momentum(span: Span) -> list[Departure]:
-    # The claim's own number stands in no assumption; `_set` looks at it.
-    return []
 
 
 def _random(span: Span) -> list[Departure]:
@@ -168,7 +158,8 @@ MET: Mapping[str, Callable[[Span], list[Departure]]] = {
     "torque not limited": _unlimited,
     WHEELS: _wheels_unlimited,
     "wheels without friction": _friction,
-    "total momentum at most as told": _momentum,
+    # The claim's own number stands in no assumption; `_set` looks at it.
+    "total momentum at most as told": _kept,
     "no torque from outside but what the law cancels": _cancelled,
     "no torque from outside": _alone,
     "torque from outside bounded in norm": _random,
@@ -177,11 +168,6 @@ MET: Mapping[str, Callable[[Span], list[Departure]]] = {
 }
 """For each assumption of a claim about motions how a flight departs from it. The first four a simulation meets, but for what
 `departures` says of held torque and of changes."""
-
-
-def size(torque: Array, kind: str) -> Array:
-    """What a limit of a kind is about, of each torque or control (n, 3)."""
-    return np.linalg.norm(torque, axis=1) if kind == "norm" else np.abs(torque).max(axis=1)
 
 
 def cancels(loop: ClosedLoop) -> bool:

@@ -15,6 +15,8 @@ DECADES = range(1, 7)
 """The k of the accuracies 10^-k whose iterations are counted."""
 LAST = 0.25
 """Share of the run over which chatter and the final error are measured."""
+ALMOST = 1.0 - 1e-9
+"""A share of a limit from which on it counts as reached."""
 KEPT = 0.1
 """Share of the run at its end in which nothing counts as settled: a motion that goes to and fro, or that a longer run
 would show to leave again, is within its bounds there by chance."""
@@ -131,21 +133,22 @@ def _overshoot(q: NDArray[np.float64]) -> float:
 
 def limit_share(u: NDArray[np.float64], limit: float, kind: str) -> float:
     """Share of the samples (n, 3) that are on their limit."""
-    return float(_on_limit(u, limit, kind).mean())
+    return float(on_limit(u, limit, kind).mean())
 
 
-def _on_limit(u: NDArray[np.float64], limit: float, kind: str) -> NDArray[np.bool_]:
+def on_limit(u: NDArray[np.float64], limit: float, kind: str) -> NDArray[np.bool_]:
+    """Tell which samples (n, components) are on their limit; none where there is none."""
     if kind == "none" or not np.isfinite(limit):
         return np.zeros(len(u), dtype=bool)
     size = np.linalg.norm(u, axis=1) if kind == "norm" else np.abs(u).max(axis=1)
-    return size >= limit * (1.0 - 1e-9)
+    return size >= limit * ALMOST
 
 
 def _limit_share(run: Recording) -> float:
     """Share of the samples in which the command, which an actuator may lag behind, is on its limit, or a wheel's motor is
     asked for all that it can give: less as its momentum fills up, and nothing once it is lost."""
-    on_limit = _on_limit(run["command"], run.attrs["torque_limit"], run.attrs["limit"])
+    bound = on_limit(run["command"], run.attrs["torque_limit"], run.attrs["limit"])
     if "wheel_command" in run.arrays:
         asked = np.abs(run["wheel_command"])
-        on_limit |= ((asked > 0.0) & (asked >= run["wheel_available"] * (1.0 - 1e-9))).any(axis=1)
-    return float(on_limit.mean())
+        bound |= ((asked > 0.0) & (asked >= run["wheel_available"] * ALMOST)).any(axis=1)
+    return float(bound.mean())

@@ -57,11 +57,11 @@ class Board:
         return f"{scaled:.3g}" if abs(scaled) < 1e3 else f"{scaled:.0f}"
 
     def told(self, metric: str, row: Mapping[str, Any]) -> str:
-        """What `shown` shows of the results of a law, with a mark where a time is not counted for it is reached so late."""
+        """Show the results of a law as `shown` does, with a mark where a time is reached too late to be counted."""
         return self.shown(metric, row.get(metric)) + (LATE if metric in row.get("cut_off", ()) else "")
 
     def late(self, results: Mapping[str, Mapping[str, Any]]) -> str:
-        """What the mark means; empty where no law has one."""
+        """Explain the mark; empty where no law has one."""
         marked = any(set(row.get("cut_off", ())) & set(self.measures) for row in results.values())
         return (
             f"{LATE.strip()} within its bounds only at the very end of the run, which does not count: fly longer."

@@ -51,7 +51,7 @@ class Rest(NamedTuple):
 
 
 def goal_of(gains: Any) -> Circle | Rest:
-    """What a law makes for, by its gains: a circle of this radius and rate, else rest at this y and z, without them at the
+    """Tell from its gains what a law makes for: a circle of this radius and rate, else rest at this y and z, or at the
     libration point."""
     if hasattr(gains, "radius") and hasattr(gains, "rate"):
         return Circle(gains.radius, gains.rate)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.analysis.departure import ALMOST, LOST, Departure, size
+from starhold.analysis.departure import LOST, Departure
+from starhold.analysis.metrics import on_limit
 from starhold.laws.station import l2_circle
 from starhold.laws.station.interface import SeenPoint
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from starhold.simulation.lane import Recording
 
 SLACK = 1e-6
-"""Of V, and of scaled distances and velocities: what the integration makes of a motion along a border."""
+"""The integration moves V, scaled distances and velocities by so much in a motion along a border."""
 
 
 def station_departures(
@@ -47,14 +48,12 @@ def station_departures(
 
 
 def _conditions(claim: Claim, loop: StationLoop, run: Recording) -> list[tuple[Any, str]]:
-    """What the claim assumes not to be, (n,), beside lag and its set."""
-    command, limit = run["command"], loop.limit * ALMOST
-    if loop.limit_kind == "none" or not math.isfinite(limit):
-        return []
+    """The samples (n,) that a claim assumes not to be, beside lag and its set, each with its sentence."""
+    command, limit, kind = run["command"], loop.limit, loop.limit_kind
     if claim.kind in ("circle", "rest"):
-        return [(size(command, loop.limit_kind) >= limit, "the control reaches its limit")]
-    if claim.kind == "saturated-axis":
-        return [(np.abs(command[:, 1:]).max(axis=1) >= limit, "the control along Y or Z reaches its limit")]
+        return [(on_limit(command, limit, kind), "the control reaches its limit")]
+    if claim.kind == "saturated-axis" and kind != "none":
+        return [(on_limit(command[:, 1:], limit, "axis"), "the control along Y or Z reaches its limit")]
     return []
 
 

@@ -1,4 +1,4 @@
-"""What half the integration step changes in a run: the error of the integration, as far as a run can tell it."""
+"""The error of the integration, as far as a run can tell it: half the integration step changes so much."""
 
 from __future__ import annotations
 

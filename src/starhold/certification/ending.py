@@ -123,7 +123,10 @@ class Nearby:
             nonlocal rate, turn
             push, lost = (number(x) * HELD for x in self.outside(rate, turn))
             try:
-                step = _guess(A, push * push * turned, lost, place)
+                with warnings.catch_warnings():
+                    # SciPy warns of what is near singular; whether a step holds is shown in rationals.
+                    warnings.simplefilter("ignore", RuntimeWarning)
+                    step = _guess(A, push * push * turned, lost, place)
             except ValueError:
                 # A matrix is singular or not finite in floats.
                 step = None
@@ -155,22 +158,16 @@ def _guess(A: Array, pushed: Array, lost: float, place: slice) -> Step | None:
     # SciPy takes a while to load, and not every command certifies.
     solve: Callable[..., Array] = import_module("scipy.linalg").solve_continuous_lyapunov
 
-    def solved(moved: Array, fed: Array) -> Array:
-        with warnings.catch_warnings():
-            # Where it is near singular; whether a step holds is shown in rationals.
-            warnings.simplefilter("ignore", RuntimeWarning)
-            return solve(moved, fed)
-
     def inner(a: float, rounds: int) -> tuple[float, float, Array]:
         """The largest |w|2 or |q|2 in the ellipsoid, c, and the inverse of S, by iteration."""
         moved, c = A + 0.5 * a * np.eye(6), 1.0
         fed[:3, :3], fed[3:, 3:] = pushed / a, 0.0
-        inside = solved(moved, -fed)
+        inside = solve(moved, -fed)
         size = first = _size(inside, place)
         for _ in range(rounds):
             c = math.sqrt(0.5 * lost * _size(inside, RATES) * _size(inside, TURNS))
             fed[3:, 3:] = c * np.eye(3)
-            inside = solved(moved, -fed - lost / (2.0 * c) * inside[:, RATES] @ inside[RATES])
+            inside = solve(moved, -fed - lost / (2.0 * c) * inside[:, RATES] @ inside[RATES])
             last, size = size, _size(inside, place)
             if not size < 100.0 * first:
                 return math.inf, c, inside

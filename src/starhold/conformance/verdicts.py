@@ -1,13 +1,20 @@
-"""What a check of a law finds, and the check that laws of all kinds share."""
+"""What a check of a law finds, and what the checks of laws of all kinds share."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from typing import Literal, NamedTuple
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, Literal, NamedTuple
 
+from starhold.algebra.structure import flatten
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law
 from starhold.laws.interface import Card, fields
+from starhold.loop.kernels import fly_plainly
+from starhold.simulation.lane import fly
+from starhold.simulation.lanes import simulate_many
+
+STEPS = 40
+"""Control steps of a flight that checks fly."""
 
 
 class NonconformityError(Exception):
@@ -44,6 +51,28 @@ def run(checks: Iterable[Callable[..., None]], law: Law) -> Iterator[Verdict]:
 def require(condition: bool, reason: str) -> None:
     if not condition:
         raise NonconformityError(reason)
+
+
+def round_trips(law: Law, write: Callable[..., str], parse: Callable[[str, str], Any]) -> None:
+    """Check that gains written to a scenario file and read back are the same, and unknown keys refused."""
+    for gains in law.examples():
+        text = write(law, gains)
+        require(parse(text, law.name).laws[0].gains == gains, "gains change on the way through TOML")
+        try:
+            parse(text + "no_such_key = 1\n", law.name)
+        except InputError:
+            continue
+        raise NonconformityError("an unknown key is accepted")
+
+
+def agree(loop: Any, starts: Sequence[Any], lanes: Sequence[int]) -> None:
+    """Check that a single flight, these lanes of a batch, which start alike, and plain Python agree bit for bit."""
+    one = flatten(fly(loop, STEPS)[1].state)
+    for threads in (1, 2):
+        batch = simulate_many(loop, starts, STEPS, threads=threads)
+        same = all(batch.states[:, lane].tolist() == one for lane in lanes)
+        require(same, f"a lane of a batch on {threads} threads differs from a single flight")
+    require(flatten(fly_plainly(loop, STEPS).state) == one, "plain Python differs from the compiled kernel")
 
 
 def declares_itself(law: Law) -> None:
