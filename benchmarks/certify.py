@@ -26,21 +26,21 @@ from scipy.linalg import solve_continuous_are
 from sympy.core.cache import clear_cache
 
 from common import header, interleaved, show
+from starhold import checker
 from starhold.algebra.quaternion import derivative
 from starhold.algebra.vector import add
-from starhold.certification import checker
 from starhold.certification.certificate import Certificate, write
 from starhold.certification.certify import certify
 from starhold.certification.motion import ATTITUDE, RATE, Motion
 from starhold.certification.subject import make_subject
-from starhold.laws.interface import Seen
-from starhold.laws.riccati import linear_model
+from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.models.craft import Craft, tensor
-from starhold.models.rigid_body import angular_acceleration
+from starhold.parts.bodies.rigid_body import angular_acceleration
+from starhold.parts.craft import Craft, tensor
 from starhold.scenario.building import build
 from starhold.scenario.opening import open_scenario
 from starhold.scenario.reading import Scenario, builtin_names
+from starhold.synthesis.riccati import linear_model
 
 ROUNDS = 3
 TORQUES = ("e1", "e2", "e3")
@@ -61,7 +61,7 @@ def in_sympy(loop: ClosedLoop) -> dict[tuple[str, ...], Any]:
     zero = (sympy.Integer(0),) * 3
     inertia = sympy.Matrix(3, 3, [sympy.Rational(x) for x in tensor(loop.craft.inertia).ravel().tolist()])
     craft: Any = Craft(_rows(inertia), _rows(inertia.inv()), sympy.oo, sympy.Integer(1))
-    seen: Any = Seen(q, w, w, zero, zero, e, zero, sympy.Rational(loop.period))
+    seen: Any = Measurement(q, w, w, zero, zero, e, zero, sympy.Rational(loop.period))
     gains = type(loop.gains)(*(_rational(value) for value in loop.gains))
     memory = loop.law.remember(loop.gains, loop.craft, loop.period)
     torque, _ = loop.law.torque(seen, gains, craft, memory)

@@ -21,11 +21,11 @@ import numpy as np
 from starhold.algebra.quaternion import Quaternion, vector_part
 from starhold.algebra.vector import ZERO, Vector, add, scale
 from starhold.laws.catalogue import Law
-from starhold.laws.interface import Card, NoMemory, Seen
+from starhold.laws.interface import Card, Measurement, NoMemory
 from starhold.laws.pd import Gains
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.models.craft import EARTH, Craft, make_craft
-from starhold.models.rigid_body import State
+from starhold.parts.bodies.rigid_body import State
+from starhold.parts.craft import EARTH, Craft, make_craft
 
 PERIOD = 0.1
 INERTIA = (2.0, 3.0, 4.0)
@@ -92,13 +92,13 @@ def show(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     print()
 
 
-def feedback(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
+def feedback(seen: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """u = -k_attitude sigma - k_rate w, sigma = q/(1 + q0); shown q0 >= 0, it keeps |sigma| <= 1."""
     q = seen.attitude
     return add(scale(-gains.k_attitude / (1.0 + q[0]), vector_part(q)), scale(-gains.k_rate, seen.rate)), memory
 
 
-def steady(seen: Seen, gains: Vector, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
+def steady(seen: Measurement, gains: Vector, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """A constant torque, no control at all."""
     return gains, memory
 
@@ -121,7 +121,7 @@ def problem(law: Law, gains: Any, start: State = START, **options: Any) -> Close
     return ClosedLoop(craft, law, gains, start, PERIOD, **(around | options))
 
 
-FEEDBACK_LOOP = problem(FEEDBACK, FEEDBACK_GAINS, cover="shortest")
+FEEDBACK_LOOP = problem(FEEDBACK, FEEDBACK_GAINS, sign_policy="shortest")
 STEADY_LOOP = problem(STEADY, STEADY_TORQUE)
 
 

@@ -22,8 +22,8 @@ from scipy.integrate import solve_ivp
 from common import header, interleaved, show
 from starhold.analysis.roots import Found, search
 from starhold.analysis.transient import Limits
-from starhold.report.modal_roots import pick_modal, problem_of
 from starhold.scenario.reading import load
+from starhold.studies.modal_roots import pick_modal, problem_of
 
 SCENARIO = load("landing-limits")
 TABLE: Any = SCENARIO.table.transient

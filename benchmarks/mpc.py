@@ -41,11 +41,11 @@ from starhold.algebra.structured import Buffer, repeat
 from starhold.algebra.vector import ZERO
 from starhold.laws import mpc
 from starhold.laws.catalogue import catalogue
-from starhold.laws.interface import Seen
+from starhold.laws.interface import Measurement
 from starhold.laws.predictive.motion import linearise, sample
 from starhold.laws.predictive.problem import carve, motion, weights
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.models.craft import Craft, make_craft
+from starhold.parts.craft import Craft, make_craft
 from starhold.simulation import lane
 from starhold.trace.calling import bind
 from starhold.trace.machine import aligned, load
@@ -83,10 +83,10 @@ def fly(gains: Any, craft: Craft, steps: int, start: Any = PUBLISHED) -> Any:
     return np.ascontiguousarray(np.vstack([record[19:23], record[23:26], body]).T)
 
 
-def seen_in(row: Any) -> Seen:
+def seen_in(row: Any) -> Measurement:
     """What the law sees in a row."""
     q, rate, position = tuple(row[:4]), tuple(row[4:7]), tuple(row[7:])
-    return Seen(q, rate, rate, ZERO, ZERO, ZERO, position, PERIOD)
+    return Measurement(q, rate, rate, ZERO, ZERO, ZERO, position, PERIOD)
 
 
 class OverRows:

@@ -25,7 +25,7 @@ from common import header, interleaved, show
 from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import Numbers, make_step, many
-from starhold.models.craft import make_craft
+from starhold.parts.craft import make_craft
 from starhold.trace.bounds import Work, work
 from starhold.trace.llvm import hexadecimal
 

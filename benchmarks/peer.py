@@ -30,7 +30,7 @@ def worker() -> None:
     from common import PUBLISHED, problem
     from starhold.algebra.structure import flatten
     from starhold.laws.catalogue import catalogue
-    from starhold.models.sensor import Noise
+    from starhold.parts.sensors.gaussian import Noise
     from starhold.simulation.lane import fly
     from starhold.simulation.lanes import simulate_many
 

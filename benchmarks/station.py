@@ -12,11 +12,11 @@ from scipy.integrate import solve_ivp
 from common import header, interleaved, show
 from starhold.algebra.structure import flatten
 from starhold.algebra.vector import ZERO
+from starhold.laws import l2_circle
 from starhold.laws.interface import NoMemory
-from starhold.laws.station import l2_circle
-from starhold.laws.station.interface import SeenPoint, station_laws
+from starhold.laws.point import PointMeasurement, station_laws
 from starhold.loop.station import StationLoop
-from starhold.models.libration import PRIMARIES, PointState, make_libration, nonlinear
+from starhold.parts.bodies.libration_point import PRIMARIES, PointState, make_libration, nonlinear
 from starhold.simulation.lane import fly
 from starhold.simulation.lanes import simulate_many
 
@@ -33,7 +33,7 @@ STARTS[1] += np.linspace(-0.1, 0.1, LANES)
 
 def control(x: Any) -> Any:
     """The law's control at a state."""
-    return l2_circle.control(SeenPoint(tuple(x[:3]), tuple(x[3:]), PERIOD, math.inf), GAINS, PLANT, NoMemory())[0]
+    return l2_circle.control(PointMeasurement(tuple(x[:3]), tuple(x[3:]), PERIOD, math.inf), GAINS, PLANT, NoMemory())[0]
 
 
 def held() -> Any:

@@ -32,9 +32,9 @@ from starhold.algebra.structure import flatten
 from starhold.algebra.vector import ZERO
 from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.models.craft import make_craft
-from starhold.models.rigid_body import State
-from starhold.models.sensor import Noise
+from starhold.parts.bodies.rigid_body import State
+from starhold.parts.craft import make_craft
+from starhold.parts.sensors.gaussian import Noise
 from starhold.simulation.lane import fly
 from starhold.simulation.lanes import simulate_many
 
@@ -181,10 +181,10 @@ def variants(loop: ClosedLoop) -> dict[str, ClosedLoop]:
     noise = Noise(1e-3, 1e-3, 1e-3)
     return {
         "plain": loop,
-        "hysteresis": replace(loop, cover="hysteresis"),
+        "hysteresis": replace(loop, sign_policy="hysteresis"),
         "full inertia": replace(loop, craft=FULL),
         "noise": replace(loop, noise=noise),
-        "all three": replace(loop, craft=FULL, cover="hysteresis", noise=noise),
+        "all three": replace(loop, craft=FULL, sign_policy="hysteresis", noise=noise),
     }
 
 

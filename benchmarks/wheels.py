@@ -12,8 +12,8 @@ import common
 import steps
 from common import header, interleaved, show
 from starhold.laws.catalogue import catalogue
-from starhold.models.wheeled_body import WheeledState
-from starhold.models.wheels import make_wheels, pyramid, three_orthogonal
+from starhold.parts.effectors.wheeled_body import WheeledState
+from starhold.parts.effectors.wheels import make_wheels, pyramid, three_orthogonal
 
 GOAL = 2.5
 """A loop with four wheels costs at most this many times the loop without."""

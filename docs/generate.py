@@ -18,10 +18,10 @@ from starhold.algebra import quaternion, scalar, several, structured
 from starhold.algebra import vector as vectors
 from starhold.algebra.quantity import quantities
 from starhold.laws.catalogue import Law, catalogue
-from starhold.laws.interface import Card, Gain, NoMemory, Seen, Start
-from starhold.laws.station.interface import SeenPoint, station_laws
-from starhold.models.craft import Craft, make_craft
-from starhold.models.libration import Libration
+from starhold.laws.interface import Card, Gain, Measurement, NoMemory, Start
+from starhold.laws.point import PointMeasurement, station_laws
+from starhold.parts.bodies.libration_point import Libration
+from starhold.parts.craft import Craft, make_craft
 
 CRAFT = make_craft([2.0, 3.0, 4.0])
 
@@ -35,7 +35,7 @@ def first_component(law: Law) -> str:
     """The first component of the torque at a target at rest, for a body with principal axes, as text."""
     q, w = sympy.symbols("q_0:4", real=True), vector("w")
     zero = (sympy.Integer(0),) * 3
-    seen = Seen(q, w, w, zero, zero, vector("M"), vector("R"), sympy.Symbol("T"))
+    measurement = Measurement(q, w, w, zero, zero, vector("M"), vector("R"), sympy.Symbol("T"))
     gains: list[Any] = []
     for item in law.fields():
         if item.gain.shape == (3, 3):
@@ -45,7 +45,7 @@ def first_component(law: Law) -> str:
             gains.append(vector(item.name) if item.gain.shape else sympy.Symbol(item.name, real=True))
     moments = vector("J")
     craft = Craft(moments, tuple(1 / m for m in moments), sympy.Symbol("u_max"), sympy.Symbol("mu"))
-    torque, _ = law.torque(seen, law.gains(*gains), craft, NoMemory())
+    torque, _ = law.torque(measurement, law.gains(*gains), craft, NoMemory())
     return str(sympy.simplify(torque[0]))
 
 
@@ -147,7 +147,7 @@ def _start_table() -> str:
 
 TABLES = {
     "card": lambda: attributes_table(Card),
-    "seen": lambda: fields_table(Seen),
+    "measurement": lambda: fields_table(Measurement),
     "craft": lambda: fields_table(Craft),
     "scalar": lambda: functions_table(scalar),
     "vector": lambda: functions_table(vectors),
@@ -156,7 +156,7 @@ TABLES = {
     "several": lambda: functions_table(several),
     "gain": lambda: attributes_table(Gain),
     "start": _start_table,
-    "seen point": lambda: fields_table(SeenPoint),
+    "measurement point": lambda: fields_table(PointMeasurement),
     "plant": lambda: fields_table(Libration),
 }
 MARK = re.compile(r"(<!-- written by docs/generate.py: (.*?) -->\n).*?(<!-- end -->)", re.DOTALL)

@@ -11,7 +11,7 @@ CARD = Card(
     sources=("textbook",),
     assumptions=("rigid body",),
     claims="none",
-    double_cover="even",
+    quaternion_sign="even",
 )
 
 

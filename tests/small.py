@@ -13,6 +13,6 @@ duration = 5.0
 control_period = 0.1
 """
 PD = '[[law]]\ntype = "pd"\nk_rate = 0.09\nk_attitude = 0.009\n'
-WEAK = '[[law]]\ntype = "sliding"\nname = "weak"\nslope = 0.08\nreach = 1e-6\n'
+WEAK = '[[law]]\ntype = "sliding"\nname = "weak"\nsurface_gain = 0.08\nswitching_gain = 1e-6\n'
 """A switching torque below what it must stand."""
 MPC = '[[law]]\ntype = "mpc"\nq_attitude = 0.2\nq_rate = 0.2\nr = 50\n'

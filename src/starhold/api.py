@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from starhold.laws.pole_placement import place as place
-from starhold.report.kinds import kind_module, kind_of
 from starhold.scenario import designing, opening, reading
 from starhold.scenario.making import make_scenario as make_scenario
 from starhold.simulation.lane import Recording
+from starhold.studies.kinds import kind_module, kind_of
+from starhold.synthesis.pole_placement import place as place
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
     from starhold.certification.certificate import Certificate
     from starhold.certification.invariant import Problem
-    from starhold.report.failures import Failure
-    from starhold.report.flight import Flight
-    from starhold.report.modal_roots import Study
+    from starhold.studies.failures import Failure
+    from starhold.studies.flight import Flight
+    from starhold.studies.modal_roots import Study
 
 
 def load(source: str | Path, allow_unstable: bool = False) -> opening.AnyScenario:
@@ -69,7 +69,7 @@ def sweep(
     nothing is certified. Runs that differ only in numbers fly side by side on the lanes of a vector. InputError before the
     first flight where one of the scenarios cannot be.
     """
-    from starhold.report.sweeping import sweep as fly_sweep
+    from starhold.studies.sweep import sweep as fly_sweep
 
     return fly_sweep(_opened(scenario), changes, law, threads, progress)
 
@@ -77,7 +77,7 @@ def sweep(
 def to_pandas(results: Any) -> DataFrame:
     """Results as a tidy table: a run with a row a sample and a column a component (`rate_x`), flights with a row a law,
     certificates with a row a claim, designs with a row a law. TypeError for anything else."""
-    from starhold.report.frames import to_pandas as table_of
+    from starhold.studies.frames import to_pandas as table_of
 
     return table_of(results)
 
@@ -104,7 +104,7 @@ def compare(scenario: opening.AnyScenario | str | Path) -> list[Flight]:
 
 def failures(scenario: opening.AnyScenario | str | Path, law: str | None = None) -> list[Failure]:
     """What is left of a scenario on wheels after the loss of any one or two of them, under a law, the first if not given."""
-    from starhold.report.failures import study
+    from starhold.studies.failures import study
 
     opened = _turning(scenario)
     return study(opened, opened.laws[0] if law is None else opened.pick(law))
@@ -112,7 +112,7 @@ def failures(scenario: opening.AnyScenario | str | Path, law: str | None = None)
 
 def modal_roots(scenario: opening.AnyScenario | str | Path, law: str | None = None) -> Study:
     """The roots of the modal law that turn fastest within the limits of a scenario's [transient] table, and the fit."""
-    from starhold.report.modal_roots import pick_modal, study
+    from starhold.studies.modal_roots import pick_modal, study
 
     opened = _turning(scenario)
     return study(opened, pick_modal(opened, law))

@@ -23,6 +23,7 @@ from starhold.algebra.vector import (
     determinant,
     diagonal,
     dot,
+    gyroscopic_torque,
     inverse,
     multiply,
     norm,
@@ -31,7 +32,6 @@ from starhold.algebra.vector import (
     skew,
     solve,
     subtract,
-    swing,
     times,
     transpose,
     unit,
@@ -52,7 +52,7 @@ def zero(expression):
 @settings(max_examples=40)
 @given(vectors, vectors, numbers, positives)
 def test_every_reader_gives_the_same_for_vectors(a, b, c, limit):
-    for operation in (add, subtract, times, dot, cross, swing, apply):
+    for operation in (add, subtract, times, dot, cross, gyroscopic_torque, apply):
         agree(operation, a, b)
     for operation in (norm, signs, skew, diagonal):
         agree(operation, a)
@@ -66,7 +66,7 @@ def test_every_reader_gives_the_same_for_vectors(a, b, c, limit):
 @settings(max_examples=25)
 @given(matrices, matrices, vectors, numbers, numbers)
 def test_every_reader_gives_the_same_for_matrices(m, n, a, c, d):
-    for operation in (apply, swing, column):
+    for operation in (apply, gyroscopic_torque, column):
         agree(operation, m, a)
     for operation in (transpose, determinant):
         agree(operation, m)
@@ -78,11 +78,11 @@ def test_every_reader_gives_the_same_for_matrices(m, n, a, c, d):
 @given(st.lists(st.floats(), min_size=22, max_size=22))
 def test_compiled_equals_floats_for_any_float(x):
     a, b, c, m = tuple(x[:3]), tuple(x[3:6]), x[21], (tuple(x[6:9]), tuple(x[9:12]), tuple(x[12:15]))
-    for operation in (add, subtract, times, dot, cross, swing, apply):
+    for operation in (add, subtract, times, dot, cross, gyroscopic_torque, apply):
         same(operation, a, b)
     for operation in (norm, signs, skew, diagonal):
         same(operation, a)
-    for operation in (apply, swing, column):
+    for operation in (apply, gyroscopic_torque, column):
         same(operation, m, a)
     same(scale, c, a)
     same(clip_axes, a, c)
@@ -127,20 +127,20 @@ def test_inverse_of_floats(m, size):
 
 
 def test_swing_is_the_gyroscopic_torque():
-    assert zero(subtract(swing(SYMMETRIC, A), cross(A, apply(SYMMETRIC, A))))
-    assert zero(subtract(swing(B, A), cross(A, apply(B, A))))
-    assert zero(subtract(swing(diagonal(B), A), swing(B, A)))
+    assert zero(subtract(gyroscopic_torque(SYMMETRIC, A), cross(A, apply(SYMMETRIC, A))))
+    assert zero(subtract(gyroscopic_torque(B, A), cross(A, apply(B, A))))
+    assert zero(subtract(gyroscopic_torque(diagonal(B), A), gyroscopic_torque(B, A)))
     # It does no work and turns no momentum into length.
-    assert zero((dot(A, swing(SYMMETRIC, A)), dot(apply(SYMMETRIC, A), swing(SYMMETRIC, A))))
-    assert zero((dot(A, swing(B, A)), dot(apply(B, A), swing(B, A))))
+    assert zero((dot(A, gyroscopic_torque(SYMMETRIC, A)), dot(apply(SYMMETRIC, A), gyroscopic_torque(SYMMETRIC, A))))
+    assert zero((dot(A, gyroscopic_torque(B, A)), dot(apply(B, A), gyroscopic_torque(B, A))))
 
 
 @pytest.mark.parametrize("axis", range(3))
 def test_swing_vanishes_exactly_along_a_principal_axis(axis):
     moments = (2.1, 3.3, 4.7)
     rate = tuple(0.7 * (i == axis) for i in range(3))
-    assert same(swing, moments, rate) == ZERO
-    assert same(swing, diagonal(moments), rate) == ZERO
+    assert same(gyroscopic_torque, moments, rate) == ZERO
+    assert same(gyroscopic_torque, diagonal(moments), rate) == ZERO
 
 
 @given(vectors, positives)
@@ -181,7 +181,7 @@ def test_lengths(a):
 
 def test_a_matrix_is_told_from_a_diagonal_in_every_reader():
     moments, rate = (2.0, 3.0, 4.0), (0.1, -0.2, 0.3)
-    for operation in (vector.apply, vector.swing):
+    for operation in (vector.apply, vector.gyroscopic_torque):
         full, short = agree(operation, diagonal(moments), rate), agree(operation, moments, rate)
         assert close(full, short, 1e-16)
 

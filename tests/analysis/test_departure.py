@@ -15,19 +15,19 @@ from starhold.algebra.scalar import side
 from starhold.analysis.departure import LOST, MET, departures, fed_back
 from starhold.certification.certificate import BESIDE, Certificate, Claim, Obligation, write
 from starhold.certification.certify import certify
-from starhold.certification.checker import check_file, passed
-from starhold.certification.checker.check import ENDS
-from starhold.certification.checker.claims import CLAIMS
 from starhold.certification.wording import HEADINGS, sentence
-from starhold.laws.double_cover import COVERS
-from starhold.report.certificates import certify_scenario, start_inside
-from starhold.report.compare import fly_law, prove
-from starhold.report.kinds import kind_of
+from starhold.checker import check_file, passed
+from starhold.checker.check import ENDS
+from starhold.checker.claims import CLAIMS
+from starhold.parts.quaternion_sign import SIGN_POLICIES
 from starhold.report.proved import section
 from starhold.scenario.building import build
 from starhold.scenario.opening import open_scenario
 from starhold.scenario.reading import builtin_text, parse
 from starhold.simulation.lane import Recording, fly, label
+from starhold.studies.certificates import certify_scenario, start_inside
+from starhold.studies.compare import fly_law, prove
+from starhold.studies.kinds import kind_of
 
 BASE = builtin_text("three-laws").split("[[law]]")[0].replace("duration = 2000.0", "duration = 60.0")
 LAW = '\n[[law]]\ntype = "lyapunov"\nk_rate = 0.09\nk_attitude = 0.009\n'
@@ -191,11 +191,11 @@ def test_a_fault_ends_the_claims_of_the_first_certificate():
 @settings(deadline=None, max_examples=60)
 def test_the_quaternion_that_is_fed_back_is_that_of_the_loop(cosines, width):
     scenario = parse(BASE + LAW, "here")
-    loop = replace(build(scenario, scenario.laws[0]), cover="hysteresis", hysteresis_width=width)
+    loop = replace(build(scenario, scenario.laws[0]), sign_policy="hysteresis", hysteresis_width=width)
     errors = np.array([(q0, np.sqrt(max(0.0, 1.0 - q0 * q0)), 0.0, 0.0) for q0 in cosines])
     h, expected = side(cosines[0]), []
     for error in errors:
-        shown, h = COVERS["hysteresis"](tuple(error), h, loop.hysteresis_width)
+        shown, h = SIGN_POLICIES["hysteresis"](tuple(error), h, loop.hysteresis_width)
         expected.append(shown)
     assert np.array_equal(fed_back(loop, errors), np.array(expected))
 

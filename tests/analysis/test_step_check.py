@@ -7,8 +7,8 @@ import pytest
 
 from starhold.algebra.quaternion import multiply
 from starhold.analysis.step_check import halved, step_error
-from starhold.report.kinds import kind_of
 from starhold.scenario.opening import open_scenario
+from starhold.studies.kinds import kind_of
 
 
 def recordings(name, count=3):

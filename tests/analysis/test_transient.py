@@ -14,8 +14,8 @@ from starhold.analysis.roots import Problem
 from starhold.analysis.transient import Limits, Transient, Watcher, of_run
 from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.models.craft import make_craft
-from starhold.models.rigid_body import State
+from starhold.parts.bodies.rigid_body import State
+from starhold.parts.craft import make_craft
 from starhold.simulation.lane import Recording, fly, label
 
 LAW = catalogue()["modal"]

@@ -116,7 +116,7 @@ def test_station_keeping_is_made_and_changed_alike():
         "libration": {},
         "initial": {"position": [0, 0.5, 0.1]},
         "simulation": {"duration": 1.0},
-        "law": [{"type": "l2-rest", "form": "degree"}],
+        "law": [{"type": "l2-equilibrium", "form": "degree"}],
     }
     made = sh.scenario(tables).with_({"libration.point": "L1", "control.limit": 4.0})
     assert made.laws[0].limit == 4.0

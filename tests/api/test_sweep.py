@@ -10,9 +10,9 @@ import xarray as xr
 
 import starhold as sh
 from starhold.algebra.structure import flatten
-from starhold.report.kinds import kind_of
 from starhold.simulation.abreast import Flying, fly_abreast
 from starhold.simulation.lane import fly
+from starhold.studies.kinds import kind_of
 
 SHORT = {"simulation.duration": 20.0, "simulation.record_every": 3}
 THREE = sh.load("three-laws").with_(SHORT)
@@ -126,10 +126,12 @@ def test_flights_abreast_have_the_samples_of_single_ones_lost_ones_included():
 
 
 def test_pairs_are_flown_as_they_are_given_and_names_pick_the_laws():
-    table = sh.sweep(THREE, [{"law.sliding.slope": 0.08, "law.sliding.reach": 0.005}, {"law.sliding.slope": 0.1}])
+    table = sh.sweep(
+        THREE, [{"law.sliding.surface_gain": 0.08, "law.sliding.switching_gain": 0.005}, {"law.sliding.surface_gain": 0.1}]
+    )
     assert table["law"].tolist() == ["sliding"] * 2
-    assert np.isnan(table["law.sliding.reach"][1])
-    both = sh.sweep(THREE, {"law.sliding.slope": [0.08, 0.1], "law.lyapunov.k_rate": [0.1]})
+    assert np.isnan(table["law.sliding.switching_gain"][1])
+    both = sh.sweep(THREE, {"law.sliding.surface_gain": [0.08, 0.1], "law.lyapunov.k_rate": [0.1]})
     assert sorted(both["law"]) == ["lyapunov", "lyapunov", "sliding", "sliding"]
     assert len(sh.sweep(THREE, {"simulation.seed": [1]})) == 3
 

@@ -9,13 +9,13 @@ import numpy as np
 
 from starhold.analysis.trial import fly_claims
 from starhold.certification.certificate import write
-from starhold.certification.checker import check_file, passed
 from starhold.certification.wording import evidence, sentence
+from starhold.checker import check_file, passed
 from starhold.errors import InputError
-from starhold.models.craft import check_inertia
-from starhold.report.certificates import certify_law, start_inside
+from starhold.parts.craft import check_inertia
 from starhold.scenario.building import build
 from starhold.scenario.opening import open_scenario
+from starhold.studies.certificates import certify_law, start_inside
 
 EARTH, RADIUS = 3.986e14, 6.4e6
 
@@ -72,7 +72,7 @@ def random_scenario(random, folder):
     lines += ["[simulation]", f"duration = {steps * period!r}", f"control_period = {period!r}"]
     lines.append("[certify]")
     lines += [some('rate = "any"', f"rate = {size(1e-6, 1.0)}")] if maybe(0.3) else []
-    lines += [f"turn = {some(size(1e-9, 1e-2), random.uniform(0.01, math.pi), math.pi)!r}"] if maybe(0.4) else []
+    lines += [f"slew_angle = {some(size(1e-9, 1e-2), random.uniform(0.01, math.pi), math.pi)!r}"] if maybe(0.4) else []
     lines += [f"inertia_tolerance = {some(size(1e-6, 1.0), 1.0)}"] if maybe(0.3) else []
     lines += [f"disturbance = {size(1e-8, 1e-3) * scale:.6g}"] if maybe(0.4) else []
     lines += [f"momentum = {some(0.0, size(1e-4, 1.0) * scale):.6g}"] if maybe(0.2) else []
@@ -138,7 +138,7 @@ def random_law(random, some, size, numbers, J, scale):
 
     kind = some("pd", "lyapunov", "matrix-pd", "lqr", "lqr-form", "sliding", "modal", "wheel", "wheel")
     name = kind.removesuffix("-form")
-    lines = ["[[law]]", f'type = "{name}"', f'double_cover = "{some("as_published", "shortest", "hysteresis")}"']
+    lines = ["[[law]]", f'type = "{name}"', f'quaternion_sign = "{some("as_published", "shortest", "hysteresis")}"']
     if random.uniform() < 0.3:
         lines.append(f"hysteresis_width = {random.uniform(0.01, 0.99):.4g}")
     if kind in ("pd", "lyapunov"):
@@ -152,8 +152,8 @@ def random_law(random, some, size, numbers, J, scale):
         lines += ['form = "I"', f"a = {size(1e-3, 10.0)}", f"b = {w * w:.6g}", f"gyroscopic = {some(0.0, 1.0)}"]
     elif kind == "sliding":
         slope = some(f"{w:.6g}", matrix(w))
-        lines += [f"slope = {slope}", f"reach = {size(1e-6, 1e-2) * scale:.6g}"]
-        lines += [f"layer = {some(0.0, size(1e-6, 1.0)):.6g}"]
+        lines += [f"surface_gain = {slope}", f"switching_gain = {size(1e-6, 1e-2) * scale:.6g}"]
+        lines += [f"boundary_layer = {some(0.0, size(1e-6, 1.0)):.6g}"]
     elif kind == "modal":
         b = f"b = {-size(1e-4, 10.0)}"
         lines += some([f"phi_0 = {-w:.6g}", f"phi_1 = {-w:.6g}", b], ['form = "equal"', f"a = {-w:.6g}", b])

@@ -10,9 +10,9 @@ from starhold.conformance.bench import sample_loop
 from starhold.laws import lqr, matrix_pd
 from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import fields
-from starhold.models.craft import make_craft, tensor
-from starhold.models.wheeled_body import WheeledState
-from starhold.models.wheels import body_inertia, make_wheels, pyramid
+from starhold.parts.craft import make_craft, tensor
+from starhold.parts.effectors.wheeled_body import WheeledState
+from starhold.parts.effectors.wheels import body_inertia, make_wheels, pyramid
 
 FULL = make_craft([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]], torque_limit=0.05)
 PRINCIPAL = make_craft([2.0, 3.0, 4.0], torque_limit=0.05)

@@ -13,16 +13,16 @@ from starhold.algebra.polynomial import exact
 from starhold.analysis.trial import draw, fly_claims
 from starhold.certification.certificate import write
 from starhold.certification.certify import Wanted, certify
-from starhold.certification.checker import check_file, passed
-from starhold.certification.checker import exact as checking
 from starhold.certification.matrices import definite, identity, least, plus, rows
 from starhold.certification.motion import Motion, cases
 from starhold.certification.potential import Cosines, Spring
 from starhold.certification.refutation import rising_state
 from starhold.certification.subject import make_subject
+from starhold.checker import check_file, passed
+from starhold.checker import exact as checking
 from starhold.laws import pd, wheel
 from starhold.laws.catalogue import catalogue
-from starhold.models.craft import make_craft
+from starhold.parts.craft import make_craft
 from tests.certification.hunt import fault_in, random_scenario
 from tests.certification.loops import free, loop_of, rotors
 
@@ -79,10 +79,10 @@ def test_a_law_may_cancel_a_part_of_the_modelled_torque(compensation, wheels, tm
 
 
 @pytest.mark.parametrize("law", ["pd", "wheel"])
-@pytest.mark.parametrize("turn", [1e-100, 1e-12, 1e-8, 1e-4, 0.02, 1.0])
+@pytest.mark.parametrize("slew_angle", [1e-100, 1e-12, 1e-8, 1e-4, 0.02, 1.0])
 def test_the_set_of_a_turn_holds_it(law, turn, tmp_path):
     gains = {"pd": pd.Gains(0.09, 0.009), "wheel": wheel.Gains(0.09, (0.0045,) * 3)}[law]
-    certificate = certify(free(loop_of(law, gains)), law, Wanted(turn=turn))
+    certificate = certify(free(loop_of(law, gains)), law, Wanted(slew_angle=turn))
     claim = certificate.claim("torque-limit")
     assert claim.outcome == "proved"
     size = 0.018 * 2 * (arb(turn) / 4).sin() ** 2 if law == "pd" else 0.018 * (arb(turn) / 2).sin() ** 2

@@ -17,8 +17,8 @@ from starhold.certification.matrices import floats, number
 from starhold.certification.motion import Motion
 from starhold.certification.potential import Spring
 from starhold.certification.subject import make_subject
-from starhold.laws.interface import NoMemory, Seen
-from starhold.models.rigid_body import angular_acceleration
+from starhold.laws.interface import Measurement, NoMemory
+from starhold.parts.bodies.rigid_body import angular_acceleration
 from starhold.trace.calling import Compiled
 from tests.certification.loops import textbook
 
@@ -33,8 +33,8 @@ def motion_of(name):
     loop = LOOPS[name]
 
     def motion(q, w, push):
-        seen = Seen(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.1, ZERO)
-        u, _ = loop.law.torque(seen, loop.gains, loop.craft, NoMemory())
+        measurement = Measurement(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.1, ZERO)
+        u, _ = loop.law.torque(measurement, loop.gains, loop.craft, NoMemory())
         return derivative(q, w), angular_acceleration(w, add(u, push), loop.craft), u
 
     return Compiled(motion, NO_TURN, ZERO, ZERO)
@@ -178,14 +178,14 @@ def test_no_proved_surface_breaks(name):
     assert claim.outcome == "proved"
     random = np.random.default_rng(12)
     J = np.array(loop.craft.inertia)
-    K = np.diag(loop.gains.slope) if np.ndim(loop.gains.slope) == 1 else np.array(loop.gains.slope)
+    K = np.diag(loop.gains.surface_gain) if np.ndim(loop.gains.surface_gain) == 1 else np.array(loop.gains.surface_gain)
     states = draw(STATES, J, Spring(0.05), 0.5, random)
     states[4:7] *= 10.0 ** random.uniform(-6, 0, size=states.shape[1])
     s = states[4:7] + K @ states[1:4]
     push = np.array(claim.numbers["torque"])[:, None] * np.sign(s)
     rates = moved(loop, states, push)
     slope = np.einsum("ik,ij,jk->k", s, J, rates[4:7] + K @ rates[1:4])
-    outside = (np.abs(s) > loop.gains.layer).all(axis=0)
+    outside = (np.abs(s) > loop.gains.boundary_layer).all(axis=0)
     assert outside.sum() > STATES // 4
     promised = -np.abs(s).sum(axis=0) * claim.numbers["margin"]
     assert (slope[outside] <= promised[outside] + 1e-12).all()

@@ -8,8 +8,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as some
 
 from starhold.algebra.polynomial import Polynomial
-from starhold.certification.checker import bernstein as bounds
-from starhold.certification.checker.exact import rational
+from starhold.checker import bernstein as bounds
+from starhold.checker.exact import rational
 
 UNIT = some.floats(-1.0, 1.0)
 POLYNOMIALS = some.dictionaries(

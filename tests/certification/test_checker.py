@@ -14,14 +14,14 @@ from flint import fmpq
 from hypothesis import assume, given, settings
 from hypothesis import strategies as some
 
-import starhold.certification.checker as checker
+import starhold.checker as checker
 from starhold.certification.certificate import write
 from starhold.certification.certify import Wanted, certify
-from starhold.certification.checker import check, check_file, passed
-from starhold.certification.checker import exact as checking
-from starhold.certification.checker.reading import in_time, limited
-from starhold.certification.checker.subject import variables
-from starhold.certification.checker.torque import SHAPES, keeps_below
+from starhold.checker import check, check_file, passed
+from starhold.checker import exact as checking
+from starhold.checker.reading import in_time, limited
+from starhold.checker.subject import variables
+from starhold.checker.torque import SHAPES, keeps_below
 from starhold.errors import InputError
 from starhold.laws import pd
 from starhold.laws.sliding import Gains as Sliding
@@ -43,7 +43,7 @@ TEXTBOOK = (
 @cache
 def _made(name, cover, disturbance, tmp):
     loop = LOOPS[name]
-    loop = loop_of(loop.law.name, loop.gains, loop.craft, cover=cover)
+    loop = loop_of(loop.law.name, loop.gains, loop.craft, sign_policy=cover)
     path = Path(tmp) / f"{name}-{cover}-{disturbance}.json"
     write([certify(loop, name, Wanted(disturbance=disturbance))], "made", path)
     return path.read_text(encoding="utf-8")
@@ -52,7 +52,9 @@ def _made(name, cover, disturbance, tmp):
 @pytest.fixture(scope="session")
 def made(tmp_path_factory):
     folder = str(tmp_path_factory.mktemp("certificates"))
-    return lambda name, cover="as_published", disturbance=0.0: json.loads(_made(name, cover, disturbance, folder))
+    return lambda name, sign_policy="as_published", disturbance=0.0: json.loads(
+        _made(name, sign_policy, disturbance, folder)
+    )
 
 
 def claims_of(content):
@@ -85,7 +87,7 @@ def by_hand(law, gains, claims, **changes):
     subject = {
         "law": law,
         "gains": gains,
-        "double_cover": "as_published",
+        "quaternion_sign": "as_published",
         "hysteresis_width": 0.5,
         "inertia": [[2.0, 0.1, 0.0], [0.1, 3.0, -0.25], [0.0, -0.25, 4.0]],
         "limit": "axis",
@@ -126,7 +128,7 @@ def converging(last="other rest repels", middle="only rest", **changes):
     numbers = {
         "level": None,
         "start": None,
-        "turn": 2.0 * math.pi,
+        "slew_angle": 2.0 * math.pi,
         "rate": None,
         "rate_everywhere": None,
         "everything": True,
@@ -164,7 +166,7 @@ def test_what_the_certifier_proves_holds(made, name, cover):
 @pytest.mark.parametrize(("target", "limit"), [("orbital", "axis"), ("orbital", "norm"), ((1.0, 0.0, 0.0, 0.0), "norm")])
 def test_moving_targets_and_limits_of_the_norm(tmp_path, cover, target, limit):
     chosen = [LOOPS[name] for name in ("pd-0", "pd-2", "lyapunov-0", "lqr-I", "sliding-1")]
-    loops = [loop_of(o.law.name, o.gains, o.craft, cover=cover, target=target, limit=limit) for o in chosen]
+    loops = [loop_of(o.law.name, o.gains, o.craft, sign_policy=cover, target=target, limit=limit) for o in chosen]
     write([certify(loop) for loop in loops], "made", tmp_path / "c.json")
     found = check_file(tmp_path / "c.json")
     assert passed(found), [f for f in found if f.verdict == "fails"]
@@ -177,18 +179,18 @@ def test_a_certificate_written_by_hand(inertia):
     assert passed(check(by_hand("pd", PD, [converging()], **changes)))
     assert passed(check(by_hand("lyapunov", {"k_rate": 0.09, "k_attitude": 0.009}, [converging()], **changes)))
     jumping = converging("jumps lower V")
-    assert passed(check(by_hand("pd", PD, [jumping], double_cover="hysteresis", **changes)))
-    low = {"level": 0.017, "start": 0.017, "everything": False, "turn": 2.9, "rate": 0.05}
+    assert passed(check(by_hand("pd", PD, [jumping], quaternion_sign="hysteresis", **changes)))
+    low = {"level": 0.017, "start": 0.017, "everything": False, "slew_angle": 2.9, "rate": 0.05}
     shorter = converging("single rest in the set", **low)
-    assert passed(check(by_hand("pd", PD, [shorter], double_cover="shortest", **changes)))
+    assert passed(check(by_hand("pd", PD, [shorter], quaternion_sign="shortest", **changes)))
 
 
 def test_false_claims_written_by_hand():
     everything = converging()
     # The feedback switches at q0 = 0, which V = s bounds.
-    assert reasons(by_hand("pd", PD, [converging("single rest in the set")], double_cover="shortest"))
-    wide = {"level": 0.019, "start": 0.019, "everything": False, "turn": 2.9, "rate": 0.05}
-    assert reasons(by_hand("pd", PD, [converging("single rest in the set", **wide)], double_cover="shortest"))
+    assert reasons(by_hand("pd", PD, [converging("single rest in the set")], quaternion_sign="shortest"))
+    wide = {"level": 0.019, "start": 0.019, "everything": False, "slew_angle": 2.9, "rate": 0.05}
+    assert reasons(by_hand("pd", PD, [converging("single rest in the set", **wide)], quaternion_sign="shortest"))
     # Unequal stiffness and gyroscopic torque leave a cubic term in V'.
     assert reasons(by_hand("lqr", SPUN, [everything]))
     assert reasons(by_hand("matrix-pd", {k: SPUN[k] for k in ("k_rate", "k_attitude")}, [everything]))
@@ -222,26 +224,26 @@ def test_a_clipped_damping_must_leave_the_stiffness_its_torque():
 # --- every number in the stronger direction ---------------------------------------------------------------------------
 
 STRONGER = [
-    ("lqr-II-uneven", "hysteresis", "convergence", ("level", "start", "turn"), UP),
-    ("lqr-I", "shortest", "convergence", ("level", "start", "turn", "rate"), UP),
-    ("pd-0", "shortest", "convergence", ("level", "start", "turn", "rate"), UP),
+    ("lqr-II-uneven", "hysteresis", "convergence", ("level", "start", "slew_angle"), UP),
+    ("lqr-I", "shortest", "convergence", ("level", "start", "slew_angle", "rate"), UP),
+    ("pd-0", "shortest", "convergence", ("level", "start", "slew_angle", "rate"), UP),
     ("lqr-I", "hysteresis", "convergence", ("level", "start", "rate", "rate_everywhere"), UP),
-    ("lqr-I", "as_published", "torque-limit", ("level", "start", "turn", "rate", "limit"), UP),
-    ("pd-0", "as_published", "torque-limit", ("level", "start", "turn", "rate", "limit"), UP),
+    ("lqr-I", "as_published", "torque-limit", ("level", "start", "slew_angle", "rate", "limit"), UP),
+    ("pd-0", "as_published", "torque-limit", ("level", "start", "slew_angle", "rate", "limit"), UP),
     ("pd-2", "as_published", "torque-limit", ("limit",), DOWN),
-    ("lqr-III", "as_published", "disturbance", ("torque", "level", "start", "turn", "rate_start"), UP),
+    ("lqr-III", "as_published", "disturbance", ("torque", "level", "start", "slew_angle", "rate_start"), UP),
     ("lqr-III", "as_published", "disturbance", ("torque", "angle", "rate"), DOWN),
-    ("pd-0", "hysteresis", "disturbance", ("torque", "level", "start", "turn", "rate_start", "rate_everywhere"), UP),
-    ("pd-2", "shortest", "disturbance", ("torque", "level", "start", "turn", "rate_start"), UP),
+    ("pd-0", "hysteresis", "disturbance", ("torque", "level", "start", "slew_angle", "rate_start", "rate_everywhere"), UP),
+    ("pd-2", "shortest", "disturbance", ("torque", "level", "start", "slew_angle", "rate_start"), UP),
     ("lqr-I", "hysteresis", "inertia", ("start",), UP),
-    ("lqr-I", "shortest", "inertia", ("start", "turn"), UP),
+    ("lqr-I", "shortest", "inertia", ("start", "slew_angle"), UP),
     ("lqr-I", "shortest", "inertia", ("rate",), 1.5),
     ("lqr-I", "as_published", "sampling", ("period", "longest"), UP),
     ("lqr-I", "as_published", "sampling", ("period", "radius"), DOWN),
     ("sliding-1", "as_published", "sliding", ("margin",), UP),
     ("sliding-1", "as_published", "sliding", ("surface", "angle", "rate"), DOWN),
-    ("sliding-1", "shortest", "sliding", ("margin", "start", "turn", "rate_start"), UP),
-    ("sliding-0", "hysteresis", "sliding", ("margin", "start", "turn", "rate_start"), UP),
+    ("sliding-1", "shortest", "sliding", ("margin", "start", "slew_angle", "rate_start"), UP),
+    ("sliding-0", "hysteresis", "sliding", ("margin", "start", "slew_angle", "rate_start"), UP),
 ]
 
 
@@ -253,7 +255,7 @@ def test_a_number_that_says_more_fails(made, name, cover, kind, keys, factor):
         changed = copy.deepcopy(alone(content, kind))
         numbers = claims_of(changed)[kind]["numbers"]
         assert numbers[key] is not None, key
-        numbers[key] = min(numbers[key] * factor, 2.0 * math.pi * UP) if key == "turn" else numbers[key] * factor
+        numbers[key] = min(numbers[key] * factor, 2.0 * math.pi * UP) if key == "slew_angle" else numbers[key] * factor
         assert not passed(check(changed)), key
 
 
@@ -335,7 +337,7 @@ def test_other_gains_or_another_inertia_fail(made, name):
         return [turned(v) for v in value] if isinstance(value, list) else -value
 
     for gain, value in subject["gains"].items():
-        if not isinstance(value, str) and np.any(value) and gain != "layer":
+        if not isinstance(value, str) and np.any(value) and gain != "boundary_layer":
             assert not passed(check(edited(content, ("", "gains", gain), turned(value)))), gain
     if "sampling" in claims_of(content):
         inertia = (np.array(subject["inertia"]) * 1.05).tolist()
@@ -587,7 +589,7 @@ def test_what_is_refuted_or_undecided_is_not_claimed(tmp_path):
     refuted = loop_of("sliding", Sliding((0.08, 0.08, 0.08), (1e-7, 5e-3, 5e-3), 0.0))
     design = loop_of("lqr", LOOPS["lqr-I"].law.design(PRINCIPAL, LOPSIDED), PRINCIPAL)
     slow = loop_of("pd", LOOPS["pd-0"].gains, FULL, period=1e3)
-    for loop, wanted in ((refuted, Wanted()), (design, Wanted(rate=math.inf)), (slow, Wanted(turn=3.0))):
+    for loop, wanted in ((refuted, Wanted()), (design, Wanted(rate=math.inf)), (slow, Wanted(slew_angle=3.0))):
         certificate = certify(loop, "one", wanted)
         assert certificate.outcome != "proved"
         write([certificate], "made", tmp_path / "c.json")
@@ -705,7 +707,7 @@ def test_the_checker_imports_nothing_of_the_certifier():
     own = list(folder.glob("*.py"))
     assert len(own) >= 9
     above = (
-        "starhold.certification.checker.",
+        "starhold.checker.",
         "starhold.algebra.",
         "starhold.models.",
         "starhold.laws.",

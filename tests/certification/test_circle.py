@@ -9,10 +9,10 @@ import pytest
 
 from starhold.algebra.vector import ZERO
 from starhold.certification.station import certify_station
-from starhold.laws.station import l2_circle
-from starhold.laws.station.interface import SeenPoint, station_laws
+from starhold.laws import l2_circle
+from starhold.laws.point import PointMeasurement, station_laws
 from starhold.loop.station import StationLoop
-from starhold.models.libration import PRIMARIES, PointState, linear, make_libration
+from starhold.parts.bodies.libration_point import PRIMARIES, PointState, linear, make_libration
 from starhold.simulation.lanes import simulate_many
 
 EARTH = PRIMARIES["sun-earth"]
@@ -45,7 +45,7 @@ def drawn(gains, level, count, random):
 
 
 def seen_at(position, velocity):
-    return SeenPoint(tuple(position.tolist()), tuple(velocity.tolist()), 1e-3, math.inf)
+    return PointMeasurement(tuple(position.tolist()), tuple(velocity.tolist()), 1e-3, math.inf)
 
 
 def test_nominal_demand_is_the_largest_on_the_circle():
@@ -56,8 +56,8 @@ def test_nominal_demand_is_the_largest_on_the_circle():
     norms = []
     for phase in np.linspace(0.0, 2.0 * np.pi, 721):
         y, z = math.cos(phase), math.sin(phase)
-        seen = SeenPoint((0.0, y, z), (0.0, -BEST.rate * z, BEST.rate * y), 1e-3, math.inf)
-        norms.append(np.linalg.norm(l2_circle.feedback(seen, BEST, PLANT)))
+        measurement = PointMeasurement((0.0, y, z), (0.0, -BEST.rate * z, BEST.rate * y), 1e-3, math.inf)
+        norms.append(np.linalg.norm(l2_circle.feedback(measurement, BEST, PLANT)))
     assert max(norms) == pytest.approx(PEAK, rel=1e-9)
 
 
@@ -70,8 +70,10 @@ def test_attracts_up_to_the_centre(gains):
     # V falls at random states by the model's and the law's own equations.
     random = np.random.default_rng(3)
     for position, velocity in zip(*(x.T for x in drawn(gains, claim.numbers["level"], 300, random)), strict=True):
-        seen = seen_at(position, velocity)
-        acceleration = np.add(linear(seen.position, seen.velocity, PLANT), l2_circle.feedback(seen, gains, PLANT))
+        measurement = seen_at(position, velocity)
+        acceleration = np.add(
+            linear(measurement.position, measurement.velocity, PLANT), l2_circle.feedback(measurement, gains, PLANT)
+        )
         step = 1e-5
         before, after = (
             l2_circle.lyapunov(seen_at(position + h * velocity, velocity + h * acceleration), gains, PLANT)

@@ -15,9 +15,9 @@ from starhold.certification.motion import Motion
 from starhold.certification.potential import Spring
 from starhold.certification.subject import make_subject
 from starhold.laws import lqr, matrix_pd, pd, sliding
-from starhold.laws.interface import NoMemory, Seen
-from starhold.models.craft import make_craft
-from starhold.models.environment import two_body_gravity_gradient
+from starhold.laws.interface import Measurement, NoMemory
+from starhold.parts.craft import make_craft
+from starhold.parts.environments.gravity import two_body_gravity_gradient
 from tests.certification.loops import FULL, PRINCIPAL, UNEVEN, loop_of, random_craft, tensor, textbook
 
 LOOPS = textbook()
@@ -36,7 +36,7 @@ def test_every_law_is_certified_under_its_textbook_assumptions(name):
 @pytest.mark.parametrize("name", sorted(n for n in LOOPS if not n.startswith(("sliding", "wheel"))))
 @pytest.mark.parametrize("cover", ["shortest", "hysteresis"])
 def test_the_double_cover_is_in_the_claim(name, cover):
-    loop = loop_of(LOOPS[name].law.name, LOOPS[name].gains, LOOPS[name].craft, cover=cover)
+    loop = loop_of(LOOPS[name].law.name, LOOPS[name].gains, LOOPS[name].craft, sign_policy=cover)
     certificate = certify(loop, name)
     main = certificate.claim("convergence")
     assert main.outcome == "proved"
@@ -47,7 +47,7 @@ def test_the_double_cover_is_in_the_claim(name, cover):
         # The switch at half a turn is outside the set, and all that is less than half a turn at rest is inside.
         s = 2.0 * (main.witness["stiffness"] or take_s(loop) / 2.0)
         assert main.numbers["start"] < s
-        assert math.radians(179.5) < main.numbers["turn"] < math.pi
+        assert math.radians(179.5) < main.numbers["slew_angle"] < math.pi
 
 
 def take_s(loop):
@@ -116,8 +116,8 @@ def largest_torque(loop, P, s, level, axis):
         q0 = 1.0 - t / s
         turn = math.sqrt(max(1.0 - q0 * q0, 0.0)) * x[:3] / np.linalg.norm(x[:3])
         w = math.sqrt(2.0 * max(level - t, 0.0)) * root @ (x[3:6] / np.linalg.norm(x[3:6]))
-        seen = Seen((q0, *turn), tuple(w), tuple(w), (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, 0.1)
-        u = np.array(loop.law.torque(seen, loop.gains, loop.craft, NoMemory())[0])
+        measurement = Measurement((q0, *turn), tuple(w), tuple(w), (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, 0.1)
+        u = np.array(loop.law.torque(measurement, loop.gains, loop.craft, NoMemory())[0])
         return -(np.linalg.norm(u) if loop.limit == "norm" else u[axis])
 
     starts = random.normal(size=(12, 7))
@@ -133,8 +133,8 @@ def test_limit_by_design_holds_everywhere():
     for _ in range(2000):
         q = random.normal(size=4)
         w = tuple(random.normal(size=3) * 10.0 ** random.uniform(-3, 3))
-        seen = Seen(tuple(q / np.linalg.norm(q)), w, w, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, 0.1)
-        u, _ = pd.torque(seen, loop.gains, loop.craft, NoMemory())
+        measurement = Measurement(tuple(q / np.linalg.norm(q)), w, w, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, 0.1)
+        u, _ = pd.torque(measurement, loop.gains, loop.craft, NoMemory())
         assert max(map(abs, u)) <= 0.05
 
 
@@ -169,7 +169,7 @@ def test_modelled_torque_is_bounded_over_the_whole_orbit():
 @pytest.mark.parametrize("cover", ["as_published", pytest.param("hysteresis", marks=pytest.mark.slow)])
 def test_disturbed_flights_end_within_the_ultimate_bound(name, cover):
     """A torque of the claimed size that always pushes away cannot leave the claimed ball, nor one that is constant."""
-    loop = loop_of(LOOPS[name].law.name, LOOPS[name].gains, LOOPS[name].craft, cover=cover)
+    loop = loop_of(LOOPS[name].law.name, LOOPS[name].gains, LOOPS[name].craft, sign_policy=cover)
     certificate = certify(loop, name, Wanted(disturbance=1e-4))
     claim = certificate.claim("disturbance")
     assert claim.outcome == "proved"
@@ -184,8 +184,8 @@ def test_disturbed_flights_end_within_the_ultimate_bound(name, cover):
         direction /= np.linalg.norm(direction)
         period, peak = 0.2, []
         for step in range(int(2000 / period)):
-            seen = Seen(tuple(q), tuple(w), tuple(w), (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, period)
-            u, _ = loop.law.torque(seen, loop.gains, loop.craft, NoMemory())
+            measurement = Measurement(tuple(q), tuple(w), tuple(w), (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, period)
+            u, _ = loop.law.torque(measurement, loop.gains, loop.craft, NoMemory())
             push = direction if mode == "constant" else w / max(np.linalg.norm(w), 1e-300)
             a = np.linalg.solve(J, np.array(u) + n["torque"] * push - np.cross(w, J @ w))
             w = w + period * a

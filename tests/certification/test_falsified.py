@@ -10,9 +10,9 @@ from starhold.analysis.trial import BrokenClaimError, fly_claims
 from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.certify import Wanted, certify
 from starhold.laws import lqr, matrix_pd, pd, sliding
-from starhold.laws.interface import NoMemory, Seen
-from starhold.models.environment import gravity_gradient
-from starhold.models.rigid_body import angular_acceleration
+from starhold.laws.interface import Measurement, NoMemory
+from starhold.parts.bodies.rigid_body import angular_acceleration
+from starhold.parts.environments.gravity import gravity_gradient
 from tests.certification.loops import FULL, LOPSIDED, PRINCIPAL, UNEVEN, loop_of
 
 STILL = (0.0, 0.0, 0.0)
@@ -27,19 +27,22 @@ def refutation(certificate, kind):
 
 def seen_at(state):
     w = tuple(state["rate"])
-    return Seen(tuple(state["attitude"]), w, w, STILL, STILL, STILL, STILL, 0.1)
+    return Measurement(tuple(state["attitude"]), w, w, STILL, STILL, STILL, STILL, 0.1)
 
 
 def slope(loop, state):
     """V' by a central difference of the law's V along the loop's motion."""
-    seen = seen_at(state)
-    torque, _ = loop.law.torque(seen, loop.gains, loop.craft, NoMemory())
-    turn, spin = derivative(seen.attitude, seen.rate), angular_acceleration(seen.rate, torque, loop.craft)
+    measurement = seen_at(state)
+    torque, _ = loop.law.torque(measurement, loop.gains, loop.craft, NoMemory())
+    turn, spin = (
+        derivative(measurement.attitude, measurement.rate),
+        angular_acceleration(measurement.rate, torque, loop.craft),
+    )
 
     def value(h):
-        q = tuple(a + h * b for a, b in zip(seen.attitude, turn, strict=True))
-        w = tuple(a + h * b for a, b in zip(seen.rate, spin, strict=True))
-        return loop.law.lyapunov(seen._replace(attitude=q, rate=w), loop.gains, loop.craft)
+        q = tuple(a + h * b for a, b in zip(measurement.attitude, turn, strict=True))
+        w = tuple(a + h * b for a, b in zip(measurement.rate, spin, strict=True))
+        return loop.law.lyapunov(measurement._replace(attitude=q, rate=w), loop.gains, loop.craft)
 
     return (value(1e-6) - value(-1e-6)) / 2e-6
 
@@ -51,7 +54,7 @@ def test_unbalanced_weights_are_not_global():
     assert slope(loop, evidence["state"]) == pytest.approx(evidence["V'"], rel=1e-4)
     # What does hold is told when nothing more is asked for.
     assert certify(loop).claim("convergence").outcome == "proved"
-    assert math.radians(3.0) < certify(loop).claim("convergence").numbers["turn"] < math.pi
+    assert math.radians(3.0) < certify(loop).claim("convergence").numbers["slew_angle"] < math.pi
 
 
 @pytest.mark.parametrize(
@@ -95,7 +98,7 @@ def test_switching_torque_below_the_gravity_gradient():
     r = np.linalg.norm(evidence["position"])
     torque = gravity_gradient(tuple(evidence["position"]), 3.0 * FULL.gravity / r**5, FULL)
     axis = evidence["axis"] - 1
-    assert torque[axis] > evidence["reach"]
+    assert torque[axis] > evidence["switching_gain"]
     s = sliding.surface(seen_at(evidence["state"]), loop.gains)
     u, _ = sliding.torque(seen_at(evidence["state"]), loop.gains, FULL, NoMemory())
     pushed = angular_acceleration(
@@ -123,8 +126,8 @@ def test_surface_that_does_not_hold_the_target():
 @pytest.mark.parametrize("kind", ["axis", "norm"])
 def test_torque_limit_ignored(kind):
     loop = loop_of("lqr", lqr.design(PRINCIPAL, UNEVEN), PRINCIPAL, limit=kind)
-    assert certify(loop, "", Wanted(turn=math.radians(40.0))).claim("torque-limit").outcome == "proved"
-    claim = certify(loop, "", Wanted(turn=math.radians(120.0))).claim("torque-limit")
+    assert certify(loop, "", Wanted(slew_angle=math.radians(40.0))).claim("torque-limit").outcome == "proved"
+    claim = certify(loop, "", Wanted(slew_angle=math.radians(120.0))).claim("torque-limit")
     assert claim.outcome == "refuted"
     state = claim.refutation().evidence["state"]
     u = np.array(loop.law.torque(seen_at(state), loop.gains, PRINCIPAL, NoMemory())[0])

@@ -6,12 +6,12 @@ import json
 import pytest
 from flint import Ordering, fmpq, fmpq_mpoly_ctx
 
-from starhold.certification.checker import check, passed
-from starhold.certification.checker.cells import divides, linear, negative_multiple, signed_like
-from starhold.certification.checker.cover import Question, answer
-from starhold.certification.checker.exact import CheckError
-from starhold.certification.checker.reading import read, read_names
 from starhold.certification.invariant import builtin_names, certify, parse, write
+from starhold.checker import check, passed
+from starhold.checker.cells import divides, linear, negative_multiple, signed_like
+from starhold.checker.cover import Question, answer
+from starhold.checker.exact import CheckError
+from starhold.checker.reading import read, read_names
 from tests.certification.invariants import proved
 from tests.running import starhold
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from starhold.algebra.polynomial import exact
-from starhold.certification.checker import check, cover, passed
 from starhold.certification.invariant import Problem, System, Wanted, certify, enclosure, parse, write
 from starhold.certification.invariant.descent import Candidate, jumps, switches
 from starhold.certification.invariant.search import closed_cells
+from starhold.checker import check, cover, passed
 from tests.certification.invariants import SQUARE, claim, expression, fractions, outcomes, system
 
 ORIGIN, ROUND = (0, 0), "x**2 + y**2"

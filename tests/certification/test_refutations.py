@@ -11,7 +11,7 @@ import pytest
 
 from starhold.certification.certificate import write
 from starhold.certification.certify import Wanted, certify
-from starhold.certification.checker import check, check_file, passed
+from starhold.checker import check, check_file, passed
 from starhold.laws import lqr, matrix_pd, pd, sliding
 from starhold.laws.catalogue import catalogue
 from starhold.laws.sliding import Gains as Sliding
@@ -36,8 +36,8 @@ CASES = {
     "indefinite": ("matrix-pd", matrix_pd.Gains((0.09,) * 3, SKEWED), Wanted(), "convergence"),
     "anywhere": ("lqr", lqr.design(PRINCIPAL, LOPSIDED), Wanted(rate=math.inf), "convergence"),
     "at any attitude": ("lqr", lqr.design(PRINCIPAL, LOPSIDED), Wanted(rate=1.0), "convergence"),
-    "axis": ("lqr", lqr.design(PRINCIPAL, UNEVEN), Wanted(turn=math.radians(120.0)), "torque-limit"),
-    "norm": ("lqr", lqr.design(PRINCIPAL, UNEVEN), Wanted(turn=math.radians(120.0)), "torque-limit"),
+    "axis": ("lqr", lqr.design(PRINCIPAL, UNEVEN), Wanted(slew_angle=math.radians(120.0)), "torque-limit"),
+    "norm": ("lqr", lqr.design(PRINCIPAL, UNEVEN), Wanted(slew_angle=math.radians(120.0)), "torque-limit"),
     "slow": ("pd", pd.Gains(9.0, 1.0), Wanted(), "sampling"),
     "pushed by gravity": ("sliding", Sliding((0.08,) * 3, (1e-7,) * 3), Wanted(), "sliding"),
     "pushed": ("sliding", Sliding((0.08,) * 3, (5e-3,) * 3), Wanted(disturbance=0.01), "sliding"),

@@ -18,12 +18,12 @@ from starhold.certification.certify import Wanted, certify
 from starhold.certification.motion import Motion
 from starhold.certification.region import ENERGY, SHAPES, Shape, holds
 from starhold.certification.subject import make_subject
-from starhold.laws.interface import NoMemory, Seen
-from starhold.models.rigid_body import angular_acceleration
-from starhold.models.sensor import Noise
-from starhold.report.certificates import start_inside
+from starhold.laws.interface import Measurement, NoMemory
+from starhold.parts.bodies.rigid_body import angular_acceleration
+from starhold.parts.sensors.gaussian import Noise
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
+from starhold.studies.certificates import start_inside
 from tests.small import CRAFT
 
 ROOT = -0.428
@@ -45,8 +45,8 @@ def falling(loop, shape, states):
     found = np.empty((2, states.shape[1]))
     for lane, state in enumerate(states.T):
         q, w = tuple(state[:4].tolist()), tuple(state[4:7].tolist())
-        seen = Seen(q, w, w, ZERO, ZERO, ZERO, ZERO, loop.period)
-        torque, _ = loop.law.torque(seen, loop.gains, loop.craft, NoMemory())
+        measurement = Measurement(q, w, w, ZERO, ZERO, ZERO, ZERO, loop.period)
+        torque, _ = loop.law.torque(measurement, loop.gains, loop.craft, NoMemory())
         dq, dw = np.array(derivative(q, w)), np.array(angular_acceleration(w, add(torque, ZERO), loop.craft))
         step = 1e-3 / (1.0 + np.abs(dw).max() + np.abs(dq).max())
         near = [shape.value(a, state[:4] + k * step * dq, state[4:7] + k * step * dw) for k in (-2, -1, 1, 2)]
@@ -63,7 +63,7 @@ def test_the_energy_alone_has_the_level_that_was_found_for_it(root):
     assert claim.witness == ENERGY._asdict()
     expected = {-0.2: 3.553, ROOT: 3.583, -1.0: 3.660, -2.0: 3.796}[root]
     assert 0.985 * expected < claim.numbers["level"] / root**2 < expected
-    assert 166.0 < math.degrees(claim.numbers["turn"]) < 174.0
+    assert 166.0 < math.degrees(claim.numbers["slew_angle"]) < 174.0
 
 
 def test_the_published_start_is_outside_the_one_and_inside_the_other():

@@ -10,16 +10,16 @@ from hypothesis import strategies as some
 
 from starhold.algebra.quaternion import derivative
 from starhold.algebra.vector import ZERO
-from starhold.certification.checker import check, passed
-from starhold.certification.checker import modal as reading
-from starhold.certification.checker.exact import CheckError, floating, rational
-from starhold.certification.checker.modal import ModalRegion, Shares
-from starhold.certification.checker.subject import read_subject
 from starhold.certification.subject import described, make_subject
+from starhold.checker import check, passed
+from starhold.checker import modal as reading
+from starhold.checker.exact import CheckError, floating, rational
+from starhold.checker.modal import ModalRegion, Shares
+from starhold.checker.subject import read_subject
 from starhold.laws import modal
-from starhold.laws.interface import NoMemory, Seen
-from starhold.models.craft import tensor
-from starhold.models.rigid_body import angular_acceleration
+from starhold.laws.interface import Measurement, NoMemory
+from starhold.parts.bodies.rigid_body import angular_acceleration
+from starhold.parts.craft import tensor
 from tests.certification.loops import random_craft, rotors
 from tests.certification.test_checker import TEXTBOOK, by_hand, content_at, proved_by_hand, replaced, spots
 
@@ -35,14 +35,14 @@ def highest_turn(level, witness):
     return 2.0 * math.acos(1.0 - min(max(u, 0.0), 2.0))
 
 
-def region(c, witness=PLAIN, cover="as_published", a=A, assumptions=TEXTBOOK, **changes):
+def region(c, witness=PLAIN, sign_policy="as_published", a=A, assumptions=TEXTBOOK, **changes):
     """A claim with level = c a2, and turn and rate as large as these can be up to rounding."""
     names = [("form", "exact identity"), ("descent", "ball arithmetic")]
     if witness[2] == witness[3] == 0.0:
         names.append(("only rest", "LaSalle"))
-    names.append(("jumps lower V" if cover == "hysteresis" else "single rest in the set", "exact inequality"))
+    names.append(("jumps lower V" if sign_policy == "hysteresis" else "single rest in the set", "exact inequality"))
     level = c * a * a
-    numbers = {"level": level, "turn": 0.999999 * highest_turn(c, witness), "rate": 0.999999 * math.sqrt(2.0 * level)}
+    numbers = {"level": level, "slew_angle": 0.999999 * highest_turn(c, witness), "rate": 0.999999 * math.sqrt(2.0 * level)}
     return proved_by_hand(
         "region", names, numbers | changes, dict(zip(("p", "c2", "g", "m"), witness, strict=True)), assumptions
     )
@@ -113,21 +113,21 @@ def by_formula(a, b, witness, u, w, x):
     return w * w / 2.0 + p * u + c2 * u * u + G * w * long * x, w * w * f1 + w * long * x * f2 - 2.0 * G * long * long
 
 
-@pytest.mark.parametrize("cover", ["as_published", "shortest", "hysteresis"])
-def test_the_double_cover(cover):
-    assert faults(file(region(3.58, cover=cover), double_cover=cover)) == {}
-    better = file(region(2.0, BETTER, cover), double_cover=cover)
+@pytest.mark.parametrize("sign_policy", ["as_published", "shortest", "hysteresis"])
+def test_the_double_cover(sign_policy):
+    assert faults(file(region(3.58, sign_policy=sign_policy), quaternion_sign=sign_policy)) == {}
+    better = file(region(2.0, BETTER, sign_policy), quaternion_sign=sign_policy)
     assert list(faults(better)) == (
-        [] if cover == "as_published" else [better["certificates"][0]["claims"][0]["obligations"][-1]["name"]]
+        [] if sign_policy == "as_published" else [better["certificates"][0]["claims"][0]["obligations"][-1]["name"]]
     )
     # With another root V falls beyond half a turn, where the shorter way switches.
-    wide = file(region(4.5, cover=cover, a=-2.0), -2.0, -0.05, double_cover=cover)
-    assert list(faults(wide)) == (["single rest in the set"] if cover == "shortest" else [])
-    other = "hysteresis" if cover != "hysteresis" else "as_published"
-    assert faults(file(region(3.58, cover=other), double_cover=cover))
+    wide = file(region(4.5, sign_policy=sign_policy, a=-2.0), -2.0, -0.05, quaternion_sign=sign_policy)
+    assert list(faults(wide)) == (["single rest in the set"] if sign_policy == "shortest" else [])
+    other = "hysteresis" if sign_policy != "hysteresis" else "as_published"
+    assert faults(file(region(3.58, sign_policy=other), quaternion_sign=sign_policy))
     for width in (0.0, 1.0, 2.0):
-        narrow = faults(file(region(3.58, cover=cover), double_cover=cover, hysteresis_width=width))
-        assert list(narrow) == (["jumps lower V"] if cover == "hysteresis" else [])
+        narrow = faults(file(region(3.58, sign_policy=sign_policy), quaternion_sign=sign_policy, hysteresis_width=width))
+        assert list(narrow) == (["jumps lower V"] if sign_policy == "hysteresis" else [])
 
 
 @pytest.mark.parametrize(
@@ -156,7 +156,7 @@ def test_a_number_that_says_more_fails(c, witness):
     content = file(region(c, witness, turn=0.999999 * highest_turn(c, witness)))
     assert faults(content) == {}
     place = ("certificates", 0, "claims", 0, "numbers")
-    for key, where in (("level", "descent"), ("turn", ""), ("rate", "")):
+    for key, where in (("level", "descent"), ("slew_angle", ""), ("rate", "")):
         raised = replaced(content, (*place, key), lambda spot, k: spot.__setitem__(k, spot[k] * (1.0 + 1e-4)))
         assert list(faults(raised)) == [where], key
         for value in (-1.0, 1e9, None, math.inf, "1"):
@@ -236,11 +236,19 @@ def test_another_law_is_refused():
 
 UNREAD = "the law divides by 1 + |q|2, which such a claim does not take"
 PROOF = {"stiffness": 0.1, "epsilon": 0.0, "rho": 0.0, "rate_bound": None}
-CONTENTS = {"start": 0.01, "everything": False, "turn": 0.1, "rate": 0.01, "rate_everywhere": None}
+CONTENTS = {"start": 0.01, "everything": False, "slew_angle": 0.1, "rate": 0.01, "rate_everywhere": None}
 EASY = {"form": "exact identity", "target": "exact identity", "only rest": "LaSalle", "torque": "ball arithmetic"}
 CONVERGES = ("form", "positive", "descent", "target", "only rest", "single rest in the set")
-END = {"torque": 1e-6, "start": 0.01, "level": 0.01, "turn": 0.1, "rate_start": 0.01, "angle": 0.1, "rate": 0.01}
-SURFACE = {"torque": [0.0] * 3, "margin": 1e-3, "surface": 0.0, "angle": 0.0, "rate": 0.0, "turn": 0.1, "everything": False}
+END = {"torque": 1e-6, "start": 0.01, "level": 0.01, "slew_angle": 0.1, "rate_start": 0.01, "angle": 0.1, "rate": 0.01}
+SURFACE = {
+    "torque": [0.0] * 3,
+    "margin": 1e-3,
+    "surface": 0.0,
+    "angle": 0.0,
+    "rate": 0.0,
+    "slew_angle": 0.1,
+    "everything": False,
+}
 OTHERS = {
     "convergence": (CONVERGES, CONTENTS | {"level": 0.01}, PROOF, TEXTBOOK),
     "torque-limit": (
@@ -344,8 +352,8 @@ def test_v_falls_as_the_law_turns_the_body(seed):
     w = random.normal(size=3) * random.uniform(0.1, 3.0)
     q, w = tuple(q.tolist()), tuple(w.tolist())
     gains = modal.Gains((a,) * 3, (a,) * 3, b)
-    seen = Seen(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.25, ZERO)
-    swing = angular_acceleration(w, modal.torque(seen, gains, craft, NoMemory())[0], craft)
+    measurement = Measurement(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.25, ZERO)
+    swing = angular_acceleration(w, modal.torque(measurement, gains, craft, NoMemory())[0], craft)
     turning = derivative(q, w)
 
     def energy(step):

@@ -9,21 +9,21 @@ import pytest
 
 from starhold.algebra.vector import ZERO
 from starhold.certification.station import certify_station
-from starhold.laws.station import l2_rest
-from starhold.laws.station.interface import station_laws
+from starhold.laws import l2_equilibrium as l2_equilibrium
+from starhold.laws.point import station_laws
 from starhold.loop.station import StationLoop
-from starhold.models.libration import PRIMARIES, PointState, make_libration
+from starhold.parts.bodies.libration_point import PRIMARIES, PointState, make_libration
 from starhold.simulation.lanes import simulate_many
 
 EARTH = PRIMARIES["sun-earth"]
 PLANT = make_libration(EARTH.larger, EARTH.smaller, EARTH.separation)
-GAINS = l2_rest.design(PLANT, l2_rest.Degree(y=1.0))
+GAINS = l2_equilibrium.design(PLANT, l2_equilibrium.Degree(y=1.0))
 STEEP = 1.0 + 2.0 * PLANT.stiffness
 REST = PointState((0.0, 1.0, 0.0), (0.0, 0.0, 0.0), ZERO)
 
 
 def loop_of(gains=GAINS, limit=math.inf, kind="axis", **changes):
-    return StationLoop(PLANT, station_laws()["l2-rest"], gains, REST, 1e-3, limit=limit, limit_kind=kind, **changes)
+    return StationLoop(PLANT, station_laws()["l2-equilibrium"], gains, REST, 1e-3, limit=limit, limit_kind=kind, **changes)
 
 
 def claims_of(*given, **changes):

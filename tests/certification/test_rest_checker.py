@@ -11,19 +11,19 @@ from flint import arb, ctx
 
 from starhold.algebra.vector import ZERO
 from starhold.certification.certificate import write
-from starhold.certification.checker import check, check_file, passed
-from starhold.certification.checker.exact import rational
-from starhold.certification.checker.station import HELD, read_station
 from starhold.certification.station import certify_station, described_station
-from starhold.laws.station import l2_rest
-from starhold.laws.station.interface import station_laws
+from starhold.checker import check, check_file, passed
+from starhold.checker.exact import rational
+from starhold.checker.station import HELD, read_station
+from starhold.laws import l2_equilibrium as l2_equilibrium
+from starhold.laws.point import station_laws
 from starhold.loop.station import StationLoop
-from starhold.models.libration import POINTS, PRIMARIES, PointState, make_libration
+from starhold.parts.bodies.libration_point import POINTS, PRIMARIES, PointState, make_libration
 from tests.certification.test_station_checker import by_hand, changed, faults, outcomes
 
 EARTH = PRIMARIES["sun-earth"]
 PLANT = make_libration(EARTH.larger, EARTH.smaller, EARTH.separation)
-GAINS = l2_rest.design(PLANT, l2_rest.Degree(y=1.0, z=-0.5))
+GAINS = l2_equilibrium.design(PLANT, l2_equilibrium.Degree(y=1.0, z=-0.5))
 STEEP = 1.0 + 2.0 * PLANT.stiffness
 STEEPNESS = math.sqrt(STEEP)
 REST, AXIS = (("certificates", 0, "claims", place) for place in (0, 1))
@@ -35,7 +35,7 @@ OFF = GAINS._replace(k_x=GAINS.k_x * (1.0 + 1e-8))
 
 def loop_of(gains=GAINS, limit=math.inf, kind="axis", plant=PLANT, **changes):
     start = PointState((0.0, gains.y, gains.z), ZERO, ZERO)
-    return StationLoop(plant, station_laws()["l2-rest"], gains, start, 1e-3, limit=limit, limit_kind=kind, **changes)
+    return StationLoop(plant, station_laws()["l2-equilibrium"], gains, start, 1e-3, limit=limit, limit_kind=kind, **changes)
 
 
 @pytest.fixture(scope="session")
@@ -80,7 +80,7 @@ def test_feedback_far_off_the_separatrix_is_not_claimed(made):
 def test_all_points_hold(made, name):
     for point in POINTS:
         plant = PRIMARIES[name].point(point)
-        content = made(l2_rest.design(plant, l2_rest.Degree(y=0.3)), 5.0, plant=plant)
+        content = made(l2_equilibrium.design(plant, l2_equilibrium.Degree(y=0.3)), 5.0, plant=plant)
         assert outcomes(content) == {"rest": "proved", "saturated-axis": "proved"}
         assert {f.verdict for f in check(content)} == {"holds"}
 
@@ -111,7 +111,7 @@ def test_a_number_that_says_more_fails(made, gains):
     for key, share, where_ in (
         ("width", 1.0011, "stays"),
         ("boundary", 1.0 - 1e-13, "nothing returns from beyond"),
-        ("reach", 1e-4, "stays"),
+        ("switching_gain", 1e-4, "stays"),
         ("limit", 1.0 + 1e-15, ""),
         ("limit", 1.0 - 1e-15, ""),
     ):
@@ -119,10 +119,10 @@ def test_a_number_that_says_more_fails(made, gains):
     for key in numbers:
         for value in (-1.0, 0.0, None, math.inf, math.nan, "1", True):
             assert faults(changed(content, (*place, key), value)), (key, value)
-    assert faults(changed(content, (*place, "turn"), 1.0))
+    assert faults(changed(content, (*place, "slew_angle"), 1.0))
     assert faults(changed(content, (*place, "width"), numbers["boundary"]))
     # What says less holds.
-    for key, share in (("width", 0.9), ("reach", 0.9), ("boundary", 2.0)):
+    for key, share in (("width", 0.9), ("switching_gain", 0.9), ("boundary", 2.0)):
         assert not faults(changed(content, (*place, key), numbers[key] * share)), (key, share)
 
 
@@ -131,7 +131,7 @@ def test_gains_off_the_separatrix_hold_up_to_a_reach(made):
     content = made(OFF, 4.0)
     width = content["certificates"][0]["claims"][1]["numbers"]["width"]
     reach = width / (OFF.k_x / STEEP - 2.0)
-    at = (*AXIS, "numbers", "reach")
+    at = (*AXIS, "numbers", "switching_gain")
     assert not faults(changed(content, at, 0.999999 * reach))
     assert ("saturated-axis", "stays") in faults(changed(content, at, 1.000001 * reach))
     rounded = made(GAINS, 4.0)
@@ -196,7 +196,7 @@ def test_other_laws_do_not_come_to_rest(made):
         for gains in law.examples():
             loop = StationLoop(PLANT, law, gains, loop_of().start, 1e-3, limit=4.0, limit_kind="axis")
             other = changed(content, SUBJECT, json.loads(json.dumps(described_station(loop))))
-            if law.name != "l2-rest":
+            if law.name != "l2-equilibrium":
                 assert set(faults(other).values()) == {f"the law {law.name} does not come to rest"}
 
 

@@ -13,12 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 
 from starhold.algebra.vector import add, scale
-from starhold.certification.checker.exact import CheckError, floating, rational
-from starhold.certification.checker.rest import LimitedAxis, Rest
 from starhold.certification.station import certify_station
-from starhold.laws.station import l2_rest
-from starhold.laws.station.interface import SeenPoint, StationLaw
-from starhold.models.libration import linear
+from starhold.checker.equilibrium import Equilibrium, LimitedAxis
+from starhold.checker.exact import CheckError, floating, rational
+from starhold.laws import l2_equilibrium as l2_equilibrium
+from starhold.laws.point import PointMeasurement, StationLaw
+from starhold.parts.bodies.libration_point import linear
 from starhold.simulation.lanes import simulate_many
 from tests.certification.test_rest_checker import GAINS, PLANT, STEEP, STEEPNESS, STRONG, WEAK, loop_of, station
 
@@ -38,18 +38,20 @@ def refused(claim):
 
 def altered(**parts):
     """The law with other equations."""
-    module = ModuleType("l2_rest_altered")
-    vars(module).update({name: value for name, value in vars(l2_rest).items() if not name.startswith("__")})
+    module = ModuleType("l2_equilibrium_altered")
+    vars(module).update({name: value for name, value in vars(l2_equilibrium).items() if not name.startswith("__")})
     vars(module).update(parts)
-    return StationLaw("l2-rest", module)
+    return StationLaw("l2-equilibrium", module)
 
 
 def pushed(*more):
     """The feedback and a push that depends on the state."""
-    return lambda seen, gains, plant: add(l2_rest.feedback(seen, gains, plant), tuple(f(seen, gains, plant) for f in more))
+    return lambda measurement, gains, plant: add(
+        l2_equilibrium.feedback(measurement, gains, plant), tuple(f(measurement, gains, plant) for f in more)
+    )
 
 
-def nothing(seen, gains, plant):
+def nothing(measurement, gains, plant):
     return 0.0
 
 
@@ -61,9 +63,9 @@ def nothing(seen, gains, plant):
         {"feedback": pushed(nothing, nothing, lambda s, g, p: 1e-12 + 0.0 * s.position[0])},
         {"feedback": pushed(lambda s, g, p: s.position[0] * s.position[0], nothing, nothing)},
         {"feedback": pushed(nothing, lambda s, g, p: s.period * s.position[1], nothing)},
-        {"control": lambda s, g, p, m: ((*l2_rest.feedback(s, g, p)[:2], 0.0), m)},
-        {"control": lambda s, g, p, m: (scale(1.0 + 2.0**-50, l2_rest.feedback(s, g, p)), m)},
-        {"control": lambda s, g, p, m: (add(l2_rest.control(s, g, p, m)[0], (s.limit, 0.0, 0.0)), m)},
+        {"control": lambda s, g, p, m: ((*l2_equilibrium.feedback(s, g, p)[:2], 0.0), m)},
+        {"control": lambda s, g, p, m: (scale(1.0 + 2.0**-50, l2_equilibrium.feedback(s, g, p)), m)},
+        {"control": lambda s, g, p, m: (add(l2_equilibrium.control(s, g, p, m)[0], (s.limit, 0.0, 0.0)), m)},
     ],
 )
 def test_another_law_is_noticed(parts):
@@ -72,9 +74,12 @@ def test_another_law_is_noticed(parts):
     law = altered(**parts)
     if "feedback" in parts:
         # What flies is the altered feedback as well.
-        vars(law.module)["control"] = lambda seen, gains, plant, memory: (law.module.feedback(seen, gains, plant), memory)
+        vars(law.module)["control"] = lambda measurement, gains, plant, memory: (
+            law.module.feedback(measurement, gains, plant),
+            memory,
+        )
     with pytest.raises(CheckError):
-        Rest(law, rest.gains, rest.plant, False).form()
+        Equilibrium(law, rest.gains, rest.plant, False).form()
 
 
 def test_the_form_is_that_of_the_motion():
@@ -82,7 +87,7 @@ def test_the_form_is_that_of_the_motion():
     full.form()
     for one, other in ((full, False), (plain, True)):
         with pytest.raises(CheckError, match="undoes"):
-            Rest(one.law, one.gains, one.plant, other).form()
+            Equilibrium(one.law, one.gains, one.plant, other).form()
     for k, (stiff, damp) in enumerate(plain.axes):
         assert (stiff, damp) == full.axes[k]
         assert damp == rational(GAINS.k_velocity[k])
@@ -157,9 +162,9 @@ def flown_along_x(gains, limit, x, v, time=14.0, step=2e-3):
 
     def slope(x, v):
         still = np.zeros_like(x)
-        seen = SeenPoint((x, gains.y + still, gains.z + still), (v, still, still), step, limit)
-        command = l2_rest.feedback(seen, gains, PLANT)[0]
-        return v, linear(seen.position, seen.velocity, PLANT)[0] + np.clip(command, -limit, limit)
+        measurement = PointMeasurement((x, gains.y + still, gains.z + still), (v, still, still), step, limit)
+        command = l2_equilibrium.feedback(measurement, gains, PLANT)[0]
+        return v, linear(measurement.position, measurement.velocity, PLANT)[0] + np.clip(command, -limit, limit)
 
     for _ in range(round(time / step)):
         a, b = slope(x, v)
@@ -174,7 +179,7 @@ def test_flights_agree(gains):
     numbers = certify_station(loop_of(gains, limit)).claims[1].numbers
     random = np.random.default_rng(3)
     x, side = random.uniform(-1.0, 1.0, 400), np.where(np.arange(400) % 2 == 0, 1.0, -1.0)
-    x = np.where(np.arange(400) < 300, 5.0 * numbers["width"], numbers["reach"]) * x
+    x = np.where(np.arange(400) < 300, 5.0 * numbers["width"], numbers["switching_gain"]) * x
     for size, returns in ((0.98 * numbers["width"], True), (1.002 * numbers["boundary"], False)):
         end, speed = flown_along_x(gains, limit, x, STEEPNESS * (side * size - x))
         if returns:

@@ -14,12 +14,12 @@ from starhold.algebra.quaternion import derivative
 from starhold.algebra.vector import ZERO, add, apply, cross
 from starhold.certification.certify import Wanted, certify
 from starhold.certification.frame import take_apart
-from starhold.certification.gyroscopic import crossed, swing
+from starhold.certification.gyroscopic import crossed, gyroscopic_torque
 from starhold.certification.matrices import floats, identity, number, plus, rows
 from starhold.certification.motion import RATE, Motion
 from starhold.certification.subject import make_subject
-from starhold.laws.interface import NoMemory, Seen
-from starhold.models.rigid_body import angular_acceleration
+from starhold.laws.interface import Measurement, NoMemory
+from starhold.parts.bodies.rigid_body import angular_acceleration
 from starhold.trace.calling import Compiled
 from tests.certification.loops import free, tensor, textbook
 
@@ -31,7 +31,7 @@ def motion_of(loop):
     """Compiled: attitude and rate after a step under a constant torque from outside, by the classical Runge-Kutta method."""
 
     def slope(q, w, push):
-        u, _ = loop.law.torque(Seen(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.1, ZERO), loop.gains, loop.craft, NoMemory())
+        u, _ = loop.law.torque(Measurement(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.1, ZERO), loop.gains, loop.craft, NoMemory())
         return *derivative(q, w), *angular_acceleration(w, add(u, push), loop.craft)
 
     def step(q, w, push, h):
@@ -107,7 +107,9 @@ def largest_torque(loop, level, kind):
     random = np.random.default_rng(2)
 
     def command(q, w):
-        return loop.law.torque(Seen(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.1, ZERO), loop.gains, loop.craft, NoMemory())[0]
+        return loop.law.torque(Measurement(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.1, ZERO), loop.gains, loop.craft, NoMemory())[
+            0
+        ]
 
     torque = Compiled(command, (1.0, 0.0, 0.0, 0.0), ZERO)
 
@@ -167,7 +169,7 @@ def test_the_bound_of_the_gyroscopic_torque_is_sharp(moments):
     """Half the range of the moments over |w|2, and (J3 - J1)/(2 sqrt(J1 J3)) over w.Jw (Kantorovich)."""
     J = rows(np.diag(moments))
     low, high = min(moments), max(moments)
-    found = [swing(gyroscopic(J), metric) for metric in (identity(3), J)]
+    found = [gyroscopic_torque(gyroscopic(J), metric) for metric in (identity(3), J)]
     sharp = (high - low) / 2.0, (high - low) / (2.0 * math.sqrt(low * high))
     for bound, least in zip(found, sharp, strict=True):
         assert least * (1.0 - 1e-12) <= number(bound.most) <= least * (1.0 + 1e-5) + 1e-9
@@ -186,6 +188,6 @@ def test_no_rate_exceeds_the_bound_of_quadratic_forms(entries, moments):
     for parts in (own, gyroscopic(A)):
         values = dict(zip(RATE, w, strict=True))
         sizes = [sum((number(c) * values[a] * values[b] for (a, b), c in p.terms.items()), 0.0 * w[0]) for p in parts]
-        assert np.linalg.norm(sizes, axis=0).max() <= number(swing(parts, P).most) * (1.0 + 1e-12)
+        assert np.linalg.norm(sizes, axis=0).max() <= number(gyroscopic_torque(parts, P).most) * (1.0 + 1e-12)
     forms = [[[part.slope(a).slope(b).at({}) / 2 for b in RATE] for a in RATE] for part in gyroscopic(A)]
     assert crossed(forms) == plus(A, identity(3, A[0][0]), -1)

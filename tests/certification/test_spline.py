@@ -17,19 +17,19 @@ from starhold.algebra.vector import ZERO, add, cross, subtract
 from starhold.analysis.trial import draw
 from starhold.certification.certificate import write
 from starhold.certification.certify import certify
-from starhold.certification.checker import check_file, passed
-from starhold.certification.checker.exact import CheckError
-from starhold.certification.checker.spline import moves_within
 from starhold.certification.matrices import floats, number
 from starhold.certification.matrices import rows as rows_of
 from starhold.certification.potential import Spring
 from starhold.certification.spline import spline_bounds
 from starhold.certification.wording import sentence
+from starhold.checker import check_file, passed
+from starhold.checker.exact import CheckError
+from starhold.checker.spline import moves_within
 from starhold.errors import InputError
 from starhold.laws import pd, wheel
-from starhold.laws.interface import NoMemory, Seen
-from starhold.models.craft import tensor
-from starhold.models.target import Knots, knots_of, tabulate
+from starhold.laws.interface import Measurement, NoMemory
+from starhold.parts.craft import tensor
+from starhold.parts.targets.target import Knots, knots_of, tabulate
 from tests.certification.loops import FULL, free, loop_of
 
 
@@ -252,6 +252,8 @@ def test_no_state_of_the_set_needs_more_torque_than_told_anywhere_on_the_spline(
     for state, rate, acceleration in zip(states.T, spline(t, 1), spline(t, 2), strict=True):
         q, w = tuple(state[:4]), tuple(state[4:7])
         turning, spinning = to_body(q, tuple(rate)), to_body(q, tuple(acceleration))
-        seen = Seen(q, w, add(w, turning), turning, subtract(spinning, cross(w, turning)), ZERO, ZERO, 1.0, ZERO)
-        largest = max(largest, *map(abs, loop.law.torque(seen, loop.gains, craft, NoMemory())[0]))
+        measurement = Measurement(
+            q, w, add(w, turning), turning, subtract(spinning, cross(w, turning)), ZERO, ZERO, 1.0, ZERO
+        )
+        largest = max(largest, *map(abs, loop.law.torque(measurement, loop.gains, craft, NoMemory())[0]))
     assert 2.0 < largest <= 6.0

@@ -10,14 +10,14 @@ import pytest
 
 from starhold.algebra.vector import ZERO
 from starhold.certification.certificate import write
-from starhold.certification.checker import check, check_file, passed
-from starhold.certification.checker.exact import floating
-from starhold.certification.checker.station import read_station
 from starhold.certification.station import certify_station, described_station
-from starhold.laws.station import l2_circle
-from starhold.laws.station.interface import station_laws
+from starhold.checker import check, check_file, passed
+from starhold.checker.exact import floating
+from starhold.checker.station import read_station
+from starhold.laws import l2_circle
+from starhold.laws.point import station_laws
 from starhold.loop.station import StationLoop
-from starhold.models.libration import POINTS, PRIMARIES, PointState, make_libration
+from starhold.parts.bodies.libration_point import POINTS, PRIMARIES, PointState, make_libration
 from tests.certification.test_checker import by_hand, replaced
 
 EARTH = PRIMARIES["sun-earth"]
@@ -219,12 +219,12 @@ def test_a_claim_of_the_other_kind_fails(made):
         (("gains", "k_velocity"), 0.0, ("", "")),
         (("gains", "feedback"), "relay", ("circle", "only the circle")),
         (("gains", "feedback"), 1, ("", "")),
-        (("gains", "layer"), -1.0, ("", "")),
+        (("gains", "boundary_layer"), -1.0, ("", "")),
         (("gains", "model"), "nonlinear", ("circle", "form")),
         (("gains", "other"), 1.0, ("", "")),
         (("model",), "nonlinear", ("circle", "")),
         (("model",), "other", ("", "")),
-        (("law",), "l2-rest", ("", "")),
+        (("law",), "l2-equilibrium", ("", "")),
         (("law",), "lyapunov", ("", "")),
         (("limit",), "axis", ("control-limit", "control")),
         (("limit",), "none", ("control-limit", "control")),
@@ -253,7 +253,7 @@ def test_the_claims_are_about_this_loop(made, key, value, failing):
 
 def test_a_relay_without_a_layer_is_not_claimed(made):
     content = made(SOFT, 1.2)
-    bare = changed(content, (*SUBJECT, "gains", "layer"), 0.0)
+    bare = changed(content, (*SUBJECT, "gains", "boundary_layer"), 0.0)
     assert {("circle", "only the circle"), ("control-limit", "only the circle")} <= set(faults(bare))
 
 
@@ -310,7 +310,7 @@ def test_another_circle_must_be_held(made):
     assert not held(1.05, of=0.4)
     assert not held(1.05, needs=0.1)
     assert not held(1.05, control=0.1)
-    for key, value in (("feedback", "smooth"), ("layer", 0.1), ("k", 0.1), ("model", "nonlinear")):
+    for key, value in (("feedback", "smooth"), ("boundary_layer", 0.1), ("k", 0.1), ("model", "nonlinear")):
         assert not passed(check(changed(content, (*SUBJECT, "gains", key), value)))
 
 

@@ -13,12 +13,12 @@ from hypothesis import strategies as some
 
 from starhold.algebra.scalar import where
 from starhold.algebra.vector import add, scale, subtract
-from starhold.certification.checker.circle import Circle
-from starhold.certification.checker.exact import CheckError, floating, rational
-from starhold.certification.checker.polar import keeps_within, phases
+from starhold.checker.circle import Circle
+from starhold.checker.exact import CheckError, floating, rational
+from starhold.checker.polar import keeps_within, phases
+from starhold.laws import l2_circle
 from starhold.laws.interface import NoMemory
-from starhold.laws.station import l2_circle
-from starhold.laws.station.interface import SeenPoint, StationLaw, along
+from starhold.laws.point import PointMeasurement, StationLaw, along
 from starhold.loop.station import MODELS
 from tests.certification.test_station_checker import BACK, BEST, PLANT, RELAY, SOFT, WIDE, peak, station
 
@@ -44,8 +44,8 @@ def drawn_gains(random):
     )
 
 
-def command(seen, gains):
-    return l2_circle.control(seen, gains, PLANT, NoMemory())[0]
+def command(measurement, gains):
+    return l2_circle.control(measurement, gains, PLANT, NoMemory())[0]
 
 
 @settings(max_examples=60)
@@ -56,14 +56,14 @@ def test_v_changes_as_the_law_moves_the_craft(seed):
     model = int(random.integers(2))
     gains = drawn_gains(random)._replace(model=model)
     x, v = (tuple(random.normal(size=3).tolist()) for _ in range(2))
-    seen = SeenPoint(x, v, 1e-3, math.inf)
-    swing = add(MODELS[("linear", "nonlinear")[model]](x, v, PLANT), command(seen, gains))
-    moved = SeenPoint(*(tuple(np.array(a) + 1e-30j * np.array(b)) for a, b in ((x, v), (v, swing))), 1e-3, math.inf)
+    measurement = PointMeasurement(x, v, 1e-3, math.inf)
+    swing = add(MODELS[("linear", "nonlinear")[model]](x, v, PLANT), command(measurement, gains))
+    moved = PointMeasurement(*(tuple(np.array(a) + 1e-30j * np.array(b)) for a, b in ((x, v), (v, swing))), 1e-3, math.inf)
     expected = l2_circle.lyapunov(moved, gains, PLANT).imag / 1e-30
     circle = station(gains, model=("linear", "nonlinear")[model]).circle
     circle.form()
     f2, f3 = v[1] + gains.rate * x[2], v[2] - gains.rate * x[1]
-    share = gains.k if gains.feedback == 0 else gains.k / max(math.hypot(f2, f3), gains.layer)
+    share = gains.k if gains.feedback == 0 else gains.k / max(math.hypot(f2, f3), gains.boundary_layer)
     values = dict(zip(("x1", "x2", "x3", "v1", "v2", "v3", "t2", "t3"), (*x, *v, share * f2, share * f3), strict=True))
     found = floating(circle.lyapunov.slope.at({name: rational(value) for name, value in values.items()}))
     # The full problem is near the linear one, but for cancellation of what the law undoes.
@@ -79,29 +79,32 @@ def altered(**parts):
     return StationLaw("l2-circle", module)
 
 
-def less_damping(seen, gains, plant, taken):
-    return subtract(l2_circle.neutral(seen, gains, plant), taken)
+def less_damping(measurement, gains, plant, taken):
+    return subtract(l2_circle.neutral(measurement, gains, plant), taken)
 
 
 def with_damping(taken):
-    return lambda seen, gains, plant, memory: (less_damping(seen, gains, plant, taken(seen, gains, plant)), memory)
+    return lambda measurement, gains, plant, memory: (
+        less_damping(measurement, gains, plant, taken(measurement, gains, plant)),
+        memory,
+    )
 
 
-def wrong_of(seen, gains):
-    return (0.0, *l2_circle.errors(seen, gains)[1:])
+def wrong_of(measurement, gains):
+    return (0.0, *l2_circle.errors(measurement, gains)[1:])
 
 
 @pytest.mark.parametrize("gains", [BEST, RELAY, SOFT])
 @pytest.mark.parametrize(
     "taken",
     [
-        lambda seen, gains, plant: scale(-gains.k, wrong_of(seen, gains)),
-        lambda seen, gains, plant: scale(gains.k + 1e-9, wrong_of(seen, gains)),
-        lambda seen, gains, plant: (0.0, gains.k * seen.velocity[1], gains.k * seen.velocity[2]),
-        lambda seen, gains, plant: along(wrong_of(seen, gains), gains.k, 2.0 * gains.layer + 1e-3),
-        lambda seen, gains, plant: scale(gains.k * seen.period, wrong_of(seen, gains)),
+        lambda measurement, gains, plant: scale(-gains.k, wrong_of(measurement, gains)),
+        lambda measurement, gains, plant: scale(gains.k + 1e-9, wrong_of(measurement, gains)),
+        lambda measurement, gains, plant: (0.0, gains.k * measurement.velocity[1], gains.k * measurement.velocity[2]),
+        lambda measurement, gains, plant: along(wrong_of(measurement, gains), gains.k, 2.0 * gains.boundary_layer + 1e-3),
+        lambda measurement, gains, plant: scale(gains.k * measurement.period, wrong_of(measurement, gains)),
         # The rate of the plant's axes in place of the circle's.
-        lambda seen, gains, plant: scale(gains.k, wrong_of(seen, gains._replace(rate=plant.rate))),
+        lambda measurement, gains, plant: scale(gains.k, wrong_of(measurement, gains._replace(rate=plant.rate))),
     ],
 )
 def test_other_damping_is_noticed(gains, taken):
@@ -116,8 +119,11 @@ def test_the_damping_as_published_is_taken():
     for gains in (BEST, RELAY, SOFT):
         circle = station(gains).circle
 
-        def taken(seen, gains, plant):
-            smooth, relayed = scale(gains.k, wrong_of(seen, gains)), along(wrong_of(seen, gains), gains.k, gains.layer)
+        def taken(measurement, gains, plant):
+            smooth, relayed = (
+                scale(gains.k, wrong_of(measurement, gains)),
+                along(wrong_of(measurement, gains), gains.k, gains.boundary_layer),
+            )
             return tuple(where(gains.feedback == 1, a, b) for a, b in zip(relayed, smooth, strict=True))
 
         Circle(altered(control=with_damping(taken)), circle.gains, circle.plant, False).form()
@@ -128,26 +134,34 @@ def test_the_damping_as_published_is_taken():
     [
         (
             {
-                "lyapunov": lambda seen, gains, plant: (
-                    l2_circle.lyapunov(seen, gains, plant) + seen.position[0] * seen.position[0]
+                "lyapunov": lambda measurement, gains, plant: (
+                    l2_circle.lyapunov(measurement, gains, plant) + measurement.position[0] * measurement.position[0]
                 )
             },
             "V is not",
         ),
         (
-            {"neutral": lambda seen, gains, plant: add(l2_circle.neutral(seen, gains, plant), (0.0, seen.position[1], 0.0))},
+            {
+                "neutral": lambda measurement, gains, plant: add(
+                    l2_circle.neutral(measurement, gains, plant), (0.0, measurement.position[1], 0.0)
+                )
+            },
             "does not keep V",
         ),
         (
-            {"neutral": lambda seen, gains, plant: add(l2_circle.neutral(seen, gains, plant), (seen.position[1], 0.0, 0.0))},
+            {
+                "neutral": lambda measurement, gains, plant: add(
+                    l2_circle.neutral(measurement, gains, plant), (measurement.position[1], 0.0, 0.0)
+                )
+            },
             "along X depends on the rest",
         ),
         # What turns (f2, f3) keeps V, and moves them in another way.
         (
             {
-                "neutral": lambda seen, gains, plant: add(
-                    l2_circle.neutral(seen, gains, plant),
-                    (0.0, l2_circle.errors(seen, gains)[2], -l2_circle.errors(seen, gains)[1]),
+                "neutral": lambda measurement, gains, plant: add(
+                    l2_circle.neutral(measurement, gains, plant),
+                    (0.0, l2_circle.errors(measurement, gains)[2], -l2_circle.errors(measurement, gains)[1]),
                 )
             },
             "f2 changes in another way",
@@ -167,9 +181,9 @@ def sizes(gains, kind, r, n, angle, turn):
     """The control at many states of the plane x = 0, by the law's neutral control and its damping in floats."""
     y, z, f2, f3 = r * np.cos(turn), r * np.sin(turn), n * np.cos(angle), n * np.sin(angle)
     zero = np.zeros_like(y)
-    seen = SeenPoint((zero, y, z), (zero, f2 - gains.rate * z, f3 + gains.rate * y), 1e-3, math.inf)
-    share = gains.k if gains.feedback == 0 else gains.k / np.maximum(n, gains.layer)
-    x, *rest = (np.asarray(part) for part in l2_circle.neutral(seen, gains, PLANT))
+    measurement = PointMeasurement((zero, y, z), (zero, f2 - gains.rate * z, f3 + gains.rate * y), 1e-3, math.inf)
+    share = gains.k if gains.feedback == 0 else gains.k / np.maximum(n, gains.boundary_layer)
+    x, *rest = (np.asarray(part) for part in l2_circle.neutral(measurement, gains, PLANT))
     u = np.array([x, rest[0] - share * f2, rest[1] - share * f3])
     return np.sqrt((u * u).sum(axis=0)) if kind == "norm" else np.abs(u).max(axis=0)
 
@@ -227,8 +241,8 @@ def test_the_control_turns_with_the_phase(seed):
     c, s = math.cos(turn), math.sin(turn)
     a, b = n * math.cos(angle), n * math.sin(angle)
     y, z, f2, f3 = r * c, r * s, a * c - b * s, a * s + b * c
-    told = command(SeenPoint((0.0, y, z), (0.0, f2 - gains.rate * z, f3 + gains.rate * y), 1e-3, math.inf), gains)
-    share = gains.k if gains.feedback == 0 else gains.k / max(n, gains.layer)
+    told = command(PointMeasurement((0.0, y, z), (0.0, f2 - gains.rate * z, f3 + gains.rate * y), 1e-3, math.inf), gains)
+    share = gains.k if gains.feedback == 0 else gains.k / max(n, gains.boundary_layer)
     values = {"r": r, "a": a, "b": b, "p": share * a, "q": share * b}
     exactly = {name: rational(float(value)) for name, value in values.items()}
     for (C, S), have in zip(phases(station(gains).circle), told, strict=True):

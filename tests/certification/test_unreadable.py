@@ -8,10 +8,10 @@ from starhold.certification.certify import certify
 from starhold.conformance.bench import sample_loop
 from starhold.conformance.suite import examine
 from starhold.laws.catalogue import adopted, from_file
-from starhold.report.certificates import certify_scenario
-from starhold.report.compare import compare
 from starhold.scenario.reading import parse
 from starhold.scenario.writing import scenario_with
+from starhold.studies.certificates import certify_scenario
+from starhold.studies.compare import compare
 
 HEAD = """
 from typing import Annotated, NamedTuple
@@ -34,20 +34,21 @@ def examples():
 """
 V = """
 
-def lyapunov(seen, gains, craft):
-    return 0.5 * dot(seen.rate, apply(craft.inertia, seen.rate)) + 2.0 * gains.k * (1.0 - seen.attitude[0])
+def lyapunov(measurement, gains, craft):
+    energy = 0.5 * dot(measurement.rate, apply(craft.inertia, measurement.rate))
+    return energy + 2.0 * gains.k * (1.0 - measurement.attitude[0])
 """
 PLAIN = """
 
-def torque(seen, gains, craft, memory):
+def torque(measurement, gains, craft, memory):
     size = {size}
-    return add(scale(-gains.d, seen.rate), scale(-gains.k * size, vector_part(seen.attitude))), memory
+    return add(scale(-gains.d, measurement.rate), scale(-gains.k * size, vector_part(measurement.attitude))), memory
 """
 SIZES = {
-    "a square root": "sqrt(1.0 + dot(seen.rate, seen.rate))",
-    "a division by what varies": "1.0 / (1.5 + seen.attitude[0])",
-    "less_equal": "where(less_equal(seen.attitude[0], 0.5), 1.0, 2.0)",
-    "opposite": "where(opposite(less(seen.attitude[0], 0.5)), 1.0, 2.0)",
+    "a square root": "sqrt(1.0 + dot(measurement.rate, measurement.rate))",
+    "a division by what varies": "1.0 / (1.5 + measurement.attitude[0])",
+    "less_equal": "where(less_equal(measurement.attitude[0], 0.5), 1.0, 2.0)",
+    "opposite": "where(opposite(less(measurement.attitude[0], 0.5)), 1.0, 2.0)",
 }
 TWIST = """
 
@@ -59,10 +60,10 @@ def remember(gains, craft, period):
     return Memory((0.0, 0.0, 0.0))
 
 
-def torque(seen, gains, craft, memory):
-    s = add(seen.rate, scale(gains.k / gains.d, vector_part(seen.attitude)))
+def torque(measurement, gains, craft, memory):
+    s = add(measurement.rate, scale(gains.k / gains.d, vector_part(measurement.attitude)))
     u = tuple(-gains.root * sqrt(absolute(x)) * side(x) + v for x, v in zip(s, memory.v))
-    v = tuple(clip(v - seen.period * 0.001 * clip(1000.0 * x, 1.0), 0.01) for x, v in zip(s, memory.v))
+    v = tuple(clip(v - measurement.period * 0.001 * clip(1000.0 * x, 1.0), 0.01) for x, v in zip(s, memory.v))
     return u, Memory(v)
 """
 

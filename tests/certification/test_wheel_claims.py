@@ -13,17 +13,17 @@ from starhold.algebra.vector import ZERO
 from starhold.analysis.trial import BrokenClaimError, fly_claims
 from starhold.certification.certificate import Certificate, write
 from starhold.certification.certify import Wanted, certify
-from starhold.certification.checker import check_file, passed
 from starhold.certification.wording import sentence
+from starhold.checker import check_file, passed
 from starhold.laws import pd, wheel
 from starhold.laws.catalogue import catalogue
-from starhold.laws.interface import NoMemory, Seen
-from starhold.models.craft import make_craft, tensor
-from starhold.models.rigid_body import angular_acceleration
-from starhold.models.wheels import lose, three_orthogonal
-from starhold.report.certificates import certify_law, certify_scenario
+from starhold.laws.interface import Measurement, NoMemory
+from starhold.parts.bodies.rigid_body import angular_acceleration
+from starhold.parts.craft import make_craft, tensor
+from starhold.parts.effectors.wheels import lose, three_orthogonal
 from starhold.scenario.building import build
 from starhold.scenario.reading import load, parse
+from starhold.studies.certificates import certify_law, certify_scenario
 from tests.certification.loops import FULL, free, loop_of, rotors
 
 EVEN = wheel.Gains(0.3, (0.015, 0.015, 0.015))
@@ -45,8 +45,8 @@ def motion(gains, craft):
 
     def rates(x):
         q, w = tuple(x[:4]), tuple(x[4:])
-        seen = Seen(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.1)
-        u, _ = wheel.torque(seen, gains, craft, NoMemory())
+        measurement = Measurement(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.1)
+        u, _ = wheel.torque(measurement, gains, craft, NoMemory())
         return np.array([*derivative(q, w), *angular_acceleration(w, u, craft)])
 
     return rates
@@ -79,7 +79,7 @@ def test_three_half_turns_where_weights_differ_and_each_is_unstable(k, damping):
     for _ in range(20):
         axis = random.normal(size=3)
         axis /= np.linalg.norm(axis)
-        torque = wheel.torque(Seen((0.0, *axis), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.1), gains, FULL, NoMemory())[0]
+        torque = wheel.torque(Measurement((0.0, *axis), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.1), gains, FULL, NoMemory())[0]
         assert np.linalg.norm(torque) > 0.0
 
 
@@ -103,7 +103,7 @@ def test_two_equal_weights_leave_one_axis_and_a_circle():
 @pytest.mark.parametrize("cover", ["as_published", "shortest", "hysteresis"])
 @pytest.mark.parametrize("target", ["orbital", (1.0, 0.0, 0.0, 0.0)])
 def test_the_wheel_law_converges_almost_always_whatever_the_wheels_store(gains, cover, target):
-    loop = rotors("wheel", gains, target, cover=cover)
+    loop = rotors("wheel", gains, target, sign_policy=cover)
     certificate = certify(loop)
     assert certificate.outcome == "proved"
     main = certificate.claim("convergence")
@@ -146,13 +146,13 @@ def test_claims_that_are_not_built_say_so():
     loop = rotors("wheel", EVEN)
     found = certify(loop, "", Wanted(disturbance=1e-4)).claim("disturbance")
     assert found.outcome == "undecided"
-    uneven = certify(rotors("wheel", UNEVEN), "", Wanted(turn=0.1)).claim("wheels")
+    uneven = certify(rotors("wheel", UNEVEN), "", Wanted(slew_angle=0.1)).claim("wheels")
     assert uneven.outcome == "undecided"
     assert "weights" in uneven.obligations[0].evidence["reason"]
     peak = replace(loop, allocation="least-peak")
     assert certify(peak).claim("wheels") is None
-    assert certify(peak, "", Wanted(turn=0.1)).claim("wheels").outcome == "undecided"
-    far = certify(loop, "", Wanted(turn=3.0)).claim("wheels")
+    assert certify(peak, "", Wanted(slew_angle=0.1)).claim("wheels").outcome == "undecided"
+    far = certify(loop, "", Wanted(slew_angle=3.0)).claim("wheels")
     assert far.outcome == "undecided"
 
 
@@ -168,7 +168,7 @@ def test_a_loop_that_counts_on_a_lost_wheel_claims_nothing():
 
 
 @pytest.mark.parametrize("law", ["wheel", "pd"])
-@pytest.mark.parametrize(("limits", "binding"), [((0.02, 10.0), "motors"), ((10.0, 0.3), "stored")])
+@pytest.mark.parametrize(("limits", "binding"), [((0.02, 10.0), "motors"), ((10.0, 0.3), "wheel_momentum")])
 def test_limits_of_wheels_are_kept_and_nearly_used(law, limits, binding):
     """An optimiser over the certified set finds nothing beyond the told numbers, and comes near what binds."""
     gains = EVEN if law == "wheel" else pd.examples()[0]
@@ -182,7 +182,7 @@ def test_limits_of_wheels_are_kept_and_nearly_used(law, limits, binding):
     shares = -np.array(wheels.least)
     begun = np.array(loop.start.momentum)
     kept = begun - shares @ (begun @ np.array(wheels.axes))
-    most = {"motors": np.zeros(3), "stored": np.zeros(3)}
+    most = {"motors": np.zeros(3), "wheel_momentum": np.zeros(3)}
     for _ in range(20_000):
         t = random.uniform(0.0, min(n["level"], s if law == "wheel" else 2.0 * s))
         q0 = math.sqrt(1.0 - t / s) if law == "wheel" else 1.0 - t / s
@@ -194,15 +194,15 @@ def test_limits_of_wheels_are_kept_and_nearly_used(law, limits, binding):
         w = math.sqrt(2.0 * (n["level"] - t)) * turned
         q = (q0, *(math.sqrt(1.0 - q0 * q0) * axis / np.linalg.norm(axis)))
         stored = n["momentum"] * total / np.linalg.norm(total) - J @ w
-        seen = Seen(q, tuple(w), tuple(w), ZERO, ZERO, ZERO, ZERO, 0.1, tuple(stored))
-        u = np.array(loop.law.torque(seen, loop.gains, loop.craft, NoMemory())[0])
+        measurement = Measurement(q, tuple(w), tuple(w), ZERO, ZERO, ZERO, ZERO, 0.1, tuple(stored))
+        u = np.array(loop.law.torque(measurement, loop.gains, loop.craft, NoMemory())[0])
         most["motors"] = np.maximum(most["motors"], np.abs(shares @ u))
-        most["stored"] = np.maximum(most["stored"], np.abs(kept + shares @ stored))
+        most["wheel_momentum"] = np.maximum(most["wheel_momentum"], np.abs(kept + shares @ stored))
     for name in most:
         assert (most[name] <= np.array(n[name]) * (1.0 + 1e-9)).all()
     assert most[binding].max() > 0.8 * max(n[binding])
     assert max(n["motors"]) <= limits[0]
-    assert max(n["stored"]) <= 0.99 * limits[1]
+    assert max(n["wheel_momentum"]) <= 0.99 * limits[1]
 
 
 def test_flights_keep_within_the_wheels_and_catch_what_does_not():
@@ -221,12 +221,12 @@ def test_a_torque_limit_of_the_wheel_law_without_wheels():
     loop = loop_of("wheel", wheel.Gains(0.05, (0.01, 0.01, 0.01)), make_craft(tensor(FULL.inertia), torque_limit=0.04))
     claim = certify(free(loop)).claim("torque-limit")
     assert claim.outcome == "proved"
-    assert math.radians(100.0) < claim.numbers["turn"] < math.pi
-    asked = certify(loop, "", Wanted(turn=math.radians(100.0)))
+    assert math.radians(100.0) < claim.numbers["slew_angle"] < math.pi
+    asked = certify(loop, "", Wanted(slew_angle=math.radians(100.0)))
     assert asked.claim("torque-limit").outcome == "proved"
     assert fly_claims(free(loop), certify(free(loop)), flights=256).torque_share <= 1.0
     tight = replace(loop, craft=make_craft(tensor(FULL.inertia), torque_limit=0.01))
-    refuted = certify(tight, "", Wanted(turn=math.radians(60.0))).claim("torque-limit")
+    refuted = certify(tight, "", Wanted(slew_angle=math.radians(60.0))).claim("torque-limit")
     assert refuted.outcome == "refuted"
 
 

@@ -8,12 +8,12 @@ from hypothesis import example, given
 from hypothesis import strategies as some
 
 from starhold.certification.certificate import Certificate, Claim, Obligation
-from starhold.certification.checker import Finding
 from starhold.certification.wording import eigenvalues, sentence, shown
+from starhold.checker import Finding
 from starhold.cli.show_certificates import print_certificate, print_findings
-from starhold.report.certificates import Tried
+from starhold.studies.certificates import Tried
 
-SUBJECT = {"law": "lqr", "double_cover": "as_published", "hysteresis_width": 0.5}
+SUBJECT = {"law": "lqr", "quaternion_sign": "as_published", "hysteresis_width": 0.5}
 
 
 @given(some.floats(1e-300, 1e300))
@@ -49,7 +49,7 @@ def test_a_torque_that_is_withstood_is_not_rounded_up():
 
 
 @pytest.mark.parametrize(
-    ("turn", "cover", "law", "every"),
+    ("slew_angle", "cover", "law", "every"),
     [
         (math.radians(186.0), "as_published", "lqr", False),
         (math.radians(359.0), "as_published", "lqr", False),
@@ -62,8 +62,8 @@ def test_a_torque_that_is_withstood_is_not_rounded_up():
     ],
 )
 def test_every_attitude_is_said_of_both_its_quaternions(turn, cover, law, every):
-    numbers = {"turn": turn, "rate": 0.1, "rate_everywhere": None, "everything": False}
-    told = sentence(claim("convergence", **numbers), {**SUBJECT, "double_cover": cover, "law": law})
+    numbers = {"slew_angle": turn, "rate": 0.1, "rate_everywhere": None, "everything": False}
+    told = sentence(claim("convergence", **numbers), {**SUBJECT, "quaternion_sign": cover, "law": law})
     assert ("rest at every attitude and" in told) == every
     assert every or f"up to {shown(math.degrees(turn))}°" in told
     assert "global on rotations" not in told

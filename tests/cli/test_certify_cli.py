@@ -89,7 +89,7 @@ def test_what_nobody_can_prove_is_undecided(tmp_path):
     [
         ('rate = "-1 deg/s"', "certify.rate"),
         ('rate = "anything"', "certify.rate"),
-        ('turn = "181 deg"', "certify.turn"),
+        ('slew_angle = "181 deg"', "certify.turn"),
         ("inertia_tolerance = 1.5", "certify.inertia_tolerance"),
         ("disturbance = -1e-5", "certify.disturbance"),
         ("speed = 1.0", "certify.speed"),

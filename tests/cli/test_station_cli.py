@@ -5,7 +5,7 @@ import json
 import pytest
 import xarray as xr
 
-from starhold.laws.station.interface import station_laws
+from starhold.laws.point import station_laws
 from starhold.scenario.reading import builtin_text
 from tests.running import starhold
 
@@ -78,7 +78,7 @@ def test_certifies_and_checks(short):
     assert [claim["outcome"] for claim in found[1]["claims"]] == ["proved", "refuted"]
     checked = starhold("check", "sure/certificate.json", cwd=short)
     assert checked.returncode == 0, checked.stdout
-    rest = starhold("certify", "l2-rest", "--law", "beside Y", "-o", "rest", cwd=short)
+    rest = starhold("certify", "l2-equilibrium", "--law", "beside Y", "-o", "rest", cwd=short)
     assert rest.returncode == 0, rest.stderr
     assert "99.89 %" in rest.stdout
 

@@ -30,12 +30,20 @@ GOOD = Path(catalogue()["pd"].module.__file__).read_text()
 BROKEN = {
     "wrong unit": ('Gain("N m s", above', 'Gain("N m", above', "keeps_units"),
     "torque at rest": ("craft), feedback)", "craft), add(feedback, (1e-9, 0.0, 0.0)))", "rests_on_target"),
-    "anti-damping": ("scale(gains.k_rate, seen.rate)", "scale(-gains.k_rate, seen.rate)", "decreases_lyapunov"),
+    "anti-damping": (
+        "scale(gains.k_rate, measurement.rate)",
+        "scale(-gains.k_rate, measurement.rate)",
+        "decreases_lyapunov",
+    ),
     "wrong sign of stiffness": ("scale(gains.k_attitude", "scale(-gains.k_attitude", "decreases_lyapunov"),
-    "even in q": ("vector_part(seen.attitude)", "scale(seen.attitude[0], vector_part(seen.attitude))", "double_cover"),
+    "even in q": (
+        "vector_part(measurement.attitude)",
+        "scale(measurement.attitude[0], vector_part(measurement.attitude))",
+        "quaternion_sign",
+    ),
     "not finite": (
-        "subtract(tracking_torque(seen, craft), feedback)",
-        "subtract(scale(0.0 / (1.0 - seen.attitude[0] * seen.attitude[0]), seen.rate), feedback)",
+        "subtract(tracking_torque(measurement, craft), feedback)",
+        "subtract(scale(0.0 / (1.0 - measurement.attitude[0] * measurement.attitude[0]), measurement.rate), feedback)",
         "stays_finite",
     ),
     "example out of bounds": ("Gains(0.5, 0.05)", "Gains(-0.5, 0.05)", "declares_itself"),
@@ -68,11 +76,15 @@ def test_examine_reports_each_check_once():
 
 
 UNREADABLE = {
-    "a library's root": ("size = math.sqrt(dot(seen.rate, seen.rate))", "none of the scalar operations", "sqrt"),
-    "an if": ("size = 1.0 if seen.rate[0] > 0.0 else 2.0", "a comparison of numbers", "where"),
-    "NumPy": ("size = np.linalg.norm(seen.rate)", "a function of NumPy", "starhold.algebra.vector"),
-    "a power": ("size = seen.rate[0] ** 2", "a power", "products"),
-    "an unknown operator": ("size = seen.rate[0] % 2.0", "an operator that is none", "+ - * /"),
+    "a library's root": (
+        "size = math.sqrt(dot(measurement.rate, measurement.rate))",
+        "none of the scalar operations",
+        "sqrt",
+    ),
+    "an if": ("size = 1.0 if measurement.rate[0] > 0.0 else 2.0", "a comparison of numbers", "where"),
+    "NumPy": ("size = np.linalg.norm(measurement.rate)", "a function of NumPy", "starhold.algebra.vector"),
+    "a power": ("size = measurement.rate[0] ** 2", "a power", "products"),
+    "an unknown operator": ("size = measurement.rate[0] % 2.0", "an operator that is none", "+ - * /"),
 }
 
 

@@ -12,11 +12,11 @@ import starhold as sh
 from starhold.algebra import scalar
 from starhold.algebra.quantity import quantities
 from starhold.conformance.suite import examine, find_law
-from starhold.laws.interface import Card, Gain, Seen, Start
+from starhold.laws.interface import Card, Gain, Measurement, Start
 from starhold.laws.interface import fields as gains_of
-from starhold.laws.station.interface import SeenPoint
-from starhold.models.craft import Craft
-from starhold.models.libration import Libration
+from starhold.laws.point import PointMeasurement
+from starhold.parts.bodies.libration_point import Libration
+from starhold.parts.craft import Craft
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "law-authors.md").read_text(encoding="utf-8")
@@ -46,7 +46,7 @@ def folder(tmp_path):
 def test_its_tables_are_written_from_the_code():
     filled = runpy.run_path(str(ROOT / "docs" / "generate.py"))["filled"]
     assert filled(PAGE) == PAGE
-    for cls in (Seen, Craft, SeenPoint, Libration):
+    for cls in (Measurement, Craft, PointMeasurement, Libration):
         assert set(quantities(cls)) == set(cls._fields)
         assert all(f"| `{name}` | " in PAGE for name in cls._fields)
     for cls in (Card, Gain):

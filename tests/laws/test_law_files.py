@@ -9,11 +9,11 @@ import pytest
 from jsonschema import ValidationError, validate
 
 import starhold as sh
-from starhold.certification.checker import check_file, passed
+from starhold.checker import check_file, passed
 from starhold.conformance.suite import examine, find_law
 from starhold.laws import catalogue as catalogues
 from starhold.laws.catalogue import adopted, catalogue, from_file
-from starhold.laws.station.interface import StationLaw, station_laws
+from starhold.laws.point import StationLaw, station_laws
 from starhold.scenario.opening import json_schema
 from tests.running import starhold
 
@@ -34,12 +34,13 @@ class Gains(NamedTuple):
     p: Annotated[float, Gain("N m", above=0.0, text="stiffness")] = 0.009
 
 
-def torque(seen, gains, craft, memory):
-    return scale(-1.0, add(scale(gains.k, seen.rate), scale(gains.p, vector_part(seen.attitude)))), memory
+def torque(measurement, gains, craft, memory):
+    return scale(-1.0, add(scale(gains.k, measurement.rate), scale(gains.p, vector_part(measurement.attitude)))), memory
 
 
-def lyapunov(seen, gains, craft):
-    return 0.5 * dot(seen.rate, apply(craft.inertia, seen.rate)) + 2.0 * gains.p * (1.0 - seen.attitude[0])
+def lyapunov(measurement, gains, craft):
+    energy = 0.5 * dot(measurement.rate, apply(craft.inertia, measurement.rate))
+    return energy + 2.0 * gains.p * (1.0 - measurement.attitude[0])
 
 
 def examples():
@@ -68,9 +69,9 @@ def remember(gains, plant, period):
     return Memory(0.0)
 
 
-def control(seen, gains, plant, memory):
-    whole = clip(memory.sum + seen.period * seen.position[1], 1.0)
-    held = tuple(-gains.k * x - gains.d * v for x, v in zip(seen.position, seen.velocity))
+def control(measurement, gains, plant, memory):
+    whole = clip(memory.sum + measurement.period * measurement.position[1], 1.0)
+    held = tuple(-gains.k * x - gains.d * v for x, v in zip(measurement.position, measurement.velocity))
     return (held[0], held[1] - whole, held[2]), Memory(whole)
 
 
@@ -204,11 +205,15 @@ def test_what_is_wrong_with_a_law_table_is_one_line(kind, folder):
 
 
 BROKEN = {
-    "syntax": ("def torque(seen,", "def torque(seen", "my_law.py, line"),
+    "syntax": ("def torque(measurement,", "def torque(measurement", "my_law.py, line"),
     "name": ("CARD = Card(", "CARD = Cards(", "my_law.py, line 10: NameError"),
     "part missing": ("def torque", "def torques", "a law needs torque"),
     "no unit": ('Annotated[float, Gain("N m s", above=0.0, text="damping")]', "float", "k declares no unit"),
-    "attribute": ("gains.k, seen.rate", "gains.k, seen.rates", "law my-law: my_law.py, line 19: AttributeError"),
+    "attribute": (
+        "gains.k, measurement.rate",
+        "gains.k, measurement.rates",
+        "law my-law: my_law.py, line 19: AttributeError",
+    ),
     "shape": (", memory\n", "\n", "torque must return three numbers and the memory"),
     "memory": (", memory\n", ", (1.0,)\n", "the memory that torque returns must be formed as it was given"),
     "exit": ("CARD = Card(", "raise SystemExit(3)\nCARD = Card(", "SystemExit"),

@@ -6,10 +6,10 @@ from scipy.linalg import solve_continuous_are
 
 from starhold.errors import InputError
 from starhold.laws import lqr
-from starhold.laws.riccati import linear_model, riccati_residual, solve_riccati
-from starhold.laws.weights import BALANCES
-from starhold.models.craft import make_craft, tensor
+from starhold.parts.craft import make_craft, tensor
 from starhold.scenario.reading import builtin_text, parse
+from starhold.synthesis.riccati import linear_model, riccati_residual, solve_riccati
+from starhold.synthesis.weights import BALANCES
 
 RANDOM = np.random.default_rng(1960)
 

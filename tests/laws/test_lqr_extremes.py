@@ -15,9 +15,9 @@ from scipy.linalg import solve_continuous_are
 from scipy.optimize import minimize
 
 from starhold.laws import lqr
-from starhold.laws.riccati import linear_modes, solve_riccati
-from starhold.laws.weights import BALANCES, kappa
-from starhold.models.craft import make_craft, tensor
+from starhold.parts.craft import make_craft, tensor
+from starhold.synthesis.riccati import linear_modes, solve_riccati
+from starhold.synthesis.weights import BALANCES, kappa
 
 CLOSE = 1e-9
 

@@ -5,7 +5,7 @@ import pytest
 
 from starhold.errors import InputError
 from starhold.laws import lqr
-from starhold.models.craft import make_craft
+from starhold.parts.craft import make_craft
 from starhold.scenario.reading import builtin_text, parse
 from tests.running import starhold
 

@@ -12,16 +12,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from starhold.algebra.quaternion import to_body
-from starhold.algebra.vector import ZERO, add, cross, swing
+from starhold.algebra.vector import ZERO, add, cross, gyroscopic_torque
 from starhold.conformance.bench import random_quaternions
 from starhold.errors import InputError
 from starhold.laws import modal
-from starhold.laws.interface import NoMemory, Seen
-from starhold.laws.pole_placement import place, reached
-from starhold.models.craft import make_craft, tensor
-from starhold.models.environment import gravity_gradient
-from starhold.models.rigid_body import angular_acceleration
+from starhold.laws.interface import Measurement, NoMemory
+from starhold.parts.bodies.rigid_body import angular_acceleration
+from starhold.parts.craft import make_craft, tensor
+from starhold.parts.environments.gravity import gravity_gradient
 from starhold.scenario.reading import parse
+from starhold.synthesis.pole_placement import place, reached
 from tests.small import CRAFT
 
 INERTIA = ((12.0, -1.5, 0.7), (-1.5, 15.0, 2.0), (0.7, 2.0, 9.0))
@@ -35,7 +35,7 @@ def matrix(v):
 
 def at(attitude, rate, torque=ZERO, position=ZERO):
     """What the law sees at a target at rest."""
-    return Seen(tuple(attitude), tuple(rate), tuple(rate), ZERO, ZERO, tuple(torque), tuple(position), 0.1)
+    return Measurement(tuple(attitude), tuple(rate), tuple(rate), ZERO, ZERO, tuple(torque), tuple(position), 0.1)
 
 
 def symbolic_torque(craft, position):
@@ -44,7 +44,7 @@ def symbolic_torque(craft, position):
     quaternion, rate = state[:4], state[4:]
     strength = 3.0 * MU / math.hypot(*position) ** 5
     known = gravity_gradient(to_body(quaternion, position), strength, craft)
-    total = sympy.Matrix([g - s for g, s in zip(known, swing(craft.inertia, rate), strict=True)])
+    total = sympy.Matrix([g - s for g, s in zip(known, gyroscopic_torque(craft.inertia, rate), strict=True)])
     return sympy.lambdify(state, [sympy.Matrix(known), total, total.jacobian(state)])
 
 
@@ -89,13 +89,15 @@ def test_closed_loop_is_the_published_one_whatever_the_inertia(seed):
     inertia = turn @ np.diag(random.uniform(1.0, 1.9, 3)) @ turn.T
     craft = make_craft(tuple(map(tuple, (0.5 * (inertia + inertia.T)).tolist())), gravity=MU)
     vectors = [tuple(random.normal(size=3).tolist()) for _ in range(6)]
-    seen = Seen(random_quaternions(1, seed)[0], *vectors[:5], ZERO, 0.1, vectors[5])
+    measurement = Measurement(random_quaternions(1, seed)[0], *vectors[:5], ZERO, 0.1, vectors[5])
     a, b = -random.uniform(0.1, 3.0), -random.uniform(0.001, 0.5)
-    torque, _ = modal.torque(seen, modal.Gains((a, a, a), (a, a, a), b), craft, NoMemory())
-    outside = add(add(torque, seen.external_torque), tuple(-x for x in cross(seen.body_rate, seen.stored)))
-    absolute = angular_acceleration(seen.body_rate, outside, craft)
-    found = np.array(absolute) - np.array(seen.target_acceleration)
-    q0, q, w = seen.attitude[0], np.array(seen.attitude[1:]), np.array(seen.rate)
+    torque, _ = modal.torque(measurement, modal.Gains((a, a, a), (a, a, a), b), craft, NoMemory())
+    outside = add(
+        add(torque, measurement.external_torque), tuple(-x for x in cross(measurement.body_rate, measurement.wheel_momentum))
+    )
+    absolute = angular_acceleration(measurement.body_rate, outside, craft)
+    found = np.array(absolute) - np.array(measurement.target_acceleration)
+    q0, q, w = measurement.attitude[0], np.array(measurement.attitude[1:]), np.array(measurement.rate)
     inverse = np.linalg.inv(np.eye(3) + matrix(q))
     k = 2 * a * (1 - 2 * a * b) * (q0 - 1) + 0.5 * (1 - 8 * a * b) * (w @ q) + b * q0 * (w @ w)
     wanted = 2 * a * w - 2 * a * a * inverse @ q + k * inverse @ w

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 from scipy.signal import place_poles
 
-from starhold.laws.pole_placement import UncontrollableError, displacement, is_stable, levels, place, reached
+from starhold.synthesis.pole_placement import UncontrollableError, displacement, is_stable, levels, place, reached
 
 
 def cross(v):

@@ -12,17 +12,17 @@ import starhold as sh
 from starhold.algebra.quaternion import normalise
 from starhold.algebra.vector import ZERO
 from starhold.laws.catalogue import catalogue
-from starhold.laws.interface import NoMemory, Seen
-from starhold.models.craft import make_craft, tensor
+from starhold.laws.interface import Measurement, NoMemory
+from starhold.parts.craft import make_craft, tensor
 
 BODY = {
-    "name": "turn",
+    "name": "slew_angle",
     "spacecraft": {"inertia": [2.0, 3.0, 4.0], "torque_limit": 0.05, "limit": "norm"},
     "initial": {"angles": ["60 deg", "20 deg", 0], "rate": ["1 deg/s", 0, 0]},
     "simulation": {"duration": 300, "control_period": 0.1},
     "settling": {"attitude_tolerance": "0.1 deg", "rate_tolerance": "0.01 deg/s"},
 }
-LAWS = {"pd": {}, "lyapunov": {}, "sliding": {"layer": 2e-3}}
+LAWS = {"pd": {}, "lyapunov": {}, "sliding": {"boundary_layer": 2e-3}}
 
 
 def asked(law, time, **changes):
@@ -47,7 +47,7 @@ def modes(law, gains, craft):
     def acceleration(x):
         angle, rate = x[:3], tuple(x[3:].tolist())
         q = normalise((1.0, *(0.5 * angle).tolist()))
-        u = law.torque(Seen(q, rate, rate, ZERO, ZERO, ZERO, ZERO, 0.1), gains, craft, NoMemory())[0]
+        u = law.torque(Measurement(q, rate, rate, ZERO, ZERO, ZERO, ZERO, 0.1), gains, craft, NoMemory())[0]
         return np.linalg.solve(tensor(craft.inertia), np.array(u) - np.cross(rate, tensor(craft.inertia) @ rate))
 
     h = 1e-6 * np.array([1.0, 1.0, 1.0, 1e-3, 1e-3, 1e-3])
@@ -86,7 +86,7 @@ def test_sliding_has_the_roots_of_its_surface_and_its_layer(craft, w, zeta, reac
     gains = law.design(craft, spec)
     found = np.sort(modes(law, gains, craft).real)
     slow, fast = w * (zeta - math.sqrt(zeta**2 - 1.0)), w * (zeta + math.sqrt(zeta**2 - 1.0))
-    assert max(gains.reach) == pytest.approx(reach)
+    assert max(gains.switching_gain) == pytest.approx(reach)
     assert np.sum(np.abs(found + slow) < 1e-3 * slow) >= 3
     if isinstance(craft.inertia[0], float):
         assert found == pytest.approx(-np.array([fast] * 3 + [slow] * 3), rel=1e-3)
@@ -112,7 +112,7 @@ def test_flights_settle_when_asked_within_the_torque_and_not_much_sooner(law, st
         pytest.skip("its surface is not attracting there")
     scenario = sh.scenario(BODY | {"initial": STARTS[start], "law": [asked(law, 200)]})
     for cover in ("as_published", "shortest"):
-        other = scenario.with_({"law[1].double_cover": cover})
+        other = scenario.with_({"law[1].quaternion_sign": cover})
         found = sh.metrics(sh.simulate(other))
         assert 190.0 < found["settling_time"] <= 200.0
         assert found["peak_torque_norm"] <= 0.05
@@ -166,7 +166,7 @@ def test_wheels_bound_torque_and_momentum():
         ("pd", {"law[1]": {"type": "pd", "form": "bandwidth", "bandwidth": 1e200}}, "between 1e-30 and 1e+30"),
         (
             "sliding",
-            {"law[1]": {"type": "sliding", "form": "bandwidth", "bandwidth": 1, "reach": 1, "damping": 0.5}},
+            {"law[1]": {"type": "sliding", "form": "bandwidth", "bandwidth": 1, "switching_gain": 1, "damping": 0.5}},
             "at least 1",
         ),
     ],

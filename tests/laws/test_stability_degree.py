@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from starhold.laws.stability_degree import (
+from starhold.synthesis.stability_degree import (
     Designed,
     Optimum,
     boundary,

@@ -11,10 +11,10 @@ import sympy
 from starhold.algebra.structure import flatten
 from starhold.algebra.vector import ZERO
 from starhold.laws.interface import NoMemory
-from starhold.laws.station.interface import SeenPoint, station_laws
+from starhold.laws.point import PointMeasurement, station_laws
 from starhold.loop.kernels import fly_plainly
 from starhold.loop.station import StationLoop
-from starhold.models.libration import PRIMARIES, PointState, make_libration
+from starhold.parts.bodies.libration_point import PRIMARIES, PointState, make_libration
 from starhold.simulation.lane import fly
 from starhold.simulation.lanes import simulate_many
 
@@ -53,18 +53,18 @@ def test_is_finite(law, gains):
     random = np.random.default_rng(1)
     for _ in range(200):
         x, v = random.normal(size=(2, 3)) * 10.0 ** random.uniform(-9.0, 1.0)
-        seen = SeenPoint(tuple(x.tolist()), tuple(v.tolist()), 1e-3, 4.0)
-        assert all(map(math.isfinite, law.control(seen, gains, PLANT, NoMemory())[0]))
+        measurement = PointMeasurement(tuple(x.tolist()), tuple(v.tolist()), 1e-3, 4.0)
+        assert all(map(math.isfinite, law.control(measurement, gains, PLANT, NoMemory())[0]))
 
 
 @every
 def test_is_read_by_sympy(law, gains):
     x, v = sympy.symbols("x1:4", real=True), sympy.symbols("v1:4", real=True)
-    found = law.control(SeenPoint(x, v, sympy.Symbol("T"), sympy.Integer(4)), gains, PLANT, NoMemory())[0]
+    found = law.control(PointMeasurement(x, v, sympy.Symbol("T"), sympy.Integer(4)), gains, PLANT, NoMemory())[0]
     values = dict(zip((*x, *v), (0.01, 0.9, 0.1, 0.1, -0.2, 1.3), strict=True))
     numbers = [float(sympy.sympify(part).evalf(subs=values)) for part in found]
-    seen = SeenPoint((0.01, 0.9, 0.1), (0.1, -0.2, 1.3), 1e-3, 4.0)
-    np.testing.assert_allclose(numbers, law.control(seen, gains, PLANT, NoMemory())[0], rtol=1e-9, atol=1e-12)
+    measurement = PointMeasurement((0.01, 0.9, 0.1), (0.1, -0.2, 1.3), 1e-3, 4.0)
+    np.testing.assert_allclose(numbers, law.control(measurement, gains, PLANT, NoMemory())[0], rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("law", [law for law in station_laws().values() if law.forms], ids=lambda law: law.name)

@@ -8,14 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from starhold.algebra.quaternion import conjugate, derivative, multiply, to_body, vector_part
-from starhold.algebra.vector import ZERO, add, apply, cross, dot, subtract, swing
-from starhold.conformance.bench import random_quaternions, random_seen
+from starhold.algebra.vector import ZERO, add, apply, cross, dot, gyroscopic_torque, subtract
+from starhold.conformance.bench import random_measurements, random_quaternions
 from starhold.laws import lyapunov, matrix_pd, pd, sliding
 from starhold.laws.catalogue import catalogue
-from starhold.laws.double_cover import as_published, hysteresis, shortest
-from starhold.laws.interface import NoMemory, Seen
-from starhold.models.craft import Craft, make_craft, tensor
-from starhold.models.rigid_body import angular_acceleration
+from starhold.laws.interface import Measurement, NoMemory
+from starhold.parts.bodies.rigid_body import angular_acceleration
+from starhold.parts.craft import Craft, make_craft, tensor
+from starhold.parts.quaternion_sign import as_published, hysteresis, shortest
 
 number = st.floats(-1.0, 1.0)
 triple = st.tuples(number, number, number)
@@ -31,26 +31,26 @@ def symbolic_body():
     moments = sympy.symbols("J1:4", positive=True)
     craft = Craft(moments, tuple(1 / m for m in moments), sympy.oo, sympy.Symbol("mu"))
     zero = (sympy.Integer(0),) * 3
-    seen = Seen(q, symbols("w"), symbols("w"), zero, zero, symbols("M"), zero, sympy.Symbol("T"))
-    return seen, craft
+    measurement = Measurement(q, symbols("w"), symbols("w"), zero, zero, symbols("M"), zero, sympy.Symbol("T"))
+    return measurement, craft
 
 
-def slope(value, seen, torque, craft):
+def slope(value, measurement, torque, craft):
     """dV/dt along the motion, from the models' equations of motion."""
-    rates = [*derivative(seen.attitude, seen.rate), *angular_acceleration(seen.rate, torque, craft)]
-    variables = [*seen.attitude, *seen.rate]
+    rates = [*derivative(measurement.attitude, measurement.rate), *angular_acceleration(measurement.rate, torque, craft)]
+    variables = [*measurement.attitude, *measurement.rate]
     return sum(sympy.diff(value, x) * r for x, r in zip(variables, rates, strict=True))
 
 
 @pytest.mark.parametrize("law", [pd, lyapunov])
 def test_lyapunov_function_falls_as_damping_says(law):
-    seen, craft = symbolic_body()
+    measurement, craft = symbolic_body()
     gains = law.Gains(*sympy.symbols("k_w k_q", positive=True))
-    torque, _ = law.torque(seen, gains, craft, NoMemory())
+    torque, _ = law.torque(measurement, gains, craft, NoMemory())
     # The law `lyapunov` knows the external torque and cancels it; `pd` is for a body free of any.
-    external = seen.external_torque if law is lyapunov else (0, 0, 0)
-    found = slope(law.lyapunov(seen, gains, craft), seen, add(torque, external), craft)
-    assert sympy.expand(found + gains.k_rate * dot(seen.rate, seen.rate)) == 0
+    external = measurement.external_torque if law is lyapunov else (0, 0, 0)
+    found = slope(law.lyapunov(measurement, gains, craft), measurement, add(torque, external), craft)
+    assert sympy.expand(found + gains.k_rate * dot(measurement.rate, measurement.rate)) == 0
 
 
 @pytest.mark.parametrize("form", ["inertial", "diagonal"])
@@ -86,13 +86,13 @@ def test_sliding_variable_falls_whatever_the_torque_below_reach(rate, disturbanc
     craft = make_craft([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]])
     gains = sliding.Gains(((0.08, 0.01, 0.0), (0.01, 0.1, 0.0), (0.0, 0.0, 0.12)), (0.005, 0.006, 0.007), 0.0)
     attitude = random_quaternions(100)[number]
-    seen = Seen(attitude, rate, rate, ZERO, ZERO, ZERO, ZERO, 0.1)
-    torque, _ = sliding.torque(seen, gains, craft, NoMemory())
-    s = sliding.surface(seen, gains)
+    measurement = Measurement(attitude, rate, rate, ZERO, ZERO, ZERO, ZERO, 0.1)
+    torque, _ = sliding.torque(measurement, gains, craft, NoMemory())
+    s = sliding.surface(measurement, gains)
     acceleration = angular_acceleration(rate, add(torque, disturbance), craft)
-    s_rate = add(acceleration, apply(gains.slope, vector_part(derivative(attitude, rate))))
+    s_rate = add(acceleration, apply(gains.surface_gain, vector_part(derivative(attitude, rate))))
     found = dot(s, apply(craft.inertia, s_rate))
-    expected = dot(s, disturbance) - sum(g * abs(x) for g, x in zip(gains.reach, s, strict=True))
+    expected = dot(s, disturbance) - sum(g * abs(x) for g, x in zip(gains.switching_gain, s, strict=True))
     assert found == pytest.approx(expected, abs=1e-12)
 
 
@@ -114,10 +114,10 @@ def test_motion_relative_to_a_moving_target_obeys_the_equations_of_rest(name, da
         def left_side(turning, spinning, attitude=attitude, gains=gains):
             body_rate = add(error_rate, turning)
             moving = subtract(spinning, cross(error_rate, turning))
-            seen = Seen(attitude, error_rate, body_rate, turning, moving, ZERO, ZERO, 0.1)
-            torque, _ = law.torque(seen, gains, craft, NoMemory())
+            measurement = Measurement(attitude, error_rate, body_rate, turning, moving, ZERO, ZERO, 0.1)
+            torque, _ = law.torque(measurement, gains, craft, NoMemory())
             relative = subtract(angular_acceleration(body_rate, torque, craft), moving)
-            return add(apply(craft.inertia, relative), swing(craft.inertia, error_rate))
+            return add(apply(craft.inertia, relative), gyroscopic_torque(craft.inertia, error_rate))
 
         assert left_side(target_rate, target_acceleration) == pytest.approx(left_side(ZERO, ZERO), abs=1e-12)
 
@@ -139,10 +139,12 @@ def test_laws_are_read_by_balls_and_symbols_too(name):
         )  # fmt: skip
 
     for gains in law.examples():
-        for seen in random_seen(5):
-            plain, _ = law.torque(seen, gains, craft, NoMemory())
-            balls, _ = law.torque(as_numbers(seen, arb), as_numbers(gains, arb), as_numbers(craft, arb), NoMemory())
-            exact, _ = law.torque(as_numbers(seen, sympy.Rational), as_numbers(gains, sympy.Rational), craft, NoMemory())
+        for measurement in random_measurements(5):
+            plain, _ = law.torque(measurement, gains, craft, NoMemory())
+            balls, _ = law.torque(as_numbers(measurement, arb), as_numbers(gains, arb), as_numbers(craft, arb), NoMemory())
+            exact, _ = law.torque(
+                as_numbers(measurement, sympy.Rational), as_numbers(gains, sympy.Rational), craft, NoMemory()
+            )
             for x, ball, fraction in zip(plain, balls, exact, strict=True):
                 assert abs(float(ball.mid()) - x) <= 1e-14
                 assert ball.rad() < 1e-10

@@ -10,9 +10,9 @@ from scipy.integrate import solve_ivp
 from starhold.algebra.structure import flatten, unflatten
 from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.models.actuator import Dynamics
-from starhold.models.craft import make_craft
-from starhold.models.rigid_body import State, angular_momentum, kinetic_energy
+from starhold.parts.actuators.dynamics import Dynamics
+from starhold.parts.bodies.rigid_body import State, angular_momentum, kinetic_energy
+from starhold.parts.craft import make_craft
 from starhold.simulation.lane import fly
 
 J = np.array([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]])
@@ -146,7 +146,7 @@ def test_motion_too_fast_to_follow_is_reported_and_ends_the_samples():
 
 
 def test_history_is_tracked_to_the_hold_error():
-    from starhold.models.target import tabulate
+    from starhold.parts.targets.target import tabulate
 
     errors = []
     for period in (0.2, 0.1):
@@ -167,7 +167,7 @@ def test_history_is_tracked_to_the_hold_error():
 @pytest.mark.parametrize("name", ["pd", "matrix-pd", "lyapunov", "sliding"])
 def test_orbital_frame_is_held_from_the_start(name):
     from starhold.algebra.quaternion import NO_TURN
-    from starhold.models.target import orbital
+    from starhold.parts.targets.target import orbital
 
     goal = orbital(None, START.position, START.velocity, 0, NO_TURN)
     start = START._replace(attitude=goal.attitude, rate=goal.rate)

@@ -9,10 +9,10 @@ import pytest
 from starhold.errors import InputError
 from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.models.actuator import Dynamics
-from starhold.models.craft import make_craft
-from starhold.models.rigid_body import State
-from starhold.models.wheels import make_wheels, pyramid, relaxation
+from starhold.parts.actuators.dynamics import Dynamics
+from starhold.parts.bodies.rigid_body import State
+from starhold.parts.craft import make_craft
+from starhold.parts.effectors.wheels import make_wheels, pyramid, relaxation
 from starhold.scenario.building import build
 from starhold.scenario.checking import RESOLVED, check_substeps
 from starhold.scenario.reading import builtin_text, parse

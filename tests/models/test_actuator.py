@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from starhold.algebra.structure import move
 from starhold.algebra.vector import ZERO, add, cross, dot, norm, scale, subtract, unit
-from starhold.models.actuator import (
+from starhold.parts.actuators.dynamics import (
     Dynamics,
     ideal,
     lagging,

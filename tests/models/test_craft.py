@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from starhold.algebra.vector import apply
-from starhold.models.craft import EARTH, check_inertia, make_craft, matrix, tensor, vector
+from starhold.parts.craft import EARTH, check_inertia, make_craft, matrix, tensor, vector
 
 seeds = st.integers(0, 2**32 - 1)
 sizes = st.floats(-6.0, 6.0).map(lambda e: 10.0**e)

@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from starhold.algebra.quaternion import NO_TURN, derivative, to_body
 from starhold.algebra.vector import ZERO, apply, cross, dot, scale
-from starhold.models.craft import Craft, make_craft, matrix, vector
-from starhold.models.environment import free_space, gravity_gradient, two_body, two_body_gravity_gradient
+from starhold.parts.craft import Craft, make_craft, matrix, vector
+from starhold.parts.environments.gravity import free_space, gravity_gradient, two_body, two_body_gravity_gradient
 from tests.algebra.readers import agree, close, components, quaternions, reduced_by_unit_norm, same, symbols, vanishes
 
 MU = 3.986e14

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from starhold.algebra.vector import ZERO, add, scale
-from starhold.models.actuator import Dynamics, lagging
-from starhold.models.libration import (
+from starhold.parts.actuators.dynamics import Dynamics, lagging
+from starhold.parts.bodies.libration_point import (
     EARTH_DIAMETER,
     POINTS,
     PRIMARIES,

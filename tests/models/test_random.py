@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.special import ndtr
 
 from starhold.algebra.words import bits_of, with_bits
-from starhold.models.random import (
+from starhold.parts.random import (
     cosine_and_sine,
     normal_vector,
     normals,

@@ -12,9 +12,7 @@ from hypothesis import strategies as st
 
 from starhold.algebra.structure import flatten, move
 from starhold.algebra.vector import ZERO, add, apply, cross, dot, inverse, norm, scale, subtract
-from starhold.models.craft import Craft, make_craft
-from starhold.models.environment import two_body_gravity_gradient
-from starhold.models.rigid_body import (
+from starhold.parts.bodies.rigid_body import (
     State,
     angular_acceleration,
     angular_momentum,
@@ -23,6 +21,8 @@ from starhold.models.rigid_body import (
     tidy,
     with_torque,
 )
+from starhold.parts.craft import Craft, make_craft
+from starhold.parts.environments.gravity import two_body_gravity_gradient
 from tests.algebra.readers import (
     agree,
     close,

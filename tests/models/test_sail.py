@@ -10,7 +10,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from starhold.algebra.vector import norm
-from starhold.models.sail import (
+from starhold.synthesis.sail import (
     LAMBERT,
     MIRROR_CENTRE,
     MIRROR_RADIUS,
@@ -35,7 +35,7 @@ from starhold.models.sail import (
     steered,
     widest_cosine,
 )
-from starhold.models.sail import given as force_of
+from starhold.synthesis.sail import given as force_of
 from tests.algebra.readers import agree, directions
 
 PRESSURE = 4.5e-6

@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 from starhold.algebra.quaternion import NO_TURN, relative, stretch
 from starhold.algebra.vector import ZERO, add
 from starhold.algebra.words import bits_of, with_bits
-from starhold.models.random import normal_vector
-from starhold.models.sensor import (
+from starhold.parts.random import normal_vector
+from starhold.parts.sensors.gaussian import (
     ATTITUDE,
     RATE,
     TORQUE,

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize, minimize_scalar
 
 from starhold.algebra.vector import norm
-from starhold.models.libration import EARTH_DIAMETER, PRIMARIES, linear, nonlinear
-from starhold.models.station import (
+from starhold.parts.bodies.libration_point import EARTH_DIAMETER, PRIMARIES, linear, nonlinear
+from starhold.synthesis.circle import (
     Station,
     best_rate,
     demand,

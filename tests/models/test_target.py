@@ -16,9 +16,9 @@ from starhold.algebra.quaternion import NO_TURN, derivative, relative, stretch, 
 from starhold.algebra.structure import move
 from starhold.algebra.structured import Buffer
 from starhold.algebra.vector import ZERO, cross, dot, scale, unit
-from starhold.models.craft import EARTH, make_craft
-from starhold.models.environment import two_body
-from starhold.models.target import Target, history, inertial, orbital, tabulate
+from starhold.parts.craft import EARTH, make_craft
+from starhold.parts.environments.gravity import two_body
+from starhold.parts.targets.target import Target, history, inertial, orbital, tabulate
 from tests.algebra.readers import agree, angles, close, directions, quaternions, same
 
 CRAFT = make_craft([1.0, 1.0, 1.0])

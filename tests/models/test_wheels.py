@@ -16,11 +16,11 @@ from starhold.algebra.polynomial import Polynomial, constants, pieces
 from starhold.algebra.quaternion import derivative, renormalise, to_reference
 from starhold.algebra.structure import flatten, leaves, move, unflatten
 from starhold.algebra.structured import Buffer, repeat
-from starhold.algebra.vector import add, apply, dot, inverse, scale, subtract, swing
-from starhold.models.craft import matrix
-from starhold.models.envelope import with_facets
-from starhold.models.wheel_units import WHEEL_UNITS
-from starhold.models.wheels import (
+from starhold.algebra.vector import add, apply, dot, gyroscopic_torque, inverse, scale, subtract
+from starhold.parts.craft import matrix
+from starhold.parts.effectors.envelope import with_facets
+from starhold.parts.effectors.wheel_units import WHEEL_UNITS
+from starhold.parts.effectors.wheels import (
     BAND,
     CREEP,
     allocate,
@@ -33,8 +33,8 @@ from starhold.models.wheels import (
     nasa_standard,
     on_body,
     pyramid,
-    stored,
     three_orthogonal,
+    wheel_momentum,
 )
 from starhold.trace.calling import Compiled
 from starhold.trace.machine import load
@@ -221,7 +221,7 @@ def test_every_reader_agrees(torque, momentum, rate):
     wheels = make_wheels(pyramid(), 0.01, 0.1, 5.0, viscous=1e-4, coulomb=2e-3)
     agree(allocate, torque, wheels)
     agree(on_body, momentum, momentum, rate, wheels)
-    agree(stored, momentum, wheels)
+    agree(wheel_momentum, momentum, wheels)
     agree(motor, momentum, momentum, rate, wheels)
     agree(available, momentum, momentum, wheels)
     same(allocate_peak, torque, with_facets(wheels))
@@ -281,7 +281,7 @@ TOTAL = ((12.0, 0.5, -0.3), (0.5, 9.0, 0.2), (-0.3, 0.2, 15.0))
 def slope(state, command, inertia, wheels):
     attitude, rate, momentum = state
     h_rate = motor(command, momentum, rate, wheels)
-    torque = subtract(on_body(h_rate, momentum, rate, wheels), swing(inertia, rate))
+    torque = subtract(on_body(h_rate, momentum, rate, wheels), gyroscopic_torque(inertia, rate))
     return derivative(attitude, rate), apply(inverse(inertia), torque), h_rate
 
 
@@ -295,7 +295,7 @@ def step(state, h, command, inertia, wheels):
 
 
 def whole_momentum(state, inertia, wheels):
-    return to_reference(state[0], add(apply(inertia, state[1]), stored(state[2], wheels)))
+    return to_reference(state[0], add(apply(inertia, state[1]), wheel_momentum(state[2], wheels)))
 
 
 def noted(state, inertia, wheels):
@@ -367,7 +367,7 @@ def test_rotors_at_rest_in_the_body_are_part_of_it():
     wheels = simple(pyramid(), inertia=0.2, viscous=1e3)
     rate = (0.3, -0.2, 0.5)
     momentum = tuple(0.2 * float(np.dot(a, rate)) for a in wheels.axes)
-    whole = np.array(body_inertia(TOTAL, wheels)) @ rate + np.array(stored(momentum, wheels))
+    whole = np.array(body_inertia(TOTAL, wheels)) @ rate + np.array(wheel_momentum(momentum, wheels))
     np.testing.assert_allclose(whole, np.array(TOTAL) @ rate, rtol=1e-14)
 
 

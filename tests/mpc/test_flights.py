@@ -13,9 +13,9 @@ from starhold.algebra.vector import ZERO
 from starhold.laws import mpc
 from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.models.craft import make_craft
-from starhold.models.rigid_body import State
-from starhold.models.target import tabulate
+from starhold.parts.bodies.rigid_body import State
+from starhold.parts.craft import make_craft
+from starhold.parts.targets.target import tabulate
 from starhold.simulation import lane
 from tests.mpc.setting import CRAFTS, WEIGHTS
 

@@ -12,8 +12,8 @@ from starhold.algebra.quaternion import normalise
 from starhold.algebra.vector import ZERO
 from starhold.laws import mpc
 from starhold.laws.catalogue import catalogue
-from starhold.laws.interface import Seen, tracking_torque
-from starhold.models.craft import make_craft, tensor
+from starhold.laws.interface import Measurement, tracking_torque
+from starhold.parts.craft import make_craft, tensor
 from tests.mpc.setting import CRAFTS, POSITION, WEIGHTS, fresh, seen_at
 
 
@@ -29,8 +29,8 @@ def test_riccati_terminal_gives_the_endless_horizon(craft: Any, horizon: int):
     q, r = np.diag([*gains.q_attitude, *gains.q_rate]), np.diag(gains.r)
     p = solve_discrete_are(a, b, q, r)
     best = -np.linalg.solve(r + b.T @ p @ b, b.T @ p @ a) @ x
-    seen = seen_at((np.sqrt(1.0 - x @ x), *x[:3].tolist()), ZERO, period=period)
-    command, memory = mpc.torque(seen, gains, craft, mpc.remember(gains, craft, period))
+    measurement = seen_at((np.sqrt(1.0 - x @ x), *x[:3].tolist()), ZERO, period=period)
+    command, memory = mpc.torque(measurement, gains, craft, mpc.remember(gains, craft, period))
     assert command == pytest.approx(best, rel=1e-6)
     assert mpc.counters(memory) == (1, 1, 1, 0, 0)
 
@@ -46,13 +46,13 @@ def test_budget_is_reported_and_the_limit_kept(limit: str):
     # A long period: the limits bind early and late moves, not all of them.
     craft, period = CRAFTS["principal"], 2.0
     gains = mpc.Gains(*WEIGHTS[:2], (0.5, 0.5, 0.5), horizon=20, limit=mpc.LIMITS.index(limit), budget=1)
-    seen = seen_at((0.9, 0.3, -0.2, 0.1), (0.05, -0.04, 0.06), period=period)
-    command, memory = mpc.torque(seen, gains, craft, fresh(gains, craft, period))
+    measurement = seen_at((0.9, 0.3, -0.2, 0.1), (0.05, -0.04, 0.06), period=period)
+    command, memory = mpc.torque(measurement, gains, craft, fresh(gains, craft, period))
     counters = mpc.counters(memory)
     assert (counters[mpc.CALLS], counters[mpc.SWEEPS], counters[mpc.EXHAUSTED]) == (1, 1, 1)
     assert spread(command, limit) <= craft.torque_limit + 1e-9
     enough = gains._replace(budget=50)
-    command, memory = mpc.torque(seen, enough, craft, fresh(enough, craft, period))
+    command, memory = mpc.torque(measurement, enough, craft, fresh(enough, craft, period))
     assert mpc.counters(memory)[mpc.EXHAUSTED] == 0
     assert 1 < mpc.counters(memory)[mpc.WORST] < 50
     assert spread(command, limit) == pytest.approx(craft.torque_limit, rel=1e-6)
@@ -65,12 +65,12 @@ def spread(command: Any, limit: str) -> float:
 
 @pytest.mark.parametrize("limit", ["axis", "norm", "none"])
 def test_an_endless_limit_is_none(limit: str):
-    seen = seen_at((0.3, 0.8, -0.4, 0.2), (0.5, -0.4, 0.6))
+    measurement = seen_at((0.3, 0.8, -0.4, 0.2), (0.5, -0.4, 0.6))
     craft = make_craft([2.0, 3.0, 4.0])
     gains = mpc.Gains(*WEIGHTS, limit=mpc.LIMITS.index(limit))
-    command, _ = mpc.torque(seen, gains, craft, fresh(gains, craft))
+    command, _ = mpc.torque(measurement, gains, craft, fresh(gains, craft))
     free = gains._replace(limit=mpc.LIMITS.index("none"))
-    assert command == mpc.torque(seen, free, CRAFTS["principal"], fresh(free))[0]
+    assert command == mpc.torque(measurement, free, CRAFTS["principal"], fresh(free))[0]
     assert np.isfinite(command).all()
 
 
@@ -81,15 +81,15 @@ def test_tracking_torque_counts_towards_the_limit(limit: str):
     target_rate, acceleration, rate = (0.03, -0.02, 0.04), (1e-3, 2e-3, -1e-3), (1e-4, 2e-4, -1e-4)
     body = tuple(np.add(target_rate, rate).tolist())
     q = normalise((1.0, 1e-4, -2e-4, 1e-4))
-    seen = Seen(q, rate, body, target_rate, acceleration, ZERO, ZERO, 0.1)
+    measurement = Measurement(q, rate, body, target_rate, acceleration, ZERO, ZERO, 0.1)
     free = gains._replace(limit=mpc.LIMITS.index("none"))
-    ahead = np.array(tracking_torque(seen, craft))
+    ahead = np.array(tracking_torque(measurement, craft))
     resting = seen_at(q, rate)
     at_rest = mpc.torque(resting, free, craft, fresh(free, craft))[0]
-    assert mpc.torque(seen, free, craft, fresh(free, craft))[0] == pytest.approx(ahead + at_rest, rel=1e-9)
+    assert mpc.torque(measurement, free, craft, fresh(free, craft))[0] == pytest.approx(ahead + at_rest, rel=1e-9)
     # A limit that the tracking torque alone exceeds.
     weak = make_craft(tensor(craft.inertia), 0.3 * float(np.abs(ahead).min()))
-    command, memory = mpc.torque(seen, gains, weak, fresh(gains, weak))
+    command, memory = mpc.torque(measurement, gains, weak, fresh(gains, weak))
     assert spread(command, limit) == pytest.approx(weak.torque_limit, rel=1e-9)
     assert mpc.counters(memory)[mpc.EXHAUSTED] == 0
 
@@ -104,9 +104,9 @@ def test_units_do_not_matter(factors: tuple[float, float, float]):
     craft = make_craft([2.0, 3.0, 4.0], 0.004)
     other = make_craft([x * kg * m**2 for x in (2.0, 3.0, 4.0)], 0.004 * torque_unit, craft.gravity * m**3 / s**2)
     q, w = (0.3, 0.8, -0.4, 0.2), (0.05, -0.04, 0.06)
-    seen = seen_at(q, w, POSITION)
+    measurement = seen_at(q, w, POSITION)
     seen_other = seen_at(q, tuple(x / s for x in w), tuple(x * m for x in POSITION), 0.1 * s)
-    one = np.array(mpc.torque(seen, gains, craft, fresh(gains, craft))[0])
+    one = np.array(mpc.torque(measurement, gains, craft, fresh(gains, craft))[0])
     two = np.array(mpc.torque(seen_other, changed, other, fresh(changed, other, 0.1 * s))[0])
     assert two / torque_unit == pytest.approx(one, rel=1e-6)
 
@@ -124,10 +124,10 @@ def test_gains_are_checked_as_declared():
 @pytest.mark.parametrize("limit", ["axis", "norm"])
 def test_a_measurement_that_is_no_number_is_forgotten(limit: str):
     craft, gains = CRAFTS["principal"], mpc.Gains(*WEIGHTS, limit=mpc.LIMITS.index(limit))
-    seen = seen_at((0.3, 0.8, -0.4, 0.2), (0.05, -0.04, 0.06), POSITION)
+    measurement = seen_at((0.3, 0.8, -0.4, 0.2), (0.05, -0.04, 0.06), POSITION)
     memory = fresh(gains)
-    for rate in (seen.rate, (0.0, np.nan, 0.0)):
-        _, memory = mpc.torque(seen._replace(rate=rate), gains, craft, memory)
+    for rate in (measurement.rate, (0.0, np.nan, 0.0)):
+        _, memory = mpc.torque(measurement._replace(rate=rate), gains, craft, memory)
     assert mpc.counters(memory)[mpc.SHAPED] == 0
-    command, _ = mpc.torque(seen, gains, craft, memory)
-    assert command == mpc.torque(seen, gains, craft, fresh(gains))[0]
+    command, _ = mpc.torque(measurement, gains, craft, memory)
+    assert command == mpc.torque(measurement, gains, craft, fresh(gains))[0]

@@ -9,7 +9,7 @@ import pytest
 
 from starhold.algebra.structured import Buffer, repeat
 from starhold.laws import mpc
-from starhold.laws.interface import Seen
+from starhold.laws.interface import Measurement
 from starhold.laws.predictive.problem import Problem
 from starhold.laws.predictive.single import record_solver, work_out
 from starhold.laws.predictive.solver import PATIENCE
@@ -55,10 +55,10 @@ LIKE = 23
 """Numbers of what the law sees, but for the wheels' momentum."""
 
 
-def seen_in(numbers: Any) -> Seen:
+def seen_in(numbers: Any) -> Measurement:
     """What the law sees, from its numbers in order."""
     n = tuple(numbers)
-    return Seen(n[0:4], n[4:7], n[7:10], n[10:13], n[13:16], n[16:19], n[19:22], n[22])
+    return Measurement(n[0:4], n[4:7], n[7:10], n[10:13], n[13:16], n[16:19], n[19:22], n[22])
 
 
 def law_over_rows(gains: mpc.Gains, craft: Any) -> Subject:

@@ -16,8 +16,8 @@ from benchmarks import common
 
 from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.models.craft import EARTH
-from starhold.models.rigid_body import State
+from starhold.parts.bodies.rigid_body import State
+from starhold.parts.craft import EARTH
 from starhold.simulation.lane import fly
 
 pytest.importorskip("Basilisk", reason="Basilisk comes with the test extra where it has a wheel")

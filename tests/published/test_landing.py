@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from starhold.analysis.transient import Limits
-from starhold.report.compare import compare
-from starhold.report.modal_roots import law_lines, pick_modal, problem_of, study, write_table
 from starhold.report.modal_roots_picture import draw
 from starhold.scenario.reading import builtin_text, load, parse
+from starhold.studies.compare import compare
+from starhold.studies.modal_roots import law_lines, pick_modal, problem_of, study, write_table
 
 LIMITS = Limits(math.radians(30.0), math.radians(50.0))
 CHECKED = {10: -1.564, 45: -1.054, 85: -0.896, 90: -0.858, 135: -0.548, 180: -0.376}

@@ -13,16 +13,16 @@ from scipy.integrate import solve_ivp
 
 from starhold.algebra.vector import ZERO
 from starhold.laws.interface import NoMemory
-from starhold.laws.station.interface import SeenPoint
-from starhold.laws.station.l2_circle import peak_demand
-from starhold.models.libration import PointState
-from starhold.report.flight import Flight
-from starhold.report.station.compare import build, compare, fly_law
+from starhold.laws.l2_circle import peak_demand
+from starhold.laws.point import PointMeasurement
+from starhold.parts.bodies.libration_point import PointState
 from starhold.scenario.opening import open_scenario
 from starhold.scenario.reading import builtin_text
 from starhold.scenario.station.reading import parse_station
 from starhold.simulation.lanes import simulate_many
 from starhold.simulation.station import simulate_station
+from starhold.studies.flight import Flight
+from starhold.studies.station import build, compare, fly_law
 
 
 @cache
@@ -110,8 +110,8 @@ def test_ten_years_in_the_full_problem():
 
 
 def test_rest_is_kept_within_the_separatrices_and_lost_beyond():
-    flights = flown("l2-rest")
-    scenario = open_scenario("l2-rest")
+    flights = flown("l2-equilibrium")
+    scenario = open_scenario("l2-equilibrium")
     steep = 1.0 + 2.0 * scenario.craft.stiffness
     for name, flight in flights.items():
         saddle = scenario.pick(name).limit / steep
@@ -133,7 +133,7 @@ def test_the_circle_is_reached_from_a_quarter_inwards():
 
 def test_the_steepest_descent_of_the_published_v_stops_on_a_wrong_circle():
     """Its V' is zero where y' = -rate z and z' = rate y, whatever the radius."""
-    text = builtin_text("l2-circle").replace("layer = 0.005", "layer = 0.005\npull = 1e-9")
+    text = builtin_text("l2-circle").replace("boundary_layer = 0.005", "boundary_layer = 0.005\npull = 1e-9")
     scenario = parse_station(text, "greedy")
     entry = scenario.pick("l2-optimal")
     assert in_radii(fly_law(scenario, entry, build(scenario, entry)), "deviation") > 0.2
@@ -145,7 +145,7 @@ def test_the_steepest_descent_of_the_published_v_stops_on_a_wrong_circle():
         ("l2-circle", "smooth", 0.6),
         ("l2-deficit", "deficit 10", 0.6),
         ("l2-nonlinear", "full model", 0.6),
-        ("l2-rest", "beside Y", 0.6),
+        ("l2-equilibrium", "beside Y", 0.6),
     ],
 )
 def test_scipy_flies_the_same_in_the_limit_of_small_periods(scenario_name, law, years):
@@ -156,7 +156,7 @@ def test_scipy_flies_the_same_in_the_limit_of_small_periods(scenario_name, law, 
 
     def slope(_, state):
         position, velocity = tuple(state[:3]), tuple(state[3:])
-        command, _memory = loop.law.control(SeenPoint(position, velocity, 1e-3, size), loop.gains, plant, NoMemory())
+        command, _memory = loop.law.control(PointMeasurement(position, velocity, 1e-3, size), loop.gains, plant, NoMemory())
         return [*velocity, *np.add(motion(position, velocity, plant), limit(command, size))]
 
     start = [*loop.start.position, *loop.start.velocity]

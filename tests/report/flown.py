@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from starhold.analysis.metrics import measure
-from starhold.report.flight import Flight
 from starhold.scenario.building import build
 from starhold.scenario.reading import Scenario, builtin_text, parse
 from starhold.simulation.lane import Recording, fly, label
+from starhold.studies.flight import Flight
 
 HOSTILE = '</script><script>alert("ruse")</script><b>$x_1$ & co'
 
@@ -45,7 +45,7 @@ def flights() -> tuple[Flight, ...]:
         loop = build(found, entry)
         run = label(loop, *fly(loop, table.simulation.steps), 1)
         metrics = measure(run, table.settling.attitude_tolerance, table.settling.rate_tolerance)
-        made.append(Flight(entry.name, entry.law.name, run, metrics, {"k_rate": "0.09 N m s", "reach": "<5> mN m"}))
+        made.append(Flight(entry.name, entry.law.name, run, metrics, {"k_rate": "0.09 N m s", "switching_gain": "<5> mN m"}))
     return tuple(made)
 
 

@@ -12,9 +12,9 @@ from PIL import Image
 
 from starhold.algebra.cosines import to_angles
 from starhold.report.figures import draw
-from starhold.report.flight import COLOURS, Flight, colour, number_text
 from starhold.report.plots import collect, early, roll_pitch_yaw, thin, thin_times, until
 from starhold.simulation.lane import Recording
+from starhold.studies.flight import COLOURS, Flight, colour, number_text
 from tests.report import flown
 
 NAMES = ["scalar", "attitude", "rate", "torque", "angle", "roll-pitch-yaw", "accuracy"]

@@ -14,7 +14,7 @@ import pytest
 
 from starhold.analysis.metrics import MEASURES
 from starhold.analysis.ranking import ATTITUDE
-from starhold.models.craft import check_inertia
+from starhold.parts.craft import check_inertia
 from starhold.report.page import _box, render, write_page
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse

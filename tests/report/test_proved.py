@@ -91,7 +91,7 @@ def test_a_refuted_claim_shows_the_state_that_refutes_it() -> None:
     assert outcomes(found).count("refuted") == 2
     rate = ", ".join(f"{x:.4g}" for x in refuted.evidence["state"]["rate"])
     assert f"w = ({rate}) rad/s" in plain(found.text)
-    # Seen without opening anything.
+    # Measurement without opening anything.
     page = section([replace(flown.flights()[0], certificates=(certificate,))])
     summaries = re.findall(r"<summary>.*?</summary>", page, flags=re.DOTALL)
     assert any(rate in summary for summary in summaries)
@@ -111,7 +111,7 @@ def test_flights_without_certificates_have_no_section() -> None:
 def test_what_certificates_hold_is_no_markup() -> None:
     obligation = Obligation("form", flown.HOSTILE, "undecided", {"reason": flown.HOSTILE})
     claim = Claim("convergence", {"everything": True}, {}, (flown.HOSTILE,), (obligation,))
-    subject = {"double_cover": "as_published"}
+    subject = {"quaternion_sign": "as_published"}
     found = told(Certificate(flown.HOSTILE, subject, (claim,)))
     assert not any(tag == "script" for tag, _ in found.tags)
     assert found.text.count(flown.HOSTILE) >= 5
@@ -132,7 +132,7 @@ def test_the_whole_page_with_certificates_is_deterministic_and_loads_nothing() -
 def test_every_kind_of_claim_can_be_told_where_it_is_undecided(kind: str) -> None:
     numbers = {
         "convergence": {"rate_everywhere": 0.1, "everything": False},
-        "torque-limit": {"limit": 0.1, "kind": "axis", "level": 0.0, "start": 0.0, "turn": 0.0, "rate": 0.0},
+        "torque-limit": {"limit": 0.1, "kind": "axis", "level": 0.0, "start": 0.0, "slew_angle": 0.0, "rate": 0.0},
         "inertia": {"tolerance": 0.4},
         "disturbance": {"torque": 1e-3},
         "sampling": {"period": 1.0, "radius": 1.2, "eigenvalues": [[1.2, 0.0]], "longest": None, "every_shorter": False},
@@ -140,12 +140,12 @@ def test_every_kind_of_claim_can_be_told_where_it_is_undecided(kind: str) -> Non
         "region": {},
         "circle": {},
         "rest": {},
-        "saturated-axis": {"limit": 1.0, "width": 0.1, "reach": 100.0, "boundary": 0.11},
+        "saturated-axis": {"limit": 1.0, "width": 0.1, "switching_gain": 100.0, "boundary": 0.11},
         "control-limit": {"kind": "norm", "limit": 3.5},
         "sliding": {"torque": [0.0, 0.0, 0.0], "margin": 1e-3},
     }[kind]
     claim = Claim(kind, numbers, {}, (), (Obligation("form", "exact identity", "undecided", {"reason": "why not"}),))
-    found = told(Certificate("law", {"double_cover": "shortest"}, (claim,)))
+    found = told(Certificate("law", {"quaternion_sign": "shortest"}, (claim,)))
     assert outcomes(found) == ["undecided"] * 2
     assert "why not" in found.text
 

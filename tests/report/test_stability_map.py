@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from starhold.laws.stability_degree import boundary, optimum
 from starhold.report.stability_map import LINE, draw_map, sketch
+from starhold.synthesis.stability_degree import boundary, optimum
 
 GIVEN = [
     ((1.0, 1.5, 2.0), 0.5, 0.3, 2.0),

@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from starhold.analysis.station import BOARD, Circle, Rest, measure_station
-from starhold.report.flight import Flight, colour
-from starhold.report.station.compare import compare
+from starhold.analysis.station import BOARD, Circle, Equilibrium, measure_station
 from starhold.report.station.figures import draw
 from starhold.report.station.page import render, write_page
 from starhold.report.station.phase import phase_portrait
@@ -19,6 +17,8 @@ from starhold.report.station.plots import collect
 from starhold.scenario.reading import builtin_text
 from starhold.scenario.station.reading import StationScenario, parse_station
 from starhold.simulation.lane import Recording
+from starhold.studies.flight import Flight, colour
+from starhold.studies.station import compare
 from tests.report import flown
 from tests.report.test_page import Reader
 
@@ -95,11 +95,11 @@ def test_names_from_files_are_no_markup() -> None:
     assert name in found.words
 
 
-@pytest.mark.parametrize("name", ["l2-circle", "l2-deficit", "l2-rest"])
+@pytest.mark.parametrize("name", ["l2-circle", "l2-deficit", "l2-equilibrium"])
 def test_every_figure_is_drawn_with_every_law(tmp_path: Path, name: str) -> None:
     paths = draw(flights(name), tmp_path, told(name))
     names = {"deviation.png", "control.png", "projections.png", "space.png"} | (
-        {"phase.png"} if name == "l2-rest" else set()
+        {"phase.png"} if name == "l2-equilibrium" else set()
     )
     assert {path.name for path in paths} == names
     for path in paths:
@@ -118,8 +118,8 @@ def test_one_law_and_a_lost_one_alone_are_drawn(tmp_path: Path) -> None:
 
 
 def test_the_phase_portrait_is_as_the_publication_draws_it() -> None:
-    scenario = told("l2-rest")
-    plot = phase_portrait(flights("l2-rest"), scenario.laws, scenario)
+    scenario = told("l2-equilibrium")
+    plot = phase_portrait(flights("l2-equilibrium"), scenario.laws, scenario)
     assert plot is not None
     (plane,) = plot.planes
     saddle = scenario.laws[0].limit / (1.0 + 2.0 * scenario.craft.stiffness)
@@ -167,7 +167,7 @@ def test_metrics_of_a_run_made_by_hand() -> None:
     assert found["peak_ratio"] == pytest.approx(1.0)
     assert found["effort"] == pytest.approx(6.0 * units.velocity)
     assert found["effort_per_year"] == pytest.approx(6.0 * units.velocity * 365.25 * 86400 / (4.0 * units.time))
-    rest = measure_station(recording(position, control), units, Rest((0.0, 0.0, 1.0)), 0.01)
+    rest = measure_station(recording(position, control), units, Equilibrium((0.0, 0.0, 1.0)), 0.01)
     assert rest["final_distance"] == pytest.approx(np.sqrt(2.0) * units.length)
     assert (rest["settling_time"], rest["cut_off"]) == (None, ["settling_time"])
     assert found["cut_off"] == []

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from starhold.report.flight import Flight
 from starhold.report.page import render
 from starhold.report.plots import collect
 from starhold.report.transients import against_limits, section, told
 from starhold.scenario.reading import Scenario, parse
 from starhold.simulation.lane import Recording
+from starhold.studies.flight import Flight
 from tests.report import flown
 
 LIMITS = '[transient]\nrate_limit = 0.2\nacceleration_limit = "0.5 deg/s^2"\nangle_end = 3.0\nrate_end = 1.0\n'

@@ -5,8 +5,8 @@ import warnings
 import pytest
 
 from starhold.errors import InputError
-from starhold.report.kinds import kind_of
 from starhold.scenario.opening import open_scenario
+from starhold.studies.kinds import kind_of
 from tests.scenario.mutants import mutant
 
 EACH = 60

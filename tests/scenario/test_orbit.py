@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from starhold.errors import InputError
-from starhold.models.orbit import BODIES, Elements, body_of, from_elements, lowest, meets_at
+from starhold.parts.orbit import BODIES, Elements, body_of, from_elements, lowest, meets_at
 from starhold.scenario.reading import builtin_text, parse
 
 EARTH = BODIES["Earth"]

@@ -15,13 +15,13 @@ from pydantic_core import PydanticCustomError
 from starhold.errors import InputError
 from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import Gain
-from starhold.report.kinds import kind_of
 from starhold.scenario.building import build
 from starhold.scenario.opening import json_schema, open_scenario
 from starhold.scenario.quantity import reader
 from starhold.scenario.reading import builtin_names, builtin_text, load, parse
 from starhold.scenario.template import template_text
 from starhold.scenario.writing import law_table
+from starhold.studies.kinds import kind_of
 
 BASE = builtin_text("three-laws")
 
@@ -58,7 +58,7 @@ def test_the_published_experiment_is_as_published():
     assert (loop.start.position, loop.start.velocity) == ((7e6, 0.0, 0.0), (0.0, 7550.0, 0.0))
     assert (loop.period, loop.limit, loop.gravity_gradient) == (0.1, "axis", True)
     assert scenario.pick("lyapunov").gains == (0.09, 0.009)
-    assert scenario.pick("sliding").gains.slope == (0.08, 0.08, 0.08)
+    assert scenario.pick("sliding").gains.surface_gain == (0.08, 0.08, 0.08)
 
 
 FAULTS = {
@@ -161,7 +161,7 @@ FAULTS = {
     "law without type": ('type = "lyapunov"', "", ["law[1].type"]),
     "gain out of bounds": ("k_rate = 0.09", "k_rate = -0.09", ["law[1].k_rate", "-0.09", "above 0"]),
     "unknown mode": ('mode = "inertial"', 'mode = "inertia"', ["target.mode", "inertial"]),
-    "unknown cover": ("k_rate = 0.09", 'k_rate = 0.09\ndouble_cover = "short"', ["law[1].double_cover", "shortest"]),
+    "unknown sign policy": ("k_rate = 0.09", 'k_rate = 0.09\ndouble_cover = "short"', ["law[1].quaternion_sign", "shortest"]),
     "form of a law without": ("k_rate = 0.09", 'k_rate = 0.09\nform = "I"', ["law[1].form"]),
     "gravity without orbit": (
         "[orbit]\nposition = [7.0e6, 0, 0]         # m, inertial\nvelocity = [0, 7550, 0]",
@@ -262,7 +262,7 @@ def test_units_convert():
 
 def test_matrix_gain_takes_number_diagonal_or_matrix():
     matrices = [
-        parse(BASE.replace("slope = 0.08", f"slope = {text}"), "x").pick("sliding").gains.slope
+        parse(BASE.replace("surface_gain = 0.08", f"surface_gain = {text}"), "x").pick("sliding").gains.surface_gain
         for text in ("0.08", "[0.08, 0.08, 0.08]", "[[0.08, 0, 0], [0, 0.08, 0], [0, 0, 0.08]]")
     ]
     assert matrices == [(0.08, 0.08, 0.08)] * 3

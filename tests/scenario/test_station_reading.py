@@ -7,17 +7,17 @@ import jsonschema
 import numpy as np
 import pytest
 
-from starhold.analysis.station import Circle, Rest, goal_of
+from starhold.analysis.station import Circle, Equilibrium, goal_of
 from starhold.errors import InputError
-from starhold.laws.station.interface import station_laws
-from starhold.models.libration import EARTH_DIAMETER, PRIMARIES
-from starhold.report.kinds import kind_of
+from starhold.laws.point import station_laws
+from starhold.parts.bodies.libration_point import EARTH_DIAMETER, PRIMARIES
 from starhold.scenario.opening import json_schema, open_scenario
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.scenario.station.building import build
 from starhold.scenario.station.reading import StationScenario, parse_station
 from starhold.scenario.station.schema import StationLawTable, StationTable
 from starhold.scenario.template import template_text
+from starhold.studies.kinds import kind_of
 
 BASE = builtin_text("l2-circle")
 OWN = 'larger = 1.327e20\nsmaller = 4.035e14\nseparation = "1.496e11 m"'
@@ -90,13 +90,13 @@ FAULTS = {
     "gain out of bounds": ("radius = 1.0", "radius = -1.0", ["law[1].radius", "above 0"]),
     "same name": ('name = "relay"', 'name = "smooth"', ["law[2].name", "no other law"]),
     "deficit of rest": (
-        'type = "l2-optimal"\nlayer = 0.005\nform = "best"\nradius = 1.0',
-        'type = "l2-rest"\nform = "degree"\ndeficit = 0.1',
+        'type = "l2-optimal"\nboundary_layer = 0.005\nform = "best"\nradius = 1.0',
+        'type = "l2-equilibrium"\nform = "degree"\ndeficit = 0.1',
         ["law[4].deficit", "without a circle"],
     ),
     "margin of rest": (
-        'type = "l2-optimal"\nlayer = 0.005\nform = "best"\nradius = 1.0',
-        'type = "l2-rest"\nform = "degree"',
+        'type = "l2-optimal"\nboundary_layer = 0.005\nform = "best"\nradius = 1.0',
+        'type = "l2-equilibrium"\nform = "degree"',
         ["control.margin", "without a circle"],
     ),
     "no best rate": ('point = "L2"', 'point = "L3"', ["law[1]", "not above 2"]),
@@ -139,15 +139,14 @@ def test_strings_with_units_are_scaled():
 def test_lengths_of_laws_take_units_too():
     """Laws' radii, places, rates and layers: numbers are scaled, strings carry units, as in the other tables."""
     head = BASE.split("[[law]]")[0]
-    law = (
-        '[[law]]\ntype = "l2-circle"\nradius = "6371 km"\nrate = "0.01 rad/d"\nlayer = "1 cm/s"\nalpha = 1\nk = 1\nk_x = 18'
-    )
+    law = '[[law]]\ntype = "l2-circle"\nradius = "6371 km"\nrate = "0.01 rad/d"\nboundary_layer = "1 cm/s"\nalpha = 1'
+    law += "\nk = 1\nk_x = 18"
     scenario = parse_station(f"{head}{law}\nk_velocity = 6", "my.toml")
     gains, units = scenario.laws[0].gains, scenario.units
     assert gains.radius == pytest.approx(0.5, rel=1e-15)
     assert gains.rate == pytest.approx(0.01 / 86400.0 * units.time)
-    assert gains.layer == pytest.approx(0.01 / units.velocity)
-    rest = f'{head}[[law]]\ntype = "l2-rest"\nform = "degree"\nlimit = 1.0\ny = "-12742 km"\nz = 0.5'
+    assert gains.boundary_layer == pytest.approx(0.01 / units.velocity)
+    rest = f'{head}[[law]]\ntype = "l2-equilibrium"\nform = "degree"\nlimit = 1.0\ny = "-12742 km"\nz = 0.5'
     assert parse_station(rest, "my.toml").laws[0].gains[:2] == pytest.approx((-1.0, 0.5))
 
 
@@ -163,7 +162,7 @@ def test_a_limit_in_the_law_comes_before_the_common_one():
 
 
 def test_starts_on_the_circle_of_each_law_and_at_its_place_of_rest():
-    for name in ("l2-circle", "l2-rest"):
+    for name in ("l2-circle", "l2-equilibrium"):
         scenario = open_scenario(name)
         assert isinstance(scenario, StationScenario)
         for entry in scenario.laws:
@@ -173,7 +172,7 @@ def test_starts_on_the_circle_of_each_law_and_at_its_place_of_rest():
             if isinstance(goal, Circle):
                 assert loop.start.velocity == (0.0, 0.0, goal.rate)
             else:
-                assert isinstance(goal, Rest)
+                assert isinstance(goal, Equilibrium)
                 assert loop.start.velocity == (0.0, 0.0, 0.0)
 
 
@@ -214,7 +213,7 @@ def test_each_kind_is_refused_where_the_other_is_needed():
 def test_unstable_gains_are_refused_unless_they_are_allowed(tmp_path):
     head = BASE.split("[[law]]")[0]
     circle = 'type = "l2-circle"\nradius = 1\nrate = 1.4\nalpha = 1\nk = 1\nk_x = {}\nk_velocity = 6'
-    rest = 'type = "l2-rest"\nlimit = 1.0\ny = 0\nz = 0\nk_x = {}\nk_velocity = [6.0, {}, 4.0]'
+    rest = 'type = "l2-equilibrium"\nlimit = 1.0\ny = 0\nz = 0\nk_x = {}\nk_velocity = [6.0, {}, 4.0]'
     for law in (circle.format(8.8), rest.format(8.8, 3.4), rest.format(17.8, 0.0)):
         (tmp_path / "my.toml").write_text(f"{head}[[law]]\n{law}")
         with pytest.raises(InputError, match=r"law\[1\]: .*--allow-unstable"):
@@ -227,4 +226,4 @@ def test_unstable_gains_are_refused_unless_they_are_allowed(tmp_path):
 def test_every_station_law_has_a_goal():
     for law in station_laws().values():
         for gains in law.examples():
-            assert isinstance(goal_of(gains), Circle | Rest)
+            assert isinstance(goal_of(gains), Circle | Equilibrium)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from starhold.errors import InputError
-from starhold.report.modal_roots import pick_modal, study
 from starhold.scenario.designing import design
 from starhold.scenario.reading import builtin_text, load, parse
+from starhold.studies.modal_roots import pick_modal, study
 
 BASE = builtin_text("landing-limits")
 COARSE = BASE.replace('step = "5 deg"', 'step = "85 deg"').replace("step = 0.001", "step = 0.05")

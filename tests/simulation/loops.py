@@ -9,17 +9,17 @@ import numpy as np
 
 from starhold.conformance.bench import random_quaternions, sample_loop
 from starhold.laws.catalogue import catalogue
-from starhold.laws.station.interface import station_laws
+from starhold.laws.point import station_laws
 from starhold.loop.kernels import Numbers, form
 from starhold.loop.station import StationLoop
-from starhold.models.actuator import Dynamics
-from starhold.models.libration import PRIMARIES, PointState
-from starhold.models.sensor import Noise
-from starhold.models.target import tabulate
-from starhold.report.kinds import kind_of
+from starhold.parts.actuators.dynamics import Dynamics
+from starhold.parts.bodies.libration_point import PRIMARIES, PointState
+from starhold.parts.sensors.gaussian import Noise
+from starhold.parts.targets.target import tabulate
 from starhold.scenario.building import build
 from starhold.scenario.opening import open_scenario
 from starhold.scenario.reading import builtin_names, builtin_text, parse
+from starhold.studies.kinds import kind_of
 
 NOISE = Noise(1e-4, 1e-3, 1e-4)
 FAULT = """
@@ -59,7 +59,10 @@ def choices() -> dict[str, Any]:
         for name, law in laws.items()
         for place, gains in enumerate(law.examples())
     }
-    found |= {f"{cover}, {kind}": replace(plain, cover=cover, limit=kind) for cover, kind in zip(COVERS, KINDS, strict=True)}
+    found |= {
+        f"{cover}, {kind}": replace(plain, sign_policy=cover, limit=kind)
+        for cover, kind in zip(SIGN_POLICIES, KINDS, strict=True)
+    }
     found["orbital target"] = replace(plain, target="orbital")
     times = np.arange(12) * 10.0
     table = tabulate(times, np.array(random_quaternions(12)), np.arange(1101) * plain.period)
@@ -80,4 +83,4 @@ def choices() -> dict[str, Any]:
     return found
 
 
-COVERS, KINDS = ("as_published", "shortest", "hysteresis"), ("none", "norm", "axis")
+SIGN_POLICIES, KINDS = ("as_published", "shortest", "hysteresis"), ("none", "norm", "axis")

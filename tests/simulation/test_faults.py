@@ -9,15 +9,15 @@ from starhold.algebra.quaternion import to_reference
 from starhold.algebra.structure import flatten
 from starhold.algebra.vector import ZERO
 from starhold.errors import InputError
-from starhold.laws.interface import NoMemory, Seen
+from starhold.laws.interface import Measurement, NoMemory
 from starhold.loop.kernels import make_step
-from starhold.models.craft import make_craft, tensor
-from starhold.models.envelope import authority
-from starhold.report.certificates import certify_scenario
+from starhold.parts.craft import make_craft, tensor
+from starhold.parts.effectors.envelope import authority
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, parse
 from starhold.simulation.lane import fly, label
 from starhold.simulation.lanes import simulate_many
+from starhold.studies.certificates import certify_scenario
 from tests import small
 
 WHEELS = builtin_text("wheels-orbital").replace("gravity_gradient = true", "gravity_gradient = false")
@@ -124,7 +124,7 @@ def test_the_law_reckons_with_the_old_inertia_until_the_diagnosis(action):
     told, apart = 300 if action == "none" else 150, 0
     for k in range(300):
         q, w = tuple(run["attitude_error"][k].tolist()), tuple(run["rate"][k].tolist())
-        seen = Seen(q, w, w, ZERO, ZERO, ZERO, ZERO, loop.period)
+        seen = Measurement(q, w, w, ZERO, ZERO, ZERO, ZERO, loop.period)
         by_old, by_new = (loop.law.torque(seen, loop.gains, craft, NoMemory())[0] for craft in (old, new))
         assert tuple(run["command"][k].tolist()) == (by_old if k < told else by_new)
         apart += by_old != by_new

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from starhold.errors import InputError
-from starhold.report.compare import build, record
 from starhold.report.netcdf import BLOCK
 from starhold.report.results import write_run
 from starhold.scenario.reading import load
 from starhold.simulation import lane
+from starhold.studies.compare import build, record
 
 
 def test_samples_on_disk_are_those_in_memory(monkeypatch):

@@ -9,9 +9,9 @@ from starhold.algebra.structure import flatten
 from starhold.conformance.bench import random_quaternions, sample_loop
 from starhold.laws.catalogue import catalogue
 from starhold.loop.kernels import fly_plainly
-from starhold.models.actuator import Dynamics
-from starhold.models.craft import make_craft
-from starhold.models.sensor import Noise
+from starhold.parts.actuators.dynamics import Dynamics
+from starhold.parts.craft import make_craft
+from starhold.parts.sensors.gaussian import Noise
 from starhold.simulation.lane import fly, simulate
 from starhold.simulation.lanes import alongside, carry_columns, simulate_many
 

@@ -12,8 +12,13 @@ from scipy.optimize import linprog
 from starhold.analysis.metrics import measure
 from starhold.cli.failing import print_failures
 from starhold.errors import InputError
-from starhold.models.wheels import lose, make_wheels, pyramid
-from starhold.report.failures import (
+from starhold.parts.effectors.wheels import lose, make_wheels, pyramid
+from starhold.report.failures_picture import draw
+from starhold.report.results import open_folder
+from starhold.scenario.building import build
+from starhold.scenario.reading import builtin_text, load, parse
+from starhold.simulation.lane import fly, label
+from starhold.studies.failures import (
     FULL,
     Failure,
     _flown,
@@ -23,11 +28,6 @@ from starhold.report.failures import (
     study,
     write_table,
 )
-from starhold.report.failures_picture import draw
-from starhold.report.results import open_folder
-from starhold.scenario.building import build
-from starhold.scenario.reading import builtin_text, load, parse
-from starhold.simulation.lane import fly, label
 from tests.running import starhold
 
 BUILTIN = builtin_text("wheels-orbital")

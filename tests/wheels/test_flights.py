@@ -7,10 +7,10 @@ import pytest
 
 from starhold.algebra.quaternion import to_reference
 from starhold.errors import InputError
-from starhold.models.craft import make_craft, tensor
-from starhold.models.envelope import authority
-from starhold.models.rigid_body import State
-from starhold.models.wheels import make_wheels, pyramid, stored
+from starhold.parts.bodies.rigid_body import State
+from starhold.parts.craft import make_craft, tensor
+from starhold.parts.effectors.envelope import authority
+from starhold.parts.effectors.wheels import make_wheels, pyramid, wheel_momentum
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import fly, label
@@ -57,7 +57,7 @@ def test_total_angular_momentum_is_kept_without_torque_from_outside(layout, allo
     J = tensor(loop.craft.inertia)
     total = []
     for q, w, h in zip(run["attitude"], run["rate"], run["wheel_momentum"], strict=True):
-        body = J @ w + np.array(stored(tuple(h), loop.wheels))
+        body = J @ w + np.array(wheel_momentum(tuple(h), loop.wheels))
         total.append(to_reference(tuple(q), tuple(body)))
     total = np.array(total)
     size = np.linalg.norm(total[0])
@@ -130,7 +130,7 @@ def test_retuned_gains_are_those_designed_for_the_torque_left():
 
 def test_authority_is_the_torque_that_every_direction_can_have():
     wheels = make_wheels(pyramid(), 1e-3, 0.02, 0.4)
-    from starhold.models.wheels import allocate
+    from starhold.parts.effectors.wheels import allocate
 
     random = np.random.default_rng(0)
     directions = random.normal(size=(500, 3))

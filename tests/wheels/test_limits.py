@@ -10,14 +10,14 @@ from starhold.analysis.metrics import measure
 from starhold.errors import InputError
 from starhold.loop.kernels import fly_plainly
 from starhold.loop.step import attitude_step
-from starhold.models.envelope import authority, with_facets
-from starhold.models.wheels import MOST, allocate_peak
-from starhold.report.flight import Flight
+from starhold.parts.effectors.envelope import authority, with_facets
+from starhold.parts.effectors.wheels import MOST, allocate_peak
 from starhold.report.plots import collect
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
 from starhold.simulation.lane import fly, label
 from starhold.simulation.lanes import simulate_many
+from starhold.studies.flight import Flight
 
 CRAFT = """
 name = "on wheels"

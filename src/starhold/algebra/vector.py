@@ -76,8 +76,8 @@ def apply(m: Matrix | Vector, a: Vector) -> Vector:
     return times(rows, a) if _is_diagonal(m) else (dot(rows[0], a), dot(rows[1], a), dot(rows[2], a))
 
 
-def swing(m: Matrix | Vector, a: Vector) -> Vector:
-    """a x (m a) for a symmetric m: the gyroscopic torque is swing(J, w). A vector stands for a diagonal m."""
+def gyroscopic_torque(m: Matrix | Vector, a: Vector) -> Vector:
+    """a x (m a) for a symmetric m: the gyroscopic torque is gyroscopic_torque(J, w). A vector stands for a diagonal m."""
     if _is_diagonal(m):
         j: Any = m
         return ((j[2] - j[1]) * (a[1] * a[2]), (j[0] - j[2]) * (a[2] * a[0]), (j[1] - j[0]) * (a[0] * a[1]))

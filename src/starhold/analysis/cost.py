@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import Arguments, Numbers, make_kernel, numbers_of, replay
-from starhold.models.sensor import exact, no_disturbance
+from starhold.parts.sensors.gaussian import exact, no_disturbance
 
 if TYPE_CHECKING:
     from starhold.simulation.lane import Recording

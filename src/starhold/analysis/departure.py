@@ -15,13 +15,13 @@ from starhold.algebra.vector import ZERO
 from starhold.analysis.metrics import ALMOST, on_limit
 from starhold.certification.certificate import WHEELS
 from starhold.certification.region import Shape
-from starhold.laws.double_cover import COVERS
-from starhold.laws.interface import Seen
+from starhold.laws.interface import Measurement
 from starhold.loop.kernels import make_step
-from starhold.models.craft import tensor
-from starhold.models.rigid_body import kinetic_energy
-from starhold.models.sensor import SILENT
-from starhold.models.wheels import BAND, Wheels
+from starhold.parts.bodies.rigid_body import kinetic_energy
+from starhold.parts.craft import tensor
+from starhold.parts.effectors.wheels import BAND, Wheels
+from starhold.parts.quaternion_sign import SIGN_POLICIES
+from starhold.parts.sensors.gaussian import SILENT
 
 if TYPE_CHECKING:
     from starhold.certification.certificate import Certificate, Claim
@@ -173,13 +173,13 @@ MET: Mapping[str, Callable[[Span], list[Departure]]] = {
 def cancels(loop: ClosedLoop) -> bool:
     """Whether the law takes the torque that the models know from what it commands: at the start, whatever that is."""
     loop = replace(loop, noise=SILENT)
-    seen = make_step(loop.parts()).look(loop.carry(), 0, 0, loop.craft, loop.setup())
+    measurement = make_step(loop.parts()).look(loop.carry(), 0, 0, loop.craft, loop.setup())
     memory = loop.law.remember(loop.gains, loop.craft, loop.period)
     more = 0.01 * loop.craft.torque_limit if math.isfinite(loop.craft.torque_limit) else 1.0
     # From rest on target, where clipped and switching laws are farthest from their limits.
-    seen = seen._replace(attitude=(1.0, 0.0, 0.0, 0.0), rate=ZERO)
+    measurement = measurement._replace(attitude=(1.0, 0.0, 0.0, 0.0), rate=ZERO)
     torques = [
-        np.array(loop.law.torque(seen._replace(external_torque=(x, x, x)), loop.gains, loop.craft, memory)[0])
+        np.array(loop.law.torque(measurement._replace(external_torque=(x, x, x)), loop.gains, loop.craft, memory)[0])
         for x in (0.0, more)
     ]
     return bool(np.allclose(torques[0] - torques[1], more, rtol=1e-6))
@@ -221,10 +221,10 @@ def _function(claim: Claim, span: Span) -> Array | None:
         return np.asarray(kinetic_energy(cast(Any, rate), loop.craft) + 2.0 * stiffness * (1.0 - q[0]))
     # What has been read as a polynomial takes whole columns at once.
     columns: Any = [tuple(x.T) for x in (span["rate"], span["rate"] - span["rate_error"], _stored(span))]
-    seen = Seen(tuple(q), cast(Any, rate), columns[0], columns[1], ZERO, ZERO, ZERO, loop.period, columns[2])
+    measurement = Measurement(tuple(q), cast(Any, rate), columns[0], columns[1], ZERO, ZERO, ZERO, loop.period, columns[2])
     if claim.kind == "sliding":
-        return np.asarray(kinetic_energy(loop.law.module.surface(seen, loop.gains), loop.craft))
-    return None if function is None else np.asarray(function(seen, loop.gains, loop.craft))
+        return np.asarray(kinetic_energy(loop.law.module.surface(measurement, loop.gains), loop.craft))
+    return None if function is None else np.asarray(function(measurement, loop.gains, loop.craft))
 
 
 def _levels(claim: Claim) -> tuple[float | None, float | None]:
@@ -240,12 +240,12 @@ def _stored(span: Span) -> Array:
 
 def fed_back(loop: ClosedLoop, error: Array) -> Array:
     """The quaternions (n, 4) that the law is shown without noise, of the true errors (n, 4)."""
-    if loop.cover == "as_published":
+    if loop.sign_policy == "as_published":
         return error
-    if loop.cover == "shortest":
+    if loop.sign_policy == "shortest":
         return np.where(error[:, :1] < 0.0, -error, error)
     h, shown = side(float(error[0, 0])), np.empty(len(error))
     for place, q0 in enumerate(error[:, 0].tolist()):
-        h = COVERS["hysteresis"]((q0, 0.0, 0.0, 0.0), h, loop.hysteresis_width)[1]
+        h = SIGN_POLICIES["hysteresis"]((q0, 0.0, 0.0, 0.0), h, loop.hysteresis_width)[1]
         shown[place] = h
     return error * shown[:, None]

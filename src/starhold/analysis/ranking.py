@@ -13,7 +13,7 @@ LATE = " †"
 
 
 @dataclass(frozen=True)
-class Board:
+class MetricSet:
     """How results of a kind of scenario are told: the metrics that are shown, less being better in each; those that laws are
     ranked by in turn; and the unit of time, with its seconds."""
 
@@ -75,5 +75,5 @@ class Board:
         return [self.measures[metric].heading for metric in self.order if metric in there]
 
 
-ATTITUDE = Board(MEASURES, ("settling_time", "final_attitude_error", "effort"))
+ATTITUDE = MetricSet(MEASURES, ("settling_time", "final_attitude_error", "effort"))
 """Settled before unsettled, then sooner, then more accurate, then more sparing."""

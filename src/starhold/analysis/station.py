@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from starhold.algebra.vector import ZERO, Vector
 from starhold.analysis.metrics import LAST, Measure, limit_share, stays_within, too_late
-from starhold.analysis.ranking import Board
+from starhold.analysis.ranking import MetricSet
 
 if TYPE_CHECKING:
-    from starhold.models.libration import Units
+    from starhold.parts.bodies.libration_point import Units
     from starhold.simulation.lane import Recording
 
 DAY, YEAR = 86_400.0, 365.25 * 86_400.0
@@ -36,7 +36,7 @@ class Circle(NamedTuple):
         return np.hypot(np.hypot(position[:, 1], position[:, 2]) - self.radius, position[:, 0])
 
 
-class Rest(NamedTuple):
+class Equilibrium(NamedTuple):
     """A place of rest; scaled."""
 
     place: Vector
@@ -50,12 +50,12 @@ class Rest(NamedTuple):
         return np.linalg.norm(position - np.array(self.place), axis=1)
 
 
-def goal_of(gains: Any) -> Circle | Rest:
+def goal_of(gains: Any) -> Circle | Equilibrium:
     """Tell from its gains what a law makes for: a circle of this radius and rate, else rest at this y and z, or at the
     libration point."""
     if hasattr(gains, "radius") and hasattr(gains, "rate"):
         return Circle(gains.radius, gains.rate)
-    return Rest((0.0, getattr(gains, "y", 0.0), getattr(gains, "z", 0.0)))
+    return Equilibrium((0.0, getattr(gains, "y", 0.0), getattr(gains, "z", 0.0)))
 
 
 MEASURES: dict[str, Measure] = {
@@ -75,10 +75,10 @@ MEASURES: dict[str, Measure] = {
 }
 """The metrics a comparison shows; in each, less is better."""
 
-BOARD = Board(MEASURES, ("deviation", "settling_time", "effort_per_year"), "days", DAY)
+BOARD = MetricSet(MEASURES, ("deviation", "settling_time", "effort_per_year"), "days", DAY)
 
 
-def measure_station(run: Recording, units: Units, goal: Circle | Rest, tolerance: float) -> dict[str, Any]:
+def measure_station(run: Recording, units: Units, goal: Circle | Equilibrium, tolerance: float) -> dict[str, Any]:
     """Metrics of a run as `simulate_station` gives it; `tolerance` (scaled) is the distance that counts as near. Times that
     are never reached are None, as are all final values of a motion that was lost; `diverged_at` (s) is None for one that
     was not; `cut_off` names a time that is None because it lies within the last quarter of the run."""

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from starhold.analysis.departure import LOST, Departure
 from starhold.analysis.metrics import on_limit
-from starhold.laws.station import l2_circle
-from starhold.laws.station.interface import SeenPoint
+from starhold.laws import l2_circle
+from starhold.laws.point import PointMeasurement
 
 if TYPE_CHECKING:
     from starhold.certification.certificate import Certificate, Claim
@@ -78,6 +78,6 @@ def outside(
 
 def circle_value(gains: Any, position: NDArray[np.float64], velocity: NDArray[np.float64]) -> NDArray[np.float64]:
     """V of the circle at many states, (3, n) each."""
-    seen: Any = SeenPoint(tuple(position), tuple(velocity), 0.0, math.inf)
-    f1, f2, f3 = l2_circle.errors(seen, gains)
+    measurement: Any = PointMeasurement(tuple(position), tuple(velocity), 0.0, math.inf)
+    f1, f2, f3 = l2_circle.errors(measurement, gains)
     return np.asarray(0.5 * (gains.alpha * f1 * f1 + f2 * f2 + f3 * f3))

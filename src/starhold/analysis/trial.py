@@ -22,12 +22,12 @@ from starhold.certification.region import Shape
 from starhold.certification.sampling import stable_period
 from starhold.certification.sliding import take_surface
 from starhold.certification.subject import make_subject
-from starhold.laws.interface import Seen
+from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.models.actuator import IDEAL
-from starhold.models.craft import tensor
-from starhold.models.sensor import SILENT
-from starhold.models.wheels import Wheels
+from starhold.parts.actuators.dynamics import IDEAL
+from starhold.parts.craft import tensor
+from starhold.parts.effectors.wheels import Wheels
+from starhold.parts.sensors.gaussian import SILENT
 from starhold.simulation.lanes import Batch, simulate_many
 
 FLIGHTS = 10_000
@@ -96,7 +96,7 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
 def _fly_region(loop: ClosedLoop, certificate: Certificate, claim: Claim, flights: int, seed: int) -> Trial:
     free, shape, level = _undisturbed(loop, certificate), Shape(**claim.witness), claim.numbers["level"]
     a = free.law.module.single_root(free.gains)[0]
-    sign: Callable[[Array], Any] = lambda q0: np.where(q0 < 0.0, -1.0, 1.0) if free.cover == "shortest" else 1.0  # noqa: E731
+    sign: Callable[[Array], Any] = lambda q0: np.where(q0 < 0.0, -1.0, 1.0) if free.sign_policy == "shortest" else 1.0  # noqa: E731
 
     def value(states: Array) -> Array:
         return shape.value(a, states[:4] * sign(states[0]), states[4:7])
@@ -138,7 +138,7 @@ def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, fl
     """From random states with s.Js/2 <= level, long enough to reach the surface without torque from outside."""
     J = tensor(loop.craft.inertia)
     least, greatest = (float(x) for x in np.linalg.eigvalsh(J)[[0, -1]])
-    free = replace(_undisturbed(loop, certificate), cover="as_published")
+    free = replace(_undisturbed(loop, certificate), sign_policy="as_published")
     found = take_surface(Motion(make_subject(free)))
     reach, layer = np.array([number(g) for g in found.reach]), number(found.layer)
     free = replace(free, period=_sliding_period(free.period, floats(found.K), reach, least, greatest))
@@ -152,7 +152,7 @@ def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, fl
 
     def s_of(states: Array) -> Array:
         w: Any = tuple(states[4:7])
-        return np.array(surface(Seen(tuple(states[:4]), w, w, ZERO, ZERO, ZERO, ZERO, free.period), loop.gains))  # type: ignore
+        return np.array(surface(Measurement(tuple(states[:4]), w, w, ZERO, ZERO, ZERO, ZERO, free.period), loop.gains))  # type: ignore
 
     # Drawn as rates, s is taken as what was drawn: w = s - Kq.
     wanted = np.sqrt(level / (2.0 + level)) * states[4:7]
@@ -235,7 +235,7 @@ def _undisturbed(loop: ClosedLoop, certificate: Certificate) -> ClosedLoop:
         noise=SILENT,
         limit="none",
         dynamics=IDEAL,
-        cover="shortest" if loop.cover == "hysteresis" else loop.cover,
+        sign_policy="shortest" if loop.sign_policy == "hysteresis" else loop.sign_policy,
     )
 
 
@@ -278,7 +278,7 @@ def _value(loop: ClosedLoop, frame: Frame, epsilon: float) -> Callable[[Array], 
     P, J, potential = floats(frame.P), tensor(loop.craft.inertia), frame.potential
 
     def value(states: Array) -> Array:
-        q, w = states[:4] * (np.where(states[0] < 0.0, -1.0, 1.0) if loop.cover == "shortest" else 1.0), states[4:7]
+        q, w = states[:4] * (np.where(states[0] < 0.0, -1.0, 1.0) if loop.sign_policy == "shortest" else 1.0), states[4:7]
         return np.einsum("ik,ij,jk->k", w, P, w) / 2.0 + potential.of(q) + epsilon * np.einsum("ik,ij,jk->k", q[1:], J, w)
 
     return value
@@ -289,7 +289,7 @@ def _need(states: Array, loop: ClosedLoop, claim: Claim) -> float:
     torque = states[13:16]
     if claim.kind == "wheels":
         wheels = cast(Wheels, loop.wheels)
-        needs = (np.array(wheels.least) @ torque, claim.numbers["motors"]), (states[16:], claim.numbers["stored"])
+        needs = (np.array(wheels.least) @ torque, claim.numbers["motors"]), (states[16:], claim.numbers["wheel_momentum"])
         # What a lost wheel is claimed to need is zero, and it needs that.
         return max(float((np.abs(found).max(axis=1) / np.maximum(limits, 1e-300)).max()) for found, limits in needs)
     size = np.linalg.norm(torque, axis=0) if loop.limit == "norm" else np.abs(torque)

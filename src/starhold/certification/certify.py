@@ -21,7 +21,7 @@ from starhold.certification.saturation import FREE, saturation
 from starhold.certification.sliding import surface_claim
 from starhold.certification.subject import Subject, described, make_subject
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.models.wheels import gives_what_is_asked
+from starhold.parts.effectors.wheels import gives_what_is_asked
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Wanted:
     """
 
     rate: float | None = None
-    turn: float | None = None
+    slew_angle: float | None = None
     inertia_tolerance: float | None = None
     disturbance: float = 0.0
     momentum: float | None = None
@@ -88,9 +88,9 @@ def _by_lyapunov(subject: Subject, wanted: Wanted) -> list[Claim]:
     # The law's own V, where it serves, gives the larger sets.
     basin = own or found
     wheeled = subject.loop.wheels is not None
-    limit = saturation(basin, wanted.turn) if wheeled else torque_limit(basin, wanted.turn)
+    limit = saturation(basin, wanted.slew_angle) if wheeled else torque_limit(basin, wanted.slew_angle)
     more = (
-        (limit, wanted.turn or (wheeled and wanted.momentum is not None)),
+        (limit, wanted.slew_angle or (wheeled and wanted.momentum is not None)),
         (disturbance(basin), wanted.disturbance),
         (inertia_box(basin, wanted.inertia_tolerance), wanted.inertia_tolerance),
     )
@@ -100,15 +100,15 @@ def _by_lyapunov(subject: Subject, wanted: Wanted) -> list[Claim]:
 
 def _unshown(subject: Subject, wanted: Wanted) -> list[Claim]:
     """What is asked of a law without a V of its own."""
-    rate, turn, tolerance = wanted.rate, wanted.turn, wanted.inertia_tolerance
+    rate, turn, tolerance = wanted.rate, wanted.slew_angle, wanted.inertia_tolerance
     asked: list[tuple[str, dict[str, Any]]] = []
     if rate is not None:
         asked.append(("convergence", {"rate_everywhere": None if isinf(rate) else rate, "everything": isinf(rate)}))
     limit = subject.loop.craft.torque_limit
     if turn is not None and subject.loop.wheels is not None:
-        asked.append(("wheels", {"turn": turn}))
+        asked.append(("wheels", {"slew_angle": turn}))
     elif turn is not None and subject.loop.limit != "none" and isfinite(limit):
-        asked.append(("torque-limit", {"turn": turn, "kind": subject.loop.limit, "limit": limit}))
+        asked.append(("torque-limit", {"slew_angle": turn, "kind": subject.loop.limit, "limit": limit}))
     if tolerance is not None:
         asked.append(("inertia", {"tolerance": tolerance}))
     return [_undecided(kind, numbers, subject, "the law declares no V to show it with") for kind, numbers in asked]

@@ -26,11 +26,11 @@ from starhold.certification.boxes import Sides, holds_on
 from starhold.certification.certificate import BALLS, EXACT, EXACT_SIGN, LASALLE, Claim
 from starhold.certification.convergence import ALMOST, Obligations
 from starhold.certification.matrices import number, root_float
-from starhold.certification.station_terms import UNLIMITED, assumed, mismatch, seen_point
+from starhold.certification.station_terms import UNLIMITED, assumed, mismatch, point_measurement
 from starhold.certification.subject import above, below
-from starhold.laws.station import l2_circle as law
+from starhold.laws import l2_circle as law
 from starhold.loop.station import StationLoop
-from starhold.models.libration import linear
+from starhold.parts.bodies.libration_point import linear
 
 IN_PLANE = "starts in the plane x = 0 without a rate along X"
 MOST = 400_000
@@ -72,7 +72,7 @@ def attracts(loop: StationLoop) -> Claim:
         return finish()
     found.add("form", EXACT, True)
     g = circle.gains
-    if g.feedback == 1 and g.layer == 0:
+    if g.feedback == 1 and g.boundary_layer == 0:
         held = _held_circle(circle)
         apart = held["radius"] != number(g.radius) and 0.0 < held["needs"] <= number(g.k)
         found.add("only the circle", LASALLE, False if apart else None, held if apart else {"reason": TOO_NEAR})
@@ -135,10 +135,12 @@ def _told(circle: Circle, level: float) -> dict[str, Any]:
 def _is_neutral(circle: Circle) -> bool:
     """Whether, along the linear model under the neutral control, V' = 0, f2' = -2 alpha f1 y, f3' = -2 alpha f1 z, and x''
     is a linear function of x and x' alone with the coefficients of the feedback."""
-    seen, plant, gains = seen_point(), constants(circle.plant), constants(circle.gains)
-    acceleration: Any = add(linear(seen.position, seen.velocity, plant), law.neutral(seen, gains, plant))
+    measurement, plant, gains = point_measurement(), constants(circle.plant), constants(circle.gains)
+    acceleration: Any = add(
+        linear(measurement.position, measurement.velocity, plant), law.neutral(measurement, gains, plant)
+    )
     names = [f"x{i}" for i in (1, 2, 3)], [f"v{i}" for i in (1, 2, 3)]
-    rates = dict(zip((*names[0], *names[1]), (*seen.velocity, *acceleration), strict=True))
+    rates = dict(zip((*names[0], *names[1]), (*measurement.velocity, *acceleration), strict=True))
 
     def along(function: Any) -> Polynomial:
         total: Any = Polynomial.constant(0)
@@ -146,12 +148,17 @@ def _is_neutral(circle: Circle) -> bool:
             total = total + function.slope(name) * rate
         return total
 
-    f1, f2, f3 = law.errors(seen, gains)
-    y, z = seen.position[1], seen.position[2]
+    f1, f2, f3 = law.errors(measurement, gains)
+    y, z = measurement.position[1], measurement.position[2]
     pulled = 2 * gains.alpha * f1
     steep = circle.plant.rate**2 + 2 * circle.plant.stiffness
-    x = (steep - circle.gains.k_x) * seen.position[0] - circle.gains.k_velocity * seen.velocity[0]
-    parts = (along(law.lyapunov(seen, gains, plant)), along(f2) + pulled * y, along(f3) + pulled * z, acceleration[0] - x)
+    x = (steep - circle.gains.k_x) * measurement.position[0] - circle.gains.k_velocity * measurement.velocity[0]
+    parts = (
+        along(law.lyapunov(measurement, gains, plant)),
+        along(f2) + pulled * y,
+        along(f3) + pulled * z,
+        acceleration[0] - x,
+    )
     return not any(part.terms for part in parts)
 
 
@@ -226,7 +233,9 @@ class _Demand:
         share = g.k
         if self.circle.gains.feedback == 1:
             length = wrong.sqrt()
-            share = g.k / Intervals(np.maximum(length.low, g.layer.low), np.maximum(length.high, g.layer.high))
+            share = g.k / Intervals(
+                np.maximum(length.low, g.boundary_layer.low), np.maximum(length.high, g.boundary_layer.high)
+            )
         across, up, pull = f2 - g.rate * z, f3 + g.rate * y, 2.0 * g.alpha * f1
         u = (
             -2.0 * p.rate * across,

@@ -262,10 +262,10 @@ def _capped(stay: Any | None, motion: Motion, frame: Frame, rho: Any) -> Any | N
     loop = motion.subject.loop
     if frame.potential.even:
         return stay
-    if loop.cover == "shortest":
+    if loop.sign_policy == "shortest":
         # At q0 = 0, where the feedback switches, V is at least s.
         cap = frame.s * ALMOST
-    elif loop.cover == "hysteresis" and rho != 0:
+    elif loop.sign_policy == "hysteresis" and rho != 0:
         cap = (1 + rho) * frame.s * exact(loop.hysteresis_width) / rho * ALMOST
     else:
         return stay
@@ -282,12 +282,12 @@ def _covers(numbers: dict[str, Any], rate: Any) -> bool:
 def _double_cover(motion: Motion, frame: Frame, stay: Any | None) -> tuple[str, str, bool | None, dict[str, Any]]:
     loop = motion.subject.loop
     even = frame.potential.even
-    if stay is not None and stay < frame.potential.barrier and (even or loop.cover != "hysteresis"):
+    if stay is not None and stay < frame.potential.barrier and (even or loop.sign_policy != "hysteresis"):
         return "single rest in the set", EXACT_SIGN, True, {}
     if even:
         # V has no minimum there, and falls wherever the body turns.
         return "half turns repel", EXACT_SIGN, True, {}
-    if loop.cover == "hysteresis":
+    if loop.sign_policy == "hysteresis":
         narrow = 0.0 < loop.hysteresis_width < 1.0
         return "jumps lower V", EXACT_SIGN, narrow or None, {} if narrow else {"reason": "the width is not between 0 and 1"}
     if loop.wheels is not None and frame.exact:

@@ -115,7 +115,7 @@ def disturbance(basin: Basin) -> Claim | None:
         "rate_bound": None if rate_bound is None else number(rate_bound),
         "tau": number(ball.tau),
         "beta": number(ball.beta),
-        "shift": None if not steps or near.swing.shift is None else number(near.swing.shift),
+        "shift": None if not steps or near.gyroscopic_torque.shift is None else number(near.gyroscopic_torque.shift),
         "steps": [{"form": floats(s.S).tolist(), "decay": number(s.decay), "spread": number(s.spread)} for s in steps],
     }
     proved = tuple(Obligation(name, EXACT_SIGN, "proved") for name in ("descent", "strict", "end", "start"))
@@ -200,7 +200,7 @@ def _ball(basin: Basin, cross: Cross, torque: Any, bound: Any | None, epsilon: A
     room = torque * torque / (4 * tau)
     turn = root_above(room * greatest([row[3:] for row in inverse(left)[3:]]))
     width = exact(loop.hysteresis_width)
-    if turn >= 1 or (loop.cover == "hysteresis" and turn * turn >= 1 - width * width):
+    if turn >= 1 or (loop.sign_policy == "hysteresis" and turn * turn >= 1 - width * width):
         return None
     # There s (1 - q0) = s q2/(1 + q0), for q0 < 0 is outside the level set.
     H = _size(frame, cross, epsilon, 1 / (1 + root_below(1 - turn * turn)))
@@ -214,7 +214,7 @@ def _ball(basin: Basin, cross: Cross, torque: Any, bound: Any | None, epsilon: A
         "as_published": frame.s * (2 - turn * turn) * ALMOST,
         "hysteresis": (1 + rho) * frame.s * width / rho * ALMOST,
     }
-    level = exact(below(caps[loop.cover] if stay is None else min(stay, caps[loop.cover])))
+    level = exact(below(caps[loop.sign_policy] if stay is None else min(stay, caps[loop.sign_policy])))
     start = exact(below(level * (1 - rho) / (1 + rho)))
     # What V + epsilon C is at least: over every w (spring)(1 - q0), and over every q w.(lean)w/2.
     J, square = cross.J, epsilon * epsilon
@@ -226,7 +226,7 @@ def _ball(basin: Basin, cross: Cross, torque: Any, bound: Any | None, epsilon: A
     told = {
         "level": number(level),
         "start": number(start),
-        "turn": held["turn"],
+        "slew_angle": held["slew_angle"],
         "rate_start": held["rate"],
         "rate_everywhere": held["rate_everywhere"],
     }

@@ -26,7 +26,7 @@ from flint import fmpq
 from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import Polynomial, exact
-from starhold.certification.gyroscopic import Swing, swing
+from starhold.certification.gyroscopic import Swing, gyroscopic_torque
 from starhold.certification.matrices import (
     Rows,
     blocks,
@@ -93,15 +93,15 @@ class Nearby:
         return product(found, found)
 
     @cached_property
-    def swing(self) -> Swing:
+    def gyroscopic_torque(self) -> Swing:
         """The bound of |g| over |w|2."""
         J, zero = self.motion.subject.inertia, Polynomial.constant(0)
         turned = [sum((c * part for c, part in zip(row, self.accelerations, strict=True)), zero) for row in J]
-        return swing(turned, identity(3))
+        return gyroscopic_torque(turned, identity(3))
 
     def outside(self, rate: Any, turn: Any) -> tuple[Any, Any]:
         """What |m + g| and 1 - q0 do not exceed."""
-        return self.torque + self.swing.most * rate * rate, 1 - root_below(1 - turn * turn)
+        return self.torque + self.gyroscopic_torque.most * rate * rate, 1 - root_below(1 - turn * turn)
 
     def holds(self, step: Step, rate: Any, turn: Any) -> bool:
         """Whether the step's inequality does."""
@@ -139,7 +139,7 @@ class Nearby:
 
         for _ in range(STEPS):
             before = rate, turn
-            if self.swing.most != 0:
+            if self.gyroscopic_torque.most != 0:
                 # Else the rate is no part of what the next step needs.
                 shrink(RATES)
             shrink(TURNS)

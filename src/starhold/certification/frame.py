@@ -216,10 +216,10 @@ def contents(start: Any | None, P: Rows, potential: Potential) -> dict[str, Any]
     every attitude (rad/s; None: not every attitude is in it); all from below. For start None everything."""
     if start is None:
         turn = math.pi if potential.even else 2.0 * math.pi
-        return {"turn": turn, "rate": None, "rate_everywhere": None, "everything": True}
+        return {"slew_angle": turn, "rate": None, "rate_everywhere": None, "everything": True}
     inertia = greatest(P)
     everywhere = None
     if start >= potential.top:
         everywhere = below(root_below(2 * (start - potential.top) / inertia))
     rate = below(root_below(2 * start / inertia))
-    return {"turn": potential.turn(start), "rate": rate, "rate_everywhere": everywhere, "everything": False}
+    return {"slew_angle": potential.turn(start), "rate": rate, "rate_everywhere": everywhere, "everything": False}

@@ -37,7 +37,7 @@ class Swing:
     weight: Any | None = None
 
 
-def swing(parts: Sequence[Polynomial], P: Rows) -> Swing:
+def gyroscopic_torque(parts: Sequence[Polynomial], P: Rows) -> Swing:
     """The least bound that was found of the part of polynomials that is quadratic in the rate.
 
     If G(w) = w x Aw, so G(w) = w x (A + p)w for every p, and |G(w)| <= |w||(A + p)w| <= (c|w|2 + |(A + p)w|2/c)/2, which is

@@ -20,8 +20,8 @@ from starhold.certification.matrices import definite, floats, greatest, identity
 from starhold.certification.motion import ATTITUDE, RATE, Motion, ShapeError, at_rest, cases
 from starhold.certification.refutation import rational_turn, state_evidence
 from starhold.certification.subject import Subject, below
-from starhold.models.craft import check_inertia
-from starhold.models.rigid_body import kinetic_energy
+from starhold.parts.bodies.rigid_body import kinetic_energy
+from starhold.parts.craft import check_inertia
 
 NAMES = ("j11", "j22", "j33", "j12", "j13", "j23")
 
@@ -73,7 +73,7 @@ class Family:
 
     def _same_potential(self) -> bool:
         """Whether V is the kinetic energy of whatever inertia and a function of the attitude."""
-        parts: list[Any] = [_function(m) - kinetic_energy(m.seen.rate, m.plant) for m in (self.nominal, self.other)]
+        parts: list[Any] = [_function(m) - kinetic_energy(m.measurement.rate, m.plant) for m in (self.nominal, self.other)]
         return not (parts[0] - parts[1]).terms
 
     def _same_slope(self) -> bool:
@@ -103,7 +103,7 @@ class Family:
 
     def claim_for_any(self) -> Claim:
         """The claim for every inertia; V is then strictly what the law's own V is, up to a factor."""
-        cover = self.nominal.subject.loop.cover
+        cover = self.nominal.subject.loop.sign_policy
         even, stiffness = self.frame.potential.even, self.nominal.stiffness
         start = self.frame.s * ALMOST if cover == "shortest" and not even else None
         obligations = [
@@ -148,7 +148,11 @@ class Family:
         level, start = self._levels(rho)
         most = self.sizes(exact(tolerance))[1]
         held = contents(start, identity(3, most), self.frame.potential)
-        obligations = [("form", EXACT), *((n, EXACT_SIGN) for n in ("positive", "descent", "strict")), _cover(loop.cover)]
+        obligations = [
+            ("form", EXACT),
+            *((n, EXACT_SIGN) for n in ("positive", "descent", "strict")),
+            _cover(loop.sign_policy),
+        ]
         numbers = {"tolerance": tolerance, "start": None if start is None else number(start), **held}
         witness = {"stiffness": number(self.nominal.stiffness), "epsilon": number(epsilon), "rho": number(rho)}
         return self._proved(numbers, witness | {"level": None if level is None else number(level)}, obligations)
@@ -156,9 +160,9 @@ class Family:
     def _levels(self, rho: Any) -> tuple[Any | None, Any | None]:
         """The level that the double cover allows, and that from which motions stay below it."""
         loop, s = self.nominal.subject.loop, self.frame.s
-        if loop.cover == "as_published":
+        if loop.sign_policy == "as_published":
             return None, None
-        cap = s if loop.cover == "shortest" else (1 + rho) * s * exact(loop.hysteresis_width) / rho
+        cap = s if loop.sign_policy == "shortest" else (1 + rho) * s * exact(loop.hysteresis_width) / rho
         level = exact(below(cap * ALMOST))
         return level, exact(below(level * (1 - rho) / (1 + rho)))
 
@@ -180,7 +184,7 @@ class Family:
         for share in (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9):
             rho = exact(share)
             epsilon = exact(float(f"{0.9999 * share * number(s / most) ** 0.5:.6g}"))
-            if self.nominal.subject.loop.cover == "hysteresis" and not self._holds_every_attitude(rho, most):
+            if self.nominal.subject.loop.sign_policy == "hysteresis" and not self._holds_every_attitude(rho, most):
                 continue
             if epsilon * epsilon * most < rho * rho * s and definite(decrease(self.frame, cross, epsilon, None)):
                 return epsilon, rho

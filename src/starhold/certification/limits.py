@@ -14,7 +14,7 @@ from starhold.algebra.polynomial import Polynomial, exact, jointly
 from starhold.certification.certificate import BALLS, Claim, Obligation
 from starhold.certification.convergence import Basin, assumed, reached
 from starhold.certification.frame import contents
-from starhold.certification.gyroscopic import Swing, is_swing, swing
+from starhold.certification.gyroscopic import Swing, gyroscopic_torque, is_swing
 from starhold.certification.matrices import (
     Rows,
     floats,
@@ -104,7 +104,7 @@ def told_set(basin: Basin, level: Any | None, turn: float | None) -> dict[str, A
     start = basin.start_of(level)
     told = {"level": None if level is None else number(level), "start": None if start is None else number(start)}
     told |= contents(start, basin.frame.P, basin.frame.potential)
-    return told if turn is None else told | {"turn": turn}
+    return told if turn is None else told | {"slew_angle": turn}
 
 
 def level_of_turn(basin: Basin, turn: float) -> tuple[Any, Any]:
@@ -165,7 +165,7 @@ def load_of(basin: Basin, parts: list[Polynomial], limit: Any) -> Load:
     inverse_of = inverse(basin.frame.P)
     rate = greatest(product(product(rates, inverse_of), transposed(rates)))
     attitude = greatest(product(attitudes, transposed(attitudes)))
-    turning = swing(parts, basin.frame.P)
+    turning = gyroscopic_torque(parts, basin.frame.P)
     mixed = min(_mixed(parts, rates, inverse_of), root_above(rate) * turning.most)
     lines = _lines(parts[0], rates[0], basin.frame.P, turning.most) if len(parts) == 1 else ()
     return Load(rate, attitude, turning, mixed, lines, tuple(_rest(basin, part) for part in parts), limit)

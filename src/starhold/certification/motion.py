@@ -18,9 +18,9 @@ from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.vector import add, apply, cross, dot, scale, subtract
 from starhold.certification.matrices import Rows
 from starhold.certification.subject import Subject, direction, exact_craft
-from starhold.laws.interface import Seen
-from starhold.models.craft import Craft
-from starhold.models.rigid_body import angular_acceleration, kinetic_energy
+from starhold.laws.interface import Measurement
+from starhold.parts.bodies.rigid_body import angular_acceleration, kinetic_energy
+from starhold.parts.craft import Craft
 
 ATTITUDE, RATE = ("q0", "q1", "q2", "q3"), ("w1", "w2", "w3")
 AXES = ATTITUDE[1:]
@@ -72,7 +72,7 @@ class Motion:
         return constants(self.subject.loop.gains)
 
     @cached_property
-    def seen(self) -> Seen:
+    def measurement(self) -> Measurement:
         """What the law is told, in variables."""
         zero: Any = (Polynomial.constant(0),) * 3
         still = not self.subject.moving or self.unknown_inertia
@@ -84,29 +84,31 @@ class Motion:
         absolute, stored = add(rate, turning), zero
         if self.subject.loop.wheels is not None:
             stored = subtract(direction("h"), apply(self.plant.inertia, absolute))
-        return Seen(direction("q", 0, 4), rate, absolute, turning, acceleration, known, direction("p"), period, stored)
+        return Measurement(
+            direction("q", 0, 4), rate, absolute, turning, acceleration, known, direction("p"), period, stored
+        )
 
     @cached_property
     def torque(self) -> Any:
         """The law's torque, piecewise."""
         memory = self.subject.law.remember(self.subject.loop.gains, self.subject.loop.craft, self.subject.loop.period)
-        q: Any = vector_part(self.seen.attitude)
+        q: Any = vector_part(self.measurement.attitude)
         with reciprocal(1 + dot(q, q), "z"):
-            return self.subject.law.torque(self.seen, self.gains, self.nominal, memory)[0]
+            return self.subject.law.torque(self.measurement, self.gains, self.nominal, memory)[0]
 
     @cached_property
     def acceleration(self) -> Any:
         """The derivative of the rate relative to the target, times `factor`."""
-        outside = add(self.torque, add(self.seen.external_torque, direction("m")))
+        outside = add(self.torque, add(self.measurement.external_torque, direction("m")))
         # Of the wheels' action on the body the torque is what is asked of them.
-        outside = subtract(outside, cross(self.seen.body_rate, self.seen.stored))
-        absolute = angular_acceleration(self.seen.body_rate, outside, self.plant)
-        return subtract(absolute, scale(self.factor, self.seen.target_acceleration))  # type: ignore
+        outside = subtract(outside, cross(self.measurement.body_rate, self.measurement.wheel_momentum))
+        absolute = angular_acceleration(self.measurement.body_rate, outside, self.plant)
+        return subtract(absolute, scale(self.factor, self.measurement.target_acceleration))  # type: ignore
 
     @cached_property
     def turning(self) -> Any:
         """The derivative of the error attitude."""
-        return derivative(self.seen.attitude, self.seen.rate)
+        return derivative(self.measurement.attitude, self.measurement.rate)
 
     def along(self, function: Polynomial) -> Any:
         """The derivative of a polynomial of the state along the motion, times `factor`."""
@@ -123,15 +125,15 @@ class Motion:
     def lyapunov(self) -> Polynomial | None:
         """V for the plant that moves; None where the law has none of its own and no other is asked for."""
         if self.stiffness is not None:
-            energy: Any = kinetic_energy(self.seen.rate, self.plant)
+            energy: Any = kinetic_energy(self.measurement.rate, self.plant)
             return energy + 2 * self.stiffness * (1 - Polynomial.variable("q0"))
         function = self.subject.law.lyapunov
-        return None if function is None else function(self.seen, self.gains, self.plant)
+        return None if function is None else function(self.measurement, self.gains, self.plant)
 
     @cached_property
     def cross_term(self) -> Polynomial:
         """q.J w, which makes a strict Lyapunov function of V."""
-        return dot(vector_part(self.seen.attitude), apply(self.plant.inertia, self.seen.rate))  # type: ignore
+        return dot(vector_part(self.measurement.attitude), apply(self.plant.inertia, self.measurement.rate))  # type: ignore
 
     def linear(self, sign: int = 1) -> tuple[Rows, Rows]:
         """K_rate and K_attitude of the law near attitude (sign, 0, 0, 0) at rest, u = -K_rate w - K_attitude q."""

@@ -117,17 +117,17 @@ def region(subject: Subject) -> Claim | None:
         return finish()
     found.add("form", EXACT, True)
     a, beta = exact(root[0]), exact(root[0]) * exact(root[1])
-    best = _largest(a, beta, subject.loop.cover)
+    best = _largest(a, beta, subject.loop.sign_policy)
     if best is None:
         found.add("descent", BALLS, None, {"reason": "no level is small enough"})
         return finish()
     shape, level = best
     witness |= shape._asdict()
-    told |= {"level": level, "turn": _turn(shape, exact(level) / (a * a)), "rate": root_float(2 * exact(level))}
+    told |= {"level": level, "slew_angle": _turn(shape, exact(level) / (a * a)), "rate": root_float(2 * exact(level))}
     found.add("descent", BALLS, True)
     if shape == ENERGY:
         found.add("only rest", LASALLE, True)
-    if subject.loop.cover == "hysteresis":
+    if subject.loop.sign_policy == "hysteresis":
         narrow = 0.0 < subject.loop.hysteresis_width < 1.0
         found.add(
             "jumps lower V", EXACT_SIGN, narrow or None, {} if narrow else {"reason": "the width is not between 0 and 1"}

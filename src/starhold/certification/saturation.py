@@ -23,8 +23,8 @@ from starhold.certification.limits import (
 )
 from starhold.certification.matrices import greatest, inverse, least, number, product, root_above
 from starhold.certification.subject import above, below
-from starhold.models.wheeled_body import WheeledState
-from starhold.models.wheels import BAND, Wheels
+from starhold.parts.effectors.wheeled_body import WheeledState
+from starhold.parts.effectors.wheels import BAND, Wheels
 
 TRIES = (1e-4, 1e-3)
 """Each wheel is bounded twice, so that more digits would take seconds."""
@@ -43,7 +43,7 @@ def saturation(basin: Basin, turn: float | None = None) -> Claim | None:
     numbers: dict[str, Any] = {"momentum": number(basin.motion.subject.total_momentum)}
 
     def refused(reason: str) -> Claim:
-        asked = {} if turn is None else {"turn": turn}
+        asked = {} if turn is None else {"slew_angle": turn}
         found = Obligation("torque", BALLS, "undecided", {"reason": reason})
         return Claim("wheels", numbers | asked, {}, assumed(basin.motion.subject, limits=FREE), (found,))
 
@@ -75,7 +75,7 @@ def saturation(basin: Basin, turn: float | None = None) -> Claim | None:
         if not within(basin, known, level):
             return refused("the bound of a motor's torque exceeds its limit")
     numbers |= told_set(basin, level, turn)
-    numbers |= {"motors": _needs(basin, carried, level), "stored": _stored(basin, wheels, level)}
+    numbers |= {"motors": _needs(basin, carried, level), "wheel_momentum": _stored(basin, wheels, level)}
     before, witness = reached(basin, level, bounded=True)
     shown = (Obligation("torque", BALLS, "proved"), Obligation("momentum", EXACT_SIGN, "proved"))
     return Claim("wheels", numbers, witness, assumed(basin.motion.subject, limits=FREE), (*before, *shown))

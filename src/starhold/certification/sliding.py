@@ -26,7 +26,7 @@ from starhold.certification.matrices import (
 )
 from starhold.certification.motion import AXES, RATE, Motion, Truths
 from starhold.certification.subject import Subject, above, as_tuple, below, perigee
-from starhold.models.environment import gravity_gradient
+from starhold.parts.environments.gravity import gravity_gradient
 
 ASSUMPTIONS = (
     "rigid body",
@@ -98,25 +98,25 @@ def surface_claim(subject: Subject) -> Claim | None:
             "proved" if turn < 1 else "undecided",
             {} if turn < 1 else {"reason": "the layer is too thick"},
         )
-    steep, cover = spectral_norm_above(found.K), subject.loop.cover
+    steep, cover = spectral_norm_above(found.K), subject.loop.sign_policy
     add("other rest repels" if cover == "as_published" else "no switch of the double cover", EXACT_SIGN, "proved")
     numbers["surface"] = above(size)
     numbers["angle"] = float((2 * arb(min(turn, fmpq(1))).asin()).upper().mid()) * (1.0 + 1e-15)
     numbers["rate"] = above(size + steep * turn)
-    numbers |= {"everything": True, "start": None, "turn": 2.0 * math.pi, "rate_start": None}
+    numbers |= {"everything": True, "start": None, "slew_angle": 2.0 * math.pi, "rate_start": None}
     if cover != "as_published":
         # While |s| < K_min the half of the double cover that is fed back is not left: there (q0)' > 0 at q0 = 0.
         start = exact(below(least(subject.inertia) * stiff * stiff / 2 * ALMOST))
         fastest = root_below(2 * start / greatest(subject.inertia))
         widest = arb(min(fastest / steep, fmpq(1)))
         numbers |= {"everything": False, "start": number(start), "rate_start": below(fastest)}
-        numbers["turn"] = float((2 * widest.asin()).lower().mid()) * (1.0 - 1e-15)
+        numbers["slew_angle"] = float((2 * widest.asin()).lower().mid()) * (1.0 - 1e-15)
     return finish()
 
 
 def take_surface(motion: Motion) -> Surface:
     """The surface and the switching torque; ArithmeticError where they are not of that form."""
-    plain: list[Polynomial] = list(motion.subject.law.module.surface(motion.seen, motion.gains))
+    plain: list[Polynomial] = list(motion.subject.law.module.surface(motion.measurement, motion.gains))
     K = [[component.terms.get((name,), fmpq(0)) for name in AXES] for component in plain]
     for component, axis in zip(plain, RATE, strict=True):
         if (component.only(lambda m: not (len(m) == 1 and m[0] in AXES)) - Polynomial.variable(axis)).terms:

@@ -9,7 +9,7 @@ import numpy as np
 
 from starhold.certification.certificate import EXACT, Certificate, Claim, Obligation
 from starhold.certification.circle import attracts, control_limit
-from starhold.certification.rest import rests, saturated_axis
+from starhold.certification.equilibrium import rests, saturated_axis
 from starhold.certification.station_terms import UNLIMITED, assumed
 from starhold.certification.subject import described_gains
 from starhold.loop.station import StationLoop
@@ -37,7 +37,7 @@ def _claims(loop: StationLoop) -> list[Claim]:
         claims.append(attracts(loop))
         if limited and claims[0].outcome == "proved":
             claims.append(control_limit(loop))
-    elif loop.law.name == "l2-rest":
+    elif loop.law.name == "l2-equilibrium":
         claims.append(rests(loop))
         if limited and loop.limit_kind == "axis" and loop.model == "linear" and claims[0].outcome == "proved":
             claims.append(saturated_axis(loop))

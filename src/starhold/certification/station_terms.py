@@ -6,7 +6,7 @@ from typing import Any
 
 from starhold.algebra.polynomial import Polynomial
 from starhold.certification.subject import direction
-from starhold.laws.station.interface import SeenPoint
+from starhold.laws.point import PointMeasurement
 from starhold.loop.station import StationLoop
 
 COMMON = (
@@ -32,7 +32,7 @@ def mismatch(loop: StationLoop) -> str:
     return "the law undoes the linear model, and the full problem is flown"
 
 
-def seen_point() -> SeenPoint:
+def point_measurement() -> PointMeasurement:
     """What the law sees, in variables x1..x3 and v1..v3."""
     zero: Any = Polynomial.constant(0)
-    return SeenPoint(direction("x"), direction("v"), zero, zero)
+    return PointMeasurement(direction("x"), direction("v"), zero, zero)

@@ -15,11 +15,11 @@ from starhold.certification.spline import spline_bounds
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.models.craft import Craft, tensor
-from starhold.models.environment import gravity_gradient
-from starhold.models.target import Knots
-from starhold.models.wheeled_body import WheeledState
-from starhold.models.wheels import Wheels
+from starhold.parts.craft import Craft, tensor
+from starhold.parts.effectors.wheeled_body import WheeledState
+from starhold.parts.effectors.wheels import Wheels
+from starhold.parts.environments.gravity import gravity_gradient
+from starhold.parts.targets.target import Knots
 
 SPLINE = "rotation spline"
 """What a tabulated target follows between its knots, see `models.target.Knots`."""
@@ -89,7 +89,7 @@ def described(subject: Subject) -> dict[str, Any]:
     return {
         "law": loop.law.name,
         "gains": described_gains(loop.law, loop.gains),
-        "double_cover": loop.cover,
+        "quaternion_sign": loop.sign_policy,
         "hysteresis_width": loop.hysteresis_width,
         "inertia": tensor(loop.craft.inertia).tolist(),
         "limit": loop.limit,

@@ -109,7 +109,7 @@ def place(numbers: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     rate = numbers.get("rate_everywhere")
     if rate is not None:
         return "from every attitude and rate" if math.isinf(rate) else f"from every attitude at up to {speed(rate, more)}"
-    turn, on_target = numbers.get("turn"), numbers.get("rate_start", numbers.get("rate"))
+    turn, on_target = numbers.get("slew_angle"), numbers.get("rate_start", numbers.get("rate"))
     if turn is None:
         return ""
     held = _rests(turn, subject, more)
@@ -122,7 +122,7 @@ def _rests(turn: float, subject: Mapping[str, Any], more: bool) -> str:
     if turn < math.pi:
         return f"rest at up to {angle(turn, more)}"
     most = {"shortest": math.pi, "hysteresis": 2.0 * math.acos(-min(subject["hysteresis_width"], 1.0)) * (1.0 + 1e-15)}
-    if _even(subject) or turn >= most.get(subject["double_cover"], 2.0 * math.pi):
+    if _even(subject) or turn >= most.get(subject["quaternion_sign"], 2.0 * math.pi):
         return "rest at every attitude"
     return (
         f"rest at every attitude told by the shorter of its quaternions, and by the longer up to {angle(turn, more)} of 360°"
@@ -132,17 +132,17 @@ def _rests(turn: float, subject: Mapping[str, Any], more: bool) -> str:
 def _even(subject: Mapping[str, Any]) -> bool:
     """Whether the law takes both quaternions of an attitude for the same."""
     law = known_law(subject.get("law", ""))
-    return law is not None and law.card.double_cover == "even"
+    return law is not None and law.card.quaternion_sign == "even"
 
 
 def _cover(numbers: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     everywhere = numbers.get("everything") or numbers.get("rate_everywhere") is not None
     if _even(subject):
         return ", almost always: it could also rest at half turns, which are unstable" if everywhere else ""
-    if subject["double_cover"] == "hysteresis":
+    if subject["quaternion_sign"] == "hysteresis":
         whole = ", whichever quaternion it starts with: global on rotations, and robust by its hysteresis"
         return whole if everywhere else ", robust by its hysteresis"
-    if subject["double_cover"] == "shortest":
+    if subject["quaternion_sign"] == "shortest":
         return " by the shorter way; at half a turn the feedback switches, and noise may hold it there"
     if everywhere:
         return ", almost always at q0 = 1; it may turn the long way to get there (unwinding)"
@@ -161,7 +161,7 @@ def _convergence(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 
 def _region(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     where = place(n, subject) or "from a level set of V"
-    either = ", from either quaternion of an attitude" if subject["double_cover"] == "hysteresis" else ""
+    either = ", from either quaternion of an attitude" if subject["quaternion_sign"] == "hysteresis" else ""
     return f"{where} the body comes to rest on target without leaving the set{either}; the set is the same for every inertia"
 
 
@@ -174,7 +174,9 @@ def _torque_limit(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 def _wheels(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if "motors" not in n:
         return "no motor of a wheel reaches its limit"
-    torque, stored = (shown(max(n[name]), unit, up=True) for name, unit in (("motors", " N m"), ("stored", " N m s")))
+    torque, stored = (
+        shown(max(n[name]), unit, up=True) for name, unit in (("motors", " N m"), ("wheel_momentum", " N m s"))
+    )
     while_ = f"while the total momentum is at most {shown(n['momentum'], ' N m s')}"
     most = f"no motor gives more than {torque} and no wheel stores more than {stored}"
     return f"{place(n, subject)} {while_}, {most}{_followed(subject)}"

@@ -24,10 +24,10 @@ def certify(
     from starhold.certification.certificate import FILE, write
     from starhold.cli.show import console
     from starhold.cli.show_certificates import print_certificate
-    from starhold.report.files import whole
-    from starhold.report.kinds import kind_of
+    from starhold.files import atomic_write
     from starhold.report.results import open_folder
     from starhold.scenario.opening import open_scenario
+    from starhold.studies.kinds import kind_of
 
     scenario = open_scenario(file, allow_unstable)
     folder = open_folder(output or Path("results") / f"{scenario.name}-certificate", force)
@@ -36,7 +36,7 @@ def certify(
         print_certificate(found)
     certificates = [found.certificate for found in tried]
     path = folder / FILE
-    with whole(path) as hidden:
+    with atomic_write(path) as hidden:
         write(certificates, scenario.name, hidden)
     console.print(f"Certificate: {path}. Re-check it: starhold check {path}", soft_wrap=True)
     outcomes = {certificate.outcome for certificate in certificates}
@@ -54,11 +54,11 @@ def check(
     """Check a certificate independently of the program that made it: trusts nothing in the file but what it claims."""
     from contextlib import ExitStack
 
-    from starhold.certification.checker import check_file, passed
+    from starhold.checker import check_file, passed
     from starhold.cli.show_certificates import print_findings
     from starhold.conformance.suite import find_law
     from starhold.laws.catalogue import adopted, catalogue
-    from starhold.laws.station.interface import StationLaw, station_laws
+    from starhold.laws.point import StationLaw, station_laws
 
     with ExitStack() as laws:
         # Only what the user names is run: a certificate comes from elsewhere.

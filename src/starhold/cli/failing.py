@@ -12,7 +12,7 @@ import typer
 from starhold.cli.arguments import FailuresOutput, Force, ScenarioFile
 
 if TYPE_CHECKING:
-    from starhold.report.failures import Failure
+    from starhold.studies.failures import Failure
 
 
 def failures(
@@ -25,10 +25,10 @@ def failures(
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
     from starhold.cli.show import console
-    from starhold.report.failures import require_wheels, study, write_table
     from starhold.report.failures_picture import draw
     from starhold.report.results import FAILURES, open_folder
     from starhold.scenario.reading import load
+    from starhold.studies.failures import require_wheels, study, write_table
 
     scenario = load(file)
     entry = scenario.laws[0] if law is None else scenario.pick(law)
@@ -53,7 +53,7 @@ def print_failures(found: Sequence[Failure]) -> None:
     from rich.table import Table
 
     from starhold.cli.show import console
-    from starhold.report.flight import number_text
+    from starhold.studies.flight import number_text
 
     flown = [failure.gains for failure in found if failure.gains is not None]
     retuned = [name for name in flown[0] if any(number_text(g[name]) != number_text(flown[0][name]) for g in flown)]
@@ -84,7 +84,7 @@ def print_failures(found: Sequence[Failure]) -> None:
 def _row(failure: Failure, retuned: Sequence[str], designed: bool) -> list[str]:
     from starhold.certification.wording import shown
     from starhold.report.failures_picture import direction_text
-    from starhold.report.flight import number_text
+    from starhold.studies.flight import number_text
 
     axes = "three" if failure.controllable else f"[red]not {direction_text(failure)}[/red]"
     begun = [axes, f"{failure.condition:.3g}", f"{failure.authority:.4g}", f"{100.0 * failure.share:.1f}"]
@@ -99,7 +99,7 @@ def _row(failure: Failure, retuned: Sequence[str], designed: bool) -> list[str]:
 
 
 def _full(failure: Failure) -> str:
-    from starhold.report.failures import HORIZON
+    from starhold.studies.failures import HORIZON
 
     known: Any = failure.saturation
     if known is None:

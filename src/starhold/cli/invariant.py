@@ -26,7 +26,7 @@ def invariant(file: SystemFile = None, output: InvariantOutput = None, force: Fo
     from starhold.certification import invariant as sets
     from starhold.certification.certificate import FILE
     from starhold.cli.show import console
-    from starhold.report.files import whole
+    from starhold.files import atomic_write
     from starhold.report.invariant_picture import PICTURE, draw, sketch
     from starhold.report.results import open_folder
 
@@ -39,7 +39,7 @@ def invariant(file: SystemFile = None, output: InvariantOutput = None, force: Fo
     certificate = sets.certify(problem)
     sketches = sketch(problem, certificate)
     _print(certificate, sketches)
-    with whole(folder / FILE) as hidden:
+    with atomic_write(folder / FILE) as hidden:
         sets.write(certificate, hidden)
     said = f"Certificate: {folder / FILE}."
     if draw(sketches, folder / PICTURE, problem.name) is not None:

@@ -36,8 +36,8 @@ from starhold.errors import InputError
 if TYPE_CHECKING:
     from types import ModuleType
 
-    from starhold.report.flight import Flight
     from starhold.scenario.opening import AnyScenario
+    from starhold.studies.flight import Flight
 
 app = typer.Typer(
     help="Design, certify, fly and compare control laws for spacecraft.",
@@ -97,9 +97,9 @@ def _fly(
     # First of all, for it takes as long to get ready as the flight takes.
     with Painter() as painter:
         from starhold.cli.show import console, flying, print_outcome
-        from starhold.report.kinds import kind_of
         from starhold.report.results import open_folder, write_run
         from starhold.scenario.opening import open_scenario
+        from starhold.studies.kinds import kind_of
 
         scenario = open_scenario(file, allow_unstable)
         kind = kind_of(scenario)
@@ -182,7 +182,7 @@ def laws(name: Annotated[str | None, typer.Argument(help="show this law's card a
     from starhold.cli.show import print_law, print_laws
     from starhold.conformance.suite import find_law
     from starhold.laws.catalogue import catalogue
-    from starhold.laws.station.interface import station_laws
+    from starhold.laws.point import station_laws
     from starhold.scenario.checking import nearest
 
     known = catalogue() | station_laws()
@@ -201,7 +201,7 @@ def laws(name: Annotated[str | None, typer.Argument(help="show this law's card a
 def wheels() -> None:
     """List the reaction wheels of the catalogue, for `unit` in a scenario."""
     from starhold.cli.show import print_wheels
-    from starhold.models.wheel_units import WHEEL_UNITS
+    from starhold.parts.effectors.wheel_units import WHEEL_UNITS
 
     print_wheels(WHEEL_UNITS)
 
@@ -233,7 +233,7 @@ def new(
 ) -> None:
     """Write a commented scenario file that runs as it is."""
     from starhold.cli.show import console
-    from starhold.report.files import whole
+    from starhold.files import atomic_write
     from starhold.scenario.reading import builtin_names, builtin_text, nearest
     from starhold.scenario.template import template_text
 
@@ -252,10 +252,10 @@ def new(
         text = f"#:schema ./{beside.name}\n{text}"
     if path.exists() and not force:
         raise InputError(str(path), "", "a file that exists", "another name, or --force")
-    with whole(path) as hidden:
+    with atomic_write(path) as hidden:
         hidden.write_text(text, encoding="utf-8")
     if schema:
-        with whole(beside) as hidden:
+        with atomic_write(beside) as hidden:
             hidden.write_text(_schema_text(), encoding="utf-8")
     console.print(f"Wrote {path}. Try: starhold compare {path}", soft_wrap=True)
 

@@ -11,7 +11,7 @@ import typer
 from starhold.cli.arguments import Force, RootsOutput, ScenarioFile, Unstable
 
 if TYPE_CHECKING:
-    from starhold.report.modal_roots import Study
+    from starhold.studies.modal_roots import Study
 
 
 def modal_roots(
@@ -25,10 +25,10 @@ def modal_roots(
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
     from starhold.cli.show import console
-    from starhold.report.modal_roots import law_lines, pick_modal, study, write_table
     from starhold.report.modal_roots_picture import draw
     from starhold.report.results import ROOTS, open_folder
     from starhold.scenario.reading import load
+    from starhold.studies.modal_roots import law_lines, pick_modal, study, write_table
 
     scenario = load(file, allow_unstable)
     entry = pick_modal(scenario, law)

@@ -11,7 +11,7 @@ from starhold.cli.arguments import Force
 from starhold.errors import InputError
 
 if TYPE_CHECKING:
-    from starhold.models.station import Station
+    from starhold.synthesis.circle import Station
 
 _DAY = 86400.0
 
@@ -31,10 +31,10 @@ def sail(
     force: Force = False,
 ) -> None:
     """How large a sail keeps a craft on a circle about a libration point: best rate, peak demand, area, margin, deficits."""
-    from starhold.models.libration import PRIMARIES
-    from starhold.models.sail import check_optics
-    from starhold.models.station import Station
+    from starhold.parts.bodies.libration_point import PRIMARIES
     from starhold.scenario.reading import nearest
+    from starhold.synthesis.circle import Station
+    from starhold.synthesis.sail import check_optics
 
     if primaries not in PRIMARIES:
         raise InputError("sail", "--primaries", primaries, nearest(primaries, _solar()))
@@ -66,7 +66,7 @@ def sail(
 
 
 def _solar() -> list[str]:
-    from starhold.models.libration import PRIMARIES
+    from starhold.parts.bodies.libration_point import PRIMARIES
 
     return [name for name in PRIMARIES if name.startswith("sun-")]
 
@@ -110,8 +110,8 @@ def _write(station: Station, path: Path) -> None:
 def print_sail(station: Station, point: str, mass: float, area: float | None) -> None:
     """The design in words, then the tables."""
     from starhold.cli.show import console
-    from starhold.models.station import demand
     from starhold.report.sail_table import dearer
+    from starhold.synthesis.circle import demand
 
     plant, units = station.plant, station.units
     away = 1e-3 * abs(plant.from_smaller) * units.length
@@ -141,7 +141,7 @@ def _light(station: Station) -> str:
 
 
 def _margin(station: Station, area: float, mass: float) -> str:
-    from starhold.models.station import demand, rates_held
+    from starhold.synthesis.circle import demand, rates_held
 
     margin = station.margin(area, mass)
     held = rates_held(margin * demand(station.rate, station.plant), station.plant)

@@ -12,11 +12,11 @@ from rich.table import Table
 
 if TYPE_CHECKING:
     from starhold.laws.catalogue import Law
-    from starhold.models.wheel_units import WheelUnit
-    from starhold.report.flight import Flight
+    from starhold.parts.effectors.wheel_units import WheelUnit
     from starhold.scenario.designing import Design
     from starhold.scenario.reading import LawEntry
     from starhold.scenario.station.reading import StationEntry
+    from starhold.studies.flight import Flight
 
 WIDE = 132
 COLUMN = 11
@@ -84,13 +84,13 @@ def _step_text(flight: Flight) -> str:
 
 def print_table(flights: Sequence[Flight]) -> None:
     """The ranked comparison; a star marks the best of each metric. On a narrow screen laws become columns."""
-    board = flights[0].board
+    metric_set = flights[0].metric_set
     results: Mapping[str, Mapping[str, Any]] = {flight.name: flight.metrics for flight in flights}
-    won, order = board.winners(results), board.ranked(results)
-    metrics = board.columns(results)
-    measures = [board.measures[metric] for metric in metrics]
+    won, order = metric_set.winners(results), metric_set.ranked(results)
+    metrics = metric_set.columns(results)
+    measures = [metric_set.measures[metric] for metric in metrics]
     heads = [f"{measure.heading}\n[dim]{measure.unit}[/dim]" for measure in measures]
-    cells = [[_cell(board.told(metric, results[name]), name in won[metric]) for metric in metrics] for name in order]
+    cells = [[_cell(metric_set.told(metric, results[name]), name in won[metric]) for metric in metrics] for name in order]
     table = Table(title_justify="left", show_edge=False, pad_edge=False)
     if console.width >= max(WIDE, COLUMN * (1 + len(metrics))):
         for head in ("law", *heads):
@@ -104,11 +104,11 @@ def print_table(flights: Sequence[Flight]) -> None:
             table.add_row(head.replace("\n", " "), *(row[column] for row in cells))
     console.print()
     console.print(table)
-    if late := board.late(results):
+    if late := metric_set.late(results):
         console.print(late, highlight=False)
     if len(flights) > 1:
         console.print(
-            f"Ranked by {', then '.join(board.headings(results))}; [bold green]*[/bold green] best of its kind.",
+            f"Ranked by {', then '.join(metric_set.headings(results))}; [bold green]*[/bold green] best of its kind.",
             highlight=False,
         )
 
@@ -121,7 +121,7 @@ def print_design(design: Design, law: Law) -> None:
     """The inputs of a design, its gains, and what it can be judged by."""
     import numpy as np
 
-    from starhold.report.flight import number_text
+    from starhold.studies.flight import number_text
 
     console.print(f'[bold]{design.name}[/bold]: {law.card.title}, form "{design.form}"', highlight=False)
     for title, items, values in (

@@ -13,9 +13,9 @@ from starhold.certification.wording import HEADINGS, OBLIGATIONS, eigenvalues, e
 from starhold.cli.show import console
 
 if TYPE_CHECKING:
-    from starhold.certification.checker import Finding
-    from starhold.report.certificates import Tried
-    from starhold.report.flight import Flight
+    from starhold.checker import Finding
+    from starhold.studies.certificates import Tried
+    from starhold.studies.flight import Flight
 
 LONGEST = 1_000
 """Characters of a file that are printed at a time."""

@@ -11,10 +11,10 @@ from starhold.algebra.quaternion import NO_TURN, Quaternion
 from starhold.algebra.structure import unflatten
 from starhold.algebra.vector import ZERO, Vector
 from starhold.laws.catalogue import Law
-from starhold.laws.interface import Seen
+from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.models.craft import Craft, make_craft
-from starhold.models.rigid_body import State
+from starhold.parts.bodies.rigid_body import State
+from starhold.parts.craft import Craft, make_craft
 
 CRAFT = make_craft([2.0, 3.0, 4.0], torque_limit=0.05)
 PERIOD = 0.1
@@ -26,15 +26,15 @@ def random_quaternions(count: int, seed: int = 7) -> list[Quaternion]:
     return [unflatten(q / np.linalg.norm(q), NO_TURN) for q in numbers]
 
 
-def random_seen(count: int, external: bool = True, seed: int = 11) -> Iterator[Seen]:
+def random_measurements(count: int, external: bool = True, seed: int = 11) -> Iterator[Measurement]:
     """What a law sees at random states of a body at a target at rest, with or without a modelled torque."""
     random = np.random.default_rng(seed)
     for attitude in random_quaternions(count, seed + 1):
         rate: Vector = unflatten(random.normal(scale=0.05, size=3), ZERO)
         torque: Vector = unflatten(random.normal(scale=1e-5, size=3), ZERO) if external else ZERO
         position: Vector = unflatten(random.normal(scale=4e6, size=3), ZERO) if external else ZERO
-        stored: Vector = unflatten(random.normal(scale=0.1, size=3), ZERO) if external else ZERO
-        yield Seen(attitude, rate, rate, ZERO, ZERO, torque, position, PERIOD, stored)
+        wheel_momentum: Vector = unflatten(random.normal(scale=0.1, size=3), ZERO) if external else ZERO
+        yield Measurement(attitude, rate, rate, ZERO, ZERO, torque, position, PERIOD, wheel_momentum)
 
 
 def sample_loop(law: Law, gains: Any) -> ClosedLoop:
@@ -52,10 +52,10 @@ def sample_loop(law: Law, gains: Any) -> ClosedLoop:
         gravity_gradient=True,
         target=goal,
         limit="axis",
-        cover="hysteresis",
+        sign_policy="hysteresis",
     )
 
 
-def call(law: Law, seen: Seen, gains: Any, craft: Craft = CRAFT) -> Vector:
+def call(law: Law, measurement: Measurement, gains: Any, craft: Craft = CRAFT) -> Vector:
     """The torque of a law called once, with a fresh memory."""
-    return law.torque(seen, gains, craft, law.remember(gains, craft, seen.period))[0]
+    return law.torque(measurement, gains, craft, law.remember(gains, craft, measurement.period))[0]

@@ -10,9 +10,9 @@ from starhold.algebra.vector import ZERO
 from starhold.analysis.station import goal_of, measure_station
 from starhold.certification.station import certify_station
 from starhold.conformance.verdicts import STEPS, agree, declares_itself, require, round_trips
-from starhold.laws.station.interface import SeenPoint, StationLaw
+from starhold.laws.point import PointMeasurement, StationLaw
 from starhold.loop.station import StationLoop
-from starhold.models.libration import PRIMARIES, PointState
+from starhold.parts.bodies.libration_point import PRIMARIES, PointState
 from starhold.scenario.station.building import build
 from starhold.scenario.station.reading import parse_station
 from starhold.scenario.writing import station_scenario_with
@@ -31,26 +31,26 @@ def _states(count: int) -> Any:
     random = np.random.default_rng(1)
     for _ in range(count):
         x, v = random.normal(size=(2, 3)) * 10.0 ** random.uniform(-9.0, 1.0)
-        yield SeenPoint(tuple(x.tolist()), tuple(v.tolist()), 1e-3, LIMIT)
+        yield PointMeasurement(tuple(x.tolist()), tuple(v.tolist()), 1e-3, LIMIT)
 
 
-def _call(law: Any, seen: SeenPoint, gains: Any) -> Any:
-    return law.control(seen, gains, PLANT, law.remember(gains, PLANT, seen.period))[0]
+def _call(law: Any, measurement: PointMeasurement, gains: Any) -> Any:
+    return law.control(measurement, gains, PLANT, law.remember(gains, PLANT, measurement.period))[0]
 
 
 def is_pure(law: StationLaw) -> None:
     """The control depends on nothing but its arguments."""
     for gains in law.examples():
-        for seen in _states(10):
-            require(_call(law, seen, gains) == _call(law, seen, gains), f"two calls differ at {seen}")
+        for measurement in _states(10):
+            require(_call(law, measurement, gains) == _call(law, measurement, gains), f"two calls differ at {measurement}")
 
 
 def stays_finite(law: StationLaw) -> None:
     """Finite control near the point and far away."""
-    rest = SeenPoint(ZERO, ZERO, 1e-3, LIMIT)
+    rest = PointMeasurement(ZERO, ZERO, 1e-3, LIMIT)
     for gains in law.examples():
-        for seen in (rest, *_states(200)):
-            require(bool(np.isfinite(_call(law, seen, gains)).all()), f"not finite at {seen}")
+        for measurement in (rest, *_states(200)):
+            require(bool(np.isfinite(_call(law, measurement, gains)).all()), f"not finite at {measurement}")
 
 
 def reads_alike(law: StationLaw) -> None:

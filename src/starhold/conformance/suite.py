@@ -17,7 +17,7 @@ from starhold.analysis.cost import call_costs
 from starhold.analysis.metrics import measure
 from starhold.analysis.trial import fly_claims
 from starhold.certification.certify import certify
-from starhold.conformance.bench import CRAFT, call, random_quaternions, random_seen, sample_loop
+from starhold.conformance.bench import CRAFT, call, random_measurements, random_quaternions, sample_loop
 from starhold.conformance.station import STATION_CHECKS
 from starhold.conformance.units import rescaled
 from starhold.conformance.verdicts import (
@@ -32,9 +32,9 @@ from starhold.conformance.verdicts import (
 )
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law, catalogue, from_file, read_module
-from starhold.laws.interface import Seen
-from starhold.laws.station.interface import StationLaw, station_laws
-from starhold.models.rigid_body import angular_acceleration
+from starhold.laws.interface import Measurement
+from starhold.laws.point import StationLaw, station_laws
+from starhold.parts.bodies.rigid_body import angular_acceleration
 from starhold.scenario.building import build
 from starhold.scenario.checking import nearest
 from starhold.scenario.reading import parse
@@ -43,7 +43,7 @@ from starhold.simulation.lane import fly, label
 
 FEW = 16
 """Flights that try a certificate."""
-ON_TARGET = Seen((1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.1)
+ON_TARGET = Measurement((1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.1)
 
 
 def examine(law: Law) -> Iterator[Verdict]:
@@ -71,8 +71,8 @@ def find_law(given: str) -> Law:
 def is_pure(law: Law) -> None:
     """The torque depends on nothing but its arguments."""
     for gains in law.examples():
-        for seen in random_seen(10):
-            require(call(law, seen, gains) == call(law, seen, gains), f"two calls differ at {seen}")
+        for measurement in random_measurements(10):
+            require(call(law, measurement, gains) == call(law, measurement, gains), f"two calls differ at {measurement}")
 
 
 def reads_alike(law: Law) -> None:
@@ -99,10 +99,10 @@ def treats_double_cover_as_stated(law: Law) -> None:
     """q and -q give what the card says of the double cover."""
     for gains in law.examples():
         differences: list[float] = []
-        for seen in random_seen(20):
-            other = seen._replace(attitude=stretch(-1.0, seen.attitude))
-            differences.append(float(np.abs(np.subtract(call(law, seen, gains), call(law, other, gains))).max()))
-        if law.card.double_cover == "even":
+        for measurement in random_measurements(20):
+            other = measurement._replace(attitude=stretch(-1.0, measurement.attitude))
+            differences.append(float(np.abs(np.subtract(call(law, measurement, gains), call(law, other, gains))).max()))
+        if law.card.quaternion_sign == "even":
             require(max(differences) < 1e-12, f"q and -q differ by {max(differences):g} N m, the card says they do not")
         else:
             require(max(differences) > 1e-12, "q and -q never differ, the card says they do")
@@ -133,8 +133,8 @@ def stays_finite(law: Law) -> None:
     for gains in law.examples():
         for attitude in [(1.0, 0.0, 0.0, 0.0), (-1.0, 0.0, 0.0, 0.0), *halves]:
             for rate in (ZERO, (0.1, -0.2, 0.05)):
-                seen = ON_TARGET._replace(attitude=attitude, rate=rate, body_rate=rate)
-                require(bool(np.isfinite(call(law, seen, gains)).all()), f"not finite at {attitude}, rate {rate}")
+                measurement = ON_TARGET._replace(attitude=attitude, rate=rate, body_rate=rate)
+                require(bool(np.isfinite(call(law, measurement, gains)).all()), f"not finite at {attitude}, rate {rate}")
 
 
 def survives_toml(law: Law) -> None:
@@ -145,11 +145,11 @@ def survives_toml(law: Law) -> None:
 def keeps_units(law: Law) -> None:
     """The declared units are right: the torque is the same in any system of units."""
     for gains in law.examples():
-        for seen in random_seen(5):
-            plain = np.array(call(law, seen, gains))
+        for measurement in random_measurements(5):
+            plain = np.array(call(law, measurement, gains))
             size = max(float(np.abs(plain).max()), 1e-9)
             for factors in ((7.0, 1.0, 1.0), (1.0, 3.0, 1.0), (1.0, 1.0, 0.2), (2.0, 0.3, 5.0)):
-                seen2, gains2, craft2, back = rescaled(law, seen, gains, CRAFT, factors)
+                seen2, gains2, craft2, back = rescaled(law, measurement, gains, CRAFT, factors)
                 other = np.array(call(law, seen2, gains2, craft2)) * back
                 error = float(np.abs(other - plain).max()) / size
                 require(error < 1e-6, f"with kg, m, s scaled by {factors} the torque changes by {error:.1e} of itself")
@@ -163,18 +163,18 @@ def decreases_lyapunov(law: Law) -> None:
         raise NotApplicableError("the card claims nothing")
     for gains in law.examples():
         require(abs(law.lyapunov(ON_TARGET, gains, CRAFT)) < 1e-15, "V is not zero at rest on target")
-        for seen in random_seen(300, external=False):
-            value = law.lyapunov(seen, gains, CRAFT)
-            require(value > 0.0, f"V = {value:g} at {seen}")
-            slope = _slope(law, seen, gains)
-            require(slope <= 1e-7 * value, f"dV/dt = {slope:g} at {seen}")
+        for measurement in random_measurements(300, external=False):
+            value = law.lyapunov(measurement, gains, CRAFT)
+            require(value > 0.0, f"V = {value:g} at {measurement}")
+            slope = _slope(law, measurement, gains)
+            require(slope <= 1e-7 * value, f"dV/dt = {slope:g} at {measurement}")
 
 
 def can_be_certified(law: Law) -> None:
     """The certifier reads the law, or says what of it cannot be read."""
     for gains in law.examples():
         plain = sample_loop(law, gains)
-        for loop in (plain, replace(plain, target="orbital"), replace(plain, limit="norm", cover="as_published")):
+        for loop in (plain, replace(plain, target="orbital"), replace(plain, limit="norm", sign_policy="as_published")):
             certificate = certify(loop)
             require(certificate.outcome in ("proved", "refuted", "undecided"), f"outcome {certificate.outcome}")
             for claim in certificate.claims:
@@ -198,16 +198,16 @@ def flies_a_scenario(law: Law) -> None:
         fly_claims(loop, certify(loop, law.name), flights=FEW)
 
 
-def _slope(law: Law, seen: Seen, gains: Any) -> float:
+def _slope(law: Law, measurement: Measurement, gains: Any) -> float:
     """dV/dt along the closed loop, by a central difference."""
-    rates = angular_acceleration(seen.body_rate, call(law, seen, gains), CRAFT)
-    turning = derivative(seen.attitude, seen.rate)
+    rates = angular_acceleration(measurement.body_rate, call(law, measurement, gains), CRAFT)
+    turning = derivative(measurement.attitude, measurement.rate)
     function = law.lyapunov
     assert function is not None
 
     def value(h: float) -> float:
-        rate = move(seen.rate, h, rates)
-        moved = seen._replace(attitude=move(seen.attitude, h, turning), rate=rate, body_rate=rate)
+        rate = move(measurement.rate, h, rates)
+        moved = measurement._replace(attitude=move(measurement.attitude, h, turning), rate=rate, body_rate=rate)
         return function(moved, gains, CRAFT)
 
     return (value(1e-4) - value(-1e-4)) / 2e-4

@@ -7,13 +7,13 @@ from typing import Any
 
 from starhold.algebra.quantity import quantities
 from starhold.laws.catalogue import Law
-from starhold.laws.interface import Seen
-from starhold.models.craft import Craft
+from starhold.laws.interface import Measurement
+from starhold.parts.craft import Craft
 
 
 def rescaled(
-    law: Law, seen: Seen, gains: Any, craft: Craft, factors: tuple[float, float, float]
-) -> tuple[Seen, Any, Craft, float]:
+    law: Law, measurement: Measurement, gains: Any, craft: Craft, factors: tuple[float, float, float]
+) -> tuple[Measurement, Any, Craft, float]:
     """The arguments of a law in a system of units where 1 kg, 1 m and 1 s are `factors` units, and the factor that takes
     the torque it gives back to N m."""
 
@@ -23,7 +23,7 @@ def rescaled(
     gain_units = [None if item.gain.choices or item.gain.whole else item.gain.unit for item in law.fields()]
     own = [v if unit is None else _times(v, _factor(unit, factors)) for v, unit in zip(gains, gain_units, strict=True)]
     return (
-        Seen(*scaled(seen, _units(Seen))),
+        Measurement(*scaled(measurement, _units(Measurement))),
         law.gains(*own),
         Craft(*scaled(craft, _units(Craft))),
         1.0 / _factor("N m", factors),

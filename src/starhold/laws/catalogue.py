@@ -112,7 +112,8 @@ def catalogue() -> dict[str, Law]:
 def installed(package: str, kind: type[AnyLaw]) -> dict[str, AnyLaw]:
     """The laws of a kind by name: those of a package of starhold, and those that other packages offer."""
     modules = pkgutil.iter_modules(import_module(package).__path__, f"{package}.")
-    found = [_as_law(import_module(entry.name), kind) for entry in modules if _declares_card(entry.name)]
+    loaded = [import_module(entry.name) for entry in modules if _declares_card(entry.name)]
+    found = [_as_law(module, kind) for module in loaded if hasattr(module, kind.equation)]
     for point in entry_points(group="starhold.laws"):
         try:
             module = point.load()

@@ -1,9 +1,10 @@
 """What a law sees, and what a law file declares.
 
-A law file holds `CARD`, `class Gains(NamedTuple)`, the equation `torque(seen, gains, craft, memory) -> (torque, memory)`
-and `examples()`. It may add `lyapunov(seen, gains, craft)`, design forms (`FORMS` with `design(craft, spec)`,
-and `complete(spec, start)` for inputs that the scenario gives), `check(gains)` that refuses what cannot be stable,
-and `remember(gains, craft, period)` for a memory that is not empty.
+A law file holds `CARD`, `class Gains(NamedTuple)`, the equation
+`torque(measurement, gains, craft, memory) -> (torque, memory)` and `examples()`. It may add
+`lyapunov(measurement, gains, craft)`, design forms (`FORMS` with `design(craft, spec)`, and `complete(spec, start)` for
+inputs that the scenario gives), `check(gains)` that refuses what cannot be stable, and `remember(gains, craft, period)` for
+a memory that is not empty.
 """
 
 from __future__ import annotations
@@ -17,11 +18,11 @@ import numpy as np
 
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import Quaternion
-from starhold.algebra.vector import ZERO, Vector, add, apply, subtract, swing
-from starhold.models.craft import Craft, compact
+from starhold.algebra.vector import ZERO, Vector, add, apply, gyroscopic_torque, subtract
+from starhold.parts.craft import Craft, compact
 
 
-class Seen(NamedTuple):
+class Measurement(NamedTuple):
     """What a law is told at a control instant; vectors are in body axes."""
 
     attitude: Annotated[Quaternion, Quantity("1", "turn from the target axes to the body axes, scalar first")]
@@ -32,7 +33,7 @@ class Seen(NamedTuple):
     external_torque: Annotated[Vector, Quantity("N m", "modelled torque from outside at this attitude")]
     position: Annotated[Vector, Quantity("m", "from the centre of attraction")]
     period: Annotated[float, Quantity("s", "for which the torque will be held")]
-    stored: Annotated[Vector, Quantity("N m s", "angular momentum of the body's wheels")] = ZERO
+    wheel_momentum: Annotated[Vector, Quantity("N m s", "angular momentum of the body's wheels")] = ZERO
 
 
 class NoMemory(NamedTuple):
@@ -48,7 +49,7 @@ class Start:
 
     attitude: Quaternion
     rate: Vector
-    stored: Vector | None
+    wheel_momentum: Vector | None
     torque: float
     momentum: float
     attitude_tolerance: float
@@ -77,7 +78,7 @@ class Card:
     """What its claim takes for granted; not empty where it claims something."""
     claims: Claim
     """The stability that is claimed: global, almost-global, local or none."""
-    double_cover: Literal["odd", "even"] = "odd"
+    quaternion_sign: Literal["odd", "even"] = "odd"
     """odd: feeding back -q in place of q changes the torque; even: it does not."""
     rest_tolerance: float = 0.0
     """Largest torque (N m) at rest on target; zero but for laws that solve a problem to a tolerance."""
@@ -178,8 +179,10 @@ def fields(cls: Any) -> list[Field]:
     return found
 
 
-def tracking_torque(seen: Seen, craft: Craft) -> Vector:
+def tracking_torque(measurement: Measurement, craft: Craft) -> Vector:
     """The torque (N m) that makes the motion relative to a moving target obey the equations of a target at rest,
     J w_e' + w_e x J w_e = rest of the torque; zero for a target at rest."""
-    gyroscopic = subtract(swing(craft.inertia, seen.body_rate), swing(craft.inertia, seen.rate))
-    return add(gyroscopic, apply(craft.inertia, seen.target_acceleration))
+    gyroscopic = subtract(
+        gyroscopic_torque(craft.inertia, measurement.body_rate), gyroscopic_torque(craft.inertia, measurement.rate)
+    )
+    return add(gyroscopic, apply(craft.inertia, measurement.target_acceleration))

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import vector_part
-from starhold.algebra.vector import Matrix, Vector, add, apply, scale, subtract, swing
+from starhold.algebra.vector import Matrix, Vector, add, apply, gyroscopic_torque, scale, subtract
 from starhold.laws import matrix_pd
-from starhold.laws.interface import Card, Gain, NoMemory, Seen, tracking_torque
-from starhold.laws.riccati import (
+from starhold.laws.interface import Card, Gain, Measurement, NoMemory, tracking_torque
+from starhold.parts.craft import Craft, compact, tensor
+from starhold.synthesis.riccati import (
     OUT_OF_RANGE,
     closed_form,
     is_full,
@@ -21,8 +22,7 @@ from starhold.laws.riccati import (
     scipy_axes,
     solve_riccati,
 )
-from starhold.laws.weights import BALANCES, balance, check_axes, check_spreads, kappa, positive, positive_definite
-from starhold.models.craft import Craft, compact, tensor
+from starhold.synthesis.weights import BALANCES, balance, check_axes, check_spreads, kappa, positive, positive_definite
 
 CARD = Card(
     title="Closed-form LQR",
@@ -86,11 +86,11 @@ class Numeric(NamedTuple):
 FORMS: dict[str, Any] = {"I": FormI, "II": FormII, "III": FormIII, "numeric": Numeric}
 
 
-def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
+def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Control torque (N m, body)."""
-    feedback = add(apply(gains.k_rate, seen.rate), apply(gains.k_attitude, vector_part(seen.attitude)))
-    gyroscopic = scale(gains.gyroscopic, swing(craft.inertia, seen.rate))
-    return subtract(add(tracking_torque(seen, craft), gyroscopic), feedback), memory
+    feedback = add(apply(gains.k_rate, measurement.rate), apply(gains.k_attitude, vector_part(measurement.attitude)))
+    gyroscopic = scale(gains.gyroscopic, gyroscopic_torque(craft.inertia, measurement.rate))
+    return subtract(add(tracking_torque(measurement, craft), gyroscopic), feedback), memory
 
 
 lyapunov = matrix_pd.lyapunov

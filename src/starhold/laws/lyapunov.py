@@ -6,10 +6,10 @@ from typing import Annotated, NamedTuple
 
 from starhold.algebra.quaternion import vector_part
 from starhold.algebra.scalar import Scalar
-from starhold.algebra.vector import Vector, add, apply, dot, scale, subtract, swing
-from starhold.laws import response
-from starhold.laws.interface import Card, Gain, NoMemory, Seen
-from starhold.models.craft import Craft
+from starhold.algebra.vector import Vector, add, apply, dot, gyroscopic_torque, scale, subtract
+from starhold.laws.interface import Card, Gain, Measurement, NoMemory
+from starhold.parts.craft import Craft
+from starhold.synthesis import response
 
 CARD = Card(
     title="Lyapunov",
@@ -27,11 +27,11 @@ class Gains(NamedTuple):
     k_attitude: Annotated[float, Gain("N m", above=0.0, text="stiffness against the quaternion's vector part")]
 
 
-def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
+def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Control torque (N m, body)."""
-    feedback = add(scale(-gains.k_rate, seen.rate), scale(-gains.k_attitude, vector_part(seen.attitude)))
-    gyroscopic = swing(craft.inertia, seen.body_rate)
-    model = add(subtract(gyroscopic, seen.external_torque), apply(craft.inertia, seen.target_acceleration))
+    feedback = add(scale(-gains.k_rate, measurement.rate), scale(-gains.k_attitude, vector_part(measurement.attitude)))
+    gyroscopic = gyroscopic_torque(craft.inertia, measurement.body_rate)
+    model = add(subtract(gyroscopic, measurement.external_torque), apply(craft.inertia, measurement.target_acceleration))
     return add(feedback, model), memory
 
 
@@ -40,10 +40,10 @@ complete = response.complete
 design, explain = response.designs(Gains, torque)
 
 
-def lyapunov(seen: Seen, gains: Gains, craft: Craft) -> Scalar:
+def lyapunov(measurement: Measurement, gains: Gains, craft: Craft) -> Scalar:
     """V = w.Jw/2 + 2 k_attitude (1 - q0) (J); V' = -k_rate |w|2."""
-    energy = 0.5 * dot(seen.rate, apply(craft.inertia, seen.rate))
-    return energy + 2.0 * gains.k_attitude * (1.0 - seen.attitude[0])
+    energy = 0.5 * dot(measurement.rate, apply(craft.inertia, measurement.rate))
+    return energy + 2.0 * gains.k_attitude * (1.0 - measurement.attitude[0])
 
 
 def examples() -> list[Gains]:

@@ -9,8 +9,8 @@ import numpy as np
 from starhold.algebra.quaternion import vector_part
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Matrix, Vector, add, apply, dot, solve, subtract
-from starhold.laws.interface import Card, Gain, NoMemory, Seen, tracking_torque
-from starhold.models.craft import Craft, compact, tensor
+from starhold.laws.interface import Card, Gain, Measurement, NoMemory, tracking_torque
+from starhold.parts.craft import Craft, compact, tensor
 
 CARD = Card(
     title="Matrix-gain PD",
@@ -66,16 +66,16 @@ def design(craft: Craft, spec: Inertial | Diagonal) -> Gains:
     return Gains(compact(k_rate), compact(np.linalg.inv(spec.a * inertia + spec.b * np.eye(3))))
 
 
-def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
+def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Control torque (N m, body)."""
-    feedback = add(apply(gains.k_rate, seen.rate), apply(gains.k_attitude, vector_part(seen.attitude)))
-    return subtract(tracking_torque(seen, craft), feedback), memory
+    feedback = add(apply(gains.k_rate, measurement.rate), apply(gains.k_attitude, vector_part(measurement.attitude)))
+    return subtract(tracking_torque(measurement, craft), feedback), memory
 
 
-def lyapunov(seen: Seen, gains: Gains, craft: Craft) -> Scalar:
+def lyapunov(measurement: Measurement, gains: Gains, craft: Craft) -> Scalar:
     """V = w.K_attitude^-1 Jw/2 + 2 (1 - q0); V' = -w.K_attitude^-1 K_rate w under the law's assumptions."""
-    weighted = solve(gains.k_attitude, apply(craft.inertia, seen.rate))
-    return 0.5 * dot(seen.rate, weighted) + 2.0 * (1.0 - seen.attitude[0])
+    weighted = solve(gains.k_attitude, apply(craft.inertia, measurement.rate))
+    return 0.5 * dot(measurement.rate, weighted) + 2.0 * (1.0 - measurement.attitude[0])
 
 
 def examples() -> list[Gains]:

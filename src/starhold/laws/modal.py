@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.scalar import Scalar
-from starhold.algebra.vector import Matrix, Vector, add, apply, cross, dot, scale, subtract, swing
-from starhold.laws.interface import Card, Gain, NoMemory, Seen, Start
-from starhold.models.craft import Craft, tensor
+from starhold.algebra.vector import Matrix, Vector, add, apply, cross, dot, gyroscopic_torque, scale, subtract
+from starhold.laws.interface import Card, Gain, Measurement, NoMemory, Start
+from starhold.parts.craft import Craft, tensor
 
 CARD = Card(
     title="Modal",
@@ -130,19 +130,21 @@ def _upper(q: Vector, w: Vector, gains: Gains, craft: Craft, first: Scalar, rest
     return subtract(subtract(scale(first, half), scale(0.5 * dot(w, rest), last)), pulled)
 
 
-def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
+def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Control torque (N m, body).
 
     With x' = (q0', q') the level above gives K_0 x = K_1 x' - phi_0 (K_1 (q0 - 1, q) + J w) beside the known torque, whose
     Jacobians cancel. Nothing is divided by w: where it vanishes, the scalar part has no pole of its own to place.
     """
-    q, w = vector_part(seen.attitude), seen.rate
-    turning = derivative(seen.attitude, w)
-    held = _upper(q, w, gains, craft, seen.attitude[0] - 1.0, q)
+    q, w = vector_part(measurement.attitude), measurement.rate
+    turning = derivative(measurement.attitude, w)
+    held = _upper(q, w, gains, craft, measurement.attitude[0] - 1.0, q)
     moved = _upper(q, w, gains, craft, turning[0], vector_part(turning))
     feedback = subtract(moved, apply(gains.phi_0, add(held, apply(craft.inertia, w))))
-    model = add(swing(craft.inertia, seen.body_rate), cross(seen.body_rate, seen.stored))
-    model = subtract(add(model, apply(craft.inertia, seen.target_acceleration)), seen.external_torque)
+    model = add(
+        gyroscopic_torque(craft.inertia, measurement.body_rate), cross(measurement.body_rate, measurement.wheel_momentum)
+    )
+    model = subtract(add(model, apply(craft.inertia, measurement.target_acceleration)), measurement.external_torque)
     return subtract(model, feedback), memory
 
 

@@ -13,12 +13,12 @@ from starhold.algebra.quaternion import vector_part
 from starhold.algebra.scalar import less, maximum, where
 from starhold.algebra.structured import Buffer, when
 from starhold.algebra.vector import Vector, add, clip_axes, clip_norm, scale
-from starhold.laws.interface import Card, Gain, Seen, tracking_torque
+from starhold.laws.interface import Card, Gain, Measurement, tracking_torque
 from starhold.laws.predictive.motion import linearise, sample
 from starhold.laws.predictive.problem import COUNTERS, Problem, Store, carve, put_limits, size
 from starhold.laws.predictive.sixes import triple
 from starhold.laws.predictive.solver import Solved, advance, improve
-from starhold.models.craft import Craft, tensor
+from starhold.parts.craft import Craft, tensor
 
 CARD = Card(
     title="Predictive",
@@ -122,18 +122,18 @@ def terminal_weight(gains: Gains, craft: Craft, period: float) -> tuple[Any, Any
     return p, feedback
 
 
-def torque(seen: Seen, gains: Gains, craft: Craft, memory: Memory) -> tuple[Vector, Memory]:
+def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: Memory) -> tuple[Vector, Memory]:
     """Control torque (N m, body): the first move of the best plan. Weights and horizon are those the memory was made for;
     the memory is changed."""
     problem = program(gains, memory)
     store = carve(problem)
-    ahead = tracking_torque(seen, craft)
+    ahead = tracking_torque(measurement, craft)
     bound = math.inf if gains.limit == UNLIMITED else craft.torque_limit
-    sample(problem, linearise(seen, craft), seen.period)
+    sample(problem, linearise(measurement, craft), measurement.period)
     put_limits(problem, scale(-1.0, ahead), bound)
     warm = less(0.0, store.counters[SHAPED])
     when(warm, lambda: advance(problem))
-    store.states.put(0, (*vector_part(seen.attitude), *seen.rate))
+    store.states.put(0, (*vector_part(measurement.attitude), *measurement.rate))
     _count(store, improve(problem, gains.budget, warm))
     command = add(triple(store.plan, 0), ahead)
     # Adding the tracking torque back rounds; the limit is kept exactly.

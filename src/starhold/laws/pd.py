@@ -8,9 +8,9 @@ from typing import Annotated, NamedTuple
 from starhold.algebra.quaternion import vector_part
 from starhold.algebra.scalar import Scalar, less, where
 from starhold.algebra.vector import Vector, add, apply, clip_axes, dot, scale, subtract
-from starhold.laws import response
-from starhold.laws.interface import Card, Gain, NoMemory, Seen, tracking_torque
-from starhold.models.craft import Craft
+from starhold.laws.interface import Card, Gain, Measurement, NoMemory, tracking_torque
+from starhold.parts.craft import Craft
+from starhold.synthesis import response
 
 CARD = Card(
     title="Quaternion PD",
@@ -40,9 +40,9 @@ def remember(gains: Gains, craft: Craft, period: float) -> NoMemory:
     return NoMemory()
 
 
-def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
+def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Control torque (N m, body)."""
-    damping = scale(gains.k_rate, seen.rate)
+    damping = scale(gains.k_rate, measurement.rate)
     within = clip_axes(damping, craft.torque_limit - gains.k_attitude)
     clipped = less(0.5, gains.limit)
     damping = (
@@ -50,8 +50,8 @@ def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Ve
         where(clipped, within[1], damping[1]),
         where(clipped, within[2], damping[2]),
     )
-    feedback = add(damping, scale(gains.k_attitude, vector_part(seen.attitude)))
-    return subtract(tracking_torque(seen, craft), feedback), memory
+    feedback = add(damping, scale(gains.k_attitude, vector_part(measurement.attitude)))
+    return subtract(tracking_torque(measurement, craft), feedback), memory
 
 
 FORMS = response.FORMS
@@ -59,10 +59,10 @@ complete = response.complete
 design, explain = response.designs(Gains, torque)
 
 
-def lyapunov(seen: Seen, gains: Gains, craft: Craft) -> Scalar:
+def lyapunov(measurement: Measurement, gains: Gains, craft: Craft) -> Scalar:
     """V = w.Jw/2 + 2 k_attitude (1 - q0) (J); V' = -w.damping."""
-    energy = 0.5 * dot(seen.rate, apply(craft.inertia, seen.rate))
-    return energy + 2.0 * gains.k_attitude * (1.0 - seen.attitude[0])
+    energy = 0.5 * dot(measurement.rate, apply(craft.inertia, measurement.rate))
+    return energy + 2.0 * gains.k_attitude * (1.0 - measurement.attitude[0])
 
 
 def examples() -> list[Gains]:

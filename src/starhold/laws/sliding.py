@@ -11,15 +11,15 @@ import numpy as np
 
 from starhold.algebra.quaternion import vector_part
 from starhold.algebra.scalar import Scalar, clip, less, maximum, sign, where
-from starhold.algebra.vector import Matrix, Vector, add, apply, cross, scale, subtract, swing, times
-from starhold.laws import response
-from starhold.laws.interface import Card, Gain, NoMemory, Seen, Start
-from starhold.laws.response import Turn, largest_moment, settle, told
-from starhold.models.craft import Craft, tensor, vector
+from starhold.algebra.vector import Matrix, Vector, add, apply, cross, gyroscopic_torque, scale, subtract, times
+from starhold.laws.interface import Card, Gain, Measurement, NoMemory, Start
+from starhold.parts.craft import Craft, tensor, vector
+from starhold.synthesis import response
+from starhold.synthesis.response import Turn, largest_moment, settle, told
 
 CARD = Card(
     title="Sliding mode",
-    summary="reaches the surface w + K q = 0 against any torque below `reach`, then slides to the target",
+    summary="reaches the surface w + K q = 0 against any torque below `switching_gain`, then slides to the target",
     sources=(
         "Smooth sliding-mode control for spacecraft attitude tracking maneuvers (1995)",
         "published comparison of Lyapunov, sliding-mode and predictive attitude control, eq. (18)",
@@ -27,7 +27,7 @@ CARD = Card(
     assumptions=(
         "rigid body",
         "inertia known",
-        "|M_ext| < reach on every axis",
+        "|M_ext| < switching_gain on every axis",
         "torque not limited",
         "q0 > 0 on the surface",
     ),
@@ -38,11 +38,11 @@ CARD = Card(
 class Gains(NamedTuple):
     """Surface slope, reaching torque and, to trade chatter for accuracy, the thickness of a boundary layer."""
 
-    slope: Annotated[
+    surface_gain: Annotated[
         Matrix | Vector, Gain("1/s", shape=(3, 3), text="K of the surface w + K q = 0, symmetric positive definite")
     ]
-    reach: Annotated[Vector, Gain("N m", above=0.0, shape=(3,), text="switching torque, above the disturbance")]
-    layer: Annotated[float, Gain("rad/s", at_least=0.0, text="boundary layer; 0 switches by sign")] = 0.0
+    switching_gain: Annotated[Vector, Gain("N m", above=0.0, shape=(3,), text="switching torque, above the disturbance")]
+    boundary_layer: Annotated[float, Gain("rad/s", at_least=0.0, text="boundary layer; 0 switches by sign")] = 0.0
 
 
 class Layered(NamedTuple):
@@ -51,7 +51,7 @@ class Layered(NamedTuple):
     exact about the axis of the largest moment, and faster about the others."""
 
     bandwidth: Annotated[float, Gain("rad/s", above=0.0, text="natural frequency, the least of all axes")]
-    reach: Annotated[float, Gain("N m", above=0.0, text="switching torque about the axis of the largest moment")]
+    switching_gain: Annotated[float, Gain("N m", above=0.0, text="switching torque about the axis of the largest moment")]
     damping: Annotated[float, Gain("1", at_least=1.0, text="damping ratio; 1: a double root")] = 1.0
 
 
@@ -60,10 +60,10 @@ class Settling(NamedTuple):
     at rest, without torque from outside."""
 
     time: Annotated[float, Gain("s", above=0.0, text="after which angle and rate stay within their tolerances")]
-    reach: Annotated[
+    switching_gain: Annotated[
         float | None, Gain("N m", above=0.0, text="switching torque; the torque over 2 sqrt 3, half of it, if absent")
     ] = None
-    layer: Annotated[float, Gain("rad/s", at_least=0.0, text="boundary layer; 0 switches by sign")] = 0.0
+    boundary_layer: Annotated[float, Gain("rad/s", at_least=0.0, text="boundary layer; 0 switches by sign")] = 0.0
     torque: Annotated[float | None, Gain("N m", above=0.0, text="largest norm of the torque; what there is if absent")] = (
         None
     )
@@ -73,7 +73,7 @@ class Settling(NamedTuple):
         Gain("1", shape=(4,), spread=False, text="turn from the target to the body at the start; the scenario's if absent"),
     ] = None
     rate: Annotated[Any, Gain("rad/s", shape=(3,), spread=False, text="relative rate then; the scenario's if absent")] = None
-    stored: Annotated[
+    wheel_momentum: Annotated[
         Any, Gain("N m s", shape=(3,), spread=False, text="by wheels then, body axes; the scenario's if absent")
     ] = None
     attitude_tolerance: Annotated[float | None, Gain("rad", above=0.0, text="that of [settling] if absent")] = None
@@ -86,11 +86,11 @@ FORMS: dict[str, Any] = {"bandwidth": Layered, "settling": Settling}
 def complete(spec: Layered | Settling, start: Callable[[], Start]) -> Layered | Settling:
     """The inputs of a form that settles in time, with what they leave to the scenario."""
     spec = response.complete(spec, start)
-    if isinstance(spec, Layered) or spec.reach is not None:
+    if isinstance(spec, Layered) or spec.switching_gain is not None:
         return spec
     if spec.torque is None or math.isinf(spec.torque):
-        raise ValueError("reach must be given where the torque is not limited")
-    return spec._replace(reach=spec.torque / (2.0 * math.sqrt(3.0)))
+        raise ValueError("switching_gain must be given where the torque is not limited")
+    return spec._replace(switching_gain=spec.torque / (2.0 * math.sqrt(3.0)))
 
 
 def design(craft: Craft, spec: Layered | Settling) -> Gains:
@@ -101,10 +101,10 @@ def design(craft: Craft, spec: Layered | Settling) -> Gains:
     apart = spec.damping + math.sqrt(spec.damping**2 - 1.0)
     slope, moments = 2.0 * spec.bandwidth / apart, tensor(craft.inertia)
     most = largest_moment(craft)
-    layer = spec.reach / (spec.bandwidth * apart * most)
-    reach = (spec.reach, spec.reach, spec.reach)
+    layer = spec.switching_gain / (spec.bandwidth * apart * most)
+    reach = (spec.switching_gain, spec.switching_gain, spec.switching_gain)
     if np.count_nonzero(moments - np.diag(np.diagonal(moments))) == 0:
-        reach = vector(spec.reach * np.diagonal(moments) / most)
+        reach = vector(spec.switching_gain * np.diagonal(moments) / most)
     if not (0.0 < layer < math.inf and math.isfinite(slope) and min(reach) > 0.0):
         raise ValueError("the gains leave the range of numbers")
     return Gains((slope, slope, slope), reach, layer)
@@ -112,16 +112,18 @@ def design(craft: Craft, spec: Layered | Settling) -> Gains:
 
 @lru_cache(maxsize=64)
 def _settled(craft: Craft, spec: Settling) -> tuple[Gains, Turn]:
-    reach = spec.reach
+    reach = spec.switching_gain
     if reach is None:
-        raise ValueError("reach must be given")
+        raise ValueError("switching_gain must be given")
     least = float(np.linalg.eigvalsh(tensor(craft.inertia))[0])
 
     def gains_of(x: float) -> Gains:
-        return Gains((x, x, x), (reach, reach, reach), spec.layer)
+        return Gains((x, x, x), (reach, reach, reach), spec.boundary_layer)
 
     def fastest(gains: Gains) -> float:
-        return float(tensor(gains.slope)[0, 0]) + (reach / (spec.layer * least) if spec.layer > 0.0 else 0.0)
+        return float(tensor(gains.surface_gain)[0, 0]) + (
+            reach / (spec.boundary_layer * least) if spec.boundary_layer > 0.0 else 0.0
+        )
 
     return settle(torque, gains_of, fastest, craft, spec)
 
@@ -134,17 +136,17 @@ def explain(craft: Craft, spec: Layered | Settling) -> list[tuple[str, Any]]:
         found = told(turn)
     else:
         gains = design(craft, spec)
-    slope, inertia = tensor(gains.slope), tensor(craft.inertia)
-    if gains.layer == 0.0:
+    slope, inertia = tensor(gains.surface_gain), tensor(craft.inertia)
+    if gains.boundary_layer == 0.0:
         return [*found, ("eigenvalues on the surface (1/s)", np.linalg.eigvals(-0.5 * slope))]
-    hold = np.linalg.solve(inertia, np.diag(gains.reach)) / gains.layer
+    hold = np.linalg.solve(inertia, np.diag(gains.switching_gain)) / gains.boundary_layer
     loop = np.block([[np.zeros((3, 3)), np.eye(3)], [-0.5 * hold @ slope, -0.5 * slope - hold]])
     return [*found, ("eigenvalues of the linear loop in the layer (1/s)", np.linalg.eigvals(loop))]
 
 
-def surface(seen: Seen, gains: Gains) -> Vector:
+def surface(measurement: Measurement, gains: Gains) -> Vector:
     """s = w + K q (rad/s)."""
-    return add(seen.rate, apply(gains.slope, vector_part(seen.attitude)))
+    return add(measurement.rate, apply(gains.surface_gain, vector_part(measurement.attitude)))
 
 
 def switch(s: Scalar, layer: Scalar) -> Scalar:
@@ -153,15 +155,15 @@ def switch(s: Scalar, layer: Scalar) -> Scalar:
     return where(inside, clip(s / maximum(layer, 1e-300), 1.0), sign(s))
 
 
-def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
+def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Control torque (N m, body)."""
-    q = vector_part(seen.attitude)
-    q_rate = scale(0.5, add(scale(seen.attitude[0], seen.rate), cross(q, seen.rate)))
-    wanted = subtract(seen.target_acceleration, apply(gains.slope, q_rate))
-    equivalent = add(swing(craft.inertia, seen.body_rate), apply(craft.inertia, wanted))
-    s = surface(seen, gains)
-    switching = (switch(s[0], gains.layer), switch(s[1], gains.layer), switch(s[2], gains.layer))
-    return subtract(equivalent, times(gains.reach, switching)), memory
+    q = vector_part(measurement.attitude)
+    q_rate = scale(0.5, add(scale(measurement.attitude[0], measurement.rate), cross(q, measurement.rate)))
+    wanted = subtract(measurement.target_acceleration, apply(gains.surface_gain, q_rate))
+    equivalent = add(gyroscopic_torque(craft.inertia, measurement.body_rate), apply(craft.inertia, wanted))
+    s = surface(measurement, gains)
+    switching = (switch(s[0], gains.boundary_layer), switch(s[1], gains.boundary_layer), switch(s[2], gains.boundary_layer))
+    return subtract(equivalent, times(gains.switching_gain, switching)), memory
 
 
 def examples() -> list[Gains]:

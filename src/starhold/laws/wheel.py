@@ -10,9 +10,9 @@ import numpy as np
 from starhold.algebra.quaternion import vector_part
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Vector, add, apply, cross, dot, scale, subtract
-from starhold.laws.interface import Card, Gain, NoMemory, Seen
-from starhold.laws.stability_degree import Designed, brute_force, design_gains
-from starhold.models.craft import Craft, tensor
+from starhold.laws.interface import Card, Gain, Measurement, NoMemory
+from starhold.parts.craft import Craft, tensor
+from starhold.synthesis.stability_degree import Designed, brute_force, design_gains
 
 CARD = Card(
     title="Reaction-wheel law",
@@ -20,7 +20,7 @@ CARD = Card(
     sources=("published study of reaction-wheel attitude control with a given degree of stability",),
     assumptions=("rigid body", "inertia and wheel momentum known", "external torque known", "torque not limited"),
     claims="almost-global",
-    double_cover="even",
+    quaternion_sign="even",
 )
 
 
@@ -90,27 +90,27 @@ def _twist(k: Vector, q: Vector) -> Vector:
     return ((k[1] + k[2]) * q[0], (k[2] + k[0]) * q[1], (k[0] + k[1]) * q[2])
 
 
-def torque(seen: Seen, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
+def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Torque asked of the wheels (N m, body)."""
-    q = vector_part(seen.attitude)
+    q = vector_part(measurement.attitude)
     twist = _twist(gains.k_attitude, q)
     # S = 2 (q0 Mq + Mq x q), of which equal weights leave 4 k q0 q.
-    cosines = scale(2.0, add(scale(seen.attitude[0], twist), cross(twist, q)))
-    feedback = add(scale(gains.k_rate, seen.rate), cosines)
-    momentum = add(apply(craft.inertia, seen.body_rate), seen.stored)
-    model = add(cross(seen.body_rate, momentum), apply(craft.inertia, seen.target_acceleration))
-    model = subtract(model, seen.external_torque)
+    cosines = scale(2.0, add(scale(measurement.attitude[0], twist), cross(twist, q)))
+    feedback = add(scale(gains.k_rate, measurement.rate), cosines)
+    momentum = add(apply(craft.inertia, measurement.body_rate), measurement.wheel_momentum)
+    model = add(cross(measurement.body_rate, momentum), apply(craft.inertia, measurement.target_acceleration))
+    model = subtract(model, measurement.external_torque)
     return subtract(scale(gains.compensation, model), feedback), memory
 
 
-def lyapunov(seen: Seen, gains: Gains, craft: Craft) -> Scalar:
+def lyapunov(measurement: Measurement, gains: Gains, craft: Craft) -> Scalar:
     """V = w.Jw/2 + sum k_i (1 - a_ii) = w.Jw/2 + 2 q.Mq (J); V' = -k_rate |w|2 with full compensation.
 
     At rest S = 0 also at half turns: about the three axes, or, where weights are equal, about any axis in their plane. V
     falls from each of them in some direction, so that they are unstable.
     """
-    q = vector_part(seen.attitude)
-    return 0.5 * dot(seen.rate, apply(craft.inertia, seen.rate)) + 2.0 * dot(q, _twist(gains.k_attitude, q))
+    q = vector_part(measurement.attitude)
+    return 0.5 * dot(measurement.rate, apply(craft.inertia, measurement.rate)) + 2.0 * dot(q, _twist(gains.k_attitude, q))
 
 
 def examples() -> list[Gains]:

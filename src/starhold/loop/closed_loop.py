@@ -16,16 +16,21 @@ from starhold.algebra.structure import alike, leaves, unflatten
 from starhold.algebra.structured import Buffer
 from starhold.algebra.vector import ZERO, Vector, apply
 from starhold.laws.catalogue import Law
-from starhold.laws.double_cover import COVERS
 from starhold.laws.interface import NoMemory
-from starhold.models import actuator, environment, rigid_body, sensor, target, wheeled_body
-from starhold.models.craft import Craft
-from starhold.models.envelope import with_facets
-from starhold.models.rigid_body import State
-from starhold.models.wheeled_body import WheeledState
-from starhold.models.wheels import Wheels, allocate, allocate_peak, relaxation
+from starhold.parts.actuators import dynamics as actuator
+from starhold.parts.bodies import rigid_body
+from starhold.parts.bodies.rigid_body import State
+from starhold.parts.craft import Craft
+from starhold.parts.effectors import wheeled_body
+from starhold.parts.effectors.envelope import with_facets
+from starhold.parts.effectors.wheeled_body import WheeledState
+from starhold.parts.effectors.wheels import Wheels, allocate, allocate_peak, relaxation
+from starhold.parts.environments import gravity as environment
+from starhold.parts.quaternion_sign import SIGN_POLICIES
+from starhold.parts.sensors import gaussian as sensor
+from starhold.parts.targets import target
 
-Cover = Literal["as_published", "shortest", "hysteresis"]
+SignPolicy = Literal["as_published", "shortest", "hysteresis"]
 Limit = Literal["axis", "norm", "none"]
 Allocation = Literal["least-squares", "least-peak"]
 ALLOCATIONS = {"least-squares": allocate, "least-peak": allocate_peak}
@@ -60,7 +65,7 @@ class Parts(NamedTuple):
     tidy: Callable[..., Any]
     with_torque: Callable[..., Any]
     rates: Callable[..., Any]
-    stored: Callable[..., Any]
+    wheel_momentum: Callable[..., Any]
     record: Callable[..., Any]
     share: Callable[..., Any]
 
@@ -145,7 +150,7 @@ class ClosedLoop:
     """Where the command is cut off, in the way of `limit` (N m); None: at the torque limit that the law sees, the craft's.
     Beside wheels the law sees what they surely give together, and the wheels cut off what is more."""
     dynamics: actuator.Dynamics = actuator.IDEAL
-    cover: Cover = "as_published"
+    sign_policy: SignPolicy = "as_published"
     hysteresis_width: float = 0.5
     seed: int = 1
     wheels: Wheels | None = None
@@ -172,7 +177,7 @@ class ClosedLoop:
             goal,
             sensor.noisy if seen_noise else sensor.exact,
             sensor.gaussian_disturbance if self.noise.torque > 0.0 else sensor.no_disturbance,
-            COVERS[self.cover],
+            SIGN_POLICIES[self.sign_policy],
             self.law.torque,
             LIMITS[self.limit],
             actuator.start_ideal if ideal else actuator.start_lagging,
@@ -180,7 +185,7 @@ class ClosedLoop:
             body.tidy,
             body.with_torque,
             body.rates,
-            body.stored,
+            body.wheel_momentum,
             body.record,
             ALLOCATIONS[self.allocation],
         )

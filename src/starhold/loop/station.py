@@ -9,11 +9,12 @@ from typing import Any, Literal, NamedTuple
 from starhold.algebra.scalar import both, is_finite, less, opposite, where
 from starhold.algebra.vector import ZERO, Vector, dot
 from starhold.algebra.words import number_of
-from starhold.laws.station.interface import SeenPoint, StationLaw
+from starhold.laws.point import PointMeasurement, StationLaw
 from starhold.loop.closed_loop import LIMITS
 from starhold.loop.step import Step, runge_kutta
-from starhold.models import actuator, libration
-from starhold.models.libration import Libration, PointState
+from starhold.parts.actuators import dynamics as actuator
+from starhold.parts.bodies import libration_point as libration
+from starhold.parts.bodies.libration_point import Libration, PointState
 
 MODELS = {"linear": libration.linear, "nonlinear": libration.nonlinear}
 
@@ -137,7 +138,7 @@ def station_step(parts: StationParts) -> Step:
     motion, law, limit, begin, response = parts
 
     def look(carry, step, key, plant, setup):
-        return SeenPoint(carry.state.position, carry.state.velocity, setup.period, setup.limit)
+        return PointMeasurement(carry.state.position, carry.state.velocity, setup.period, setup.limit)
 
     def decide(carry, step, key, gains, plant, setup):
         command, memory = law(look(carry, step, key, plant, setup), gains, plant, carry.memory)

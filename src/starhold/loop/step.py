@@ -11,10 +11,10 @@ from starhold.algebra.scalar import both, is_finite, less, opposite, where
 from starhold.algebra.structure import move
 from starhold.algebra.vector import ZERO, Vector, add, cross, dot, subtract
 from starhold.algebra.words import number_of, word_of
-from starhold.laws.interface import Seen
+from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import Carry, Parts
-from starhold.models.actuator import ideal
-from starhold.models.target import inertial, orbital
+from starhold.parts.actuators.dynamics import ideal
+from starhold.parts.targets.target import inertial, orbital
 
 
 class Sample(NamedTuple):
@@ -60,7 +60,7 @@ def runge_kutta(slope: Callable[..., Any]) -> Callable[..., Any]:
 def attitude_step(parts: Parts) -> Step:
     """The equations of a control step made of these parts."""
     environment, target, sense, disturb, cover, law, limit, begin, response, *body = parts
-    tidy, with_torque, rates, stored, record, share = body
+    tidy, with_torque, rates, wheel_momentum, record, share = body
 
     def look(carry, step, key, craft, setup):
         state = carry.state
@@ -72,8 +72,8 @@ def attitude_step(parts: Parts) -> Step:
         target_rate, target_acceleration = to_body(error, goal.rate), to_body(error, goal.acceleration)
         error_rate = subtract(rate, target_rate)
         target_acceleration = subtract(target_acceleration, cross(error_rate, target_rate))
-        held = stored(state, setup.wheels)
-        return Seen(error, error_rate, rate, target_rate, target_acceleration, external, position, setup.period, held)
+        held = wheel_momentum(state, setup.wheels)
+        return Measurement(error, error_rate, rate, target_rate, target_acceleration, external, position, setup.period, held)
 
     def look_at_rest(carry, step, key, craft, setup):
         # The same for a target that does not turn, spared the arithmetic on zeros, which must not be dropped.
@@ -82,8 +82,8 @@ def attitude_step(parts: Parts) -> Step:
         attitude, rate = sense(state.attitude, state.rate, setup.noise, key, word_of(step))
         external = environment(state.position, attitude, craft)[1]
         position = to_body(attitude, state.position)
-        held = stored(state, setup.wheels)
-        return Seen(relative(goal.attitude, attitude), rate, rate, ZERO, ZERO, external, position, setup.period, held)
+        held = wheel_momentum(state, setup.wheels)
+        return Measurement(relative(goal.attitude, attitude), rate, rate, ZERO, ZERO, external, position, setup.period, held)
 
     def keep(carry, step, setup):
         return carry.goal
@@ -95,9 +95,9 @@ def attitude_step(parts: Parts) -> Step:
     follow = renew if target is orbital else keep
 
     def decide(carry, step, key, gains, craft, setup):
-        seen = see(carry, step, key, craft, setup)
-        shown, h = cover(seen.attitude, carry.h, setup.width)
-        command, memory = law(seen._replace(attitude=shown), gains, craft, carry.memory)
+        measurement = see(carry, step, key, craft, setup)
+        shown, h = cover(measurement.attitude, carry.h, setup.width)
+        command, memory = law(measurement._replace(attitude=shown), gains, craft, carry.memory)
         command = limit(command, setup.command_limit)
         state = with_torque(carry.state, begin(carry.state.torque, command))
         disturbance = disturb(setup.noise, key, word_of(step))

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from starhold.report.failures import Failure
-from starhold.report.files import whole
-from starhold.report.flight import COLOURS
+from starhold.files import atomic_write
+from starhold.studies.failures import Failure
+from starhold.studies.flight import COLOURS
 
 DPI = 110
 
@@ -78,7 +78,7 @@ def draw(found: Sequence[Failure], path: Path, title: str) -> Path:
     at = (0.012, 1.0 - 0.30 / height)
     figure.legend(handles=handles, loc="upper left", bbox_to_anchor=at, ncols=4, fontsize=8.5, frameon=False)
     # No software entry, lest equal figures differ between releases.
-    with whole(path) as hidden:
+    with atomic_write(path) as hidden:
         figure.savefig(hidden, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
     return path
 

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 
 from starhold.analysis.metrics import DECADES
-from starhold.report.files import whole
-from starhold.report.flight import Flight, colour
+from starhold.files import atomic_write
 from starhold.report.plots import ACCURACIES, Plot, Plots, back_to_front, collect, early, steps_within, until
+from starhold.studies.flight import Flight, colour
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -218,6 +218,6 @@ def width_of(number: int, count: int, thin: bool = False) -> float:
 
 def _save(figure: Any, path: Path) -> Path:
     # Fast compression: the files are small either way. No software entry, lest equal figures differ between releases.
-    with whole(path) as hidden:
+    with atomic_write(path) as hidden:
         figure.savefig(hidden, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
     return path

@@ -16,8 +16,8 @@ from starhold.certification.invariant.enclosure import Form
 from starhold.certification.invariant.search import Values
 from starhold.certification.invariant.theorems import indicator
 from starhold.certification.invariant.wording import down
-from starhold.report.files import whole
-from starhold.report.flight import COLOURS
+from starhold.files import atomic_write
+from starhold.studies.flight import COLOURS
 
 PICTURE = "invariant.png"
 DPI = 110
@@ -184,7 +184,7 @@ def draw(sketches: Sequence[Sketch], path: Path, title: str) -> Path | None:
         borderpad=0.0,
         columnspacing=1.4,
     )
-    with whole(path) as hidden:
+    with atomic_write(path) as hidden:
         figure.savefig(hidden, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
     return path
 

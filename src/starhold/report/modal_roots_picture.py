@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from starhold.analysis.roots import Best, Pieces
-from starhold.report.files import whole
-from starhold.report.flight import COLOURS
-from starhold.report.modal_roots import Study
+from starhold.files import atomic_write
+from starhold.studies.flight import COLOURS
+from starhold.studies.modal_roots import Study
 
 DPI = 110
 LINES = {"fit": ("own fit", "-", COLOURS[2]), "published": ("published fit", (0, (5, 2.5)), COLOURS[1])}
@@ -82,7 +82,7 @@ def draw(found: Study, path: Path, title: str) -> Path:
         for side in ("top", "right"):
             axis.spines[side].set_visible(False)
     # No software entry, lest equal figures differ between releases.
-    with whole(path) as hidden:
+    with atomic_write(path) as hidden:
         figure.savefig(hidden, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
     return path
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from starhold.algebra.quaternion import conjugate, multiply, to_body
 from starhold.analysis.metrics import DECADES
-from starhold.models.craft import EARTH, whole
-from starhold.report.flight import Flight
+from starhold.parts.craft import EARTH, total_inertia
 from starhold.report.page_parts import (
     POINTS,
     columns_list,
@@ -33,6 +32,7 @@ from starhold.report.page_parts import (
 from starhold.report.plots import ACCURACIES, Panel, Plot, Plots, collect, early, steps_within, until
 from starhold.report.proved import section as proved
 from starhold.report.transients import section as transients
+from starhold.studies.flight import Flight
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -48,7 +48,7 @@ SECONDS = 14.0
 """How long the animation plays."""
 
 _VIEWS = (
-    "Seen in the axes of the target (dashed, x* y* z*); solid axes are the body's, and the angle "
+    "Measurement in the axes of the target (dashed, x* y* z*); solid axes are the body's, and the angle "
     "is what is left to turn. The outline is that of the uniform box with this inertia."
 )
 _ORBITAL = (
@@ -140,7 +140,7 @@ def _scene(scenario: Scenario, flights: Sequence[Flight]) -> dict[str, Any]:
         q = flight.recording["attitude_error"]
         attitudes.append([rounded(q[place], 4) for place in places if place < len(q)] or [[1.0, 0.0, 0.0, 0.0]])
     times = longest[places] if len(places) > 1 else np.array([0.0, 1.0])
-    size, axes = _box(whole(scenario.craft))
+    size, axes = _box(total_inertia(scenario.craft))
     return {
         "times": rounded(times),
         "digits": max(0, min(3, 3 - math.floor(math.log10(max(float(times[-1]), 1e-3))))),

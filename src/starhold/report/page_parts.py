@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from starhold.report.flight import Flight, colour, number_text
 from starhold.report.plots import Panel, Plot, back_to_front
 from starhold.report.proved import swatch
+from starhold.studies.flight import Flight, colour, number_text
 
 if TYPE_CHECKING:
     from starhold.scenario.checking import LawBook
@@ -129,22 +129,22 @@ def lost_alarm(flights: Sequence[Flight]) -> str:
 
 def ranking(flights: Sequence[Flight]) -> str:
     """The ranked table."""
-    board = flights[0].board
+    metric_set = flights[0].metric_set
     results = {flight.name: flight.metrics for flight in flights}
-    metrics = board.columns(results)
-    best = board.winners(results)
+    metrics = metric_set.columns(results)
+    best = metric_set.winners(results)
     numbers = {flight.name: number for number, flight in enumerate(flights)}
     head = "".join(
         f'<th scope="col" title="{escape(measure.meaning)}">{escape(measure.heading)}'
         f"<small>{escape(measure.unit) or '&nbsp;'}</small></th>"
-        for measure in (board.measures[metric] for metric in metrics)
+        for measure in (metric_set.measures[metric] for metric in metrics)
     )
     rows: list[str] = []
-    for place, name in enumerate(board.ranked(results), 1):
+    for place, name in enumerate(metric_set.ranked(results), 1):
         flight = flights[numbers[name]]
         lost = flight.lost is not None
         cells = "".join(
-            f"{BEST if name in best[metric] else '<td>'}{board.told(metric, flight.metrics)}</td>" for metric in metrics
+            f"{BEST if name in best[metric] else '<td>'}{metric_set.told(metric, flight.metrics)}</td>" for metric in metrics
         )
         fate = f"diverged at {flight.lost_text()}" if lost else flight.law if flight.law != name else ""
         rows.append(
@@ -152,8 +152,8 @@ def ranking(flights: Sequence[Flight]) -> str:
             f'<th scope="row" style="text-align:left">{swatch(numbers[name])}{escape(name)}'
             f"{f'<small>{escape(fate)}</small>' if fate else ''}</th>{cells}</tr>"
         )
-    order = ", then ".join(board.headings(results))
-    late = f" {board.late(results)}".rstrip()
+    order = ", then ".join(metric_set.headings(results))
+    late = f" {metric_set.late(results)}".rstrip()
     return (
         '<h2>Ranking</h2>\n<div class="wide"><table class="ranking"><thead><tr><th scope="col">#</th>'
         f'<th scope="col" style="text-align:left">law</th>{head}</tr></thead>\n'
@@ -220,8 +220,10 @@ def _value(value: Any) -> str:
 
 def columns_list(flights: Sequence[Flight]) -> str:
     """What the columns of the ranking mean."""
-    board = flights[0].board
-    measures = [board.measures[metric] for metric in board.columns({flight.name: flight.metrics for flight in flights})]
+    metric_set = flights[0].metric_set
+    measures = [
+        metric_set.measures[metric] for metric in metric_set.columns({flight.name: flight.metrics for flight in flights})
+    ]
     items = "".join(
         f"<dt>{escape(measure.heading)}{f', {escape(measure.unit)}' if measure.unit else ''}</dt>"
         f"<dd>{escape(measure.meaning)}</dd>"

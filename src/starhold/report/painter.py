@@ -14,7 +14,7 @@ from threading import Thread
 from typing import TYPE_CHECKING
 
 from starhold.errors import InputError
-from starhold.report.files import clear_unfinished
+from starhold.files import clear_unfinished
 
 if TYPE_CHECKING:
     from starhold.report.figures import Picture

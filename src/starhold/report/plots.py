@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.analysis.metrics import DECADES, acceleration, error_angle, stays_within
-from starhold.report.flight import Flight
+from starhold.studies.flight import Flight
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario

@@ -8,7 +8,7 @@ from typing import Any
 
 from starhold.certification.certificate import FILE, Claim, Obligation
 from starhold.certification.wording import HEADINGS, OBLIGATIONS, evidence, methods, sentence
-from starhold.report.flight import Flight, colour, number_text
+from starhold.studies.flight import Flight, colour, number_text
 
 NOTE = (
     "Proved means shown by a computation without rounding: identities and inequalities in exact rational numbers, the rest "
@@ -39,7 +39,7 @@ SYMBOLS = {
     "weight": ("c in |ω| |(J + p)ω| ≤ (c |ω|² + |(J + p)ω|²/c)/2", ""),
     "momentum": ("total angular momentum, at most", "N m s"),
     "motors": ("torque of each motor, at most", "N m"),
-    "stored": ("momentum of each wheel, at most", "N m s"),
+    "wheel_momentum": ("momentum of each wheel, at most", "N m s"),
     "margin": ("torque in hand on the weakest axis", "N m"),
     "surface": ("|s| in the end, at most", "rad/s"),
     "radius": ("spectral radius at the control period, at most", ""),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import starhold
 from starhold.certification.certificate import FILE as CERTIFICATES
 from starhold.errors import InputError
-from starhold.report.files import claim, clear_unfinished, whole
+from starhold.files import atomic_write, claim, clear_unfinished
 from starhold.report.netcdf import write_netcdf
 from starhold.scenario.checking import cut
 from starhold.scenario.opening import AnyScenario
@@ -74,12 +74,12 @@ def signed(run: Recording, scenario: AnyScenario) -> Recording:
 def write_run(run: Recording, path: Path) -> None:
     """A run as netCDF-4."""
     path.parent.mkdir(exist_ok=True)
-    with whole(path) as hidden:
+    with atomic_write(path) as hidden:
         write_netcdf(run, hidden)
 
 
 def write_summary(scenario: AnyScenario, results: dict[str, dict[str, Any]], path: Path) -> None:
     """The metrics of each law, SI units, as JSON; a value that does not exist is null."""
     content = {"scenario": scenario.name, "starhold_version": starhold.__version__, "laws": results}
-    with whole(path) as hidden:
+    with atomic_write(path) as hidden:
         hidden.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from starhold.models.libration import nonlinear
-from starhold.models.station import Station, demand
-from starhold.report.files import whole
+from starhold.files import atomic_write
+from starhold.parts.bodies.libration_point import nonlinear
+from starhold.synthesis.circle import Station, demand
 
 RATES = (0.8, 1.0, 1.2, 1.6, 1.8, 2.0)
 """Omega; the best rate comes beside them."""
@@ -50,7 +50,7 @@ def dearer(station: Station) -> float:
 def write_table(station: Station, path: Path) -> None:
     """The table as CSV, SI units, one row a rate and reflectivity."""
     columns = reflectivities(station)
-    with whole(path) as hidden, hidden.open("w", encoding="utf-8", newline="") as file:
+    with atomic_write(path) as hidden, hidden.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(
             ["rate", "period", "peak_scaled", "peak", "pressure", "radius", "specular", "diffuse", "area_per_mass"]

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from starhold.laws.stability_degree import Optimum, boundary, degree, optimum
-from starhold.report.files import whole
+from starhold.files import atomic_write
+from starhold.synthesis.stability_degree import Optimum, boundary, degree, optimum
 
 DPI = 110
 POINTS = 400
@@ -205,6 +205,6 @@ def _axes(ratios: tuple[float, ...]) -> list[tuple[str, float]]:
 
 def _save(figure: Any, path: Path) -> Path:
     # No software entry, lest equal figures differ between releases.
-    with whole(path) as hidden:
+    with atomic_write(path) as hidden:
         figure.savefig(hidden, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
     return path

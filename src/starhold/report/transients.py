@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from starhold.analysis.metrics import too_late
 from starhold.analysis.transient import Limits, of_run
-from starhold.report.flight import Flight
 from starhold.report.proved import swatch
+from starhold.studies.flight import Flight
 
 if TYPE_CHECKING:
     from starhold.scenario.transient import TransientTable

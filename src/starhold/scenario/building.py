@@ -6,8 +6,8 @@ import numpy as np
 
 from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.models.actuator import Dynamics
-from starhold.models.sensor import Noise
+from starhold.parts.actuators.dynamics import Dynamics
+from starhold.parts.sensors.gaussian import Noise
 from starhold.scenario.checking import check_substeps, try_law
 from starhold.scenario.faults import make_events
 from starhold.scenario.reading import LawEntry, Scenario
@@ -34,7 +34,7 @@ def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
         limit="none" if np.isinf(body.torque_limit) else body.limit,
         command_limit=None if scenario.wheels is None else body.torque_limit,
         dynamics=Dynamics(body.actuator_lag, body.torque_rate_limit),
-        cover=entry.double_cover,
+        sign_policy=entry.quaternion_sign,
         hysteresis_width=entry.hysteresis_width,
         seed=table.simulation.seed,
         wheels=scenario.wheels,

@@ -191,8 +191,8 @@ def try_law(loop: Any, where: str, key: str) -> None:
         carry, setup = loop.carry(), loop.setup()
         if law.file is None:
             return
-        seen = make_step(loop.parts()).look(carry, 0, (0, 0), loop.craft, setup)
-        given = getattr(law.module, law.equation)(seen, loop.gains, loop.craft, carry.memory)
+        measurement = make_step(loop.parts()).look(carry, 0, (0, 0), loop.craft, setup)
+        given = getattr(law.module, law.equation)(measurement, loop.gains, loop.craft, carry.memory)
         pair = given if isinstance(given, tuple) and len(cast(Any, given)) == 2 else (None, None)
         if not isinstance(pair[0], tuple) or len(cast(Any, pair[0])) != 3:
             raise ValueError(f"{law.file.name}: {law.equation} must return three numbers and the memory, not {show(given)}")

@@ -8,9 +8,9 @@ import numpy as np
 
 from starhold.errors import InputError
 from starhold.loop.closed_loop import Event
-from starhold.models.craft import Craft
-from starhold.models.envelope import authority
-from starhold.models.wheels import Wheels, lose
+from starhold.parts.craft import Craft
+from starhold.parts.effectors.envelope import authority
+from starhold.parts.effectors.wheels import Wheels, lose
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.scenario.schema import FaultTable
 

@@ -10,8 +10,8 @@ from pydantic import model_validator
 
 from starhold.algebra.vector import Vector, cross, norm
 from starhold.laws.interface import Gain
-from starhold.models.craft import EARTH
-from starhold.models.orbit import BODIES, NEWTON, Elements, body_of, from_elements, lowest, meets_at
+from starhold.parts.craft import EARTH
+from starhold.parts.orbit import BODIES, NEWTON, Elements, body_of, from_elements, lowest, meets_at
 from starhold.scenario.quantity import quantity
 from starhold.scenario.tables import Table, at_key
 

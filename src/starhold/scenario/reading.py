@@ -12,9 +12,9 @@ import numpy as np
 
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law, catalogue
-from starhold.models.craft import Craft, compact, make_craft
-from starhold.models.envelope import authority
-from starhold.models.wheels import Wheels, body_inertia
+from starhold.parts.craft import Craft, compact, make_craft
+from starhold.parts.effectors.envelope import authority
+from starhold.parts.effectors.wheels import Wheels, body_inertia
 from starhold.scenario.checking import (
     LONGEST_TEXT,
     LawBook,
@@ -47,7 +47,7 @@ class LawEntry(Named):
     name: str
     law: Law
     gains: Any
-    double_cover: Any = "as_published"
+    quaternion_sign: Any = "as_published"
     hysteresis_width: float = 0.5
     form: str | None = None
     spec: Any = None
@@ -181,10 +181,10 @@ def _read_law(data: Any, scenario: Scenario, key: str, taken: set[str], allow_un
         spec = (
             None
             if form is None
-            else law.complete(law.forms[form](*values), lambda: told_to_design(scenario, read.double_cover))
+            else law.complete(law.forms[form](*values), lambda: told_to_design(scenario, read.quaternion_sign))
         )
     gains = make_gains(law, values, spec, scenario.craft, where, key)
     if not allow_unstable:
         refuse_unstable(lambda: law.check(gains), where, key)
     name = free_name(read.name, law.name, taken, where, key)
-    return LawEntry(name, law, gains, read.double_cover, read.hysteresis_width, form, spec, read.fault_action)
+    return LawEntry(name, law, gains, read.quaternion_sign, read.hysteresis_width, form, spec, read.fault_action)

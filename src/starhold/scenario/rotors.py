@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from starhold.models.wheel_units import WHEEL_UNITS
-from starhold.models.wheels import Wheels, make_wheels, nasa_standard, pyramid, three_orthogonal
+from starhold.parts.effectors.wheel_units import WHEEL_UNITS
+from starhold.parts.effectors.wheels import Wheels, make_wheels, nasa_standard, pyramid, three_orthogonal
 from starhold.scenario.schema import Rotor, WheelsTable, WheelTable
 
 LAYOUTS = {"orthogonal": three_orthogonal, "pyramid": pyramid, "nasa-standard": nasa_standard}

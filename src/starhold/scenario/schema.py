@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, create_model, model_validator
 
 from starhold.laws.catalogue import Law, catalogue
 from starhold.laws.interface import Gain
-from starhold.models.craft import check_inertia
+from starhold.parts.craft import check_inertia
 from starhold.scenario.checking import MOST_SUBSTEPS
 from starhold.scenario.orbit import Orbit
 from starhold.scenario.quantity import any_quantity, quantity, quantity_or, reader
@@ -227,7 +227,7 @@ class CertifyTable(Table):
         float | None,
         *quantity_or("any", math.inf, Gain("rad/s", above=0.0, text="convergence from every attitude at up to this rate")),
     ] = None
-    turn: Annotated[
+    slew_angle: Annotated[
         float | None, *quantity(Gain("rad", above=0.0, at_most=math.pi, text="turns from rest within the torque limit"))
     ] = None
     inertia_tolerance: Annotated[
@@ -247,7 +247,7 @@ class LawTable(Table):
 
     type: str
     name: Annotated[Name | None, Field(description="how tables and folders call it; the type if absent")] = None
-    double_cover: Annotated[
+    quaternion_sign: Annotated[
         Literal["as_published", "shortest", "hysteresis"], Field(description="which of q and -q is fed back")
     ] = "as_published"
     hysteresis_width: Annotated[float, *quantity(Gain("1", above=0.0, at_most=0.999, text="flips when h q0 < -width"))] = 0.5

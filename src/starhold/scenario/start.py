@@ -14,10 +14,10 @@ from starhold.algebra.scalar import side
 from starhold.algebra.vector import ZERO, add, subtract
 from starhold.errors import InputError
 from starhold.laws.interface import Start
-from starhold.models.rigid_body import State
-from starhold.models.target import Knots, Target, inertial, knots_of, orbital, tabulate
-from starhold.models.wheeled_body import WheeledState
-from starhold.models.wheels import capacity, stored
+from starhold.parts.bodies.rigid_body import State
+from starhold.parts.effectors.wheeled_body import WheeledState
+from starhold.parts.effectors.wheels import capacity, wheel_momentum
+from starhold.parts.targets.target import Knots, Target, inertial, knots_of, orbital, tabulate
 from starhold.scenario.history import read_history
 from starhold.scenario.rotors import start_momenta
 from starhold.scenario.schema import Pointing
@@ -110,6 +110,6 @@ def told_to_design(scenario: Scenario, cover: str) -> Start:
     free = table.spacecraft.limit == "none" and scenario.wheels is None
     torque = math.inf if free else scenario.torque_limit(scenario.wheels)
     if scenario.wheels is not None and isinstance(begun, WheeledState):
-        held_by_wheels, momentum = stored(begun.momentum, scenario.wheels), capacity(scenario.wheels, begun.momentum)
+        held_by_wheels, momentum = wheel_momentum(begun.momentum, scenario.wheels), capacity(scenario.wheels, begun.momentum)
     tolerances = table.settling
     return Start(error, rate, held_by_wheels, torque, momentum, tolerances.attitude_tolerance, tolerances.rate_tolerance)

@@ -15,8 +15,8 @@ from starhold.algebra.structure import flatten, leaves, mapped, rebuild, unflatt
 from starhold.loop.closed_loop import ClosedLoop, Phase
 from starhold.loop.kernels import Arguments, Numbers, Observer, make_kernel, many, numbers_of
 from starhold.loop.station import StationLoop, StationPhase
-from starhold.models.libration import PointState
-from starhold.models.rigid_body import State
+from starhold.parts.bodies.libration_point import PointState
+from starhold.parts.bodies.rigid_body import State
 from starhold.simulation.lane import Progress
 from starhold.trace.machine import aligned, widest
 

@@ -22,11 +22,11 @@ from starhold.algebra.scalar import (
 )
 from starhold.algebra.structured import Buffer, Index, repeat, until
 from starhold.algebra.vector import IDENTITY, Matrix, Vector, apply, cross, dot, scale, skew, subtract, transpose
-from starhold.laws.interface import Seen
+from starhold.laws.interface import Measurement
 from starhold.laws.predictive import sixes
 from starhold.laws.predictive.problem import Problem, Store, carve
 from starhold.laws.predictive.sixes import Numbers, Rows, transposed
-from starhold.models.craft import Craft, whole
+from starhold.parts.craft import Craft, total_inertia
 
 TERMS = 30
 """Most terms of the Taylor series; fewer once they no longer count."""
@@ -46,21 +46,21 @@ class Linear(NamedTuple):
     push: Matrix
 
 
-def linearise(seen: Seen, craft: Craft) -> Linear:
+def linearise(measurement: Measurement, craft: Craft) -> Linear:
     """The motion near what is seen (SI units).
 
     A = [[-[w]x, E/2], [J^-1 G, J^-1 ([Jw]x - [w]x J)]], B = [0; J^-1], G = 6 (mu/R^5) ([R]x J - [JR]x) [R]x with R from
     the centre of attraction in body axes; G = 0 where there is none (R = 0).
     """
-    w, position = seen.rate, seen.position
-    momentum, pull = apply(craft.inertia, w), apply(whole(craft), position)
+    w, position = measurement.rate, measurement.position
+    momentum, pull = apply(craft.inertia, w), apply(total_inertia(craft), position)
     square = dot(position, position)
     strength = divide(6.0 * craft.gravity, square * square * sqrt(square))
     strength = where(less(0.0, square), strength, 0.0)
 
     def stiffness(e: Vector) -> Vector:
         lever = cross(position, e)
-        tilt = subtract(cross(position, apply(whole(craft), lever)), cross(pull, lever))
+        tilt = subtract(cross(position, apply(total_inertia(craft), lever)), cross(pull, lever))
         return scale(strength, apply(craft.inverse_inertia, tilt))
 
     def damping(e: Vector) -> Vector:

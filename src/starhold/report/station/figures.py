@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from starhold.report.figures import POINTS, headed, over_time, paint, plain, width_of, without_runs
-from starhold.report.flight import Flight, colour
 from starhold.report.station.planes import Guide, Plane, PlanePlot
 from starhold.report.station.plots import StationPlots, collect
 from starhold.scenario.station.reading import StationScenario
+from starhold.studies.flight import Flight, colour
 
 FILLS = {"light": "#e8f1fa", "dark": "#c3dcf1"}
 GREY = "0.35"

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from starhold.analysis.station import DAY
-from starhold.report.flight import Flight
 from starhold.report.page_parts import (
     OVER_TIME,
     POINTS,
@@ -31,6 +30,7 @@ from starhold.report.proved import section as proved
 from starhold.report.station.planes import Guide, PlanePlot
 from starhold.report.station.plots import StationPlots, collect
 from starhold.scenario.station.reading import StationScenario
+from starhold.studies.flight import Flight
 
 FRAMES = 1200
 """Places of the craft in the three-dimensional views."""

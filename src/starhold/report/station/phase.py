@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.analysis.station import Rest, goal_of
-from starhold.report.flight import Flight, colour
+from starhold.analysis.station import Equilibrium, goal_of
 from starhold.report.plots import Curve
 from starhold.report.station.planes import Guide, Line, Plane, PlanePlot
 from starhold.scenario.station.reading import StationEntry, StationScenario
+from starhold.studies.flight import Flight, colour
 
 WINDOW = 1.7
 """Half the width of the picture, in distances of the saddles."""
@@ -66,7 +66,7 @@ def phase_portrait(
 ) -> PlanePlot | None:
     """x and x' of laws that hold a place of rest, among the paths of the X axis alone; None where no law does so or no law's
     X axis has a limit of its own."""
-    resting = [entry for entry in entries if isinstance(goal_of(entry.gains), Rest) and math.isfinite(entry.limit)]
+    resting = [entry for entry in entries if isinstance(goal_of(entry.gains), Equilibrium) and math.isfinite(entry.limit)]
     if not resting or scenario.table.control.limit_kind != "axis":
         return None
     first = _Axis(resting[0], scenario)

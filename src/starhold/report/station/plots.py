@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.analysis.station import DAY, YEAR, Circle, Rest, goal_of
-from starhold.models.libration import EARTH_DIAMETER
-from starhold.report.flight import Flight, colour
+from starhold.analysis.station import DAY, YEAR, Circle, Equilibrium, goal_of
+from starhold.parts.bodies.libration_point import EARTH_DIAMETER
 from starhold.report.plots import Curve, Panel, Plot, near, positive, sound, thin, thin_times
 from starhold.report.station.phase import phase_portrait
 from starhold.report.station.planes import Guide, Line, Plane, PlanePlot, ring
 from starhold.scenario.station.reading import StationEntry, StationScenario
+from starhold.studies.flight import Flight, colour
 
 LONG = 400.0 * DAY
 """Runs of more seconds are drawn over years."""
@@ -143,7 +143,7 @@ def _projections(flights: Sequence[Flight], entries: Sequence[StationEntry], sce
         bounds = [_square(guide) for guide in bounds]
     strong = (1.0 + ROOM) * max([most, *(float(np.abs(guide.x).max()) for guide in bounds)])
     x = reach(0)
-    places_of = [goal.place for goal in map(_goal, entries) if isinstance(goal, Rest)]
+    places_of = [goal.place for goal in map(_goal, entries) if isinstance(goal, Equilibrium)]
     rests = [Guide(np.array([y]), np.array([z]), "rest", kind="points") for _, y, z in places_of]
     planes = [
         Plane("x", "y", [Line(p[:, 0], p[:, 1]) for p in places], [], (-x, x, -across, across), False),

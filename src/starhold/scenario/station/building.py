@@ -8,9 +8,9 @@ from starhold.algebra.scalar import is_finite
 from starhold.algebra.vector import ZERO, add, dot, norm
 from starhold.analysis.station import goal_of
 from starhold.errors import InputError
-from starhold.laws.station.interface import SeenPoint
+from starhold.laws.point import PointMeasurement
 from starhold.loop.station import StationLoop
-from starhold.models.libration import PointState
+from starhold.parts.bodies.libration_point import PointState
 from starhold.scenario.checking import check_substeps, try_law
 from starhold.scenario.station.reading import StationEntry, StationScenario
 
@@ -42,8 +42,8 @@ def build(scenario: StationScenario, entry: StationEntry) -> StationLoop:
         raise InputError(
             scenario.where, "initial.position", f"a start {away:.6g} away", f"less than lost_beyond, {loop.far:.6g}"
         )
-    seen = SeenPoint(loop.start.position, loop.start.velocity, loop.period, loop.limit)
-    command, _ = entry.law.control(seen, entry.gains, plant, loop.carry().memory)
+    measurement = PointMeasurement(loop.start.position, loop.start.velocity, loop.period, loop.limit)
+    command, _ = entry.law.control(measurement, entry.gains, plant, loop.carry().memory)
     if not is_finite(dot(command, command)):
         allowed = "a limit, margin or deficit: this law takes as much control as there is"
         raise InputError(scenario.where, f"law {entry.name}", "no limit of the control", allowed)

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from starhold.analysis.station import Circle, Rest, goal_of
+from starhold.analysis.station import Circle, Equilibrium, goal_of
 from starhold.errors import InputError
-from starhold.laws.station.interface import StationLaw, station_laws
-from starhold.laws.station.l2_circle import peak_demand
-from starhold.models.libration import Libration, Units
+from starhold.laws.l2_circle import peak_demand
+from starhold.laws.point import StationLaw, station_laws
+from starhold.parts.bodies.libration_point import Libration, Units
 from starhold.scenario.checking import (
     LawBook,
     Named,
@@ -63,7 +63,7 @@ class StationScenario(LawBook[StationEntry]):
         """The numbers of the libration point, which laws act on."""
         return self.table.libration.plant
 
-    def goal(self, name: str) -> Circle | Rest:
+    def goal(self, name: str) -> Circle | Equilibrium:
         """What the law of this name makes for."""
         return goal_of(self.pick(name).gains)
 

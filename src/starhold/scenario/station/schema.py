@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from starhold.laws.interface import Gain
-from starhold.laws.station.interface import station_laws
-from starhold.models.libration import EARTH_DIAMETER, PRIMARIES, Libration, Primaries, Units
-from starhold.models.orbit import BODIES, body_of
+from starhold.laws.point import station_laws
+from starhold.parts.bodies.libration_point import EARTH_DIAMETER, PRIMARIES, Libration, Primaries, Units
+from starhold.parts.orbit import BODIES, body_of
 from starhold.scenario.checking import MOST_SUBSTEPS, nearest
 from starhold.scenario.orbit import check_gravity, too_dense
 from starhold.scenario.quantity import quantity, scaled

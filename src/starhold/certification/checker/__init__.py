@@ -1,5 +1,0 @@
-"""The independent checker of certificates: it shares no code with the certifier, and reads the claims anew."""
-
-from starhold.certification.checker.check import Finding, check, check_file, passed
-
-__all__ = ["Finding", "check", "check_file", "passed"]

@@ -1,0 +1,199 @@
+"""The independent checker of stability certificates: it trusts nothing in a file but what is claimed, and derives every
+number and condition anew from the law's and the models' equations, by other methods than the certifier's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from flint import ctx
+
+from starhold.checker.claims import CLAIMS
+from starhold.checker.exact import CheckError, Obligation, Verdict, demand
+from starhold.checker.invariant import FORMAT as INVARIANT
+from starhold.checker.invariant import invariant_findings
+from starhold.checker.reading import limited, read_file, shallow
+from starhold.checker.refutation import refutation
+from starhold.checker.shapes import (
+    CERTIFICATE,
+    CLAIM,
+    FILE,
+    HOWS,
+    NUMBERS,
+    OBLIGATION,
+    STATION,
+    SUBJECT,
+    WITNESS,
+    shaped,
+)
+from starhold.checker.station import STATION_CLAIMS, Station, read_station, station_refutation
+from starhold.checker.subject import Subject, read_subject
+
+FORMAT = "starhold certificate 1"
+ENDS = ("convergence", "region", "torque-limit", "wheels", "inertia", "disturbance", "sliding", "circle", "rest")
+"""Kinds of claims about where the motion ends, one of which a certificate that counts as proved must hold."""
+BITS = 192
+"""Precision of balls: enough that they are far narrower than the margins of a certificate."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What the check says of one obligation of a claim; without an obligation, of the claim, certificate or file."""
+
+    certificate: str
+    claim: str
+    obligation: str
+    verdict: Verdict
+    reason: str
+
+
+def passed(findings: Sequence[Finding]) -> bool:
+    """Whether all that is claimed to be proved was shown again. What is not claimed is not proved either."""
+    return all(finding.verdict not in ("fails", "not checked") for finding in findings)
+
+
+def check_file(path: Path | str) -> list[Finding]:
+    """The findings about a certificate file; InputError where there is none that can be read."""
+    content, faults = read_file(path)
+    return [*(Finding("", "", "", "fails", fault) for fault in faults), *check(content)]
+
+
+def check(content: Any) -> list[Finding]:
+    """The findings about the content of a certificate file."""
+    # What overflows in a guess is caught where the guess is verified.
+    with ctx.workprec(BITS), np.errstate(all="ignore"):
+        try:
+            shallow(content)
+            shaped(content, FILE, "the file")
+            demand(content["format"] in (FORMAT, INVARIANT), f"the format is not {FORMAT!r} or {INVARIANT!r}")
+            demand(len(content["certificates"]) > 0, "there are no certificates")
+        except CheckError as fault:
+            return [Finding("", "", "", "fails", str(fault))]
+        if content["format"] == INVARIANT:
+            return [
+                Finding(str(given.get("name", "")), *found)
+                for given in content["certificates"]
+                for found in invariant_findings(given)
+            ]
+        return [finding for given in content["certificates"] for finding in _certificate(given)]
+
+
+def _certificate(given: Mapping[str, Any]) -> Iterator[Finding]:
+    name = str(given.get("name", ""))
+    subject, fault = _guarded(partial(_subject, given))
+    if subject is None:
+        yield Finding(name, "", "", "fails", fault)
+        return
+    for claim in given["claims"]:
+        kind = str(claim.get("kind", ""))
+        proofs, fault = _guarded(partial(_claim, subject, claim))
+        if proofs is None:
+            yield Finding(name, kind, "", "fails", fault)
+            continue
+        for obligation, verdict, reason in proofs:
+            yield Finding(name, kind, obligation, verdict, reason)
+    if not given["claims"]:
+        yield Finding(name, "", "", "not claimed", "there are no claims")
+
+
+def _guarded(work: Callable[[], Any]) -> tuple[Any, str]:
+    """What a piece of work gives, or None and why it fails: whatever goes wrong in a check fails it."""
+    try:
+        with limited():
+            return work(), ""
+    except CheckError as fault:
+        return None, str(fault)
+    except (ArithmeticError, AttributeError, LookupError, MemoryError, RecursionError, TypeError, ValueError) as error:
+        return None, f"cannot be verified: {error}"
+
+
+def _subject(given: Any) -> Subject | Station:
+    shaped(given, CERTIFICATE, "the certificate")
+    station = "plant" in given["subject"]
+    shaped(given["subject"], STATION if station else SUBJECT, "the subject")
+    outcomes = [claim.get("outcome") for claim in given["claims"]]
+    follows = _follows(outcomes)
+    kinds = [str(claim.get("kind")) for claim in given["claims"]]
+    if follows == "proved" and not set(kinds) & set(ENDS):
+        follows = "undecided"
+    demand(given["outcome"] == follows, "the outcome does not follow from the claims")
+    demand(len(set(kinds)) == len(kinds), "two claims are of one kind")
+    return (read_station if station else read_subject)(given["subject"])
+
+
+def _claim(subject: Subject | Station, claim: Any) -> list[tuple[str, Verdict, str]]:
+    """Verdict and reason for each obligation of a claim."""
+    shaped(claim, CLAIM, "the claim")
+    kinds = STATION_CLAIMS if isinstance(subject, Station) else CLAIMS
+    demand(claim["kind"] in kinds, f"there is no kind of claim {claim['kind']} about such a loop")
+    for obligation in claim["obligations"]:
+        shaped(obligation, OBLIGATION, "an obligation")
+    outcomes = [obligation["outcome"] for obligation in claim["obligations"]]
+    demand(claim["outcome"] == _follows(outcomes), "the outcome does not follow from the obligations")
+    told, proofs = _obliges(subject, claim)
+    demand(claim["assumptions"] == told, "the assumptions are not those of such a claim")
+    if claim["outcome"] != "proved":
+        return _unproved(subject, claim)
+    shaped(claim["numbers"], NUMBERS[claim["kind"]], "the numbers")
+    shaped(claim["witness"], WITNESS[claim["kind"]], "the witness")
+    shown = proofs()
+    found = [(o["name"], o["how"]) for o in claim["obligations"]]
+    needed = [(name, how) for name, how, _ in shown if how]
+    demand(found == needed, f"the obligations are not {', '.join(f'{name} ({how})' for name, how in needed)}")
+    demand(not any(o["evidence"] for o in claim["obligations"]), "what is proved has no evidence against it")
+    return [_verdict(proof) for proof in shown]
+
+
+def _obliges(subject: Subject | Station, claim: Any) -> tuple[list[str], Callable[[], list[Obligation]]]:
+    """The assumptions of a claim, and what makes the list of what has to be shown."""
+    if isinstance(subject, Station):
+        about = STATION_CLAIMS[claim["kind"]]
+        return about.assumptions(subject), partial(about.proofs, subject, claim)
+    kind, wheels = CLAIMS[claim["kind"]], subject.wheels is not None
+    demand(kind.wheels is None or kind.wheels == wheels, f"such a claim is {'not ' if wheels else ''}for loops with wheels")
+    return kind.assumptions(claim["numbers"], wheels), partial(kind.proofs, subject, claim)
+
+
+def _verdict(proof: Obligation) -> tuple[str, Verdict, str]:
+    name, how, verify = proof
+    reason, fault = _guarded(verify)
+    return (name if how else "", "fails", fault) if reason is None else (name if how else "", "holds", reason)
+
+
+def _unproved(subject: Subject | Station, claim: Mapping[str, Any]) -> list[tuple[str, Verdict, str]]:
+    """Nothing of such a claim counts as proved; a refutation must be one."""
+    for part, shapes in (("numbers", NUMBERS), ("witness", WITNESS)):
+        shape, given = shapes[claim["kind"]], claim[part]
+        known = all(key in shape and (value is None or shape[key](value)) for key, value in given.items())
+        demand(known, f"the {part} are not those of such a claim")
+    names = [obligation["name"] for obligation in claim["obligations"]]
+    demand(len(set(names)) == len(names), "an obligation is told of twice")
+    for obligation in claim["obligations"]:
+        how, proved = HOWS.get(obligation["name"], ()), obligation["outcome"] == "proved"
+        demand(obligation["how"] in how, f"there is no obligation {obligation['name']} that is shown so")
+        demand(not (proved and obligation["evidence"]), "what is proved has no evidence against it")
+    found: list[tuple[str, Verdict, str]] = []
+    for obligation in claim["obligations"]:
+        name, verdict, reason = obligation["name"], "not claimed", f"{obligation['outcome']}, the claim is not proved"
+        if obligation["outcome"] == "refuted":
+            shown, fault = _guarded(partial(_refutes, subject, claim, obligation))
+            verdict, reason = ("fails", f"not refuted: {fault}") if shown is None else ("not claimed", f"refuted: {shown}")
+        found.append((name, verdict, reason))
+    return found
+
+
+def _refutes(subject: Subject | Station, claim: Mapping[str, Any], obligation: Mapping[str, Any]) -> str:
+    if isinstance(subject, Station):
+        return station_refutation(subject, claim, obligation)
+    return refutation(subject, claim, obligation)
+
+
+def _follows(outcomes: Sequence[Any]) -> str:
+    if "refuted" in outcomes:
+        return "refuted"
+    return "proved" if outcomes and all(outcome == "proved" for outcome in outcomes) else "undecided"

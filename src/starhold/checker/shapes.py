@@ -1,0 +1,226 @@
+"""What may stand in a certificate file: the keys of each object, and what each may hold. Nothing here is shared with the
+certifier."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
+
+from starhold.checker.exact import demand
+
+Test: TypeAlias = Callable[[Any], bool]
+
+
+def shaped(given: Any, shape: Mapping[str, Test], where: str) -> None:
+    """That an object has exactly the keys of a shape, and under each what its test allows."""
+    demand(isinstance(given, Mapping), f"{where} is not an object")
+    demand(set(given) == set(shape), f"{where} has not the keys {', '.join(shape) or '(none)'}")
+    for key, test in shape.items():
+        demand(test(given[key]), f"{where} has something else than it may under {key}")
+
+
+def _number(x: Any) -> bool:
+    if isinstance(x, bool) or not isinstance(x, (int, float)):
+        return False
+    try:
+        return math.isfinite(x) and float(x) == x
+    except OverflowError:
+        return False
+
+
+def _text(x: Any) -> bool:
+    """Text of characters that can be written: no lone surrogates, none that steer a terminal."""
+    return isinstance(x, str) and x.isprintable()
+
+
+def _flag(x: Any) -> bool:
+    return isinstance(x, bool)
+
+
+def _object(x: Any) -> bool:
+    return isinstance(x, Mapping)
+
+
+def _plain(x: Any) -> bool:
+    """Numbers, texts, lists and objects without an infinity in them."""
+    if isinstance(x, Mapping):
+        return all(isinstance(key, str) and _plain(value) for key, value in x.items())  # pyright: ignore
+    return all(map(_plain, x)) if isinstance(x, list) else x is None or _flag(x) or _text(x) or _number(x)  # pyright: ignore
+
+
+def _gain(x: Any) -> bool:
+    return _text(x) or _number(x) or (isinstance(x, list) and all(map(_gain, x)))  # pyright: ignore
+
+
+def _list(test: Test, count: int | None = None) -> Test:
+    def holds(x: Any) -> bool:
+        return isinstance(x, list) and (count is None or len(x) == count) and all(map(test, x))  # pyright: ignore
+
+    return holds
+
+
+def _one(*allowed: str) -> Test:
+    return lambda x: isinstance(x, str) and x in allowed
+
+
+def _or_none(test: Test) -> Test:
+    return lambda x: x is None or test(x)
+
+
+def _within(shape: Mapping[str, Test]) -> Test:
+    return lambda x: isinstance(x, Mapping) and set(x) == set(shape) and all(shape[key](x[key]) for key in shape)  # pyright: ignore
+
+
+_OUTCOME = _one("proved", "refuted", "undecided")
+_VECTOR, _MAYBE = _list(_number, 3), _or_none(_number)
+FILE: dict[str, Test] = {
+    "format": _text,
+    "scenario": _text,
+    "versions": lambda x: _object(x) and all(map(_text, x.values())),
+    "certificates": _list(_object),
+}
+CERTIFICATE: dict[str, Test] = {
+    "name": lambda x: _text(x) and len(x) <= 1_000,
+    "outcome": _OUTCOME,
+    "subject": _object,
+    "claims": _list(_object),
+}
+CLAIM: dict[str, Test] = {
+    "kind": _text,
+    "outcome": _OUTCOME,
+    "numbers": lambda x: _object(x) and _plain(x),
+    "witness": lambda x: _object(x) and _plain(x),
+    "assumptions": _list(_text),
+    "obligations": _list(_object),
+}
+OBLIGATION: dict[str, Test] = {
+    "name": _text,
+    "how": _text,
+    "outcome": _OUTCOME,
+    "evidence": lambda x: _object(x) and _plain(x),
+}
+_EXACT, _SIGN, _BALLS, _ROOTS = ("exact identity",), ("exact inequality",), ("ball arithmetic",), ("certified roots",)
+HOWS: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(("form", "target"), _EXACT),
+    "descent": _SIGN + _BALLS,
+    **dict.fromkeys(("only rest", "only the circle"), ("LaSalle",)),
+    **dict.fromkeys(("torque", "control", "stays", "nothing returns from beyond"), _BALLS),
+    "strict": _SIGN + _BALLS,
+    "other rest repels": _SIGN + _ROOTS,
+    **dict.fromkeys(("stable at the period", "stable at the longest"), _ROOTS),
+    **dict.fromkeys(("positive", "single rest in the set", "half turns repel", "jumps lower V", "momentum", "end"), _SIGN),
+    **dict.fromkeys(("start", "stable in between", "reach exceeds torque", "surface holds the target", "layer"), _SIGN),
+    **dict.fromkeys(("no switch of the double cover", "centre outside", "x returns", "each axis returns"), _SIGN),
+}
+"""How each obligation may be shown, whatever the claim."""
+_WHEELS: dict[str, Test] = {
+    "axes": _list(_VECTOR),
+    "torque_limit": _list(_MAYBE),
+    "momentum_limit": _list(_MAYBE),
+    "inertia": _list(_number),
+    "least": _list(_VECTOR),
+    "momentum": _list(_number),
+    "allocation": _one("least-squares", "least-peak"),
+    "total_momentum": _number,
+}
+_HISTORY: dict[str, Test] = {
+    "interpolant": _one("rotation spline"),
+    "times": _list(_number),
+    "attitudes": _list(_list(_number, 4)),
+    "rates": _list(_VECTOR),
+}
+SUBJECT: dict[str, Test] = {
+    "law": _text,
+    "gains": lambda x: _object(x) and all(map(_gain, x.values())),
+    "quaternion_sign": _one("as_published", "shortest", "hysteresis"),
+    "hysteresis_width": _number,
+    "inertia": _list(_VECTOR, 3),
+    "limit": _one("axis", "norm", "none"),
+    "torque_limit": _MAYBE,
+    "orbit": _or_none(_within({"position": _VECTOR, "velocity": _VECTOR, "gravitational_parameter": _number})),
+    "gravity_gradient": _flag,
+    "target": _one("inertial", "orbital", "history"),
+    "history": _or_none(_within(_HISTORY)),
+    "target_rate": _number,
+    "target_acceleration": _number,
+    "modelled_torque": _VECTOR,
+    "modelled_torque_norm": _number,
+    "disturbance": _number,
+    "control_period": _number,
+    "wheels": _or_none(_within(_WHEELS)),
+}
+STATION: dict[str, Test] = {
+    "law": _text,
+    "gains": lambda x: _object(x) and all(map(_gain, x.values())),
+    "plant": lambda x: _object(x) and all(map(_number, x.values())),
+    "model": _one("linear", "nonlinear"),
+    "limit": _one("axis", "norm", "none"),
+    "control_limit": _MAYBE,
+    "lag": _number,
+    "control_period": _number,
+}
+"""Of a loop that keeps a craft near a libration point."""
+_CIRCLE: dict[str, Test] = dict.fromkeys(("level", "inner", "outer", "velocity"), _number)
+_CONTENTS: dict[str, Test] = {
+    "start": _MAYBE,
+    "everything": _flag,
+    "slew_angle": _number,
+    "rate": _MAYBE,
+    "rate_everywhere": _MAYBE,
+}
+NUMBERS: dict[str, dict[str, Test]] = {
+    "convergence": {"level": _MAYBE, **_CONTENTS},
+    "torque-limit": {"level": _MAYBE, **_CONTENTS, "limit": _number, "kind": _one("axis", "norm")},
+    "wheels": {
+        "level": _MAYBE,
+        **_CONTENTS,
+        "momentum": _number,
+        **dict.fromkeys(("motors", "wheel_momentum"), _list(_number)),
+    },
+    "inertia": {"tolerance": _MAYBE, **_CONTENTS},
+    "disturbance": {
+        **dict.fromkeys(("torque", "start", "level", "slew_angle", "rate_start", "angle", "rate"), _number),
+        "rate_everywhere": _MAYBE,
+    },
+    "sampling": {
+        **dict.fromkeys(("period", "radius", "longest"), _number),
+        "every_shorter": _flag,
+        "eigenvalues": _list(_list(_number, 2), 6),
+    },
+    "sliding": {
+        "torque": _VECTOR,
+        **dict.fromkeys(("margin", "surface", "angle", "rate", "slew_angle"), _number),
+        "everything": _flag,
+        "start": _MAYBE,
+        "rate_start": _MAYBE,
+    },
+    "region": dict.fromkeys(("level", "slew_angle", "rate"), _number),
+    "circle": _CIRCLE,
+    "control-limit": {**_CIRCLE, "limit": _number, "kind": _one("axis", "norm")},
+    "rest": {},
+    "saturated-axis": dict.fromkeys(("limit", "width", "reach", "boundary"), _number),
+}
+STEP: dict[str, Test] = {"form": _list(_list(_number, 6), 6), "decay": _number, "spread": _number}
+"""Of the proof where a torque from outside lets motions end."""
+_PROOF: dict[str, Test] = {"stiffness": _MAYBE, "epsilon": _number, "rho": _number}
+WITNESS: dict[str, dict[str, Test]] = {
+    "convergence": {**_PROOF, "rate_bound": _MAYBE},
+    "torque-limit": {**_PROOF, **dict.fromkeys(("rate_bound", "shift", "weight"), _MAYBE)},
+    "wheels": {**_PROOF, "rate_bound": _MAYBE},
+    "inertia": {**_PROOF, "level": _MAYBE},
+    "disturbance": {
+        **_PROOF,
+        "rate_bound": _MAYBE,
+        "shift": _MAYBE,
+        **dict.fromkeys(("tau", "beta"), _number),
+        "steps": _list(_object),
+    },
+    "sampling": {},
+    "sliding": {},
+    "region": dict.fromkeys(("p", "c2", "g", "m"), _number),
+    "circle": {},
+    "control-limit": {},
+    "rest": {},
+    "saturated-axis": {"mu": _number},
+}

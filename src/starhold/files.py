@@ -1,0 +1,65 @@
+"""Files that appear under their names only when they are whole, and folders that one process at a time writes into."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+
+from starhold.errors import InputError
+
+UNFINISHED = ".writing-"
+"""How names of folders begin in which files are being written."""
+_claimed: dict[tuple[int, int], int] = {}
+"""Open handles of the folders that this process has claimed, by device and inode."""
+
+
+def claim(folder: Path) -> None:
+    """Make this process the only one that writes results into a folder, until it ends.
+
+    Raises BlockingIOError where another one does. The system drops the claim with the process, however that ends.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    status = os.fstat(handle)
+    place = (status.st_dev, status.st_ino)
+    try:
+        if place not in _claimed:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _claimed[place] = handle
+    except BlockingIOError:
+        raise
+    except OSError:
+        # A file system without locks.
+        pass
+    finally:
+        if _claimed.get(place) != handle:
+            os.close(handle)
+
+
+def clear_unfinished(folder: Path) -> None:
+    """Remove what processes that were killed left half written in a folder and in those in it."""
+    for left in (*folder.glob(f"{UNFINISHED}*"), *folder.glob(f"*/{UNFINISHED}*")):
+        shutil.rmtree(left, ignore_errors=True)
+
+
+@contextmanager
+def atomic_write(path: Path) -> Generator[Path]:
+    """A path to write to, in a hidden folder beside `path`, renamed to it on success and removed on failure. InputError
+    where it cannot be written."""
+    hidden: Path | None = None
+    try:
+        hidden = Path(tempfile.mkdtemp(prefix=UNFINISHED, dir=path.parent))
+        yield hidden / path.name
+        os.replace(hidden / path.name, path)
+    except OSError as error:
+        raise InputError(str(path), "", "", f"cannot be written: {error.strerror or error}") from None
+    finally:
+        if hidden is not None:
+            shutil.rmtree(hidden, ignore_errors=True)

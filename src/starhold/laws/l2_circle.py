@@ -1,0 +1,127 @@
+"""A circle round the line through the libration point: a set of states is made attractive, not a motion in time."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, NamedTuple
+
+from starhold.algebra.scalar import Scalar, less, where
+from starhold.algebra.vector import Vector, scale, subtract
+from starhold.laws.interface import Card, Gain, NoMemory
+from starhold.laws.point import MODELS, PointMeasurement, along, check_x, hold_x, least_rate, nonlinear_remainder
+from starhold.parts.bodies.libration_point import Libration
+from starhold.synthesis.circle import demand
+
+CARD = Card(
+    title="Circle round a libration point",
+    summary="V = (alpha f1^2 + f2^2 + f3^2)/2 falls to zero on y^2 + z^2 = radius^2, run through at a constant rate; a "
+    "relay without a layer holds a whole band of circles",
+    sources=("published study of the direct Lyapunov method for compact invariant sets: a limit cycle round L2",),
+    assumptions=("linear motion near the point", "control not limited"),
+    claims="local",
+)
+
+
+class Gains(NamedTuple):
+    """The circle, how strongly it attracts, and the feedback along X; all scaled."""
+
+    radius: Annotated[float, Gain(above=0.0, dimension="length", text="of the circle, lengths")]
+    rate: Annotated[float, Gain(dimension="rate", text="at which it is run through, from Y to Z; negative the other way")]
+    alpha: Annotated[float, Gain(above=0.0, text="weight of the distance from the circle")]
+    k: Annotated[float, Gain(above=0.0, text="feedback on what the velocity is off by; of a relay the size of its thrust")]
+    k_x: Annotated[float, Gain(above=0.0, text="on the position along X")]
+    k_velocity: Annotated[float, Gain(above=0.0, text="on the velocity along X")]
+    feedback: Annotated[int, Gain(choices=("smooth", "relay"), text="relay: k in the direction against the error")] = 0
+    boundary_layer: Annotated[
+        float, Gain(at_least=0.0, dimension="velocity", text="velocity error within which the relay is proportional")
+    ] = 0.0
+    model: Annotated[int, Gain(choices=MODELS, text="nonlinear: what the linear model leaves out is undone too")] = 0
+
+
+class Best(NamedTuple):
+    """The rate of the least control, and along X the double root of the natural rate."""
+
+    radius: Annotated[float, Gain(above=0.0, dimension="length", text="of the circle, lengths")]
+    alpha: Annotated[float, Gain(above=0.0, text="weight of the distance from the circle")] = 1.0
+    k: Annotated[float, Gain(above=0.0, text="feedback on what the velocity is off by; of a relay its thrust")] = 1.0
+    feedback: Annotated[int, Gain(choices=("smooth", "relay"), text="relay: k in the direction against the error")] = 0
+    boundary_layer: Annotated[
+        float, Gain(at_least=0.0, dimension="velocity", text="velocity error within which the relay is proportional")
+    ] = 0.0
+    model: Annotated[int, Gain(choices=MODELS, text="nonlinear: what the linear model leaves out is undone too")] = 0
+
+
+FORMS: dict[str, Any] = {"best": Best}
+
+
+def design(plant: Libration, spec: Best) -> Gains:
+    """rate = sqrt(C - 2 Omega^2), at which the peak demand is 2 Omega sqrt(C - Omega^2) radius. ValueError for less C."""
+    rate, steep = least_rate(plant), plant.rate**2 + 2.0 * plant.stiffness
+    x = (2.0 * steep, 2.0 * math.sqrt(steep))
+    return Gains(spec.radius, rate, spec.alpha, spec.k, *x, spec.feedback, spec.boundary_layer, spec.model)
+
+
+def check(gains: Gains, plant: Libration) -> None:
+    """ValueError where X is unstable."""
+    check_x(gains.k_x, gains.k_velocity, plant)
+
+
+def explain(plant: Libration, spec: Best) -> list[tuple[str, Any]]:
+    """What the circle asks of the control."""
+    rate = design(plant, spec).rate
+    peak = peak_demand(plant, rate) * spec.radius
+    return [("rate", rate), ("period (of the turning axes)", plant.rate / abs(rate)), ("peak demand (scaled)", peak)]
+
+
+def peak_demand(plant: Libration, rate: float) -> float:
+    """The largest norm of the control on a circle of radius one: sqrt(4 Omega^2 rate^2 + (C - rate^2)^2), or C - Omega^2
+    - rate^2 in the Y direction where that is more."""
+    return max(demand(rate / plant.rate, plant), abs(plant.stiffness - plant.rate**2 - rate**2))
+
+
+def errors(measurement: PointMeasurement, gains: Gains) -> Vector:
+    """f1 = y^2 + z^2 - radius^2, f2 = y' + rate z, f3 = z' - rate y, which vanish on the circle."""
+    y, z = measurement.position[1], measurement.position[2]
+    return (
+        y * y + z * z - gains.radius * gains.radius,
+        measurement.velocity[1] + gains.rate * z,
+        measurement.velocity[2] - gains.rate * y,
+    )
+
+
+def neutral(measurement: PointMeasurement, gains: Gains, plant: Libration) -> Vector:
+    """The control under which V stays as it is (scaled)."""
+    y, z, v = measurement.position[1], measurement.position[2], measurement.velocity
+    pull, square = 2.0 * gains.alpha * errors(measurement, gains)[0], plant.rate * plant.rate
+    return (
+        hold_x(measurement, gains.k_x, gains.k_velocity, plant),
+        2.0 * plant.rate * v[0] + (plant.stiffness - square) * y - gains.rate * v[2] - pull * y,
+        plant.stiffness * z + gains.rate * v[1] - pull * z,
+    )
+
+
+def feedback(measurement: PointMeasurement, gains: Gains, plant: Libration) -> Vector:
+    """Control acceleration for the linear model (scaled): what keeps V, and what lowers it."""
+    off = errors(measurement, gains)
+    wrong = (0.0, off[1], off[2])
+    smooth, relayed = scale(gains.k, wrong), along(wrong, gains.k, gains.boundary_layer)
+    relay = less(0.5, gains.feedback)
+    damping = (0.0, where(relay, relayed[1], smooth[1]), where(relay, relayed[2], smooth[2]))
+    return subtract(neutral(measurement, gains, plant), damping)
+
+
+def control(measurement: PointMeasurement, gains: Gains, plant: Libration, memory: NoMemory) -> tuple[Vector, NoMemory]:
+    """Control acceleration (scaled)."""
+    return subtract(feedback(measurement, gains, plant), nonlinear_remainder(measurement, plant, gains.model)), memory
+
+
+def lyapunov(measurement: PointMeasurement, gains: Gains, plant: Libration) -> Scalar:
+    """V = (alpha f1^2 + f2^2 + f3^2)/2, zero on the circle; V' = -k (f2^2 + f3^2), of a relay -k |(f2, f3)|."""
+    off = errors(measurement, gains)
+    return 0.5 * (gains.alpha * off[0] * off[0] + off[1] * off[1] + off[2] * off[2])
+
+
+def examples() -> list[Gains]:
+    """Circles round L2 of the Sun and the Earth, smooth and by relay."""
+    smooth = Gains(1.0, 1.393, 1.0, 1.0, 17.8, 6.0)
+    return [smooth, smooth._replace(feedback=1, k=0.5, boundary_layer=1e-3, model=1)]

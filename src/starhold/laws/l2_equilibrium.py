@@ -1,0 +1,77 @@
+"""Rest beside the libration point, where the panels see the Sun past the smaller body."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, NamedTuple
+
+from starhold.algebra.vector import Vector, subtract
+from starhold.laws.interface import Card, Gain, NoMemory
+from starhold.laws.point import MODELS, PointMeasurement, check_x, hold_x, nonlinear_remainder
+from starhold.parts.bodies.libration_point import Libration
+
+CARD = Card(
+    title="Rest beside a libration point",
+    summary="u = constant feed-forward + feedback axis by axis, the Coriolis acceleration undone",
+    sources=("published study of the direct Lyapunov method for compact invariant sets: holding a point near L2",),
+    assumptions=("linear motion near the point", "control not limited"),
+    claims="local",
+)
+
+
+class Gains(NamedTuple):
+    """Where it rests, and the feedback of each axis; all scaled."""
+
+    y: Annotated[float, Gain(dimension="length", text="place of rest along Y, lengths")]
+    z: Annotated[float, Gain(dimension="length", text="place of rest along Z, lengths")]
+    k_x: Annotated[float, Gain(above=0.0, text="on the position along X")]
+    k_velocity: Annotated[Vector, Gain(shape=(3,), text="on the velocity, by axis")]
+    model: Annotated[int, Gain(choices=MODELS, text="nonlinear: what the linear model leaves out is undone too")] = 0
+
+
+class Degree(NamedTuple):
+    """The feedback of the largest degree of stability that leaves the natural stiffness along Y and Z alone."""
+
+    y: Annotated[float, Gain(dimension="length", text="place of rest along Y, lengths")] = 0.0
+    z: Annotated[float, Gain(dimension="length", text="place of rest along Z, lengths")] = 0.0
+    model: Annotated[int, Gain(choices=MODELS, text="nonlinear: what the linear model leaves out is undone too")] = 0
+
+
+FORMS: dict[str, Any] = {"degree": Degree}
+
+
+def design(plant: Libration, spec: Degree) -> Gains:
+    """Along X, x'' = s^2 x + u, the double root -s; along Y and Z the natural frequency, critically damped."""
+    square = plant.rate**2
+    steep = square + 2.0 * plant.stiffness
+    slow, out = plant.stiffness - square, plant.stiffness
+    velocity = (2.0 * math.sqrt(steep), 2.0 * math.sqrt(slow), 2.0 * math.sqrt(out))
+    return Gains(spec.y, spec.z, 2.0 * steep, velocity, spec.model)
+
+
+def check(gains: Gains, plant: Libration) -> None:
+    """ValueError where X is unstable, or the velocity along Y or Z is not fed back."""
+    check_x(gains.k_x, gains.k_velocity[0], plant)
+    if min(gains.k_velocity) <= 0.0:
+        raise ValueError("k_velocity must be above 0 on every axis, or motion along it does not die out")
+
+
+def feedback(measurement: PointMeasurement, gains: Gains, plant: Libration) -> Vector:
+    """Control acceleration for the linear model (scaled)."""
+    square = plant.rate * plant.rate
+    k = gains.k_velocity
+    return (
+        hold_x(measurement, gains.k_x, k[0], plant),
+        (plant.stiffness - square) * gains.y + 2.0 * plant.rate * measurement.velocity[0] - k[1] * measurement.velocity[1],
+        plant.stiffness * gains.z - k[2] * measurement.velocity[2],
+    )
+
+
+def control(measurement: PointMeasurement, gains: Gains, plant: Libration, memory: NoMemory) -> tuple[Vector, NoMemory]:
+    """Control acceleration (scaled)."""
+    return subtract(feedback(measurement, gains, plant), nonlinear_remainder(measurement, plant, gains.model)), memory
+
+
+def examples() -> list[Gains]:
+    """Gains for the Sun and the Earth, one Earth diameter aside."""
+    return [Gains(1.0, 0.0, 17.8, (6.0, 3.4, 4.0)), Gains(0.0, 1.0, 17.8, (6.0, 3.4, 4.0), 1)]

@@ -1,0 +1,97 @@
+"""What a law and the equations of motion know of the spacecraft."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.quantity import Quantity
+from starhold.algebra.vector import Matrix, Vector
+
+EARTH = 3.986e14
+"""Gravitational parameter of the Earth, m3/s2, as the published experiment uses it."""
+
+
+class Craft(NamedTuple):
+    """A rigid spacecraft. The inertia, about the centre of mass in body axes, is three moments where these are principal,
+    else a matrix: `apply` and `swing` take both."""
+
+    inertia: Annotated[Matrix | Vector, Quantity("kg m^2", "of a craft with wheels without their rotors' about their axes")]
+    inverse_inertia: Annotated[Matrix | Vector, Quantity("1/(kg m^2)", "its inverse")]
+    torque_limit: Annotated[
+        float,
+        Quantity(
+            "N m", "that a law may reckon with, per axis or in norm; infinite for none; with wheels at most what they give"
+        ),
+    ]
+    gravity: Annotated[float, Quantity("m^3/s^2", "gravitational parameter of the body that it orbits")]
+    with_rotors: Annotated[
+        Matrix | Vector | tuple[()], Quantity("kg m^2", "inertia with the rotors; () without wheels")
+    ] = ()
+
+
+def total_inertia(craft: Craft) -> Matrix | Vector:
+    """The inertia with all that is in the craft, which gravity acts on (kg m2)."""
+    return craft.with_rotors or craft.inertia
+
+
+def make_craft(inertia: Any, torque_limit: float = math.inf, gravity: float = EARTH) -> Craft:
+    """A validated craft from three principal moments or a 3x3 tensor (kg m2).
+
+    Raises ValueError when the tensor is not symmetric, not positive definite, breaks the triangle inequality
+    J1 + J2 >= J3, which every real mass distribution obeys, or when the limit is not positive.
+    """
+    full = check_inertia(inertia)
+    if not torque_limit > 0.0:
+        raise ValueError(f"the torque limit must be positive, not {torque_limit:g}")
+    return Craft(compact(full), compact(np.linalg.inv(full)), float(torque_limit), float(gravity))
+
+
+def tensor(inertia: Matrix | Vector) -> NDArray[np.float64]:
+    """The 3x3 array of a craft's inertia."""
+    array = np.array(inertia)
+    return np.diag(array) if array.ndim == 1 else array
+
+
+def check_inertia(inertia: Any) -> NDArray[np.float64]:
+    """The 3x3 tensor of three principal moments or a 3x3 array; ValueError says what no rigid body can have."""
+    tensor = np.asarray(inertia, dtype=float)
+    if tensor.shape == (3,):
+        tensor = np.diag(tensor)
+    if tensor.shape != (3, 3):
+        raise ValueError(f"inertia must be three moments or a 3x3 matrix, not an array of shape {tensor.shape}")
+    if not np.isfinite(tensor).all():
+        raise ValueError("inertia must be finite")
+    # Against the largest entry: a rotated tensor carries rounding errors in its small products of inertia.
+    if np.abs(tensor - tensor.T).max() > 1e-9 * np.abs(tensor).max():
+        raise ValueError("inertia must be symmetric")
+    tensor = 0.5 * (tensor + tensor.T)
+    moments = np.linalg.eigvalsh(tensor)
+    shown = ", ".join(f"{m:g}" for m in moments)
+    if moments[0] <= 0.0:
+        raise ValueError(f"inertia must be positive definite; its principal moments are {shown}")
+    if moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-9):
+        raise ValueError(f"no body has these principal moments ({shown}): the largest exceeds the sum of the others")
+    return tensor
+
+
+def compact(array: Any) -> Matrix | Vector:
+    """A 3x3 array as a matrix, or as the vector of its diagonal where nothing stands beside it."""
+    full = np.asarray(array, dtype=float)
+    diagonal = np.diagonal(full)
+    return matrix(full) if np.count_nonzero(full - np.diag(diagonal)) else vector(diagonal)
+
+
+def vector(array: Any) -> Vector:
+    """Three numbers as a tuple of floats."""
+    a: list[float] = np.asarray(array, dtype=float).tolist()
+    return (a[0], a[1], a[2])
+
+
+def matrix(array: Any) -> Matrix:
+    """A 3x3 array as a tuple of rows of floats."""
+    a: list[list[float]] = np.asarray(array, dtype=float).tolist()
+    return ((a[0][0], a[0][1], a[0][2]), (a[1][0], a[1][1], a[1][2]), (a[2][0], a[2][1], a[2][2]))

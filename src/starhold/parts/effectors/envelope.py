@@ -1,0 +1,102 @@
+"""The torque that reaction wheels can give together: the facets of its envelope, and the largest box and ball within it."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.structured import Buffer
+from starhold.algebra.vector import Vector
+from starhold.parts.effectors.wheels import COPLANAR, Wheels
+
+Array = NDArray[np.float64]
+
+
+def with_facets(wheels: Wheels) -> Wheels:
+    """The wheels with what `allocate_peak` needs. The facets are as many for any wheels of that number, so that one kernel
+    serves them before a loss and after."""
+    return wheels._replace(facets=_facets(wheels.axes, _counted(wheels)))
+
+
+def authority(wheels: Wheels, kind: Literal["axis", "norm"] = "norm", *, peak: bool = False) -> float:
+    """The torque (N m) that the wheels surely give: any torque of at most this norm ("norm"), or of at most this about each
+    body axis at once ("axis"), is shared out within the motors' torque limits. 0 where a wheel that is counted on has none.
+
+    Shared out by least squares it is the largest such ball or box. With the least peak it is the largest within the
+    envelope of wheels that all have the least of the limits: the largest, where the limits are equal.
+    """
+    limits = [wheels.torque_limit[k] for k in _counted(wheels)]
+    if peak:
+        pieces = np.array(_facets(wheels.axes, _counted(wheels)).cells).reshape(-1, 6 + 3 * len(wheels.axes))
+        return min(limits) / float(_sizes(pieces[:, :3], kind).max())
+    shares = _sizes(np.array(wheels.least)[list(_counted(wheels))], kind)
+    return min(limit / share for limit, share in zip(limits, shares.tolist(), strict=True))
+
+
+def _sizes(rows: Array, kind: str) -> Array:
+    """The most that each row (n, 3) gives of a vector within the unit ball or box."""
+    return np.linalg.norm(rows, axis=1, ord=1 if kind == "axis" else 2)
+
+
+def _counted(wheels: Wheels) -> tuple[int, ...]:
+    """The wheels that torque is shared out among."""
+    return tuple(k for k, row in enumerate(wheels.least) if any(row))
+
+
+@cache
+def _facets(rows: tuple[Vector, ...], counted: tuple[int, ...]) -> Buffer:
+    """The pieces of `allocate_peak`, see `Wheels.facets`. Parallel wheels act as one of several times the strength; the
+    pairs of axes that lie in one plane share a facet, within which the same problem is solved once more with the plane's
+    axes alone. The last piece is repeated up to one for each pair of wheels."""
+    axes = np.array(rows)
+    spread = _merge_parallel(axes, counted)
+    strong = spread.T @ axes
+    unit = strong / np.linalg.norm(strong, axis=1)[:, None]
+    count = len(strong)
+    correction = np.linalg.pinv(strong.T)
+    pieces: list[Array] = []
+    seen: set[tuple[int, int]] = set()
+    for pair in ((i, j) for j in range(count) for i in range(j)):
+        if pair in seen:
+            continue
+        normal = np.cross(unit[pair[0]], unit[pair[1]])
+        normal /= np.linalg.norm(normal)
+        heights = strong @ normal
+        plane = [k for k in range(count) if k in pair or abs(unit[k] @ normal) < COPLANAR]
+        seen.update((i, j) for j in plane for i in plane if i < j)
+        outside = np.sign(heights)
+        outside[plane] = 0.0
+        normal /= outside @ heights
+        peak = np.outer(outside, normal)
+        left = np.eye(3) - strong.T @ peak
+        # Two axes leave no choice, so either of them tells it.
+        for free in plane if len(plane) > 2 else plane[:1]:
+            across = np.cross(normal, unit[free])
+            sides = np.where(np.isin(np.arange(count), plane), np.sign(strong @ across), 0.0)
+            sides[free] = 0.0
+            across /= sides @ (strong @ across)
+            torques = peak + np.outer(sides, across @ left)
+            torques[free] = strong[free] @ (np.eye(3) - strong.T @ torques) / (strong[free] @ strong[free])
+            torques += correction @ (np.eye(3) - strong.T @ torques)
+            pieces.append(np.concatenate([normal, across @ left, (-spread @ torques).ravel()]))
+    most = math.comb(len(axes), 2)
+    pieces += [pieces[-1]] * (most - len(pieces))
+    return Buffer(np.concatenate(pieces).tolist())
+
+
+def _merge_parallel(axes: Array, counted: tuple[int, ...]) -> Array:
+    """Signs (wheels, classes): the torque of wheel k is that of its class of parallel wheels times the sign."""
+    classes: list[Array] = []
+    leaders: list[Array] = []
+    for k in counted:
+        parallel = [c for c, leader in enumerate(leaders) if np.linalg.norm(np.cross(leader, axes[k])) < COPLANAR]
+        if not parallel:
+            leaders.append(axes[k])
+            classes.append(np.zeros(len(axes)))
+            parallel = [len(leaders) - 1]
+        classes[parallel[0]][k] = np.sign(leaders[parallel[0]] @ axes[k])
+    return np.array(classes).T

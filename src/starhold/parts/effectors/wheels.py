@@ -1,0 +1,337 @@
+"""Reaction wheels: how a wanted torque is shared out among them, what their motors and friction do, what the body feels.
+
+The state of a wheel is the absolute axial momentum h = inertia (W + a . rate) of its rotor (N m s): a is its unit axis in
+body axes, W its speed relative to the body. With the wheels' axial inertia taken out of the body's (`body_inertia`),
+
+    J' w' = on_body + external - w x J' w,        h_i' = motor_i
+
+hold exactly, and the momentum of the whole is J' w + sum a_i h_i: motors and friction are internal.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.scalar import Scalar, absolute, both, clip, either, less, less_equal, where
+from starhold.algebra.several import each, weighted
+from starhold.algebra.structured import Buffer, repeat
+from starhold.algebra.vector import Vector, add, cross, dot, scale
+from starhold.parts.craft import check_inertia, vector
+
+Numbers = tuple[Scalar, ...]
+"""A number for each wheel."""
+Rows = tuple[Vector, ...]
+"""A vector for each wheel: motor torque i is row i times the wanted body torque."""
+
+BAND = 0.01
+"""Over this last part of the momentum range the motor loses its outward torque, linearly to none at the limit."""
+CREEP = 1.0
+"""Below this relative speed (rad/s) Coulomb friction grows in proportion to the speed: a friction that jumps with the sign
+would make any integrator of fixed step chatter about standstill."""
+
+MOST = 24
+"""Wheels of a craft: with least-peak allocation the work grows with the cube of their number."""
+COPLANAR = 1e-9
+"""Sine of the angle below which axes count as parallel, or as lying in a plane."""
+_WORST_CONDITION = 1e3
+
+
+class Wheels(NamedTuple):
+    """N wheels: unit spin axes (body), rotor inertias about them (kg m2), largest motor torques (N m; 0 for a lost wheel),
+    largest axial momenta (N m s), viscous (N m s) and Coulomb friction (N m); and how to share out a torque, by least
+    squares (one row a wheel, zero for one that takes no part) or with the least peak (see `envelope.with_facets`, without
+    which there is nothing to share it out with)."""
+
+    axes: tuple[Vector, ...]
+    inertia: Numbers
+    torque_limit: Numbers
+    momentum_limit: Numbers
+    viscous: Numbers
+    coulomb: Numbers
+    least: Rows
+    facets: Buffer | tuple[()] = ()
+    """The pieces of `allocate_peak`, of 6 + 3 N numbers each: a normal, an edge, and a row for each wheel. Torques in the
+    cone above a facet of the envelope cost the peak |normal . torque|, and pieces of one facet are told apart by the
+    largest |edge . torque|."""
+
+
+def allocate(torque: Vector, wheels: Wheels) -> Numbers:
+    """Motor torques (N m) that together give the body this torque (N m), -sum a_i tau_i = torque, with the least sum of
+    squares. Neither limits nor friction are looked at; a lost wheel gets none."""
+    return each(dot, (wheels.least,), torque)
+
+
+def allocate_peak(torque: Vector, wheels: Wheels) -> Numbers:
+    """Motor torques (N m) that together give the body this torque (N m), the largest of them as small as can be; where
+    that leaves a choice, the next largest too. Continuous and piecewise linear in the torque. Neither limits nor friction
+    are looked at; a lost wheel gets none. Not for exact polynomials, which cannot compare pieces with pieces.
+
+    By duality the least peak is the largest |y . torque| with sum |y . a_k| = 1, and the largest is reached where y is
+    normal to two of the axes: all other wheels give the peak, and the two follow from the torque (facets of a zonotope, the
+    torque envelope; Markley, Reynolds, Liu, Lebsock 2010, Maximum Torque and Momentum Envelopes for Reaction-Wheel Arrays).
+    """
+    facets, width = wheels.facets, 6 + 3 * len(wheels.axes)
+    if not isinstance(facets, Buffer):
+        raise TypeError("these wheels have no facets: see models.envelope.with_facets")
+
+    def piece(k: Any) -> tuple[Any, ...]:
+        n0, n1, n2, e0, e1, e2, *rows = facets.row(k, width)
+        shared = each(dot, (tuple(zip(rows[::3], rows[1::3], rows[2::3], strict=True)),), torque)
+        return absolute(dot((n0, n1, n2), torque)), absolute(dot((e0, e1, e2), torque)), *shared
+
+    def better(k: Any, *best: Scalar) -> tuple[Any, ...]:
+        found = piece(k + 1)
+        # Where two facets cost the same, both give the same torques.
+        inner = both(less_equal(best[0], found[0]), less(best[1], found[1]))
+        wins = either(less(best[0], found[0]), inner)
+        return tuple(where(wins, new, old) for new, old in zip(found, best, strict=True))
+
+    return repeat(facets.size // width - 1, better, *piece(0))[2:]
+
+
+def motor(command: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels) -> Numbers:
+    """d(momentum)/dt of each wheel (N m) under the commanded motor torques (N m), at axial momenta (N m s) and body rate
+    (rad/s): the command within the torque limit, faded out where it would carry the momentum beyond its limit (see BAND),
+    and friction against the speed relative to the body (see CREEP). Infinite limits are none."""
+    columns = (
+        command,
+        momentum,
+        wheels.axes,
+        wheels.inertia,
+        wheels.torque_limit,
+        wheels.momentum_limit,
+        wheels.viscous,
+        wheels.coulomb,
+    )
+    return each(_motor, columns, rate)
+
+
+def _motor(
+    command: Scalar,
+    momentum: Scalar,
+    axis: Vector,
+    inertia: Scalar,
+    torque_limit: Scalar,
+    momentum_limit: Scalar,
+    viscous: Scalar,
+    coulomb: Scalar,
+    rate: Vector,
+) -> Scalar:
+    # Reciprocals of what does not change, which a compiler takes out of the loop over the lanes.
+    speed = momentum * (1.0 / inertia) - dot(axis, rate)
+    given = _room(command, momentum, momentum_limit) * clip(command, torque_limit)
+    return given - viscous * speed - coulomb * clip(speed * (1.0 / CREEP), 1.0)
+
+
+def _room(command: Scalar, momentum: Scalar, limit: Scalar) -> Scalar:
+    """The share of its torque that the momentum leaves a motor, in the direction of the command."""
+    filled = momentum * (1.0 / limit)
+    above, below = _fraction((1.0 - filled) * (1.0 / BAND)), _fraction((1.0 + filled) * (1.0 / BAND))
+    return where(less(0.0, command), above, below)
+
+
+def available(command: Numbers, momentum: Numbers, wheels: Wheels) -> Numbers:
+    """The most that each motor gives now in the direction of its command (N m): its torque limit, faded out as its momentum
+    fills up."""
+    return each(_available, (command, momentum, wheels.torque_limit, wheels.momentum_limit))
+
+
+def _available(command: Scalar, momentum: Scalar, torque_limit: Scalar, momentum_limit: Scalar) -> Scalar:
+    room = _room(command, momentum, momentum_limit)
+    # No share of an unlimited torque is none.
+    return where(less(0.0, room), room * torque_limit, 0.0)
+
+
+def _fraction(x: Scalar) -> Scalar:
+    """x kept within [0, 1]."""
+    return where(less(x, 0.0), 0.0, where(less(x, 1.0), x, 1.0))
+
+
+def on_body(momentum_rate: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels) -> Vector:
+    """The torque of the wheels on the body (N m): -sum a_i h_i' - rate x sum a_i h_i."""
+    turning = add(weighted(momentum_rate, wheels.axes), cross(rate, wheel_momentum(momentum, wheels)))
+    return scale(-1.0, turning)
+
+
+def wheel_momentum(momentum: Numbers, wheels: Wheels) -> Vector:
+    """The wheels' momentum in body axes (N m s): sum a_i h_i."""
+    return weighted(momentum, wheels.axes)
+
+
+def make_wheels(
+    axes: Sequence[Sequence[float]],
+    inertia: float | Sequence[float],
+    torque_limit: float | Sequence[float],
+    momentum_limit: float | Sequence[float],
+    viscous: float | Sequence[float] = 0.0,
+    coulomb: float | Sequence[float] = 0.0,
+) -> Wheels:
+    """Validated wheels from N spin axes (body; any length) and, for all or for each, rotor inertia (kg m2), torque limit
+    (N m; 0 for a wheel that takes no part), momentum limit (N m s), viscous (N m s) and Coulomb friction (N m). Limits may
+    be infinite.
+
+    Raises ValueError where a number is out of range, there are more than MOST wheels, fewer than three working wheels have
+    independent axes (it names the body direction without authority), or they lie so close to a plane that the matrix of the
+    axes has a condition number above 1000.
+    """
+    matrix = _unit_axes(axes)
+    count = len(matrix)
+    columns = (
+        _column("rotor inertia", inertia, count, least=None),
+        _column("torque limit", torque_limit, count, least=0.0, infinite=True),
+        _column("momentum limit", momentum_limit, count, least=None, infinite=True),
+        _column("viscous friction", viscous, count, least=0.0),
+        _column("Coulomb friction", coulomb, count, least=0.0),
+    )
+    working = [i for i in range(count) if columns[1][i] > 0.0]
+    _check_authority(matrix[working], "the wheels give" if len(working) == count else "the working wheels give")
+    return Wheels(_rows(matrix), *columns, _least_squares(matrix, working))
+
+
+def lose(wheels: Wheels, index: int) -> Wheels:
+    """The wheels after one of them (`index` counts from 0, messages from 1) has lost its motor: it takes no part in
+    allocation any more, its torque limit is 0, and its rotor only coasts down by friction.
+
+    Raises ValueError where there is no such wheel, or the others no longer act about three axes (it names the body direction
+    without authority).
+    """
+    count = len(wheels.axes)
+    if not 0 <= index < count:
+        raise ValueError(f"there is no wheel {index + 1}; the wheels are 1 to {count}")
+    limits = tuple(0.0 if i == index else limit for i, limit in enumerate(wheels.torque_limit))
+    working = [i for i in range(count) if limits[i] > 0.0]
+    matrix = np.array(wheels.axes)
+    _check_authority(matrix[working], f"without wheel {index + 1} the others give")
+    return wheels._replace(torque_limit=limits, least=_least_squares(matrix, working), facets=())
+
+
+def capacity(wheels: Wheels, momentum: Sequence[float]) -> float:
+    """The norm (N m s) of the momentum that wheels with these axial momenta (N m s) at the start can store before a motor
+    fades, whatever its direction, with least-squares allocation; 0 where one is there already."""
+    total = wheel_momentum(tuple(momentum), wheels)
+    columns = zip(wheels.least, wheels.momentum_limit, momentum, strict=True)
+    # What moves no momentum to the body stays in the rotors.
+    rooms = [((1.0 - BAND) * limit - abs(held + dot(row, total)), math.sqrt(dot(row, row))) for row, limit, held in columns]
+    return max(0.0, min(room / share for room, share in rooms if share > 0.0))
+
+
+def relaxation(wheels: Wheels) -> float:
+    """The fastest rate (1/s) at which friction brings a rotor to rest, that of Coulomb friction within CREEP included."""
+    columns = zip(wheels.viscous, wheels.coulomb, wheels.inertia, strict=True)
+    return max((viscous + coulomb / CREEP) / inertia for viscous, coulomb, inertia in columns)
+
+
+def gives_what_is_asked(wheels: Wheels) -> bool:
+    """Whether, within the limits of the wheels, the torque on the body is the one that is shared out: not so while a lost
+    wheel is still counted on."""
+    working = [(axis, row) for axis, row, limit in zip(wheels.axes, wheels.least, wheels.torque_limit, strict=True) if limit]
+    axes, rows = (
+        (np.array(part).reshape(-1, 3) for part in zip(*working, strict=True)) if working else (np.zeros((1, 3)),) * 2
+    )
+    return bool(np.abs(axes.T @ rows + np.eye(3)).max() < 1e-9)
+
+
+def body_inertia(inertia_total: Any, wheels: Wheels) -> NDArray[np.float64]:
+    """J' = J - sum inertia_i a_i a_i^T (3, 3; kg m2) of a craft whose total inertia, wheels at rest in it included, is J
+    (three principal moments or 3x3).
+
+    J' is not the inertia of a body: it need not obey the triangle inequality. Raises ValueError where J is not an inertia
+    or J' is not positive definite.
+    """
+    axes = np.array(wheels.axes)
+    rest = check_inertia(inertia_total) - (axes.T * np.array(wheels.inertia)) @ axes
+    moments = np.linalg.eigvalsh(rest)
+    if moments[0] <= 0.0:
+        shown = ", ".join(f"{m:g}" for m in moments)
+        raise ValueError(f"the rotors have more inertia than the craft: without them its principal moments are {shown}")
+    # What symmetric layouts leave of the products is rounding, and would cost the loop its diagonal inertia.
+    rest[np.abs(rest) < 1e-15 * moments[-1]] = 0.0
+    return rest
+
+
+def three_orthogonal() -> tuple[Vector, ...]:
+    """Three wheels along the body axes."""
+    return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def pyramid(elevation: float = math.atan(math.sqrt(0.5))) -> tuple[Vector, ...]:
+    """Four wheels about the z axis, this far above the xy plane (rad) and halfway between the x and y axes; the default
+    serves all three body axes alike. ValueError where the elevation is not between 0 and pi/2."""
+    if not 0.0 < elevation < 0.5 * math.pi:
+        raise ValueError(f"the elevation of a pyramid must be between 0 and pi/2 rad, not {elevation:g}")
+    flat, up = math.cos(elevation) * math.sqrt(0.5), math.sin(elevation)
+    return ((flat, flat, up), (-flat, flat, up), (-flat, -flat, up), (flat, -flat, up))
+
+
+def nasa_standard() -> tuple[Vector, ...]:
+    """Four wheels: three along the body axes and a spare at equal angles to them."""
+    skewed = math.sqrt(1.0 / 3.0)
+    return (*three_orthogonal(), (skewed, skewed, skewed))
+
+
+def _unit_axes(axes: Sequence[Sequence[float]]) -> NDArray[np.float64]:
+    matrix = np.asarray(axes, dtype=float)
+    if matrix.ndim != 2 or matrix.shape[1] != 3:
+        raise ValueError(f"wheel axes must be vectors of three numbers, not an array of shape {matrix.shape}")
+    if len(matrix) > MOST:
+        raise ValueError(f"at most {MOST} wheels are taken, not {len(matrix)}")
+    lengths = np.linalg.norm(matrix, axis=1)
+    for i, length in enumerate(lengths.tolist()):
+        if not 0.0 < length < math.inf:
+            raise ValueError(f"the axis of wheel {i + 1} must have a finite length above zero, not {length:g}")
+    return matrix / lengths[:, None]
+
+
+def _column(name: str, value: Any, count: int, least: float | None, infinite: bool = False) -> Numbers:
+    """A number for each wheel; `least` None asks for positive ones."""
+    given = np.asarray(value, dtype=float)
+    if given.shape not in ((), (count,)):
+        raise ValueError(f"{name}: one number or {count} are needed, not an array of shape {given.shape}")
+    column: list[float] = np.broadcast_to(given, (count,)).tolist()
+    for i, number in enumerate(column):
+        sound = number > 0.0 if least is None else number >= least
+        if not sound or (math.isinf(number) and not infinite):
+            range_ = "positive" if least is None else "zero or more"
+            raise ValueError(
+                f"the {name} of wheel {i + 1} must be {range_}{'' if infinite else ' and finite'}, not {number:g}"
+            )
+    return tuple(column)
+
+
+def _check_authority(axes: NDArray[np.float64], who: str) -> None:
+    """ValueError unless the axes (working wheels, 3) span the space well."""
+    if len(axes) == 0:
+        raise ValueError(f"{who} no torque at all: none is left")
+    directions, sizes, _ = np.linalg.svd(axes.T)
+    sizes = np.append(sizes, np.zeros(3 - len(sizes)))
+    lacking = directions[:, sizes <= COPLANAR * sizes[0]]
+    if lacking.shape[1]:
+        shown = " and ".join(_shown(direction) for direction in lacking.T)
+        raise ValueError(f"{who} no torque about the body direction {shown}: three independent axes are needed")
+    condition = float(sizes[0] / sizes[2])
+    if condition > _WORST_CONDITION:
+        raise ValueError(
+            f"{who} hardly any torque about the body direction {_shown(directions[:, 2])}: "
+            f"the condition number of the axes is {condition:.3g}, above {_WORST_CONDITION:g}"
+        )
+
+
+def _shown(direction: NDArray[np.float64]) -> str:
+    rounded = direction.round(9)
+    leading = np.flatnonzero(np.abs(rounded) > 0.5 * np.abs(rounded).max())[0]
+    return f"({', '.join(f'{x:.3g}' for x in (np.sign(rounded[leading]) * rounded + 0.0).tolist())})"
+
+
+def _rows(matrix: NDArray[np.float64]) -> tuple[Vector, ...]:
+    return tuple(vector(row) for row in matrix)
+
+
+def _least_squares(axes: NDArray[np.float64], working: list[int]) -> Rows:
+    rows = np.zeros_like(axes)
+    rows[working] = -np.linalg.pinv(axes[working].T)
+    return _rows(rows)

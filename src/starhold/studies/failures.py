@@ -1,0 +1,326 @@
+"""What a spacecraft can still do after the loss of one or two of its wheels: numbers, a CSV file and a picture."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.analysis.metrics import measure
+from starhold.errors import InputError
+from starhold.files import atomic_write
+from starhold.parts.craft import tensor
+from starhold.parts.effectors.envelope import authority
+from starhold.parts.effectors.wheels import Wheels, lose
+from starhold.scenario.building import build
+from starhold.scenario.schema import FaultTable
+from starhold.simulation.lane import Recording, fly, label
+from starhold.studies.certificates import certify_law
+from starhold.synthesis.stability_degree import degree, scale
+
+if TYPE_CHECKING:
+    from starhold.loop.closed_loop import ClosedLoop
+    from starhold.scenario.reading import LawEntry, Scenario
+
+Array: TypeAlias = NDArray[np.float64]
+
+FULL = 0.99
+"""Share of its momentum limit at which a wheel counts as saturated: beyond it the motor loses its outward torque."""
+HORIZON = 1000
+"""So many orbits ahead, growth is extrapolated; a slower one counts as none."""
+WEAK = 1e-3
+"""Singular values of the axes below this share of the largest belong to directions without authority."""
+SINGULAR = 1e-9
+MOST_STEPS = 2_000_000
+"""Flights are not continued beyond the scenario's duration where that takes more control steps."""
+
+
+@dataclass(frozen=True)
+class Saturation:
+    """When the first wheel reaches its momentum limit: the time (s) and which wheel (from 1), both None where none does; how
+    that is known ("flown", "extrapolated", "none"); and over what time (s) its growth was taken (None where flown)."""
+
+    time: float | None
+    wheel: int | None
+    known: str
+    window: float | None
+
+
+@dataclass(frozen=True)
+class Failure:
+    """What is left after a loss. What needs three axes is None where they are not left.
+
+    lost: wheels, counted from 1, none for the intact set. lacking: body directions without authority, orthonormal (n, 3).
+    condition: condition number of the working axes. authority: N m. share: of the intact authority. gains: what the law is
+    flown with, by field. eta: degree of stability (1/s), intact and after; None for a law not designed for one. settling:
+    s, None where it does not settle within the scenario's duration. diverged_at: s, None where the motion was not lost.
+    certified: the largest turn from rest (rad), and the largest rate on target (rad/s), from which no motor and no wheel is
+    proved to meet its limit on the way to the target; None where that is not proved.
+    momentum_share: largest |h| over its limit among working wheels during the flight. flown: length of the flight (s).
+    orbit: its period (s), None without one. refused: why the law cannot fly with what is left; then nothing
+    is told of a flight.
+    """
+
+    lost: tuple[int, ...]
+    lacking: tuple[tuple[float, ...], ...]
+    condition: float
+    authority: float
+    share: float
+    gains: dict[str, Any] | None = None
+    eta_intact: float | None = None
+    eta: float | None = None
+    settling: float | None = None
+    diverged_at: float | None = None
+    certified: tuple[float, float] | None = None
+    saturation: Saturation | None = None
+    momentum_share: float | None = None
+    flown: float | None = None
+    orbit: float | None = None
+    refused: str = ""
+
+    @property
+    def name(self) -> str:
+        """The lost wheels in words."""
+        return " and ".join(map(str, self.lost)) or "none"
+
+    @property
+    def controllable(self) -> bool:
+        """Whether three axes are left."""
+        return not self.lacking
+
+
+def study(
+    scenario: Scenario, entry: LawEntry, notice: Callable[[int, int, str], None] = lambda done, total, name: None
+) -> list[Failure]:
+    """The intact set, then every single and every double loss, flown with a law of the scenario in place of its own faults.
+
+    The loss comes at time 0 and is known at once: the torque is shared out among the wheels left and, where the law was
+    designed for a degree of stability, its gains are designed for the torque left. `notice` hears the number done, that of
+    all, and the loss that comes next. InputError where the scenario has no wheels.
+    """
+    wheels = require_wheels(scenario)
+    count = len(wheels.axes)
+    losses = [lost for size in range(3) for lost in combinations(range(1, count + 1), size)]
+    intact = authority(wheels)
+    eta = _degree(scenario, entry, entry.gains)
+    found: list[Failure] = []
+    for done, lost in enumerate(losses):
+        failure = _left(wheels, lost, intact)
+        notice(done, len(losses), failure.name)
+        failure = replace(failure, eta_intact=eta)
+        found.append(_flown(scenario, entry, failure) if failure.controllable else failure)
+    notice(len(losses), len(losses), "")
+    return found
+
+
+def directions_lacking(axes: Array) -> Array:
+    """Orthonormal body directions (n, 3) about which wheels with these axes (k, 3) give no torque, or hardly any."""
+    if len(axes) == 0:
+        return np.eye(3)
+    directions, sizes, _ = np.linalg.svd(axes.T)
+    sizes = np.append(sizes, np.zeros(3 - len(sizes)))
+    lacking = directions[:, sizes <= WEAK * sizes[0]].T
+    leading = np.take_along_axis(lacking, np.abs(lacking.round(9)).argmax(axis=1)[:, None], axis=1)
+    return np.sign(leading) * lacking
+
+
+def write_table(found: Sequence[Failure], entry: LawEntry, path: Path) -> None:
+    """All numbers as CSV, SI units in the header; what does not exist is an empty cell, vectors are separated by blanks."""
+    gains = {f"{item.name} ({item.gain.unit})": item.name for item in entry.law.fields()}
+    with atomic_write(path) as hidden, hidden.open("w", encoding="utf-8", newline="") as file:
+        rows = csv.writer(file, lineterminator="\n")
+        rows.writerow([*_cells(found[0]), *gains])
+        for failure in found:
+            chosen = failure.gains or {}
+            rows.writerow([*_cells(failure).values(), *(_numbers(chosen.get(name)) for name in gains.values())])
+
+
+def _cells(failure: Failure) -> dict[str, str]:
+    known = failure.saturation or Saturation(None, None, "", None)
+    certified = failure.certified or (None, None)
+    return {
+        "lost wheels": _numbers(failure.lost),
+        "controllable axes": str(3 - len(failure.lacking)),
+        "directions without authority": "; ".join(map(_numbers, failure.lacking)),
+        "condition number": _numbers(failure.condition),
+        "torque authority (N m)": _numbers(failure.authority),
+        "share of intact authority": _numbers(failure.share),
+        "degree of stability intact (1/s)": _numbers(failure.eta_intact),
+        "degree of stability after (1/s)": _numbers(failure.eta),
+        "settling time (s)": _numbers(failure.settling),
+        "diverged at (s)": _numbers(failure.diverged_at),
+        "certified turn (rad)": _numbers(certified[0]),
+        "certified rate (rad/s)": _numbers(certified[1]),
+        "saturation time (s)": _numbers(known.time),
+        "saturating wheel": _numbers(known.wheel),
+        "saturation known from": known.known,
+        "window of momentum growth (s)": _numbers(known.window),
+        "largest share of momentum limit": _numbers(failure.momentum_share),
+        "time flown (s)": _numbers(failure.flown),
+        "not flown because": failure.refused,
+    }
+
+
+def _numbers(value: Any) -> str:
+    if value is None or isinstance(value, str):
+        return value or ""
+    return " ".join(repr(number) for number in np.asarray(value).ravel().tolist())
+
+
+def require_wheels(scenario: Scenario) -> Wheels:
+    """The wheels of a scenario; InputError where it has none."""
+    wheels = scenario.wheels
+    if wheels is None:
+        raise InputError(scenario.where, "wheels", "no wheels", "a scenario with [wheels] or [[wheel]] tables")
+    return wheels
+
+
+def _left(wheels: Wheels, lost: tuple[int, ...], intact: float) -> Failure:
+    """The wheels that are left, judged as when a fault is diagnosed."""
+    limits = tuple(0.0 if i in lost else limit for i, limit in enumerate(wheels.torque_limit, 1))
+    axes = np.array([axis for i, axis in enumerate(wheels.axes, 1) if i not in lost])
+    try:
+        left = lose(wheels._replace(torque_limit=limits), lost[0] - 1) if lost else wheels
+    except ValueError:
+        lacking = tuple(tuple(map(float, direction.round(12) + 0.0)) for direction in directions_lacking(axes))
+        return Failure(lost, lacking, _condition(axes), 0.0, 0.0)
+    able = authority(left)
+    share = able / intact if math.isfinite(intact) else 1.0
+    return Failure(lost, (), _condition(axes), able, share)
+
+
+def _condition(axes: Array) -> float:
+    sizes = np.linalg.svd(axes, compute_uv=False) if len(axes) >= 3 else np.zeros(3)
+    return float(sizes[0] / sizes[2]) if sizes[2] > SINGULAR * sizes[0] else math.inf
+
+
+def _designed(entry: LawEntry) -> bool:
+    return entry.form == "degree-of-stability" and {"torque", "momentum"} <= set(entry.spec._fields)
+
+
+def _degree(scenario: Scenario, entry: LawEntry, gains: Any) -> float | None:
+    """Degree of stability (1/s) that these gains give; None for a law that is not designed for one."""
+    if not _designed(entry):
+        return None
+    moments = np.linalg.eigvalsh(tensor(scenario.craft.inertia))
+    units = scale(moments, entry.spec.torque, entry.spec.momentum)
+    return float(degree(*units.scaled(gains.k_attitude[0], gains.k_rate), units.ratios)) / units.t0
+
+
+def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
+    table = scenario.table
+    retune = _designed(entry) and 0.0 < failure.authority < math.inf
+    faults = [
+        FaultTable(time=0.0, wheel=wheel, lost=True, action="both" if retune else "reallocate") for wheel in failure.lost
+    ]
+    # What the law does about faults of the file is no matter here.
+    own = replace(entry, fault_action=None)
+    try:
+        loop = build(replace(scenario, table=table.model_copy(update={"fault": faults})), own)
+    except InputError as error:
+        if not faults:
+            raise
+        return replace(failure, refused=error.allowed)
+    gains = loop.events[-1].gains if loop.events else loop.gains
+    period = _orbit_period(scenario)
+    every, steps = table.simulation.record_every, _steps(scenario, loop, period)
+    samples, carry = fly(loop, steps, every)
+    recording = label(loop, samples, carry, every)
+    metrics = measure(_until(recording, table.simulation.duration), *_tolerances(scenario))
+    working = [i for i in range(len(require_wheels(scenario).axes)) if i + 1 not in failure.lost]
+    filled = recording["wheel_momentum"][:, working] / np.array(require_wheels(scenario).momentum_limit)[working]
+    lost_at = metrics["diverged_at"]
+    known = None if lost_at is not None else saturation(recording["time"], filled, period)
+    if known is not None and known.wheel is not None:
+        known = replace(known, wheel=working[known.wheel - 1] + 1)
+    return replace(
+        failure,
+        gains={
+            item.name: item.gain.choices[value] if item.gain.choices else value
+            for item, value in zip(entry.law.fields(), gains, strict=True)
+        },
+        eta=_degree(scenario, entry, gains),
+        settling=metrics["settling_time"],
+        diverged_at=lost_at,
+        certified=_certified(scenario, entry, loop),
+        saturation=known,
+        momentum_share=float(np.abs(filled).max()),
+        flown=float(recording["time"][-1]),
+        orbit=period,
+    )
+
+
+def _certified(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> tuple[float, float] | None:
+    claim = certify_law(scenario, entry, loop)[0].certificate.claim("wheels")
+    if claim is None or claim.outcome != "proved":
+        return None
+    # Where nothing limits the wheels no claim is made, so that the set is bounded.
+    return claim.numbers["slew_angle"], claim.numbers["rate"]
+
+
+def _tolerances(scenario: Scenario) -> tuple[float, float]:
+    return scenario.table.settling.attitude_tolerance, scenario.table.settling.rate_tolerance
+
+
+def _orbit_period(scenario: Scenario) -> float | None:
+    """Of the orbit that the spacecraft starts in (s); None without one, or where it is not closed."""
+    orbit = scenario.table.orbit
+    if orbit is None:
+        return None
+    position, velocity = orbit.start
+    inverse = 2.0 / math.hypot(*position) - math.hypot(*velocity) ** 2 / orbit.gravitational_parameter
+    return 2.0 * math.pi / math.sqrt(orbit.gravitational_parameter * inverse**3) if inverse > 0.0 else None
+
+
+def _steps(scenario: Scenario, loop: ClosedLoop, period: float | None) -> int:
+    """Control steps to fly: an orbit more than the scenario's where that can be, for what the wheels store swings with the
+    orbit, and over less than one orbit nobody tells that from growth."""
+    steps = scenario.table.simulation.steps
+    if period is None or isinstance(loop.target, np.ndarray) or loop.remembers:
+        return steps
+    every = scenario.table.simulation.record_every
+    more = math.ceil(period / loop.period / every + 1.0) * every
+    return steps + more if steps + more <= MOST_STEPS else steps
+
+
+def _until(recording: Recording, time: float) -> Recording:
+    """The recording up to a time (s); a motion lost later is lost all the same."""
+    kept = int(np.searchsorted(recording["time"], time * (1.0 + 1e-9), side="right"))
+    return Recording({name: values[:kept] for name, values in recording.arrays.items()}, recording.attrs)
+
+
+def saturation(times: Array, filled: Array, period: float | None) -> Saturation:
+    """When the first of some wheels is full: times (n,) (s), momenta over their limits (n, wheels), orbit period (s).
+
+    Growth is taken over the last orbit, or the last half of the flight where that is shorter or there is no orbit; the
+    largest momentum on its side within that time is carried on with it, which is right to within an orbit. Wheels in the
+    answer count from 1.
+    """
+    beyond = np.argwhere(np.abs(filled) > FULL)
+    if len(beyond):
+        row, wheel = beyond[0].tolist()
+        return Saturation(float(times[row]), wheel + 1, "flown", None)
+    end, half = float(times[-1]), 0.5 * float(times[-1])
+    window = half if period is None or period > end else period
+    last = times >= end - window
+    best = Saturation(None, None, "none", window)
+    if window <= 0.0:
+        return best
+    reach = end + HORIZON * (window if period is None else period)
+    for wheel, share in enumerate(filled.T):
+        growth = (share[-1] - np.interp(end - window, times, share)) / window
+        if growth == 0.0:
+            continue
+        outward = np.sign(growth) * share[last]
+        top = int(outward.argmax())
+        full = float(times[last][top] + (FULL - outward[top]) / abs(growth))
+        if full < (reach if best.time is None else best.time):
+            best = Saturation(full, wheel + 1, "extrapolated", window)
+    return best

@@ -1,0 +1,59 @@
+"""Results as tidy tables of pandas: what is measured in columns, what it is measured of in rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from starhold.certification.certificate import Certificate
+from starhold.scenario.designing import Design
+from starhold.studies.flight import Flight
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from pandas import DataFrame
+
+
+def frame_of(rows: Sequence[dict[str, Any]]) -> DataFrame:
+    """A table of rows; what is None counts as missing."""
+    # Loaded here, for no command needs it.
+    import pandas as pd
+
+    columns = {name: None for row in rows for name in row}
+    return pd.DataFrame({name: [np.nan if row.get(name) is None else row[name] for row in rows] for name in columns})
+
+
+def to_pandas(results: Any) -> DataFrame:
+    """A run, or a list of flights, certificates or designs, as a table; see `starhold.to_pandas`."""
+    if hasattr(results, "data_vars"):
+        return run_frame(results)
+    items = [results] if isinstance(results, Flight | Certificate | Design) else list(results)
+    rows: list[dict[str, Any]] = []
+    for item in items:
+        if isinstance(item, Flight):
+            rows.append({"name": item.name, "law": item.law, **item.metrics})
+        elif isinstance(item, Certificate):
+            rows += [
+                {"name": item.name, "claim": claim.kind, "outcome": claim.outcome, **claim.numbers} for claim in item.claims
+            ]
+        elif isinstance(item, Design):
+            rows.append({"name": item.name, "law": item.law, "form": item.form, **item.inputs, **item.gains})
+        else:
+            raise TypeError(f"no table is made of {type(item).__name__}: a run, flights, certificates or designs are wanted")
+    return frame_of(rows)
+
+
+def run_frame(run: xr.Dataset) -> DataFrame:
+    """A run with a row a sample: time, then every component in a column of its own, such as rate_x."""
+    import pandas as pd
+
+    columns: dict[str, Any] = {"time": run["time"].to_numpy()}
+    for name, values in run.data_vars.items():
+        dimension = str(values.dims[1])
+        known = dimension in run.coords
+        labels = run[dimension].to_numpy() if known else np.arange(1, values.shape[1] + 1)
+        data = cast(Any, values.to_numpy())
+        columns |= {f"{name}_{label}": data[:, place] for place, label in enumerate(labels)}
+    return pd.DataFrame(columns)

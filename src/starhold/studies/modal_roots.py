@@ -1,0 +1,152 @@
+"""The roots of the modal law that turn fastest within a scenario's limits: the search, the fit through it, a CSV file."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.analysis.roots import PUBLISHED, Found, Pieces, Problem, fit, search, unmet
+from starhold.analysis.transient import Limits
+from starhold.errors import InputError
+from starhold.files import atomic_write
+from starhold.scenario.building import build
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import LawEntry, Scenario
+    from starhold.scenario.transient import TransientTable
+
+DIGITS = 6
+"""Of the fit as it is printed; the roots have three or four."""
+PUBLISHED_FOR: dict[str, Any] = {
+    "rate_limit": math.radians(30.0),
+    "acceleration_limit": math.radians(50.0),
+    "angle_end": math.radians(0.1),
+    "rate_end": math.radians(0.1),
+    "start_rate": (math.radians(20.0) / math.sqrt(3.0),) * 3,
+}
+"""What the published fit was made for, with the axis along the rate."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """What a search found, angle by angle; the fit through it, None for too few angles; and the published one, None where
+    the limits or the start are not the published ones."""
+
+    found: list[Found]
+    b: float
+    eased: bool
+    """Whether the limits were tried with tolerances too."""
+    own: Pieces | None
+    published: Pieces | None
+
+    @property
+    def angles(self) -> NDArray[np.float64]:
+        """Initial angles (rad), (n,)."""
+        return np.array([item.angle for item in self.found])
+
+    @property
+    def roots(self) -> NDArray[np.float64]:
+        """The best roots within the limits (1/s), (n,)."""
+        return np.array([math.nan if item.hard is None else item.hard.root for item in self.found])
+
+    def fits(self) -> dict[str, Pieces]:
+        """The fits there are, by how tables call them."""
+        both = {"fit": self.own, "published": self.published}
+        return {name: pieces for name, pieces in both.items() if pieces is not None}
+
+
+def pick_modal(scenario: Scenario, law: str | None) -> LawEntry:
+    """The law of this name, or the first modal one. InputError where that is not modal, or the scenario has no limits."""
+    if scenario.table.transient is None:
+        raise InputError(scenario.where, "transient", "no such table", "a [transient] table with limits")
+    if scenario.table.target.mode != "inertial":
+        raise InputError(scenario.where, "target.mode", scenario.table.target.mode, '"inertial": the search turns to rest')
+    entries = [entry for entry in scenario.laws if entry.law.name == "modal"]
+    entry = scenario.pick(law) if law is not None else entries[0] if entries else None
+    if entry is None or entry.law.name != "modal":
+        raise InputError(scenario.where, "law", law or "none that is modal", 'a law with type = "modal"')
+    return entry
+
+
+def study(scenario: Scenario, entry: LawEntry, notice: Callable[[int, int], None] = lambda done, total: None) -> Study:
+    """The search of a scenario, with a law that `pick_modal` gives, of which only b counts. `notice` hears how many angles
+    are done. InputError where no root keeps the limits from some angle."""
+    table: Any = scenario.table.transient
+    limits, eased = _limits(table)
+    problem = problem_of(scenario, entry)
+    found = search(problem, table.angles, table.roots, limits, eased, notice)
+    for item in found:
+        if item.hard is None:
+            raise _unreachable(scenario, problem, item.angle, limits)
+    hard = [item.hard.root for item in found if item.hard is not None]
+    b = problem.b
+    return Study(found, b, eased != limits, fit(table.angles, hard), PUBLISHED if _as_published(table, b) else None)
+
+
+def problem_of(scenario: Scenario, entry: LawEntry) -> Problem:
+    """What a scenario's search flies, faults left out."""
+    table: Any = scenario.table.transient
+    steps, ends = scenario.table.simulation.steps, (table.angle_end, table.rate_end)
+    return Problem(build(scenario, entry), steps, table.axis, table.start_rate, *ends, entry.gains.b)
+
+
+def _limits(table: TransientTable) -> tuple[Limits, Limits]:
+    """Hard, and with their tolerances."""
+    hard = Limits(table.rate_limit, table.acceleration_limit)
+    return hard, Limits(hard.rate + table.rate_tolerance, hard.acceleration + table.acceleration_tolerance)
+
+
+def _as_published(table: TransientTable, b: float) -> bool:
+    along = np.linalg.norm(np.cross(table.axis, table.start_rate)) < 1e-9 and np.dot(table.axis, table.start_rate) > 0.0
+    given = (np.allclose(getattr(table, name), value, rtol=1e-9) for name, value in PUBLISHED_FOR.items())
+    return bool(along) and b == -0.01 and all(given)
+
+
+def _unreachable(scenario: Scenario, problem: Problem, angle: float, limits: Limits) -> InputError:
+    """Which limit cannot be kept from an angle."""
+    table: Any = scenario.table.transient
+    why, duration = unmet(problem, angle, table.roots, limits), f"{problem.steps * problem.loop.period:g} s"
+    ended = f"from {math.degrees(angle):.4g} deg no root that comes to its end within {duration}"
+    if why.what == "end":
+        text = f"a longer one, or other roots: {ended.replace(' that comes', ' comes')}"
+        return InputError(scenario.where, "simulation.duration", duration, text)
+    if why.what == "both":
+        return InputError(
+            scenario.where, "transient", "rate_limit and acceleration_limit", f"wider ones: {ended} keeps both"
+        )
+    unit = "deg/s" if why.what == "rate" else "deg/s^2"
+    limit = f"{math.degrees(getattr(limits, why.what)):.6g} {unit}"
+    text = f"at least {math.degrees(why.least):.6g} {unit}: {ended} does with less (root {why.root:.6g} 1/s)"
+    return InputError(scenario.where, f"transient.{why.what}_limit", limit, text)
+
+
+def law_lines(pieces: Pieces, b: float) -> list[str]:
+    """A [[law]] table in TOML that takes its root from a fit."""
+    below, above = ([float(f"{x:.{DIGITS}g}") for x in piece] for piece in (pieces.below, pieces.above))
+    split = f'split = "{math.degrees(pieces.split):.{DIGITS}g} deg"'
+    return ["[[law]]", 'type = "modal"', 'form = "fit"', f"below = {below}", f"above = {above}", split, f"b = {b!r}"]
+
+
+def write_table(what: Study, path: Path) -> None:
+    """The search as CSV, SI units and radians, one row an angle; with the fits at that angle."""
+    head = ["angle", "root", "time", "peak_rate", *(f"peak_acceleration_{axis}" for axis in "xyz")]
+    eased = ["eased_root", "eased_time"] if what.eased else []
+    fits = {f"{name}_root": pieces.at(what.angles) for name, pieces in what.fits().items()}
+    with atomic_write(path) as hidden, hidden.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([*head, *eased, *fits])
+        for place, item in enumerate(what.found):
+            row: list[Any] = [item.angle]
+            if item.hard is not None:
+                flown = item.hard.transient
+                row += [item.hard.root, item.hard.time, flown.peak_rate, *flown.peak_acceleration]
+            if what.eased and item.eased is not None:
+                row += [item.eased.root, item.eased.time]
+            writer.writerow([*row, *(float(values[place]) for values in fits.values())])

@@ -1,0 +1,79 @@
+"""Flies a scenario with many values of some of its keys, and measures each run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from starhold.errors import InputError
+from starhold.scenario.checking import show
+from starhold.scenario.making import variants
+from starhold.scenario.opening import AnyScenario
+from starhold.simulation.abreast import Flying, fly_abreast
+from starhold.simulation.lane import Progress
+from starhold.studies.frames import frame_of
+from starhold.studies.kinds import kind_of
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+
+def sweep(
+    scenario: AnyScenario,
+    changes: Mapping[str, Iterable[Any]] | Iterable[Mapping[str, Any]],
+    law: str | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> DataFrame:
+    """A row for each law and each of the changes, see `starhold.sweep`."""
+    points = _points(scenario, changes)
+    names = [law] if law is not None else _named(scenario, points)
+    kind = kind_of(scenario)
+    rows: list[dict[str, Any]] = []
+    flown: list[AnyScenario] = []
+    flights: list[Flying] = []
+    # All of them before the first flight, so that what is wrong with the last is said at once.
+    for point, other in zip(points, variants(scenario, points), strict=True):
+        simulation = other.table.simulation
+        for name in names:
+            loop = kind.build(other, other.pick(name))
+            rows.append({**point, "law": name})
+            flown.append(other)
+            flights.append(Flying(loop, simulation.steps, simulation.record_every))
+
+    def measured(number: int, samples: Any, carry: Any) -> dict[str, Any]:
+        return kind.metrics_of(kind.name_samples(flown[number], flights[number].loop, samples, carry))
+
+    found = fly_abreast(flights, measured, threads, progress)
+    return frame_of([row | metrics for row, metrics in zip(rows, found, strict=True)])
+
+
+def _points(scenario: AnyScenario, changes: Any) -> list[dict[str, Any]]:
+    """The changes one by one: given so, or every combination of the values of each key."""
+    if isinstance(changes, Mapping):
+        columns = {key: _values(scenario, key, values) for key, values in changes.items()}
+        points = [dict(zip(columns, chosen, strict=True)) for chosen in product(*columns.values())]
+    else:
+        points = [dict(point) for point in changes]
+    if not points or not all(points):
+        allowed = 'values of some keys, {"law.pd.k_rate": [0.1, 0.2]}, or a list of changes as `with_` takes them'
+        raise InputError(scenario.where, "sweep", "nothing to change", allowed)
+    return points
+
+
+def _values(scenario: AnyScenario, key: str, values: Any) -> list[Any]:
+    if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable):
+        raise InputError(scenario.where, key, show(values), "a list of values to fly")
+    return values.tolist() if isinstance(values, np.ndarray) else list(values)
+
+
+def _named(scenario: AnyScenario, points: list[dict[str, Any]]) -> list[str]:
+    """The laws that the changes are about; all where they are about none, or about some by their places."""
+    keys = {key for point in points for key in point if key.startswith("law")}
+    names = [entry.name for entry in scenario.laws]
+    about = [name for name in names if any(f"{key}.".startswith(f"law.{name}.") for key in keys)]
+    by_place = any(key.startswith("law[") or key == "law" for key in keys)
+    return names if by_place or not about else about

@@ -1,0 +1,307 @@
+"""Gains of feedback on rate and quaternion from what the closed loop is to do: bandwidth and damping, or when it settles.
+
+The linear loop J a'' + k_rate a' + k_attitude a/2 = 0 (a an angle, q = a/2) has about a principal axis of moment J_i the
+natural frequency sqrt(k_attitude/(2 J_i)) and the damping ratio k_rate/sqrt(2 J_i k_attitude): with one number for all axes
+both are least about the axis of the largest moment.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache, lru_cache, partial
+from typing import Annotated, Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from starhold.algebra.quaternion import Quaternion, derivative, renormalise, vector_part
+from starhold.algebra.scalar import Scalar, either, less, maximum, where
+from starhold.algebra.structure import move
+from starhold.algebra.structured import repeat
+from starhold.algebra.vector import ZERO, Vector, cross, dot, scale, subtract
+from starhold.algebra.words import number_of
+from starhold.laws.interface import Gain, Measurement, NoMemory, Start
+from starhold.parts.bodies.rigid_body import angular_acceleration
+from starhold.parts.craft import Craft, tensor
+from starhold.trace.calling import Compiled
+
+STEPS = 4000
+"""Integration steps of a turn that is tried, and at most so many times MOST of them."""
+MOST = 64
+RESOLVED = 0.4
+"""Part of the fastest time constant that a step may be."""
+IN_HAND = 0.99
+"""Share of the time asked for that designs use up: a torque that is held settles a little later."""
+
+
+class Bandwidth(NamedTuple):
+    """Natural frequency and damping of the linear loop: exact about the axis of the largest moment of inertia, more about
+    the others."""
+
+    bandwidth: Annotated[float, Gain("rad/s", above=0.0, text="natural frequency, the least of all axes")]
+    damping: Annotated[float, Gain("1", above=0.0, text="damping ratio, the least of all axes")] = 0.7
+
+
+class Settling(NamedTuple):
+    """The lowest gains that settle in time, within the torque that there is, found by integrating the turn: towards a target
+    at rest, without torque from outside."""
+
+    time: Annotated[float, Gain("s", above=0.0, text="after which angle and rate stay within their tolerances")]
+    damping: Annotated[float, Gain("1", above=0.0, text="damping ratio, the least of all axes")] = 0.7
+    torque: Annotated[float | None, Gain("N m", above=0.0, text="largest norm of the torque; what there is if absent")] = (
+        None
+    )
+    momentum: Annotated[float | None, Gain("N m s", above=0.0, text="that wheels can store; what there is if absent")] = None
+    attitude: Annotated[
+        Quaternion | None,
+        Gain("1", shape=(4,), spread=False, text="turn from the target to the body at the start; the scenario's if absent"),
+    ] = None
+    rate: Annotated[
+        Vector | None, Gain("rad/s", shape=(3,), spread=False, text="relative rate then; the scenario's if absent")
+    ] = None
+    wheel_momentum: Annotated[
+        Any, Gain("N m s", shape=(3,), spread=False, text="by wheels then, body axes; the scenario's if absent")
+    ] = None
+    attitude_tolerance: Annotated[float | None, Gain("rad", above=0.0, text="that of [settling] if absent")] = None
+    rate_tolerance: Annotated[float | None, Gain("rad/s", above=0.0, text="that of [settling] if absent")] = None
+
+
+FORMS: dict[str, Any] = {"bandwidth": Bandwidth, "settling": Settling}
+Spec = TypeVar("Spec", bound=NamedTuple)
+
+
+def complete(spec: Spec, start: Callable[[], Start]) -> Spec:
+    """The inputs of a form that settles in time, with what they leave to the scenario."""
+    left = [name for name in Start.__dataclass_fields__ if getattr(spec, name, 0) is None]
+    return spec._replace(**{name: getattr(start(), name) for name in left}) if left else spec
+
+
+class Turn(NamedTuple):
+    """What came of a turn: when it settled (s; infinite where it did not), and the largest norms of the torque (N m) and of
+    the momentum that wheels store (N m s; 0 without)."""
+
+    time: float
+    torque: float
+    momentum: float
+
+
+def largest_moment(craft: Craft) -> float:
+    """The largest principal moment of inertia (kg m2)."""
+    return float(np.linalg.eigvalsh(tensor(craft.inertia))[-1])
+
+
+def feedback(craft: Craft, bandwidth: float, damping: float) -> tuple[float, float]:
+    """k_rate (N m s) and k_attitude (N m); ValueError where they are no finite positive numbers."""
+    moment = largest_moment(craft)
+    gains = 2.0 * damping * bandwidth * moment, 2.0 * bandwidth * bandwidth * moment
+    if not all(math.isfinite(gain) and gain > 0.0 for gain in gains):
+        raise ValueError("the gains leave the range of numbers")
+    return gains
+
+
+def fastest(craft: Craft, gains: Any) -> float:
+    """A bound on the fastest rate (1/s) of the linear loop with k_rate and k_attitude."""
+    least = float(np.linalg.eigvalsh(tensor(craft.inertia))[0])
+    return max(gains.k_rate / least, math.sqrt(0.5 * gains.k_attitude / least))
+
+
+def settle(
+    torque: Callable[..., Any],
+    gains_of: Callable[[float], Any],
+    rate_of: Callable[[Any], float],
+    craft: Craft,
+    spec: Any,
+) -> tuple[Any, Turn]:
+    """The gains of the least scale x (1/s) that settle in time, and their turn.
+
+    gains_of(x): the gains; rate_of(gains): the fastest rate (1/s) of the loop, which the integration must resolve.
+    ValueError says what time can be had where the torque or the momentum does not allow the one that is asked for.
+    """
+    if any(getattr(spec, name, 0) is None for name in Start.__dataclass_fields__ if name != "wheel_momentum"):
+        raise ValueError("a design that settles in time needs the start, the tolerances and the torque")
+    if not any(spec.attitude):
+        raise ValueError("attitude must be a quaternion that is not zero")
+    asked = IN_HAND * spec.time
+
+    def turn(x: float, horizon: float = 1.5 * spec.time) -> Turn:
+        return fly(torque, gains_of(x), craft, spec, horizon, rate_of(gains_of(x)))
+
+    def allowed(found: Turn) -> bool:
+        return found.torque <= spec.torque and found.momentum <= spec.momentum
+
+    low, high = 0.0, 0.1 / spec.time
+    found = turn(high)
+    while found.time > asked and allowed(found) and high < 1e4 / spec.time:
+        low, high = high, 1.2 * high
+        found = turn(high)
+    if not allowed(found):
+        high = _border(turn, allowed, low, high)
+        if high == 0.0 or turn(high).time > asked:
+            raise ValueError(_refusal(spec, _soonest(turn, allowed, high), found))
+    elif found.time > asked:
+        raise ValueError(_refusal(spec, _soonest(turn, allowed, high), found))
+    # A turn that is over before it begins leaves the gains as they were tried.
+    while low > 0.0 and high - low > 1e-4 * high:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if turn(middle).time <= asked else (middle, high)
+    return gains_of(high), turn(high)
+
+
+def _border(turn: Callable[..., Turn], allowed: Callable[[Turn], bool], low: float, high: float) -> float:
+    """The largest scale that is allowed, between one that is (or zero) and one that is not."""
+    while low == 0.0 and high > 0.0 and not allowed(turn(0.5 * high)):
+        high *= 0.5
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if allowed(turn(middle)) else (low, middle)
+    return low
+
+
+def _soonest(turn: Callable[..., Turn], allowed: Callable[[Turn], bool], most: float) -> float:
+    """About the shortest time in which any scale up to `most` settles."""
+    best = math.inf
+    for x in (most / 1.1**k for k in range(80) if most > 0.0):
+        settled = None
+        # Until it settles, or the horizon is too long for the steps that the loop needs.
+        with suppress(ValueError):
+            turns = (turn(x, 4.0**k / x) for k in range(1, 6))
+            settled = next((found for found in turns if found.time < math.inf), None)
+        if settled is not None and allowed(settled):
+            best = min(best, settled.time)
+    return best
+
+
+def _refusal(spec: Any, best: float, found: Turn) -> str:
+    what = f"{spec.torque:.4g} N m of torque"
+    if found.torque <= spec.torque and found.momentum > spec.momentum:
+        what = f"{spec.momentum:.4g} N m s that the wheels can store"
+    if math.isinf(best):
+        return f"it does not settle within {what} and these tolerances, whatever the time"
+    return f"{spec.time:.4g} s to settle is too short: {what} allow about {best / IN_HAND:.3g} s"
+
+
+def fly(torque: Callable[..., Any], gains: Any, craft: Craft, spec: Any, horizon: float, rate: float) -> Turn:
+    """The turn of a body under a law, which acts on it without pause, from the start of a form over a horizon (s). `rate`:
+    the fastest (1/s) of the loop. ValueError where that is too fast to be followed."""
+    speed = math.hypot(*spec.rate)
+    least = max(rate, speed) * horizon / (STEPS * RESOLVED)
+    many = next((m for m in (1, 4, 16, MOST) if m >= least), None)
+    if many is None:
+        raise ValueError("the loop is too fast beside the time it is to settle in")
+    count = STEPS * many
+    half = math.sin(0.5 * min(spec.attitude_tolerance, math.pi))
+    ends = (half * half, spec.rate_tolerance**2)
+    size = math.hypot(*spec.attitude)
+    step, begun = horizon / count, (tuple(q / size for q in spec.attitude), tuple(map(float, spec.rate)))
+    wheels = spec.wheel_momentum is not None
+    held = tuple(map(float, spec.wheel_momentum)) if wheels else ZERO
+    flown = _flight(torque, count, wheels, _Like((gains, craft)))
+    last, most, momentum = flown(gains, craft, (*begun, held), step, ends)
+    time = math.inf if not last < count else (last + 1.0) * step
+    return Turn(time, math.sqrt(most), math.sqrt(momentum))
+
+
+class _Like:
+    """Arguments of a kernel, equal to others of the same form."""
+
+    def __init__(self, values: Any) -> None:
+        self.values, self.form = values, _form(values)
+
+    def __hash__(self) -> int:
+        return hash(self.form)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Like) and self.form == other.form
+
+
+def _form(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return (type(value), *(_form(part) for part in value))  # pyright: ignore
+    return "number" if isinstance(value, float) else value
+
+
+@cache
+def _flight(torque: Callable[..., Any], count: int, wheels: bool, like: _Like) -> Compiled:
+    """The turn, compiled: gains, craft, start, step and squared ends give the last step at which angle or rate was outside
+    (-1: at none), and the largest squares of torque and of the momentum that wheels store."""
+
+    def motion(state: Any, gains: Any, craft: Craft, step: Scalar) -> Any:
+        attitude, rate, stored = state
+        given = torque(Measurement(attitude, rate, rate, ZERO, ZERO, ZERO, ZERO, step, stored), gains, craft, NoMemory())[0]
+        felt = subtract(given, cross(rate, stored)) if wheels else given
+        taken = scale(-1.0, given) if wheels else ZERO
+        return given, (derivative(attitude, rate), angular_acceleration(rate, felt, craft), taken)
+
+    def whole(gains: Any, craft: Craft, begun: Any, step: Scalar, ends: Any) -> Any:
+        def turn(k: Any, state: Any, last: Scalar, most: Scalar, momentum: Scalar) -> Any:
+            given, a = motion(state, gains, craft, step)
+            b = motion(move(state, 0.5 * step, a), gains, craft, step)[1]
+            c = motion(move(state, 0.5 * step, b), gains, craft, step)[1]
+            d = motion(move(state, step, c), gains, craft, step)[1]
+            q, w, stored = state
+            # Not so written that a NaN, which is neither, would count as within.
+            inside = either(less(ends[0], dot(vector_part(q), vector_part(q))), less(ends[1], dot(w, w)))
+            after = move(state, step / 6.0, move(move(move(a, 2.0, b), 2.0, c), 1.0, d))
+            notes = (
+                where(inside, number_of(k), last),
+                maximum(most, dot(given, given)),
+                maximum(momentum, dot(stored, stored)),
+            )
+            return (renormalise(after[0]), *after[1:]), *notes
+
+        state, last, most, momentum = repeat(count, turn, begun, -1.0, 0.0, 0.0)
+        # Lost, or still outside at the end.
+        q, w, _ = state
+        there = less(dot(vector_part(q), vector_part(q)), ends[0])
+        there = where(there, where(less(dot(w, w), ends[1]), last, float(count)), float(count))
+        return there, most, momentum
+
+    return Compiled(whole, *like.values, ((1.0, 0.0, 0.0, 0.0), ZERO, ZERO), 1.0, (1.0, 1.0))
+
+
+def designs(
+    make: Callable[[float, float], Any], torque: Callable[..., Any]
+) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """`design` and `explain` of a law with these two forms: `make` gives its gains of damping and stiffness (N m s, N m)."""
+
+    @lru_cache(maxsize=64)
+    def settled(craft: Craft, spec: Settling) -> tuple[Any, Turn]:
+        def gains_of(x: float) -> Any:
+            return make(*feedback(craft, x, spec.damping))
+
+        return settle(torque, gains_of, partial(fastest, craft), craft, spec)
+
+    def design(craft: Craft, spec: Bandwidth | Settling) -> Any:
+        if isinstance(spec, Bandwidth):
+            return make(*feedback(craft, spec.bandwidth, spec.damping))
+        return settled(craft, spec)[0]
+
+    def explain(craft: Craft, spec: Bandwidth | Settling) -> list[tuple[str, Any]]:
+        found = design(craft, spec)
+        turned = told(settled(craft, spec)[1]) if isinstance(spec, Settling) else []
+        return turned + explained(craft, found.k_rate, found.k_attitude)
+
+    return design, explain
+
+
+def explained(craft: Craft, k_rate: float, k_attitude: float) -> list[tuple[str, Any]]:
+    """Natural frequency and damping about each principal axis, and the linear loop's eigenvalues."""
+    moments = np.linalg.eigvalsh(tensor(craft.inertia))
+    roots = np.array([np.roots([moment, k_rate, 0.5 * k_attitude]) for moment in moments]).ravel()
+    return [
+        ("principal moments (kg m^2)", moments),
+        ("natural frequency (rad/s)", np.sqrt(0.5 * k_attitude / moments)),
+        ("damping ratio", k_rate / np.sqrt(2.0 * moments * k_attitude)),
+        ("eigenvalues of the linear loop (1/s)", roots),
+        ("degree of stability (1/s)", float(-roots.real.max())),
+    ]
+
+
+def told(turn: Turn) -> list[tuple[str, Any]]:
+    """What the turn of a design that settles in time comes to."""
+    return [
+        ("settles after (s)", turn.time),
+        ("largest torque (N m)", turn.torque),
+        ("largest momentum of the wheels (N m s)", turn.momentum),
+    ]

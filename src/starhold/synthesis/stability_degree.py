@@ -1,0 +1,234 @@
+"""Gains of u = -k_rate w - k_attitude S, S = 4 q0 q, with the largest degree of stability that a wheel's torque allows.
+
+With the gyroscopic torque compensated, each axis obeys, near the target and with time in units of t0,
+
+    i l^2 + K_w l + 2 K_a = 0,    i = J_axis / J_x,  K_a = t0^2 k_attitude / J_x,  K_w = t0 k_rate / J_x,
+
+and the degree of stability is eta = -max Re l over the axes. The initial error (alpha, rad) and the initial rate (omega,
+1/t0) may ask for no more than the wheel's torque: 2 K_a alpha + K_w omega <= L. The torque that compensates is not counted.
+
+Why `optimum` is the optimum. Every root lies left of -h exactly where i (m - h)^2 + K_w (m - h) + 2 K_a has no root with a
+positive real part, that is, where K_w >= 2 i h and 2 K_a >= K_w h - i h^2. Over all axes, with a the smallest and b the
+largest ratio,
+
+    eta >= h  <=>  K_w >= 2 b h  and  2 K_a >= K_w h - a h^2.
+
+Both bounds rise with K_w, so no gains with eta >= h ask for less torque, whatever alpha and omega, than the corner
+K_w = 2 b h, 2 K_a = (2 b - a) h^2, where K_a = c K_w^2 with c = (2 b - a) / (8 b^2) = (1 - (1 - a/b)^2) / (8 a). What the
+corner asks for, (2 b - a) alpha h^2 + 2 b omega h, rises with h: the largest h spends the whole budget. For alpha > 0 the
+corner is the only optimum. For alpha = 0 the budget bounds K_w alone, and any larger K_a does as well: the corner is the
+least of them. For omega = 0 it bounds K_a alone, and still the corner is the only one, for more damping slows axis a. For
+equal moments c = 1/(8a): the critically damped double root. The order of the axes does not matter.
+
+Source: study of reaction-wheel attitude control, degree of stability.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from starhold.parts.craft import check_inertia
+
+Array = NDArray[np.floating[Any]]
+
+OUT_OF_RANGE = "the gains leave the range of floating-point numbers"
+
+
+class Optimum(NamedTuple):
+    """Scaled gains and the scaled degree of stability that they give."""
+
+    K_a: float
+    K_w: float
+    eta: float
+
+
+class Scale(NamedTuple):
+    """Units in which the equations have no dimension.
+
+    moment: J_x (kg m2); t0: H_max / Hdot_max (s); L: the wheel's torque, Hdot_max t0^2 / J_x, which is also its momentum
+    in units of J_x / t0; ratios: J_axis / J_x of the three axes.
+    """
+
+    moment: float
+    t0: float
+    L: float
+    ratios: tuple[float, float, float]
+
+    def gains(self, K_a: float, K_w: float) -> tuple[float, float]:
+        """k_attitude (N m) and k_rate (N m s) of scaled gains."""
+        return K_a * self.moment / self.t0 / self.t0, K_w * self.moment / self.t0
+
+    def scaled(self, k_attitude: float, k_rate: float) -> tuple[float, float]:
+        """K_a and K_w of gains in N m and N m s."""
+        return k_attitude * self.t0 * self.t0 / self.moment, k_rate * self.t0 / self.moment
+
+
+class Designed(NamedTuple):
+    """A design: t0 (s), L, ratios (3,), K_a, K_w and eta, all scaled, then eta in 1/s, k_attitude (N m), k_rate (N m s)."""
+
+    t0: float
+    L: float
+    ratios: tuple[float, float, float]
+    K_a: float
+    K_w: float
+    eta: float
+    eta_per_second: float
+    k_attitude: float
+    k_rate: float
+
+
+def degree(K_a: ArrayLike, K_w: ArrayLike, ratios: ArrayLike) -> Array:
+    """Degree of stability, -max Re l over the axes (1/t0), of scaled gains of any sign.
+
+    K_a and K_w have any shapes (...) that broadcast; ratios is (n,), or (..., n) with one set of ratios for each pair of
+    gains. Returns (...). ValueError where a ratio is not positive.
+    """
+    i = np.asarray(ratios, dtype=float)
+    if i.ndim == 0 or i.shape[-1] == 0 or not (i > 0.0).all():
+        raise ValueError("ratios must be positive, one for each axis")
+    stiffness, damping = (np.asarray(value, dtype=float)[..., None] for value in (K_a, K_w))
+    inside = damping * damping - 8.0 * i * stiffness
+    root = np.sqrt(np.maximum(inside, 0.0))
+    slowest = (damping - root) / (2.0 * i)
+    # The same root without the difference of near numbers, which strong damping makes of it.
+    total = damping + root
+    rationalised = 4.0 * stiffness / np.where(total > 0.0, total, 1.0)
+    return np.where((inside > 0.0) & (damping > 0.0), rationalised, slowest).min(axis=-1)
+
+
+def boundary(ratios: ArrayLike) -> float:
+    """c of the curve K_a = c K_w^2: above it the oscillation of the largest moment's axis decides eta, below it the slow
+    aperiodic motion of the smallest's. ratios: (3,), positive, else ValueError."""
+    a, b = _extremes(ratios)
+    return (2.0 - a / b) / (8.0 * b)
+
+
+def optimum(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> Optimum:
+    """The scaled gains with the largest degree of stability within 2 K_a alpha + K_w omega <= budget.
+
+    ratios: (3,), J_axis / J_x in any order; alpha: largest initial error (rad); omega: largest initial rate (1/t0);
+    budget: L. ValueError where ratios or the budget are not positive, where alpha or omega are negative or both zero, for
+    then nothing bounds the gains, and where the gains leave the range of floats.
+    """
+    a, b = _extremes(ratios)
+    alpha, omega, budget = _demands(alpha, omega, budget)
+    # The positive root of (2 b - a) alpha h^2 + 2 b omega h = L, in the form that holds for alpha = 0 too.
+    turn = b * omega
+    lower = turn + math.hypot(turn, math.sqrt(2.0 * b - a) * math.sqrt(alpha) * math.sqrt(budget))
+    eta = budget / lower if lower > 0.0 else math.inf
+    best = Optimum(0.5 * (2.0 * b - a) * eta * eta, 2.0 * b * eta, eta)
+    if not all(0.0 < value < math.inf for value in best):
+        raise ValueError(OUT_OF_RANGE)
+    return best
+
+
+def brute_force(ratios: ArrayLike, alpha: float, omega: float, budget: float, points: int = 41, rounds: int = 8) -> Optimum:
+    """The best of a grid of gains along and below the budget line, `points` each way, refined `rounds` times around it.
+
+    Knows `degree` and the budget, nothing of `optimum`, whose arguments and errors it shares. Sets of equal or larger eta
+    are convex, so the best lies beside the best point of a line and of the grid: eta is right to about 1e-9, relative.
+    """
+    a, b = _extremes(ratios)
+    alpha, omega, budget = _demands(alpha, omega, budget)
+    if points < 5 or rounds < 1:
+        raise ValueError(f"points must be at least 5 and rounds at least 1, not {points} and {rounds}")
+    most_a = budget / (2.0 * alpha) if alpha > 0.0 else math.inf
+    most_w = budget / omega if omega > 0.0 else math.inf
+    # Where all axes oscillate more stiffness changes nothing, and where none does more damping only slows.
+    most_a, most_w = min(most_a, most_w * most_w / (8.0 * a)), min(most_w, math.sqrt(8.0 * b * most_a))
+    if not (0.0 < most_a < math.inf and 0.0 < most_w < math.inf):
+        raise ValueError(OUT_OF_RANGE)
+    best = Optimum(0.0, 0.0, -math.inf)
+    low, high = 0.0, most_w
+    for _ in range(rounds):
+        K_w = np.linspace(low, high, points)
+        left = (budget - K_w * omega) / (2.0 * alpha) if alpha > 0.0 else np.full_like(K_w, most_a)
+        K_a, eta = _best_stiffness(K_w, np.clip(left, 0.0, most_a), ratios, points, rounds)
+        at = int(np.argmax(eta))
+        if eta[at] > best.eta:
+            best = Optimum(float(K_a[at]), float(K_w[at]), float(eta[at]))
+        low, high = float(K_w[max(at - 1, 0)]), float(K_w[min(at + 1, points - 1)])
+    return best
+
+
+def scale(moments: ArrayLike, torque: float, momentum: float) -> Scale:
+    """Units for principal moments (3,) (kg m2), a wheel's largest torque Hdot_max (N m) and momentum H_max (N m s).
+
+    ValueError where these are not positive and finite, or no rigid body has these moments.
+    """
+    if np.shape(moments) != (3,):
+        raise ValueError(f"moments must be three numbers, not an array of shape {np.shape(moments)}")
+    x, y, z = (float(moment) for moment in np.diagonal(check_inertia(moments)))
+    torque, momentum = _positive("torque", torque), _positive("momentum", momentum)
+    t0 = momentum / torque
+    units = Scale(x, t0, momentum * t0 / x, (1.0, y / x, z / x))
+    if not all(0.0 < value < math.inf for value in (*units[:3], *units.ratios)):
+        raise ValueError("these moments, torque and momentum leave the range of floating-point numbers")
+    return units
+
+
+def design_gains(moments: ArrayLike, torque: float, momentum: float, angle: float, rate: float) -> Designed:
+    """The gains with the largest degree of stability that ask, in the initial state, for no more than the torque.
+
+    moments: principal, (3,) (kg m2); torque: Hdot_max (N m) and momentum: H_max (N m s) of each axis' wheel; angle: largest
+    initial error (rad, at most pi); rate: largest initial rate (rad/s). ValueError as `scale` and `optimum` raise it. A
+    momentum J rate above H_max, which no wheel started at rest can take up, is not refused: no gains change that. H_max sets
+    the unit of time alone; the gains in N m and N m s do not depend on it.
+    """
+    units = scale(moments, torque, momentum)
+    angle, rate = _not_negative("angle", angle), _not_negative("rate", rate)
+    if angle > math.pi:
+        raise ValueError(f"angle must be at most pi rad, not {angle:g}")
+    if angle == 0.0 and rate == 0.0:
+        raise ValueError("angle and rate are both 0: the torque bounds no gain")
+    best = optimum(units.ratios, angle, rate * units.t0, units.L)
+    k_attitude, k_rate = units.gains(best.K_a, best.K_w)
+    if not (0.0 < k_attitude < math.inf and 0.0 < k_rate < math.inf):
+        raise ValueError(OUT_OF_RANGE)
+    return Designed(units.t0, units.L, units.ratios, *best, best.eta / units.t0, k_attitude, k_rate)
+
+
+def _extremes(ratios: ArrayLike) -> tuple[float, float]:
+    """The smallest and the largest ratio."""
+    values = np.asarray(ratios, dtype=float)
+    if values.shape != (3,) or not (np.isfinite(values).all() and (values > 0.0).all()):
+        raise ValueError("ratios must be three positive numbers, J_axis / J_x")
+    return float(values.min()), float(values.max())
+
+
+def _demands(alpha: float, omega: float, budget: float) -> tuple[float, float, float]:
+    """The three as plain floats; ValueError where they bound no gain."""
+    given = _not_negative("alpha", alpha), _not_negative("omega", omega), _positive("budget", budget)
+    if given[0] == 0.0 and given[1] == 0.0:
+        raise ValueError("alpha and omega are both 0: the budget bounds no gain")
+    return given
+
+
+def _positive(name: str, value: float) -> float:
+    if not 0.0 < value < math.inf:
+        raise ValueError(f"{name} must be positive and finite, not {value:g}")
+    return float(value)
+
+
+def _not_negative(name: str, value: float) -> float:
+    if not 0.0 <= value < math.inf:
+        raise ValueError(f"{name} must be at least 0 and finite, not {value:g}")
+    return float(value)
+
+
+def _best_stiffness(K_w: Array, most: Array, ratios: ArrayLike, points: int, rounds: int) -> tuple[Array, Array]:
+    """For each damping (n,) the best stiffness up to `most` (n,), from a grid refined around its best, and its eta."""
+    low, high = np.zeros_like(most), most
+    rows = np.arange(len(K_w))
+    found = low, low
+    for _ in range(rounds):
+        K_a = np.linspace(low, high, points, axis=1)
+        eta = degree(K_a, K_w[:, None], ratios)
+        at = np.argmax(eta, axis=1)
+        found = K_a[rows, at], eta[rows, at]
+        low, high = K_a[rows, np.maximum(at - 1, 0)], K_a[rows, np.minimum(at + 1, points - 1)]
+    return found
