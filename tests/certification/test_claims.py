@@ -35,7 +35,7 @@ def test_every_law_is_certified_under_its_textbook_assumptions(name):
 
 @pytest.mark.parametrize("name", sorted(n for n in LOOPS if not n.startswith(("sliding", "wheel"))))
 @pytest.mark.parametrize("cover", ["shortest", "hysteresis"])
-def test_the_double_cover_is_in_the_claim(name, cover):
+def test_the_quaternion_sign_is_in_the_claim(name, cover):
     loop = loop_of(LOOPS[name].law.name, LOOPS[name].gains, LOOPS[name].craft, sign_policy=cover)
     certificate = certify(loop, name)
     main = certificate.claim("convergence")

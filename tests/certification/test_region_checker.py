@@ -114,7 +114,7 @@ def by_formula(a, b, witness, u, w, x):
 
 
 @pytest.mark.parametrize("sign_policy", ["as_published", "shortest", "hysteresis"])
-def test_the_double_cover(sign_policy):
+def test_the_quaternion_sign(sign_policy):
     assert faults(file(region(3.58, sign_policy=sign_policy), quaternion_sign=sign_policy)) == {}
     better = file(region(2.0, BETTER, sign_policy), quaternion_sign=sign_policy)
     assert list(faults(better)) == (

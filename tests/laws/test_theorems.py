@@ -152,7 +152,7 @@ def test_laws_are_read_by_balls_and_symbols_too(name):
 
 
 @given(st.floats(-1, 1), st.sampled_from([-1.0, 1.0]), st.floats(0.05, 0.95))
-def test_double_cover_options(q0, h, width):
+def test_quaternion_sign_options(q0, h, width):
     rest = (1 - q0**2) ** 0.5
     q = (q0, rest, 0.0, 0.0)
     assert as_published(q, h, width) == (q, h)

@@ -161,7 +161,11 @@ FAULTS = {
     "law without type": ('type = "lyapunov"', "", ["law[1].type"]),
     "gain out of bounds": ("k_rate = 0.09", "k_rate = -0.09", ["law[1].k_rate", "-0.09", "above 0"]),
     "unknown mode": ('mode = "inertial"', 'mode = "inertia"', ["target.mode", "inertial"]),
-    "unknown sign policy": ("k_rate = 0.09", 'k_rate = 0.09\ndouble_cover = "short"', ["law[1].quaternion_sign", "shortest"]),
+    "unknown sign policy": (
+        "k_rate = 0.09",
+        'k_rate = 0.09\nquaternion_sign = "short"',
+        ["law[1].quaternion_sign", "shortest"],
+    ),
     "form of a law without": ("k_rate = 0.09", 'k_rate = 0.09\nform = "I"', ["law[1].form"]),
     "gravity without orbit": (
         "[orbit]\nposition = [7.0e6, 0, 0]         # m, inertial\nvelocity = [0, 7550, 0]",

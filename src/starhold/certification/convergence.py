@@ -189,7 +189,7 @@ def reached(basin: Basin, level: Any | None, bounded: bool = False) -> tuple[lis
         found.add("only rest", LASALLE, *((True, None) if basin.frame.potential.even else _rests_only_there(motion)))
     else:
         found.add("strict", EXACT_SIGN, True)
-    found.add(*_double_cover(motion, basin.frame, level))
+    found.add(*_quaternion_sign(motion, basin.frame, level))
     witness = {
         "stiffness": None if motion.stiffness is None else number(motion.stiffness),
         "epsilon": number(basin.epsilon),
@@ -279,7 +279,7 @@ def _covers(numbers: dict[str, Any], rate: Any) -> bool:
     return rate is not None and found is not None and found >= rate
 
 
-def _double_cover(motion: Motion, frame: Frame, stay: Any | None) -> tuple[str, str, bool | None, dict[str, Any]]:
+def _quaternion_sign(motion: Motion, frame: Frame, stay: Any | None) -> tuple[str, str, bool | None, dict[str, Any]]:
     loop = motion.subject.loop
     even = frame.potential.even
     if stay is not None and stay < frame.potential.barrier and (even or loop.sign_policy != "hysteresis"):

@@ -95,7 +95,7 @@ def rests_on_target(law: Law) -> None:
         require(size <= law.card.rest_tolerance, f"torque {size:g} N m at rest on target")
 
 
-def treats_double_cover_as_stated(law: Law) -> None:
+def treats_quaternion_sign_as_stated(law: Law) -> None:
     """q and -q give what the card says of the double cover."""
     for gains in law.examples():
         differences: list[float] = []
@@ -218,7 +218,7 @@ CHECKS: tuple[Callable[[Law], None], ...] = (
     is_pure,
     reads_alike,
     rests_on_target,
-    treats_double_cover_as_stated,
+    treats_quaternion_sign_as_stated,
     ignores_inertial_frame,
     stays_finite,
     survives_toml,
