@@ -9,7 +9,7 @@ import tomllib
 from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Generic, Self, TypeVar, cast
+from typing import Any, ClassVar, Generic, Self, TypeVar, cast
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import PydanticCustomError
@@ -37,6 +37,8 @@ class Named:
 class LawBook(Generic[_Entry]):
     """What scenarios of all kinds share: a table with a name, and laws with names of their own."""
 
+    body: ClassVar[str]
+    """The part that moves, by name."""
     table: Any
     laws: tuple[_Entry, ...]
     text: str

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -65,6 +65,7 @@ class Scenario(LawBook[LawEntry]):
     """A scenario file read and checked: its tables, its laws with their gains, its text, what errors call it, and the
     folder that file names in it are relative to."""
 
+    body: ClassVar[str] = "rigid-body"
     table: ScenarioTable
     laws: tuple[LawEntry, ...]
     text: str

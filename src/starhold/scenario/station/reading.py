@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from starhold.analysis.station import Circle, Equilibrium, goal_of
 from starhold.errors import InputError
@@ -46,6 +46,7 @@ class StationEntry(Named):
 class StationScenario(LawBook[StationEntry]):
     """A scenario of station keeping, read and checked."""
 
+    body: ClassVar[str] = "libration-point"
     table: StationTable
     laws: tuple[StationEntry, ...]
     text: str
