@@ -64,7 +64,7 @@ def in_sympy(loop: ClosedLoop) -> dict[tuple[str, ...], Any]:
     seen: Any = Measurement(q, w, w, zero, zero, e, zero, sympy.Rational(loop.period))
     gains = type(loop.gains)(*(_rational(value) for value in loop.gains))
     memory = loop.law.remember(loop.gains, loop.craft, loop.period)
-    torque, _ = loop.law.torque(seen, gains, craft, memory)
+    torque, _ = loop.law.command(seen, gains, craft, memory)
     function = loop.law.lyapunov
     assert function is not None
     moving: Any = angular_acceleration(w, add(torque, e), craft)  # type: ignore[arg-type]

@@ -14,7 +14,8 @@ from starhold.algebra.structure import flatten
 from starhold.algebra.vector import ZERO
 from starhold.laws import l2_circle
 from starhold.laws.interface import NoMemory
-from starhold.laws.point import PointMeasurement, station_laws
+from starhold.laws.point import PointMeasurement
+from starhold.laws.catalogue import catalogue
 from starhold.loop.station import StationLoop
 from starhold.parts.bodies.libration_point import PRIMARIES, PointState, make_libration, nonlinear
 from starhold.simulation.lane import fly
@@ -26,7 +27,7 @@ GAINS = l2_circle.design(PLANT, l2_circle.Best(1.0, model=1))
 START = PointState((0.02, 1.05, 0.0), (0.0, 0.0, GAINS.rate), ZERO)
 STEPS, LANES = 6283, 2048
 PERIOD = 2.0 * math.pi / STEPS
-LOOP = StationLoop(PLANT, station_laws()["l2-circle"], GAINS, START, PERIOD, model="nonlinear", limit_kind="none")
+LOOP = StationLoop(PLANT, catalogue("libration-point")["l2-circle"], GAINS, START, PERIOD, model="nonlinear", limit_kind="none")
 STARTS = np.repeat(np.array(flatten(START))[:, None], LANES, axis=1)
 STARTS[1] += np.linspace(-0.1, 0.1, LANES)
 

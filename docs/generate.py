@@ -19,7 +19,8 @@ from starhold.algebra import vector as vectors
 from starhold.algebra.quantity import quantities
 from starhold.laws.catalogue import Law, catalogue
 from starhold.laws.interface import Card, Gain, Measurement, NoMemory, Start
-from starhold.laws.point import PointMeasurement, station_laws
+from starhold.laws.point import PointMeasurement
+from starhold.laws.catalogue import catalogue
 from starhold.parts.bodies.libration_point import Libration
 from starhold.parts.craft import Craft, make_craft
 
@@ -45,7 +46,7 @@ def first_component(law: Law) -> str:
             gains.append(vector(item.name) if item.gain.shape else sympy.Symbol(item.name, real=True))
     moments = vector("J")
     craft = Craft(moments, tuple(1 / m for m in moments), sympy.Symbol("u_max"), sympy.Symbol("mu"))
-    torque, _ = law.torque(measurement, law.gains(*gains), craft, NoMemory())
+    torque, _ = law.command(measurement, law.gains(*gains), craft, NoMemory())
     return str(sympy.simplify(torque[0]))
 
 
@@ -78,7 +79,7 @@ def page() -> str:
             text = "First component of the torque, target at rest, principal axes, matrix gains multiples of the identity:"
             lines += [text, "", f"    u_1 = {first_component(law)}", ""]
     lines += ["# Laws of station keeping", "", "Numbers are scaled, see [station keeping](station-keeping.md).", ""]
-    for law in station_laws().values():
+    for law in catalogue("libration-point").values():
         lines += described(law)
     return "\n".join(lines)
 

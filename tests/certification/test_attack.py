@@ -34,7 +34,7 @@ def motion_of(name):
 
     def motion(q, w, push):
         measurement = Measurement(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.1, ZERO)
-        u, _ = loop.law.torque(measurement, loop.gains, loop.craft, NoMemory())
+        u, _ = loop.law.command(measurement, loop.gains, loop.craft, NoMemory())
         return derivative(q, w), angular_acceleration(w, add(u, push), loop.craft), u
 
     return Compiled(motion, NO_TURN, ZERO, ZERO)

@@ -117,7 +117,7 @@ def largest_torque(loop, P, s, level, axis):
         turn = math.sqrt(max(1.0 - q0 * q0, 0.0)) * x[:3] / np.linalg.norm(x[:3])
         w = math.sqrt(2.0 * max(level - t, 0.0)) * root @ (x[3:6] / np.linalg.norm(x[3:6]))
         measurement = Measurement((q0, *turn), tuple(w), tuple(w), (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, 0.1)
-        u = np.array(loop.law.torque(measurement, loop.gains, loop.craft, NoMemory())[0])
+        u = np.array(loop.law.command(measurement, loop.gains, loop.craft, NoMemory())[0])
         return -(np.linalg.norm(u) if loop.limit == "norm" else u[axis])
 
     starts = random.normal(size=(12, 7))
@@ -185,7 +185,7 @@ def test_disturbed_flights_end_within_the_ultimate_bound(name, cover):
         period, peak = 0.2, []
         for step in range(int(2000 / period)):
             measurement = Measurement(tuple(q), tuple(w), tuple(w), (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, period)
-            u, _ = loop.law.torque(measurement, loop.gains, loop.craft, NoMemory())
+            u, _ = loop.law.command(measurement, loop.gains, loop.craft, NoMemory())
             push = direction if mode == "constant" else w / max(np.linalg.norm(w), 1e-300)
             a = np.linalg.solve(J, np.array(u) + n["torque"] * push - np.cross(w, J @ w))
             w = w + period * a

@@ -33,7 +33,7 @@ def seen_at(state):
 def slope(loop, state):
     """V' by a central difference of the law's V along the loop's motion."""
     measurement = seen_at(state)
-    torque, _ = loop.law.torque(measurement, loop.gains, loop.craft, NoMemory())
+    torque, _ = loop.law.command(measurement, loop.gains, loop.craft, NoMemory())
     turn, spin = (
         derivative(measurement.attitude, measurement.rate),
         angular_acceleration(measurement.rate, torque, loop.craft),
@@ -130,7 +130,7 @@ def test_torque_limit_ignored(kind):
     claim = certify(loop, "", Wanted(slew_angle=math.radians(120.0))).claim("torque-limit")
     assert claim.outcome == "refuted"
     state = claim.refutation().evidence["state"]
-    u = np.array(loop.law.torque(seen_at(state), loop.gains, PRINCIPAL, NoMemory())[0])
+    u = np.array(loop.law.command(seen_at(state), loop.gains, PRINCIPAL, NoMemory())[0])
     assert (np.linalg.norm(u) if kind == "norm" else np.abs(u).max()) > PRINCIPAL.torque_limit
     value = loop.law.lyapunov(seen_at(state), loop.gains, PRINCIPAL)
     # The state is in the set: no higher than a rest turned by 120 degrees.

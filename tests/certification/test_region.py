@@ -46,7 +46,7 @@ def falling(loop, shape, states):
     for lane, state in enumerate(states.T):
         q, w = tuple(state[:4].tolist()), tuple(state[4:7].tolist())
         measurement = Measurement(q, w, w, ZERO, ZERO, ZERO, ZERO, loop.period)
-        torque, _ = loop.law.torque(measurement, loop.gains, loop.craft, NoMemory())
+        torque, _ = loop.law.command(measurement, loop.gains, loop.craft, NoMemory())
         dq, dw = np.array(derivative(q, w)), np.array(angular_acceleration(w, add(torque, ZERO), loop.craft))
         step = 1e-3 / (1.0 + np.abs(dw).max() + np.abs(dq).max())
         near = [shape.value(a, state[:4] + k * step * dq, state[4:7] + k * step * dw) for k in (-2, -1, 1, 2)]

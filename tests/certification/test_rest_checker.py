@@ -16,7 +16,7 @@ from starhold.checker import check, check_file, passed
 from starhold.checker.exact import rational
 from starhold.checker.station import HELD, read_station
 from starhold.laws import l2_equilibrium as l2_equilibrium
-from starhold.laws.point import station_laws
+from starhold.laws.catalogue import catalogue
 from starhold.loop.station import StationLoop
 from starhold.parts.bodies.libration_point import POINTS, PRIMARIES, PointState, make_libration
 from tests.certification.test_station_checker import by_hand, changed, faults, outcomes
@@ -35,7 +35,7 @@ OFF = GAINS._replace(k_x=GAINS.k_x * (1.0 + 1e-8))
 
 def loop_of(gains=GAINS, limit=math.inf, kind="axis", plant=PLANT, **changes):
     start = PointState((0.0, gains.y, gains.z), ZERO, ZERO)
-    return StationLoop(plant, station_laws()["l2-equilibrium"], gains, start, 1e-3, limit=limit, limit_kind=kind, **changes)
+    return StationLoop(plant, catalogue("libration-point")["l2-equilibrium"], gains, start, 1e-3, limit=limit, limit_kind=kind, **changes)
 
 
 @pytest.fixture(scope="session")
@@ -192,7 +192,7 @@ def test_a_claim_of_the_other_kind_fails(made):
 
 def test_other_laws_do_not_come_to_rest(made):
     content = made(GAINS, 4.0)
-    for law in station_laws().values():
+    for law in catalogue("libration-point").values():
         for gains in law.examples():
             loop = StationLoop(PLANT, law, gains, loop_of().start, 1e-3, limit=4.0, limit_kind="axis")
             other = changed(content, SUBJECT, json.loads(json.dumps(described_station(loop))))

@@ -31,7 +31,7 @@ def motion_of(loop):
     """Compiled: attitude and rate after a step under a constant torque from outside, by the classical Runge-Kutta method."""
 
     def slope(q, w, push):
-        u, _ = loop.law.torque(Measurement(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.1, ZERO), loop.gains, loop.craft, NoMemory())
+        u, _ = loop.law.command(Measurement(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.1, ZERO), loop.gains, loop.craft, NoMemory())
         return *derivative(q, w), *angular_acceleration(w, add(u, push), loop.craft)
 
     def step(q, w, push, h):
@@ -107,7 +107,7 @@ def largest_torque(loop, level, kind):
     random = np.random.default_rng(2)
 
     def command(q, w):
-        return loop.law.torque(Measurement(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.1, ZERO), loop.gains, loop.craft, NoMemory())[
+        return loop.law.command(Measurement(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.1, ZERO), loop.gains, loop.craft, NoMemory())[
             0
         ]
 

@@ -255,5 +255,5 @@ def test_no_state_of_the_set_needs_more_torque_than_told_anywhere_on_the_spline(
         measurement = Measurement(
             q, w, add(w, turning), turning, subtract(spinning, cross(w, turning)), ZERO, ZERO, 1.0, ZERO
         )
-        largest = max(largest, *map(abs, loop.law.torque(measurement, loop.gains, craft, NoMemory())[0]))
+        largest = max(largest, *map(abs, loop.law.command(measurement, loop.gains, craft, NoMemory())[0]))
     assert 2.0 < largest <= 6.0

@@ -15,7 +15,7 @@ from starhold.checker import check, check_file, passed
 from starhold.checker.exact import floating
 from starhold.checker.station import read_station
 from starhold.laws import l2_circle
-from starhold.laws.point import station_laws
+from starhold.laws.catalogue import catalogue
 from starhold.loop.station import StationLoop
 from starhold.parts.bodies.libration_point import POINTS, PRIMARIES, PointState, make_libration
 from tests.certification.test_checker import by_hand, replaced
@@ -34,7 +34,7 @@ SUBJECT = ("certificates", 0, "subject")
 
 def loop_of(gains=BEST, limit=math.inf, kind="norm", plant=PLANT, **changes):
     start = PointState((0.0, gains.radius, 0.0), (0.0, 0.0, gains.rate * gains.radius), ZERO)
-    return StationLoop(plant, station_laws()["l2-circle"], gains, start, 1e-3, limit=limit, limit_kind=kind, **changes)
+    return StationLoop(plant, catalogue("libration-point")["l2-circle"], gains, start, 1e-3, limit=limit, limit_kind=kind, **changes)
 
 
 def peak(gains, kind="norm", plant=PLANT):
@@ -125,7 +125,7 @@ def test_all_points_are_read(name):
 
 def test_other_laws_are_read_and_claim_no_circle(made):
     content = made()
-    for law in station_laws().values():
+    for law in catalogue("libration-point").values():
         for gains in law.examples():
             loop = StationLoop(PLANT, law, gains, loop_of().start, 1e-3)
             other = changed(content, SUBJECT, json.loads(json.dumps(described_station(loop))))

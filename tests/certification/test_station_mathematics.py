@@ -18,7 +18,8 @@ from starhold.checker.exact import CheckError, floating, rational
 from starhold.checker.polar import keeps_within, phases
 from starhold.laws import l2_circle
 from starhold.laws.interface import NoMemory
-from starhold.laws.point import PointMeasurement, StationLaw, along
+from starhold.laws.point import PointMeasurement, along
+from starhold.laws.catalogue import Law
 from starhold.loop.station import MODELS
 from tests.certification.test_station_checker import BACK, BEST, PLANT, RELAY, SOFT, WIDE, peak, station
 
@@ -76,7 +77,7 @@ def altered(**parts):
     module = ModuleType("l2_circle_altered")
     vars(module).update({name: value for name, value in vars(l2_circle).items() if not name.startswith("__")})
     vars(module).update(parts)
-    return StationLaw("l2-circle", module)
+    return Law("l2-circle", module)
 
 
 def less_damping(measurement, gains, plant, taken):

@@ -195,7 +195,7 @@ def test_limits_of_wheels_are_kept_and_nearly_used(law, limits, binding):
         q = (q0, *(math.sqrt(1.0 - q0 * q0) * axis / np.linalg.norm(axis)))
         stored = n["momentum"] * total / np.linalg.norm(total) - J @ w
         measurement = Measurement(q, tuple(w), tuple(w), ZERO, ZERO, ZERO, ZERO, 0.1, tuple(stored))
-        u = np.array(loop.law.torque(measurement, loop.gains, loop.craft, NoMemory())[0])
+        u = np.array(loop.law.command(measurement, loop.gains, loop.craft, NoMemory())[0])
         most["motors"] = np.maximum(most["motors"], np.abs(shares @ u))
         most["wheel_momentum"] = np.maximum(most["wheel_momentum"], np.abs(kept + shares @ stored))
     for name in most:

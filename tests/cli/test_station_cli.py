@@ -5,7 +5,7 @@ import json
 import pytest
 import xarray as xr
 
-from starhold.laws.point import station_laws
+from starhold.laws.catalogue import catalogue
 from starhold.scenario.reading import builtin_text
 from tests.running import starhold
 
@@ -86,7 +86,7 @@ def test_certifies_and_checks(short):
 @pytest.mark.xdist_group("cli")
 def test_lists_design_and_new(short):
     listed = starhold("laws", cwd=short).stdout
-    assert all(name in listed for name in station_laws())
+    assert all(name in listed for name in catalogue("libration-point"))
     assert "radius" in starhold("laws", "l2-circle", cwd=short).stdout
     assert "l2-nonlinear" in starhold("scenarios", cwd=short).stdout
     designed = starhold("design", "short.toml", "--law", "deficit 0", cwd=short)

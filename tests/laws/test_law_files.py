@@ -13,7 +13,8 @@ from starhold.checker import check_file, passed
 from starhold.conformance.suite import examine, find_law
 from starhold.laws import catalogue as catalogues
 from starhold.laws.catalogue import adopted, catalogue, from_file
-from starhold.laws.point import StationLaw, station_laws
+from starhold.laws.catalogue import Law
+from starhold.laws.catalogue import catalogue
 from starhold.scenario.opening import json_schema
 from tests.running import starhold
 
@@ -161,7 +162,7 @@ def test_a_station_law_from_a_file_with_a_memory(folder):
     assert flight.law == "point"
     assert float(np.abs(flight.run.position[-1]).max()) < 0.1
     law = find_law(str(folder / "laws" / "point.py"))
-    assert isinstance(law, StationLaw)
+    assert isinstance(law, Law)
     verdicts = list(examine(law))
     assert [v for v in verdicts if v.outcome == "failed"] == []
     assert len(verdicts) == 6
@@ -177,9 +178,9 @@ def test_the_schema_of_scenario_files_takes_it(folder):
         validate(read | {"law": [{"k": 0.1}]}, schema)
 
 
-@pytest.mark.parametrize("name", sorted(station_laws()))
+@pytest.mark.parametrize("name", sorted(catalogue("libration-point")))
 def test_station_laws_of_starhold_conform(name):
-    assert [v for v in examine(station_laws()[name]) if v.outcome == "failed"] == []
+    assert [v for v in examine(catalogue("libration-point")[name]) if v.outcome == "failed"] == []
 
 
 WRONG = {
@@ -248,7 +249,7 @@ def test_laws_of_other_packages_of_both_kinds_are_found(folder, monkeypatch, rec
     monkeypatch.setattr(catalogues, "entry_points", lambda group: points)
     turning, holding = catalogue.__wrapped__(), station_laws.__wrapped__()
     assert set(turning) - set(catalogue()) == {"my-law"}
-    assert set(holding) - set(station_laws()) == {"point"}
+    assert set(holding) - set(catalogue("libration-point")) == {"point"}
     assert not recwarn.list
     monkeypatch.setattr("starhold.scenario.station.reading.station_laws", lambda: holding)
     monkeypatch.setattr("starhold.scenario.reading.catalogue", lambda: turning)

@@ -47,7 +47,7 @@ def modes(law, gains, craft):
     def acceleration(x):
         angle, rate = x[:3], tuple(x[3:].tolist())
         q = normalise((1.0, *(0.5 * angle).tolist()))
-        u = law.torque(Measurement(q, rate, rate, ZERO, ZERO, ZERO, ZERO, 0.1), gains, craft, NoMemory())[0]
+        u = law.command(Measurement(q, rate, rate, ZERO, ZERO, ZERO, ZERO, 0.1), gains, craft, NoMemory())[0]
         return np.linalg.solve(tensor(craft.inertia), np.array(u) - np.cross(rate, tensor(craft.inertia) @ rate))
 
     h = 1e-6 * np.array([1.0, 1.0, 1.0, 1e-3, 1e-3, 1e-3])

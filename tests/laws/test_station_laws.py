@@ -11,7 +11,8 @@ import sympy
 from starhold.algebra.structure import flatten
 from starhold.algebra.vector import ZERO
 from starhold.laws.interface import NoMemory
-from starhold.laws.point import PointMeasurement, station_laws
+from starhold.laws.point import PointMeasurement
+from starhold.laws.catalogue import catalogue
 from starhold.loop.kernels import fly_plainly
 from starhold.loop.station import StationLoop
 from starhold.parts.bodies.libration_point import PRIMARIES, PointState, make_libration
@@ -20,7 +21,7 @@ from starhold.simulation.lanes import simulate_many
 
 EARTH = PRIMARIES["sun-earth"]
 PLANT = make_libration(EARTH.larger, EARTH.smaller, EARTH.separation)
-CASES = [(law, gains) for law in station_laws().values() for gains in law.examples()]
+CASES = [(law, gains) for law in catalogue("libration-point").values() for gains in law.examples()]
 every = pytest.mark.parametrize(("law", "gains"), CASES, ids=lambda value: getattr(value, "name", ""))
 
 
@@ -54,20 +55,20 @@ def test_is_finite(law, gains):
     for _ in range(200):
         x, v = random.normal(size=(2, 3)) * 10.0 ** random.uniform(-9.0, 1.0)
         measurement = PointMeasurement(tuple(x.tolist()), tuple(v.tolist()), 1e-3, 4.0)
-        assert all(map(math.isfinite, law.control(measurement, gains, PLANT, NoMemory())[0]))
+        assert all(map(math.isfinite, law.command(measurement, gains, PLANT, NoMemory())[0]))
 
 
 @every
 def test_is_read_by_sympy(law, gains):
     x, v = sympy.symbols("x1:4", real=True), sympy.symbols("v1:4", real=True)
-    found = law.control(PointMeasurement(x, v, sympy.Symbol("T"), sympy.Integer(4)), gains, PLANT, NoMemory())[0]
+    found = law.command(PointMeasurement(x, v, sympy.Symbol("T"), sympy.Integer(4)), gains, PLANT, NoMemory())[0]
     values = dict(zip((*x, *v), (0.01, 0.9, 0.1, 0.1, -0.2, 1.3), strict=True))
     numbers = [float(sympy.sympify(part).evalf(subs=values)) for part in found]
     measurement = PointMeasurement((0.01, 0.9, 0.1), (0.1, -0.2, 1.3), 1e-3, 4.0)
-    np.testing.assert_allclose(numbers, law.control(measurement, gains, PLANT, NoMemory())[0], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(numbers, law.command(measurement, gains, PLANT, NoMemory())[0], rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize("law", [law for law in station_laws().values() if law.forms], ids=lambda law: law.name)
+@pytest.mark.parametrize("law", [law for law in catalogue("libration-point").values() if law.forms], ids=lambda law: law.name)
 def test_forms_give_gains_and_say_where_they_cannot(law):
     for kind in law.forms.values():
         spec = kind(radius=1.0) if "radius" in kind._fields else kind()

@@ -46,7 +46,7 @@ def slope(value, measurement, torque, craft):
 def test_lyapunov_function_falls_as_damping_says(law):
     measurement, craft = symbolic_body()
     gains = law.Gains(*sympy.symbols("k_w k_q", positive=True))
-    torque, _ = law.torque(measurement, gains, craft, NoMemory())
+    torque, _ = law.command(measurement, gains, craft, NoMemory())
     # The law `lyapunov` knows the external torque and cancels it; `pd` is for a body free of any.
     external = measurement.external_torque if law is lyapunov else (0, 0, 0)
     found = slope(law.lyapunov(measurement, gains, craft), measurement, add(torque, external), craft)
@@ -115,7 +115,7 @@ def test_motion_relative_to_a_moving_target_obeys_the_equations_of_rest(name, da
             body_rate = add(error_rate, turning)
             moving = subtract(spinning, cross(error_rate, turning))
             measurement = Measurement(attitude, error_rate, body_rate, turning, moving, ZERO, ZERO, 0.1)
-            torque, _ = law.torque(measurement, gains, craft, NoMemory())
+            torque, _ = law.command(measurement, gains, craft, NoMemory())
             relative = subtract(angular_acceleration(body_rate, torque, craft), moving)
             return add(apply(craft.inertia, relative), gyroscopic_torque(craft.inertia, error_rate))
 
@@ -140,9 +140,9 @@ def test_laws_are_read_by_balls_and_symbols_too(name):
 
     for gains in law.examples():
         for measurement in random_measurements(5):
-            plain, _ = law.torque(measurement, gains, craft, NoMemory())
-            balls, _ = law.torque(as_numbers(measurement, arb), as_numbers(gains, arb), as_numbers(craft, arb), NoMemory())
-            exact, _ = law.torque(
+            plain, _ = law.command(measurement, gains, craft, NoMemory())
+            balls, _ = law.command(as_numbers(measurement, arb), as_numbers(gains, arb), as_numbers(craft, arb), NoMemory())
+            exact, _ = law.command(
                 as_numbers(measurement, sympy.Rational), as_numbers(gains, sympy.Rational), craft, NoMemory()
             )
             for x, ball, fraction in zip(plain, balls, exact, strict=True):

@@ -156,7 +156,7 @@ def test_scipy_flies_the_same_in_the_limit_of_small_periods(scenario_name, law, 
 
     def slope(_, state):
         position, velocity = tuple(state[:3]), tuple(state[3:])
-        command, _memory = loop.law.control(PointMeasurement(position, velocity, 1e-3, size), loop.gains, plant, NoMemory())
+        command, _memory = loop.law.command(PointMeasurement(position, velocity, 1e-3, size), loop.gains, plant, NoMemory())
         return [*velocity, *np.add(motion(position, velocity, plant), limit(command, size))]
 
     start = [*loop.start.position, *loop.start.velocity]

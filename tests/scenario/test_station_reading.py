@@ -9,7 +9,7 @@ import pytest
 
 from starhold.analysis.station import Circle, Equilibrium, goal_of
 from starhold.errors import InputError
-from starhold.laws.point import station_laws
+from starhold.laws.catalogue import catalogue
 from starhold.parts.bodies.libration_point import EARTH_DIAMETER, PRIMARIES
 from starhold.scenario.opening import json_schema, open_scenario
 from starhold.scenario.reading import builtin_text, load, parse
@@ -224,6 +224,6 @@ def test_unstable_gains_are_refused_unless_they_are_allowed(tmp_path):
 
 
 def test_every_station_law_has_a_goal():
-    for law in station_laws().values():
+    for law in catalogue("libration-point").values():
         for gains in law.examples():
             assert isinstance(goal_of(gains), Circle | Equilibrium)

@@ -9,7 +9,7 @@ import numpy as np
 
 from starhold.conformance.bench import random_quaternions, sample_loop
 from starhold.laws.catalogue import catalogue
-from starhold.laws.point import station_laws
+from starhold.laws.catalogue import catalogue
 from starhold.loop.kernels import Numbers, form
 from starhold.loop.station import StationLoop
 from starhold.parts.actuators.dynamics import Dynamics
@@ -75,7 +75,7 @@ def choices() -> dict[str, Any]:
     for allocation in ("least-squares", "least-peak"):
         found[f"wheels with a fault, {allocation}"] = replace(wheeled, allocation=allocation)
     point = PRIMARIES["sun-earth"].point()
-    for name, law in station_laws().items():
+    for name, law in catalogue("libration-point").items():
         for model in ("linear", "nonlinear"):
             begin = PointState((0.1, 1.0, 0.2), (0.0, 0.1, -1.0), (0.0, 0.0, 0.0))
             lag = 0.0086 if model == "linear" else 0.0

@@ -125,7 +125,7 @@ def test_the_law_reckons_with_the_old_inertia_until_the_diagnosis(action):
     for k in range(300):
         q, w = tuple(run["attitude_error"][k].tolist()), tuple(run["rate"][k].tolist())
         seen = Measurement(q, w, w, ZERO, ZERO, ZERO, ZERO, loop.period)
-        by_old, by_new = (loop.law.torque(seen, loop.gains, craft, NoMemory())[0] for craft in (old, new))
+        by_old, by_new = (loop.law.command(seen, loop.gains, craft, NoMemory())[0] for craft in (old, new))
         assert tuple(run["command"][k].tolist()) == (by_old if k < told else by_new)
         apart += by_old != by_new
     assert apart > 250

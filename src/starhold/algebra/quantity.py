@@ -1,4 +1,4 @@
-"""Annotations tell what the fields of a state or of an argument mean; tables and checks read them."""
+"""Annotations tell what the fields of a state or of an argument mean; tables, recordings and checks read them."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ from typing import Any, NamedTuple, get_args, get_type_hints
 
 
 class Quantity(NamedTuple):
-    """The unit and the meaning of a field."""
+    """The unit and the meaning of a field. `dimension` names what its components run over in recordings: "axis" for vectors,
+    "quaternion", "wheel"; "" for a single number."""
 
     unit: str
     text: str
+    dimension: str = ""
 
 
 def quantities(cls: Any) -> dict[str, Quantity]:

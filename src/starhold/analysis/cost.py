@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra.structure import flatten
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import Arguments, Numbers, make_kernel, numbers_of, replay
-from starhold.parts.sensors.gaussian import exact, no_disturbance
 
 if TYPE_CHECKING:
     from starhold.simulation.lane import Recording
@@ -28,10 +28,10 @@ class Replay:
 
     def __init__(self, loop: ClosedLoop, states: NDArray[np.float64]) -> None:
         # The noise of the simulation is no part of a call.
-        quiet: Any = loop.parts()._replace(sense=exact, disturb=no_disturbance)
-        numbers = Numbers(loop.gains, loop.craft, loop.craft, loop.setup())
+        loop = loop.without("random-torque") if loop.used("estimator") else loop.without("random-torque", "sensor")
+        numbers = Numbers.of(loop.phases(1)[0])
         arguments = Arguments(*numbers)
-        self._kernel, self._seed = make_kernel(replay, quiet, 1, loop.carry(), numbers), loop.seed
+        self._kernel, self._seed = make_kernel(replay, loop.composition(), 1, loop.carry(), numbers), loop.seed
         self._memories = {"states": np.ascontiguousarray(states), "shared": arguments.shared, "own": arguments.shared}
         self._memories |= {"tables": arguments.tables, "carry": np.array(numbers_of(loop.carry()))}
 
@@ -42,8 +42,17 @@ class Replay:
 
 def recorded_states(loop: ClosedLoop, recording: Recording) -> NDArray[np.float64]:
     """The loop's states at the samples of its recording, of a long one at the first of them (number, numbers of a state)."""
-    names = ["wheel_momentum" if name == "momentum" else name for name in type(loop.start)._fields]
-    return np.hstack([recording[name][:CALLS] for name in names])
+    carry = loop.carry()
+    columns = [recording[name][:CALLS] for name in type(carry.state)._fields]
+    for state in carry.effectors:
+        for name, value in zip(state._fields, state, strict=True):
+            found = [
+                run for key, run in recording.arrays.items() if key.endswith(name) and key not in type(carry.state)._fields
+            ]
+            # One that is not recorded stays as it was at the start.
+            start = np.tile(flatten((value,)), (len(columns[0]), 1))
+            columns.append(np.reshape(found[0][:CALLS], start.shape) if found else start)
+    return np.hstack(columns)
 
 
 def call_costs(loop: ClosedLoop, states: NDArray[np.float64], calls: int = CALLS, seconds: float = 1.0) -> dict[str, float]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, cast
 
 import numpy as np
@@ -21,7 +20,6 @@ from starhold.parts.bodies.rigid_body import kinetic_energy
 from starhold.parts.craft import tensor
 from starhold.parts.effectors.wheels import BAND, Wheels
 from starhold.parts.quaternion_sign import SIGN_POLICIES
-from starhold.parts.sensors.gaussian import SILENT
 
 if TYPE_CHECKING:
     from starhold.certification.certificate import Certificate, Claim
@@ -104,11 +102,16 @@ def _kept(span: Span) -> list[Departure]:
 
 
 def _exact(span: Span) -> list[Departure]:
-    noise, actuators = span.loop.noise, span.loop.dynamics
+    loop = span.loop
+    noisy, lag, slow = loop.find("gaussian"), loop.find("lag"), loop.has("rate-limit")
+    slow = slow or (lag is not None and math.isfinite(lag.params.rate_limit))
+    told = ("gaussian", "lag", "rate-limit")
+    others = [f for role in ("sensor", "estimator", "actuator") for f in loop.used(role) if f.part.name not in told]
     return [
-        *span.always("the sensors are noisy", noise.attitude > 0.0 or noise.rate > 0.0),
-        *span.always("the actuators lag", actuators.lag > 0.0),
-        *span.always("the torque's rate is limited", math.isfinite(actuators.rate_limit)),
+        *span.always("the sensors are noisy", noisy is not None and any(noisy.params)),
+        *span.always("the actuators lag", lag is not None),
+        *span.always("the torque's rate is limited", slow),
+        *(one for f in others for one in span.always(f"the {f.part.role} {f.called} is there", True)),
     ]
 
 
@@ -133,20 +136,26 @@ def _friction(span: Span) -> list[Departure]:
 
 
 def _random(span: Span) -> list[Departure]:
-    return span.always("a random torque acts", span.loop.noise.torque > 0.0)
+    found = span.loop.find("random-torque")
+    known = ("random-torque", "gravity-gradient")
+    others = [f for f in span.loop.used("environment") if f.part.hook("torque") and f.part.name not in known]
+    return [
+        *span.always("a random torque acts", found is not None and found.params.deviation > 0.0),
+        *(one for f in others for one in span.always(f"the torque {f.called} acts", True)),
+    ]
 
 
 def _cancelled(span: Span) -> list[Departure]:
-    gravity = span.loop.gravity_gradient and not cancels(span.loop)
+    gravity = span.loop.has("gravity-gradient") and not cancels(span.loop)
     return [*_random(span), *span.always("the law does not cancel the gravity gradient", gravity)]
 
 
 def _alone(span: Span) -> list[Departure]:
-    return [*_random(span), *span.always("the gravity gradient acts", span.loop.gravity_gradient)]
+    return [*_random(span), *span.always("the gravity gradient acts", span.loop.has("gravity-gradient"))]
 
 
 def _still(span: Span) -> list[Departure]:
-    return span.always("the target turns", not isinstance(span.loop.target, tuple))
+    return span.always("the target turns", span.loop.target.part.name != "inertial")
 
 
 MET: Mapping[str, Callable[[Span], list[Departure]]] = {
@@ -172,14 +181,14 @@ MET: Mapping[str, Callable[[Span], list[Departure]]] = {
 
 def cancels(loop: ClosedLoop) -> bool:
     """Whether the law takes the torque that the models know from what it commands: at the start, whatever that is."""
-    loop = replace(loop, noise=SILENT)
-    measurement = make_step(loop.parts()).look(loop.carry(), 0, 0, loop.craft, loop.setup())
+    loop = loop.without("sensor", "estimator")
+    measurement = make_step(loop.composition()).measure(loop.carry(), 0, 0, loop.craft, loop.setup())
     memory = loop.law.remember(loop.gains, loop.craft, loop.period)
     more = 0.01 * loop.craft.torque_limit if math.isfinite(loop.craft.torque_limit) else 1.0
     # From rest on target, where clipped and switching laws are farthest from their limits.
     measurement = measurement._replace(attitude=(1.0, 0.0, 0.0, 0.0), rate=ZERO)
     torques = [
-        np.array(loop.law.torque(measurement._replace(external_torque=(x, x, x)), loop.gains, loop.craft, memory)[0])
+        np.array(loop.law.command(measurement._replace(external_torque=(x, x, x)), loop.gains, loop.craft, memory)[0])
         for x in (0.0, more)
     ]
     return bool(np.allclose(torques[0] - torques[1], more, rtol=1e-6))

@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from starhold.analysis.departure import LOST, Departure
 from starhold.analysis.metrics import on_limit
+from starhold.certification.station_terms import lag_of
 from starhold.laws import l2_circle
 from starhold.laws.point import PointMeasurement
 
 if TYPE_CHECKING:
     from starhold.certification.certificate import Certificate, Claim
-    from starhold.loop.station import StationLoop
+    from starhold.loop.closed_loop import ClosedLoop
     from starhold.simulation.lane import Recording
 
 SLACK = 1e-6
@@ -23,7 +24,7 @@ SLACK = 1e-6
 
 
 def station_departures(
-    certificate: Certificate, loop: StationLoop, run: Recording, unit: float
+    certificate: Certificate, loop: ClosedLoop, run: Recording, unit: float
 ) -> dict[str, tuple[Departure, ...]]:
     """For each proved kind of claim how a run leaves it, in order of time; empty where it does not. unit: of time, in s."""
 
@@ -33,7 +34,7 @@ def station_departures(
 
     at = run.attrs.get("diverged_at")
     common = [] if at is None else [Departure(at * unit, LOST)]
-    if loop.lag > 0.0:
+    if lag_of(loop) > 0.0:
         common.append(Departure(0.0, "the control lags"))
     found: dict[str, tuple[Departure, ...]] = {}
     for claim in certificate.claims:
@@ -47,9 +48,9 @@ def station_departures(
     return found
 
 
-def _conditions(claim: Claim, loop: StationLoop, run: Recording) -> list[tuple[Any, str]]:
+def _conditions(claim: Claim, loop: ClosedLoop, run: Recording) -> list[tuple[Any, str]]:
     """The samples (n,) that a claim assumes not to be, beside lag and its set, each with its sentence."""
-    command, limit, kind = run["command"], loop.limit, loop.limit_kind
+    command, limit, kind = run["command"], loop.cutoff(), loop.limit
     if claim.kind in ("circle", "rest"):
         return [(on_limit(command, limit, kind), "the control reaches its limit")]
     if claim.kind == "saturated-axis" and kind != "none":
@@ -58,11 +59,11 @@ def _conditions(claim: Claim, loop: StationLoop, run: Recording) -> list[tuple[A
 
 
 def outside(
-    claim: Claim, loop: StationLoop, position: NDArray[np.float64], velocity: NDArray[np.float64], slack: float = 0.0
+    claim: Claim, loop: ClosedLoop, position: NDArray[np.float64], velocity: NDArray[np.float64], slack: float = 0.0
 ) -> Any:
     """Which states, (3, n) each, lie outside a claim's set by more than a slack, (n,); none of a claim about all states."""
     if claim.kind == "saturated-axis":
-        steep = math.sqrt(loop.plant.rate**2 + 2.0 * loop.plant.stiffness)
+        steep = math.sqrt(loop.craft.rate**2 + 2.0 * loop.craft.stiffness)
         far = np.abs(position[0] + velocity[0] / steep) > claim.numbers["width"] * (1.0 + slack)
         far |= np.abs(position[0]) > claim.numbers["reach"] * (1.0 + slack)
         # The claim takes Y and Z as held; where a flight starts otherwise it is none of those that it speaks of.

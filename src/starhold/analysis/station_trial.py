@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from starhold.analysis.station_departure import circle_value, outside
 from starhold.analysis.trial import FLIGHTS, LEGS, SLACK, BrokenClaimError, Trial
 from starhold.certification.certificate import Certificate
-from starhold.loop.station import StationLoop
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.simulation.lanes import simulate_many
 
 Array = NDArray[np.float64]
@@ -22,13 +22,13 @@ FLOOR = 1e-6
 """Of V at the centre of the circle: what the held control makes of zero."""
 
 
-def fly_station(loop: StationLoop, certificate: Certificate, flights: int = FLIGHTS, seed: int = 1) -> Trial | None:
+def fly_station(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHTS, seed: int = 1) -> Trial | None:
     """Fly the certified set of the circle; None where that is not proved. Raises BrokenClaimError."""
     claims = [certificate.claim(kind) for kind in ("control-limit", "circle")]
     claim = next((c for c in claims if c is not None and c.outcome == "proved"), None)
     if claim is None:
         return None
-    free = replace(loop, period=min(loop.period, PERIOD), substeps=1, lag=0.0, limit_kind="none")
+    free = replace(loop.without("lag"), period=min(loop.period, PERIOD), substeps=1, limit="none")
     level, random = claim.numbers["level"], np.random.default_rng(seed)
     states = draw(loop.gains, level, flights, random)
     floor = FLOOR * loop.gains.alpha * loop.gains.radius**4
@@ -41,12 +41,12 @@ def fly_station(loop: StationLoop, certificate: Certificate, flights: int = FLIG
             shown = ", ".join(f"{x:.9g}" for x in states[:6, int(np.argmax(wrong))])
             raise BrokenClaimError(f"{certificate.name}, {claim.kind}: V rises on a flight, which is then at ({shown})")
         highest, before = max(highest, float((after / np.maximum(before, floor)).max())), after
-        need = max(need, float(_size(states[6:9], loop.limit_kind).max()))
+        need = max(need, float(_size(states[6:9], loop.limit).max()))
     if claim.kind == "circle":
         return Trial(flights, level, highest, None)
-    if need > loop.limit * (1.0 + 1e-12):
-        raise BrokenClaimError(f"{certificate.name}: a flight from the certified set needs {need:g} of {loop.limit:g}")
-    return Trial(flights, level, highest, need / loop.limit)
+    if need > loop.cutoff() * (1.0 + 1e-12):
+        raise BrokenClaimError(f"{certificate.name}: a flight from the certified set needs {need:g} of {loop.cutoff():g}")
+    return Trial(flights, level, highest, need / loop.cutoff())
 
 
 def draw(gains: Any, level: float, count: int, random: np.random.Generator) -> Array:
@@ -62,7 +62,7 @@ def draw(gains: Any, level: float, count: int, random: np.random.Generator) -> A
     return states
 
 
-def station_start_inside(certificate: Certificate, loop: StationLoop) -> dict[str, bool]:
+def station_start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
     """Whether the loop's start lies in the sets of the proved claims that are about a part of all states."""
     found: dict[str, bool] = {}
     for claim in certificate.claims:

@@ -11,10 +11,9 @@ from starhold.analysis.metrics import error_angle
 
 if TYPE_CHECKING:
     from starhold.loop.closed_loop import ClosedLoop
-    from starhold.loop.station import StationLoop
     from starhold.simulation.lane import Recording
 
-AnyLoop = TypeVar("AnyLoop", "ClosedLoop", "StationLoop")
+AnyLoop = TypeVar("AnyLoop", "ClosedLoop", "ClosedLoop")
 
 STATE = ("attitude", "rate", "position", "velocity", "wheel_momentum")
 """What is compared of a recording, where it is there."""

@@ -154,7 +154,7 @@ class Watcher:
         error, none = relative(goal, state.attitude), np.zeros(starts.shape[1])
         angle, square = self.ends.angle * dot(error[1:], error[1:]), dot(state.rate, state.rate)
         noted = np.array([angle, self.ends.rate * square, none, none, square, none, none, none])
-        observer = Observer(watch(self.loop.parts()), Watched(0.0, 0.0, 0.0, 0.0, 0.0, ZERO), self.ends)
+        observer = Observer(watch(self.loop.composition()), Watched(0.0, 0.0, 0.0, 0.0, 0.0, ZERO), self.ends)
         (phase,) = self.loop.phases(max(steps, 1))
         phase = phase._replace(last=steps, gains=gains)
         carries = carry_columns(self.loop, starts, phase)

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
-from starhold.algebra.quaternion import NO_TURN
 from starhold.algebra.vector import ZERO
 from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.frame import Frame, take_apart
@@ -24,10 +23,8 @@ from starhold.certification.sliding import take_surface
 from starhold.certification.subject import make_subject
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.actuators.dynamics import IDEAL
 from starhold.parts.craft import tensor
 from starhold.parts.effectors.wheels import Wheels
-from starhold.parts.sensors.gaussian import SILENT
 from starhold.simulation.lanes import Batch, simulate_many
 
 FLIGHTS = 10_000
@@ -71,7 +68,7 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
         return None
     free = _undisturbed(loop, certificate)
     if loop.wheels is not None and claim.kind == "wheels":
-        free = replace(free, wheels=_without_friction(loop.wheels))
+        free = _on(free, _without_friction(loop.wheels))
     # The claim's own V, which need not be the law's.
     stiffness = claim.witness["stiffness"]
     frame = take_apart(Motion(make_subject(free), None if stiffness is None else exact(stiffness)))
@@ -222,19 +219,15 @@ def _undisturbed(loop: ClosedLoop, certificate: Certificate) -> ClosedLoop:
         # The loop's own period may be one that the linear loop is unstable with.
         longest = stable_period(Motion(make_subject(loop)))
     period = loop.period if longest is None else min(loop.period, longest / 400.0)
+    wheels = loop.find("wheels")
     return replace(
         loop,
         start=loop.start._replace(position=ZERO, velocity=ZERO, torque=ZERO),
-        wheels=None if loop.wheels is None else _boundless(loop.wheels),
+        parts=() if wheels is None else (replace(wheels, params=_boundless(wheels.params)),),
         events=(),
         period=period,
         substeps=1,
-        orbit=False,
-        gravity_gradient=False,
-        target=NO_TURN,
-        noise=SILENT,
         limit="none",
-        dynamics=IDEAL,
         sign_policy="shortest" if loop.sign_policy == "hysteresis" else loop.sign_policy,
     )
 
@@ -250,6 +243,11 @@ def _paced(
         least = float(np.linalg.eigvalsh(tensor(loop.craft.inertia))[0])
         fastest += certificate.subject["wheels"]["total_momentum"] / least
     return replace(loop, period=min(loop.period, TURN / max(fastest, 1e-300))), states
+
+
+def _on(loop: ClosedLoop, wheels: Wheels) -> ClosedLoop:
+    """The loop on other wheels."""
+    return loop.with_parts(*(replace(f, params=wheels) for f in loop.used("effector") if f.part.name == "wheels"))
 
 
 def _without_friction(wheels: Wheels) -> Wheels:

@@ -29,7 +29,7 @@ from starhold.certification.matrices import number, root_float
 from starhold.certification.station_terms import UNLIMITED, assumed, mismatch, point_measurement
 from starhold.certification.subject import above, below
 from starhold.laws import l2_circle as law
-from starhold.loop.station import StationLoop
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.libration_point import linear
 
 IN_PLANE = "starts in the plane x = 0 without a rate along X"
@@ -52,11 +52,11 @@ class Circle:
         return self.gains.alpha * self.gains.radius**4 / 2
 
 
-def _circle(loop: StationLoop) -> Circle:
-    return Circle(*(type(values)(*map(exact, values)) for values in (loop.plant, loop.gains)))
+def _circle(loop: ClosedLoop) -> Circle:
+    return Circle(*(type(values)(*map(exact, values)) for values in (loop.craft, loop.gains)))
 
 
-def attracts(loop: StationLoop) -> Claim:
+def attracts(loop: ClosedLoop) -> Claim:
     """That all motions from {V <= level} end on the circle."""
     found, told, circle = Obligations(), dict[str, Any](), _circle(loop)
 
@@ -90,10 +90,10 @@ def attracts(loop: StationLoop) -> Claim:
     return finish()
 
 
-def control_limit(loop: StationLoop) -> Claim:
+def control_limit(loop: ClosedLoop) -> Claim:
     """That the control stays within its limit on motions from a smaller set, in the plane x = 0."""
     found, circle = Obligations(), _circle(loop)
-    told: dict[str, Any] = {"limit": loop.limit, "kind": loop.limit_kind}
+    told: dict[str, Any] = {"limit": loop.cutoff(), "kind": loop.limit}
 
     def finish() -> Claim:
         return Claim("control-limit", told, {}, assumed(loop, IN_PLANE), tuple(found))
@@ -101,11 +101,11 @@ def control_limit(loop: StationLoop) -> Claim:
     if loop.gains.model:
         found.add("control", BALLS, None, {"reason": "only for a law that undoes the linear model alone"})
         return finish()
-    asked = _on_circle(circle, loop.limit_kind)
-    if asked[0] > exact(loop.limit) ** 2 * (1 + exact(1e-12)):
+    asked = _on_circle(circle, loop.limit)
+    if asked[0] > exact(loop.cutoff()) ** 2 * (1 + exact(1e-12)):
         found.add("control", BALLS, False, {"control": math.sqrt(number(asked[0])), "angle": asked[1]})
         return finish()
-    demand = _Demand(circle, loop.limit, loop.limit_kind)
+    demand = _Demand(circle, loop.cutoff(), loop.limit)
     guess = demand.guess()
     for level in (guess * (1.0 - less) for less in LESS):
         if level > 0.0 and demand.within(level):

@@ -22,10 +22,10 @@ from starhold.algebra.vector import add
 from starhold.certification.certificate import BALLS, EXACT, EXACT_SIGN, Claim
 from starhold.certification.convergence import Obligations
 from starhold.certification.matrices import number
-from starhold.certification.station_terms import UNLIMITED, assumed, mismatch, point_measurement
+from starhold.certification.station_terms import UNLIMITED, assumed, mismatch, model_of, point_measurement
 from starhold.certification.subject import above, below
 from starhold.laws import l2_equilibrium as law
-from starhold.loop.station import StationLoop
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.libration_point import linear
 
 HELD = "held at rest along Y and Z, where no Coriolis acceleration acts along X"
@@ -46,12 +46,12 @@ class Axis(NamedTuple):
     limit: Any
 
 
-def rests(loop: StationLoop) -> Claim:
+def rests(loop: ClosedLoop) -> Claim:
     """That every motion ends at rest where the law wants it."""
     found = Obligations()
 
     def finish() -> Claim:
-        clear = () if loop.model == "linear" else (CLEAR,)
+        clear = () if model_of(loop) == "linear" else (CLEAR,)
         return Claim("rest", {}, {}, assumed(loop, UNLIMITED, *clear), tuple(found))
 
     reason = mismatch(loop)
@@ -59,24 +59,29 @@ def rests(loop: StationLoop) -> Claim:
         found.add("form", EXACT, None, {"reason": reason or "the axes do not move each on its own"})
         return finish()
     found.add("form", EXACT, True)
-    plant, gains = (exact(loop.plant.rate), exact(loop.plant.stiffness)), loop.gains
+    plant, gains = (exact(loop.craft.rate), exact(loop.craft.stiffness)), loop.gains
     stiff = exact(gains.k_x) > plant[0] ** 2 + 2 * plant[1] and plant[1] > plant[0] ** 2
     damped = all(exact(k) > 0 for k in gains.k_velocity)
     found.add("each axis returns", EXACT_SIGN, stiff and damped)
     return finish()
 
 
-def saturated_axis(loop: StationLoop) -> Claim:
+def saturated_axis(loop: ClosedLoop) -> Claim:
     """From where the X axis returns although its control is limited, and that it does from nowhere else."""
     found, told, witness = Obligations(), dict[str, Any](), dict[str, Any]()
     axis = _axis(loop)
-    if _demand(loop) > exact(loop.limit):
+    if _demand(loop) > exact(loop.cutoff()):
         found.add("stays", BALLS, None, {"reason": "the other axes cannot be held with so little control"})
-        return Claim("saturated-axis", {"limit": loop.limit}, {}, assumed(loop, HELD), tuple(found))
+        return Claim("saturated-axis", {"limit": loop.cutoff()}, {}, assumed(loop, HELD), tuple(found))
     bound = axis.limit / axis.p
     width = below(exact(number(bound)) * exact(SHARE))
     far = below(exact(number(bound)) * exact(FAR))
-    told |= {"limit": loop.limit, "width": width, "reach": far, "boundary": above(exact(number(bound)) * exact(1 + 1e-15))}
+    told |= {
+        "limit": loop.cutoff(),
+        "width": width,
+        "reach": far,
+        "boundary": above(exact(number(bound)) * exact(1 + 1e-15)),
+    }
     m, e = arb(width), abs(axis.k - axis.s * axis.c)
     holds = (axis.limit / m).min(axis.c * axis.s)
     mu = number(exact(number(2 * (holds - axis.p) / axis.p)))
@@ -90,22 +95,22 @@ def saturated_axis(loop: StationLoop) -> Claim:
     return Claim("saturated-axis", told, witness, assumed(loop, HELD), tuple(found))
 
 
-def _axis(loop: StationLoop) -> Axis:
-    p = exact(loop.plant.rate) ** 2 + 2 * exact(loop.plant.stiffness)
+def _axis(loop: ClosedLoop) -> Axis:
+    p = exact(loop.craft.rate) ** 2 + 2 * exact(loop.craft.stiffness)
     k, c = exact(loop.gains.k_x), exact(loop.gains.k_velocity[0])
-    return Axis(arb(p), arb(p).sqrt(), arb(k), arb(c), arb(loop.limit))
+    return Axis(arb(p), arb(p).sqrt(), arb(k), arb(c), arb(loop.cutoff()))
 
 
-def _demand(loop: StationLoop) -> Any:
+def _demand(loop: ClosedLoop) -> Any:
     """What holding Y and Z takes at least."""
-    square, c = exact(loop.plant.rate) ** 2, exact(loop.plant.stiffness)
+    square, c = exact(loop.craft.rate) ** 2, exact(loop.craft.stiffness)
     return max(abs((c - square) * exact(loop.gains.y)), abs(c * exact(loop.gains.z)))
 
 
-def _separate(loop: StationLoop) -> bool:
+def _separate(loop: ClosedLoop) -> bool:
     """Whether under the law every axis of the linear model has the acceleration that the claims are about."""
     measurement: Any = point_measurement()
-    plant, gains = constants(loop.plant), constants(loop.gains)
+    plant, gains = constants(loop.craft), constants(loop.gains)
     found: Any = add(linear(measurement.position, measurement.velocity, plant), law.feedback(measurement, gains, plant))
     x, v = measurement.position, measurement.velocity
     square, c = plant.rate * plant.rate, plant.stiffness

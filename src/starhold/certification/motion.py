@@ -94,7 +94,7 @@ class Motion:
         memory = self.subject.law.remember(self.subject.loop.gains, self.subject.loop.craft, self.subject.loop.period)
         q: Any = vector_part(self.measurement.attitude)
         with reciprocal(1 + dot(q, q), "z"):
-            return self.subject.law.torque(self.measurement, self.gains, self.nominal, memory)[0]
+            return self.subject.law.command(self.measurement, self.gains, self.nominal, memory)[0]
 
     @cached_property
     def acceleration(self) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from flint import fmpq
@@ -23,7 +23,6 @@ from starhold.certification.limits import (
 )
 from starhold.certification.matrices import greatest, inverse, least, number, product, root_above
 from starhold.certification.subject import above, below
-from starhold.parts.effectors.wheeled_body import WheeledState
 from starhold.parts.effectors.wheels import BAND, Wheels
 
 TRIES = (1e-4, 1e-3)
@@ -48,10 +47,10 @@ def saturation(basin: Basin, turn: float | None = None) -> Claim | None:
         return Claim("wheels", numbers | asked, {}, assumed(basin.motion.subject, limits=FREE), (found,))
 
     J = basin.motion.subject.inertia
-    stored = np.array(cast(WheeledState, loop.start).momentum) @ np.array(wheels.axes)
+    stored = np.array(loop.rotors) @ np.array(wheels.axes)
     if numbers["momentum"] + float(np.linalg.norm(stored)) < number(least(J) * basin.motion.subject.target_rate):
         return refused("nothing at rest on target has so little momentum")
-    if loop.allocation != "least-squares":
+    if wheels.allocation:
         return refused("only for torque shared out by least squares")
     if basin.frame.s is None:
         return refused(UNEQUAL)
@@ -129,7 +128,7 @@ def _inertia(basin: Basin) -> tuple[Any, Any]:
 def _shares(basin: Basin, wheels: Wheels) -> list[tuple[Any, Any]]:
     """For each wheel what it keeps of its momentum at the start whatever the motors do, and its part in a momentum of any
     direction."""
-    begun = [exact(h) for h in cast(WheeledState, basin.motion.subject.loop.start).momentum]
+    begun = [exact(h) for h in basin.motion.subject.loop.rotors]
     axes = [[exact(x) for x in axis] for axis in wheels.axes]
     n = [sum((h * axis[k] for h, axis in zip(begun, axes, strict=True)), fmpq(0)) for k in range(3)]
     found: list[tuple[Any, Any]] = []

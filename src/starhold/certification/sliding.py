@@ -26,7 +26,7 @@ from starhold.certification.matrices import (
 )
 from starhold.certification.motion import AXES, RATE, Motion, Truths
 from starhold.certification.subject import Subject, above, as_tuple, below, perigee
-from starhold.parts.environments.gravity import gravity_gradient
+from starhold.parts.environments.gravity_gradient import gravity_gradient
 
 ASSUMPTIONS = (
     "rigid body",

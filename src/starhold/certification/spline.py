@@ -21,7 +21,7 @@ from starhold.algebra.polynomial import exact
 from starhold.algebra.quaternion import relative
 from starhold.algebra.vector import add, cross, dot, scale, subtract
 from starhold.certification.matrices import number
-from starhold.parts.targets.target import Knots
+from starhold.parts.targets.history import Knots
 
 BITS = 192
 POINTS = 17

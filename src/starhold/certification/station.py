@@ -10,12 +10,12 @@ import numpy as np
 from starhold.certification.certificate import EXACT, Certificate, Claim, Obligation
 from starhold.certification.circle import attracts, control_limit
 from starhold.certification.equilibrium import rests, saturated_axis
-from starhold.certification.station_terms import UNLIMITED, assumed
+from starhold.certification.station_terms import UNLIMITED, assumed, lag_of, model_of
 from starhold.certification.subject import described_gains
-from starhold.loop.station import StationLoop
+from starhold.loop.closed_loop import ClosedLoop
 
 
-def certify_station(loop: StationLoop, name: str = "") -> Certificate:
+def certify_station(loop: ClosedLoop, name: str = "") -> Certificate:
     """The certificate of a station-keeping loop; without claims, which is undecided, for a law that none are made about."""
     # What overflows in a guess is caught where the guess is verified.
     with np.errstate(all="ignore"):
@@ -30,29 +30,29 @@ def certify_station(loop: StationLoop, name: str = "") -> Certificate:
     return Certificate(name or loop.law.name, described_station(loop), tuple(claims))
 
 
-def _claims(loop: StationLoop) -> list[Claim]:
+def _claims(loop: ClosedLoop) -> list[Claim]:
     claims: list[Claim] = []
-    limited = loop.limit_kind != "none" and math.isfinite(loop.limit)
+    limited = loop.limit != "none" and math.isfinite(loop.cutoff())
     if loop.law.name == "l2-circle":
         claims.append(attracts(loop))
         if limited and claims[0].outcome == "proved":
             claims.append(control_limit(loop))
     elif loop.law.name == "l2-equilibrium":
         claims.append(rests(loop))
-        if limited and loop.limit_kind == "axis" and loop.model == "linear" and claims[0].outcome == "proved":
+        if limited and loop.limit == "axis" and model_of(loop) == "linear" and claims[0].outcome == "proved":
             claims.append(saturated_axis(loop))
     return claims
 
 
-def described_station(loop: StationLoop) -> dict[str, Any]:
+def described_station(loop: ClosedLoop) -> dict[str, Any]:
     """The loop as plain numbers and names, all that a checker needs to build it again."""
     return {
         "law": loop.law.name,
         "gains": described_gains(loop.law, loop.gains),
-        "plant": loop.plant._asdict(),
-        "model": loop.model,
-        "limit": loop.limit_kind,
-        "control_limit": loop.limit if math.isfinite(loop.limit) else None,
-        "lag": loop.lag,
+        "plant": loop.craft._asdict(),
+        "model": model_of(loop),
+        "limit": loop.limit,
+        "control_limit": loop.cutoff() if math.isfinite(loop.cutoff()) else None,
+        "lag": lag_of(loop),
         "control_period": loop.period,
     }

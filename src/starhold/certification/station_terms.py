@@ -7,7 +7,7 @@ from typing import Any
 from starhold.algebra.polynomial import Polynomial
 from starhold.certification.subject import direction
 from starhold.laws.point import PointMeasurement
-from starhold.loop.station import StationLoop
+from starhold.loop.closed_loop import ClosedLoop
 
 COMMON = (
     "circular motion of the two bodies",
@@ -18,14 +18,14 @@ LINEAR, FULL = "linear motion near the point", "motion exactly as modelled"
 UNLIMITED = "control not limited"
 
 
-def assumed(loop: StationLoop, *more: str) -> tuple[str, ...]:
+def assumed(loop: ClosedLoop, *more: str) -> tuple[str, ...]:
     """The assumptions of a claim about a loop."""
-    return (LINEAR if loop.model == "linear" else FULL, *COMMON, *more)
+    return (LINEAR if model_of(loop) == "linear" else FULL, *COMMON, *more)
 
 
-def mismatch(loop: StationLoop) -> str:
+def mismatch(loop: ClosedLoop) -> str:
     """What is wrong where the law undoes another model than the one that is flown; empty where it undoes that."""
-    if loop.model == ("nonlinear" if loop.gains.model else "linear"):
+    if model_of(loop) == ("nonlinear" if loop.gains.model else "linear"):
         return ""
     if loop.gains.model:
         return "the law undoes what the linear model does not have"
@@ -36,3 +36,14 @@ def point_measurement() -> PointMeasurement:
     """What the law sees, in variables x1..x3 and v1..v3."""
     zero: Any = Polynomial.constant(0)
     return PointMeasurement(direction("x"), direction("v"), zero, zero)
+
+
+def model_of(loop: ClosedLoop) -> str:
+    """The field that the motion is in: "linear" or "nonlinear"."""
+    return "linear" if loop.has("linear-gravity") else "nonlinear"
+
+
+def lag_of(loop: ClosedLoop) -> float:
+    """The time constant of the control surfaces (scaled), 0 for none."""
+    found = loop.find("lag")
+    return 0.0 if found is None else found.params.lag

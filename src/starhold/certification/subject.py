@@ -16,10 +16,9 @@ from starhold.errors import InputError
 from starhold.laws.catalogue import Law
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.craft import Craft, tensor
-from starhold.parts.effectors.wheeled_body import WheeledState
-from starhold.parts.effectors.wheels import Wheels
-from starhold.parts.environments.gravity import gravity_gradient
-from starhold.parts.targets.target import Knots
+from starhold.parts.effectors.wheels import ALLOCATIONS, Wheels
+from starhold.parts.environments.gravity_gradient import gravity_gradient
+from starhold.parts.targets.history import Knots
 
 SPLINE = "rotation spline"
 """What a tabulated target follows between its knots, see `models.target.Knots`."""
@@ -63,7 +62,7 @@ def make_subject(loop: ClosedLoop, disturbance: float = 0.0, momentum: float | N
     momentum (N m s); if absent what the loop starts with, or what it has at rest on target if that is more."""
     rate, acceleration = _target_bounds(loop)
     axes, norm = (fmpq(0), fmpq(0), fmpq(0)), fmpq(0)
-    if loop.gravity_gradient:
+    if loop.has("gravity-gradient"):
         axes, norm = _gravity_gradient_bounds(loop)
     # The subject is what its file says.
     axes, (norm, rate, acceleration) = (
@@ -85,7 +84,6 @@ def described(subject: Subject) -> dict[str, Any]:
         "gravitational_parameter": loop.craft.gravity,
     }
     knots = followed(loop)
-    kind = loop.target if isinstance(loop.target, str) else "inertial" if knots is None else "history"
     return {
         "law": loop.law.name,
         "gains": described_gains(loop.law, loop.gains),
@@ -94,9 +92,9 @@ def described(subject: Subject) -> dict[str, Any]:
         "inertia": tensor(loop.craft.inertia).tolist(),
         "limit": loop.limit,
         "torque_limit": _finite(limit),
-        "orbit": orbit if loop.orbit else None,
-        "gravity_gradient": loop.gravity_gradient,
-        "target": kind,
+        "orbit": orbit if loop.has("two-body") else None,
+        "gravity_gradient": loop.has("gravity-gradient"),
+        "target": loop.target.part.name,
         "history": None if knots is None else {"interpolant": SPLINE} | {n: x.tolist() for n, x in knots._asdict().items()},
         "target_rate": above(subject.target_rate),
         "target_acceleration": above(subject.target_acceleration),
@@ -110,10 +108,10 @@ def described(subject: Subject) -> dict[str, Any]:
 
 def followed(loop: ClosedLoop) -> Knots | None:
     """The knots of the spline that a tabulated target follows; of a table that comes without, its rows are the knots."""
-    table = loop.target
-    if not isinstance(table, np.ndarray):
+    if loop.target.part.name != "history":
         return None
-    return loop.knots or Knots(np.arange(len(table), dtype=float) * loop.period, table[:, :4], table[:, 4:7])
+    table, knots = loop.target.params
+    return knots or Knots(np.arange(len(table), dtype=float) * loop.period, table[:, :4], table[:, 4:7])
 
 
 def described_gains(law: Law, gains: Any) -> dict[str, Any]:
@@ -125,15 +123,14 @@ def described_gains(law: Law, gains: Any) -> dict[str, Any]:
 
 
 def _described_wheels(subject: Subject, wheels: Wheels) -> dict[str, Any]:
-    start = cast(WheeledState, subject.loop.start)
     return {
         "axes": [list(axis) for axis in wheels.axes],
         "torque_limit": [_finite(limit) for limit in wheels.torque_limit],
         "momentum_limit": [_finite(limit) for limit in wheels.momentum_limit],
         "inertia": list(wheels.inertia),
         "least": [list(row) for row in wheels.least],
-        "momentum": list(start.momentum),
-        "allocation": subject.loop.allocation,
+        "momentum": list(subject.loop.rotors),
+        "allocation": ALLOCATIONS[wheels.allocation],
         "total_momentum": number(subject.total_momentum),
     }
 
@@ -171,8 +168,8 @@ def _plain(value: Any) -> Any:
 
 def _momentum(loop: ClosedLoop, target_rate: Any) -> float:
     """Norm of the total angular momentum at the start or at rest on target, whichever is more, rounded up (N m s)."""
-    start, inertia = cast(WheeledState, loop.start), tensor(loop.craft.inertia)
-    begun = inertia @ start.rate + np.array(start.momentum) @ np.array(cast(Wheels, loop.wheels).axes)
+    inertia = tensor(loop.craft.inertia)
+    begun = inertia @ loop.start.rate + np.array(loop.rotors) @ np.array(cast(Wheels, loop.wheels).axes)
     still = float(np.linalg.eigvalsh(inertia)[-1]) * above(target_rate)
     return max(float(np.linalg.norm(begun)), still) * (1.0 + 1e-12)
 
@@ -243,7 +240,7 @@ def _target_bounds(loop: ClosedLoop) -> tuple[Any, Any]:
             return spline_bounds(knots)
         except ArithmeticError as reason:
             raise InputError("target", "history", str(reason), "attitudes closer together") from None
-    if not isinstance(loop.target, str):
+    if loop.target.part.name != "orbital":
         return fmpq(0), fmpq(0)
     nearest, momentum, eccentricity, gravity = perigee(loop)
     # The orbital frame turns by h/r2, and this changes by -2 h r'/r3 with |r'| at most mu e/h.

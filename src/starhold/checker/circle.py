@@ -20,7 +20,8 @@ from starhold.algebra.vector import add, subtract
 from starhold.checker.exact import ZERO, Dual, demand, dual, floating, rational, up
 from starhold.checker.subject import named, variables
 from starhold.checker.symbols import expanded, in_symbols, positive
-from starhold.laws.point import PointMeasurement, StationLaw
+from starhold.laws.catalogue import Law
+from starhold.laws.point import PointMeasurement
 from starhold.parts.bodies.libration_point import Libration, linear
 
 TAKEN = ("t2", "t3")
@@ -30,7 +31,7 @@ TAKEN = ("t2", "t3")
 class Circle:
     """Law, gains, plant and motion of a loop, all numbers exact."""
 
-    law: StationLaw
+    law: Law
     gains: Any
     plant: Libration
     full: bool
@@ -172,7 +173,7 @@ def _agrees(law: Any, size: Any, layer: Any, full: bool) -> bool:
     gains, measurement, velocity = loop.gains, loop.measurement, loop.measurement.velocity
     wrong = (velocity[1] + gains.rate * measurement.position[2], velocity[2] - gains.rate * measurement.position[1])
     share = gains.k if not relay else gains.k / (size if layer == 0 or (size - layer).is_positive else layer)
-    flown, meant = loop.flown(law, full), add(loop.natural, law.neutral(measurement, gains, loop.plant))
+    flown, meant = loop.flown(law, full), add(loop.natural, law.neutral(measurement, gains, loop.craft))
     damping: Sequence[Any] = (sympy.Integer(0), share * wrong[0], share * wrong[1])
     for have, want, taken in zip(flown, meant, damping, strict=True):
         left = have - want + taken

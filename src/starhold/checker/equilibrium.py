@@ -21,8 +21,9 @@ from starhold.algebra.vector import add
 from starhold.checker.exact import ONE, ZERO, Interval, demand, hurwitz, intervals
 from starhold.checker.subject import named, variables
 from starhold.checker.symbols import expanded, in_symbols
-from starhold.laws.point import PointMeasurement, StationLaw
-from starhold.parts.actuators.dynamics import limit_axis
+from starhold.laws.catalogue import Law
+from starhold.laws.point import PointMeasurement
+from starhold.parts.actuators.limits import limit_axis
 from starhold.parts.bodies.libration_point import Libration, linear
 
 
@@ -30,7 +31,7 @@ from starhold.parts.bodies.libration_point import Libration, linear
 class Equilibrium:
     """Law, gains, plant and motion of a loop, all numbers exact."""
 
-    law: StationLaw
+    law: Law
     gains: Any
     plant: Libration
     full: bool
@@ -85,7 +86,7 @@ def _flies(law: Any, full: bool) -> bool:
     """Whether, for all states and numbers, the command is the feedback and, in the full problem, takes off what the linear
     model leaves out; but for the centres of the bodies, where neither is a number."""
     loop = in_symbols(law, {"model": int(full)}, ("k_velocity",))
-    meant = add(loop.natural, law.feedback(loop.measurement, loop.gains, loop.plant))
+    meant = add(loop.natural, law.feedback(loop.measurement, loop.gains, loop.craft))
     return all(expanded(have - want) == 0 for have, want in zip(loop.flown(law, full), meant, strict=True))
 
 
@@ -111,7 +112,7 @@ class LimitedAxis:
         still = Polynomial({})
         speed: Any = (v, still, still)
         measurement: Any = PointMeasurement((x, *constants(loop.place[1:])), speed, *variables(("period", "limit")))  # pyright: ignore
-        gains, plant = constants(loop.gains), constants(loop.plant)
+        gains, plant = constants(loop.gains), constants(loop.craft)
         pull: Any = linear(measurement.position, measurement.velocity, plant)[0]
         command: Any = loop.law.module.feedback(measurement, gains, plant)
         p, k, c = pull.terms.get(("x1",), ZERO), -command[0].terms.get(("x1",), ZERO), -command[0].terms.get(("v1",), ZERO)

@@ -128,7 +128,7 @@ class Loop:
         craft = self._craft(subject.inertia, inverted(subject.inertia))
         q: Any = vector_part(self.measurement.attitude)
         with reciprocal(1 + dot(q, q), QUOTIENT):
-            found = jointly(subject.law.torque(self.measurement, subject.gains, craft, subject.memory)[0])
+            found = jointly(subject.law.command(self.measurement, subject.gains, craft, subject.memory)[0])
         switches = {name for truths, _ in found for c, _ in truths for name in c.positive.variables()}
         read = {name for _, parts in found for p in parts for name in p.variables()} | switches
         demand(QUOTIENT not in switches, "the law switches on a quotient")

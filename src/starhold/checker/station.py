@@ -16,7 +16,7 @@ from starhold.checker.equilibrium import Equilibrium, LimitedAxis
 from starhold.checker.exact import ZERO, CheckError, Obligation, demand, rational
 from starhold.checker.polar import keeps_within
 from starhold.checker.region import BALLS, EXACT, LASALLE, SIGN, Numbers
-from starhold.laws.point import StationLaw, station_laws
+from starhold.laws.catalogue import Law, catalogue
 from starhold.parts.bodies.libration_point import Libration
 
 CLOSE = fmpq(1, 10**9)
@@ -33,7 +33,7 @@ CLEAR = "never at the centre of one of the two bodies"
 class Station:
     """The subject of a certificate, its numbers exact. `full`: the motion is that of the full problem."""
 
-    law: StationLaw
+    law: Law
     gains: Any
     plant: Libration
     full: bool
@@ -55,7 +55,7 @@ class Station:
 
 def read_station(given: Mapping[str, Any]) -> Station:
     """The subject in a certificate whose keys and types are in order; a CheckError where it says what cannot be."""
-    law = station_laws().get(given["law"])
+    law = catalogue("libration-point").get(given["law"])
     if law is None:
         raise CheckError(f"there is no law {given['law']} for libration points")
     fields = {item.name: item.gain for item in law.fields()}

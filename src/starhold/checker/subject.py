@@ -35,7 +35,7 @@ from starhold.checker.spline import moves_within
 from starhold.checker.wheels import Wheels, read_wheels
 from starhold.laws.catalogue import Law, catalogue
 from starhold.parts.craft import EARTH, Craft, check_inertia, compact
-from starhold.parts.environments.gravity import gravity_gradient
+from starhold.parts.environments.gravity_gradient import gravity_gradient
 
 
 def named(letter: str, first: int = 1) -> tuple[str, ...]:

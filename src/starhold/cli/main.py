@@ -182,13 +182,12 @@ def laws(name: Annotated[str | None, typer.Argument(help="show this law's card a
     from starhold.cli.show import print_law, print_laws
     from starhold.conformance.suite import find_law
     from starhold.laws.catalogue import catalogue
-    from starhold.laws.point import station_laws
     from starhold.scenario.checking import nearest
 
-    known = catalogue() | station_laws()
+    known = catalogue() | catalogue("libration-point")
     if name is None:
         print_laws("attitude", catalogue())
-        print_laws("station keeping", station_laws())
+        print_laws("station keeping", catalogue("libration-point"))
     elif name.endswith(".py"):
         print_law(find_law(name))
     elif name not in known:

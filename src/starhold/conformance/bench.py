@@ -14,6 +14,7 @@ from starhold.laws.catalogue import Law
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.rigid_body import State
+from starhold.parts.catalogue import fit
 from starhold.parts.craft import Craft, make_craft
 
 CRAFT = make_craft([2.0, 3.0, 4.0], torque_limit=0.05)
@@ -37,6 +38,10 @@ def random_measurements(count: int, external: bool = True, seed: int = 11) -> It
         yield Measurement(attitude, rate, rate, ZERO, ZERO, torque, position, PERIOD, wheel_momentum)
 
 
+ORBIT = (fit("environment", "two-body"), fit("environment", "gravity-gradient"))
+"""An orbit with its gravity gradient."""
+
+
 def sample_loop(law: Law, gains: Any) -> ClosedLoop:
     """A full 3x3 inertia in orbit under the gravity gradient, with hysteresis and a limit for each axis."""
     craft = make_craft([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]], torque_limit=0.05)
@@ -48,9 +53,7 @@ def sample_loop(law: Law, gains: Any) -> ClosedLoop:
         gains,
         start,
         PERIOD,
-        orbit=True,
-        gravity_gradient=True,
-        target=goal,
+        parts=(fit("target", "inertial", goal), *ORBIT),
         limit="axis",
         sign_policy="hysteresis",
     )
@@ -58,4 +61,4 @@ def sample_loop(law: Law, gains: Any) -> ClosedLoop:
 
 def call(law: Law, measurement: Measurement, gains: Any, craft: Craft = CRAFT) -> Vector:
     """The torque of a law called once, with a fresh memory."""
-    return law.torque(measurement, gains, craft, law.remember(gains, craft, measurement.period))[0]
+    return law.command(measurement, gains, craft, law.remember(gains, craft, measurement.period))[0]

@@ -10,21 +10,24 @@ from starhold.algebra.vector import ZERO
 from starhold.analysis.station import goal_of, measure_station
 from starhold.certification.station import certify_station
 from starhold.conformance.verdicts import STEPS, agree, declares_itself, require, round_trips
-from starhold.laws.point import PointMeasurement, StationLaw
-from starhold.loop.station import StationLoop
+from starhold.laws.catalogue import Law
+from starhold.laws.point import PointMeasurement
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.libration_point import PRIMARIES, PointState
+from starhold.parts.catalogue import fit
 from starhold.scenario.station.building import build
 from starhold.scenario.station.reading import parse_station
 from starhold.scenario.writing import station_scenario_with
-from starhold.simulation.station import simulate_station
+from starhold.simulation.lane import fly, label
 
 LIMIT = 4.0
+PARTS = (fit("environment", "three-body-gravity"), fit("actuator", "lag", 0.0086))
 PLANT = PRIMARIES["sun-earth"].point("L2")
 
 
-def _loop(law: StationLaw, gains: Any) -> StationLoop:
+def _loop(law: Law, gains: Any) -> ClosedLoop:
     start = PointState((0.01, 0.9, 0.1), (0.1, 0.0, 1.3), ZERO)
-    return StationLoop(PLANT, law, gains, start, 1e-3, model="nonlinear", limit=LIMIT, lag=0.0086)
+    return ClosedLoop(PLANT, law, gains, start, 1e-3, parts=PARTS, limit="norm", command_limit=LIMIT)
 
 
 def _states(count: int) -> Any:
@@ -35,17 +38,17 @@ def _states(count: int) -> Any:
 
 
 def _call(law: Any, measurement: PointMeasurement, gains: Any) -> Any:
-    return law.control(measurement, gains, PLANT, law.remember(gains, PLANT, measurement.period))[0]
+    return law.command(measurement, gains, PLANT, law.remember(gains, PLANT, measurement.period))[0]
 
 
-def is_pure(law: StationLaw) -> None:
+def is_pure(law: Law) -> None:
     """The control depends on nothing but its arguments."""
     for gains in law.examples():
         for measurement in _states(10):
             require(_call(law, measurement, gains) == _call(law, measurement, gains), f"two calls differ at {measurement}")
 
 
-def stays_finite(law: StationLaw) -> None:
+def stays_finite(law: Law) -> None:
     """Finite control near the point and far away."""
     rest = PointMeasurement(ZERO, ZERO, 1e-3, LIMIT)
     for gains in law.examples():
@@ -53,24 +56,24 @@ def stays_finite(law: StationLaw) -> None:
             require(bool(np.isfinite(_call(law, measurement, gains)).all()), f"not finite at {measurement}")
 
 
-def reads_alike(law: StationLaw) -> None:
+def reads_alike(law: Law) -> None:
     """Plain Python, one lane and every lane of a batch agree bit for bit."""
     for gains in law.examples():
         loop = _loop(law, gains)
         agree(loop, [loop.start] * 3, range(3))
 
 
-def survives_toml(law: StationLaw) -> None:
+def survives_toml(law: Law) -> None:
     """Gains written to a scenario file and read back are the same; unknown keys are refused."""
     round_trips(law, station_scenario_with, parse_station)
 
 
-def flies_a_scenario(law: StationLaw) -> None:
+def flies_a_scenario(law: Law) -> None:
     """It flies from a scenario file, is measured and certified, or the certificate says what cannot be read."""
     for gains in law.examples():
         scenario = parse_station(station_scenario_with(law, gains), law.name)
         loop = build(scenario, scenario.laws[0])
-        measure_station(simulate_station(loop, STEPS), scenario.units, goal_of(gains), scenario.table.settling.tolerance)
+        measure_station(label(loop, *fly(loop, STEPS), 1), scenario.units, goal_of(gains), scenario.table.settling.tolerance)
         for claim in certify_station(loop, law.name).claims:
             for obligation in claim.obligations:
                 told = obligation.outcome == "proved" or bool(obligation.evidence)

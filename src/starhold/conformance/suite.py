@@ -31,10 +31,10 @@ from starhold.conformance.verdicts import (
     run,
 )
 from starhold.errors import InputError
-from starhold.laws.catalogue import Law, catalogue, from_file, read_module
+from starhold.laws.catalogue import Law, catalogue, from_file
 from starhold.laws.interface import Measurement
-from starhold.laws.point import StationLaw, station_laws
 from starhold.parts.bodies.rigid_body import angular_acceleration
+from starhold.parts.catalogue import fit
 from starhold.scenario.building import build
 from starhold.scenario.checking import nearest
 from starhold.scenario.reading import parse
@@ -48,18 +48,17 @@ ON_TARGET = Measurement((1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO
 
 def examine(law: Law) -> Iterator[Verdict]:
     """Run every check for laws of its kind over a law, in order, going on after failures."""
-    return run(STATION_CHECKS if isinstance(law, StationLaw) else CHECKS, law)
+    return run(STATION_CHECKS if law.body == "libration-point" else CHECKS, law)
 
 
 def find_law(given: str) -> Law:
     """The law that is installed under a name, or that a file holds, of either kind. InputError where there is none."""
-    installed: dict[str, Law] = {**catalogue(), **station_laws()}
+    installed: dict[str, Law] = {**catalogue(), **catalogue("libration-point")}
     path = Path(given)
     if given in installed and not path.is_file():
         return installed[given]
     try:
-        station = hasattr(read_module(path), StationLaw.equation)
-        return from_file(path, station_laws(), StationLaw) if station else from_file(path, catalogue())
+        return from_file(path, installed)
     except FileNotFoundError:
         allowed = f"a Python file that holds a law, or a law by name: {nearest(given, list(installed))}"
         raise InputError(given, "", "no such file", allowed) from None
@@ -118,10 +117,8 @@ def ignores_inertial_frame(law: Law) -> None:
             position=to_reference(turn, s.position),
             velocity=to_reference(turn, s.velocity),
         )
-        goal = loop.target
-        if isinstance(goal, (str, np.ndarray)):
-            raise TypeError("the sample loop holds an inertial attitude")
-        other = replace(loop, start=turned, target=normalise(multiply(turn, goal)))
+        goal = fit("target", "inertial", normalise(multiply(turn, loop.target.params.attitude)))
+        other = replace(loop.with_parts(goal), start=turned)
         rows = slice(13, 16)
         difference = np.abs(fly(loop, STEPS)[0][rows] - fly(other, STEPS)[0][rows]).max()
         require(difference <= 1e-9, f"the torque changes by {difference:g} N m")
@@ -174,7 +171,11 @@ def can_be_certified(law: Law) -> None:
     """The certifier reads the law, or says what of it cannot be read."""
     for gains in law.examples():
         plain = sample_loop(law, gains)
-        for loop in (plain, replace(plain, target="orbital"), replace(plain, limit="norm", sign_policy="as_published")):
+        for loop in (
+            plain,
+            plain.without("target").with_parts(fit("target", "orbital")),
+            replace(plain, limit="norm", sign_policy="as_published"),
+        ):
             certificate = certify(loop)
             require(certificate.outcome in ("proved", "refuted", "undecided"), f"outcome {certificate.outcome}")
             for claim in certificate.claims:

@@ -96,7 +96,7 @@ def explain(craft: Craft, spec: Equal | Fit) -> list[tuple[str, Any]]:
     return [("root a (1/s)", a), ("time constant (s)", -1.0 / a)]  # type: ignore[operator]
 
 
-def check(gains: Gains) -> None:
+def check(gains: Gains, craft: Craft) -> None:
     """ValueError where a spectrum is not stable."""
     for name in ("phi_0", "phi_1"):
         roots = np.linalg.eigvals(tensor(getattr(gains, name)))

@@ -1,64 +1,18 @@
-"""What a station-keeping law sees, and what it declares: `CARD`, `Gains`, `examples()` and the equation
-`control(measurement, gains, plant, memory) -> (control, memory)`; `FORMS` with `design(plant, spec)` if it likes.
+"""Equations that laws near a libration point share.
 
-All in the scaled units of `models.libration`: the axes turn at rate 1, lengths count in a unit that the scenario chooses.
+All in the scaled units of `parts.bodies.libration_point`: the axes turn at rate 1, lengths count in a unit that the scenario
+chooses.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cache
-from typing import Annotated, Any, ClassVar, NamedTuple
-
-from starhold.algebra.quantity import Quantity
 from starhold.algebra.scalar import Scalar, less, maximum, sqrt, where
 from starhold.algebra.vector import Vector, dot, scale, subtract
-from starhold.laws import catalogue as laws
-from starhold.parts.bodies.libration_point import Libration, linear, nonlinear
+from starhold.parts.bodies.libration_point import Libration, PointMeasurement, linear, nonlinear
 from starhold.synthesis.circle import best_rate
 
 MODELS = ("linear", "nonlinear")
 """Of the motion, in the order of the numbers that gains hold for them."""
-
-
-class PointMeasurement(NamedTuple):
-    """What a law is told at a control instant; scaled."""
-
-    position: Annotated[Vector, Quantity("length", "from the libration point, turning axes")]
-    velocity: Annotated[Vector, Quantity("length Omega", "relative to the turning axes")]
-    period: Annotated[float, Quantity("1/Omega", "for which the control will be held")]
-    limit: Annotated[float, Quantity("length Omega^2", "of the control's norm or of each axis; infinite for none")]
-
-
-@dataclass(frozen=True)
-class StationLaw(laws.Law):
-    """A law file for a libration point as an object."""
-
-    equation: ClassVar[str] = "control"
-
-    @property
-    def torque(self) -> Callable[..., Any]:
-        """There is none; `control` is the equation."""
-        raise AttributeError("a station-keeping law gives a control, no torque")
-
-    @property
-    def control(self) -> Callable[..., Any]:
-        """The equation of the control acceleration."""
-        return self.module.control
-
-    def check(self, gains: Any, plant: Libration | None = None) -> None:
-        """ValueError where gains, each within its bounds, make a loop about this point that cannot be stable."""
-        teller = getattr(self.module, "check", None)
-        if teller is not None:
-            teller(gains, plant)
-
-
-@cache
-def station_laws() -> dict[str, StationLaw]:
-    """All station-keeping laws that are installed, by name: modules of this package with a `CARD`, and those that the entry
-    points `starhold.laws` of other packages name and that have a `control`."""
-    return laws.installed("starhold.laws", StationLaw)
 
 
 def least_rate(plant: Libration) -> float:

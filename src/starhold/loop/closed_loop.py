@@ -1,98 +1,95 @@
-"""The closed loop: plant, target, sensors, law and actuators put together. The only place a law meets a plant."""
+"""The closed loop: a body, a law, and the parts around them. The only place a law meets a plant."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from starhold.algebra.quaternion import NO_TURN, Quaternion, relative
-from starhold.algebra.scalar import side
-from starhold.algebra.structure import alike, leaves, unflatten
-from starhold.algebra.structured import Buffer
+from starhold.algebra.structure import alike, leaves
 from starhold.algebra.vector import ZERO, Vector, apply
 from starhold.laws.catalogue import Law
-from starhold.laws.interface import NoMemory
-from starhold.parts.actuators import dynamics as actuator
-from starhold.parts.bodies import rigid_body
-from starhold.parts.bodies.rigid_body import State
-from starhold.parts.craft import Craft
-from starhold.parts.effectors import wheeled_body
-from starhold.parts.effectors.envelope import with_facets
-from starhold.parts.effectors.wheeled_body import WheeledState
-from starhold.parts.effectors.wheels import Wheels, allocate, allocate_peak, relaxation
-from starhold.parts.environments import gravity as environment
-from starhold.parts.quaternion_sign import SIGN_POLICIES
-from starhold.parts.sensors import gaussian as sensor
-from starhold.parts.targets import target
+from starhold.parts.catalogue import find
+from starhold.parts.contract import NoMemory
+from starhold.parts.effectors.wheels import Wheels
+from starhold.parts.part import Fitted, Part
+from starhold.parts.roles import Goal
+from starhold.parts.targets.inertial import Params as Inertial
 
-SignPolicy = Literal["as_published", "shortest", "hysteresis"]
 Limit = Literal["axis", "norm", "none"]
-Allocation = Literal["least-squares", "least-peak"]
-ALLOCATIONS = {"least-squares": allocate, "least-peak": allocate_peak}
-LIMITS = {"axis": actuator.limit_axis, "norm": actuator.limit_norm, "none": actuator.limit_none}
+SignPolicy = Literal["as_published", "shortest", "hysteresis"]
+ON_TARGET = Fitted(find("target", "inertial"), Inertial())
+"""The inertial axes as a target."""
 
 
 class Setup(NamedTuple):
-    """The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument."""
+    """The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. Those of parts stand
+    in the order in which a loop has them; limit: of the command; far: the distance at which the motion counts as lost."""
 
     period: float
     substep: float
-    target: Any
-    noise: sensor.Noise
+    limit: float
     width: float
-    command_limit: float
-    dynamics: actuator.Dynamics
-    wheels: Any
+    far: float
+    target: Any
+    environments: tuple[Any, ...]
+    effectors: tuple[Any, ...]
+    sensors: tuple[Any, ...]
+    estimator: Any
+    actuators: tuple[Any, ...]
 
 
-class Parts(NamedTuple):
-    """The equations of a loop."""
+class Composition(NamedTuple):
+    """The parts whose equations a loop is made of; equal for loops that one kernel flies, but for the form of their numbers."""
 
-    environment: Callable[..., Any]
-    target: Callable[..., Any]
-    sense: Callable[..., Any]
-    disturb: Callable[..., Any]
-    cover: Callable[..., Any]
-    law: Callable[..., Any]
-    limit: Callable[..., Any]
-    begin: Callable[..., Any]
-    response: Callable[..., Any]
-    tidy: Callable[..., Any]
-    with_torque: Callable[..., Any]
-    rates: Callable[..., Any]
-    wheel_momentum: Callable[..., Any]
-    record: Callable[..., Any]
-    share: Callable[..., Any]
+    body: Part
+    law: Part
+    target: Part | None
+    environments: tuple[Part, ...]
+    effectors: tuple[Part, ...]
+    sensors: tuple[Part, ...]
+    estimator: Part | None
+    actuators: tuple[Part, ...]
+    limit: Limit
+    sign_policy: str
+
+
+class Memories(NamedTuple):
+    """What parts keep from control step to control step, in the order in which a loop has them; `followed` is the target's
+    attitude at the last one, where it is continued from that."""
+
+    followed: Any
+    environments: tuple[Any, ...]
+    sensors: tuple[Any, ...]
+    readings: tuple[Any, ...]
+    estimator: Any
+    estimate: Any
 
 
 class Carry(NamedTuple):
-    """What a trajectory carries from step to step: the state, the law's memory, the target attitude seen last (only where
-    the target has to be continued from it), the side h = +-1 of the double cover, the command and the random torque held,
-    and the control step at which the motion was lost (-1: not lost)."""
+    """What a trajectory carries from step to step: the states of the body, of the effectors, and of actuators that another one
+    follows; the law's memory, those of other parts, the sign h = +-1 of the quaternion policy, the command, and the control
+    step at which the motion was lost (-1: not lost)."""
 
-    state: State | WheeledState
+    state: Any
+    effectors: tuple[Any, ...]
+    actuators: tuple[Vector, ...]
     memory: Any
-    goal: Any
-    h: float
+    memories: Memories
+    h: Any
     command: Vector
-    disturbance: Vector
     lost_at: float
 
 
 class Event(NamedTuple):
-    """From a control step on: other wheels (None for a craft without), gains or craft than before, and what the law then
-    takes the craft for."""
+    """From a control step on: other parts, gains or craft than before, and the nominal model that the law then has."""
 
     step: int
-    wheels: Wheels | None
+    parts: tuple[Fitted, ...]
     gains: Any
-    craft: Craft
-    known: Craft
+    craft: Any
+    nominal: Any
 
 
 class Phase(NamedTuple):
@@ -101,103 +98,135 @@ class Phase(NamedTuple):
     first: int
     last: int
     gains: Any
-    craft: Craft
-    known: Craft
+    nominal: Any
+    craft: Any
     setup: Setup
-    before: Craft
+    before: Any
     """What the craft was until this phase."""
 
     @property
-    def turns(self) -> bool:
+    def jumps(self) -> bool:
         """Whether the body's rate jumps as the phase begins."""
-        pairs = zip(leaves(self.craft.inertia), leaves(self.before.inertia), strict=True)
-        return not all(np.array_equal(*pair) for pair in pairs)
+        pairs = zip(leaves(self.craft), leaves(self.before), strict=True)
+        return hasattr(self.craft, "inertia") and not all(np.array_equal(*pair) for pair in pairs)
 
     def rate_from(self, rate: Vector) -> Vector:
         """The body's rate (rad/s) as the phase begins, from that at the end of the one before: what moves inside the craft
         leaves its angular momentum."""
-        if not self.turns:
+        pairs = zip(leaves(self.craft.inertia), leaves(self.before.inertia), strict=True)
+        if all(np.array_equal(*pair) for pair in pairs):
             return rate
         return apply(self.craft.inverse_inertia, apply(self.before.inertia, rate))
 
     def entered(self, carry: Carry) -> Carry:
         """What is carried into the phase."""
-        return carry._replace(state=carry.state._replace(rate=self.rate_from(carry.state.rate)))
+        return carry._replace(state=carry.state._replace(rate=self.rate_from(carry.state.rate))) if self.jumps else carry
 
 
 @dataclass(frozen=True)
 class ClosedLoop:
-    """One law on one spacecraft in one setting; SI units and radians.
+    """One law on one body in one setting; SI units and radians, or the body's scaled ones.
 
-    target: a quaternion (inertial to target axes), "orbital", or a table of `models.target.tabulate` with a row for each
-    control step and one more; knots: of the spline that the table was taken from. noise adds to what the sensors say and to
-    the torque.
+    craft: the numbers of the body; start: its state; parts: whatever else the loop is made of, in any order of roles and in
+    the order within a role in which torques add up and a command passes through actuators.
     """
 
-    craft: Craft
+    craft: Any
     law: Law
     gains: Any
-    start: State | WheeledState
+    start: Any
     period: float
     substeps: int = 1
-    orbit: bool = False
-    gravity_gradient: bool = False
-    target: Quaternion | Literal["orbital"] | NDArray[np.float64] = NO_TURN
-    knots: target.Knots | None = None
-    noise: sensor.Noise = sensor.SILENT
+    parts: tuple[Fitted, ...] = ()
     limit: Limit = "axis"
     command_limit: float | None = None
     """Where the command is cut off, in the way of `limit` (N m); None: at the torque limit that the law sees, the craft's.
     Beside wheels the law sees what they surely give together, and the wheels cut off what is more."""
-    dynamics: actuator.Dynamics = actuator.IDEAL
     sign_policy: SignPolicy = "as_published"
     hysteresis_width: float = 0.5
+    far: float = 1e3
     seed: int = 1
-    wheels: Wheels | None = None
-    """Wheels that give the torque; `start` then is a `WheeledState`, and the craft's inertia that without their rotors'
-    moments about their spin axes."""
-    allocation: Allocation = "least-squares"
     events: tuple[Event, ...] = ()
     """What changes during a run, in order of time."""
 
-    def parts(self) -> Parts:
-        """The equations this loop is made of."""
-        around = environment.two_body if self.orbit else environment.free_space
-        if self.gravity_gradient:
-            around = environment.two_body_gravity_gradient
-        goal = target.history if isinstance(self.target, np.ndarray) else target.inertial
-        if isinstance(self.target, str):
-            goal = target.orbital
-        seen_noise = self.noise.attitude > 0.0 or self.noise.rate > 0.0
-        ideal = self.dynamics.lag == 0.0 and math.isinf(self.dynamics.rate_limit)
-        response = actuator.lagging if self.dynamics.lag > 0.0 else actuator.ramping
-        body = rigid_body if self.wheels is None else wheeled_body
-        return Parts(
-            around,
-            goal,
-            sensor.noisy if seen_noise else sensor.exact,
-            sensor.gaussian_disturbance if self.noise.torque > 0.0 else sensor.no_disturbance,
-            SIGN_POLICIES[self.sign_policy],
-            self.law.torque,
-            LIMITS[self.limit],
-            actuator.start_ideal if ideal else actuator.start_lagging,
-            actuator.ideal if ideal else response,
-            body.tidy,
-            body.with_torque,
-            body.rates,
-            body.wheel_momentum,
-            body.record,
-            ALLOCATIONS[self.allocation],
+    @property
+    def body(self) -> Part:
+        """The part that moves."""
+        return find("body", self.law.body)
+
+    def used(self, role: str) -> tuple[Fitted, ...]:
+        """The parts of a role."""
+        return tuple(fitted for fitted in self.parts if fitted.part.role == role)
+
+    def find(self, name: str) -> Fitted | None:
+        """The first part of this name, as the part itself is called."""
+        return next((fitted for fitted in self.parts if fitted.part.name == name), None)
+
+    def has(self, name: str) -> bool:
+        """Whether it has a part of this name."""
+        return self.find(name) is not None
+
+    def with_parts(self, *more: Fitted) -> Self:
+        """The loop with these parts in the places of parts of the same name, or after the others."""
+        kept, new = list(self.parts), list(more)
+        for place, fitted in enumerate(kept):
+            same = next((one for one in new if one.part.name == fitted.part.name), None)
+            if same is not None:
+                kept[place] = same
+                new.remove(same)
+        return replace(self, parts=(*kept, *new))
+
+    def without(self, *words: str) -> Self:
+        """The loop without the parts of these roles or names."""
+        return replace(self, parts=tuple(f for f in self.parts if f.part.role not in words and f.part.name not in words))
+
+    @property
+    def wheels(self) -> Wheels | None:
+        """The reaction wheels, where it has any."""
+        found = self.find("wheels")
+        return None if found is None else found.params
+
+    @property
+    def rotors(self) -> tuple[float, ...]:
+        """The angular momenta of the wheels' rotors at the start (N m s)."""
+        found = self.find("wheels")
+        return () if found is None else found.start.momentum
+
+    @property
+    def target(self) -> Fitted:
+        """What the body is to reach; the inertial axes where nothing else is said."""
+        return next(iter(self.used("target")), ON_TARGET)
+
+    def cutoff(self) -> float:
+        """Where the command is cut off (infinite for nowhere)."""
+        return getattr(self.craft, "torque_limit", np.inf) if self.command_limit is None else self.command_limit
+
+    def composition(self) -> Composition:
+        """The parts whose equations this loop is made of."""
+        estimator = next(iter(self.used("estimator")), None)
+        used = {role: tuple(f.part for f in self.used(role)) for role in ("environment", "effector", "sensor", "actuator")}
+        return Composition(
+            self.body,
+            self.law,
+            self.target.part if self.aims else None,
+            used["environment"],
+            used["effector"],
+            used["sensor"],
+            None if estimator is None else estimator.part,
+            used["actuator"],
+            self.limit,
+            self.sign_policy if self.body.module.SIGN_POLICIES else "",
         )
 
     @property
+    def aims(self) -> bool:
+        """Whether the body is to follow an attitude."""
+        return "attitude" in self.body.module.State._fields
+
+    @property
     def fastest(self) -> float:
-        """The fastest rate (1/s) at which an actuator or a rotor comes to rest by itself, which the integration must
-        resolve: 1/lag, and friction over a rotor's inertia."""
-        rates = [1.0 / self.dynamics.lag if self.dynamics.lag > 0.0 else 0.0]
-        wheels = [event.wheels for event in self.events] + [self.wheels]
-        rates += [relaxation(found) for found in wheels if found is not None]
-        return max(rates)
+        """The fastest rate (1/s) at which a part comes to rest by itself, which the integration must resolve."""
+        return max([0.0, *(fitted.fastest for fitted in (*self.parts, *(f for event in self.events for f in event.parts)))])
 
     @property
     def remembers(self) -> bool:
@@ -206,43 +235,74 @@ class ClosedLoop:
 
     def setup(self) -> Setup:
         """The numbers of this loop."""
-        goal = NO_TURN if isinstance(self.target, str) else self.target
-        if isinstance(goal, np.ndarray):
-            goal = Buffer(goal.ravel().tolist())
-        substep = self.period / self.substeps
-        wheels: Any = NoMemory() if self.wheels is None else self.wheels
-        if self.wheels is not None and self.allocation == "least-peak":
-            wheels = with_facets(self.wheels)
-        cut = self.craft.torque_limit if self.command_limit is None else self.command_limit
-        return Setup(self.period, substep, goal, self.noise, self.hysteresis_width, cut, self.dynamics, wheels)
+
+        def prepared(role: str) -> tuple[Any, ...]:
+            return tuple(fitted.prepared(self.period) for fitted in self.used(role))
+
+        return Setup(
+            self.period,
+            self.period / self.substeps,
+            self.cutoff(),
+            self.hysteresis_width,
+            self.far,
+            self.target.prepared(self.period) if self.aims else (),
+            prepared("environment"),
+            prepared("effector"),
+            prepared("sensor"),
+            *(prepared("estimator") or ((),)),
+            prepared("actuator"),
+        )
 
     def phases(self, steps: int) -> list[Phase]:
         """A run of so many control steps, cut where something changes."""
-        events = (Event(0, self.wheels, self.gains, self.craft, self.craft), *self.events)
+        events = (Event(0, self.parts, self.gains, self.craft, self.craft), *self.events)
         # Of one form in all phases, so that one kernel flies them all.
         gains = alike([event.gains for event in events])
-        crafts = alike([event.craft for event in events] + [event.known for event in events])
+        crafts = alike([event.craft for event in events] + [event.nominal for event in events])
         lasts = [*(min(event.step, steps) for event in self.events), steps]
         found: list[Phase] = []
         before = crafts[0]
-        for event, last, own, craft, known in zip(events, lasts, gains, crafts, crafts[len(events) :], strict=False):
+        for event, last, own, craft, nominal in zip(events, lasts, gains, crafts, crafts[len(events) :], strict=False):
             if last > event.step:
-                setup = replace(self, wheels=event.wheels).setup()
-                found.append(Phase(event.step, last, own, craft, known, setup, before))
+                setup = replace(self, parts=event.parts).setup()
+                found.append(Phase(event.step, last, own, nominal, craft, setup, before))
                 before = craft
         return found
 
-    def carry(self, start: State | WheeledState | None = None, gains: Any = None, known: Craft | None = None) -> Carry:
-        """What a trajectory starts with; from another start, with other gains or a craft that the law takes it for."""
-        start = self.start if start is None else start
-        memory = self.law.remember(gains or self.gains, known or self.craft, self.period)
-        goal = NoMemory()
-        if isinstance(self.target, str):
-            goal = target.orbital(None, start.position, start.velocity, 0, NO_TURN).attitude
-        error = relative(self._goal_at_start(goal), start.attitude)
-        return Carry(start, memory, goal, side(error[0]), ZERO, ZERO, -1.0)
+    def carry(self, start: Any = None, gains: Any = None, nominal: Any = None) -> Carry:
+        """What a trajectory starts with; from another state of the body, with other gains or another nominal model."""
+        start, setup = self.start if start is None else start, self.setup()
+        memory = self.law.remember(gains or self.gains, nominal or self.craft, self.period)
+        goal = self._goal(start, setup) if self.aims else None
+        h = () if goal is None else self.body.module.side_of(start, goal)
+        sensors, estimator = self.used("sensor"), next(iter(self.used("estimator")), None)
+        memories = Memories(
+            goal.attitude if goal is not None and self.target.part.flag("FOLLOWS") else NoMemory(),
+            tuple(f.remembered(own) for f, own in zip(self.used("environment"), setup.environments, strict=True)),
+            tuple(f.remembered(own, start) for f, own in zip(sensors, setup.sensors, strict=True)),
+            tuple(_first(f.part.module.Reading, f.part, start) for f in sensors if is_recorded(f.part)),
+            NoMemory() if estimator is None else estimator.remembered(setup.estimator, start),
+            () if estimator is None else _first(estimator.part.module.Estimate, estimator.part, start),
+        )
+        effectors = tuple(f.remembered(own) for f, own in zip(self.used("effector"), setup.effectors, strict=True))
+        followed = sum(f.part.hook("rates") is not None for f in self.used("actuator"))
+        return Carry(start, effectors, (ZERO,) * (followed - 1), memory, memories, h, ZERO, -1.0)
 
-    def _goal_at_start(self, followed: Any) -> Quaternion:
-        if isinstance(self.target, np.ndarray):
-            return unflatten(self.target[0, :4], NO_TURN)
-        return followed if isinstance(self.target, str) else self.target
+    def first_attitude(self) -> Any:
+        """The attitude of a target that does not depend on the state, at the start."""
+        return self._goal(self.start, self.setup()).attitude
+
+    def _goal(self, start: Any, setup: Setup) -> Goal:
+        """The goal at the start, from whichever of equal attitudes."""
+        return self.target.part.module.goal(setup.target, start, 0, (1.0, 0.0, 0.0, 0.0))
+
+
+def is_recorded(sensor: Part) -> bool:
+    """Whether what a sensor measures is recorded."""
+    return getattr(sensor.module, "RECORDED", True)
+
+
+def _first(kind: Any, part: Part, state: Any) -> Any:
+    """A reading or an estimate before the first: what is so called of the state, else what the part says."""
+    own = getattr(part.module, "FIRST", {})
+    return kind(*(own[name] if name in own else getattr(state, name) for name in kind._fields))

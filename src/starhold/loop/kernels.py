@@ -1,5 +1,5 @@
-"""The kernels that repeat the step of a closed loop, of whatever kind, over one lane or many: programs recorded from the
-equations of a step, compiled when they are first asked for.
+"""The kernels that repeat the step of a closed loop over one lane or many: programs recorded from the equations of a step,
+compiled when they are first asked for.
 
 One lane, any lane of a batch, plain Python, C and JavaScript agree bit for bit. No fast-math anywhere.
 """
@@ -17,25 +17,28 @@ from starhold.algebra.scalar import less
 from starhold.algebra.structure import buffers, flatten, leaves, mapped, move, unflatten
 from starhold.algebra.structured import Buffer, at, repeat
 from starhold.algebra.words import word_add, word_of
-from starhold.loop.closed_loop import Parts
-from starhold.loop.station import StationParts, station_step
-from starhold.loop.step import Step, attitude_step
+from starhold.loop.closed_loop import ClosedLoop, Composition, Phase
+from starhold.loop.step import Step, make_equations
 from starhold.trace.machine import load, word
 from starhold.trace.program import Program
 from starhold.trace.recording import Cells, Recorder
 
-AnyParts: TypeAlias = Parts | StationParts
 Array: TypeAlias = NDArray[np.float64]
 
 
 class Numbers(NamedTuple):
-    """What a kernel takes as arguments: gains, the craft that the law takes it for, the craft that flies, the setup. Numbers
-    of theirs may be arrays (lanes,), where lanes differ. Whole numbers are constants of the kernel."""
+    """The arguments of a kernel: gains, the nominal model that the law has of the craft, the craft that flies, the setup.
+    Numbers of theirs may be arrays (lanes,), where lanes differ. Whole numbers are constants of the kernel."""
 
     gains: Any
-    known: Any
+    nominal: Any
     craft: Any
     setup: Any
+
+    @classmethod
+    def of(cls, phase: Phase) -> Numbers:
+        """The numbers that a phase is flown with."""
+        return cls(phase.gains, phase.nominal, phase.craft, phase.setup)
 
 
 class Observer(NamedTuple):
@@ -48,9 +51,9 @@ class Observer(NamedTuple):
 
 
 @cache
-def make_step(parts: AnyParts) -> Step:
+def make_step(parts: Composition) -> Step:
     """The equations of a control step made of these parts."""
-    return station_step(parts) if isinstance(parts, StationParts) else attitude_step(parts)
+    return make_equations(parts)
 
 
 def form(value: Any) -> Any:
@@ -64,13 +67,13 @@ def form(value: Any) -> Any:
     return "number" if isinstance(value, float) else (type(value), value)
 
 
-def fly_plainly(loop: Any, steps: int, run: int = 0) -> Any:
+def fly_plainly(loop: ClosedLoop, steps: int, run: int = 0) -> Any:
     """What a loop without events carries after so many control steps in plain Python."""
-    step, carry, setup, key = make_step(loop.parts()), loop.carry(), loop.setup(), (loop.seed, run)
+    step, carry, setup, key = make_step(loop.composition()), loop.carry(), loop.setup(), (loop.seed, run)
     for k in range(steps):
-        carry = step.decide(step.check(carry, k, setup), k, key, loop.gains, loop.craft, setup)
+        carry = step.update(step.check(carry, k, setup), k, key, loop.gains, loop.craft, setup)
         for _ in range(loop.substeps):
-            carry = step.hold(carry, loop.craft, setup)
+            carry = step.propagate(carry, loop.craft, setup)
     return step.check(carry, steps, setup)
 
 
@@ -157,7 +160,7 @@ class Kernel:
 _KERNELS: dict[Any, Kernel] = {}
 
 
-def make_kernel(kind: Callable[..., Program], parts: AnyParts, width: int, *arguments: Any) -> Kernel:
+def make_kernel(kind: Callable[..., Program], parts: Composition, width: int, *arguments: Any) -> Kernel:
     """The kernel of a program kind(step, *arguments); one serves all arguments of the same form."""
     key = (kind, parts, width, *map(form, arguments))
     if key not in _KERNELS:
@@ -176,7 +179,7 @@ def one(step: Step, carry: Any, numbers: Numbers, substeps: int) -> Program:
         counts = [recorder.input(name, "index") for name in ("first", "groups", "each", "place", "row")]
         first, groups, each, place, row = counts
         key = (recorder.input("seed", "word"), recorder.input("run", "word"))
-        gains, known, craft, setup = Arguments(*numbers).bound(recorder, 0)
+        gains, nominal, craft, setup = Arguments(*numbers).bound(recorder, 0)
         state = _state(carry, cells, 0)
 
         def lost(carry: Any) -> Any:
@@ -185,15 +188,15 @@ def one(step: Step, carry: Any, numbers: Numbers, substeps: int) -> Program:
         def group(g: Any, carry: Any) -> Any:
             def turn(k: Any, carry: Any) -> Any:
                 now = first + (g * each + k)
-                decided = step.decide(carry, now, key, gains, known, setup)
+                updated = step.update(carry, now, key, gains, nominal, setup)
 
                 def write() -> None:
-                    sample = flatten(step.sample(decided, now, setup))
+                    sample = flatten(step.sample(updated, now, setup))
                     for i, number in enumerate(sample):
                         record[(row + g) * len(sample) + i] = number
 
                 at(k, place, write)
-                return (step.check(_held(step, decided, craft, setup, substeps), now + 1, setup),)
+                return (step.check(_propagated(step, updated, craft, setup, substeps), now + 1, setup),)
 
             return repeat(each, turn, carry, stop=lost)
 
@@ -214,15 +217,15 @@ def many(step: Step, carry: Any, numbers: Numbers, substeps: int, observer: Obse
         arguments = Arguments(*numbers, more)
 
         def block(b: Any) -> None:
-            gains, known, craft, setup, noting = arguments.bound(recorder, b * len(arguments.own))
+            gains, nominal, craft, setup, noting = arguments.bound(recorder, b * len(arguments.own))
             key = (seed, word_add(word_add(run, word_of(b * width)), recorder.lane()))
             base, place = b * len(numbers_of(carry)), b * len(flatten(first_noted))
             state, noted = _state(carry, cells, base), _state(first_noted, seen, place)
 
             def turn(k: Any, carry: Any, noted: Any) -> Any:
                 now = first + k
-                decided = step.decide(carry, now, key, gains, known, setup)
-                after = step.check(_held(step, decided, craft, setup, substeps), now + 1, setup)
+                updated = step.update(carry, now, key, gains, nominal, setup)
+                after = step.check(_propagated(step, updated, craft, setup, substeps), now + 1, setup)
                 if observer is not None:
                     noted = observer.note(noted, carry, after, now + 1, setup, noting)
                 return after, noted
@@ -235,29 +238,31 @@ def many(step: Step, carry: Any, numbers: Numbers, substeps: int, observer: Obse
     return recorder.program("fly", "Flies many closed loops.")
 
 
-def _held(step: Step, carry: Any, craft: Any, setup: Any, substeps: int) -> Any:
+def _propagated(step: Step, carry: Any, craft: Any, setup: Any, substeps: int) -> Any:
     """The carry after the substeps of a control step."""
     if substeps == 1:
-        return step.hold(carry, craft, setup)
-    return repeat(substeps, lambda _, carry: (step.hold(carry, craft, setup),), carry)[0]
+        return step.propagate(carry, craft, setup)
+    return repeat(substeps, lambda _, carry: (step.propagate(carry, craft, setup),), carry)[0]
 
 
 def replay(step: Step, carry: Any, numbers: Numbers) -> Program:
-    """The control calls of a run, recorded, to time them: decisions on states first .. first+count-1, one after another."""
+    """The control calls of a run, recorded, to time them: updates on states first .. first+count-1, one after another."""
     recorder = Recorder()
     with recorder.recording():
         cells, states = recorder.memory("carry", lanes=True, writable=True), recorder.memory("states")
         first, count = recorder.input("first", "index"), recorder.input("count", "index")
         key = (recorder.input("seed", "word"), recorder.input("run", "word"))
-        gains, known, _, setup = Arguments(*numbers).bound(recorder, 0)
-        begun, width = _state(carry, cells, 0), len(flatten(carry.state))
+        gains, nominal, _, setup = Arguments(*numbers).bound(recorder, 0)
+        like = (carry.state, carry.effectors)
+        begun, width = _state(carry, cells, 0), len(flatten(like))
 
         def turn(k: Any, carry: Any) -> Any:
             # Each call waits for the torque of the call before.
             u = carry.command
             wait = 0.0 * (u[0] + u[1] + u[2])
-            state = _state(carry.state, states, (first + k) * width)
-            return (step.decide(carry._replace(state=move(state, wait, state)), first + k, key, gains, known, setup),)
+            state, effectors = _state(like, states, (first + k) * width)
+            carry = carry._replace(state=move(state, wait, state), effectors=effectors)
+            return (step.update(carry, first + k, key, gains, nominal, setup),)
 
         _put(cells, 0, repeat(count, turn, begun)[0])
     return recorder.program("replay", "Repeats the control calls of a run.")

@@ -1,140 +1,254 @@
-"""The equations of one control step of an attitude loop, which all readers share: `decide` (what the law commands at a
-control instant) and `hold` (the motion under the held command)."""
+"""The equations of one control step, which all readers share: `measure` (what a law is told), `update` (what it commands at a
+control instant) and `propagate` (the motion under the held command), composed of the equations of a loop's parts."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
-from starhold.algebra.quaternion import Quaternion, relative, to_body
-from starhold.algebra.scalar import both, is_finite, less, opposite, where
+from starhold.algebra.scalar import both, less, opposite, where
 from starhold.algebra.structure import move
-from starhold.algebra.vector import ZERO, Vector, add, cross, dot, subtract
+from starhold.algebra.vector import ZERO, add
 from starhold.algebra.words import number_of, word_of
-from starhold.laws.interface import Measurement
-from starhold.loop.closed_loop import Carry, Parts
-from starhold.parts.actuators.dynamics import ideal
-from starhold.parts.targets.target import inertial, orbital
-
-
-class Sample(NamedTuple):
-    """One recorded instant: the true state, the error relative to the target, the command."""
-
-    attitude: Quaternion
-    rate: Vector
-    position: Vector
-    velocity: Vector
-    torque: Vector
-    command: Vector
-    attitude_error: Quaternion
-    rate_error: Vector
+from starhold.loop.closed_loop import Carry, Composition, is_recorded
+from starhold.parts.actuators.limits import LIMITS
+from starhold.parts.part import Part
+from starhold.parts.random import RANGE, Dice
+from starhold.parts.roles import Loads, Scene
 
 
 class Step(NamedTuple):
-    """The equations of one control step. `look` gives what the law sees before the double cover is folded."""
+    """The equations of one control step. `measure` gives what the law is told, before the quaternion sign policy chooses."""
 
-    look: Callable[..., Any]
-    decide: Callable[..., Any]
-    hold: Callable[..., Any]
+    measure: Callable[..., Any]
+    update: Callable[..., Any]
+    propagate: Callable[..., Any]
     check: Callable[..., Any]
     sample: Callable[..., Any]
 
 
 def runge_kutta(slope: Callable[..., Any]) -> Callable[..., Any]:
-    """The classical method of fourth order over a substep, for d(state)/dt = slope(state, begun, carry, craft, setup).
+    """The classical method of fourth order over a substep, for d(state)/dt = slope(state, *more)."""
 
-    begun: what the slope is told of the substep's start.
-    """
-
-    def advance(state, begun, carry, craft, setup):
-        h = setup.substep
-        a = slope(state, begun, carry, craft, setup)
-        b = slope(move(state, 0.5 * h, a), begun, carry, craft, setup)
-        c = slope(move(state, 0.5 * h, b), begun, carry, craft, setup)
-        d = slope(move(state, h, c), begun, carry, craft, setup)
+    def advance(state, h, *more):
+        a = slope(state, *more)
+        b = slope(move(state, 0.5 * h, a), *more)
+        c = slope(move(state, 0.5 * h, b), *more)
+        d = slope(move(state, h, c), *more)
         return move(state, h / 6.0, move(move(move(a, 2.0, b), 2.0, c), 1.0, d))
 
     return advance
 
 
-def attitude_step(parts: Parts) -> Step:
+def total(vectors: Any) -> Any:
+    """The sum of vectors from the first to the last; None of none."""
+    found = None
+    for vector in vectors:
+        found = vector if found is None else add(found, vector)
+    return found
+
+
+def make_equations(parts: Composition) -> Step:
     """The equations of a control step made of these parts."""
-    environment, target, sense, disturb, cover, law, limit, begin, response, *body = parts
-    tidy, with_torque, rates, wheel_momentum, record, share = body
+    body, target = parts.body.module, parts.target
+    command_of, limit = parts.law.command, LIMITS[parts.limit]
+    policy = body.SIGN_POLICIES.get(parts.sign_policy)
+    named = _Named(parts)
+    still = target is None or target.flag("STILL")
 
-    def look(carry, step, key, craft, setup):
-        state = carry.state
-        goal = target(setup.target, state.position, state.velocity, step, carry.goal)
-        attitude, rate = sense(state.attitude, state.rate, setup.noise, key, word_of(step))
-        error = relative(goal.attitude, attitude)
-        external = environment(state.position, attitude, craft)[1]
-        position = to_body(attitude, state.position)
-        target_rate, target_acceleration = to_body(error, goal.rate), to_body(error, goal.acceleration)
-        error_rate = subtract(rate, target_rate)
-        target_acceleration = subtract(target_acceleration, cross(error_rate, target_rate))
-        held = wheel_momentum(state, setup.wheels)
-        return Measurement(error, error_rate, rate, target_rate, target_acceleration, external, position, setup.period, held)
+    def goal_of(carry, state, step, setup):
+        return None if target is None else target.module.goal(setup.target, state, step, carry.memories.followed)
 
-    def look_at_rest(carry, step, key, craft, setup):
-        # The same for a target that does not turn, spared the arithmetic on zeros, which must not be dropped.
-        state = carry.state
-        goal = target(setup.target, state.position, state.velocity, step, carry.goal)
-        attitude, rate = sense(state.attitude, state.rate, setup.noise, key, word_of(step))
-        external = environment(state.position, attitude, craft)[1]
-        position = to_body(attitude, state.position)
-        held = wheel_momentum(state, setup.wheels)
-        return Measurement(relative(goal.attitude, attitude), rate, rate, ZERO, ZERO, external, position, setup.period, held)
+    def observed(carry, step, key, craft, setup):
+        """What the law is told, and what sensors and estimator keep of it."""
+        state, memories = carry.state, carry.memories
+        goal = goal_of(carry, state, step, setup)
+        readings, kept = SimpleNamespace(), []
+        found, shown = state, []
+        for sensor, memory, params, first in zip(parts.sensors, memories.sensors, setup.sensors, named.sensors, strict=True):
+            reading, memory = sensor.module.measure(state, memory, params, Dice(key, word_of(step), first), step)
+            vars(readings).update(reading._asdict())
+            found = found._replace(**{name: x for name, x in reading._asdict().items() if name in state._fields})
+            kept.append(memory)
+            if is_recorded(sensor):
+                shown.append(reading)
+        estimate, own = memories.estimate, memories.estimator
+        if parts.estimator is not None:
+            estimate, own = parts.estimator.module.estimate(readings, own, setup.estimator, craft, setup.period)
+            found = state._replace(**{name: x for name, x in estimate._asdict().items() if name in state._fields})
+        telling = [one for one in named.torques if one.part.flag("MODELLED")]
+        torque = total(
+            one.part.module.torque(found, setup.environments[one.place], craft, memories.environments[one.place])
+            for one in telling
+        )
+        momentum = total(
+            e.module.momentum(s, p) for e, s, p in zip(parts.effectors, carry.effectors, setup.effectors, strict=True)
+        )
+        scene = Scene(
+            goal,
+            still,
+            ZERO if torque is None else torque,
+            ZERO if momentum is None else momentum,
+            setup.period,
+            setup.limit,
+        )
+        followed = goal.attitude if target is not None and target.flag("FOLLOWS") else memories.followed
+        return body.observe(found, scene), memories._replace(
+            followed=followed, sensors=tuple(kept), readings=tuple(shown), estimator=own, estimate=estimate
+        )
 
-    def keep(carry, step, setup):
-        return carry.goal
+    def measure(carry, step, key, craft, setup):
+        return observed(carry, step, key, craft, setup)[0]
 
-    def renew(carry, step, setup):
-        return target(setup.target, carry.state.position, carry.state.velocity, step, carry.goal).attitude
+    def update(carry, step, key, gains, craft, setup):
+        told, memories = observed(carry, step, key, craft, setup)
+        h = carry.h
+        if policy is not None:
+            attitude, h = policy(told.attitude, h, setup.width)
+            told = told._replace(attitude=attitude)
+        command, memory = command_of(told, gains, craft, carry.memory)
+        command = limit(command, setup.limit)
+        passed = command
+        for actuator, params in zip(parts.actuators, setup.actuators, strict=True):
+            if actuator.hook("command") is not None:
+                passed = actuator.module.command(passed, params)
+        state = carry.state if named.dynamic else carry.state._replace(**{body.COMMAND: passed})
+        environments = [
+            e.module.update(m, carry.state, p, Dice(key, word_of(step), first), step) if e.hook("update") else m
+            for e, m, p, first in zip(
+                parts.environments, memories.environments, setup.environments, named.environments, strict=True
+            )
+        ]
+        memories = memories._replace(environments=tuple(environments))
+        return Carry(state, carry.effectors, carry.actuators, memory, memories, h, passed, carry.lost_at)
 
-    see = look_at_rest if target is inertial else look
-    follow = renew if target is orbital else keep
+    def outside(kind, state, craft, memories, setup):
+        """The sum of what environments give of a kind."""
+        found = named.torques if kind == "torque" else named.accelerations
+        return total(
+            getattr(one.part.module, kind)(state, setup.environments[one.place], craft, memories.environments[one.place])
+            for one in found
+        )
 
-    def decide(carry, step, key, gains, craft, setup):
-        measurement = see(carry, step, key, craft, setup)
-        shown, h = cover(measurement.attitude, carry.h, setup.width)
-        command, memory = law(measurement._replace(attitude=shown), gains, craft, carry.memory)
-        command = limit(command, setup.command_limit)
-        state = with_torque(carry.state, begin(carry.state.torque, command))
-        disturbance = disturb(setup.noise, key, word_of(step))
-        return Carry(state, memory, follow(carry, step, setup), h, command, disturbance, carry.lost_at)
+    def slope(moving, begun, carry, craft, setup):
+        state, effectors, outputs = moving
+        applied = getattr(state, body.COMMAND)
+        commands = begun.commands
+        if commands is None:
+            commands = tuple(_commands(applied, setup))
+        reactions, inertias = [], []
+        for effector, own, command, params in zip(parts.effectors, effectors, commands, setup.effectors, strict=True):
+            reactions.append(effector.module.reaction(own, command, state, params))
+            if effector.hook("inertia") is not None:
+                inertias.append(effector.module.inertia(own, params))
+        loads = Loads(
+            outside("acceleration", state, craft, carry.memories, setup),
+            outside("torque", state, craft, carry.memories, setup),
+            total(reactions),
+            None if not inertias else _matrices(inertias),
+            not named.acting,
+        )
+        output_rates, command_rate = _driven(outputs, applied, carry, begun, setup)
+        rates = body.rates(state, loads, command_rate, craft)
+        turning = rates[state._fields.index("rate")] if parts.effectors else None
+        own_rates = tuple(
+            effector.module.rates(own, command, state, turning, params)
+            for effector, own, command, params in zip(parts.effectors, effectors, commands, setup.effectors, strict=True)
+        )
+        return (rates, own_rates, output_rates)
 
-    def slope(state, begun, carry, craft, setup):
-        acceleration, external = environment(state.position, state.attitude, craft)
-        given, shared = begun
-        torque_rate = response(state.torque, carry.command, given, setup.substep, setup.dynamics)
-        outside = add(carry.disturbance, external)
-        split = share if shared is None else lambda torque, wheels: shared
-        return rates(state, outside, acceleration, torque_rate, craft, setup.wheels, split)
+    def _commands(applied, setup):
+        for effector, params in zip(parts.effectors, setup.effectors, strict=True):
+            yield effector.module.command(applied, params) if effector.flag("ACTS") else ()
+
+    def _driven(outputs, applied, carry, begun, setup):
+        """d(output)/dt of the actuators that lag: of those before the last, and of the last, whose output acts."""
+        if not named.dynamic:
+            return (), None
+        inputs, values = (carry.command, *outputs), (*outputs, applied)
+        starts = (*begun.outputs, begun.applied)
+        rates = tuple(
+            actuator.module.rates(value, given, start, setup.substep, params)
+            for actuator, value, given, start, params in zip(
+                named.dynamic, values, inputs, starts, [setup.actuators[k] for k in named.dynamic_places], strict=True
+            )
+        )
+        return rates[:-1], rates[-1]
 
     advance = runge_kutta(slope)
 
-    def hold(carry, craft, setup):
+    def propagate(carry, craft, setup):
         """One substep."""
-        given = carry.state.torque
-        # What is held is shared out once.
-        shared = share(given, setup.wheels) if setup.wheels and response is ideal else None
-        end = advance(carry.state, (given, shared), carry, craft, setup)
-        return carry._replace(state=tidy(end))
+        applied = getattr(carry.state, body.COMMAND)
+        # A command that is held is shared out once.
+        commands = tuple(_commands(applied, setup)) if not named.dynamic else None
+        begun = _Begun(commands, applied, carry.actuators)
+        state, effectors, outputs = advance(
+            (carry.state, carry.effectors, carry.actuators), setup.substep, begun, carry, craft, setup
+        )
+        return carry._replace(state=body.renormalised(state), effectors=effectors, actuators=outputs)
 
     def check(carry, step, setup):
-        """Note the step at which the motion is not finite, or turns by more than a radian in one substep."""
-        s = carry.state
-        turn = setup.substep * setup.substep * dot(s.rate, s.rate)
-        sound = both(less(turn, 1.0), both(is_finite(s.attitude[0]), is_finite(dot(s.position, s.position))))
+        """Note the step at which the motion is lost: no longer finite, or beyond what the integration can follow."""
+        sound = body.is_sound(carry.state, setup)
         lost = where(both(opposite(sound), less(carry.lost_at, 0.0)), number_of(step), carry.lost_at)
         return carry._replace(lost_at=lost)
 
     def sample(carry, step, setup):
-        s = carry.state
-        goal = target(setup.target, s.position, s.velocity, step, carry.goal)
-        error = relative(goal.attitude, s.attitude)
-        rate = subtract(s.rate, to_body(error, goal.rate))
-        body = Sample(s.attitude, s.rate, s.position, s.velocity, s.torque, carry.command, error, rate)
-        return record(body, s, setup.wheels, share)
+        state = carry.state
+        applied = getattr(state, body.COMMAND)
+        commands = tuple(_commands(applied, setup))
+        users = list(zip(parts.effectors, carry.effectors, commands, setup.effectors, strict=True))
+        given = total(e.module.applied(own, command, state, p) for e, own, command, p in users if e.flag("ACTS"))
+        own = body.sample(state, goal_of(carry, state, step, setup), applied if given is None else given, carry.command)
+        records = tuple(e.module.record(s, command, state, p) for e, s, command, p in users if e.hook("record"))
+        return (own, records, carry.memories.readings, carry.memories.estimate)
 
-    return Step(see, decide, hold, check, sample)
+    return Step(measure, update, propagate, check, sample)
+
+
+class _Begun(NamedTuple):
+    """What a substep begins with: the effectors' commands where they are held, and what actuators put out."""
+
+    commands: Any
+    applied: Any
+    outputs: Any
+
+
+class _Placed(NamedTuple):
+    """A part and its place among those of its role."""
+
+    part: Part
+    place: int
+
+
+class _Named:
+    """What is told of a composition before any equation runs."""
+
+    def __init__(self, parts: Composition) -> None:
+        environments = [_Placed(part, place) for place, part in enumerate(parts.environments)]
+        self.torques = [one for one in environments if one.part.hook("torque") is not None]
+        self.accelerations = [one for one in environments if one.part.hook("acceleration") is not None]
+        self.dynamic_places = [k for k, part in enumerate(parts.actuators) if part.hook("rates") is not None]
+        self.dynamic = [parts.actuators[k] for k in self.dynamic_places]
+        self.acting = any(effector.flag("ACTS") for effector in parts.effectors)
+        ranges = _ranges([*parts.environments, *parts.sensors])
+        self.environments, self.sensors = ranges[: len(environments)], ranges[len(environments) :]
+
+
+def _ranges(parts: list[Part]) -> list[int]:
+    """The first random number of each part: what it asks for where it is the first of its name, else a range of its own."""
+    found: list[int] = []
+    for place, part in enumerate(parts):
+        own = getattr(part.module, "NUMBERS_FROM", None)
+        found.append((place + 1) * RANGE if own is None or part in parts[:place] else own)
+    return found
+
+
+def _matrices(inertias: Any) -> Any:
+    """The sum of 3x3 matrices."""
+    found = inertias[0]
+    for more in inertias[1:]:
+        found = tuple(add(a, b) for a, b in zip(found, more, strict=True))
+    return found

@@ -9,7 +9,7 @@ from starhold.algebra.quaternion import relative, to_body
 from starhold.algebra.scalar import absolute, less, maximum, where
 from starhold.algebra.vector import Vector, dot, subtract
 from starhold.algebra.words import number_of
-from starhold.loop.closed_loop import Parts
+from starhold.loop.closed_loop import Composition
 
 
 class Ends(NamedTuple):
@@ -33,9 +33,10 @@ class Watched(NamedTuple):
 
 
 @cache
-def watch(parts: Parts) -> Any:
+def watch(parts: Composition) -> Any:
     """The `note` of an `Observer` that keeps a `Watched`; its numbers are `Ends`."""
     target = parts.target
+    assert target is not None
 
     def last_above(then: Any, now: Any, before: Any, step: Any) -> Any:
         # A fraction of the step before, by a line through the two squares.
@@ -44,7 +45,7 @@ def watch(parts: Parts) -> Any:
 
     def note(seen: Watched, before: Any, carry: Any, step: Any, setup: Any, ends: Ends) -> Watched:
         s = carry.state
-        goal = target(setup.target, s.position, s.velocity, step, carry.goal)
+        goal = target.module.goal(setup.target, s, step, carry.memories.followed)
         error = relative(goal.attitude, s.attitude)
         left = subtract(s.rate, to_body(error, goal.rate))
         angle = ends.angle * (error[1] * error[1] + error[2] * error[2] + error[3] * error[3])

@@ -149,3 +149,22 @@ def normal_vector(key: tuple[Word, Word], step: Word, first: int, deviation: Sca
     """Three independent Gaussians of the given standard deviation: the numbers `first` to `first` + 2 of a step."""
     x, y, z = normals(key, step, first, 3)
     return scale(deviation, (x, y, z))
+
+
+class Dice:
+    """The random numbers of one part at one control step: functions of (seed, run, step, number), in a range of its own."""
+
+    def __init__(self, key: tuple[Word, Word], step: Word, first: int) -> None:
+        self._key, self._step, self._first = key, step, first
+
+    def vector(self, place: int, deviation: Scalar) -> Vector:
+        """Three independent Gaussians of this standard deviation: the part's numbers `place` to `place` + 2."""
+        return normal_vector(self._key, self._step, self._first + place, deviation)
+
+    def normals(self, place: int, count: int) -> tuple[Scalar, ...]:
+        """Independent standard Gaussians: the part's numbers from `place` on."""
+        return normals(self._key, self._step, self._first + place, count)
+
+
+RANGE = 64
+"""Random numbers that a part may use at a control step."""

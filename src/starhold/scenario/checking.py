@@ -20,7 +20,6 @@ from starhold.loop.kernels import form, make_step
 from starhold.scenario.tables import check_name
 
 _Model = TypeVar("_Model", bound=BaseModel)
-_Law = TypeVar("_Law", bound=Law)
 _Entry = TypeVar("_Entry")
 MOST_SUBSTEPS = 10**6
 """Of a control period, which is over before an interrupt is heeded."""
@@ -121,14 +120,14 @@ def numbered(laws: Any, where: str) -> list[tuple[str, Any]]:
 
 
 def pick_law(
-    data: Any, known: Mapping[str, _Law], kind: type[_Law], folder: Path, where: str, key: str
-) -> tuple[dict[str, Any], _Law, str | None]:
+    data: Any, known: Mapping[str, Law], folder: Path, where: str, key: str
+) -> tuple[dict[str, Any], Law, str | None]:
     """A law table with its type, the law of that type or in the `file` of the table, which is relative to a folder, and its
     form."""
     if not isinstance(data, dict):
         raise InputError(where, key, show(data), "a [[law]] table")
     table = cast(dict[str, Any], data)
-    law = _law_of(table, known, where, key) if "file" not in table else _law_in(table, known, kind, folder, where, key)
+    law = _law_of(table, known, where, key) if "file" not in table else _law_in(table, known, folder, where, key)
     table = {name: value for name, value in table.items() if name != "file"} | {"type": law.name}
     form = table.get("form")
     if form is not None and (not isinstance(form, str) or form not in law.forms):
@@ -137,7 +136,7 @@ def pick_law(
     return table, law, form
 
 
-def _law_of(table: dict[str, Any], known: Mapping[str, _Law], where: str, key: str) -> _Law:
+def _law_of(table: dict[str, Any], known: Mapping[str, Law], where: str, key: str) -> Law:
     name = table.get("type")
     if not isinstance(name, str) or name not in known:
         allowed = nearest(str(name), list(known)) if isinstance(name, str) else f"{nearest('', list(known))}; or a file"
@@ -145,14 +144,17 @@ def _law_of(table: dict[str, Any], known: Mapping[str, _Law], where: str, key: s
     return known[name]
 
 
-def _law_in(table: dict[str, Any], known: Mapping[str, _Law], kind: type[_Law], folder: Path, where: str, key: str) -> _Law:
+def _law_in(table: dict[str, Any], known: Mapping[str, Law], folder: Path, where: str, key: str) -> Law:
     given, key = table["file"], f"{key}.file"
     if not isinstance(given, str):
         raise InputError(where, key, show(given), 'the name of a Python file, such as "mine.py"')
     if "type" in table:
         raise InputError(where, key, show(given), "either a type or a file, not both")
     try:
-        law = from_file(folder / given, known, kind)
+        law = from_file(folder / given, known)
+        bodies = {one.body for one in known.values()}
+        if law.body not in bodies:
+            raise ValueError(f"a law for the body {law.body}, not for {', '.join(bodies)}")
     except OSError as error:
         raise InputError(where, key, f"{show(given)}: {error.strerror}", "a Python file that holds a law") from None
     except ValueError as error:
@@ -193,8 +195,8 @@ def try_law(loop: Any, where: str, key: str) -> None:
         carry, setup = loop.carry(), loop.setup()
         if law.file is None:
             return
-        measurement = make_step(loop.parts()).look(carry, 0, (0, 0), loop.craft, setup)
-        given = getattr(law.module, law.equation)(measurement, loop.gains, loop.craft, carry.memory)
+        measurement = make_step(loop.composition()).measure(carry, 0, (0, 0), loop.craft, setup)
+        given = law.command(measurement, loop.gains, loop.craft, carry.memory)
         pair = given if isinstance(given, tuple) and len(cast(Any, given)) == 2 else (None, None)
         if not isinstance(pair[0], tuple) or len(cast(Any, pair[0])) != 3:
             raise ValueError(f"{law.file.name}: {law.equation} must return three numbers and the memory, not {show(given)}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,12 @@ from starhold.loop.closed_loop import Event
 from starhold.parts.craft import Craft
 from starhold.parts.effectors.envelope import authority
 from starhold.parts.effectors.wheels import Wheels, lose
+from starhold.parts.part import Fitted
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.scenario.schema import FaultTable
 
 
-def make_events(scenario: Scenario, entry: LawEntry) -> tuple[Event, ...]:
+def make_events(scenario: Scenario, entry: LawEntry, parts: tuple[Fitted, ...]) -> tuple[Event, ...]:
     """The events of a law's run: each fault when it happens, and what is done about it when it is diagnosed.
 
     InputError where a fault names a wheel that is not there, or comes after the end, or leaves less body than the rotors
@@ -28,8 +30,9 @@ def make_events(scenario: Scenario, entry: LawEntry) -> tuple[Event, ...]:
         moments.append((fault.time, False, place))
         if entry.action_on(fault) != "none":
             moments.append((fault.time + fault.delay, True, place))
-    now = Event(0, scenario.wheels, entry.gains, scenario.craft, scenario.craft)
-    begun = 0.0 if now.wheels is None else authority(now.wheels)
+    now = Event(0, parts, entry.gains, scenario.craft, scenario.craft)
+    wheels = scenario.wheels
+    begun = 0.0 if wheels is None else authority(wheels)
     share, learnt, limit = 1.0, (0.0, 0), scenario.craft.torque_limit
     events: list[Event] = []
     for time, diagnosed, place in sorted(moments):
@@ -37,23 +40,29 @@ def make_events(scenario: Scenario, entry: LawEntry) -> tuple[Event, ...]:
         action = entry.action_on(fault)
         body = _body(scenario, place, fault)
         if not diagnosed:
-            wheels = None if now.wheels is None else _struck(now.wheels, fault)
-            now = now._replace(wheels=wheels, craft=body or now.craft)
+            wheels = None if wheels is None else _struck(wheels, fault)
+            now = now._replace(parts=_on(now.parts, wheels), craft=body or now.craft)
         else:
             # Diagnosed late, an inertia that has changed again since is no news.
             if body is not None and (fault.time, place) > learnt:
-                now, learnt = now._replace(known=body), (fault.time, place)
-            if now.wheels is not None and fault.strikes_wheel:
-                left = _left(scenario, now.wheels, place, fault)
+                now, learnt = now._replace(nominal=body), (fault.time, place)
+            if wheels is not None and fault.strikes_wheel:
+                left = _left(scenario, wheels, place, fault)
                 share, limit = authority(left) / begun, scenario.torque_limit(left)
-                now = now._replace(wheels=now.wheels if action == "retune" else left)
+                wheels = wheels if action == "retune" else left
+                now = now._replace(parts=_on(now.parts, wheels))
             # The law's limit is nothing that the body feels, so both crafts have it.
-            now = now._replace(known=now.known._replace(torque_limit=limit))
+            now = now._replace(nominal=now.nominal._replace(torque_limit=limit))
             if action in ("retune", "both"):
-                now = now._replace(gains=_retuned(scenario, entry, now.known, share, place))
+                now = now._replace(gains=_retuned(scenario, entry, now.nominal, share, place))
         now = now._replace(step=round(time / period), craft=now.craft._replace(torque_limit=limit))
         events.append(now)
     return tuple(events)
+
+
+def _on(parts: tuple[Fitted, ...], wheels: Wheels | None) -> tuple[Fitted, ...]:
+    """The parts of a loop on other wheels."""
+    return tuple(replace(f, params=wheels) if f.part.name == "wheels" else f for f in parts)
 
 
 def _check(scenario: Scenario, place: int, fault: FaultTable) -> None:

@@ -175,7 +175,7 @@ def read_attitude(data: dict[str, Any], text: str, where: str, folder: Path, all
 
 def _read_law(data: Any, scenario: Scenario, key: str, taken: set[str], allow_unstable: bool) -> LawEntry:
     where = scenario.where
-    table, law, form = pick_law(data, catalogue(), Law, scenario.folder, where, key)
+    table, law, form = pick_law(data, catalogue(), scenario.folder, where, key)
     read = validate(law_model(law, form), table, where, key, extra=["file", *(["form"] if law.forms else [])])
     values = [getattr(read, item.name) for item in law.fields(form)]
     with refusing(law, where, key):
@@ -186,6 +186,6 @@ def _read_law(data: Any, scenario: Scenario, key: str, taken: set[str], allow_un
         )
     gains = make_gains(law, values, spec, scenario.craft, where, key)
     if not allow_unstable:
-        refuse_unstable(lambda: law.check(gains), where, key)
+        refuse_unstable(lambda: law.check(gains, scenario.craft), where, key)
     name = free_name(read.name, law.name, taken, where, key)
     return LawEntry(name, law, gains, read.quaternion_sign, read.hysteresis_width, form, spec, read.fault_action)

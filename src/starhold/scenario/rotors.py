@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from starhold.parts.effectors.wheel_units import WHEEL_UNITS
-from starhold.parts.effectors.wheels import Wheels, make_wheels, nasa_standard, pyramid, three_orthogonal
+from starhold.parts.effectors.wheels import ALLOCATIONS, Wheels, make_wheels, nasa_standard, pyramid, three_orthogonal
 from starhold.scenario.schema import Rotor, WheelsTable, WheelTable
 
 LAYOUTS = {"orthogonal": three_orthogonal, "pyramid": pyramid, "nasa-standard": nasa_standard}
@@ -25,7 +25,8 @@ def make_rotors(shared: WheelsTable | None, single: Sequence[WheelTable]) -> Whe
         axes = list(LAYOUTS[shared.layout]())
     tables = list(single) if single else [shared] * len(axes)
     columns = {name: [_number(name, table, shared, place) for place, table in enumerate(tables, 1)] for name in NUMBERS}
-    return make_wheels(axes, **columns)
+    allocation = ALLOCATIONS.index("least-squares" if shared is None else shared.allocation)
+    return make_wheels(axes, **columns)._replace(allocation=allocation)
 
 
 def start_momenta(shared: WheelsTable | None, single: Sequence[WheelTable], count: int) -> tuple[float, ...]:

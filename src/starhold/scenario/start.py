@@ -15,9 +15,11 @@ from starhold.algebra.vector import ZERO, add, subtract
 from starhold.errors import InputError
 from starhold.laws.interface import Start
 from starhold.parts.bodies.rigid_body import State
-from starhold.parts.effectors.wheeled_body import WheeledState
+from starhold.parts.catalogue import fit
 from starhold.parts.effectors.wheels import capacity, wheel_momentum
-from starhold.parts.targets.target import Knots, Target, inertial, knots_of, orbital, tabulate
+from starhold.parts.part import Fitted
+from starhold.parts.roles import Goal
+from starhold.parts.targets import history
 from starhold.scenario.history import read_history
 from starhold.scenario.rotors import start_momenta
 from starhold.scenario.schema import Pointing
@@ -35,29 +37,18 @@ def _attitude(pointing: Pointing) -> Quaternion:
     return normalise(stretch(1.0 / max(map(abs, pointing.attitude)), pointing.attitude))
 
 
-def target_of(scenario: Scenario) -> Any:
-    """The target as a `ClosedLoop` takes it."""
-    table = scenario.table.target
+def target_of(scenario: Scenario) -> Fitted:
+    """The target of the scenario."""
+    table, simulation = scenario.table.target, scenario.table.simulation
     if table.mode == "orbital":
-        return "orbital"
-    return _attitude(table) if table.mode == "inertial" else _table(scenario)
-
-
-def knots_for(scenario: Scenario) -> Knots | None:
-    """The knots of the spline that a target with a history follows; None for other targets."""
-    simulation = scenario.table.simulation
-    last = simulation.steps * simulation.control_period
-    return (
-        _history(scenario, lambda times, rows: knots_of(times, rows, last))
-        if scenario.table.target.mode == "history"
-        else None
-    )
-
-
-def _table(scenario: Scenario) -> Any:
-    simulation = scenario.table.simulation
+        return fit("target", "orbital")
+    if table.mode == "inertial":
+        return fit("target", "inertial", _attitude(table))
     samples = np.arange(simulation.steps + 1) * simulation.control_period
-    return _history(scenario, lambda times, rows: tabulate(times, rows, samples))
+    rows = _history(scenario, lambda times, rows: history.tabulate(times, rows, samples))
+    last = simulation.steps * simulation.control_period
+    knots = _history(scenario, lambda times, rows: history.knots_of(times, rows, last))
+    return fit("target", "history", rows, knots)
 
 
 def _history(scenario: Scenario, use: Callable[..., Any]) -> Any:
@@ -72,44 +63,36 @@ def _history(scenario: Scenario, use: Callable[..., Any]) -> Any:
         raise InputError(scenario.where, "target.file", f"{path}: {error}", allowed) from None
 
 
-def start_of(scenario: Scenario, goal: Any) -> State | WheeledState:
+def start_of(scenario: Scenario, goal: Fitted) -> State:
     """The first state of a run with this target."""
     table = scenario.table
     orbit = table.orbit
     position, velocity = (ZERO, ZERO) if orbit is None else orbit.start
-    attitude, rate = _attitude(table.initial), table.initial.rate
+    begun = State(_attitude(table.initial), table.initial.rate, position, velocity, ZERO)
     if table.initial.relative_to == "target":
-        held = _target_at_start(goal, position, velocity)
-        rate = add(rate, to_body(attitude, held.rate))
-        attitude = multiply(held.attitude, attitude)
-    wheels = scenario.wheels
-    if wheels is None:
-        return State(attitude, rate, position, velocity, ZERO)
-    momentum = start_momenta(table.wheels, table.wheel, len(wheels.axes))
-    return WheeledState(attitude, rate, position, velocity, ZERO, momentum)
+        held = _goal_at_start(goal, begun)
+        rate = add(begun.rate, to_body(begun.attitude, held.rate))
+        return begun._replace(attitude=multiply(held.attitude, begun.attitude), rate=rate)
+    return begun
 
 
-def _target_at_start(goal: Any, position: Any, velocity: Any) -> Target:
-    if isinstance(goal, str):
-        return orbital(None, position, velocity, 0, NO_TURN)
-    if isinstance(goal, np.ndarray):
-        row = goal[0].tolist()
-        return Target(tuple(row[:4]), tuple(row[4:7]), tuple(row[7:]))
-    return inertial(goal, position, velocity, 0, None)
+def _goal_at_start(goal: Fitted, begun: State) -> Goal:
+    return goal.part.module.goal(goal.prepared(1.0), begun, 0, NO_TURN)
 
 
 def told_to_design(scenario: Scenario, cover: str) -> Start:
     """What the design of a law of a scenario may reckon with; `cover`: which of q and -q is fed back."""
     table, goal = scenario.table, target_of(scenario)
     begun = start_of(scenario, goal)
-    held = _target_at_start(goal, begun.position, begun.velocity)
+    held = _goal_at_start(goal, begun)
     error = relative(held.attitude, begun.attitude)
     error = error if cover == "as_published" else stretch(side(error[0]), error)
     rate = subtract(begun.rate, to_body(error, held.rate))
     momentum, held_by_wheels = math.inf, None
     free = table.spacecraft.limit == "none" and scenario.wheels is None
     torque = math.inf if free else scenario.torque_limit(scenario.wheels)
-    if scenario.wheels is not None and isinstance(begun, WheeledState):
-        held_by_wheels, momentum = wheel_momentum(begun.momentum, scenario.wheels), capacity(scenario.wheels, begun.momentum)
+    if scenario.wheels is not None:
+        momenta = start_momenta(table.wheels, table.wheel, len(scenario.wheels.axes))
+        held_by_wheels, momentum = wheel_momentum(momenta, scenario.wheels), capacity(scenario.wheels, momenta)
     tolerances = table.settling
     return Start(error, rate, held_by_wheels, torque, momentum, tolerances.attitude_tolerance, tolerances.rate_tolerance)

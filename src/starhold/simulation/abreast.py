@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.structure import flatten, leaves, mapped
+from starhold.algebra.structure import buffers, flatten, leaves, mapped, places
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import Arguments, Kernel, Numbers, form, make_kernel, make_step, numbers_of, one, state_of
 from starhold.simulation.lane import Progress, fly
 from starhold.trace.machine import aligned, widest
@@ -25,8 +26,7 @@ MOST = 2**26
 class Flying(NamedTuple):
     """A loop, its control steps, and the control steps a sample."""
 
-    loop: Any
-    """A `ClosedLoop` or a `StationLoop`."""
+    loop: ClosedLoop
     steps: int
     record_every: int
 
@@ -65,9 +65,9 @@ def fly_abreast(
 def _key(flight: Flying) -> Any:
     """Equal for flights that one kernel serves, with the same tables."""
     loop = flight.loop
-    phases = [(p.first, p.last, form((p.gains, p.known, p.craft, p.setup))) for p in loop.phases(flight.steps)]
-    table = loop.target.tobytes() if isinstance(getattr(loop, "target", None), np.ndarray) else b""
-    return (loop.parts(), loop.substeps, loop.seed, form(loop.carry()), tuple(phases), table, *flight[1:])
+    phases = [(p.first, p.last, form(Numbers.of(p))) for p in loop.phases(flight.steps)]
+    tables = [np.array(table.cells).tobytes() for phase in loop.phases(flight.steps) for table in buffers(phase.setup)]
+    return (loop.composition(), loop.substeps, loop.seed, form(loop.carry()), tuple(phases), tuple(tables), *flight[1:])
 
 
 def _one_by_one(group: Sequence[Flying], numbers: Sequence[int], use: Callable[..., Any]) -> list[Callable[[], Any]]:
@@ -79,14 +79,14 @@ def _one_by_one(group: Sequence[Flying], numbers: Sequence[int], use: Callable[.
 
 def _together(group: Sequence[Flying], numbers: Sequence[int], use: Callable[..., Any]) -> list[Callable[[], Any]]:
     loop, steps, every = group[0]
-    size = len(flatten(make_step(loop.parts()).sample(loop.carry(), 0, loop.setup())))
+    size = len(flatten(make_step(loop.composition()).sample(loop.carry(), 0, loop.setup())))
     width = widest(len(numbers_of(loop.carry())))
     if (steps // every + 1) * size * width > MOST:
         return _one_by_one(group, numbers, use)
     phases = [flight.loop.phases(steps) for flight in group]
     # Of all lanes at once, so that one kernel flies every block of them.
     whole = [_spread([own[k] for own in phases]) for k in range(len(phases[0]))]
-    kernels = [make_kernel(one, loop.parts(), width, loop.carry(), values, loop.substeps) for values in whole]
+    kernels = [make_kernel(one, loop.composition(), width, loop.carry(), values, loop.substeps) for values in whole]
 
     def block(first: int) -> list[tuple[int, Any]]:
         lanes = [min(first + k, len(group) - 1) for k in range(width)]
@@ -100,7 +100,7 @@ def _together(group: Sequence[Flying], numbers: Sequence[int], use: Callable[...
 
 def _spread(phases: Sequence[Any]) -> Numbers:
     """The numbers of a phase for many lanes: those that differ become arrays (lanes,)."""
-    values = [Numbers(phase.gains, phase.known, phase.craft, phase.setup) for phase in phases]
+    values = [Numbers.of(phase) for phase in phases]
     columns = zip(*(leaves(value) for value in values), strict=True)
 
     def leaf(first: Any) -> Any:
@@ -117,7 +117,7 @@ class _Vector:
     def __init__(self, flights: Sequence[Flying], phases: Sequence[Any], kernels: Sequence[Kernel], size: int) -> None:
         self.phases, self.kernels, self.size, self.width = phases, kernels, size, len(flights)
         loop, self.steps, self.every = flights[0]
-        self.seed, self.like, self.step = loop.seed, loop.carry(), make_step(loop.parts())
+        self.seed, self.like, self.step = loop.seed, loop.carry(), make_step(loop.composition())
         self.begun: list[Any] = [flight.loop.carry() for flight in flights]
         self.setups = [flight.loop.setup() for flight in flights]
         self.carry = aligned(len(numbers_of(self.like)), self.width)
@@ -125,7 +125,7 @@ class _Vector:
             self.carry[:, lane] = numbers_of(carry)
         self.samples = aligned((self.steps // self.every + 1) * size, self.width)
         self.samples[:] = np.nan
-        self.lost_row = len(flatten(self.like)) - 1
+        self.lost_row = places(self.like).lost_at
 
     def fly(self, numbers: Sequence[Numbers]) -> Callable[[int], tuple[NDArray[np.float64], Any]]:
         """Fly to the end; returns what gives samples and carry of a lane."""

@@ -8,17 +8,16 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra.quantity import Quantity, quantities
 from starhold.algebra.structure import flatten
 from starhold.errors import InputError
-from starhold.loop.closed_loop import Carry, ClosedLoop
+from starhold.loop.closed_loop import Carry, ClosedLoop, is_recorded
 from starhold.loop.kernels import Arguments, Kernel, Numbers, make_kernel, make_step, numbers_of, one, state_of
-from starhold.loop.station import StationCarry, StationLoop
-from starhold.loop.step import Sample
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,30 +31,6 @@ PULSE = 0.1
 IN_MEMORY = 2**28
 """Bytes of samples that are held in memory; more of them lie in a temporary file."""
 
-COLUMNS: dict[str, tuple[str, str, str]] = {
-    "attitude": ("quaternion", "1", "attitude, inertial to body, scalar first"),
-    "rate": ("axis", "rad/s", "angular velocity, body axes"),
-    "position": ("axis", "m", "position, inertial"),
-    "velocity": ("axis", "m/s", "velocity, inertial"),
-    "torque": ("axis", "N m", "torque applied by the actuators, body axes"),
-    "command": ("axis", "N m", "torque commanded, within the limits, body axes"),
-    "attitude_error": ("quaternion", "1", "turn from the target to the body, scalar first"),
-    "rate_error": ("axis", "rad/s", "angular velocity relative to the target, body axes"),
-}
-"""Recorded quantities in the order of `Sample`: dimension, unit, meaning."""
-
-WHEELS: dict[str, tuple[str, str, str]] = {
-    "wheel_momentum": ("wheel", "N m s", "angular momentum of each rotor about its spin axis"),
-    "wheel_torque": ("wheel", "N m", "rate of that momentum: the motor's torque and friction"),
-    "wheel_command": ("wheel", "N m", "torque asked of each motor"),
-    "wheel_available": (
-        "wheel",
-        "N m",
-        "most that the motor gives in that direction, as its momentum is",
-    ),
-}
-"""What is recorded of wheels, after the quantities of COLUMNS, in the order of `WheelSample`."""
-
 
 class Variable(NamedTuple):
     """Names of the dimensions, values, and attributes such as the unit."""
@@ -67,12 +42,11 @@ class Variable(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class Recording:
-    """A trajectory as arrays: `time` (n,) and the quantities of `columns`; of an attitude loop in SI those of COLUMNS,
-    (n, 4) or (n, 3), and of WHEELS."""
+    """A trajectory as arrays: `time` (n,) and the quantities of `columns`, (n, components) or (n,) of single numbers."""
 
     arrays: dict[str, NDArray[np.float64]]
     attrs: dict[str, Any]
-    columns: dict[str, tuple[str, str, str]] = field(default_factory=lambda: COLUMNS | WHEELS)
+    columns: dict[str, Quantity] = field(default_factory=dict[str, Quantity])
     time_unit: str = "s"
 
     def __repr__(self) -> str:
@@ -93,13 +67,14 @@ class Recording:
         """What is recorded, and its coordinates, by name."""
         data: dict[str, Variable] = {}
         columns = {name: told for name, told in self.columns.items() if name in self.arrays}
-        for name, (dimension, unit, meaning) in columns.items():
-            data[name] = Variable(("time", dimension), self[name], {"units": unit, "long_name": meaning})
+        for name, (unit, meaning, dimension) in columns.items():
+            dimensions = ("time", dimension) if dimension else ("time",)
+            data[name] = Variable(dimensions, self[name], {"units": unit, "long_name": meaning})
         coords = {
             "time": Variable(("time",), self["time"], {"units": self.time_unit, "long_name": "time"}),
             "axis": Variable(("axis",), ["x", "y", "z"], {}),
         }
-        if any(dimension == "quaternion" for dimension, _, _ in columns.values()):
+        if any(told.dimension == "quaternion" for told in columns.values()):
             coords["quaternion"] = Variable(("quaternion",), ["q0", "q1", "q2", "q3"], {})
         return data, coords
 
@@ -117,21 +92,12 @@ def simulate(
     return label(loop, samples, carry, record_every).dataset()
 
 
-@overload
 def fly(
     loop: ClosedLoop, steps: int, record_every: int = 1, run: int = 0, progress: Progress | None = None
-) -> tuple[NDArray[np.float64], Carry]: ...
-@overload
-def fly(
-    loop: StationLoop, steps: int, record_every: int = 1, run: int = 0, progress: Progress | None = None
-) -> tuple[NDArray[np.float64], StationCarry]: ...
-def fly(
-    loop: ClosedLoop | StationLoop, steps: int, record_every: int = 1, run: int = 0, progress: Progress | None = None
-) -> tuple[NDArray[np.float64], Any]:
+) -> tuple[NDArray[np.float64], Carry]:
     """The samples (number, sample) of a trajectory, one row for each number of a sample, and what it carries at its end."""
-    like: Any = loop.carry()
-    phases: Any = loop.phases(steps)
-    width = len(flatten(make_step(loop.parts()).sample(like, 0, loop.setup())))
+    like, phases = loop.carry(), loop.phases(steps)
+    width = len(flatten(make_step(loop.composition()).sample(like, 0, loop.setup())))
     samples = _room(steps, record_every, width)
     carry, done, chunk = np.array(numbers_of(like)), 0, steps if progress is None else 1
     flight = _Flight(loop, like, record_every, run, samples)
@@ -149,7 +115,7 @@ def fly(
         lost_at = state_of(carry, like).lost_at
         if lost_at == 0.0:
             # Nothing was decided; what there is to see is the start.
-            samples[0] = flatten(make_step(loop.parts()).sample(like, 0, loop.setup()))
+            samples[0] = flatten(make_step(loop.composition()).sample(like, 0, loop.setup()))
         if lost_at >= 0.0:
             return samples[: max(1, int(np.ceil(lost_at / record_every)))].T, state_of(carry, like)
     if steps % record_every == 0 and phases:
@@ -168,8 +134,8 @@ class _Flight:
     def _prepared(self, phase: Any) -> tuple[Arguments, Kernel]:
         """Arguments and kernel of a phase, made once for all the chunks that it is flown in."""
         if phase.first not in self._ready:
-            numbers = Numbers(phase.gains, phase.known, phase.craft, phase.setup)
-            kernel = make_kernel(one, self.loop.parts(), 1, self.like, numbers, self.loop.substeps)
+            numbers = Numbers.of(phase)
+            kernel = make_kernel(one, self.loop.composition(), 1, self.like, numbers, self.loop.substeps)
             self._ready[phase.first] = Arguments(*numbers), kernel
         return self._ready[phase.first]
 
@@ -192,29 +158,49 @@ class _Flight:
 def label(loop: ClosedLoop, samples: NDArray[np.float64], carry: Carry, record_every: int) -> Recording:
     """The samples of `fly` under their names."""
     arrays = {"time": np.arange(samples.shape[1]) * (loop.period * record_every)}
+    columns: dict[str, Quantity] = {}
     row = 0
-    for name in Sample._fields:
-        size = _size(name)
-        arrays[name] = samples[row : row + size].T
+    for name, quantity, size in recorded(loop):
+        values = samples[row : row + size]
+        arrays[name], columns[name] = values.T if quantity.dimension else values[0], quantity
         row += size
-    if loop.wheels is not None:
-        count = len(loop.wheels.axes)
-        for place, name in enumerate(WHEELS):
-            arrays[name] = samples[row + place * count : row + (place + 1) * count].T
     attrs: dict[str, Any] = {
+        "body": loop.body.name,
         "law": loop.law.name,
         "control_period": loop.period,
         "record_every": record_every,
-        "torque_limit": loop.craft.torque_limit if loop.command_limit is None else loop.command_limit,
+        f"{loop.body.module.COMMAND}_limit": loop.cutoff(),
         "limit": loop.limit,
+        "parts": ", ".join(fitted.called for fitted in loop.parts),
     }
     if carry.lost_at >= 0.0:
         attrs["diverged_at"] = carry.lost_at * loop.period
-    return Recording(arrays, attrs)
+    return Recording(arrays, attrs, columns, loop.body.module.TIME_UNIT)
 
 
-def _size(name: str) -> int:
-    return 4 if COLUMNS[name][0] == "quaternion" else 3
+def recorded(loop: ClosedLoop) -> list[tuple[str, Quantity, int]]:
+    """The recorded quantities in the order of samples: name, quantity and how many numbers it has. Those of sensors and of an
+    estimator are called after the part; so are those of effectors where a name would stand twice."""
+    sample = make_step(loop.composition()).sample(loop.carry(), 0, loop.setup())
+    own, records, readings, estimate = sample
+    effectors = [f for f in loop.used("effector") if f.part.hook("record") is not None]
+    sensors = [f for f in loop.used("sensor") if is_recorded(f.part)]
+    estimators = loop.used("estimator")
+    found: list[tuple[str, Quantity, int]] = []
+    taken: set[str] = set()
+    groups = [("", own), *(("", one) for one in records)]
+    callers = ["", *(f.called for f in effectors)]
+    groups += [(f.called, one) for f, one in zip(sensors, readings, strict=True)]
+    groups += [(f.called, estimate) for f in estimators]
+    callers += [f.called for f in (*sensors, *estimators)]
+    for (prefix, values), caller in zip(groups, callers, strict=True):
+        told = quantities(type(values))
+        for name, value in zip(values._fields, values, strict=True):
+            stem = prefix or (caller if name in taken else "")
+            full = f"{stem.replace('-', '_')}_{name}" if stem else name
+            taken.add(full)
+            found.append((full, told[name], len(flatten((value,)))))
+    return found
 
 
 def _room(steps: int, record_every: int, width: int) -> NDArray[np.float64]:

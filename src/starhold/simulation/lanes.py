@@ -11,48 +11,43 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.structure import flatten, leaves, mapped, rebuild, unflatten
+from starhold.algebra.structure import flatten, leaves, mapped, places, rebuild, unflatten
 from starhold.loop.closed_loop import ClosedLoop, Phase
 from starhold.loop.kernels import Arguments, Numbers, Observer, make_kernel, many, numbers_of
-from starhold.loop.station import StationLoop, StationPhase
-from starhold.parts.bodies.libration_point import PointState
-from starhold.parts.bodies.rigid_body import State
 from starhold.simulation.lane import Progress
 from starhold.trace.machine import aligned, widest
 
-RATE = slice(4, 7)
-"""The rows of the rate among the numbers of a state."""
 PIECES = 16
 """Pieces of a batch for each thread, between which progress is told and an interrupt is heeded."""
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Where many trajectories ended. states: (numbers of a state, lanes), rows in the order of the loop's `start`; lost_at:
-    (lanes,) control step at which the motion was lost, -1 where it was not."""
+    """Where many trajectories ended. states: (numbers of a state, lanes), rows in the order of the loop's `start` and then of
+    its effectors; lost_at: (lanes,) control step at which the motion was lost, -1 where it was not."""
 
     states: NDArray[np.float64]
     lost_at: NDArray[np.float64]
     like: Any
 
     def state(self, lane: int) -> Any:
-        """The state of a lane, a `State`, `WheeledState` or `PointState`."""
+        """The state of the body in a lane."""
         return unflatten(self.states[:, lane], self.like)
 
 
 def simulate_many(
-    loop: ClosedLoop | StationLoop,
-    starts: Sequence[State | PointState] | NDArray[np.float64],
+    loop: ClosedLoop,
+    starts: Sequence[Any] | NDArray[np.float64],
     steps: int,
     first_run: int = 0,
     threads: int | None = None,
     progress: Progress | None = None,
-    phases: Sequence[Phase | StationPhase] | None = None,
+    phases: Sequence[Phase] | None = None,
     width: int | None = None,
 ) -> Batch:
     """Fly `loop` from each of many states for `steps` control periods.
 
-    starts: states, or an array (numbers of a state, lanes); first_run: the run number of lane 0, which with the seed fixes
+    starts: states of the body, or an array (numbers of a state, lanes), with the effectors' below or without; first_run: the run number of lane 0, which with the seed fixes
     its random numbers; phases: those of the loop, `loop.phases(steps)`, with an array (lanes,) in place of every number that
     differs between lanes, whole numbers excepted, see `alongside`; width: lanes in flight at once on a core.
 
@@ -74,7 +69,8 @@ def simulate_many(
 
     fleet.share_out(work, workers, progress)
     ends = fleet.carries()
-    return Batch(ends[: len(start)], ends[fleet.lost_row], loop.start)
+    moving = len(flatten((fleet.like.state, fleet.like.effectors)))
+    return Batch(ends[:moving], ends[fleet.rows.lost_at], loop.start)
 
 
 class Fleet:
@@ -85,7 +81,7 @@ class Fleet:
 
     def __init__(
         self,
-        loop: ClosedLoop | StationLoop,
+        loop: ClosedLoop,
         carries: NDArray[np.float64],
         first_run: int,
         width: int,
@@ -95,8 +91,8 @@ class Fleet:
         self.loop, self.first_run, self.width, self.observer = loop, first_run, width, observer
         self.lanes = carries.shape[1]
         self.count = -(-self.lanes // width)
-        self.like: Any = loop.carry()
-        self.lost_row = len(flatten(self.like)) - 1
+        self.like = loop.carry()
+        self.rows = places(self.like)
         self.x = self._packed(carries)
         self.noted = self._packed(np.empty((0, self.lanes)) if noted is None else noted)
         self._ready: dict[int, Any] = {}
@@ -119,13 +115,14 @@ class Fleet:
         """What has been noted of each lane, (numbers, lanes)."""
         return self._unpacked(self.noted)
 
-    def fly(self, phase: Any, piece: range, first: int | None = None, count: int | None = None) -> None:
+    def fly(self, phase: Phase, piece: range, first: int | None = None, count: int | None = None) -> None:
         """Fly the blocks of a piece through a phase, or through `count` control steps of it from `first` on."""
         _, kernel, arguments, own, turn = self.prepare(phase)
         part = self.x[piece.start : piece.stop]
         if turn is not None and first is None:
-            rates = self._unblocked(part[:, RATE])
-            part[:, RATE] = self._blocked(np.array(turn(tuple(rates), piece)), len(piece))
+            rows = list(self.rows.state.rate)
+            rates = self._unblocked(part[:, rows])
+            part[:, rows] = self._blocked(np.array(turn(tuple(rates), piece)), len(piece))
         memories = {
             "carry": part,
             "noted": self.noted[piece.start : piece.stop],
@@ -144,14 +141,14 @@ class Fleet:
     def _blocked(self, rows: NDArray[np.float64], count: int) -> NDArray[np.float64]:
         return rows.reshape(len(rows), count, self.width).swapaxes(0, 1)
 
-    def prepare(self, phase: Any) -> Any:
+    def prepare(self, phase: Phase) -> Any:
         """Compile what flies a phase, once, before threads share it out."""
         if id(phase) not in self._ready:
             observer = self.observer
-            numbers = Numbers(phase.gains, phase.known, phase.craft, phase.setup)
+            numbers = Numbers.of(phase)
             arguments = Arguments(*numbers, () if observer is None else observer.numbers)
-            kernel = make_kernel(many, self.loop.parts(), self.width, self.like, numbers, self.loop.substeps, observer)
-            turn = self._turned(phase) if isinstance(phase, Phase) and phase.turns else None
+            kernel = make_kernel(many, self.loop.composition(), self.width, self.like, numbers, self.loop.substeps, observer)
+            turn = self._turned(phase) if phase.jumps else None
             self._ready[id(phase)] = (phase, kernel, arguments, self._packed(arguments.rows(self.lanes)), turn)
         return self._ready[id(phase)]
 
@@ -194,26 +191,37 @@ class Fleet:
                 raise
 
 
-def carry_columns(loop: ClosedLoop | StationLoop, start: NDArray[np.float64], phase: Any = None) -> NDArray[np.float64]:
+def carry_columns(loop: ClosedLoop, start: NDArray[np.float64], phase: Any = None) -> NDArray[np.float64]:
     """What each lane starts with, one column a lane, from its state (numbers of a state, lanes). phase: the first, where
     numbers of it differ between lanes."""
     lanes = start.shape[1]
-    own = phase is not None and any(isinstance(leaf, np.ndarray) for leaf in leaves((phase.gains, phase.known)))
-    if isinstance(loop, ClosedLoop) and (isinstance(loop.target, str) or (own and loop.remembers)):
-        gains, known = (None, None) if phase is None else (phase.gains, phase.known)
+    own = phase is not None and any(isinstance(leaf, np.ndarray) for leaf in leaves((phase.gains, phase.nominal)))
+    first = loop.carry()
+    rows = places(first)
+    moving = len(flatten((first.state, first.effectors)))
+    if _differ(loop) or (own and loop.remembers):
+        gains, nominal = (None, None) if phase is None else (phase.gains, phase.nominal)
         carries = (
-            loop.carry(unflatten(start[:, lane], loop.start), _of_lane(gains, lane), _of_lane(known, lane))
+            loop.carry(unflatten(start[:, lane], loop.start), _of_lane(gains, lane), _of_lane(nominal, lane))
             for lane in range(lanes)
         )
-        return np.array([numbers_of(carry) for carry in carries]).T
-    # Lanes differ in their state and in the side of the double cover they start on, and in nothing else.
-    first: Any = loop.carry()
-    columns = np.repeat(np.array(numbers_of(first))[:, None], lanes, axis=1)
-    columns[: len(start)] = start
-    if isinstance(loop, ClosedLoop):
-        goal = loop.target[0, :4] if isinstance(loop.target, np.ndarray) else np.array(loop.target)
-        columns[len(start) + len(flatten((first.memory, first.goal)))] = np.where(goal @ start[:4] < 0.0, -1.0, 1.0)
+        columns = np.array([numbers_of(carry) for carry in carries]).T
+    else:
+        columns = np.repeat(np.array(numbers_of(first))[:, None], lanes, axis=1)
+    # Beside their state, lanes differ in the sign of the quaternion that they start with.
+    columns[: min(len(start), moving)] = start
+    if loop.aims and not _differ(loop):
+        goal = loop.first_attitude()
+        columns[rows.h] = np.where(np.array(goal) @ start[list(rows.state.attitude)] < 0.0, -1.0, 1.0)
     return columns
+
+
+def _differ(loop: ClosedLoop) -> bool:
+    """Whether what a loop carries at its start, beside the body's state and h, depends on that state."""
+    starting = [f.part for f in (*loop.used("sensor"), *loop.used("estimator")) if f.part.hook("remember")]
+    return bool(starting or loop.carry().memories.readings or loop.carry().memories.estimate) or (
+        loop.aims and loop.target.part.flag("FOLLOWS")
+    )
 
 
 def alongside(values: Sequence[Any]) -> Any:

@@ -16,7 +16,6 @@ from starhold.parts.bodies.rigid_body import kinetic_energy
 from starhold.parts.craft import tensor
 from starhold.parts.effectors.wheels import gives_what_is_asked
 from starhold.parts.quaternion_sign import SIGN_POLICIES
-from starhold.parts.sensors.gaussian import SILENT
 from starhold.scenario.building import build
 from starhold.simulation.lane import fly
 
@@ -63,18 +62,20 @@ def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:
         return found
     latest = {event.step: event for event in loop.events if event.step < steps}
     for step, event in latest.items():
-        sound = event.wheels is None or gives_what_is_asked(event.wheels)
-        if not sound or event.known.inertia != event.craft.inertia:
+        sound = all(gives_what_is_asked(f.params) for f in event.parts if f.part.name == "wheels")
+        if not sound or event.nominal.inertia != event.craft.inertia:
             continue
-        now = replace(loop, events=(), craft=event.craft, gains=event.gains, wheels=event.wheels)
+        now = replace(loop, events=(), craft=event.craft, gains=event.gains, parts=event.parts)
         if step:
             # A step more, for what the event changes at once.
             carry = fly(loop, step)[1]
             phase = next(phase for phase in loop.phases(steps) if phase.first == step)
-            state = carry.state._replace(rate=phase.rate_from(carry.state.rate))
-            now = replace(now, start=state)
-            if isinstance(loop.target, np.ndarray):
-                now = replace(now, target=loop.target[step:])
+            carry = phase.entered(carry)
+            moving = zip(now.used("effector"), carry.effectors, strict=True)
+            now = replace(now, start=carry.state).with_parts(*(replace(f, start=own) for f, own in moving))
+            if loop.target.part.name == "history":
+                table = loop.target.params.table[step:]
+                now = now.with_parts(replace(loop.target, params=loop.target.params._replace(table=table)))
         found = [(step, now)] if step == 0 else [*found, (step, now)]
     return found
 
@@ -105,8 +106,8 @@ def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
     if loop.remembers:
         return {}
     # The true start, whatever the sensors make of it.
-    loop = replace(loop, noise=SILENT)
-    measurement = make_step(loop.parts()).look(loop.carry(), 0, 0, loop.craft, loop.setup())
+    loop = loop.without("sensor", "estimator")
+    measurement = make_step(loop.composition()).measure(loop.carry(), 0, 0, loop.craft, loop.setup())
     shown = measurement._replace(
         attitude=SIGN_POLICIES[loop.sign_policy](measurement.attitude, loop.carry().h, loop.hysteresis_width)[0]
     )

@@ -12,21 +12,20 @@ from starhold.analysis.station_departure import station_departures
 from starhold.analysis.station_trial import fly_station, station_start_inside
 from starhold.certification.station import certify_station
 from starhold.files import atomic_write
-from starhold.loop.station import StationLoop
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.libration_point import Units
 from starhold.parts.craft import vector
 from starhold.report.results import SUMMARY, signed, write_summary
 from starhold.report.station.figures import sketch as sketch
 from starhold.scenario.station.building import build as build
 from starhold.scenario.station.reading import StationEntry, StationScenario
-from starhold.simulation.lane import Progress, Recording, fly
-from starhold.simulation.station import label_station
+from starhold.simulation.lane import Progress, Recording, fly, label
 from starhold.studies.certificates import Tried
 from starhold.studies.compare import Notice, write_proved
 from starhold.studies.flight import Flight, gain_text, number_text
 
 
-def fly_law(scenario: StationScenario, entry: StationEntry, loop: StationLoop, notice: Notice | None = None) -> Flight:
+def fly_law(scenario: StationScenario, entry: StationEntry, loop: ClosedLoop, notice: Notice | None = None) -> Flight:
     """One law of the scenario, with the loop that `build` gives for it, flown and measured."""
     progress = None if notice is None else lambda done, total: notice(entry.name, done, total)
     run = record(scenario, loop, progress)
@@ -36,12 +35,12 @@ def fly_law(scenario: StationScenario, entry: StationEntry, loop: StationLoop, n
     return Flight(entry.name, entry.law.name, run, metrics, gains, metric_set=BOARD)
 
 
-def timed(loop: StationLoop, flight: Flight) -> Flight:
+def timed(loop: ClosedLoop, flight: Flight) -> Flight:
     """The flight as it is: calls are not timed where control surfaces move within hours."""
     return flight
 
 
-def prove(scenario: StationScenario, entry: StationEntry, loop: StationLoop, flight: Flight) -> Flight:
+def prove(scenario: StationScenario, entry: StationEntry, loop: ClosedLoop, flight: Flight) -> Flight:
     """The flight with the certificate of its law, and how it leaves its claims."""
     certificate = certify_station(loop, entry.name)
     left = station_departures(certificate, loop, flight.recording, scenario.units.time)
@@ -58,16 +57,16 @@ def certify_scenario(scenario: StationScenario, law: str | None = None) -> list[
     return found
 
 
-def record(scenario: StationScenario, loop: StationLoop, progress: Progress | None = None) -> Recording:
+def record(scenario: StationScenario, loop: ClosedLoop, progress: Progress | None = None) -> Recording:
     """The run of a loop, scaled, with what its units are worth among its attributes."""
     timing = scenario.table.simulation
     return name_samples(scenario, loop, *fly(loop, timing.steps, timing.record_every, progress=progress))
 
 
-def name_samples(scenario: StationScenario, loop: StationLoop, samples: Any, carry: Any) -> Recording:
+def name_samples(scenario: StationScenario, loop: ClosedLoop, samples: Any, carry: Any) -> Recording:
     """The samples of `fly` under their names, with what they are worth and measured by among the attributes."""
     units, goal = scenario.units, goal_of(loop.gains)
-    run = label_station(loop, samples, carry, scenario.table.simulation.record_every)
+    run = label(loop, samples, carry, scenario.table.simulation.record_every)
     worth = {"length_unit_m": units.length, "time_unit_s": units.time, "rate_unit_rad_per_s": units.rate}
     worth |= {"velocity_unit_m_per_s": units.velocity, "acceleration_unit_m_per_s2": units.acceleration}
     worth |= {"settling_tolerance": scenario.table.settling.tolerance}

@@ -9,12 +9,27 @@ revolution of the two bodies takes 2 pi; the unit of length is the caller's, by 
 from __future__ import annotations
 
 import math
-from typing import Annotated, NamedTuple
+from collections.abc import Callable
+from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.halving import rising
 from starhold.algebra.quantity import Quantity
-from starhold.algebra.scalar import Scalar, sqrt
-from starhold.algebra.vector import Vector, add, dot
+from starhold.algebra.scalar import Scalar, Truth, both, is_finite, less, sqrt
+from starhold.algebra.vector import ZERO, Vector, add, dot
+from starhold.parts.contract import Card
+from starhold.parts.roles import Loads, Scene
+
+CARD = Card(
+    title="Point near a libration point",
+    summary="r'' = field(r, r') + control, in axes that turn with the two bodies",
+    sources=("published study of the direct Lyapunov method for compact invariant sets: motion near L2",),
+    assumptions=("two bodies on circles about each other", "a craft without mass of its own"),
+)
+ROLE = "body"
+COMMAND = "control"
+"""Laws for this body define an equation of this name; the state has a field of this name for the control that acts."""
+TIME_UNIT = "1/Omega"
+SIGN_POLICIES: dict[str, Callable[..., Any]] = {}
 
 EARTH_DIAMETER = 12_742_000.0
 """m: the unit of length unless another is asked for."""
@@ -40,6 +55,27 @@ class PointState(NamedTuple):
     position: Vector
     velocity: Vector
     control: Vector
+
+
+class PointMeasurement(NamedTuple):
+    """Quantities that a law is told at a control instant; scaled."""
+
+    position: Annotated[Vector, Quantity("length", "from the libration point, turning axes")]
+    velocity: Annotated[Vector, Quantity("length Omega", "relative to the turning axes")]
+    period: Annotated[float, Quantity("1/Omega", "for which the control will be held")]
+    limit: Annotated[float, Quantity("length Omega^2", "of the control's norm or of each axis; infinite for none")]
+
+
+class Sample(NamedTuple):
+    """One recorded instant: the state, the control that acts, the control commanded."""
+
+    position: Annotated[Vector, Quantity("length unit", "from the libration point, turning axes", "axis")]
+    velocity: Annotated[Vector, Quantity("length unit * Omega", "relative to the turning axes", "axis")]
+    control: Annotated[Vector, Quantity("length unit * Omega^2", "acceleration that the control gives", "axis")]
+    command: Annotated[Vector, Quantity("length unit * Omega^2", "acceleration commanded, within the limit", "axis")]
+
+
+State, Measurement = PointState, PointMeasurement
 
 
 def linear(position: Vector, velocity: Vector, plant: Libration) -> Vector:
@@ -107,8 +143,34 @@ def _potential(position: Vector, distance: Scalar, pull: Scalar) -> Scalar:
 
 def motion(state: PointState, acceleration: Vector, control_rate: Vector | None) -> tuple[Vector, Vector, Vector | None]:
     """d(state)/dt under the acceleration of `linear` or `nonlinear` and the control the state holds, which changes at the
-    given rate (None: held); `actuator.lagging` is the rate of surfaces that lag."""
+    given rate (None: held)."""
     return (state.velocity, add(acceleration, state.control), control_rate)
+
+
+def rates(state: PointState, loads: Loads, control_rate: Vector | None, craft: Libration) -> Any:
+    """d(state)/dt under the field and the control."""
+    return motion(state, loads.acceleration or ZERO, control_rate)
+
+
+def renormalised(state: PointState) -> PointState:
+    """The state, which has no constraints."""
+    return state
+
+
+def is_sound(state: PointState, setup: Any) -> Truth:
+    """Whether the motion is finite and near enough."""
+    near = less(dot(state.position, state.position), setup.far * setup.far)
+    return both(is_finite(dot(state.velocity, state.velocity)), near)
+
+
+def observe(state: PointState, scene: Scene) -> PointMeasurement:
+    """The measurement that a law is told of a state as sensors or estimators tell it."""
+    return PointMeasurement(state.position, state.velocity, scene.period, scene.limit)
+
+
+def sample(state: PointState, goal: None, applied: Vector, command: Vector) -> Sample:
+    """The recorded quantities."""
+    return Sample(state.position, state.velocity, applied, command)
 
 
 class Units(NamedTuple):

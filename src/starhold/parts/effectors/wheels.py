@@ -12,16 +12,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra.quantity import Quantity
 from starhold.algebra.scalar import Scalar, absolute, both, clip, either, less, less_equal, where
 from starhold.algebra.several import each, weighted
 from starhold.algebra.structured import Buffer, repeat
 from starhold.algebra.vector import Vector, add, cross, dot, scale
+from starhold.parts.contract import Card
 from starhold.parts.craft import check_inertia, vector
+
+CARD = Card(
+    title="Reaction wheels",
+    summary="h' = motor torque - friction about each spin axis; the body feels -sum a h' - w x sum a h",
+    sources=("published study of control by reaction wheels with the largest degree of stability",),
+    assumptions=("balanced rotors", "rigid bearings"),
+)
+ROLE = "effector"
+TABLE = "wheels"
+BODY = "rigid-body"
+ACTS = True
 
 Numbers = tuple[Scalar, ...]
 """A number for each wheel."""
@@ -34,6 +47,7 @@ CREEP = 1.0
 """Below this relative speed (rad/s) Coulomb friction grows in proportion to the speed: a friction that jumps with the sign
 would make any integrator of fixed step chatter about standstill."""
 
+ALLOCATIONS = ("least-squares", "least-peak")
 MOST = 24
 """Wheels of a craft: with least-peak allocation the work grows with the cube of their number."""
 COPLANAR = 1e-9
@@ -54,10 +68,81 @@ class Wheels(NamedTuple):
     viscous: Numbers
     coulomb: Numbers
     least: Rows
+    allocation: int = 0
+    """Which of ALLOCATIONS shares out a torque."""
     facets: Buffer | tuple[()] = ()
     """The pieces of `allocate_peak`, of 6 + 3 N numbers each: a normal, an edge, and a row for each wheel. Torques in the
     cone above a facet of the envelope cost the peak |normal . torque|, and pieces of one facet are told apart by the
     largest |edge . torque|."""
+
+
+Params = Wheels
+
+
+class State(NamedTuple):
+    """The absolute angular momentum of each rotor about its spin axis (N m s)."""
+
+    momentum: Numbers
+
+
+class Sample(NamedTuple):
+    """What is recorded of the wheels."""
+
+    wheel_momentum: Annotated[Numbers, Quantity("N m s", "angular momentum of each rotor about its spin axis", "wheel")]
+    wheel_torque: Annotated[Numbers, Quantity("N m", "rate of that momentum: the motor's torque and friction", "wheel")]
+    wheel_command: Annotated[Numbers, Quantity("N m", "torque asked of each motor", "wheel")]
+    wheel_available: Annotated[
+        Numbers, Quantity("N m", "most that the motor gives in that direction, as its momentum is", "wheel")
+    ]
+
+
+def prepare(params: Wheels, period: float) -> Wheels:
+    """The wheels with what their allocation needs."""
+    from starhold.parts.effectors.envelope import with_facets
+
+    return with_facets(params) if params.allocation else params
+
+
+def command(applied: Vector, params: Wheels) -> Numbers:
+    """The motor torques (N m) that a wanted torque on the body (N m) is shared out to."""
+    return allocate_peak(applied, params) if params.allocation else allocate(applied, params)
+
+
+def reaction(own: State, command: Numbers, body: Any, params: Wheels) -> Vector:
+    """The torque of the wheels on the body (N m)."""
+    return on_body(motor(command, own.momentum, body.rate, params), own.momentum, body.rate, params)
+
+
+def rates(own: State, command: Numbers, body: Any, acceleration: Vector, params: Wheels) -> State:
+    """d(momentum)/dt of each rotor (N m)."""
+    return State(motor(command, own.momentum, body.rate, params))
+
+
+def momentum(own: State, params: Wheels) -> Vector:
+    """The rotors' momentum in body axes (N m s)."""
+    return wheel_momentum(own.momentum, params)
+
+
+def record(own: State, command: Numbers, body: Any, params: Wheels) -> Sample:
+    """The recorded quantities."""
+    rotors = motor(command, own.momentum, body.rate, params)
+    return Sample(own.momentum, rotors, command, available(command, own.momentum, params))
+
+
+def applied(own: State, command: Numbers, body: Any, params: Wheels) -> Vector:
+    """The torque that motors and friction give the body (N m), less than what is asked where wheels are at their limits."""
+    return scale(-1.0, weighted(motor(command, own.momentum, body.rate, params), params.axes))
+
+
+def fastest(params: Wheels) -> float:
+    """The fastest rate (1/s) at which friction brings a rotor to rest, that of Coulomb friction within CREEP included."""
+    columns = zip(params.viscous, params.coulomb, params.inertia, strict=True)
+    return max((viscous + coulomb / CREEP) / inertia for viscous, coulomb, inertia in columns)
+
+
+def examples() -> list[Wheels]:
+    """Three wheels along the axes, with friction, and a pyramid of four."""
+    return [make_wheels(three_orthogonal(), 1e-3, 0.05, 0.4, 1e-5, 1e-4), make_wheels(pyramid(), 1e-3, 0.05, 0.4)]
 
 
 def allocate(torque: Vector, wheels: Wheels) -> Numbers:
@@ -218,12 +303,6 @@ def capacity(wheels: Wheels, momentum: Sequence[float]) -> float:
     # What moves no momentum to the body stays in the rotors.
     rooms = [((1.0 - BAND) * limit - abs(held + dot(row, total)), math.sqrt(dot(row, row))) for row, limit, held in columns]
     return max(0.0, min(room / share for room, share in rooms if share > 0.0))
-
-
-def relaxation(wheels: Wheels) -> float:
-    """The fastest rate (1/s) at which friction brings a rotor to rest, that of Coulomb friction within CREEP included."""
-    columns = zip(wheels.viscous, wheels.coulomb, wheels.inertia, strict=True)
-    return max((viscous + coulomb / CREEP) / inertia for viscous, coulomb, inertia in columns)
 
 
 def gives_what_is_asked(wheels: Wheels) -> bool:

@@ -1,49 +1,48 @@
-"""What the control law is told of the state."""
+"""Attitude and rate with independent Gaussian errors, new at each control step."""
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeAlias
+from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quaternion import Quaternion, multiply, normalise
 from starhold.algebra.vector import Vector, add
-from starhold.parts.random import Word, normal_vector
+from starhold.parts.contract import Card, NoMemory, Parameter
+from starhold.parts.random import Dice
 
-Key: TypeAlias = tuple[Word, Word]
-"""Seed and number of a run."""
-
-
-class Noise(NamedTuple):
-    """Standard deviations: external torque (N m per axis, held for a control period), measured attitude (rad,
-    rotation about each body axis) and measured rate (rad/s)."""
-
-    torque: float
-    attitude: float
-    rate: float
-
-
-SILENT = Noise(0.0, 0.0, 0.0)
-TORQUE, ATTITUDE, RATE = 0, 3, 6
-"""Places of the random numbers of a step, three each."""
+CARD = Card(
+    title="Attitude and rate with Gaussian noise",
+    summary="q turned by Gaussian angles about the body axes, w + Gaussian",
+    sources=("published comparison of Lyapunov, sliding-mode and predictive attitude control: the noise study",),
+    assumptions=("errors independent from step to step",),
+)
+ROLE = "sensor"
+TABLE = "sensor"
+RECORDED = False
+NUMBERS_FROM = 3
 
 
-def exact(attitude: Quaternion, rate: Vector, noise: Noise, key: Key, step: Word) -> tuple[Quaternion, Vector]:
-    """The true attitude and rate."""
-    return attitude, rate
+class Params(NamedTuple):
+    """How large the errors are."""
+
+    attitude: Annotated[float, Parameter("rad", at_least=0.0, text="standard deviation of the angle about each body axis")]
+    rate: Annotated[float, Parameter("rad/s", at_least=0.0, text="standard deviation of each component")]
 
 
-def noisy(attitude: Quaternion, rate: Vector, noise: Noise, key: Key, step: Word) -> tuple[Quaternion, Vector]:
+class Reading(NamedTuple):
+    """Attitude (inertial to body) and angular velocity (rad/s, body)."""
+
+    attitude: Quaternion
+    rate: Vector
+
+
+def measure(state: Any, memory: NoMemory, params: Params, dice: Dice, step: int) -> tuple[Reading, NoMemory]:
     """Attitude turned by Gaussian angles about the body axes, rate with a Gaussian error."""
-    # Of a small turn the quaternion's vector part is half the angle.
-    d = normal_vector(key, step, ATTITUDE, 0.5 * noise.attitude)
-    seen = normalise(multiply(attitude, (1.0, d[0], d[1], d[2])))
-    return seen, add(rate, normal_vector(key, step, RATE, noise.rate))
+    # Of a small rotation the quaternion's vector part is half the angle.
+    d = dice.vector(0, 0.5 * params.attitude)
+    attitude = normalise(multiply(state.attitude, (1.0, d[0], d[1], d[2])))
+    return Reading(attitude, add(state.rate, dice.vector(3, params.rate))), memory
 
 
-def no_disturbance(noise: Noise, key: Key, step: Word) -> Vector:
-    """No random torque."""
-    return (0.0, 0.0, 0.0)
-
-
-def gaussian_disturbance(noise: Noise, key: Key, step: Word) -> Vector:
-    """A random external torque (body, N m), new each control step."""
-    return normal_vector(key, step, TORQUE, noise.torque)
+def examples() -> list[Params]:
+    """The published noise, and none."""
+    return [Params(1e-3, 1e-4), Params(0.0, 0.0)]

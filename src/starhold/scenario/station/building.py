@@ -9,8 +9,9 @@ from starhold.algebra.vector import ZERO, add, dot, norm
 from starhold.analysis.station import goal_of
 from starhold.errors import InputError
 from starhold.laws.point import PointMeasurement
-from starhold.loop.station import StationLoop
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.libration_point import PointState
+from starhold.parts.catalogue import fit
 from starhold.scenario.checking import check_substeps, try_law
 from starhold.scenario.station.reading import StationEntry, StationScenario
 
@@ -18,21 +19,23 @@ NEAR = 0.4
 """Share of the nearer body's distance at which a motion counts as lost unless the file says where."""
 
 
-def build(scenario: StationScenario, entry: StationEntry) -> StationLoop:
+def build(scenario: StationScenario, entry: StationEntry) -> ClosedLoop:
     """The closed loop of one law. InputError where the law cannot work with what it has."""
     table, plant = scenario.table, scenario.craft
     nearer = min(abs(plant.from_smaller), abs(plant.from_larger))
-    loop = StationLoop(
-        plant=plant,
+    field = "linear-gravity" if table.libration.model == "linear" else "three-body-gravity"
+    surfaces = (fit("actuator", "lag", entry.lag),) if entry.lag > 0.0 else ()
+    loop = ClosedLoop(
+        craft=plant,
         law=entry.law,
         gains=entry.gains,
         start=_start(scenario, entry),
         period=table.simulation.control_period,
         substeps=table.simulation.substeps,
-        model=table.libration.model,
-        limit=entry.limit,
-        limit_kind="none" if math.isinf(entry.limit) else table.control.limit_kind,
-        lag=entry.lag,
+        parts=(fit("environment", field), *surfaces),
+        limit="none" if math.isinf(entry.limit) else table.control.limit_kind,
+        command_limit=entry.limit,
+        seed=0,
         far=table.simulation.lost_beyond or NEAR * nearer,
     )
     check_substeps(loop, scenario.where)
@@ -42,8 +45,8 @@ def build(scenario: StationScenario, entry: StationEntry) -> StationLoop:
         raise InputError(
             scenario.where, "initial.position", f"a start {away:.6g} away", f"less than lost_beyond, {loop.far:.6g}"
         )
-    measurement = PointMeasurement(loop.start.position, loop.start.velocity, loop.period, loop.limit)
-    command, _ = entry.law.control(measurement, entry.gains, plant, loop.carry().memory)
+    measurement = PointMeasurement(loop.start.position, loop.start.velocity, loop.period, entry.limit)
+    command, _ = entry.law.command(measurement, entry.gains, plant, loop.carry().memory)
     if not is_finite(dot(command, command)):
         allowed = "a limit, margin or deficit: this law takes as much control as there is"
         raise InputError(scenario.where, f"law {entry.name}", "no limit of the control", allowed)

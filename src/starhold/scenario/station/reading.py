@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 
 from starhold.analysis.station import Circle, Equilibrium, goal_of
 from starhold.errors import InputError
+from starhold.laws.catalogue import Law, catalogue
 from starhold.laws.l2_circle import peak_demand
-from starhold.laws.point import StationLaw, station_laws
 from starhold.parts.bodies.libration_point import Libration, Units
 from starhold.scenario.checking import (
     LawBook,
@@ -34,7 +34,7 @@ class StationEntry(Named):
     """A law with its gains and the control it has: the limit and the lag (scaled)."""
 
     name: str
-    law: StationLaw
+    law: Law
     gains: Any
     limit: float
     lag: float
@@ -91,7 +91,7 @@ def read_station(data: dict[str, Any], text: str, where: str, folder: Path, allo
 def _read_law(
     data: Any, table: StationTable, where: str, folder: Path, key: str, taken: set[str], allow_unstable: bool
 ) -> StationEntry:
-    found, law, form = pick_law(data, station_laws(), StationLaw, folder, where, key)
+    found, law, form = pick_law(data, catalogue("libration-point"), folder, where, key)
     units, plant = table.libration.units, table.libration.plant
     extra = ["file", *(["form"] if law.forms else [])]
     read = validate(law_model(law, form, StationLawTable), found, where, key, extra, units)

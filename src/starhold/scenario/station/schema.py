@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
+from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import Gain
-from starhold.laws.point import station_laws
 from starhold.parts.bodies.libration_point import EARTH_DIAMETER, PRIMARIES, Libration, Primaries, Units
 from starhold.parts.orbit import BODIES, body_of
 from starhold.scenario.checking import MOST_SUBSTEPS, nearest
@@ -203,4 +203,4 @@ class StationTable(Table):
 
 def station_schema() -> dict[str, Any]:
     """A JSON Schema of scenarios of station keeping."""
-    return file_schema(StationTable, station_laws().values(), StationLawTable)
+    return file_schema(StationTable, catalogue("libration-point").values(), StationLawTable)

@@ -1,4 +1,4 @@
-"""The attitude to be held or followed, with its rate and acceleration."""
+"""An attitude over time, through a smooth curve between given ones."""
 
 from __future__ import annotations
 
@@ -8,21 +8,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.cosines import to_quaternion
-from starhold.algebra.quaternion import Quaternion, nearer
-from starhold.algebra.scalar import sqrt
 from starhold.algebra.structured import Buffer
-from starhold.algebra.vector import ZERO, Vector, cross, dot, scale
+from starhold.parts.contract import Card
+from starhold.parts.roles import Goal
 
-
-class Target(NamedTuple):
-    """q_RN (inertial to target axes), and the target's angular velocity (rad/s) and acceleration (rad/s2), both in
-    target axes."""
-
-    attitude: Quaternion
-    rate: Vector
-    acceleration: Vector
-
+CARD = Card(
+    title="Attitude history",
+    summary="q_RN(t): a twice differentiable rotation spline through given attitudes",
+    sources=("Computation of smooth orientation interpolants with angular-velocity control (2002)",),
+    assumptions=("rows at control steps are exact on the spline",),
+)
+ROLE = "target"
+TABLE = "target"
 
 HALF_TURN, SWING = 1e-6, 10.0
 """How near to a half turn, as the cosine of half of it, neighbours in a history may be, and how far (rad) the spline may
@@ -38,30 +35,31 @@ class Knots(NamedTuple):
     rates: NDArray[np.float64]
 
 
-def inertial(fixed: Quaternion, position: Vector, velocity: Vector, step: int, before: Any) -> Target:
-    """A constant attitude."""
-    return Target(fixed, ZERO, ZERO)
+class Params(NamedTuple):
+    """A table of `tabulate` with a row for each control step and one more, and the knots of the spline that it was taken from
+    (() for a table that comes without)."""
+
+    table: NDArray[np.float64]
+    knots: Knots | tuple[()] = ()
 
 
-def orbital(table: Any, position: Vector, velocity: Vector, step: int, before: Quaternion) -> Target:
-    """The orbital frame: third axis to the centre of attraction, second against the orbit normal, first along the motion.
-
-    Its rate is h/r2 about the normal, and its acceleration -2 h (r.v)/r4, exact for two-body motion. Of the two quaternions
-    it gives the one nearer to `before`, so that a law that feeds back q never sees a jump.
-    """
-    h = cross(position, velocity)
-    r2, h2 = dot(position, position), dot(h, h)
-    size = sqrt(h2)
-    down, against = scale(-1.0 / sqrt(r2), position), scale(-1.0 / size, h)
-    attitude = nearer(to_quaternion((cross(against, down), against, down)), before)
-    rate = size / r2
-    return Target(attitude, (0.0, -rate, 0.0), (0.0, 2.0 * rate * dot(position, velocity) / r2, 0.0))
+def prepare(params: Params, period: float) -> Buffer:
+    """The table as kernels read it."""
+    return Buffer(params.table.ravel().tolist())
 
 
-def history(table: Buffer, position: Vector, velocity: Vector, step: int, before: Any) -> Target:
-    """A row of a table prepared by `tabulate`, one row a control step."""
-    row: Any = table.row(step, 10)
-    return Target(row[:4], row[4:7], row[7:])
+def goal(params: Buffer, state: Any, step: int, before: Any) -> Goal:
+    """The row of this control step."""
+    row: Any = params.row(step, 10)
+    return Goal(row[:4], row[4:7], row[7:])
+
+
+def examples() -> list[Params]:
+    """A slow rotation about a slanted axis."""
+    times = np.linspace(0.0, 100.0, 11)
+    half = 0.01 * times
+    attitudes = np.stack([np.cos(half), 0.6 * np.sin(half), 0.0 * half, 0.8 * np.sin(half)], axis=1)
+    return [Params(tabulate(times, attitudes, np.arange(101) * 0.5), knots_of(times, attitudes, 50.0))]
 
 
 def tabulate(times: Any, attitudes: Any, sample_times: Any) -> NDArray[np.float64]:

@@ -1,0 +1,43 @@
+"""A first-order lag, within a largest rate of change."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, NamedTuple
+
+from starhold.algebra.scalar import Scalar
+from starhold.algebra.vector import Vector, clip_axes, scale, subtract
+from starhold.parts.contract import Card, Parameter
+
+CARD = Card(
+    title="First-order lag",
+    summary="lag u' + u = command, each component of u' within the rate limit",
+    sources=("Spacecraft Dynamics and Control (1997)",),
+    assumptions=("starts from what acts",),
+)
+ROLE = "actuator"
+BODY = ""
+
+
+class Params(NamedTuple):
+    """How fast the output follows."""
+
+    lag: Annotated[float, Parameter("s", above=0.0, text="time constant")]
+    rate_limit: Annotated[float, Parameter("N m/s", above=0.0, text="largest rate of each component; none if absent")] = (
+        math.inf
+    )
+
+
+def rates(output: Vector, target: Vector, begun: Vector, substep: Scalar, params: Params) -> Vector:
+    """d(output)/dt towards the command."""
+    return clip_axes(scale(1.0 / params.lag, subtract(target, output)), params.rate_limit)
+
+
+def fastest(params: Params) -> float:
+    """The fastest rate (1/s) at which it settles, which the integration must resolve."""
+    return 1.0 / params.lag
+
+
+def examples() -> list[Params]:
+    """A quick one, and one whose rate is limited."""
+    return [Params(0.3), Params(0.3, 0.02)]

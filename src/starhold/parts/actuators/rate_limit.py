@@ -1,0 +1,35 @@
+"""A largest rate of change of the command, without lag."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from starhold.algebra.scalar import Scalar
+from starhold.algebra.vector import Vector, clip_axes, scale, subtract
+from starhold.parts.contract import Card, Parameter
+
+CARD = Card(
+    title="Rate limit",
+    summary="u moves to the command along a straight line, each component of u' within the limit",
+    sources=("Spacecraft Dynamics and Control (1997)",),
+    assumptions=("starts from what acts",),
+)
+ROLE = "actuator"
+BODY = ""
+
+
+class Params(NamedTuple):
+    """How fast the output may change."""
+
+    rate_limit: Annotated[float, Parameter("N m/s", above=0.0, text="largest rate of each component")]
+
+
+def rates(output: Vector, target: Vector, begun: Vector, substep: Scalar, params: Params) -> Vector:
+    """d(output)/dt: the straight line from the output at the start of the substep to the command, or as far towards it as the
+    limit lets."""
+    return clip_axes(scale(1.0 / substep, subtract(target, begun)), params.rate_limit)
+
+
+def examples() -> list[Params]:
+    """A slow one."""
+    return [Params(0.02)]

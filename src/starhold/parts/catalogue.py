@@ -1,0 +1,201 @@
+"""Finds the parts of each role: modules of the role's package with a `CARD`, the entry points `starhold.parts` of other
+packages, and files."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import linecache
+import pkgutil
+import sys
+import warnings
+from collections.abc import Callable, Mapping
+from functools import cache
+from importlib import import_module
+from importlib.metadata import entry_points
+from pathlib import Path
+from traceback import extract_tb
+from types import ModuleType
+from typing import Any, TypeVar
+
+from starhold.parts.contract import Card
+from starhold.parts.part import Fitted, Part
+from starhold.parts.roles import ROLES
+
+PACKAGES = {
+    "body": "starhold.parts.bodies",
+    "effector": "starhold.parts.effectors",
+    "environment": "starhold.parts.environments",
+    "sensor": "starhold.parts.sensors",
+    "estimator": "starhold.parts.estimators",
+    "target": "starhold.parts.targets",
+    "actuator": "starhold.parts.actuators",
+}
+"""Where starhold's own parts of a role stand."""
+DEMANDED: dict[str, tuple[str, ...]] = {
+    "body": ("COMMAND", "State", "Measurement", "Sample", "rates", "observe", "sample"),
+    "effector": ("Params", "examples", "reaction", "rates", "momentum"),
+    "environment": ("Params", "examples"),
+    "sensor": ("Params", "examples", "Reading", "measure"),
+    "estimator": ("Params", "examples", "NEEDS", "Estimate", "estimate"),
+    "target": ("Params", "examples", "goal"),
+    "actuator": ("Params", "examples"),
+}
+"""What a part of a role holds at least, beside `CARD` and `ROLE`."""
+EITHER: dict[str, tuple[str, ...]] = {"environment": ("torque", "acceleration"), "actuator": ("command", "rates")}
+"""Equations of which a part of a role has at least one."""
+
+AnyPart = TypeVar("AnyPart", bound=Part)
+
+
+@cache
+def parts(role: str) -> dict[str, Part]:
+    """All parts of a role but laws that are installed, by name. One of another package that does not load is left out, with a
+    warning that names it."""
+    return installed(PACKAGES[role], role, as_part)
+
+
+def find(role: str, name: str) -> Part:
+    """The installed part of this role and name. KeyError where there is none."""
+    return parts(role)[name]
+
+
+def fit(role: str, name: str, *numbers: Any, called: str = "", start: Any = None) -> Fitted:
+    """An installed part with these parameters, for a loop; start: the state of an effector. KeyError for an unknown part."""
+    part = find(role, name)
+    return Fitted(part, part.params(*numbers), called, start)
+
+
+def installed(package: str, role: str, make: Callable[..., AnyPart]) -> dict[str, AnyPart]:
+    """The parts of a role by name: those of a package of starhold, and those that other packages offer."""
+    modules = pkgutil.iter_modules(import_module(package).__path__, f"{package}.")
+    found = [make(import_module(entry.name)) for entry in modules if _declares_card(entry.name)]
+    for point in entry_points(group="starhold.parts"):
+        try:
+            module = _loaded(point)
+        except Exception as error:
+            # Told with the laws, once.
+            if role == "law":
+                _leave_out(point.value, error)
+            continue
+        if role_of(module) != role:
+            continue
+        try:
+            part = make(module)
+            if part.name in {known.name for known in found}:
+                raise ValueError(f"a part named {part.name} exists already")
+            found.append(part)
+        except ValueError as error:
+            _leave_out(point.value, error)
+    if role == "law":
+        for point in entry_points(group="starhold.laws"):
+            _leave_out(point.value, ValueError("its entry point is called starhold.laws, now starhold.parts"))
+    return {part.name: part for part in sorted(found, key=lambda part: part.name)}
+
+
+def _loaded(point: Any) -> ModuleType:
+    module = point.load()
+    if role_of(module) not in ROLES:
+        raise ValueError(f"no part: its ROLE must be one of {', '.join(ROLES)}")
+    return module
+
+
+def role_of(module: ModuleType) -> str | None:
+    """The role that a module declares; of one with `Gains` it goes without saying."""
+    return getattr(module, "ROLE", "law" if hasattr(module, "Gains") else None)
+
+
+def _leave_out(what: str, error: Exception) -> None:
+    warnings.warn(f"the part {what} is left out: {told(error)}", stacklevel=4)
+
+
+def as_part(module: ModuleType, path: Path | None = None) -> Part:
+    """The part in a module. ValueError, one line, where it lacks a part of its role's contract."""
+    role = role_of(module)
+    if role not in DEMANDED:
+        raise ValueError(f"{module.__file__}: ROLE must be one of {', '.join(ROLES)}, not {role!r}")
+    part = make(Part, module, path, DEMANDED[role])
+    either = EITHER.get(role, ())
+    if either and not any(hasattr(module, name) for name in either):
+        raise ValueError(f"{module.__file__}: this {role} needs {' or '.join(either)}")
+    if hasattr(module, "Params") and not part.table:
+        _declared(part.fields, module)
+    return part
+
+
+def make(kind: type[AnyPart], module: ModuleType, path: Path | None, demanded: tuple[str, ...]) -> AnyPart:
+    """An object of this kind for a module that holds what is demanded. ValueError, one line, where it does not."""
+    missing = [name for name in ("CARD", *demanded) if not hasattr(module, name)]
+    if missing:
+        raise ValueError(f"{module.__file__}: this {role_of(module) or 'part'} needs {', '.join(missing)}")
+    if not isinstance(module.CARD, Card):
+        raise ValueError(f"{module.__file__}: CARD is not a Card of starhold.parts.contract")
+    return kind((module.__name__.rpartition(".")[2] if path is None else path.stem).replace("_", "-"), module, path)
+
+
+def _declared(read: Callable[[], object], module: ModuleType) -> None:
+    try:
+        read()
+    except (AttributeError, NameError, TypeError) as error:
+        raise ValueError(f"{module.__file__}: {error}") from None
+
+
+_READ: dict[tuple[Path, str], ModuleType] = {}
+
+
+def from_file(path: Path, known: Mapping[str, AnyPart], make: Callable[..., AnyPart]) -> AnyPart:
+    """The part in a file, which is run for it; known: the installed parts of its role, of which it may be one.
+
+    ValueError, one line, where the file is none of Python, fails, lacks a part of the contract, or has the name of another
+    part that is installed. OSError where it cannot be read.
+    """
+    path = path.resolve()
+    same = next((part for part in known.values() if _is_of(part, path)), None)
+    if same is not None:
+        return same
+    name = path.stem.replace("_", "-")
+    if name in known and known[name].file is None:
+        raise ValueError(f"a part named {name} is installed already; rename the file")
+    return make(read_module(path), path)
+
+
+def read_module(path: Path) -> ModuleType:
+    """A file of Python run as a module, again where its text has changed. Errors as of `from_file`."""
+    path = path.resolve()
+    source = path.read_bytes()
+    if path.suffix != ".py":
+        raise ValueError("a part's file ends in .py")
+    key = (path, hashlib.sha256(source).hexdigest())
+    if key in _READ:
+        return _READ[key]
+    # A name of its own, so that a file called random.py does not hide the library's, nor one text of a file another.
+    place = hashlib.sha256(str(path).encode(errors="replace")).hexdigest()
+    module = ModuleType(f"starhold_part_{path.stem}_{place[:8]}_{key[1][:8]}")
+    module.__file__ = str(path)
+    linecache.checkcache(str(path))
+    # Registered so that its NamedTuples can be found by their module name.
+    sys.modules[module.__name__] = module
+    try:
+        exec(compile(source, str(path), "exec", dont_inherit=True), module.__dict__)
+    except (Exception, SystemExit) as error:
+        del sys.modules[module.__name__]
+        raise ValueError(told(error, path)) from None
+    _READ[key] = module
+    return module
+
+
+def told(error: BaseException, path: Path | None = None) -> str:
+    """An error in one line, with the line of a file that it comes from."""
+    lines = [frame.lineno for frame in extract_tb(error.__traceback__) if path and frame.filename == str(path)]
+    place = f"{path.name}, line {lines[-1]}: " if path and lines else ""
+    return f"{place}{type(error).__name__}: {' '.join(str(error).split())}"
+
+
+def _is_of(part: Part, path: Path) -> bool:
+    return part.file is None and part.module.__file__ is not None and Path(part.module.__file__).resolve() == path
+
+
+def _declares_card(name: str) -> bool:
+    spec = importlib.util.find_spec(name)
+    origin = None if spec is None else spec.origin
+    return origin is not None and "\nCARD = " in Path(origin).read_text(encoding="utf-8")

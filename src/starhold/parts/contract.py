@@ -1,0 +1,134 @@
+"""The contract that every part of a closed loop keeps, whatever its role.
+
+A part is one file: `CARD` says what it is, `ROLE` what it does in a loop, `class Params(NamedTuple)` which numbers it takes,
+with units and bounds, and `examples()` gives some of them. The equations of each role, and what a part may add, stand in
+`roles`. All of them are pure functions of tuples of numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from starhold.parts.craft import compact
+
+
+class NoMemory(NamedTuple):
+    """The memory of a part that keeps nothing."""
+
+
+class NoParams(NamedTuple):
+    """The parameters of a part that takes none."""
+
+
+@dataclass(frozen=True)
+class Card:
+    """Title, sources and assumptions of a part."""
+
+    title: str
+    """A few words."""
+    summary: str
+    """One line: the part as a formula."""
+    sources: tuple[str, ...]
+    """Where it comes from."""
+    assumptions: tuple[str, ...]
+    """Where it holds, for its readers and for claims that rely on it."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """Unit, bounds and shape of one parameter, or of a law's gain, declared as an annotation."""
+
+    unit: str = "1"
+    """In which plain numbers count: "N m s", "1/s^2"; "1" for none."""
+    above: float | None = None
+    """Every number is greater."""
+    at_least: float | None = None
+    """No number is less."""
+    at_most: float | None = None
+    """No number is greater."""
+    shape: tuple[int, ...] = ()
+    """() a number, (3,) a vector, (3, 3) a matrix, for which a number stands for that multiple of the identity and a vector
+    for a diagonal. A part gets a diagonal matrix as the vector of its diagonal; `apply` and `solve` take both forms."""
+    whole: bool = False
+    """A whole number, which is a constant of the part while it is recorded: Python's `if` and `range` may use it."""
+    choices: tuple[str, ...] = ()
+    """Words, of which the part gets the place of the one that is chosen: 0, 1, ...; a constant as well."""
+    text: str = ""
+    """What it means, for listings and pages."""
+    spread: bool = True
+    """Whether a number stands for a vector of equal numbers."""
+    dimension: Literal["", "length", "velocity", "acceleration", "time", "rate"] = ""
+    """What a scaled number is one of: a file may then give a string with a unit of it too."""
+
+    def check(self, value: Any) -> Any:
+        """Convert a value to the form that equations take; ValueError says what is allowed."""
+        if self.choices:
+            if value not in self.choices:
+                raise ValueError(f"must be one of {', '.join(self.choices)}")
+            return self.choices.index(value)
+        array = np.asarray(value, dtype=float)
+        if not np.isfinite(array).all():
+            raise ValueError("must be finite")
+        if len(self.shape) == 2 and array.ndim < 2:
+            array = array * np.eye(self.shape[0]) if array.ndim == 0 else np.diag(array)
+        elif array.ndim == 0 and self.shape and self.spread:
+            array = np.full(self.shape, float(array))
+        if array.shape != self.shape:
+            raise ValueError(f"must be {self.describe()}")
+        # Bounds of a matrix speak of its eigenvalues' sign only where the part says so; entries are free.
+        if self.shape != (3, 3):
+            self._check_bounds(array)
+        if self.whole:
+            return int(array)
+        if not self.shape:
+            return float(array)
+        return compact(array) if self.shape == (3, 3) else tuple(array.tolist())
+
+    def _check_bounds(self, array: Any) -> None:
+        if self.above is not None and not (array > self.above).all():
+            raise ValueError(f"must be above {self.above:g}")
+        if self.at_least is not None and not (array >= self.at_least).all():
+            raise ValueError(f"must be at least {self.at_least:g}")
+        if self.at_most is not None and not (array <= self.at_most).all():
+            raise ValueError(f"must be at most {self.at_most:g}")
+        if self.whole and float(array) != math.floor(float(array)):
+            raise ValueError("must be a whole number")
+
+    def describe(self) -> str:
+        """Tell what may be written for this parameter."""
+        if not self.shape:
+            return "a whole number" if self.whole else "a number"
+        size = self.shape[0]
+        if len(self.shape) == 2:
+            return f"a number, {size} numbers or a {size}x{size} matrix"
+        return f"{'a number or ' if self.spread else ''}{size} numbers"
+
+
+@dataclass(frozen=True)
+class Field:
+    """A parameter of a part, a gain of a law or an input of a design form: its name, declaration and default."""
+
+    name: str
+    gain: Parameter
+    required: bool
+    default: Any = field(default=None)
+
+
+@cache
+def fields(cls: Any) -> list[Field]:
+    """Read the declared parameters of a NamedTuple class (`Params`, `Gains`, a design form), in order."""
+    found: list[Field] = []
+    hints = get_type_hints(cls, include_extras=True)
+    for name in cls._fields:
+        hint = hints[name]
+        gain = next((a for a in get_args(hint)[1:] if isinstance(a, Parameter)), None)
+        if get_origin(hint) is not Annotated or gain is None:
+            raise TypeError(f"{cls.__module__}.{cls.__name__}.{name} declares no unit: annotate it with Parameter")
+        defaults: dict[str, Any] = cls._field_defaults
+        found.append(Field(name, gain, name not in defaults, defaults.get(name)))
+    return found

@@ -1,0 +1,41 @@
+"""The torque of a point mass on a body that is no sphere."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from starhold.algebra.quaternion import to_body
+from starhold.algebra.scalar import Scalar
+from starhold.algebra.vector import Vector, gyroscopic_torque, scale
+from starhold.parts.contract import Card, NoParams
+from starhold.parts.craft import Craft, total_inertia
+from starhold.parts.environments.two_body import attraction
+
+CARD = Card(
+    title="Gravity gradient",
+    summary="M = 3 mu/r^5 R x J R, to first order in the body's size over r",
+    sources=("Fundamentals of Spacecraft Attitude Determination and Control (2014)",),
+    assumptions=("point mass", "a body small beside its orbit"),
+)
+ROLE = "environment"
+TABLE = "environment"
+NEEDS = ("two-body",)
+MODELLED = True
+Params = NoParams
+
+
+def torque(state: Any, params: NoParams, craft: Craft, memory: Any) -> Vector:
+    """Torque on the body (N m, body axes)."""
+    n2, inverse_square = attraction(state.position, craft)
+    return gravity_gradient(to_body(state.attitude, state.position), 3.0 * n2 * inverse_square, craft)
+
+
+def gravity_gradient(position: Vector, strength: Scalar, craft: Craft) -> Vector:
+    """Gravity-gradient torque (N m) for the position in body axes (m) and strength 3 mu/r5 (1/(m2 s2))."""
+    # R x J R has the form of a gyroscopic torque.
+    return scale(strength, gyroscopic_torque(total_inertia(craft), position))
+
+
+def examples() -> list[NoParams]:
+    """The one torque there is."""
+    return [NoParams()]

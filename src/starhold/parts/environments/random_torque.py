@@ -1,0 +1,44 @@
+"""A random torque, new at each control step and held between."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+from starhold.algebra.vector import ZERO, Vector
+from starhold.parts.contract import Card, Parameter
+from starhold.parts.random import Dice
+
+CARD = Card(
+    title="Random torque",
+    summary="M = Gaussian on each axis, independent from control step to control step",
+    sources=("published comparison of Lyapunov, sliding-mode and predictive attitude control: the noise study",),
+    assumptions=("held for a control period",),
+)
+ROLE = "environment"
+NUMBERS_FROM = 0
+
+
+class Params(NamedTuple):
+    """How strong it is."""
+
+    deviation: Annotated[float, Parameter("N m", at_least=0.0, text="standard deviation on each body axis")]
+
+
+def remember(params: Params) -> Vector:
+    """No torque yet."""
+    return ZERO
+
+
+def update(memory: Vector, state: Any, params: Params, dice: Dice, step: int) -> Vector:
+    """The torque of the control step that begins (N m)."""
+    return dice.vector(0, params.deviation)
+
+
+def torque(state: Any, params: Params, craft: Any, memory: Vector) -> Vector:
+    """Torque on the body (N m, body axes)."""
+    return memory
+
+
+def examples() -> list[Params]:
+    """A torque as the published noise study has it, and none."""
+    return [Params(1e-4), Params(0.0)]

@@ -1,0 +1,101 @@
+"""Parts of a loop as objects, whatever their role: a part file under its name, and a part with the numbers it has in a loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from starhold.parts.contract import Card, Field, NoMemory, fields
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part file as an object; its name is the file's, with hyphens."""
+
+    name: str
+    module: ModuleType
+    file: Path | None = None
+    """Where it was read from; None for a part that is installed."""
+
+    @property
+    def role(self) -> str:
+        """Its role, see `parts.roles`."""
+        return self.module.ROLE
+
+    @property
+    def card(self) -> Card:
+        """Title, sources and assumptions."""
+        return self.module.CARD
+
+    @property
+    def body(self) -> str:
+        """The name of the body that it fits; "" for one that fits any."""
+        return getattr(self.module, "BODY", "rigid-body")
+
+    @property
+    def table(self) -> str:
+        """The table of a scenario that gives it; "" for one that stands in a [[part]] table."""
+        return getattr(self.module, "TABLE", "")
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Other parts of the loop, or readings, that it cannot do without, by name."""
+        return getattr(self.module, "NEEDS", ())
+
+    @property
+    def params(self) -> Any:
+        """The class of its parameters, a NamedTuple."""
+        return self.module.Params
+
+    def fields(self) -> list[Field]:
+        """Its parameters in order."""
+        return fields(self.params)
+
+    def examples(self) -> list[Any]:
+        """Parameters that tests and docs run."""
+        return self.module.examples()
+
+    def hook(self, name: str) -> Callable[..., Any] | None:
+        """An equation that parts of its role may define or leave out."""
+        return getattr(self.module, name, None)
+
+    def flag(self, name: str) -> bool:
+        """Whether it declares itself to be so, see `parts.roles`."""
+        return bool(getattr(self.module, name, False))
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A part in a loop: its parameters, the name that recordings and errors call it by, and the state that it starts with (of
+    effectors; None for what the part says)."""
+
+    part: Part
+    params: Any = ()
+    name: str = ""
+    start: Any = None
+
+    @property
+    def called(self) -> str:
+        """Its name in the loop, by default the part's."""
+        return self.name or self.part.name
+
+    def prepared(self, period: float) -> Any:
+        """Its parameters as equations take them, for a control period (s)."""
+        make = self.part.hook("prepare")
+        return self.params if make is None else make(self.params, period)
+
+    def remembered(self, *about: Any) -> Any:
+        """Its memory, or an effector's state, at the start, made of its parameters and what its role adds."""
+        if self.start is not None:
+            return self.start
+        make = self.part.hook("remember")
+        return NoMemory() if make is None else make(*about)
+
+    @property
+    def fastest(self) -> float:
+        """The fastest rate (1/s) at which it settles by itself, which the integration must resolve; 0 for none."""
+        tell = self.part.hook("fastest")
+        return 0.0 if tell is None else tell(self.params)

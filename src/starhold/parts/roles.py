@@ -1,0 +1,202 @@
+"""The roles of the parts of a closed loop: for each the equations that a part of it defines, as protocols.
+
+A part is a module; `parts.contract` says what all of them hold. Equations take and give numbers and tuples of numbers, so
+that floats, traces and exact polynomials read them alike. `params` is the part's `Params` (or what its `prepare` makes of
+them), `state` the body's, `craft` the numbers of the body, `dice` random numbers of the part's own, `step` the number of the
+control step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol, TypeAlias
+
+from starhold.algebra.quaternion import Quaternion
+from starhold.algebra.scalar import Scalar, Truth
+from starhold.algebra.vector import Matrix, Vector
+from starhold.parts.random import Dice
+
+State: TypeAlias = Any
+"""A NamedTuple of numbers and tuples of them, which the part or its body defines."""
+
+
+class Goal(NamedTuple):
+    """The attitude to be reached: q_RN (inertial to target axes), and the target's angular velocity (rad/s) and acceleration
+    (rad/s2), both in target axes."""
+
+    attitude: Quaternion
+    rate: Vector
+    acceleration: Vector
+
+
+class Loads(NamedTuple):
+    """All that acts on a body, None where there is nothing of the kind: the acceleration by environments, the torque by
+    environments, the reaction of the effectors (N m, body), and the inertia that these add (3, 3); `direct`: whether the
+    actuators act on the body itself, because no effector takes the command."""
+
+    acceleration: Vector | None
+    torque: Vector | None
+    reaction: Vector | None
+    inertia: Matrix | None
+    direct: bool
+
+
+class Scene(NamedTuple):
+    """Beside the state all that a measurement is made of: the goal (None where the loop has no target), whether it never
+    turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s, body), the control period and the
+    limit of the command."""
+
+    goal: Any
+    still: bool
+    torque: Vector
+    momentum: Vector
+    period: Scalar
+    limit: Scalar
+
+
+class Body(Protocol):
+    """What moves. `State` has a field named `COMMAND` for the command that acts; `Measurement` is what laws are told, `Sample`
+    what is recorded, its fields annotated with `Quantity`. `SIGN_POLICIES`: by name, which of equivalent measurements a law is
+    shown; empty where there is no choice."""
+
+    COMMAND: str
+    TIME_UNIT: str
+    SIGN_POLICIES: dict[str, Callable[..., Any]]
+    State: type
+    Measurement: type
+    Sample: type
+
+    def rates(self, state: State, loads: Loads, command_rate: Vector | None, craft: Any, /) -> Any:
+        """d(state)/dt; command_rate is that of the command that acts, None where it is held."""
+        ...
+
+    def renormalised(self, state: State, /) -> State:
+        """The state with its constraints restored, such as the length of a quaternion."""
+        ...
+
+    def is_sound(self, state: State, setup: Any, /) -> Truth:
+        """Whether the motion is finite and slow enough for the integration; setup has `substep` and `far`."""
+        ...
+
+    def observe(self, state: State, scene: Scene, /) -> Any:
+        """The measurement of a state as sensors or estimators tell it."""
+        ...
+
+    def sample(self, state: State, goal: Any, applied: Vector, command: Vector, /) -> Any:
+        """The quantities that are recorded."""
+        ...
+
+
+class Environment(Protocol):
+    """A torque (N m, body), a force or a field; at least one of `torque` and `acceleration`. `MODELLED`: whether laws are told
+    of the torque. With a memory, `remember` and `update` renew it at each control step."""
+
+    MODELLED: bool
+
+    def torque(self, state: State, params: Any, craft: Any, memory: Any, /) -> Vector:
+        """The torque on the body (N m, body axes)."""
+        ...
+
+    def acceleration(self, state: State, params: Any, craft: Any, memory: Any, /) -> Vector:
+        """The acceleration of the body, in the axes of its position."""
+        ...
+
+    def remember(self, params: Any, /) -> Any:
+        """The memory at the start."""
+        ...
+
+    def update(self, memory: Any, state: State, params: Any, dice: Dice, step: int, /) -> Any:
+        """The memory for the control step that begins."""
+        ...
+
+
+class Effector(Protocol):
+    """A mechanism that moves with the body and shares its momentum. None knows another: each adds its reaction, and inertia if
+    it has to, and gets the body's angular acceleration for its own rates. With `ACTS` it takes the command of the law."""
+
+    ACTS: bool
+
+    def command(self, applied: Vector, params: Any, /) -> Any:
+        """The commands of its motors for a wanted torque on the body (N m)."""
+        ...
+
+    def reaction(self, own: Any, command: Any, body: State, params: Any, /) -> Vector:
+        """The torque on the body (N m) at its own state, -w x h of its momentum h included, the part that goes with the
+        body's angular acceleration left out."""
+        ...
+
+    def inertia(self, own: Any, params: Any, /) -> Matrix:
+        """The inertia (3, 3; kg m2) that the body's angular acceleration meets besides the body's own."""
+        ...
+
+    def rates(self, own: Any, command: Any, body: State, acceleration: Vector, params: Any, /) -> Any:
+        """d(own state)/dt; acceleration: the body's angular one (rad/s2)."""
+        ...
+
+    def momentum(self, own: Any, params: Any, /) -> Vector:
+        """Its angular momentum relative to the body (N m s, body axes)."""
+        ...
+
+    def record(self, own: Any, command: Any, body: State, params: Any, /) -> Any:
+        """A NamedTuple of what is recorded of it."""
+        ...
+
+
+class Sensor(Protocol):
+    """What is known of the body's state. `Reading` is a NamedTuple whose fields are called as those of the body's state that
+    it tells of; further fields are for estimators."""
+
+    Reading: type
+
+    def measure(self, state: State, memory: Any, params: Any, dice: Dice, step: int, /) -> tuple[Any, Any]:
+        """The reading, and the memory for the next."""
+        ...
+
+    def remember(self, params: Any, state: State, /) -> Any:
+        """The memory at the start."""
+        ...
+
+
+class Estimator(Protocol):
+    """The state as it is computed from readings. `NEEDS`: the readings that it takes, by name; `Estimate` is a NamedTuple whose
+    fields are called as those of the body's state that it tells of."""
+
+    NEEDS: tuple[str, ...]
+    Estimate: type
+
+    def estimate(self, readings: Any, memory: Any, params: Any, craft: Any, period: Scalar, /) -> tuple[Any, Any]:
+        """The estimate and the memory for the next; `readings` has an attribute for each name, craft is the nominal model."""
+        ...
+
+    def remember(self, params: Any, state: State, /) -> Any:
+        """The memory at the start."""
+        ...
+
+
+class Target(Protocol):
+    """The attitude to be reached over time. `STILL`: whether it never turns. `FOLLOWS`: whether it is continued from the
+    attitude that it had a control step before."""
+
+    STILL: bool
+    FOLLOWS: bool
+
+    def goal(self, params: Any, state: State, step: int, before: Any, /) -> Goal:
+        """The goal at a control step; before: its attitude at the step before where it follows that, else nothing."""
+        ...
+
+
+class Actuator(Protocol):
+    """From the command of a law to what acts. One without `rates` changes the command at control instants alone; one with them
+    has an output of its own that follows its input."""
+
+    def command(self, command: Vector, params: Any, /) -> Vector:
+        """The command that is passed on."""
+        ...
+
+    def rates(self, output: Vector, target: Vector, begun: Vector, substep: Scalar, params: Any, /) -> Vector:
+        """d(output)/dt towards an input; begun: the output at the start of the substep."""
+        ...
+
+
+ROLES = ("body", "effector", "environment", "sensor", "estimator", "target", "law", "actuator")
+"""In the order of a loop's description; each names a package under `parts`, laws have their own."""
