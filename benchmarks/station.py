@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from starhold.loop.station import StationLoop
 
 from common import header, interleaved, show
 from starhold.algebra.structure import flatten
 from starhold.algebra.vector import ZERO
 from starhold.laws import l2_circle
+from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import NoMemory
 from starhold.laws.point import PointMeasurement
-from starhold.laws.catalogue import catalogue
-from starhold.loop.station import StationLoop
 from starhold.parts.bodies.libration_point import PRIMARIES, PointState, make_libration, nonlinear
 from starhold.simulation.lane import fly
 from starhold.simulation.lanes import simulate_many

@@ -15,7 +15,6 @@ from starhold.certification.wording import HEADINGS, sentence
 from starhold.cli.main import app
 from starhold.conformance.suite import examine
 from starhold.laws.catalogue import catalogue, from_file
-from starhold.laws.catalogue import catalogue
 from starhold.scenario.building import build
 from starhold.scenario.reading import load
 

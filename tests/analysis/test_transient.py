@@ -17,6 +17,7 @@ from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.rigid_body import State
 from starhold.parts.craft import make_craft
 from starhold.simulation.lane import Recording, fly, label
+from tests.making import ORBIT, ORBITAL
 
 LAW = catalogue()["modal"]
 ZERO = (0.0, 0.0, 0.0)
@@ -68,7 +69,7 @@ def test_the_inertia_does_not_matter():
 
 def test_a_moving_target_is_refused():
     made = problem()
-    watcher = Watcher(replace(made.loop, orbit=True, target="orbital"), END, END)
+    watcher = Watcher(made.loop.with_parts(*ORBIT, ORBITAL), END, END)
     far = State((1.0, 0.0, 0.0, 0.0), ZERO, (7e6, 0.0, 0.0), (0.0, 7550.0, 0.0), ZERO)
     from starhold.algebra.structure import flatten
 

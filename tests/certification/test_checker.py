@@ -26,6 +26,7 @@ from starhold.errors import InputError
 from starhold.laws import pd
 from starhold.laws.sliding import Gains as Sliding
 from tests.certification.loops import FULL, LOPSIDED, PRINCIPAL, loop_of, textbook
+from tests.making import ORBITAL
 
 LOOPS = textbook()
 NAMES = sorted(LOOPS)
@@ -357,7 +358,7 @@ def test_an_inertia_that_no_body_has_fails(made):
 
 def test_bounds_over_the_orbit_are_recomputed(tmp_path):
     gains = LOOPS["pd-0"].gains
-    write([certify(loop_of("pd", gains, FULL, target="orbital"))], "made", tmp_path / "c.json")
+    write([certify(loop_of("pd", gains, FULL, target=ORBITAL))], "made", tmp_path / "c.json")
     content = json.loads((tmp_path / "c.json").read_text())
     subject = content["certificates"][0]["subject"]
     assert passed(check(content))

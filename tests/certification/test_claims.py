@@ -17,8 +17,8 @@ from starhold.certification.subject import make_subject
 from starhold.laws import lqr, matrix_pd, pd, sliding
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.craft import make_craft
-from starhold.parts.environments.gravity import two_body_gravity_gradient
 from tests.certification.loops import FULL, PRINCIPAL, UNEVEN, loop_of, random_craft, tensor, textbook
+from tests.equations import two_body_gravity_gradient
 
 LOOPS = textbook()
 ANY = {"wheel-0", "wheel-1", "lqr-I", "lqr-II", "lqr-III", "pd-0", "pd-1", "pd-2", "lyapunov-0", "lyapunov-1"}

@@ -12,7 +12,7 @@ from starhold.certification.certify import Wanted, certify
 from starhold.laws import lqr, matrix_pd, pd, sliding
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.bodies.rigid_body import angular_acceleration
-from starhold.parts.environments.gravity import gravity_gradient
+from starhold.parts.environments.gravity_gradient import gravity_gradient
 from tests.certification.loops import FULL, LOPSIDED, PRINCIPAL, UNEVEN, loop_of
 
 STILL = (0.0, 0.0, 0.0)

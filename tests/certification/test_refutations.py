@@ -15,6 +15,7 @@ from starhold.checker import check, check_file, passed
 from starhold.laws import lqr, matrix_pd, pd, sliding
 from starhold.laws.catalogue import catalogue
 from starhold.laws.sliding import Gains as Sliding
+from tests import making
 from tests.certification.loops import FULL, LOPSIDED, PRINCIPAL, UNEVEN, loop_of, rotors, textbook
 from tests.certification.test_checker import (
     alone,
@@ -28,6 +29,7 @@ from tests.certification.test_checker import (
     replaced,
     spots,
 )
+from tests.making import ORBITAL
 
 SKEWED = ((0.01, 0.02, 0.0), (0.02, 0.01, 0.0), (0.0, 0.0, 0.01))
 CASES = {
@@ -222,8 +224,8 @@ def test_no_surface_is_overpowered_by_a_bound_alone(tmp_path):
 
 def test_no_claim_is_about_less_momentum_than_is_had_on_target(tmp_path):
     """A body that follows the orbit at rest on target has momentum; one with none is told of by nobody."""
-    loop = rotors("wheel", catalogue()["wheel"].examples()[0], target="orbital")
-    loop = replace(loop, start=loop.start._replace(momentum=(0.0,) * 4))
+    loop = rotors("wheel", catalogue()["wheel"].examples()[0], target=ORBITAL)
+    loop = loop.with_parts(making.rotors(loop.wheels))
     whole = certify(loop)
     assert whole.claim("wheels").outcome == "proved"
     write([whole], "made", tmp_path / "c.json")

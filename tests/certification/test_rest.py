@@ -11,9 +11,9 @@ from starhold.algebra.vector import ZERO
 from starhold.certification.station import certify_station
 from starhold.laws import l2_equilibrium as l2_equilibrium
 from starhold.laws.catalogue import catalogue
-from starhold.loop.station import StationLoop
 from starhold.parts.bodies.libration_point import PRIMARIES, PointState, make_libration
 from starhold.simulation.lanes import simulate_many
+from tests.making import point_loop
 
 EARTH = PRIMARIES["sun-earth"]
 PLANT = make_libration(EARTH.larger, EARTH.smaller, EARTH.separation)
@@ -23,7 +23,9 @@ REST = PointState((0.0, 1.0, 0.0), (0.0, 0.0, 0.0), ZERO)
 
 
 def loop_of(gains=GAINS, limit=math.inf, kind="axis", **changes):
-    return StationLoop(PLANT, catalogue("libration-point")["l2-equilibrium"], gains, REST, 1e-3, limit=limit, limit_kind=kind, **changes)
+    return point_loop(
+        PLANT, catalogue("libration-point")["l2-equilibrium"], gains, REST, 1e-3, limit=limit, kind=kind, **changes
+    )
 
 
 def claims_of(*given, **changes):

@@ -17,9 +17,9 @@ from starhold.checker.exact import rational
 from starhold.checker.station import HELD, read_station
 from starhold.laws import l2_equilibrium as l2_equilibrium
 from starhold.laws.catalogue import catalogue
-from starhold.loop.station import StationLoop
 from starhold.parts.bodies.libration_point import POINTS, PRIMARIES, PointState, make_libration
 from tests.certification.test_station_checker import by_hand, changed, faults, outcomes
+from tests.making import point_loop
 
 EARTH = PRIMARIES["sun-earth"]
 PLANT = make_libration(EARTH.larger, EARTH.smaller, EARTH.separation)
@@ -35,7 +35,9 @@ OFF = GAINS._replace(k_x=GAINS.k_x * (1.0 + 1e-8))
 
 def loop_of(gains=GAINS, limit=math.inf, kind="axis", plant=PLANT, **changes):
     start = PointState((0.0, gains.y, gains.z), ZERO, ZERO)
-    return StationLoop(plant, catalogue("libration-point")["l2-equilibrium"], gains, start, 1e-3, limit=limit, limit_kind=kind, **changes)
+    return point_loop(
+        plant, catalogue("libration-point")["l2-equilibrium"], gains, start, 1e-3, limit=limit, kind=kind, **changes
+    )
 
 
 @pytest.fixture(scope="session")
@@ -194,7 +196,7 @@ def test_other_laws_do_not_come_to_rest(made):
     content = made(GAINS, 4.0)
     for law in catalogue("libration-point").values():
         for gains in law.examples():
-            loop = StationLoop(PLANT, law, gains, loop_of().start, 1e-3, limit=4.0, limit_kind="axis")
+            loop = point_loop(PLANT, law, gains, loop_of().start, 1e-3, limit=4.0, kind="axis")
             other = changed(content, SUBJECT, json.loads(json.dumps(described_station(loop))))
             if law.name != "l2-equilibrium":
                 assert set(faults(other).values()) == {f"the law {law.name} does not come to rest"}

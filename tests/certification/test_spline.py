@@ -29,7 +29,7 @@ from starhold.errors import InputError
 from starhold.laws import pd, wheel
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.craft import tensor
-from starhold.parts.targets.target import Knots, knots_of, tabulate
+from starhold.parts.targets.history import Knots, knots_of, tabulate
 from tests.certification.loops import FULL, free, loop_of
 
 

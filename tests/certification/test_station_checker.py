@@ -16,9 +16,9 @@ from starhold.checker.exact import floating
 from starhold.checker.station import read_station
 from starhold.laws import l2_circle
 from starhold.laws.catalogue import catalogue
-from starhold.loop.station import StationLoop
 from starhold.parts.bodies.libration_point import POINTS, PRIMARIES, PointState, make_libration
 from tests.certification.test_checker import by_hand, replaced
+from tests.making import point_loop
 
 EARTH = PRIMARIES["sun-earth"]
 PLANT = make_libration(EARTH.larger, EARTH.smaller, EARTH.separation)
@@ -34,7 +34,9 @@ SUBJECT = ("certificates", 0, "subject")
 
 def loop_of(gains=BEST, limit=math.inf, kind="norm", plant=PLANT, **changes):
     start = PointState((0.0, gains.radius, 0.0), (0.0, 0.0, gains.rate * gains.radius), ZERO)
-    return StationLoop(plant, catalogue("libration-point")["l2-circle"], gains, start, 1e-3, limit=limit, limit_kind=kind, **changes)
+    return point_loop(
+        plant, catalogue("libration-point")["l2-circle"], gains, start, 1e-3, limit=limit, kind=kind, **changes
+    )
 
 
 def peak(gains, kind="norm", plant=PLANT):
@@ -127,7 +129,7 @@ def test_other_laws_are_read_and_claim_no_circle(made):
     content = made()
     for law in catalogue("libration-point").values():
         for gains in law.examples():
-            loop = StationLoop(PLANT, law, gains, loop_of().start, 1e-3)
+            loop = point_loop(PLANT, law, gains, loop_of().start, 1e-3)
             other = changed(content, SUBJECT, json.loads(json.dumps(described_station(loop))))
             if law.name != "l2-circle":
                 assert "makes no circle attractive" in " ".join(faults(other).values())

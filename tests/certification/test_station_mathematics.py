@@ -10,6 +10,7 @@ import pytest
 from flint import ctx, fmpq
 from hypothesis import given, settings
 from hypothesis import strategies as some
+from starhold.loop.station import MODELS
 
 from starhold.algebra.scalar import where
 from starhold.algebra.vector import add, scale, subtract
@@ -17,10 +18,9 @@ from starhold.checker.circle import Circle
 from starhold.checker.exact import CheckError, floating, rational
 from starhold.checker.polar import keeps_within, phases
 from starhold.laws import l2_circle
+from starhold.laws.catalogue import Law
 from starhold.laws.interface import NoMemory
 from starhold.laws.point import PointMeasurement, along
-from starhold.laws.catalogue import Law
-from starhold.loop.station import MODELS
 from tests.certification.test_station_checker import BACK, BEST, PLANT, RELAY, SOFT, WIDE, peak, station
 
 

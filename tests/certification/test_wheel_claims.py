@@ -25,6 +25,7 @@ from starhold.scenario.building import build
 from starhold.scenario.reading import load, parse
 from starhold.studies.certificates import certify_law, certify_scenario
 from tests.certification.loops import FULL, free, loop_of, rotors
+from tests.making import on_wheels
 
 EVEN = wheel.Gains(0.3, (0.015, 0.015, 0.015))
 UNEVEN = wheel.Gains(0.3, (0.01, 0.015, 0.025))
@@ -149,7 +150,7 @@ def test_claims_that_are_not_built_say_so():
     uneven = certify(rotors("wheel", UNEVEN), "", Wanted(slew_angle=0.1)).claim("wheels")
     assert uneven.outcome == "undecided"
     assert "weights" in uneven.obligations[0].evidence["reason"]
-    peak = replace(loop, allocation="least-peak")
+    peak = on_wheels(loop, allocation=1)
     assert certify(peak).claim("wheels") is None
     assert certify(peak, "", Wanted(slew_angle=0.1)).claim("wheels").outcome == "undecided"
     far = certify(loop, "", Wanted(slew_angle=3.0)).claim("wheels")
@@ -159,8 +160,8 @@ def test_claims_that_are_not_built_say_so():
 def test_a_loop_that_counts_on_a_lost_wheel_claims_nothing():
     loop = rotors("wheel", EVEN)
     broken = loop.wheels._replace(torque_limit=(0.0, *loop.wheels.torque_limit[1:]))
-    assert certify(replace(loop, wheels=broken)).claims == ()
-    after = certify(replace(loop, wheels=lose(loop.wheels, 0)))
+    assert certify(on_wheels(loop, torque_limit=broken.torque_limit)).claims == ()
+    after = certify(on_wheels(loop, **lose(loop.wheels, 0)._asdict()))
     assert after.outcome == "proved"
     claim = after.claim("wheels")
     assert claim.numbers["motors"][0] == 0.0

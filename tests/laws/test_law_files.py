@@ -11,10 +11,9 @@ from jsonschema import ValidationError, validate
 import starhold as sh
 from starhold.checker import check_file, passed
 from starhold.conformance.suite import examine, find_law
-from starhold.laws import catalogue as catalogues
-from starhold.laws.catalogue import adopted, catalogue, from_file
-from starhold.laws.catalogue import Law
-from starhold.laws.catalogue import catalogue
+from starhold.laws import catalogue as laws
+from starhold.laws.catalogue import Law, adopted, catalogue, from_file
+from starhold.parts import catalogue as parts
 from starhold.scenario.opening import json_schema
 from tests.running import starhold
 
@@ -243,17 +242,31 @@ def test_a_file_with_the_name_of_another_law_is_refused_and_the_law_s_own_is_it(
     assert sh.load(folder / "own.toml").laws[0].law is catalogue()["pd"]
 
 
-def test_laws_of_other_packages_of_both_kinds_are_found(folder, monkeypatch, recwarn):
+@pytest.fixture()
+def offer(monkeypatch):
+    """Give other packages' entry points, and forget what they gave afterwards."""
+
+    def forget():
+        for found in (laws._installed, laws.catalogue, parts.parts):
+            found.cache_clear()
+
+    def give(points):
+        monkeypatch.setattr(parts, "entry_points", lambda group: points if group == "starhold.parts" else [])
+        forget()
+
+    yield give
+    forget()
+
+
+def test_laws_of_other_packages_for_both_bodies_are_found(folder, monkeypatch, recwarn, offer):
     monkeypatch.syspath_prepend(str(folder / "laws"))
-    points = [EntryPoint("a", "my_law", "starhold.laws"), EntryPoint("b", "point", "starhold.laws")]
-    monkeypatch.setattr(catalogues, "entry_points", lambda group: points)
-    turning, holding = catalogue.__wrapped__(), station_laws.__wrapped__()
-    assert set(turning) - set(catalogue()) == {"my-law"}
-    assert set(holding) - set(catalogue("libration-point")) == {"point"}
+    points = [EntryPoint("a", "my_law", "starhold.parts"), EntryPoint("b", "point", "starhold.parts")]
+    before = set(catalogue()), set(catalogue("libration-point"))
+    offer(points)
+    turning, holding = catalogue(), catalogue("libration-point")
+    assert set(turning) - before[0] == {"my-law"}
+    assert set(holding) - before[1] == {"point"}
     assert not recwarn.list
-    monkeypatch.setattr("starhold.scenario.station.reading.station_laws", lambda: holding)
-    monkeypatch.setattr("starhold.scenario.reading.catalogue", lambda: turning)
-    monkeypatch.setattr("starhold.conformance.suite.catalogue", lambda: turning)
     (folder / "own.toml").write_text(POINT + '[[law]]\ntype = "point"\nk = 30.0\nd = 9.0\n')
     assert sh.simulate(folder / "own.toml").attrs["law"] == "point"
     # A law that is installed is taken by its name and by its file.
@@ -261,10 +274,11 @@ def test_laws_of_other_packages_of_both_kinds_are_found(folder, monkeypatch, rec
     assert [v for v in examine(find_law("my-law")) if v.outcome == "failed"] == []
 
 
-def test_one_that_takes_the_name_of_another_is_left_out(monkeypatch, folder):
+def test_one_that_takes_the_name_of_another_is_left_out(monkeypatch, folder, offer):
     (folder / "laws" / "sliding.py").write_text(LAW)
     monkeypatch.syspath_prepend(str(folder / "laws"))
-    monkeypatch.setattr(catalogues, "entry_points", lambda group: [EntryPoint("a", "sliding", "starhold.laws")])
-    with pytest.warns(UserWarning, match="the law sliding is left out: ValueError: a law named sliding exists already"):
-        found = catalogue.__wrapped__()
-    assert found["sliding"].module is catalogue()["sliding"].module
+    own = catalogue()["sliding"].module
+    offer([EntryPoint("a", "sliding", "starhold.parts")])
+    with pytest.warns(UserWarning, match="the part sliding is left out: ValueError: a part named sliding exists already"):
+        found = catalogue()
+    assert found["sliding"].module is own

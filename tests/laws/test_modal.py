@@ -19,7 +19,7 @@ from starhold.laws import modal
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.bodies.rigid_body import angular_acceleration
 from starhold.parts.craft import make_craft, tensor
-from starhold.parts.environments.gravity import gravity_gradient
+from starhold.parts.environments.gravity_gradient import gravity_gradient
 from starhold.scenario.reading import parse
 from starhold.synthesis.pole_placement import place, reached
 from tests.small import CRAFT

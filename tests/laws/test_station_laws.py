@@ -10,14 +10,14 @@ import sympy
 
 from starhold.algebra.structure import flatten
 from starhold.algebra.vector import ZERO
+from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import NoMemory
 from starhold.laws.point import PointMeasurement
-from starhold.laws.catalogue import catalogue
 from starhold.loop.kernels import fly_plainly
-from starhold.loop.station import StationLoop
 from starhold.parts.bodies.libration_point import PRIMARIES, PointState, make_libration
 from starhold.simulation.lane import fly
 from starhold.simulation.lanes import simulate_many
+from tests.making import point_loop
 
 EARTH = PRIMARIES["sun-earth"]
 PLANT = make_libration(EARTH.larger, EARTH.smaller, EARTH.separation)
@@ -27,7 +27,7 @@ every = pytest.mark.parametrize(("law", "gains"), CASES, ids=lambda value: getat
 
 def loop_of(law, gains, **changes):
     start = PointState((0.01, 0.9, 0.1), (0.1, 0.0, 1.3), ZERO)
-    return StationLoop(PLANT, law, gains, start, 1e-3, limit=4.0, **changes)
+    return point_loop(PLANT, law, gains, start, 1e-3, limit=4.0, **changes)
 
 
 @every
@@ -68,7 +68,9 @@ def test_is_read_by_sympy(law, gains):
     np.testing.assert_allclose(numbers, law.command(measurement, gains, PLANT, NoMemory())[0], rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize("law", [law for law in catalogue("libration-point").values() if law.forms], ids=lambda law: law.name)
+@pytest.mark.parametrize(
+    "law", [law for law in catalogue("libration-point").values() if law.forms], ids=lambda law: law.name
+)
 def test_forms_give_gains_and_say_where_they_cannot(law):
     for kind in law.forms.values():
         spec = kind(radius=1.0) if "radius" in kind._fields else kind()

@@ -10,10 +10,13 @@ from scipy.integrate import solve_ivp
 from starhold.algebra.structure import flatten, unflatten
 from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.actuators.dynamics import Dynamics
 from starhold.parts.bodies.rigid_body import State, angular_momentum, kinetic_energy
+from starhold.parts.catalogue import fit
 from starhold.parts.craft import make_craft
+from starhold.parts.targets import orbital
+from starhold.parts.targets.history import tabulate
 from starhold.simulation.lane import fly
+from tests.making import ORBIT, ORBITAL, aimed
 
 J = np.array([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]])
 MU = 3.986e14
@@ -23,7 +26,7 @@ START = START._replace(attitude=tuple(np.array(START.attitude) / np.linalg.norm(
 
 def loop(name="lyapunov", gains=None, start=START, **options):
     law = catalogue()[name]
-    settings = {"period": 0.5, "orbit": True, "gravity_gradient": True} | options
+    settings = {"period": 0.5, "parts": ORBIT} | options
     return ClosedLoop(make_craft(J, 0.01), law, law.examples()[0] if gains is None else gains, start, **settings)
 
 
@@ -75,7 +78,7 @@ def test_default_step_agrees_to_rounding():
 
 
 def test_free_motion_conserves_momentum_and_energy():
-    free = loop("pd", orbit=False, gravity_gradient=False, period=0.1, limit="axis")
+    free = loop("pd", parts=(), period=0.1, limit="axis")
     # No control torque at all: a limit so small that it vanishes beside every other number.
     still = replace(free, craft=free.craft._replace(torque_limit=5e-324))
     samples, carry = fly(still, 20_000)
@@ -98,7 +101,7 @@ def test_orbit_conserves_energy_and_momentum():
 
 
 def test_lyapunov_function_falls_along_the_flight():
-    flown = loop("pd", orbit=False, gravity_gradient=False, period=0.02, limit="none")
+    flown = loop("pd", parts=(), period=0.02, limit="none")
     samples, _ = fly(flown, 20_000)
     g = flown.gains
     energy = 0.5 * np.einsum("ik,ij,jk->k", samples[4:7], J, samples[4:7]) + 2 * g.k_attitude * (1 - samples[19])
@@ -108,7 +111,7 @@ def test_lyapunov_function_falls_along_the_flight():
 
 
 def test_lag_is_the_exact_exponential():
-    flown = loop("pd", period=0.5, dynamics=Dynamics(0.4, math.inf), substeps=8)
+    flown = loop("pd", period=0.5, parts=(*ORBIT, fit("actuator", "lag", 0.4)), substeps=8)
     samples, _ = fly(flown, 10)
     torque, command = samples[13:16], samples[16:19]
     expected = command[:, :-1] + (torque[:, :-1] - command[:, :-1]) * math.exp(-0.5 / 0.4)
@@ -117,7 +120,7 @@ def test_lag_is_the_exact_exponential():
 
 
 def test_rate_limit_holds_without_lag():
-    flown = loop("sliding", period=0.5, dynamics=Dynamics(0.0, 0.004), substeps=5)
+    flown = loop("sliding", period=0.5, parts=(*ORBIT, fit("actuator", "rate-limit", 0.004)), substeps=5)
     samples, _ = fly(flown, 200)
     moves = np.abs(np.diff(samples[13:16], axis=1))
     assert moves.max() == pytest.approx(0.004 * 0.5, rel=1e-9)
@@ -133,9 +136,7 @@ def test_limits_hold(kind):
 
 
 def test_motion_too_fast_to_follow_is_reported_and_ends_the_samples():
-    wild = loop(
-        "pd", gains=catalogue()["pd"].gains(40.0, 0.01), orbit=False, gravity_gradient=False, limit="none", period=0.5
-    )
+    wild = loop("pd", gains=catalogue()["pd"].gains(40.0, 0.01), parts=(), limit="none", period=0.5)
     samples, carry = fly(wild, 2000)
     assert 0 < carry.lost_at < 2000
     assert samples.shape[1] == carry.lost_at
@@ -146,8 +147,6 @@ def test_motion_too_fast_to_follow_is_reported_and_ends_the_samples():
 
 
 def test_history_is_tracked_to_the_hold_error():
-    from starhold.parts.targets.target import tabulate
-
     errors = []
     for period in (0.2, 0.1):
         times = np.arange(0.0, 61.0, 2.0)
@@ -156,7 +155,7 @@ def test_history_is_tracked_to_the_hold_error():
         attitudes = np.c_[np.cos(angle / 2), np.sin(angle / 2)[:, None] * axis]
         table = tabulate(times, attitudes, np.arange(round(60 / period) + 1) * period)
         start = START._replace(attitude=tuple(table[0, :4]), rate=tuple(table[0, 4:7]))
-        flown = loop("lyapunov", start=start, target=table, period=period, limit="none")
+        flown = loop("lyapunov", start=start, parts=(*ORBIT, aimed(table)), period=period, limit="none")
         samples, _ = fly(flown, round(60 / period))
         errors.append(np.abs(samples[20:23]).max())
     # Without feed-forward the acceleration of 4e-3 rad/s2 would cost J a / k, about 0.7 of the vector part.
@@ -167,11 +166,10 @@ def test_history_is_tracked_to_the_hold_error():
 @pytest.mark.parametrize("name", ["pd", "matrix-pd", "lyapunov", "sliding"])
 def test_orbital_frame_is_held_from_the_start(name):
     from starhold.algebra.quaternion import NO_TURN
-    from starhold.parts.targets.target import orbital
 
-    goal = orbital(None, START.position, START.velocity, 0, NO_TURN)
+    goal = orbital.goal((), START, 0, NO_TURN)
     start = START._replace(attitude=goal.attitude, rate=goal.rate)
-    samples, _ = fly(loop(name, start=start, target="orbital", period=0.1), 12_000)
+    samples, _ = fly(loop(name, start=start, parts=(*ORBIT, ORBITAL), period=0.1), 12_000)
     # Twelve hundred seconds are a fifth of an orbit: a law that ignored the motion would be off by 70 degrees.
     assert np.abs(samples[20:23]).max() < (3e-3 if name == "sliding" else 2e-3)
     assert samples[19].min() > 0.99

@@ -3,20 +3,20 @@
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from starhold.errors import InputError
 from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.actuators.dynamics import Dynamics
 from starhold.parts.bodies.rigid_body import State
+from starhold.parts.catalogue import fit
 from starhold.parts.craft import make_craft
-from starhold.parts.effectors.wheels import make_wheels, pyramid, relaxation
+from starhold.parts.effectors.wheels import fastest, make_wheels, pyramid
 from starhold.scenario.building import build
 from starhold.scenario.checking import RESOLVED, check_substeps
 from starhold.scenario.reading import builtin_text, parse
 from starhold.simulation.lane import fly
+from tests.making import on_wheels
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -25,7 +25,9 @@ def loop_of(lag: float, substeps: int) -> ClosedLoop:
     start = State((1.0, 0.0, 0.0, 0.0), (0.01, 0.0, 0.0), ZERO, ZERO, ZERO)
     law = catalogue()["pd"]
     craft = make_craft([2.0, 3.0, 4.0])
-    return ClosedLoop(craft, law, law.gains(0.09, 0.009), start, 0.1, substeps, limit="none", dynamics=Dynamics(lag, np.inf))
+    return ClosedLoop(
+        craft, law, law.gains(0.09, 0.009), start, 0.1, substeps, parts=(fit("actuator", "lag", lag),), limit="none"
+    )
 
 
 @pytest.mark.parametrize("lag", [0.01, 0.036, 0.05, 0.2, 1.0])
@@ -51,11 +53,11 @@ def test_coarser_ones_would_be_wrong():
 
 def test_friction_of_wheels_counts():
     wheels = make_wheels(pyramid(), 1e-4, 0.02, 0.4, viscous=1e-3, coulomb=1e-4)
-    assert relaxation(wheels) == pytest.approx(11.0)
+    assert fastest(wheels) == pytest.approx(11.0)
     text = builtin_text("wheels-orbital")
     scenario = parse(text, "here")
     loop = build(scenario, scenario.laws[0])
     check_substeps(loop, "here")
-    sticky = replace(loop, wheels=loop.wheels._replace(viscous=tuple(100.0 * j for j in loop.wheels.inertia)))
+    sticky = on_wheels(loop, viscous=tuple(100.0 * j for j in loop.wheels.inertia))
     with pytest.raises(InputError, match="at least 20 substeps"):
         check_substeps(sticky, "here")

@@ -5,26 +5,17 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from starhold.algebra.structure import move
 from starhold.algebra.vector import ZERO, add, cross, dot, norm, scale, subtract, unit
-from starhold.parts.actuators.dynamics import (
-    Dynamics,
-    ideal,
-    lagging,
-    limit_axis,
-    limit_none,
-    limit_norm,
-    ramping,
-    start_ideal,
-    start_lagging,
-)
+from starhold.parts.actuators.limits import limit_axis, limit_none, limit_norm
 from tests.algebra.readers import agree, close, positives, same, small_vectors, vectors
+from tests.equations import Dynamics, lagging, ramping
 
 LIMITS = (limit_none, limit_axis, limit_norm)
-RESPONSES = (ideal, lagging, ramping)
+RESPONSES = (lagging, ramping)
 
 
 @settings(max_examples=30)
@@ -32,8 +23,6 @@ RESPONSES = (ideal, lagging, ramping)
 def test_every_reader_gives_the_same(torque, command, begun, limit, time):
     for operation in LIMITS:
         agree(operation, command, limit)
-    for operation in (start_ideal, start_lagging):
-        agree(operation, torque, command)
     for operation in RESPONSES:
         agree(operation, torque, command, begun, time, Dynamics(time, limit))
 
@@ -157,11 +146,3 @@ def test_ramp_goes_straight_to_the_command_at_the_rate_limit(start, command, rat
 @given(small_vectors, small_vectors, st.floats(0.01, 5.0))
 def test_ramp_without_a_limit_arrives_after_one_substep(start, command, duration):
     assert close(run(ramping, start, command, Dynamics(0.0, math.inf), duration, 1)[0], command, 1e-15)
-
-
-@given(small_vectors, small_vectors)
-def test_ideal_and_beginnings(torque, command):
-    assume(torque != command)
-    assert start_ideal(torque, command) == command
-    assert start_lagging(torque, command) == torque
-    assert run(ideal, torque, command, Dynamics(0.0, math.inf), 1.0, 3) == (torque, 0.0)

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from starhold.algebra.vector import ZERO, add, scale
-from starhold.parts.actuators.dynamics import Dynamics, lagging
 from starhold.parts.bodies.libration_point import (
     EARTH_DIAMETER,
     POINTS,
@@ -27,6 +26,7 @@ from starhold.parts.bodies.libration_point import (
     nonlinear,
 )
 from tests.algebra.readers import agree, components, symbols, vanishes
+from tests.equations import Dynamics, lagging
 
 EARTH_L2 = PRIMARIES["sun-earth"].point()
 POINTS_OF_ALL = [(name, point) for name in PRIMARIES for point in POINTS]

@@ -22,7 +22,6 @@ from starhold.parts.bodies.rigid_body import (
     with_torque,
 )
 from starhold.parts.craft import Craft, make_craft
-from starhold.parts.environments.gravity import two_body_gravity_gradient
 from tests.algebra.readers import (
     agree,
     close,
@@ -33,6 +32,7 @@ from tests.algebra.readers import (
     symbols,
     vanishes,
 )
+from tests.equations import two_body_gravity_gradient
 
 DIAGONAL = make_craft([2.0, 3.0, 4.0], 1.0)
 FULL = make_craft([[2.0, 0.1, -0.3], [0.1, 3.0, 0.2], [-0.3, 0.2, 4.0]], 1.0)

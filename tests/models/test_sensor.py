@@ -14,18 +14,9 @@ from starhold.algebra.quaternion import NO_TURN, relative, stretch
 from starhold.algebra.vector import ZERO, add
 from starhold.algebra.words import bits_of, with_bits
 from starhold.parts.random import normal_vector
-from starhold.parts.sensors.gaussian import (
-    ATTITUDE,
-    RATE,
-    TORQUE,
-    Noise,
-    exact,
-    gaussian_disturbance,
-    no_disturbance,
-    noisy,
-)
 from starhold.trace.calling import Compiled
-from tests.algebra.readers import agree, close, quaternions, same, small_vectors
+from tests.algebra.readers import close, quaternions, same, small_vectors
+from tests.equations import ATTITUDE, RATE, TORQUE, Noise, gaussian_disturbance, noisy
 
 NOISE = Noise(0.02, 0.001, 0.003)
 indices = st.integers(0, 10**9)
@@ -38,8 +29,8 @@ def of_words(equation):
     return lambda *values: equation(*values[:-3], (bits_of(values[-3]), bits_of(values[-2])), bits_of(values[-1]))
 
 
-SENSES = [of_words(sense) for sense in (exact, noisy)]
-DISTURBANCES = [of_words(disturb) for disturb in (no_disturbance, gaussian_disturbance)]
+SENSES = [of_words(sense) for sense in (noisy,)]
+DISTURBANCES = [of_words(disturb) for disturb in (gaussian_disturbance,)]
 
 
 @settings(max_examples=50)
@@ -52,17 +43,8 @@ def test_compiled_equals_floats(attitude, rate, seed, run, step):
         same(disturb, NOISE, *words)
 
 
-@settings(max_examples=10)
-@given(quaternions, small_vectors, indices)
-def test_every_reader_gives_the_same_without_random_numbers(attitude, rate, step):
-    agree(exact, attitude, rate, NOISE, (1, 2), step)
-    agree(no_disturbance, NOISE, (1, 2), step)
-
-
 @given(quaternions, small_vectors, seeds, indices, indices)
-def test_exact(attitude, rate, seed, run, step):
-    assert exact(attitude, rate, NOISE, (seed, run), step) == (attitude, rate)
-    assert no_disturbance(NOISE, (seed, run), step) == ZERO
+def test_without_noise_it_is_exact(attitude, rate, seed, run, step):
     seen, measured = noisy(attitude, rate, Noise(0.02, 0.0, 0.0), (seed, run), step)
     assert close(seen, attitude, 1e-15)
     assert measured == rate

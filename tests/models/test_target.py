@@ -17,9 +17,10 @@ from starhold.algebra.structure import move
 from starhold.algebra.structured import Buffer
 from starhold.algebra.vector import ZERO, cross, dot, scale, unit
 from starhold.parts.craft import EARTH, make_craft
-from starhold.parts.environments.gravity import two_body
-from starhold.parts.targets.target import Target, history, inertial, orbital, tabulate
+from starhold.parts.roles import Goal
+from starhold.parts.targets.history import tabulate
 from tests.algebra.readers import agree, angles, close, directions, quaternions, same
+from tests.equations import history, inertial, orbital, two_body
 
 CRAFT = make_craft([1.0, 1.0, 1.0])
 
@@ -68,7 +69,7 @@ def test_every_reader_gives_the_same(place, before):
 
 @given(quaternions, orbits)
 def test_inertial_target_rests(fixed, place):
-    assert inertial(fixed, *place, 0, NO_TURN) == Target(fixed, ZERO, ZERO)
+    assert inertial(fixed, *place, 0, NO_TURN) == Goal(fixed, ZERO, ZERO)
 
 
 @given(orbits)
@@ -259,4 +260,4 @@ def test_history_reads_the_row_of_the_step(seed, step):
     table = tabulate(times, attitudes, np.linspace(times[0], times[-1], 20))
     found = history(Buffer(table.ravel().tolist()), ZERO, ZERO, step, None)
     assert list(found.attitude + found.rate + found.acceleration) == table[step].tolist()
-    assert type(found) is Target
+    assert type(found) is Goal

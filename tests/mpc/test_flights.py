@@ -15,8 +15,9 @@ from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.rigid_body import State
 from starhold.parts.craft import make_craft
-from starhold.parts.targets.target import tabulate
+from starhold.parts.targets.history import tabulate
 from starhold.simulation import lane
+from tests.making import ORBIT, aimed
 from tests.mpc.setting import CRAFTS, WEIGHTS
 
 PUBLISHED = State((0.0, *(3.0**-0.5,) * 3), (0.04, 0.03, 0.02), (7e6, 0.0, 0.0), (0.0, 7550.0, 0.0), ZERO)
@@ -35,7 +36,7 @@ def fly(loop: ClosedLoop, steps: int) -> tuple[Any, Any]:
 def published(horizon: int, terminal: str) -> tuple[Any, Any]:
     gains = mpc.Gains(*WEIGHTS, horizon=horizon, terminal=mpc.TERMINALS.index(terminal))
     craft = CRAFTS["principal"]
-    loop = ClosedLoop(craft, catalogue()["mpc"], gains, PUBLISHED, 0.1, orbit=True, gravity_gradient=True)
+    loop = ClosedLoop(craft, catalogue()["mpc"], gains, PUBLISHED, 0.1, parts=ORBIT)
     return fly(loop, 2500)
 
 
@@ -78,7 +79,7 @@ def test_moving_target_and_no_orbit():
     attitudes = np.stack([np.cos(angle / 2), np.sin(angle / 2), still, still], axis=1)
     table = tabulate(times[::10], attitudes[::10], times)
     start = State(normalise((1.0, 0.2, -0.1, 0.1)), ZERO, ZERO, ZERO, ZERO)
-    loop = ClosedLoop(CRAFTS["principal"], catalogue()["mpc"], mpc.examples()[0], start, period, target=table)
+    loop = ClosedLoop(CRAFTS["principal"], catalogue()["mpc"], mpc.examples()[0], start, period, parts=(aimed(table),))
     record, _ = fly(loop, steps)
     assert np.abs(record[COMMAND]).max() <= 0.01 + 1e-9
     assert np.linalg.norm(record[ERROR], axis=0)[-100:].max() < 5e-3

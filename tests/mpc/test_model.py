@@ -13,7 +13,7 @@ from starhold.algebra.structured import Buffer
 from starhold.laws.predictive.motion import Linear, linearise, sample
 from starhold.laws.predictive.problem import Problem, motion, size
 from starhold.parts.bodies.rigid_body import angular_acceleration
-from starhold.parts.environments.gravity import two_body_gravity_gradient
+from tests.equations import two_body_gravity_gradient
 from tests.mpc.setting import CRAFTS, POSITION, seen_at
 
 

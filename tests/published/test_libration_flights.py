@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from starhold.simulation.station import simulate_station
 
 from starhold.algebra.vector import ZERO
 from starhold.laws.interface import NoMemory
@@ -20,7 +21,6 @@ from starhold.scenario.opening import open_scenario
 from starhold.scenario.reading import builtin_text
 from starhold.scenario.station.reading import parse_station
 from starhold.simulation.lanes import simulate_many
-from starhold.simulation.station import simulate_station
 from starhold.studies.flight import Flight
 from starhold.studies.station import build, compare, fly_law
 
@@ -152,7 +152,7 @@ def test_scipy_flies_the_same_in_the_limit_of_small_periods(scenario_name, law, 
     scenario = open_scenario(scenario_name)
     loop = build(scenario, scenario.pick(law))
     plant, length = loop.plant, years * 2.0 * math.pi
-    motion, limit, size = loop.parts().motion, loop.parts().limit, loop.limit
+    motion, limit, size = loop.composition().motion, loop.composition().limit, loop.limit
 
     def slope(_, state):
         position, velocity = tuple(state[:3]), tuple(state[3:])

@@ -9,19 +9,18 @@ import numpy as np
 
 from starhold.conformance.bench import random_quaternions, sample_loop
 from starhold.laws.catalogue import catalogue
-from starhold.laws.catalogue import catalogue
 from starhold.loop.kernels import Numbers, form
-from starhold.loop.station import StationLoop
-from starhold.parts.actuators.dynamics import Dynamics
 from starhold.parts.bodies.libration_point import PRIMARIES, PointState
-from starhold.parts.sensors.gaussian import Noise
-from starhold.parts.targets.target import tabulate
+from starhold.parts.catalogue import fit
+from starhold.parts.effectors.wheels import ALLOCATIONS
+from starhold.parts.targets.history import tabulate
 from starhold.scenario.building import build
 from starhold.scenario.opening import open_scenario
 from starhold.scenario.reading import builtin_names, builtin_text, parse
 from starhold.studies.kinds import kind_of
+from tests.making import ORBITAL, aimed, noise, on_wheels, point_loop
 
-NOISE = Noise(1e-4, 1e-3, 1e-4)
+NOISE = noise(1e-4, 1e-3, 1e-4)
 FAULT = """
 [[fault]]
 time = 30
@@ -47,7 +46,7 @@ def builtin() -> dict[str, Any]:
 def kernel_of(loop: Any) -> Any:
     """Equal for loops that one kernel flies."""
     phase = loop.phases(1)[0]
-    return loop.parts(), form(loop.carry()), form(Numbers(phase.gains, phase.known, phase.craft, phase.setup)), loop.substeps
+    return loop.composition(), form(loop.carry()), form(Numbers.of(phase)), loop.substeps
 
 
 def choices() -> dict[str, Any]:
@@ -55,7 +54,7 @@ def choices() -> dict[str, Any]:
     laws = catalogue()
     plain = sample_loop(laws["lyapunov"], laws["lyapunov"].examples()[0])
     found: dict[str, Any] = {
-        f"{name}, example {place}, noise": replace(sample_loop(law, gains), noise=NOISE)
+        f"{name}, example {place}, noise": sample_loop(law, gains).with_parts(*NOISE)
         for name, law in laws.items()
         for place, gains in enumerate(law.examples())
     }
@@ -63,24 +62,32 @@ def choices() -> dict[str, Any]:
         f"{cover}, {kind}": replace(plain, sign_policy=cover, limit=kind)
         for cover, kind in zip(SIGN_POLICIES, KINDS, strict=True)
     }
-    found["orbital target"] = replace(plain, target="orbital")
+    found["orbital target"] = plain.without("target").with_parts(ORBITAL)
     times = np.arange(12) * 10.0
     table = tabulate(times, np.array(random_quaternions(12)), np.arange(1101) * plain.period)
-    found["target from a table"] = replace(plain, target=table, noise=NOISE)
-    found["lag"] = replace(plain, dynamics=Dynamics(0.3, np.inf), substeps=2)
-    found["rate limit"] = replace(plain, dynamics=Dynamics(0.0, 0.02), substeps=2, seed=-5)
-    found["free space"] = replace(plain, orbit=False, gravity_gradient=False)
+    found["target from a table"] = plain.without("target").with_parts(aimed(table), *NOISE)
+    found["lag"] = replace(plain.with_parts(fit("actuator", "lag", 0.3)), substeps=2)
+    found["rate limit"] = replace(plain.with_parts(fit("actuator", "rate-limit", 0.02)), substeps=2, seed=-5)
+    found["free space"] = plain.without("environment")
     scenario = parse(builtin_text("wheels-orbital") + FAULT, "here")
     wheeled = build(scenario, scenario.laws[0])
     for allocation in ("least-squares", "least-peak"):
-        found[f"wheels with a fault, {allocation}"] = replace(wheeled, allocation=allocation)
+        place = ALLOCATIONS.index(allocation)
+        events = tuple(event._replace(parts=tuple(_shared(f, place) for f in event.parts)) for event in wheeled.events)
+        found[f"wheels with a fault, {allocation}"] = replace(on_wheels(wheeled, allocation=place), events=events)
     point = PRIMARIES["sun-earth"].point()
     for name, law in catalogue("libration-point").items():
         for model in ("linear", "nonlinear"):
             begin = PointState((0.1, 1.0, 0.2), (0.0, 0.1, -1.0), (0.0, 0.0, 0.0))
             lag = 0.0086 if model == "linear" else 0.0
-            found[f"{name}, {model}"] = StationLoop(point, law, law.examples()[0], begin, 1e-3, 1, model, 4.0, lag=lag)
+            found[f"{name}, {model}"] = point_loop(point, law, law.examples()[0], begin, 1e-3, model, 4.0, lag=lag)
     return found
+
+
+def _shared(fitted: Any, place: int) -> Any:
+    """A part, of wheels with another allocation."""
+    wheels = fitted.part.name == "wheels"
+    return replace(fitted, params=fitted.params._replace(allocation=place)) if wheels else fitted
 
 
 SIGN_POLICIES, KINDS = ("as_published", "shortest", "hysteresis"), ("none", "norm", "axis")

@@ -10,7 +10,6 @@ import pytest
 
 from starhold.algebra.structure import flatten
 from starhold.loop.kernels import Arguments, Numbers, form, make_step, numbers_of, one, state_of
-from starhold.loop.station import StationLoop
 from starhold.simulation.lane import fly
 from starhold.simulation.lanes import simulate_many
 from tests.simulation.loops import builtin, choices
@@ -51,17 +50,17 @@ class Leg(NamedTuple):
 def legs(name: str) -> list[Leg]:
     """The flight in plain Python."""
     loop, found = LOOPS[name], list[Leg]()
-    step, key, carry = make_step(loop.parts()), (getattr(loop, "seed", 0), RUN), loop.carry()
+    step, key, carry = make_step(loop.composition()), (getattr(loop, "seed", 0), RUN), loop.carry()
     for phase in loop.phases(steps_of(name)):
         carry = phase.entered(carry)
         # Buffers change in place.
         begun = state_of(np.array(numbers_of(carry)), carry)
         sample: list[float] = []
         for k in range(phase.first, phase.last):
-            carry = step.decide(step.check(carry, k, phase.setup), k, key, phase.gains, phase.known, phase.setup)
+            carry = step.update(step.check(carry, k, phase.setup), k, key, phase.gains, phase.nominal, phase.setup)
             sample = flatten(step.sample(carry, k, phase.setup)) if k == phase.last - 1 else sample
             for _ in range(loop.substeps):
-                carry = step.hold(carry, phase.craft, phase.setup)
+                carry = step.propagate(carry, phase.craft, phase.setup)
         carry = step.check(carry, phase.last, phase.setup)
         found.append(Leg(phase, begun, sample, carry))
     return found
@@ -87,7 +86,7 @@ def test_every_lane_of_many(name, width):
     # Lanes differ in their starts, so that what is alike in all of them cannot hide a mixture; the last is the loop's own.
     start = np.array(flatten(loop.start))
     starts = np.repeat(start[:, None], width, axis=1)
-    differs = slice(0, 3) if isinstance(loop, StationLoop) else slice(4, 7)
+    differs = slice(0, 3) if loop.body.name == "libration-point" else slice(4, 7)
     starts[differs] = starts[differs] * np.linspace(0.3, 1.0, width) + np.linspace(1e-3, 0.0, width)
     batch = simulate_many(loop, starts, steps_of(name), first_run=RUN - width + 1, width=width)
     same(batch.states[:, -1], numbers_of(legs(name)[-1].end)[: len(start)])
@@ -101,11 +100,11 @@ def jobs() -> list[tuple[Leg, Job]]:
     for name, loop in LOOPS.items():
         for leg in legs(name):
             phase = leg.phase
-            numbers = Numbers(phase.gains, phase.known, phase.craft, phase.setup)
+            numbers = Numbers(phase.gains, phase.nominal, phase.craft, phase.setup)
             arguments, steps = Arguments(*numbers), phase.last - phase.first
-            key = (loop.parts(), form(leg.begun), form(numbers), loop.substeps)
+            key = (loop.composition(), form(leg.begun), form(numbers), loop.substeps)
             if key not in programs:
-                programs[key] = one(make_step(loop.parts()), leg.begun, numbers, loop.substeps)
+                programs[key] = one(make_step(loop.composition()), leg.begun, numbers, loop.substeps)
             memories = {"carry": np.array(numbers_of(leg.begun)), "record": np.zeros(len(leg.sample))}
             memories |= {"shared": arguments.shared, "own": np.zeros(0), "tables": arguments.tables}
             counts = {"first": phase.first, "groups": 1, "each": steps, "place": steps - 1, "row": 0}

@@ -9,11 +9,11 @@ from starhold.algebra.structure import flatten
 from starhold.conformance.bench import random_quaternions, sample_loop
 from starhold.laws.catalogue import catalogue
 from starhold.loop.kernels import fly_plainly
-from starhold.parts.actuators.dynamics import Dynamics
+from starhold.parts.catalogue import fit
 from starhold.parts.craft import make_craft
-from starhold.parts.sensors.gaussian import Noise
 from starhold.simulation.lane import fly, simulate
 from starhold.simulation.lanes import alongside, carry_columns, simulate_many
+from tests.making import aimed, noise
 
 STEPS, LANES = 60, 300
 TURNED = (0.6, 0.0, 0.8, 0.0)
@@ -21,7 +21,7 @@ TURNED = (0.6, 0.0, 0.8, 0.0)
 
 def flown(name="sliding", **options):
     law = catalogue()[name]
-    return replace(sample_loop(law, law.examples()[0]), noise=Noise(1e-4, 1e-4, 1e-4), **options)
+    return replace(sample_loop(law, law.examples()[0]).with_parts(*noise(1e-4, 1e-4, 1e-4)), **options)
 
 
 def test_every_lane_equals_its_own_single_flight():
@@ -78,11 +78,12 @@ def test_lanes_may_differ_in_any_number():
     for moments in (np.array([2.0, 3.0, 4.0]) * random.uniform(0.9, 1.1, size=(11, 3))).tolist():
         slope, layer, limit = random.uniform(0.05, 0.1, size=3).tolist(), float(random.uniform(1e-3, 1e-2)), 0.02
         gains = law.gains(tuple(slope), (5e-3, 5e-3, 5e-3), layer)
-        noise = Noise(*random.uniform(1e-5, 1e-4, size=3).tolist())
+        random_parts = noise(*random.uniform(1e-5, 1e-4, size=3).tolist())
         craft = make_craft(moments, limit * float(random.uniform(0.5, 2.0)))
-        lag = Dynamics(float(random.uniform(0.2, 0.4)), float(random.uniform(0.01, 0.1)))
+        lag = fit("actuator", "lag", float(random.uniform(0.2, 0.4)), float(random.uniform(0.01, 0.1)))
         start = flown().start._replace(rate=tuple(random.normal(scale=0.05, size=3).tolist()))
-        loops.append(replace(flown(), craft=craft, gains=gains, noise=noise, dynamics=lag, start=start, target=TURNED))
+        loop = flown().with_parts(*random_parts, lag, aimed(TURNED))
+        loops.append(replace(loop, craft=craft, gains=gains, start=start))
     phases = alongside([loop.phases(STEPS) for loop in loops])
     batch = simulate_many(loops[0], [loop.start for loop in loops], STEPS, phases=phases, width=4)
     for lane, loop in enumerate(loops):

@@ -7,7 +7,6 @@ import pytest
 
 from starhold.algebra.quaternion import to_reference
 from starhold.errors import InputError
-from starhold.parts.bodies.rigid_body import State
 from starhold.parts.craft import make_craft, tensor
 from starhold.parts.effectors.envelope import authority
 from starhold.parts.effectors.wheels import make_wheels, pyramid, wheel_momentum
@@ -15,6 +14,7 @@ from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import fly, label
 from starhold.simulation.lanes import simulate_many
+from tests.making import rotors
 
 BUILTIN = builtin_text("wheels-orbital")
 STRUCK = "\n[[fault]]\ntime = 20\nwheel = 2\nlost = true\ndelay = 5\n"
@@ -76,10 +76,9 @@ def test_locked_rotors_fall_through_gravity_like_one_body():
     # So small a limit leaves no torque of the law.
     idle = replace(loop, command_limit=5e-324, limit="axis")
     speeds = np.array(loop.wheels.axes) @ loop.start.rate
-    carried = replace(idle, start=loop.start._replace(momentum=tuple(speeds.tolist())))
+    carried = idle.with_parts(rotors(loop.wheels, speeds.tolist()))
     rigid = make_craft([6.0, 8.0, 5.0], 5e-324, loop.craft.gravity)
-    start = State(*loop.start[:5])
-    bare = replace(idle, craft=rigid, wheels=None, start=start)
+    bare = replace(idle.without("wheels"), craft=rigid)
     with_wheels, without = (label(each, *fly(each, 12_000), 1) for each in (carried, bare))
     apart = np.abs(with_wheels["rate"] - without["rate"]).max()
     assert apart < 1e-3 * np.ptp(without["rate"], axis=0).max()
@@ -224,4 +223,4 @@ def test_single_wheels_take_what_they_share_and_their_own():
     assert scenario.wheels.axes[2] == (0.0, 0.0, 1.0)
     assert scenario.wheels.torque_limit == (0.02, 0.02, 0.05)
     assert scenario.wheels.momentum_limit == (0.4, 0.4, 0.02)
-    assert loop.start.momentum == (0.1, 0.1, -0.2)
+    assert loop.rotors == (0.1, 0.1, -0.2)

@@ -18,6 +18,7 @@ from starhold.scenario.reading import parse
 from starhold.simulation.lane import fly, label
 from starhold.simulation.lanes import simulate_many
 from starhold.studies.flight import Flight
+from tests.making import wheels_of
 
 CRAFT = """
 name = "on wheels"
@@ -123,8 +124,8 @@ def test_mpc_plans_within_the_wheels_torque_and_after_a_loss_within_what_is_left
     scenario, loop = made(LOST, law, limit=f'limit = "{kind}"', allocation=allocation)
     run = flown(loop)
     size = np.abs(run["command"]).max(axis=1) if kind == "axis" else np.linalg.norm(run["command"], axis=1)
-    before, after = scenario.craft.torque_limit, loop.events[1].known.torque_limit
-    assert after == scenario.torque_limit(loop.events[1].wheels) < before
+    before, after = scenario.craft.torque_limit, loop.events[1].nominal.torque_limit
+    assert after == scenario.torque_limit(wheels_of(loop.events[1])) < before
     assert size[:250].max() == pytest.approx(before, rel=1e-9)
     assert size[250:].max() <= after * (1.0 + 1e-12)
     told = np.delete(np.arange(601), np.arange(200, 250))
@@ -145,18 +146,18 @@ def test_lanes_keep_to_the_limit_that_a_loss_leaves():
 def test_a_lagging_torque_is_shared_out_as_it_changes():
     _, loop = made(STIFF, limit="actuator_lag = 0.3", allocation="least-peak")
     end = fly_plainly(loop, 12)
-    assert fly(loop, 12)[1].state == end.state
+    assert fly(loop, 12)[1].effectors == end.effectors
     # A tenth of a second after the command, wheels have what the lag let through by then, not what is given at its end.
     first = fly_plainly(loop, 1)
     reached = allocate_peak(first.state.torque, with_facets(loop.wheels))
-    assert np.abs(first.state.momentum).max() < 0.7 * 0.1 * np.abs(reached).max()
+    assert np.abs(first.effectors[0].momentum).max() < 0.7 * 0.1 * np.abs(reached).max()
 
 
 @pytest.mark.parametrize("allocation", ["least-squares", "least-peak"])
 def test_a_held_torque_shared_out_once_is_that_shared_out_at_every_stage(allocation):
     _, loop = made(STIFF, allocation=allocation)
-    once = attitude_step(loop.parts())
-    always = attitude_step(loop.parts()._replace(response=lambda *_: None))
+    once = attitude_step(loop.composition())
+    always = attitude_step(loop.composition()._replace(response=lambda *_: None))
     setup = loop.setup()
     carry = once.decide(loop.carry(), 0, (1, 0), loop.gains, loop.craft, setup)
     assert once.hold(carry, loop.craft, setup) == always.hold(carry, loop.craft, setup)
@@ -189,7 +190,7 @@ def test_laws_that_can_be_retuned_compare_with_laws_that_cannot():
     kept, unaware = (made(*parts, law=law)[1] for law in (1, 2))
     assert [event.gains == retuned.gains for event in retuned.events] == [True, False]
     assert [event.gains == kept.gains for event in kept.events] == [True, True]
-    assert kept.events[1].wheels == retuned.events[1].wheels != unaware.wheels
+    assert wheels_of(kept.events[1]) == wheels_of(retuned.events[1]) != unaware.wheels
     assert [event.step for event in unaware.events] == [200]
     assert scenario.fault_times == (20.0, 25.0)
     # A law may ask for more than the fault does, too.
@@ -209,12 +210,14 @@ def test_a_law_whose_gains_do_not_fit_what_is_left_is_refused_before_it_flies():
     pd = '\n[[law]]\ntype = "pd"\nk_rate = 0.3\nk_attitude = 0.013\nlimit = "axis"\nfault_action = "{}"\n'
     with pytest.raises(InputError, match=r"law pd from 25 s .*needs k_attitude below the torque limit of 0\.011547 N m"):
         made(LOST, pd.format("reallocate"))
-    assert made(LOST, pd.format("none"))[1].events[0].known.torque_limit > 0.013
+    assert made(LOST, pd.format("none"))[1].events[0].nominal.torque_limit > 0.013
 
 
 def test_a_motor_that_is_diagnosed_to_give_nothing_is_lost():
     weak = LOST.replace("lost = true", "torque_limit = 0") + 'action = "reallocate"\n'
-    assert made(weak, GENTLE)[1].events[1].wheels == made(LOST + 'action = "reallocate"\n', GENTLE)[1].events[1].wheels
+    assert wheels_of(made(weak, GENTLE)[1].events[1]) == wheels_of(
+        made(LOST + 'action = "reallocate"\n', GENTLE)[1].events[1]
+    )
 
 
 def test_too_many_wheels_are_refused_in_one_line():

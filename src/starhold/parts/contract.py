@@ -62,6 +62,8 @@ class Parameter:
     """What it means, for listings and pages."""
     spread: bool = True
     """Whether a number stands for a vector of equal numbers."""
+    columns: tuple[str, ...] = ()
+    """Of a table: the names of its columns. It is given as rows, or as the name of a CSV file of them."""
     dimension: Literal["", "length", "velocity", "acceleration", "time", "rate"] = ""
     """What a scaled number is one of: a file may then give a string with a unit of it too."""
 
@@ -72,8 +74,12 @@ class Parameter:
                 raise ValueError(f"must be one of {', '.join(self.choices)}")
             return self.choices.index(value)
         array = np.asarray(value, dtype=float)
+        if self.columns and (array.ndim != 2 or array.shape[1] != len(self.columns)):
+            raise ValueError(f"must be {self.describe()}")
         if not np.isfinite(array).all():
             raise ValueError("must be finite")
+        if self.columns:
+            return tuple(tuple(row) for row in array.tolist())
         if len(self.shape) == 2 and array.ndim < 2:
             array = array * np.eye(self.shape[0]) if array.ndim == 0 else np.diag(array)
         elif array.ndim == 0 and self.shape and self.spread:
@@ -101,6 +107,8 @@ class Parameter:
 
     def describe(self) -> str:
         """Tell what may be written for this parameter."""
+        if self.columns:
+            return f"rows of {', '.join(self.columns)}, or the name of a CSV file of such columns"
         if not self.shape:
             return "a whole number" if self.whole else "a number"
         size = self.shape[0]

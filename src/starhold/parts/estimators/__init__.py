@@ -1,0 +1,1 @@
+"""Estimators of the body's state, one file each."""

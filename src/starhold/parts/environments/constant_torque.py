@@ -1,0 +1,41 @@
+"""A torque that never changes, in body or inertial axes: a leak, a residual dipole in a steady field, a thruster left open."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, NamedTuple
+
+from starhold.algebra.quaternion import to_body
+from starhold.algebra.vector import Vector
+from starhold.parts.contract import Card, Parameter
+from starhold.parts.craft import Craft
+
+CARD = Card(
+    title="Constant torque",
+    summary="M = constant",
+    sources=("definition",),
+    assumptions=("no law is told of it",),
+)
+ROLE = "environment"
+
+
+class Params(NamedTuple):
+    """How much, and in which axes."""
+
+    torque: Annotated[Vector, Parameter("N m", shape=(3,), spread=False, text="on the body")]
+    axes: Annotated[int, Parameter(choices=("body", "inertial"), text="in which it stays the same")] = 0
+
+
+def torque(state: Any, params: Params, craft: Craft, memory: Any) -> Vector:
+    """Torque on the body (N m, body axes)."""
+    return to_body(state.attitude, params.torque) if params.axes else params.torque
+
+
+def bound(params: Params) -> float:
+    """The largest norm that it has (N m)."""
+    return math.hypot(*params.torque)
+
+
+def examples() -> list[Params]:
+    """A torque of the size of air drag on a small satellite, in either axes."""
+    return [Params((1e-5, -2e-5, 5e-6)), Params((1e-5, -2e-5, 5e-6), 1)]

@@ -1,0 +1,75 @@
+"""Attitude and gyro bias by a filter of fixed gains: the gyro carries the attitude on, and each new attitude corrects both."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+from starhold.algebra.quantity import Quantity
+from starhold.algebra.quaternion import Quaternion, multiply, normalise, relative, vector_part
+from starhold.algebra.scalar import Scalar, less, side, where
+from starhold.algebra.vector import ZERO, Vector, scale, subtract
+from starhold.parts.contract import Card, Parameter
+from starhold.parts.craft import Craft
+
+CARD = Card(
+    title="Complementary filter",
+    summary="q' = q (w_m - b)/2 + attitude_gain e, b' = -bias_gain e, e from each new attitude",
+    sources=("Nonlinear Complementary Filters on the Special Orthogonal Group (2008)",),
+    assumptions=("attitudes come without delay", "the bias changes slowly"),
+)
+ROLE = "estimator"
+NEEDS = ("attitude", "rate")
+FIRST = {"gyro_bias": ZERO}
+
+
+class Params(NamedTuple):
+    """How fast the estimate follows."""
+
+    attitude_gain: Annotated[
+        float, Parameter("1", above=0.0, at_most=1.0, text="share of an attitude's error put right at once")
+    ]
+    bias_gain: Annotated[float, Parameter("1/s", at_least=0.0, text="rate of the bias for a radian of error")]
+
+
+class Estimate(NamedTuple):
+    """Attitude, rate without the bias, and the bias."""
+
+    attitude: Annotated[Quaternion, Quantity("1", "estimated attitude, inertial to body, scalar first", "quaternion")]
+    rate: Annotated[Vector, Quantity("rad/s", "estimated angular velocity, body axes", "axis")]
+    gyro_bias: Annotated[Vector, Quantity("rad/s", "estimated bias of the gyro", "axis")]
+
+
+class Memory(NamedTuple):
+    """The attitude foretold for the next control step, the bias (rad/s), and whether an attitude has come yet (1)."""
+
+    attitude: Quaternion
+    bias: Vector
+    begun: Scalar
+
+
+def remember(params: Params, state: Any) -> Memory:
+    """Nothing is known before the first attitude."""
+    return Memory((1.0, 0.0, 0.0, 0.0), ZERO, 0.0)
+
+
+def estimate(readings: Any, memory: Memory, params: Params, craft: Craft, period: Scalar) -> tuple[Estimate, Memory]:
+    """The estimate at a control step, and what it foretells of the next."""
+    measured = readings.attitude
+    # A sensor that does not tell whether its attitude is new gives a new one at each control step.
+    new = less(0.5, getattr(readings, "attitude_is_new", 1.0))
+    begun = less(0.5, memory.begun)
+    foretold: Any = tuple(where(begun, old, x) for old, x in zip(memory.attitude, measured, strict=True))
+    error = relative(foretold, measured)
+    turn = scale(2.0 * side(error[0]), vector_part(error))
+    half = scale(where(new, 0.5 * params.attitude_gain, 0.0), turn)
+    attitude = normalise(multiply(foretold, (1.0, *half)))
+    bias = subtract(memory.bias, scale(where(new, params.bias_gain * period, 0.0), turn))
+    rate = subtract(readings.rate, bias)
+    step = scale(0.5 * period, rate)
+    ahead = normalise(multiply(attitude, (1.0, *step)))
+    return Estimate(attitude, rate, bias), Memory(ahead, bias, where(new, 1.0, memory.begun))
+
+
+def examples() -> list[Params]:
+    """A slow filter, and one that trusts its attitudes."""
+    return [Params(0.05, 0.002), Params(1.0, 0.0)]

@@ -1,0 +1,103 @@
+"""A star tracker: attitude with noise as a rotation, at a rate of its own and late."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, NamedTuple
+
+from starhold.algebra.quantity import Quantity
+from starhold.algebra.quaternion import Quaternion, multiply, normalise
+from starhold.algebra.scalar import Scalar, less, where
+from starhold.algebra.vector import Vector, add, dot, scale, subtract
+from starhold.parts.contract import Card, Parameter
+from starhold.parts.random import Dice
+
+CARD = Card(
+    title="Star tracker",
+    summary="q_m = q(t - delay) turned by Gaussian angles, less sure about the boresight; held between updates",
+    sources=("Fundamentals of Spacecraft Attitude Determination and Control (2014)",),
+    assumptions=("stars are always in view", "errors independent from update to update"),
+)
+ROLE = "sensor"
+FIRST = {"attitude_is_new": 0.0}
+MOST = 64
+"""Control periods that a delay may last."""
+
+
+class Params(NamedTuple):
+    """How good it is."""
+
+    cross: Annotated[float, Parameter("rad", at_least=0.0, text="standard deviation about each axis across the boresight")]
+    roll: Annotated[float, Parameter("rad", at_least=0.0, text="standard deviation about the boresight")]
+    boresight: Annotated[Vector, Parameter("1", shape=(3,), spread=False, text="where it looks, body axes")] = (
+        0.0,
+        0.0,
+        1.0,
+    )
+    interval: Annotated[float, Parameter("s", at_least=0.0, text="between updates; each control step if 0")] = 0.0
+    delay: Annotated[float, Parameter("s", at_least=0.0, text="from exposure to reading")] = 0.0
+
+
+class Numbers(NamedTuple):
+    """Deviations (rad), the unit vector of the boresight, control steps from update to update, and those of the delay."""
+
+    cross: Scalar
+    roll: Scalar
+    boresight: Vector
+    every: Scalar
+    late: int
+
+
+class Memory(NamedTuple):
+    """The last reading, the attitudes on their way, the newest first, and control steps until the next update."""
+
+    shown: Quaternion
+    waiting: tuple[Quaternion, ...]
+    left: Scalar
+
+
+class Reading(NamedTuple):
+    """The attitude that it shows, and whether it is a new one (1) or that of an earlier control step (0)."""
+
+    attitude: Annotated[
+        Quaternion, Quantity("1", "attitude as the star tracker measures it, inertial to body, scalar first", "quaternion")
+    ]
+    attitude_is_new: Annotated[float, Quantity("1", "1 where the attitude is a new one, else 0")]
+
+
+def prepare(params: Params, period: float) -> Numbers:
+    """The numbers of a control step. ValueError for a boresight without direction, and for too long a delay."""
+    size = math.hypot(*params.boresight)
+    if not size > 0.0:
+        raise ValueError("the boresight needs a direction")
+    late = round(params.delay / period)
+    if late > MOST:
+        raise ValueError(f"the delay must be at most {MOST} control periods, {MOST * period:g} s")
+    return Numbers(
+        params.cross, params.roll, scale(1.0 / size, params.boresight), float(max(1, round(params.interval / period))), late
+    )
+
+
+def remember(params: Numbers, state: Any) -> Memory:
+    """An update is due, and what is on its way is the attitude at the start."""
+    return Memory(state.attitude, (state.attitude,) * params.late, 0.0)
+
+
+def measure(state: Any, memory: Memory, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Memory]:
+    """The last update, a new one where it is due."""
+    seen = memory.waiting[-1] if params.late else state.attitude
+    angles = dice.vector(0, 1.0)
+    along = scale(dot(angles, params.boresight), params.boresight)
+    error = add(scale(0.5 * params.cross, subtract(angles, along)), scale(0.5 * params.roll, along))
+    fresh = normalise(multiply(seen, (1.0, *error)))
+    due = less(memory.left, 0.5)
+    shown: Any = tuple(where(due, new, old) for new, old in zip(fresh, memory.shown, strict=True))
+    waiting = (state.attitude, *memory.waiting[:-1]) if params.late else ()
+    left = where(due, params.every - 1.0, memory.left - 1.0)
+    return Reading(shown, where(due, 1.0, 0.0)), Memory(shown, waiting, left)
+
+
+def examples() -> list[Params]:
+    """A small one at four readings a second, and one that is exact."""
+    arcsec = math.radians(1.0 / 3600.0)
+    return [Params(6.0 * arcsec, 40.0 * arcsec, (0.0, 0.6, 0.8), 0.25, 0.2), Params(0.0, 0.0)]

@@ -1,0 +1,58 @@
+"""Closed loops in few words, for tests."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.catalogue import find, fit
+from starhold.parts.effectors.wheels import ALLOCATIONS
+from starhold.parts.effectors.wheels import State as Rotors
+from starhold.parts.part import Fitted
+
+ORBIT = (fit("environment", "two-body"), fit("environment", "gravity-gradient"))
+ORBITAL = fit("target", "orbital")
+
+
+def aimed(target: Any) -> Fitted:
+    """A quaternion or a table of `tabulate` as a target."""
+    return fit("target", "history" if isinstance(target, np.ndarray) else "inertial", target)
+
+
+def noise(torque: float = 0.0, attitude: float = 0.0, rate: float = 0.0) -> tuple[Fitted, Fitted]:
+    """A random torque (N m) and noisy sensors (rad, rad/s)."""
+    return fit("environment", "random-torque", torque), fit("sensor", "gaussian", attitude, rate)
+
+
+def rotors(wheels: Any, momenta: Any = None, allocation: str | None = None) -> Fitted:
+    """Wheels with these momenta at the start, at rest if not given."""
+    started = Rotors(tuple(momenta or (0.0,) * len(wheels.axes)))
+    if allocation is not None:
+        wheels = wheels._replace(allocation=ALLOCATIONS.index(allocation))
+    return Fitted(find("effector", "wheels"), wheels, start=started)
+
+
+def on_wheels(loop: ClosedLoop, **changes: Any) -> ClosedLoop:
+    """The loop with other numbers of its wheels."""
+    found = loop.find("wheels")
+    assert found is not None
+    return loop.with_parts(replace(found, params=found.params._replace(**changes)))
+
+
+def point_loop(
+    plant: Any, law: Any, gains: Any, start: Any, period: float, model: str = "linear", limit: float = math.inf,
+    kind: Any = "norm", lag: float = 0.0,
+) -> ClosedLoop:  # fmt: skip
+    """A law near a libration point."""
+    field = fit("environment", "linear-gravity" if model == "linear" else "three-body-gravity")
+    surfaces = (fit("actuator", "lag", lag),) if lag else ()
+    return ClosedLoop(
+        plant, law, gains, start, period, parts=(field, *surfaces), limit=kind, command_limit=limit, seed=0
+    )  # fmt: skip
+
+
+def wheels_of(event: Any) -> Any:
+    """The wheels from an event on."""
+    return next(fitted.params for fitted in event.parts if fitted.part.name == "wheels")
