@@ -9,6 +9,7 @@ from starhold.algebra.quantity import quantities
 from starhold.laws.catalogue import Law
 from starhold.laws.interface import Measurement
 from starhold.parts.craft import Craft
+from starhold.parts.part import Part
 
 
 def rescaled(
@@ -54,3 +55,20 @@ def _powers(unit: str) -> tuple[float, float, float]:
     registry = pint.UnitRegistry(cache_folder=":auto:")
     dimensions: Any = registry.parse_units("dimensionless" if unit == "1" else unit).dimensionality
     return (dimensions.get("[mass]", 0.0), dimensions.get("[length]", 0.0), dimensions.get("[time]", 0.0))
+
+
+def rescale(values: Any, units: Any, factors: tuple[float, float, float]) -> Any:
+    """Numbers of these units, one for each field, in another system of units; the same kind of tuple."""
+    parts = [_times(value, _factor(unit, factors)) for value, unit in zip(values, units, strict=True)]
+    return type(values)(*parts) if hasattr(values, "_fields") else tuple(parts)
+
+
+def rescale_params(part: Part, params: Any, factors: tuple[float, float, float]) -> Any:
+    """The parameters of a part in another system of units."""
+    if part.table:
+        return params
+    found = [
+        value if item.gain.choices or item.gain.whole else _times(value, _factor(item.gain.unit, factors))
+        for item, value in zip(part.fields(), params, strict=True)
+    ]
+    return type(params)(*found)

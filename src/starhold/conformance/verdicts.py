@@ -67,12 +67,13 @@ def round_trips(law: Law, write: Callable[..., str], parse: Callable[[str, str],
 
 def agree(loop: Any, starts: Sequence[Any], lanes: Sequence[int]) -> None:
     """Check that a single flight, these lanes of a batch, which start alike, and plain Python agree bit for bit."""
-    one = flatten(fly(loop, STEPS)[1].state)
+    end, plain = fly(loop, STEPS)[1], fly_plainly(loop, STEPS)
+    one = flatten((end.state, end.effectors))
     for threads in (1, 2):
         batch = simulate_many(loop, starts, STEPS, threads=threads)
         same = all(batch.states[:, lane].tolist() == one for lane in lanes)
         require(same, f"a lane of a batch on {threads} threads differs from a single flight")
-    require(flatten(fly_plainly(loop, STEPS).state) == one, "plain Python differs from the compiled kernel")
+    require(flatten((plain.state, plain.effectors)) == one, "plain Python differs from the compiled kernel")
 
 
 def declares_itself(law: Law) -> None:

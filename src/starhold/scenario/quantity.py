@@ -106,6 +106,10 @@ def _schema(gain: Gain) -> dict[str, Any]:
     bounds = {"exclusiveMinimum": gain.above, "minimum": gain.at_least, "maximum": gain.at_most}
     number |= {key: bound for key, bound in bounds.items() if bound is not None}
     single: list[dict[str, Any]] = [number, {"type": "string"}]
+    if gain.columns:
+        width = len(gain.columns)
+        row = {"type": "array", "items": {"anyOf": single}, "minItems": width, "maxItems": width}
+        return {"anyOf": [{"type": "string"}, {"type": "array", "items": row}]} | described
     if not gain.shape:
         return {"anyOf": single} | described
     row = {"type": "array", "items": {"anyOf": single}, "minItems": gain.shape[-1], "maxItems": gain.shape[-1]}

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Mapping
 from typing import Any
 
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law
+from starhold.parts.part import Part
 
 _BODY = """\
 name = "written"
@@ -90,3 +92,14 @@ def station_scenario_with(law: Law, gains: Any) -> str:
 def scenario_with(law: Law, gains: Any) -> str:
     """A small scenario that holds one law."""
     return _BODY + law_table(law, gains)
+
+
+def part_table(part: Part, params: Any) -> dict[str, Any]:
+    """A [[part]] table with these parameters, infinite ones left out."""
+    table: dict[str, Any] = {"type": part.name} if part.file is None else {"file": str(part.file)}
+    for item, value in zip(part.fields(), params, strict=True):
+        if isinstance(value, float) and not math.isfinite(value):
+            continue
+        plain = json.loads(json.dumps(value))
+        table[item.name] = item.gain.choices[value] if item.gain.choices else plain
+    return table

@@ -103,6 +103,11 @@ def prepare(params: Wheels, period: float) -> Wheels:
     return with_facets(params) if params.allocation else params
 
 
+def remember(params: Wheels) -> State:
+    """Rotors at rest."""
+    return State((0.0,) * len(params.axes))
+
+
 def command(applied: Vector, params: Wheels) -> Numbers:
     """The motor torques (N m) that a wanted torque on the body (N m) is shared out to."""
     return allocate_peak(applied, params) if params.allocation else allocate(applied, params)

@@ -1,0 +1,266 @@
+"""The checks that every part but a law must pass, whatever its role."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from starhold.algebra.quaternion import to_reference
+from starhold.algebra.structure import flatten, leaves
+from starhold.algebra.vector import ZERO, add, apply
+from starhold.conformance.bench import PERIOD, sample_loop
+from starhold.conformance.units import rescale, rescale_params
+from starhold.conformance.verdicts import STEPS, NotApplicableError, Verdict, agree, require, run
+from starhold.errors import InputError
+from starhold.laws.catalogue import catalogue
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.bodies.libration_point import PRIMARIES, PointState
+from starhold.parts.catalogue import as_part, fit, from_file, parts, read_module, role_of
+from starhold.parts.contract import Card
+from starhold.parts.craft import make_craft
+from starhold.parts.part import Fitted, Part
+from starhold.parts.random import Dice
+from starhold.scenario.checking import nearest
+from starhold.scenario.parts import ROLES, part_model, read_parts
+from starhold.scenario.writing import part_table
+from starhold.simulation.lane import fly, label, recorded
+
+SYSTEMS = ((7.0, 1.0, 1.0), (1.0, 3.0, 1.0), (1.0, 1.0, 0.2), (2.0, 0.3, 5.0))
+"""Units of mass, length and time, in kg, m and s, in which physics must be the same."""
+
+
+def examine_part(part: Part) -> Iterator[Verdict]:
+    """Run every check over a part, in order, going on after failures."""
+    return run(CHECKS, part)
+
+
+def find_part(given: str) -> Part:
+    """The part that is installed under a name, or that a file holds. InputError where there is none."""
+    installed = {part.name: part for role in ("body", *ROLES) for part in parts(role).values()}
+    path = Path(given)
+    if given in installed and not path.is_file():
+        return installed[given]
+    try:
+        role = role_of(read_module(path))
+        return from_file(path, parts(role) if role in ROLES else {}, as_part)
+    except FileNotFoundError:
+        allowed = f"a Python file that holds a part, or a part by name: {nearest(given, list(installed))}"
+        raise InputError(given, "", "no such file", allowed) from None
+    except (OSError, ValueError) as error:
+        found = error.strerror if isinstance(error, OSError) else ""
+        raise InputError(given, "", found or "", "a Python file that holds a part" if found else str(error)) from None
+
+
+def loop_with(part: Part, params: Any) -> ClosedLoop:
+    """A loop that holds a part, and what it needs."""
+    if part.body == "libration-point":
+        law = catalogue("libration-point")["l2-circle"]
+        start = PointState((0.01, 0.9, 0.1), (0.1, 0.0, 1.3), ZERO)
+        plant, gains = PRIMARIES["sun-earth"].point("L2"), law.examples()[0]
+        loop = ClosedLoop(plant, law, gains, start, 1e-3, limit="norm", command_limit=4.0)
+        field = () if part.hook("acceleration") else (fit("environment", "three-body-gravity"),)
+        return loop.with_parts(*field, Fitted(part, params))
+    law = catalogue()["lyapunov"]
+    loop = sample_loop(law, law.examples()[0])
+    if part.role == "target":
+        loop = loop.without("target")
+    if part.role == "estimator":
+        loop = loop.with_parts(*(fit("sensor", name, *numbers) for name, numbers in _sensors(part)))
+    return loop.with_parts(Fitted(part, params))
+
+
+def _sensors(part: Part) -> list[tuple[str, tuple[float, ...]]]:
+    """Sensors for all that an estimator needs, with some noise."""
+    found: list[tuple[str, tuple[float, ...]]] = []
+    for need in part.needs:
+        sensor = next(
+            (one for one in parts("sensor").values() if not one.table and need in one.module.Reading._fields), None
+        )
+        if sensor is None:
+            raise NotApplicableError(f"no sensor of starhold measures {need}")
+        if sensor.name not in dict(found):
+            found.append((sensor.name, tuple(sensor.examples()[0])))
+    return found
+
+
+def declares_itself(part: Part) -> None:
+    """The file declares a card, parameters with units, examples within their bounds, and what it records."""
+    card = part.card
+    require(isinstance(card, Card) and bool(card.title and card.summary), "CARD is not a Card with a title and a summary")
+    if part.role == "body":
+        raise NotApplicableError("a body's numbers come from tables of its own")
+    require(bool(part.examples()), "examples() is empty")
+    for params in part.examples():
+        require(isinstance(params, part.params), f"the example {params} is not a Params")
+        for item, value in zip(part.fields() if not part.table else (), params, strict=not part.table):
+            shown = item.gain.choices[value] if item.gain.choices else value
+            known = item.default is value or item.gain.check(shown) == value
+            require(known, f"the example's {item.name} = {value} changes when it is read")
+        recorded(loop_with(part, params))
+
+
+def reads_alike(part: Part) -> None:
+    """Plain Python, one lane and every lane of a batch agree bit for bit."""
+    _loops_only(part)
+    for params in part.examples():
+        loop = loop_with(part, params)
+        # Each lane is a run of its own, with its own random numbers.
+        agree(loop, [loop.start] * 3, (0,))
+
+
+def is_pure(part: Part) -> None:
+    """A flight depends on nothing but its loop."""
+    _loops_only(part)
+    for params in part.examples():
+        flights = [fly(loop_with(part, params), STEPS)[0] for _ in range(2)]
+        require(bool(np.array_equal(*flights)), "two flights of the same loop differ")
+
+
+def stays_finite(part: Part) -> None:
+    """All that it gives is finite at rest, at a half turn and at a fast spin."""
+    _loops_only(part)
+    for params in part.examples():
+        loop = loop_with(part, params)
+        starts = [loop.start]
+        if loop.aims:
+            poses = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 0.6, -0.8))
+            starts += [loop.start._replace(attitude=q, rate=w) for q in poses for w in (ZERO, (0.5, -0.4, 0.3))]
+        for start in starts:
+            samples, _ = fly(replace(loop, start=start), STEPS)
+            require(bool(np.isfinite(samples).all()), f"not finite from {start}")
+
+
+def survives_toml(part: Part) -> None:
+    """Parameters written to a [[part]] table and read back are the same; unknown keys are refused."""
+    if part.table or part.role == "body":
+        raise NotApplicableError(f"it has no [[part]] table; [{part.table or part.name}] gives it")
+    for params in part.examples():
+        table = part_table(part, params)
+        body = part.body or "rigid-body"
+        read = read_parts([table], body, Path(), part.name)[0].params
+        require(read == params, f"{params} becomes {read} on the way through TOML")
+        try:
+            read_parts([table | {"no_such_key": 1}], body, Path(), part.name)
+        except InputError:
+            continue
+        raise InputError(part.name, "", "an unknown key is accepted", "only the part's own keys")
+    require(bool(part_model(part).model_json_schema()["properties"]), "its table has no JSON Schema")
+
+
+def keeps_units(part: Part) -> None:
+    """The declared units are right: the physics is the same in any system of units."""
+    if part.role not in ("environment", "actuator") or part.body not in ("", "rigid-body") or part.hook("update"):
+        raise NotApplicableError("only for torques, forces and actuators without random numbers and tables")
+    craft = make_craft([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]], 0.05)
+    loop = sample_loop(catalogue()["lyapunov"], catalogue()["lyapunov"].examples()[0])
+    for params in part.examples():
+        for name, unit in (("torque", "N m"), ("acceleration", "m/s^2"), ("rates", "N m/s")):
+            equation = part.hook(name)
+            if equation is None:
+                continue
+
+            def value(system: Any, name: str = name, equation: Any = equation, params: Any = params) -> Any:
+                own = rescale_params(part, params, system)
+                state = rescale(loop.start, ("1", "rad/s", "m", "m/s", "N m"), system)
+                if name == "rates":
+                    vectors = rescale(((1e-3, 2e-3, -1e-3), (3e-3, -1e-3, 2e-3)), ("N m", "N m"), system)
+                    step = rescale((0.1,), ("s",), system)[0]
+                    return equation(*vectors, vectors[0], step, own)
+                return equation(state, own, rescale(craft, CRAFT_UNITS, system), ())
+
+            plain = np.array(value((1.0, 1.0, 1.0)))
+            for system in SYSTEMS:
+                back = rescale((1.0,), (unit,), system)[0]
+                error = float(np.abs(np.array(value(system)) / back - plain).max()) / max(float(np.abs(plain).max()), 1e-300)
+                require(error < 1e-6, f"with kg, m, s scaled by {system} {name} changes by {error:.1e} of itself")
+
+
+CRAFT_UNITS = ("kg m^2", "1/(kg m^2)", "N m", "m^3/s^2", "1")
+
+
+def keeps_momentum(part: Part) -> None:
+    """Without torque from outside the angular momentum of body and effector stays as it is."""
+    if part.role != "effector":
+        raise NotApplicableError("only effectors share the body's momentum")
+    for params in part.examples():
+        loop = loop_with(part, params).without("environment")
+        loop = replace(loop, start=loop.start._replace(position=ZERO, velocity=ZERO), period=PERIOD / 10.0)
+        carries = [loop.carry(), fly(loop, 10 * STEPS)[1]]
+        numbers = loop.setup().effectors
+        totals: list[Any] = []
+        for carry in carries:
+            own = zip(loop.used("effector"), carry.effectors, numbers, strict=True)
+            total = apply(loop.craft.inertia, carry.state.rate)
+            for fitted, state, prepared in own:
+                total = add(total, fitted.part.module.momentum(state, prepared))
+            totals.append(to_reference(carry.state.attitude, total))
+        apart = float(np.abs(np.subtract(*totals)).max()) / max(float(np.abs(totals).max()), 1e-300)
+        require(apart < 1e-7, f"the angular momentum changes by {apart:.1e} of itself")
+
+
+def measures_what_it_says(part: Part) -> None:
+    """The fields of readings and estimates are shaped as those of the body's state that they are called after."""
+    if part.role not in ("sensor", "estimator"):
+        raise NotApplicableError("only sensors and estimators tell of the state")
+    for params in part.examples():
+        loop = loop_with(part, params)
+        memories = fly(loop, 3)[1].memories
+        values = [*memories.readings, memories.estimate] if part.role == "estimator" else memories.readings
+        for value in values:
+            for name in getattr(value, "_fields", ()):
+                if name in loop.start._fields:
+                    same = len(flatten((getattr(value, name),))) == len(flatten((getattr(loop.start, name),)))
+                    require(same, f"{name} is shaped otherwise than that of the body")
+
+
+def draws_in_its_range(part: Part) -> None:
+    """Random numbers differ from step to step and from run to run, and come back with the seed."""
+    if part.hook("measure") is None and part.hook("update") is None:
+        raise NotApplicableError("it draws no random numbers")
+    loop = loop_with(part, part.examples()[0])
+    flights = [label(one, *fly(one, STEPS, run=run), 1) for one, run in ((loop, 0), (loop, 0), (loop, 1))]
+    arrays = [np.concatenate([np.ravel(values) for values in flight.arrays.values()]) for flight in flights]
+    require(bool(np.array_equal(arrays[0], arrays[1])), "the same run differs from itself")
+    if any(isinstance(x, float) and x > 0.0 for x in leaves(part.examples()[0])) and _draws(part):
+        require(not np.array_equal(arrays[0], arrays[2]), "another run has the same random numbers")
+
+
+def _draws(part: Part) -> bool:
+    """Whether its equation asks for random numbers."""
+    asked: list[int] = []
+
+    class Asked(Dice):
+        def vector(self, place: int, deviation: Any) -> Any:
+            asked.append(place)
+            return super().vector(place, deviation)
+
+    loop = loop_with(part, part.examples()[0])
+    fitted = next(f for f in loop.parts if f.part == part)
+    numbers, dice = fitted.prepared(loop.period), Asked((1, 2), 3, 0)
+    if part.hook("measure") is not None:
+        part.module.measure(loop.start, fitted.remembered(numbers, loop.start), numbers, dice, 3)
+    else:
+        part.module.update(fitted.remembered(numbers), loop.start, numbers, dice, 3)
+    return bool(asked)
+
+
+def _loops_only(part: Part) -> None:
+    if part.role == "body":
+        raise NotApplicableError("a body flies under its laws, which have their own checks")
+
+
+CHECKS = (
+    declares_itself,
+    is_pure,
+    reads_alike,
+    stays_finite,
+    survives_toml,
+    keeps_units,
+    keeps_momentum,
+    measures_what_it_says,
+    draws_in_its_range,
+)
