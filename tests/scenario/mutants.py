@@ -6,6 +6,7 @@ import random
 import tomllib
 from copy import deepcopy
 
+from starhold.scenario.bodies import bodies
 from starhold.scenario.reading import builtin_names, builtin_text
 from starhold.scenario.template import template_text
 
@@ -52,7 +53,7 @@ ODD = [
         {"from": 0, "to": 1, "step": 1e-9},
     ),
 ]
-TEXTS = [template_text(), template_text(libration=True), *(builtin_text(name) for name in builtin_names())]
+TEXTS = [*(template_text(body) for body in bodies()), *(builtin_text(name) for name in builtin_names())]
 SHORT = 40
 """Control steps of a mutant whose timing is left alone."""
 

@@ -5,8 +5,8 @@ import warnings
 import pytest
 
 from starhold.errors import InputError
-from starhold.scenario.opening import open_scenario
-from starhold.studies.kinds import kind_of
+from starhold.scenario.building import build
+from starhold.scenario.reading import load
 from tests.scenario.mutants import mutant
 
 EACH = 60
@@ -22,9 +22,9 @@ def test_a_mutant_is_built_or_refused_in_one_line(block, tmp_path):
             # An orbit that comes down after the run is not refused.
             warnings.simplefilter("ignore", UserWarning)
             try:
-                scenario = open_scenario(path, allow_unstable=seed % 2 == 0)
+                scenario = load(path, allow_unstable=seed % 2 == 0)
                 for entry in scenario.laws:
-                    kind_of(scenario).build(scenario, entry)
+                    build(scenario, entry)
             except InputError as error:
                 said.append(str(error))
     assert 10 < len(said) < EACH

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from starhold.errors import InputError
@@ -70,6 +70,8 @@ def test_elements_agree_with_basilisk():
             assert mine == pytest.approx(theirs, abs=1e-12 * np.linalg.norm(theirs))
 
 
+# Most orbits that come to mind start too low for any surface to be met.
+@settings(suppress_health_check=[HealthCheck.filter_too_much])
 @given(st.one_of(ellipses, hyperbolas), st.floats(0.05, 2.0))
 def test_the_moment_of_coming_down_is_on_the_orbit(elements, share):
     """Kepler's equation, by quadrature of the radius: dt = r dr / sqrt(2 (E r^2 + mu r) - h^2), free of the formula used."""

@@ -11,20 +11,18 @@ from starhold.analysis.station import Circle, Equilibrium, goal_of
 from starhold.errors import InputError
 from starhold.laws.catalogue import catalogue
 from starhold.parts.bodies.libration_point import EARTH_DIAMETER, PRIMARIES
-from starhold.scenario.opening import json_schema, open_scenario
+from starhold.scenario.bodies.libration_point.tables import LibrationPointTable, PointLawTable
+from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
-from starhold.scenario.station.building import build
-from starhold.scenario.station.reading import StationScenario, parse_station
-from starhold.scenario.station.schema import StationLawTable, StationTable
+from starhold.scenario.schema import json_schema
 from starhold.scenario.template import template_text
-from starhold.studies.kinds import kind_of
 
 BASE = builtin_text("l2-circle")
 OWN = 'larger = 1.327e20\nsmaller = 4.035e14\nseparation = "1.496e11 m"'
 
 
 def build_all(text):
-    scenario = parse_station(text, "my.toml")
+    scenario = parse(text, "my.toml")
     return [build(scenario, entry) for entry in scenario.laws]
 
 
@@ -119,20 +117,20 @@ def test_a_fault_is_one_line_with_file_key_and_what_is_allowed(name):
 
 def test_a_file_without_laws():
     with pytest.raises(InputError, match=r"law: found no law"):
-        parse_station(BASE.split("[[law]]")[0], "my.toml")
+        parse(BASE.split("[[law]]")[0], "my.toml")
 
 
 def test_strings_with_units_are_scaled():
     text = BASE.replace("[0.02, -0.25, 0.0]", '["12742 km", -0.25, "0 m"]\nvelocity = ["1 m/s", 0.0, 0.0]')
     text = text.replace("margin = 0.10", 'limit = "2e-6 m/s^2"\nlag = "12 h"').replace('"2 yr"', '"100 d"')
-    scenario = parse_station(text, "my.toml")
-    units, table = scenario.units, scenario.table
+    scenario = parse(text, "my.toml")
+    units, table = scenario.table.libration.units, scenario.table
     assert units.length == EARTH_DIAMETER
     assert table.initial.position == pytest.approx((1.0, -0.25, 0.0))
     assert table.initial.velocity[0] * units.velocity == pytest.approx(1.0)
     assert table.control.limit is not None
     assert table.control.limit * units.acceleration == pytest.approx(2e-6)
-    assert [entry.lag * units.time for entry in scenario.laws] == pytest.approx([43200.0] * 4)
+    assert [entry.options.lag * units.time for entry in scenario.laws] == pytest.approx([43200.0] * 4)
     assert table.simulation.steps == round(100 * 86400 / units.time / 0.001)
 
 
@@ -141,30 +139,28 @@ def test_lengths_of_laws_take_units_too():
     head = BASE.split("[[law]]")[0]
     law = '[[law]]\ntype = "l2-circle"\nradius = "6371 km"\nrate = "0.01 rad/d"\nboundary_layer = "1 cm/s"\nalpha = 1'
     law += "\nk = 1\nk_x = 18"
-    scenario = parse_station(f"{head}{law}\nk_velocity = 6", "my.toml")
-    gains, units = scenario.laws[0].gains, scenario.units
+    scenario = parse(f"{head}{law}\nk_velocity = 6", "my.toml")
+    gains, units = scenario.laws[0].gains, scenario.table.libration.units
     assert gains.radius == pytest.approx(0.5, rel=1e-15)
     assert gains.rate == pytest.approx(0.01 / 86400.0 * units.time)
     assert gains.boundary_layer == pytest.approx(0.01 / units.velocity)
     rest = f'{head}[[law]]\ntype = "l2-equilibrium"\nform = "degree"\nlimit = 1.0\ny = "-12742 km"\nz = 0.5'
-    assert parse_station(rest, "my.toml").laws[0].gains[:2] == pytest.approx((-1.0, 0.5))
+    assert parse(rest, "my.toml").laws[0].gains[:2] == pytest.approx((-1.0, 0.5))
 
 
 def test_a_limit_in_the_law_comes_before_the_common_one():
-    scenario = open_scenario("l2-deficit")
-    assert isinstance(scenario, StationScenario)
-    shares = [entry.limit / scenario.laws[0].limit for entry in scenario.laws]
+    scenario = load("l2-deficit")
+    shares = [entry.options.limit / scenario.laws[0].options.limit for entry in scenario.laws]
     assert shares[:3] == pytest.approx([1.0, 0.95, 0.9])
-    assert scenario.laws[3].limit == 2.786
-    free = parse_station(builtin_text("l2-deficit").replace("deficit = 0.0\n", ""), "my.toml")
-    assert math.isinf(free.laws[0].limit)
+    assert scenario.laws[3].options.limit == 2.786
+    free = parse(builtin_text("l2-deficit").replace("deficit = 0.0\n", ""), "my.toml")
+    assert math.isinf(free.laws[0].options.limit)
     assert build(free, free.laws[0]).limit_kind == "none"
 
 
 def test_starts_on_the_circle_of_each_law_and_at_its_place_of_rest():
     for name in ("l2-circle", "l2-equilibrium"):
-        scenario = open_scenario(name)
-        assert isinstance(scenario, StationScenario)
+        scenario = load(name)
         for entry in scenario.laws:
             loop, goal = build(scenario, entry), goal_of(entry.gains)
             offset = np.array(scenario.table.initial.position)
@@ -179,35 +175,26 @@ def test_starts_on_the_circle_of_each_law_and_at_its_place_of_rest():
 def test_two_bodies_of_ones_own():
     sun_earth = PRIMARIES["sun-earth"]
     own = f"larger = {sun_earth.larger!r}\nsmaller = {sun_earth.smaller!r}\nseparation = {sun_earth.separation!r}"
-    ours, theirs = (parse_station(BASE.replace('primaries = "sun-earth"', text), "my") for text in (own, ""))
+    ours, theirs = (parse(BASE.replace('primaries = "sun-earth"', text), "my") for text in (own, ""))
     assert ours.craft == theirs.craft
-    assert ours.units == theirs.units
+    assert ours.table.libration.units == theirs.table.libration.units
 
 
 def test_the_template_names_every_key_and_the_schema_takes_it():
-    scenario = parse_station(template_text(libration=True), "new.toml")
-    assert [kind_of(scenario).build(scenario, entry) for entry in scenario.laws]
-    for name, field in StationTable.model_fields.items():
+    scenario = parse(template_text("libration-point"), "new.toml")
+    assert [build(scenario, entry) for entry in scenario.laws]
+    for name, field in LibrationPointTable.model_fields.items():
         options = [field.annotation, *getattr(field.annotation, "__args__", ())]
         for model in (o for o in options if hasattr(o, "model_fields")):
-            assert f"[{name}]" in template_text(libration=True)
+            assert f"[{name}]" in template_text("libration-point")
             for key in model.model_fields:
-                assert f"{key} = " in template_text(libration=True) or key == "deficit"
-    for key in StationLawTable.model_fields:
-        assert key in template_text(libration=True)
+                assert f"{key} = " in template_text("libration-point") or key == "deficit"
+    for key in PointLawTable.model_fields:
+        assert key in template_text("libration-point")
     check = jsonschema.Draft202012Validator(json_schema())
     assert not list(check.iter_errors(tomllib.loads(BASE)))
     for old, new in (("radius =", "raduis ="), ("margin", "margn"), ('"L2"', '"L4"'), ('"sun-earth"', '"sun"')):
         assert list(check.iter_errors(tomllib.loads(BASE.replace(old, new))))
-
-
-def test_each_kind_is_refused_where_the_other_is_needed():
-    with pytest.raises(InputError, match="station keeping"):
-        load("l2-circle")
-    with pytest.raises(InputError, match="station keeping"):
-        parse(BASE, "my.toml")
-    with pytest.raises(InputError, match="spacecraft: found an unknown key"):
-        parse_station(BASE.replace("[control]", "[spacecraft]\n[control]"), "my.toml")
 
 
 def test_unstable_gains_are_refused_unless_they_are_allowed(tmp_path):
@@ -217,10 +204,10 @@ def test_unstable_gains_are_refused_unless_they_are_allowed(tmp_path):
     for law in (circle.format(8.8), rest.format(8.8, 3.4), rest.format(17.8, 0.0)):
         (tmp_path / "my.toml").write_text(f"{head}[[law]]\n{law}")
         with pytest.raises(InputError, match=r"law\[1\]: .*--allow-unstable"):
-            open_scenario(tmp_path / "my.toml")
-        assert open_scenario(tmp_path / "my.toml", allow_unstable=True).laws
+            load(tmp_path / "my.toml")
+        assert load(tmp_path / "my.toml", allow_unstable=True).laws
     for law in (circle.format(8.9), rest.format(8.9, 3.4)):
-        assert parse_station(f"{head}[[law]]\n{law}", "my.toml").laws
+        assert parse(f"{head}[[law]]\n{law}", "my.toml").laws
 
 
 def test_every_station_law_has_a_goal():

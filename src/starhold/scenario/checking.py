@@ -1,4 +1,4 @@
-"""What reading any kind of scenario file takes: whatever is wrong with one becomes one line."""
+"""Checks of what a scenario file holds: whatever is wrong becomes one line."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import tomllib
 from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Self, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import PydanticCustomError
@@ -20,53 +20,18 @@ from starhold.loop.kernels import form, make_step
 from starhold.scenario.tables import check_name
 
 _Model = TypeVar("_Model", bound=BaseModel)
-_Entry = TypeVar("_Entry")
+RENAMED = {
+    "double_cover": "quaternion_sign",
+    "slope": "surface_gain",
+    "reach": "switching_gain",
+    "layer": "boundary_layer",
+    "turn": "slew_angle",
+    "stored": "wheel_momentum",
+    "l2-rest": "l2-equilibrium",
+}
+"""Old names of keys, laws and built-in scenarios, refused with the new one named where that one is known."""
 MOST_SUBSTEPS = 10**6
-"""Of a control period, which is over before an interrupt is heeded."""
-
-
-class Named:
-    """What entries for laws of all kinds are shown as."""
-
-    def __repr__(self) -> str:
-        entry = cast(Any, self)
-        return f"<law {entry.name}: {entry.law.name}, {entry.gains}>"
-
-
-class LawBook(Generic[_Entry]):
-    """What scenarios of all kinds share: a table with a name, and laws with names of their own."""
-
-    body: ClassVar[str]
-    """The part that moves, by name."""
-    table: Any
-    laws: tuple[_Entry, ...]
-    text: str
-    where: str
-
-    @property
-    def name(self) -> str:
-        """The scenario's name."""
-        return self.table.name
-
-    def __repr__(self) -> str:
-        names = ", ".join(cast(Any, entry).name for entry in self.laws)
-        return f"<{type(self).__name__} {self.name}: {names}; {self.table.simulation.steps} control steps>"
-
-    def with_(self, changes: Mapping[str, Any]) -> Self:
-        """The scenario with other values at some keys: {"spacecraft.inertia": [2, 3, 4], "law.pd.k_rate": "0.1 N m s"}; the
-        key of a law's table is its name, or "law[1]" by its place; None takes away what is there. InputError as of a
-        file."""
-        # Loaded here, for it opens scenarios of all kinds.
-        from starhold.scenario.making import changed
-
-        return cast(Any, changed(cast(Any, self), changes))
-
-    def pick(self, name: str) -> _Entry:
-        """The law of this name; InputError names the nearest when there is none."""
-        for entry in self.laws:
-            if cast(Any, entry).name == name:
-                return entry
-        raise InputError(self.where, "law", name, nearest(name, [cast(Any, entry).name for entry in self.laws]))
+"""The most of a control period, which is over before an interrupt is heeded."""
 
 
 LONGEST_TEXT, DEEPEST, MOST_DIGITS = 2**22, 16, 60
@@ -89,7 +54,7 @@ def read_toml(text: str, where: str) -> dict[str, Any]:
     except RecursionError:
         raise InputError(where, "", "tables or lists too deep", f"at most {DEEPEST} within one another") from None
     except ValueError:
-        # What Python says of integers that are too long to convert.
+        # Python says so of integers that are too long to convert.
         raise InputError(where, "", "a number of thousands of digits", f"at most {MOST_DIGITS} digits") from None
     _check_sizes(tables, where)
     return tables
@@ -139,7 +104,7 @@ def pick_law(
 def _law_of(table: dict[str, Any], known: Mapping[str, Law], where: str, key: str) -> Law:
     name = table.get("type")
     if not isinstance(name, str) or name not in known:
-        allowed = nearest(str(name), list(known)) if isinstance(name, str) else f"{nearest('', list(known))}; or a file"
+        allowed = nearest(name, list(known)) if isinstance(name, str) else f"{nearest('', list(known))}; or a file"
         raise InputError(where, f"{key}.type", show(name) if name is not None else "nothing", allowed)
     return known[name]
 
@@ -264,7 +229,8 @@ def _translate(
     found = show(context.get("found", fault.get("input")))
     if fault["type"] == "extra_forbidden":
         known = list(_model_at(model, place[:-1]).model_fields) + (extra if len(place) == 1 else [])
-        return InputError(where, key, "an unknown key", nearest(place[-1], known))
+        found = "an old name" if RENAMED.get(place[-1]) in known else "an unknown key"
+        return InputError(where, key, found, nearest(place[-1], known))
     if fault["type"] == "missing":
         return InputError(where, key, "nothing", "this key is required")
     if fault["type"] in ("quantity", "quantity_at"):
@@ -290,7 +256,7 @@ def _plain(message: str) -> str:
 
 
 def show(value: Any) -> str:
-    """What was found, short enough for one line."""
+    """A value that was found, short enough for one line."""
     return cut(f'"{value}"' if isinstance(value, str) else str(value))
 
 
@@ -300,6 +266,8 @@ def cut(text: str, most: int = 60) -> str:
 
 
 def nearest(word: str, known: list[str]) -> str:
-    """The nearest known words first; all of them when none is near."""
+    """The new name of a word that is an old one, else the nearest known word, else all of them."""
+    if (new := RENAMED.get(word)) in known:
+        return f"{new}, its new name"
     near = difflib.get_close_matches(word[:100], known, n=1, cutoff=0.6)
     return f"did you mean {near[0]}?" if near else f"one of {', '.join(sorted(known))}"

@@ -10,7 +10,7 @@ import numpy as np
 
 from starhold.errors import InputError
 from starhold.laws.interface import Field
-from starhold.scenario.opening import AnyScenario
+from starhold.scenario.reading import LawEntry, Scenario
 
 
 @dataclass(frozen=True, repr=False)
@@ -34,7 +34,7 @@ class Design:
         return f"<Design {self.name}: {self.law} {self.form}; {gains}>"
 
 
-def design(scenario: AnyScenario, law: str | None = None) -> list[Design]:
+def design(scenario: Scenario, law: str | None = None) -> list[Design]:
     """Every law of a scenario that has a `form`, or the one of this name. InputError where there is none, or where its
     figures cannot be computed."""
     entries = scenario.laws if law is None else (scenario.pick(law),)
@@ -45,7 +45,7 @@ def design(scenario: AnyScenario, law: str | None = None) -> list[Design]:
     return designed
 
 
-def _design(scenario: AnyScenario, entry: Any, form: str) -> Design:
+def _design(scenario: Scenario, entry: LawEntry, form: str) -> Design:
     try:
         with np.errstate(all="ignore"):
             figures = dict(entry.law.explain(scenario.craft, entry.spec))
@@ -63,9 +63,9 @@ def _named(items: Iterable[Field], values: Iterable[Any]) -> dict[str, Any]:
     }
 
 
-def map_inputs(scenario: AnyScenario, law: str | None = None) -> tuple[Any, float, float, float]:
-    """What a map of the degree of stability is drawn from: inertia ratios, scaled angle and rate, budget; of the first law
-    that is designed for it. InputError where there is none."""
+def map_inputs(scenario: Scenario, law: str | None = None) -> tuple[Any, float, float, float]:
+    """The numbers that a map of the degree of stability is drawn from: inertia ratios, scaled angle and rate, budget; of the
+    first law that is designed for it. InputError where there is none."""
     entries = scenario.laws if law is None else (scenario.pick(law),)
     for entry in entries:
         teller = getattr(entry.law.module, "map_inputs", None)

@@ -12,30 +12,30 @@ import numpy as np
 
 from starhold.errors import InputError
 from starhold.scenario.checking import nearest, read_toml, show
-from starhold.scenario.opening import AnyScenario, open_tables
+from starhold.scenario.reading import Scenario, read_tables
 from starhold.scenario.writing import toml_text
 
 WHERE = "scenario"
-"""What errors call one that comes from no file."""
+"""The name that errors call one by that comes from no file."""
 _PART = re.compile(r"([^.\[\]]+)(?:\[(\d+)\])?")
 
 
-def make_scenario(tables: Mapping[str, Any], folder: str | Path = ".", allow_unstable: bool = False) -> AnyScenario:
+def make_scenario(tables: Mapping[str, Any], folder: str | Path = ".", allow_unstable: bool = False) -> Scenario:
     """The scenario of tables as a file would hold them, {"name": "mine", "spacecraft": {"inertia": [2, 3, 4]}, ..., "law":
     [{"type": "pd", ...}]}: strings, numbers, truths, lists and tables; tuples and NumPy arrays count as lists, and what is
     None as left out. `folder`: what file names in it are relative to. InputError says what is wrong, as of a file. A
     scenario's `with_` gives others like it, and its `text` is the file."""
     plain = _plain(tables, WHERE, "")
-    return open_tables(plain, toml_text(plain), WHERE, Path(folder), allow_unstable)
+    return read_tables(plain, toml_text(plain), WHERE, Path(folder), allow_unstable)
 
 
-def changed(scenario: AnyScenario, changes: Mapping[str, Any]) -> AnyScenario:
+def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
     """The scenario with other values at these keys, which are told as errors tell them, "spacecraft.inertia" or
     "law[2].k_rate", and of laws by their names too, "law.pd.k_rate"; None takes a key, a table or a law away."""
     return next(variants(scenario, [changes]))
 
 
-def variants(scenario: AnyScenario, changes: Iterable[Mapping[str, Any]]) -> Iterator[AnyScenario]:
+def variants(scenario: Scenario, changes: Iterable[Mapping[str, Any]]) -> Iterator[Scenario]:
     """The scenario changed in one way after the other; errors tell which."""
     names = [entry.name for entry in scenario.laws]
     tables = read_toml(scenario.text, scenario.where)
@@ -49,7 +49,7 @@ def variants(scenario: AnyScenario, changes: Iterable[Mapping[str, Any]]) -> Ite
             for key, value in change.items():
                 _put(other, _path(key, names, where), value, where)
             plain = _plain(other, where, "")
-            yield open_tables(plain, toml_text(plain), scenario.where, scenario.folder, scenario.allow_unstable)
+            yield read_tables(plain, toml_text(plain), scenario.where, scenario.folder, scenario.allow_unstable)
         except InputError as error:
             raise InputError(where, error.key, error.found, error.allowed) from None
 

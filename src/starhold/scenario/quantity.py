@@ -21,12 +21,12 @@ MOST_WHOLE = 2**53
 
 
 def quantity(gain: Gain) -> tuple[BeforeValidator, WithJsonSchema]:
-    """What pydantic needs to read a quantity: `Annotated[Any, *quantity(Gain("N m", above=0.0))]`."""
+    """The annotations by which pydantic reads a quantity: `Annotated[Any, *quantity(Gain("N m", above=0.0))]`."""
     return BeforeValidator(reader(gain)), WithJsonSchema(_schema(gain))
 
 
 def quantity_or(word: str, meaning: float, gain: Gain) -> tuple[BeforeValidator, WithJsonSchema]:
-    """The same for a quantity in whose place a word may stand."""
+    """The annotations for a quantity in whose place a word may stand."""
     read, schema = reader(gain), _schema(gain)
     described = {"anyOf": [{"const": word}, *schema["anyOf"]], "description": schema["description"]}
     return BeforeValidator(lambda value: meaning if value == word else read(value)), WithJsonSchema(described)
@@ -37,14 +37,14 @@ SCALED = {"length": "m", "velocity": "m/s", "acceleration": "m/s^2", "time": "s"
 
 
 def any_quantity(gain: Gain) -> tuple[BeforeValidator, WithJsonSchema]:
-    """The same, scaled where the declaration says of what."""
+    """The annotations for a quantity, scaled where the declaration says of what."""
     return scaled(gain.dimension, replace(gain, unit=SCALED[gain.dimension])) if gain.dimension else quantity(gain)
 
 
 def scaled(
     kind: Literal["length", "velocity", "acceleration", "time", "rate"], gain: Gain
 ) -> tuple[BeforeValidator, WithJsonSchema]:
-    """The same for scaled numbers: plain ones are, strings with the gain's unit become so. What one is worth in SI is told
+    """The annotations for scaled numbers: plain ones are, strings with the gain's unit become so. Their worth in SI is told
     by the validation's context, under the name of its kind; the bounds are of scaled numbers."""
     read, schema = reader(gain), _schema(gain)
     schema["description"] = f"{gain.text} (scaled, or with a unit such as {gain.unit})"

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
-from typing import Any, ClassVar
-
-import numpy as np
+from typing import Any
 
 from starhold.errors import InputError
-from starhold.laws.catalogue import Law, catalogue
-from starhold.parts.craft import Craft, compact, make_craft
-from starhold.parts.effectors.envelope import authority
-from starhold.parts.effectors.wheels import Wheels, body_inertia
+from starhold.laws.catalogue import Law
+from starhold.parts.part import Fitted
+from starhold.scenario.bodies import body_of
+from starhold.scenario.bodies.interface import Body, Made
 from starhold.scenario.checking import (
     LONGEST_TEXT,
-    LawBook,
-    Named,
     cut,
     free_name,
     make_gains,
@@ -30,90 +27,91 @@ from starhold.scenario.checking import (
     validate,
 )
 from starhold.scenario.checking import nearest as nearest
-from starhold.scenario.rotors import make_rotors
-from starhold.scenario.schema import FaultTable, ScenarioTable, law_model
-from starhold.scenario.start import told_to_design
+from starhold.scenario.parts import read_parts
+from starhold.scenario.schema import APART, law_model
 
-MARK = "libration"
-"""The table by which a scenario of station keeping is known."""
 LONGEST_PATH = 200
 """Characters of a path that errors show whole."""
 
 
 @dataclass(frozen=True, repr=False)
-class LawEntry(Named):
+class LawEntry:
     """A law with its gains, under the name the file gives it."""
 
     name: str
     law: Law
     gains: Any
-    quaternion_sign: Any = "as_published"
-    hysteresis_width: float = 0.5
+    options: Any
+    """The NamedTuple of what the body lets a law's table say beside its gains."""
     form: str | None = None
     spec: Any = None
     """The design form that gave the gains, and its inputs; None where the file gives the gains themselves."""
-    fault_action: str | None = None
-    """What is done about any fault where this law flies; None: what the fault says."""
 
-    def action_on(self, fault: FaultTable) -> str:
-        """What is done about a fault where this law flies."""
-        return self.fault_action or fault.action
+    def __repr__(self) -> str:
+        return f"<law {self.name}: {self.law.name}, {self.gains}>"
 
 
 @dataclass(frozen=True, repr=False)
-class Scenario(LawBook[LawEntry]):
-    """A scenario file read and checked: its tables, its laws with their gains, its text, what errors call it, and the
-    folder that file names in it are relative to."""
+class Scenario:
+    """A scenario file read and checked: how its body is read and built, its tables, its laws with their gains, its text,
+    what errors call it, and the folder that file names in it are relative to."""
 
-    body: ClassVar[str] = "rigid-body"
-    table: ScenarioTable
+    hooks: Body
+    table: Any
     laws: tuple[LawEntry, ...]
     text: str
     where: str = ""
     folder: Path = Path()
     allow_unstable: bool = False
     """Whether gains that a law tells to be unstable are taken."""
-
-    @cached_property
-    def craft(self) -> Craft:
-        """The spacecraft; with wheels, its inertia is without the rotors' moments about their own axes."""
-        return self.craft_of(self.table.spacecraft.inertia)
-
-    def craft_of(self, inertia: Any) -> Craft:
-        """The same spacecraft with another inertia (3, 3; kg m2), its wheels included; ValueError where it cannot be."""
-        gravity = {} if self.table.orbit is None else {"gravity": self.table.orbit.gravitational_parameter}
-        craft = make_craft(inertia, self.torque_limit(self.wheels), **gravity)
-        if self.wheels is None:
-            return craft
-        rest = body_inertia(inertia, self.wheels)
-        return craft._replace(inertia=compact(rest), inverse_inertia=compact(np.linalg.inv(rest)), with_rotors=craft.inertia)
-
-    def torque_limit(self, wheels: Wheels | None) -> float:
-        """The torque that a law may reckon with (N m): the limit of [spacecraft], or what these wheels surely give in its
-        way (in norm, else about each axis at once) where that is less."""
-        own, table = self.table.spacecraft, self.table.wheels
-        if wheels is None:
-            return own.torque_limit
-        peak = table is not None and table.allocation == "least-peak"
-        least = authority(wheels, "norm" if own.limit == "norm" else "axis", peak=peak)
-        return least if own.limit == "none" else min(own.torque_limit, least)
-
-    @cached_property
-    def wheels(self) -> Wheels | None:
-        """The reaction wheels, None for a craft without."""
-        return make_rotors(self.table.wheels, self.table.wheel)
+    parts: tuple[Fitted, ...] = ()
+    """The parts that [[part]] tables give."""
 
     @property
-    def fault_times(self) -> tuple[float, ...]:
-        """When faults happen and are acted on (s)."""
-        faults = self.table.fault
-        acted = [f.time + f.delay for f in faults if any(law.action_on(f) != "none" for law in self.laws)]
-        return tuple(sorted({*(fault.time for fault in faults), *acted}))
+    def name(self) -> str:
+        """The scenario's name."""
+        return self.table.name
 
+    @property
+    def body(self) -> str:
+        """The name of the body, the part that moves."""
+        return self.hooks.name
 
-def not_turning(where: str) -> InputError:
-    """What is said where a scenario of station keeping is not taken."""
-    return InputError(where, MARK, "a scenario of station keeping", "here a [spacecraft] that turns")
+    @cached_property
+    def made(self) -> Made:
+        """The numbers that the tables make. InputError where no body has them."""
+        return self.hooks.make(self.table, self.where)
+
+    @property
+    def craft(self) -> Any:
+        """The body's numbers, which laws act on."""
+        return self.made.craft
+
+    def __repr__(self) -> str:
+        names = ", ".join(entry.name for entry in self.laws)
+        return f"<{type(self).__name__} {self.name}: {names}; {self.table.simulation.steps} control steps>"
+
+    def with_(self, changes: Mapping[str, Any]) -> Scenario:
+        """The scenario with other values at some keys: {"spacecraft.inertia": [2, 3, 4], "law.pd.k_rate": "0.1 N m s"}; the
+        key of a law's table is its name, or "law[1]" by its place; None takes away what is there. InputError as of a
+        file."""
+        # Loaded here, for it reads scenarios.
+        from starhold.scenario.making import changed
+
+        return changed(self, changes)
+
+    def pick(self, name: str) -> LawEntry:
+        """The law of this name; InputError names the nearest when there is none."""
+        for entry in self.laws:
+            if entry.name == name:
+                return entry
+        raise InputError(self.where, "law", name, nearest(name, [entry.name for entry in self.laws]))
+
+    def about(self, body: str) -> Scenario:
+        """The scenario itself; InputError unless it is about the body of this name."""
+        if self.body != body:
+            raise InputError(self.where, self.hooks.marker, f"a scenario of a {self.body}", f"here one of a {body}")
+        return self
 
 
 def builtin_names() -> list[str]:
@@ -127,13 +125,18 @@ def builtin_text(name: str) -> str:
     return (resources.files("starhold.scenario") / "builtin" / f"{name}.toml").read_text(encoding="utf-8")
 
 
+def open_scenario(source: Scenario | str | Path) -> Scenario:
+    """The scenario itself, or that of a file or of a built-in name as `load` reads it."""
+    return source if isinstance(source, Scenario) else load(source)
+
+
 def load(source: str | Path, allow_unstable: bool = False) -> Scenario:
     """The scenario in a file, or the built-in one of that name. InputError says what is wrong with it; gains that a law
     tells to be unstable are, unless allowed."""
-    return parse(*read_text(source), allow_unstable)
+    return parse(*_read_text(source), allow_unstable)
 
 
-def read_text(source: str | Path) -> tuple[str, str, Path]:
+def _read_text(source: str | Path) -> tuple[str, str, Path]:
     """The text of a file or of a built-in scenario, what errors call it, and its folder."""
     path, where = Path(source), cut(str(source), LONGEST_PATH)
     try:
@@ -152,40 +155,37 @@ def read_text(source: str | Path) -> tuple[str, str, Path]:
 
 def parse(text: str, where: str, folder: Path = Path(), allow_unstable: bool = False) -> Scenario:
     """The scenario of a TOML text; `where` names it in errors."""
-    return read_attitude(read_toml(text, where), text, where, folder, allow_unstable)
+    return read_tables(read_toml(text, where), text, where, folder, allow_unstable)
 
 
-def read_attitude(data: dict[str, Any], text: str, where: str, folder: Path, allow_unstable: bool) -> Scenario:
-    """The same of the tables that a text holds."""
-    if MARK in data:
-        raise not_turning(where)
-    laws = data.get("law")
-    rest = {key: value for key, value in data.items() if key != "law"}
-    table = validate(ScenarioTable, rest, where, "", extra=["law"])
-    scenario = Scenario(table, (), text, where, folder)
-    try:
-        _ = scenario.craft
-    except ValueError as error:
-        raise InputError(where, "wheel" if table.wheels or table.wheel else "spacecraft", "", str(error)) from None
+def read_tables(data: Mapping[str, Any], text: str, where: str, folder: Path, allow_unstable: bool) -> Scenario:
+    """The scenario of the raw tables that a text holds."""
+    body = body_of(data, where, folder)
+    # First of all, for it says what the numbers of the other tables are worth.
+    context = body.context(data, where)
+    rest = {key: value for key, value in data.items() if key not in APART}
+    table = validate(body.tables, rest, where, "", extra=APART, context=context)
+    parts = read_parts(data.get("part"), body.name, folder, where, context)
+    scenario = Scenario(body, table, (), text, where, folder, allow_unstable, parts)
+    _ = scenario.made
     entries: list[LawEntry] = []
-    for key, item in numbered(laws, where):
-        entries.append(_read_law(item, scenario, key, {entry.name for entry in entries}, allow_unstable))
-    return Scenario(table, tuple(entries), text, where, folder, allow_unstable)
+    for key, item in numbered(data.get("law"), where):
+        entries.append(_read_law(item, scenario, context, key, {entry.name for entry in entries}))
+    return replace(scenario, laws=tuple(entries))
 
 
-def _read_law(data: Any, scenario: Scenario, key: str, taken: set[str], allow_unstable: bool) -> LawEntry:
-    where = scenario.where
-    table, law, form = pick_law(data, catalogue(), scenario.folder, where, key)
-    read = validate(law_model(law, form), table, where, key, extra=["file", *(["form"] if law.forms else [])])
-    values = [getattr(read, item.name) for item in law.fields(form)]
+def _read_law(data: Any, scenario: Scenario, context: Any, key: str, taken: set[str]) -> LawEntry:
+    """The law of a raw table, for a scenario that as yet has none."""
+    body, where, craft = scenario.hooks, scenario.where, scenario.craft
+    found, law, form = pick_law(data, body.laws(), scenario.folder, where, key)
+    extra = ["file", *(["form"] if law.forms else [])]
+    own = validate(law_model(law, form, body.law_table), found, where, key, extra, context)
+    values = [getattr(own, item.name) for item in law.fields(form)]
     with refusing(law, where, key):
-        spec = (
-            None
-            if form is None
-            else law.complete(law.forms[form](*values), lambda: told_to_design(scenario, read.quaternion_sign))
-        )
-    gains = make_gains(law, values, spec, scenario.craft, where, key)
-    if not allow_unstable:
-        refuse_unstable(lambda: law.check(gains, scenario.craft), where, key)
-    name = free_name(read.name, law.name, taken, where, key)
-    return LawEntry(name, law, gains, read.quaternion_sign, read.hysteresis_width, form, spec, read.fault_action)
+        spec = None if form is None else body.complete(scenario, law, law.forms[form](*values), own)
+    gains = make_gains(law, values, spec, craft, where, key)
+    if not scenario.allow_unstable:
+        refuse_unstable(lambda: law.check(gains, craft), where, key)
+    options = body.options(scenario, own, gains, key)
+    name = free_name(own.name, law.name, taken, where, key)
+    return LawEntry(name, law, gains, options, form, spec)

@@ -1,4 +1,4 @@
-"""What all tables of a scenario file share."""
+"""The base of all tables of a scenario file, and how they refuse."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def refuse(reason: str) -> PydanticCustomError:
 
 
 def at_key(key: str, reason: str, found: Any) -> PydanticCustomError:
-    """The same about one key of a table that is read."""
+    """An error about one key of a table that is read."""
     return PydanticCustomError("quantity_at", "{reason}", {"reason": reason, "key": key, "found": found})
 
 
@@ -42,4 +42,4 @@ def check_name(name: str) -> str:
 
 
 Name: TypeAlias = Annotated[str, AfterValidator(check_name)]
-"""What a scenario or a law is called: it names folders, and stands in tables and pages."""
+"""The name of a scenario or a law: it names folders, and stands in tables and pages."""

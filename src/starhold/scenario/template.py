@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from importlib import resources
+from starhold.scenario.bodies import bodies
 
 
-def template_text(libration: bool = False) -> str:
-    """A commented scenario that runs as it is and names every key, of a body that turns or of station keeping."""
-    name = "libration.toml" if libration else "template.toml"
-    return (resources.files("starhold.scenario") / name).read_text(encoding="utf-8")
+def template_text(body: str) -> str:
+    """A commented scenario, of the body of this name, that runs as it is and names every key."""
+    return bodies()[body].template

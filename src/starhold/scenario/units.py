@@ -23,7 +23,7 @@ _SHARES = {"%": "percent", "percent": "percent", "ppm": "ppm"}
 
 
 def to_number(text: str, unit: str) -> float:
-    """What a text such as "20 mN m" is worth in a unit such as "N m". ValueError says what is allowed."""
+    """The worth of a text such as "20 mN m" in a unit such as "N m". ValueError says what is allowed."""
     text = text.strip()
     number = _NUMBER.match(text)
     if number is None or len(text) > LONGEST:

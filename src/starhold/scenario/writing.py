@@ -11,17 +11,7 @@ from typing import Any
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law
 from starhold.parts.part import Part
-
-_BODY = """\
-name = "written"
-[spacecraft]
-inertia = [2.0, 3.0, 4.0]
-torque_limit = 0.05
-[simulation]
-duration = 1.0
-control_period = 0.1
-"""
-
+from starhold.scenario.bodies import body_for
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -72,26 +62,9 @@ def law_table(law: Law, gains: Any) -> str:
     return "\n".join(lines) + "\n"
 
 
-_POINT = """\
-name = "written"
-[libration]
-[control]
-limit = 4.0
-[initial]
-position = [0.0, 0.5, 0.1]
-[simulation]
-duration = 0.1
-"""
-
-
-def station_scenario_with(law: Law, gains: Any) -> str:
-    """A small scenario of station keeping that holds one law."""
-    return _POINT + law_table(law, gains)
-
-
 def scenario_with(law: Law, gains: Any) -> str:
-    """A small scenario that holds one law."""
-    return _BODY + law_table(law, gains)
+    """A small scenario of the body that a law is for, which holds this law alone."""
+    return body_for(law).example + law_table(law, gains)
 
 
 def part_table(part: Part, params: Any) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,8 +13,23 @@ from starhold.parts.craft import Craft
 from starhold.parts.effectors.envelope import authority
 from starhold.parts.effectors.wheels import Wheels, lose
 from starhold.parts.part import Fitted
-from starhold.scenario.reading import LawEntry, Scenario
-from starhold.scenario.schema import FaultTable
+from starhold.scenario.bodies.rigid_body.craft import craft_with, torque_limit, wheels_of
+from starhold.scenario.bodies.rigid_body.tables import FaultTable
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import LawEntry, Scenario
+
+
+def action_on(fault: FaultTable, entry: LawEntry) -> str:
+    """The action on a fault where this law flies."""
+    return entry.options.fault_action or fault.action
+
+
+def fault_times(scenario: Scenario) -> tuple[float, ...]:
+    """When faults happen and are acted on (s)."""
+    faults: list[FaultTable] = scenario.table.fault
+    acted = [f.time + f.delay for f in faults if any(action_on(f, entry) != "none" for entry in scenario.laws)]
+    return tuple(sorted({*(fault.time for fault in faults), *acted}))
 
 
 def make_events(scenario: Scenario, entry: LawEntry, parts: tuple[Fitted, ...]) -> tuple[Event, ...]:
@@ -28,16 +43,16 @@ def make_events(scenario: Scenario, entry: LawEntry, parts: tuple[Fitted, ...]) 
     for place, fault in enumerate(table.fault, 1):
         _check(scenario, place, fault)
         moments.append((fault.time, False, place))
-        if entry.action_on(fault) != "none":
+        if action_on(fault, entry) != "none":
             moments.append((fault.time + fault.delay, True, place))
     now = Event(0, parts, entry.gains, scenario.craft, scenario.craft)
-    wheels = scenario.wheels
+    wheels = wheels_of(scenario)
     begun = 0.0 if wheels is None else authority(wheels)
     share, learnt, limit = 1.0, (0.0, 0), scenario.craft.torque_limit
     events: list[Event] = []
     for time, diagnosed, place in sorted(moments):
         fault = table.fault[place - 1]
-        action = entry.action_on(fault)
+        action = action_on(fault, entry)
         body = _body(scenario, place, fault)
         if not diagnosed:
             wheels = None if wheels is None else _struck(wheels, fault)
@@ -48,7 +63,7 @@ def make_events(scenario: Scenario, entry: LawEntry, parts: tuple[Fitted, ...]) 
                 now, learnt = now._replace(nominal=body), (fault.time, place)
             if wheels is not None and fault.strikes_wheel:
                 left = _left(scenario, wheels, place, fault)
-                share, limit = authority(left) / begun, scenario.torque_limit(left)
+                share, limit = authority(left) / begun, torque_limit(table, left)
                 wheels = wheels if action == "retune" else left
                 now = now._replace(parts=_on(now.parts, wheels))
             # The law's limit is nothing that the body feels, so both crafts have it.
@@ -66,7 +81,7 @@ def _on(parts: tuple[Fitted, ...], wheels: Wheels | None) -> tuple[Fitted, ...]:
 
 
 def _check(scenario: Scenario, place: int, fault: FaultTable) -> None:
-    where, wheels, end = scenario.where, scenario.wheels, scenario.table.simulation.duration
+    where, wheels, end = scenario.where, wheels_of(scenario), scenario.table.simulation.duration
     if fault.strikes_wheel and wheels is None:
         raise InputError(where, f"fault[{place}]", "no wheels", "a wheel's fault only with [wheels] or [[wheel]] tables")
     if wheels is not None and _index(fault) >= len(wheels.axes):
@@ -84,7 +99,7 @@ def _body(scenario: Scenario, place: int, fault: FaultTable) -> Craft | None:
     if fault.inertia is None:
         return None
     try:
-        return scenario.craft_of(fault.inertia)
+        return craft_with(scenario, fault.inertia)
     except ValueError as error:
         raise InputError(scenario.where, f"fault[{place}].inertia", "", str(error)) from None
 

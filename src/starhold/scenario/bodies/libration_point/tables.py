@@ -6,15 +6,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
-from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import Gain
 from starhold.parts.bodies.libration_point import EARTH_DIAMETER, PRIMARIES, Libration, Primaries, Units
 from starhold.parts.orbit import BODIES, body_of
-from starhold.scenario.checking import MOST_SUBSTEPS, nearest
+from starhold.scenario.checking import nearest
 from starhold.scenario.orbit import check_gravity, too_dense
 from starhold.scenario.quantity import quantity, scaled
-from starhold.scenario.schema import MOST_STEPS, file_schema
-from starhold.scenario.tables import Name, Table, at_key, refuse
+from starhold.scenario.schema import LawTable, ScenarioTable, Timing
+from starhold.scenario.tables import Table, at_key, refuse
 
 
 def _known_pair(value: Any) -> Any:
@@ -78,7 +77,7 @@ class LibrationTable(Table):
 
     @property
     def units(self) -> Units:
-        """What scaled numbers are worth."""
+        """The worth of scaled numbers."""
         return self.pair.units(self.length_unit)
 
     @property
@@ -104,7 +103,7 @@ class Resources(Table):
 
     @property
     def told(self) -> dict[str, float]:
-        """What is said of the limit."""
+        """The ways in which the limit is given."""
         given = {"limit": self.limit, "margin": self.margin, "deficit": self.deficit}
         return {key: value for key, value in given.items() if value is not None}
 
@@ -116,7 +115,7 @@ class Resources(Table):
 
 
 class ControlTable(Resources):
-    """What holds for every law that does not say otherwise."""
+    """The control of every law that does not say otherwise."""
 
     limit_kind: Annotated[
         Literal["norm", "axis", "none"],
@@ -138,14 +137,11 @@ class PointInitial(Table):
     velocity: Annotated[Any, *scaled("velocity", Gain("m/s", shape=(3,), spread=False, text="velocity"))] = (0.0, 0.0, 0.0)
 
 
-class Timing(Table):
+class PointTiming(Timing):
     """How long and how finely."""
 
     duration: Annotated[float, *scaled("time", Gain("s", above=0.0, text="length of the run, in whole control periods"))]
     control_period: Annotated[float, *scaled("time", Gain("s", above=0.0, text="for which a control is held"))] = 0.001
-    substeps: Annotated[
-        int, *quantity(Gain("1", at_least=1, at_most=MOST_SUBSTEPS, whole=True, text="integration steps a control period"))
-    ] = 1
     record_every: Annotated[int, *quantity(Gain("1", at_least=1, whole=True, text="control steps a sample"))] = 10
     lost_beyond: Annotated[
         float | None,
@@ -154,21 +150,6 @@ class Timing(Table):
         ),
     ] = None
 
-    @model_validator(mode="after")
-    def _whole_steps(self) -> Timing:
-        if self.control_period > self.duration:
-            raise at_key("control_period", f"at most the duration, {self.duration:g}", self.control_period)
-        if not self.duration / self.control_period <= MOST_STEPS:
-            raise at_key("duration", f"at most {MOST_STEPS:.0e} control periods", self.duration)
-        if self.record_every > self.steps:
-            raise at_key("record_every", f"at most the {self.steps} control steps of the run", self.record_every)
-        return self
-
-    @property
-    def steps(self) -> int:
-        """Control steps of a run."""
-        return round(self.duration / self.control_period)
-
 
 class Near(Table):
     """When the circle or the place of rest counts as reached."""
@@ -176,31 +157,21 @@ class Near(Table):
     tolerance: Annotated[float, *scaled("length", Gain("m", above=0.0, text="distance from it"))] = 0.05
 
 
-class StationLawTable(Resources):
-    """What every law table may say beside the law's own gains."""
-
-    type: str
-    name: Annotated[Name | None, Field(description="how tables and folders call it; the type if absent")] = None
+class PointLawTable(LawTable, Resources):
+    """The keys of every law table beside the law's own gains."""
 
 
-class StationTable(Table):
+class LibrationPointTable(ScenarioTable):
     """A whole file, but for its law tables, which are read law by law."""
 
-    name: Name
-    description: str = ""
     libration: LibrationTable
     control: ControlTable = ControlTable()
     initial: PointInitial = PointInitial()
-    simulation: Timing
+    simulation: PointTiming
     settling: Near = Near()
 
     @model_validator(mode="after")
-    def _limit_is_of_something(self) -> StationTable:
+    def _limit_is_of_something(self) -> LibrationPointTable:
         if self.control.limit_kind == "none" and self.control.told:
             raise at_key("control.limit_kind", "norm or axis where there is a limit", "none")
         return self
-
-
-def station_schema() -> dict[str, Any]:
-    """A JSON Schema of scenarios of station keeping."""
-    return file_schema(StationTable, catalogue("libration-point").values(), StationLawTable)

@@ -20,9 +20,10 @@ from starhold.parts.effectors.wheels import capacity, wheel_momentum
 from starhold.parts.part import Fitted
 from starhold.parts.roles import Goal
 from starhold.parts.targets import history
-from starhold.scenario.history import read_history
-from starhold.scenario.rotors import start_momenta
-from starhold.scenario.schema import Pointing
+from starhold.scenario.bodies.rigid_body.craft import torque_limit, wheels_of
+from starhold.scenario.bodies.rigid_body.history import read_history
+from starhold.scenario.bodies.rigid_body.rotors import start_momenta
+from starhold.scenario.bodies.rigid_body.tables import Pointing
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -38,21 +39,25 @@ def _attitude(pointing: Pointing) -> Quaternion:
 
 
 def target_of(scenario: Scenario) -> Fitted:
-    """The target of the scenario."""
+    """The target of the scenario: its [[part]] with this role, or what [target] says."""
     table, simulation = scenario.table.target, scenario.table.simulation
+    own = next((fitted for fitted in scenario.parts if fitted.part.role == "target"), None)
+    if own is not None:
+        if "target" in scenario.table.model_fields_set:
+            raise InputError(scenario.where, f"part {own.called}", "a second target, beside [target]", "one target")
+        return own
     if table.mode == "orbital":
         return fit("target", "orbital")
     if table.mode == "inertial":
         return fit("target", "inertial", _attitude(table))
     samples = np.arange(simulation.steps + 1) * simulation.control_period
-    rows = _history(scenario, lambda times, rows: history.tabulate(times, rows, samples))
     last = simulation.steps * simulation.control_period
-    knots = _history(scenario, lambda times, rows: history.knots_of(times, rows, last))
-    return fit("target", "history", rows, knots)
+    rows = _history(scenario, lambda times, rows: history.tabulate(times, rows, samples))
+    return fit("target", "history", rows, _history(scenario, lambda times, rows: history.knots_of(times, rows, last)))
 
 
 def _history(scenario: Scenario, use: Callable[..., Any]) -> Any:
-    """What is made of the times and attitudes in the file of a history."""
+    """The result of `use` on the times and attitudes in the file of a history. InputError where it cannot be used."""
     path = scenario.folder / str(scenario.table.target.file)
     allowed = "a CSV file of columns time,q0,q1,q2,q3 (in another order if named), unit quaternions, times that increase"
     try:
@@ -80,19 +85,19 @@ def _goal_at_start(goal: Fitted, begun: State) -> Goal:
     return goal.part.module.goal(goal.prepared(1.0), begun, 0, NO_TURN)
 
 
-def told_to_design(scenario: Scenario, cover: str) -> Start:
-    """What the design of a law of a scenario may reckon with; `cover`: which of q and -q is fed back."""
-    table, goal = scenario.table, target_of(scenario)
+def told_to_design(scenario: Scenario, sign: str) -> Start:
+    """The start that the design of a law may reckon with; `sign`: its quaternion sign policy."""
+    table, goal, wheels = scenario.table, target_of(scenario), wheels_of(scenario)
     begun = start_of(scenario, goal)
     held = _goal_at_start(goal, begun)
     error = relative(held.attitude, begun.attitude)
-    error = error if cover == "as_published" else stretch(side(error[0]), error)
+    error = error if sign == "as_published" else stretch(side(error[0]), error)
     rate = subtract(begun.rate, to_body(error, held.rate))
     momentum, held_by_wheels = math.inf, None
-    free = table.spacecraft.limit == "none" and scenario.wheels is None
-    torque = math.inf if free else scenario.torque_limit(scenario.wheels)
-    if scenario.wheels is not None:
-        momenta = start_momenta(table.wheels, table.wheel, len(scenario.wheels.axes))
-        held_by_wheels, momentum = wheel_momentum(momenta, scenario.wheels), capacity(scenario.wheels, momenta)
+    free = table.spacecraft.limit == "none" and wheels is None
+    torque = math.inf if free else torque_limit(table, wheels)
+    if wheels is not None:
+        momenta = start_momenta(table.wheels, table.wheel, len(wheels.axes))
+        held_by_wheels, momentum = wheel_momentum(momenta, wheels), capacity(wheels, momenta)
     tolerances = table.settling
     return Start(error, rate, held_by_wheels, torque, momentum, tolerances.attitude_tolerance, tolerances.rate_tolerance)

@@ -7,7 +7,7 @@ from typing import Any
 
 from starhold.parts.effectors.wheel_units import WHEEL_UNITS
 from starhold.parts.effectors.wheels import ALLOCATIONS, Wheels, make_wheels, nasa_standard, pyramid, three_orthogonal
-from starhold.scenario.schema import Rotor, WheelsTable, WheelTable
+from starhold.scenario.bodies.rigid_body.tables import Rotor, WheelsTable, WheelTable
 
 LAYOUTS = {"orthogonal": three_orthogonal, "pyramid": pyramid, "nasa-standard": nasa_standard}
 NUMBERS = ("inertia", "torque_limit", "momentum_limit", "viscous", "coulomb")

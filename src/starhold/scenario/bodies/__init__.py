@@ -1,0 +1,43 @@
+"""The bodies that scenarios can be about: each module or folder here is one, and is named nowhere else."""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Mapping
+from difflib import get_close_matches
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from starhold.errors import InputError
+from starhold.laws.catalogue import Law
+from starhold.scenario.bodies.interface import Body
+
+
+@cache
+def bodies() -> dict[str, Body]:
+    """The bodies by name: the `BODY` of every module of this package that has one."""
+    modules = [import_module(f"{__name__}.{item.name}") for item in pkgutil.iter_modules(__path__)]
+    found: list[Body] = [module.BODY for module in modules if hasattr(module, "BODY")]
+    return {body.name: body for body in found}
+
+
+def body_of(tables: Mapping[str, Any], where: str, folder: Path) -> Body:
+    """The body that the tables of a file are about, by its marker; InputError for none and for several."""
+    markers = {body.marker: body for body in bodies().values()}
+    there = [marker for marker in markers if marker in tables]
+    if len(there) > 1:
+        raise InputError(where, there[1], f"a second body beside [{there[0]}]", "one of the two")
+    if there:
+        return markers[there[0]].chosen(tables, where, folder)
+    for key in tables:
+        # Nearer than `nearest` asks, to which a [simulation] is like a [libration].
+        if near := get_close_matches(key[:100], markers, n=1, cutoff=0.8):
+            raise InputError(where, key, "an unknown key", f"did you mean {near[0]}?")
+    raise InputError(where, "", "no body", f"one of the tables {', '.join(f'[{marker}]' for marker in sorted(markers))}")
+
+
+def body_for(law: Law) -> Body:
+    """The body that a law is for."""
+    return next(body for body in bodies().values() if body.name == law.body)

@@ -1,0 +1,80 @@
+"""How a body is told to scenarios: a module of this package holds a `BODY` with these members."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from starhold.laws.catalogue import Law
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import LawEntry, Scenario
+    from starhold.scenario.schema import LawTable, ScenarioTable
+
+
+class Made(Protocol):
+    """The numbers that a body's tables make; a body may add others."""
+
+    @property
+    def craft(self) -> Any:
+        """The body's numbers as laws and equations of motion take them."""
+        ...
+
+
+class Body(Protocol):
+    """One body: its tables, its laws, and how loops are built of them. Its `tables` have a `simulation` that is a `Timing`;
+    a table of a part's parameters is made of `schema.columns`."""
+
+    name: str
+    """The body's name, that of its module with hyphens."""
+    marker: str
+    """The top-level table by which a file is known to be about this body."""
+    tables: type[ScenarioTable]
+    """All tables of a file but those of its laws."""
+    law_table: type[LawTable]
+    """The keys of tables of laws beside their gains."""
+    example: str
+    """A small scenario in TOML, to which a law's table can be appended."""
+
+    @property
+    def template(self) -> str:
+        """A commented scenario in TOML that runs as it is and names every key."""
+        return (resources.files(type(self).__module__) / "template.toml").read_text(encoding="utf-8")
+
+    def chosen(self, tables: Mapping[str, Any], where: str, folder: Path) -> Body:
+        """The body that these raw tables, which have the marker, are about: this one, unless the marker's table names one
+        of several by a type or a file. InputError where there is no such body."""
+        return self
+
+    def laws(self) -> Mapping[str, Law]:
+        """The installed laws by name."""
+        ...
+
+    def context(self, tables: Mapping[str, Any], where: str) -> Any:
+        """The context that validators of these raw tables and of laws' gains need, such as the worth of scaled numbers.
+        InputError where the tables do not tell."""
+        return None
+
+    def make(self, table: Any, where: str) -> Made:
+        """The numbers that validated tables make. InputError where no body has them."""
+        ...
+
+    def complete(self, scenario: Scenario, law: Law, spec: Any, own: Any) -> Any:
+        """The inputs of a law's design form, with what they leave to the scenario; `own` is the law's validated table.
+        ValueError where the scenario cannot give it."""
+        return spec
+
+    def options(self, scenario: Scenario, own: Any, gains: Any, key: str) -> Any:
+        """The options that a law's validated table, called `key` in errors, or the scenario for all laws gives beside the
+        gains. InputError where they do not fit the gains."""
+        ...
+
+    def build(self, scenario: Scenario, entry: LawEntry) -> Any:
+        """The closed loop of one law."""
+        ...
+
+    def examine(self, scenario: Scenario, entry: LawEntry, loop: Any) -> None:
+        """InputError where the law of a loop, which has been called once, cannot work there."""
+        ...

@@ -1,0 +1,67 @@
+"""Scenarios of a rigid body that turns, known by their [spacecraft] table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from starhold.laws.catalogue import Law, catalogue
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.scenario.bodies.interface import Body
+from starhold.scenario.bodies.rigid_body.building import build, check_events
+from starhold.scenario.bodies.rigid_body.craft import Made, make
+from starhold.scenario.bodies.rigid_body.start import told_to_design
+from starhold.scenario.bodies.rigid_body.tables import AttitudeLawTable, RigidBodyTable
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import LawEntry, Scenario
+
+EXAMPLE = """\
+name = "written"
+[spacecraft]
+inertia = [2.0, 3.0, 4.0]
+torque_limit = 0.05
+[simulation]
+duration = 1.0
+control_period = 0.1
+"""
+
+
+class Options(NamedTuple):
+    """The keys that a law's table may hold beside its gains."""
+
+    quaternion_sign: Any
+    hysteresis_width: float
+    fault_action: str | None
+    """The action on any fault where this law flies; None: the fault's own."""
+
+
+class RigidBody(Body):
+    """A spacecraft that turns, with or without wheels."""
+
+    name = "rigid-body"
+    marker = "spacecraft"
+    tables = RigidBodyTable
+    law_table = AttitudeLawTable
+    example = EXAMPLE
+
+    def laws(self) -> Mapping[str, Law]:
+        return catalogue()
+
+    def make(self, table: RigidBodyTable, where: str) -> Made:
+        return make(table, where)
+
+    def complete(self, scenario: Scenario, law: Law, spec: Any, own: AttitudeLawTable) -> Any:
+        return law.complete(spec, lambda: told_to_design(scenario, own.quaternion_sign))
+
+    def options(self, scenario: Scenario, own: AttitudeLawTable, gains: Any, key: str) -> Options:
+        return Options(own.quaternion_sign, own.hysteresis_width, own.fault_action)
+
+    def build(self, scenario: Scenario, entry: LawEntry) -> ClosedLoop:
+        return build(scenario, entry)
+
+    def examine(self, scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> None:
+        check_events(scenario, entry, loop)
+
+
+BODY = RigidBody()

@@ -1,0 +1,64 @@
+"""From the tables of a spacecraft to the numbers that laws act on, and its wheels."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from starhold.errors import InputError
+from starhold.parts.craft import Craft, compact, make_craft
+from starhold.parts.effectors.envelope import authority
+from starhold.parts.effectors.wheels import Wheels, body_inertia
+from starhold.scenario.bodies.rigid_body.rotors import make_rotors
+from starhold.scenario.bodies.rigid_body.tables import RigidBodyTable
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import Scenario
+
+
+class Made(NamedTuple):
+    """The numbers of a spacecraft; with wheels, its inertia is without the rotors' moments about their own axes."""
+
+    craft: Craft
+    wheels: Wheels | None
+
+
+def make(table: RigidBodyTable, where: str) -> Made:
+    """The spacecraft of these tables. InputError where it cannot be."""
+    try:
+        wheels = make_rotors(table.wheels, table.wheel)
+        return Made(_craft(table, wheels, table.spacecraft.inertia), wheels)
+    except ValueError as error:
+        raise InputError(where, "wheel" if table.wheels or table.wheel else "spacecraft", "", str(error)) from None
+
+
+def wheels_of(scenario: Scenario) -> Wheels | None:
+    """The reaction wheels of a scenario, None for a craft without."""
+    made: Any = scenario.made
+    return made.wheels
+
+
+def craft_with(scenario: Scenario, inertia: Any) -> Craft:
+    """The scenario's craft with another inertia (3, 3; kg m2), its wheels included; ValueError where it cannot be."""
+    return _craft(scenario.table, wheels_of(scenario), inertia)
+
+
+def _craft(table: RigidBodyTable, wheels: Wheels | None, inertia: Any) -> Craft:
+    gravity = {} if table.orbit is None else {"gravity": table.orbit.gravitational_parameter}
+    craft = make_craft(inertia, torque_limit(table, wheels), **gravity)
+    if wheels is None:
+        return craft
+    rest = body_inertia(inertia, wheels)
+    return craft._replace(inertia=compact(rest), inverse_inertia=compact(np.linalg.inv(rest)), with_rotors=craft.inertia)
+
+
+def torque_limit(table: RigidBodyTable, wheels: Wheels | None) -> float:
+    """The torque that a law may reckon with (N m): the limit of [spacecraft], or what these wheels surely give in its
+    way (in norm, else about each axis at once) where that is less."""
+    own = table.spacecraft
+    if wheels is None:
+        return own.torque_limit
+    peak = table.wheels is not None and table.wheels.allocation == "least-peak"
+    least = authority(wheels, "norm" if own.limit == "norm" else "axis", peak=peak)
+    return least if own.limit == "none" else min(own.torque_limit, least)

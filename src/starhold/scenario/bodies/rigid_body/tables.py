@@ -1,0 +1,268 @@
+"""The tables of a scenario of a rigid body as pydantic models. Units and bounds stand with each field."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from starhold.laws.interface import Gain
+from starhold.parts.craft import check_inertia
+from starhold.scenario.bodies.rigid_body.transient import TransientTable
+from starhold.scenario.orbit import Orbit
+from starhold.scenario.quantity import quantity, quantity_or, reader
+from starhold.scenario.schema import LawTable, ScenarioTable, Timing
+from starhold.scenario.tables import Flag, Table, at_key, refuse
+
+QUATERNION = Gain("1", shape=(4,), spread=False, text="quaternion, scalar first, normalised on reading")
+ANGLES = Gain("rad", shape=(3,), spread=False, text="Euler-Krylov angles yaw, pitch, roll")
+SHORTEST, LONGEST = 0.5, 2.0
+"""Lengths between which four numbers are taken for a direction among quaternions; [0, 1, 1, 1] is one."""
+
+
+def _read_inertia(given: Any) -> Any:
+    if not isinstance(given, list) or len(given) != 3:
+        raise refuse("three principal moments or a 3x3 matrix, in kg m^2")
+    shape = (3, 3) if any(isinstance(row, list) for row in given) else (3,)
+    try:
+        return check_inertia(reader(Gain("kg m^2", shape=shape))(given))
+    except ValueError as error:
+        raise refuse(str(error)) from None
+
+
+INERTIA = (
+    BeforeValidator(_read_inertia),
+    Field(description="three principal moments or a 3x3 matrix, with the wheels (kg m^2)"),
+)
+
+
+class Spacecraft(Table):
+    """The body and its actuators."""
+
+    inertia: Annotated[Any, *INERTIA]
+    torque_limit: Annotated[float, *quantity(Gain("N m", above=0.0, text="largest torque"))] = math.inf
+    limit: Annotated[
+        Literal["axis", "norm", "none"],
+        Field(description="whether the limit holds for each axis, the norm, or not at all"),
+    ] = "axis"
+    actuator_lag: Annotated[float, *quantity(Gain("s", at_least=0.0, text="time constant of the actuators"))] = 0.0
+    torque_rate_limit: Annotated[float, *quantity(Gain("N m/s", above=0.0, text="fastest change of each torque"))] = math.inf
+
+
+class Pointing(Table):
+    """An attitude as a quaternion or as angles."""
+
+    attitude: Annotated[Any, *quantity(QUATERNION)] = None
+    angles: Annotated[Any, *quantity(ANGLES)] = None
+
+    @model_validator(mode="after")
+    def _one_attitude(self) -> Pointing:
+        if self.attitude is not None and self.angles is not None:
+            raise at_key("angles", "either attitude or angles, not both", list(self.angles))
+        if self.attitude is not None and not any(self.attitude):
+            raise at_key("attitude", "a quaternion that is not zero", list(self.attitude))
+        if self.attitude is not None and not SHORTEST <= math.hypot(*self.attitude) <= LONGEST:
+            allowed = f"a quaternion of length 1, or between {SHORTEST:g} and {LONGEST:g} to be normalised"
+            raise at_key("attitude", allowed, list(self.attitude))
+        return self
+
+
+class Initial(Pointing):
+    """Attitude and rate at the start, in the inertial frame or relative to the target."""
+
+    rate: Annotated[Any, *quantity(Gain("rad/s", shape=(3,), spread=False, text="angular velocity, body axes"))] = (
+        0.0,
+        0.0,
+        0.0,
+    )
+    relative_to: Annotated[Literal["inertial", "target"], Field(description="what attitude and rate are relative to")] = (
+        "inertial"
+    )
+
+
+class TargetTable(Pointing):
+    """The attitude to point at."""
+
+    mode: Literal["inertial", "orbital", "history"] = "inertial"
+    file: Annotated[str | None, Field(description="CSV of a history: time (s), q0, q1, q2, q3; beside the scenario")] = None
+
+    @model_validator(mode="after")
+    def _fits_mode(self) -> TargetTable:
+        if (self.mode == "history") != (self.file is not None):
+            raise at_key("file", 'a file exactly when mode = "history"', self.file)
+        if self.mode != "inertial" and (self.attitude is not None or self.angles is not None):
+            raise at_key("mode", '"inertial" where attitude or angles are given', self.mode)
+        return self
+
+
+class Environment(Table):
+    """External torques."""
+
+    gravity_gradient: Flag = False
+    torque_noise: Annotated[float, *quantity(Gain("N m", at_least=0.0, text="standard deviation per axis and step"))] = 0.0
+
+
+class Sensor(Table):
+    """Errors of the measured state."""
+
+    attitude_noise: Annotated[
+        float, *quantity(Gain("rad", at_least=0.0, at_most=math.pi, text="standard deviation, angle per axis"))
+    ] = 0.0
+    rate_noise: Annotated[float, *quantity(Gain("rad/s", at_least=0.0, text="standard deviation per axis"))] = 0.0
+
+
+class Simulation(Timing):
+    """How long and how finely."""
+
+    unit: ClassVar[str] = " s"
+    duration: Annotated[float, *quantity(Gain("s", above=0.0, text="length of the run"))]
+    control_period: Annotated[float, *quantity(Gain("s", above=0.0, text="for which a torque is held"))] = 0.1
+    seed: Annotated[int, *quantity(Gain("1", at_least=0, at_most=2**53, whole=True, text="of all random numbers"))] = 1
+
+    @model_validator(mode="after")
+    def _whole_steps(self) -> Simulation:
+        count = self.duration / self.control_period
+        if abs(count - round(count)) > 1e-6:
+            raise at_key("duration", f"a whole number of control periods of {self.control_period:g} s", self.duration)
+        return self
+
+
+class Tolerances(Table):
+    """When the target counts as reached."""
+
+    attitude_tolerance: Annotated[float, *quantity(Gain("rad", above=0.0, text="angle to the target"))] = 2e-3
+    rate_tolerance: Annotated[float, *quantity(Gain("rad/s", above=0.0, text="rate relative to the target"))] = 1e-3
+
+
+class Rotor(Table):
+    """A reaction wheel as a unit of the catalogue, or as its numbers; numbers given override the unit's."""
+
+    unit: Annotated[str | None, Field(description="a unit of the catalogue, see `starhold wheels`")] = None
+    inertia: Annotated[float | None, *quantity(Gain("kg m^2", above=0.0, text="of the rotor about its axis"))] = None
+    torque_limit: Annotated[float | None, *quantity(Gain("N m", above=0.0, text="largest motor torque"))] = None
+    momentum_limit: Annotated[float | None, *quantity(Gain("N m s", above=0.0, text="largest angular momentum"))] = None
+    viscous: Annotated[float | None, *quantity(Gain("N m s", at_least=0.0, text="friction per rad/s"))] = None
+    coulomb: Annotated[float | None, *quantity(Gain("N m", at_least=0.0, text="friction at any speed"))] = None
+    momentum: Annotated[float, *quantity(Gain("N m s", text="at the start"))] = 0.0
+
+
+class WheelTable(Rotor):
+    """One reaction wheel."""
+
+    axis: Annotated[Any, *quantity(Gain("1", shape=(3,), spread=False, text="spin axis in body axes"))]
+
+
+class WheelsTable(Rotor):
+    """All reaction wheels: what they share, and their layout unless [[wheel]] tables give the axes."""
+
+    layout: Annotated[
+        Literal["orthogonal", "pyramid", "nasa-standard"] | None, Field(description="three or four wheels of one kind")
+    ] = None
+    allocation: Annotated[
+        Literal["least-squares", "least-peak"], Field(description="how a torque is shared out among more than three")
+    ] = "least-squares"
+
+
+Action: TypeAlias = Literal["none", "reallocate", "retune", "both"]
+
+
+class FaultTable(Table):
+    """A fault of a wheel, of the body or of both during the run, and what is done about it."""
+
+    time: Annotated[float, *quantity(Gain("s", at_least=0.0, text="when it happens"))]
+    wheel: Annotated[int | None, *quantity(Gain("1", at_least=1, whole=True, text="which wheel, counted from 1"))] = None
+    lost: Annotated[Flag, Field(description="the motor gives no more torque")] = False
+    torque_limit: Annotated[float | None, *quantity(Gain("N m", at_least=0.0, text="what the motor still gives"))] = None
+    momentum_limit: Annotated[float | None, *quantity(Gain("N m s", above=0.0, text="what the wheel still stores"))] = None
+    viscous: Annotated[float | None, *quantity(Gain("N m s", at_least=0.0, text="friction per rad/s"))] = None
+    coulomb: Annotated[float | None, *quantity(Gain("N m", at_least=0.0, text="friction at any speed"))] = None
+    inertia: Annotated[Any, *INERTIA] = None
+    delay: Annotated[float, *quantity(Gain("s", at_least=0.0, text="until it is diagnosed and acted on"))] = 0.0
+    action: Annotated[
+        Action,
+        Field(description="torque shared out among the other wheels, gains designed anew for what is left, or both"),
+    ] = "both"
+    """Unless it is "none", the law knows the new inertia from the diagnosis on."""
+
+    @property
+    def strikes_wheel(self) -> bool:
+        """Whether a wheel changes."""
+        changed = (self.torque_limit, self.momentum_limit, self.viscous, self.coulomb)
+        return self.lost or any(value is not None for value in changed)
+
+    @model_validator(mode="after")
+    def _does_something(self) -> FaultTable:
+        if not self.strikes_wheel and (self.wheel is not None or self.inertia is None):
+            body = "" if self.inertia is not None else ", or a new inertia of the body without a wheel"
+            raise at_key("lost", f"true, or a new torque_limit, momentum_limit, viscous or coulomb{body}", False)
+        if self.strikes_wheel and self.wheel is None:
+            raise at_key("wheel", "the number of a wheel, from 1", None)
+        return self
+
+
+class CertifyTable(Table):
+    """Claims that certificates are to make; whatever is left out, the most that can be proved."""
+
+    rate: Annotated[
+        float | None,
+        *quantity_or("any", math.inf, Gain("rad/s", above=0.0, text="convergence from every attitude at up to this rate")),
+    ] = None
+    slew_angle: Annotated[
+        float | None, *quantity(Gain("rad", above=0.0, at_most=math.pi, text="turns from rest within the torque limit"))
+    ] = None
+    inertia_tolerance: Annotated[
+        float | None, *quantity(Gain("1", above=0.0, at_most=1.0, text="error of J_ij as a share of sqrt(J_ii J_jj)"))
+    ] = None
+    disturbance: Annotated[float, *quantity(Gain("N m", at_least=0.0, text="norm of a torque nobody models"))] = 0.0
+    momentum: Annotated[
+        float | None,
+        *quantity(
+            Gain("N m s", at_least=0.0, text="total angular momentum for claims about wheels; that at the start if absent")
+        ),
+    ] = None
+
+
+class AttitudeLawTable(LawTable):
+    """The keys of every law table beside the law's own gains."""
+
+    quaternion_sign: Annotated[
+        Literal["as_published", "shortest", "hysteresis"], Field(description="which of q and -q is fed back")
+    ] = "as_published"
+    hysteresis_width: Annotated[float, *quantity(Gain("1", above=0.0, at_most=0.999, text="flips when h q0 < -width"))] = 0.5
+    fault_action: Annotated[Action | None, Field(description="what is done about faults, in place of their own")] = None
+
+
+class RigidBodyTable(ScenarioTable):
+    """A whole file, but for its law tables, which are read law by law."""
+
+    spacecraft: Spacecraft
+    orbit: Orbit | None = None
+    initial: Initial = Initial()
+    target: TargetTable = TargetTable()
+    environment: Environment = Environment()
+    sensor: Sensor = Sensor()
+    simulation: Simulation
+    settling: Tolerances = Tolerances()
+    certify: CertifyTable = CertifyTable()
+    transient: TransientTable | None = None
+    wheels: WheelsTable | None = None
+    wheel: list[WheelTable] = Field(default_factory=list[WheelTable])
+    fault: list[FaultTable] = Field(default_factory=list[FaultTable])
+
+    @model_validator(mode="after")
+    def _wheels_have_axes(self) -> RigidBodyTable:
+        layout = None if self.wheels is None else self.wheels.layout
+        if (layout is None) == (not self.wheel) and (self.wheels is not None or self.wheel):
+            raise at_key("wheels.layout", "either a layout or [[wheel]] tables", layout)
+        return self
+
+    @model_validator(mode="after")
+    def _has_orbit(self) -> RigidBodyTable:
+        if self.orbit is None and self.environment.gravity_gradient:
+            raise at_key("environment.gravity_gradient", "false without an [orbit] table", True)
+        if self.orbit is None and self.target.mode == "orbital":
+            raise at_key("target.mode", '"orbital" only with an [orbit] table', "orbital")
+        if self.orbit is not None:
+            self.orbit.check_flight(self.simulation.duration)
+        return self

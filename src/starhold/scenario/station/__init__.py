@@ -1,1 +1,0 @@
-"""Scenarios of the second kind: keeping a craft near a libration point."""

@@ -1,0 +1,144 @@
+"""One kind of scenario with different bodies: how a file's body is known, what is refused, and names that have changed."""
+
+import pytest
+
+from starhold.errors import InputError
+from starhold.laws.catalogue import catalogue
+from starhold.laws.point import station_laws
+from starhold.scenario.bodies import bodies, body_for
+from starhold.scenario.making import make_scenario
+from starhold.scenario.reading import builtin_text, load, open_scenario, parse
+from starhold.scenario.schema import LawTable, ScenarioTable, Timing, json_schema
+from starhold.scenario.writing import scenario_with
+
+BODY = "inertia = [2.0, 3.0, 4.0]\ntorque_limit = 0.01\n"
+SLEW = f"name = 's'\n[spacecraft]\n{BODY}[simulation]\nduration = 10.0\n"
+WHEELS = f"{SLEW}[wheels]\nlayout = 'pyramid'\ninertia = 1e-3\ntorque_limit = 0.02\nmomentum_limit = 0.4\n"
+POINT = "name = 'p'\n[libration]\n[control]\nlimit = 4.0\n[simulation]\nduration = 1.0\n"
+
+
+def message(text):
+    with pytest.raises(InputError) as caught:
+        parse(text, "my.toml")
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_the_bodies_are_found_by_their_folders():
+    assert set(bodies()) == {"rigid-body", "libration-point"}
+    for name, body in bodies().items():
+        assert type(body).__module__ == f"starhold.scenario.bodies.{name.replace('-', '_')}"
+        assert issubclass(body.tables, ScenarioTable)
+        assert issubclass(body.law_table, LawTable)
+        assert issubclass(body.tables.model_fields["simulation"].annotation, Timing)
+        assert body.tables.model_fields[body.marker].is_required()
+        scenario = parse(body.template, "new.toml")
+        assert scenario.body == name
+        assert scenario.about(name) is scenario
+
+
+def test_no_two_tables_share_a_name_in_the_schema():
+    """Their schemas stand beside one another under their classes' names."""
+    known = [set(body.tables.model_json_schema()["$defs"]) for body in bodies().values()]
+    assert sum(map(len, known)) == len(set.union(*known))
+    assert set.union(*known) <= set(json_schema()["$defs"])
+
+
+@pytest.mark.parametrize("law", [*catalogue().values(), *station_laws().values()], ids=lambda law: law.name)
+def test_a_law_is_written_into_a_scenario_of_its_body(law):
+    for gains in law.examples():
+        scenario = parse(scenario_with(law, gains), "written", allow_unstable=True)
+        assert scenario.hooks is body_for(law)
+        assert scenario.laws[0].gains == gains
+
+
+def test_a_scenario_is_opened_as_it_is_or_by_name():
+    scenario = load("l2-circle")
+    assert open_scenario(scenario) is scenario
+    assert open_scenario("l2-circle").laws == scenario.laws
+
+
+def test_a_file_has_one_body():
+    law = "[[law]]\ntype = 'pd'\nk_rate = 0.1\nk_attitude = 0.1\n"
+    nobody = SLEW.replace(f"[spacecraft]\n{BODY}", "") + law
+    assert message(nobody) == "my.toml: found no body; allowed: one of the tables [libration], [spacecraft]"
+    assert message("") == "my.toml: found no body; allowed: one of the tables [libration], [spacecraft]"
+    near = SLEW.replace("[spacecraft]", "[spacecrfat]") + law
+    assert message(near) == "my.toml: spacecrfat: found an unknown key; did you mean spacecraft?"
+    both = SLEW + "[libration]\n" + law
+    assert message(both) == "my.toml: spacecraft: found a second body beside [libration]; allowed: one of the two"
+    with pytest.raises(InputError, match="scenario: found no body"):
+        make_scenario({"name": "made", "simulation": {"duration": 1.0}})
+
+
+def test_a_body_is_refused_where_another_is_needed():
+    with pytest.raises(InputError) as caught:
+        load("l2-circle").about("rigid-body")
+    assert (
+        str(caught.value) == "l2-circle: libration: found a scenario of a libration-point; allowed: here one of a rigid-body"
+    )
+
+
+def test_laws_of_one_body_are_unknown_to_another():
+    assert 'law[1].type: found "l2-circle"; allowed: one of ' in message(SLEW + "[[law]]\ntype = 'l2-circle'\n")
+    assert 'law[1].type: found "pd"; allowed: one of l2-circle' in message(POINT + "[[law]]\ntype = 'pd'\n")
+
+
+def test_what_a_law_s_table_says_beside_gains_is_its_options():
+    gains = "[[law]]\ntype = 'pd'\nk_rate = 0.1\nk_attitude = 0.1\n"
+    own = 'quaternion_sign = "hysteresis"\nhysteresis_width = 0.2\nfault_action = "none"\n'
+    assert parse(SLEW + gains, "x").laws[0].options == ("as_published", 0.5, None)
+    assert parse(SLEW + gains + own, "x").laws[0].options == ("hysteresis", 0.2, "none")
+    point = "[[law]]\ntype = 'l2-equilibrium'\nform = 'degree'\n"
+    assert parse(POINT + point, "x").laws[0].options == (4.0, 0.0)
+    assert parse(POINT + point + "limit = 3.0\nlag = 0.01\n", "x").laws[0].options == (3.0, 0.01)
+
+
+SLIDING = "[[law]]\ntype = 'sliding'\nsurface_gain = 0.08\nswitching_gain = 0.005\nboundary_layer = 0.01\n"
+SETTLING = "[[law]]\ntype = 'pd'\nform = 'settling'\ntime = 60.0\nwheel_momentum = [0, 0, 0]\n"
+CIRCLE = "[[law]]\ntype = 'l2-circle'\nform = 'best'\nradius = 1.0\nboundary_layer = 0.05\n"
+OPTIMAL = (
+    "[[law]]\ntype = 'l2-optimal'\nradius = 1.0\nrate = 1.4\nalpha = 1.0\nbeta = 1.0\n"
+    "surface_gain = 1.0\npull = 1.0\nboundary_layer = 0.05\n"
+)
+RENAMED = {
+    "quaternion sign": (SLEW + SLIDING + "quaternion_sign = 'shortest'\n", "law[1].double_cover", "quaternion_sign"),
+    "surface gain": (SLEW + SLIDING, "law[1].slope", "surface_gain"),
+    "switching gain": (SLEW + SLIDING, "law[1].reach", "switching_gain"),
+    "boundary layer": (SLEW + SLIDING, "law[1].layer", "boundary_layer"),
+    "the circle's layer": (POINT + CIRCLE, "law[1].layer", "boundary_layer"),
+    "the best law's layer": (POINT + OPTIMAL, "law[1].layer", "boundary_layer"),
+    "the best law's slope": (POINT + OPTIMAL, "law[1].slope", "surface_gain"),
+    "slew angle": (SLEW + "[certify]\nslew_angle = 0.5\n" + SLIDING, "certify.turn", "slew_angle"),
+    "wheel momentum": (WHEELS + SETTLING, "law[1].stored", "wheel_momentum"),
+}
+
+
+@pytest.mark.parametrize("case", sorted(RENAMED))
+def test_an_old_key_is_refused_with_the_new_one_named(case):
+    text, key, new = RENAMED[case]
+    old = key.rpartition(".")[2]
+    scenario = parse(text, "my.toml")
+    said = f"{key}: found an old name; allowed: {new}, its new name"
+    assert message(text.replace(f"{new} =", f"{old} =")) == f"my.toml: {said}"
+    # Where it is changed by key, as by a sweep, too.
+    with pytest.raises(InputError) as caught:
+        scenario.with_({key: 0.1})
+    assert str(caught.value) == f"my.toml with {key} = 0.1: {said}"
+    by_name = key.replace("law[1]", f"law.{scenario.laws[0].name}")
+    with pytest.raises(InputError, match=f"found an old name; allowed: {new}, its new name"):
+        scenario.with_({by_name: 0.1})
+
+
+def test_an_old_key_is_unknown_where_the_new_one_is_too():
+    assert "law[1].slope: found an unknown key" in message(SLEW + "[[law]]\ntype = 'pd'\nslope = 1.0\n")
+    assert "simulation.turn: found an unknown key" in message(SLEW.replace("duration", "turn = 1.0\nduration") + SLIDING)
+
+
+def test_the_old_name_of_a_law_and_of_a_scenario():
+    text = builtin_text("l2-equilibrium").replace('type = "l2-equilibrium"', 'type = "l2-rest"', 1)
+    assert message(text) == 'my.toml: law[1].type: found "l2-rest"; allowed: l2-equilibrium, its new name'
+    with pytest.raises(InputError, match=r"l2-rest: found no such file; .* l2-equilibrium, its new name"):
+        load("l2-rest")
+    with pytest.raises(InputError, match='found "l2-rest"; allowed: l2-equilibrium, its new name'):
+        parse(POINT + "[[law]]\ntype = 'l2-equilibrium'\nform = 'degree'\n", "x").with_({"law.l2-rest.y": 0.5})
