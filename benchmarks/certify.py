@@ -38,8 +38,7 @@ from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.rigid_body import angular_acceleration
 from starhold.parts.craft import Craft, tensor
 from starhold.scenario.building import build
-from starhold.scenario.opening import open_scenario
-from starhold.scenario.reading import Scenario, builtin_names
+from starhold.scenario.reading import builtin_names, load
 from starhold.synthesis.riccati import linear_model
 
 ROUNDS = 3
@@ -125,8 +124,8 @@ def main() -> None:
     print(header("python-flint", "sympy", "scipy"))
     rows: list[list[str]] = []
     for name in builtin_names():
-        scenario = open_scenario(name)
-        if not isinstance(scenario, Scenario):
+        scenario = load(name)
+        if scenario.body != "rigid-body":
             continue
         for entry in scenario.laws:
             loop = build(scenario, entry)

@@ -53,6 +53,6 @@ def point_loop(
     )  # fmt: skip
 
 
-def wheels_of(event: Any) -> Any:
+def wheels_after(event: Any) -> Any:
     """The wheels from an event on."""
     return next(fitted.params for fitted in event.parts if fitted.part.name == "wheels")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from starhold.scenario import designing, opening, reading
+from starhold.scenario import designing, reading
 from starhold.scenario.making import make_scenario as make_scenario
 from starhold.simulation.lane import Recording
 from starhold.studies.kinds import kind_module, kind_of
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from starhold.studies.modal_roots import Study
 
 
-def load(source: str | Path, allow_unstable: bool = False) -> opening.AnyScenario:
+def load(source: str | Path, allow_unstable: bool = False) -> reading.Scenario:
     """The scenario in a TOML file, or the built-in one of that name. InputError says what is wrong with it."""
-    return opening.open_scenario(source, allow_unstable)
+    return reading.load(source, allow_unstable)
 
 
 def simulate(
-    scenario: opening.AnyScenario | str | Path,
+    scenario: reading.Scenario | str | Path,
     law: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
@@ -55,7 +55,7 @@ def metrics(run: xr.Dataset | Flight) -> dict[str, Any]:
 
 
 def sweep(
-    scenario: opening.AnyScenario | str | Path,
+    scenario: reading.Scenario | str | Path,
     changes: Mapping[str, Iterable[Any]] | Iterable[Mapping[str, Any]],
     law: str | None = None,
     threads: int | None = None,
@@ -82,27 +82,27 @@ def to_pandas(results: Any) -> DataFrame:
     return table_of(results)
 
 
-def design(scenario: opening.AnyScenario | str | Path, law: str | None = None) -> list[designing.Design]:
+def design(scenario: reading.Scenario | str | Path, law: str | None = None) -> list[designing.Design]:
     """The gains that formulas give, with what they can be judged by: every law of a scenario that has a `form`, or the one
     of this name. InputError where there is none."""
     opened = _opened(scenario)
     return designing.design(opened, law)
 
 
-def certify(scenario: opening.AnyScenario | str | Path, law: str | None = None) -> list[Certificate]:
+def certify(scenario: reading.Scenario | str | Path, law: str | None = None) -> list[Certificate]:
     """What is proved of every law of a scenario, or of the one of this name, on its spacecraft. Each certificate has an
     `outcome` and `claims` (numbers in SI, of station keeping scaled), and has been tried by ten thousand flights."""
     opened = _opened(scenario)
     return [tried.certificate for tried in kind_of(opened).certify_scenario(opened, law)]
 
 
-def compare(scenario: opening.AnyScenario | str | Path) -> list[Flight]:
+def compare(scenario: reading.Scenario | str | Path) -> list[Flight]:
     """Fly every law of a scenario; each Flight has the run (`run`, a Dataset) and its `metrics` (SI)."""
     opened = _opened(scenario)
     return kind_of(opened).compare(opened)
 
 
-def failures(scenario: opening.AnyScenario | str | Path, law: str | None = None) -> list[Failure]:
+def failures(scenario: reading.Scenario | str | Path, law: str | None = None) -> list[Failure]:
     """What is left of a scenario on wheels after the loss of any one or two of them, under a law, the first if not given."""
     from starhold.studies.failures import study
 
@@ -110,7 +110,7 @@ def failures(scenario: opening.AnyScenario | str | Path, law: str | None = None)
     return study(opened, opened.laws[0] if law is None else opened.pick(law))
 
 
-def modal_roots(scenario: opening.AnyScenario | str | Path, law: str | None = None) -> Study:
+def modal_roots(scenario: reading.Scenario | str | Path, law: str | None = None) -> Study:
     """The roots of the modal law that turn fastest within the limits of a scenario's [transient] table, and the fit."""
     from starhold.studies.modal_roots import pick_modal, study
 
@@ -118,15 +118,12 @@ def modal_roots(scenario: opening.AnyScenario | str | Path, law: str | None = No
     return study(opened, pick_modal(opened, law))
 
 
-def _opened(scenario: opening.AnyScenario | str | Path) -> opening.AnyScenario:
-    return opening.open_scenario(scenario) if isinstance(scenario, str | Path) else scenario
+def _opened(scenario: reading.Scenario | str | Path) -> reading.Scenario:
+    return reading.open_scenario(scenario)
 
 
-def _turning(scenario: opening.AnyScenario | str | Path) -> reading.Scenario:
-    opened = _opened(scenario)
-    if not isinstance(opened, reading.Scenario):
-        raise reading.not_turning(opened.where)
-    return opened
+def _turning(scenario: reading.Scenario | str | Path) -> reading.Scenario:
+    return _opened(scenario).about("rigid-body")
 
 
 def invariant(problem: Problem | str | Path) -> Certificate:

@@ -22,8 +22,7 @@ from starhold.checker.claims import CLAIMS
 from starhold.parts.quaternion_sign import SIGN_POLICIES
 from starhold.report.proved import section
 from starhold.scenario.building import build
-from starhold.scenario.opening import open_scenario
-from starhold.scenario.reading import builtin_text, parse
+from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import Recording, fly, label
 from starhold.studies.certificates import certify_scenario, start_inside
 from starhold.studies.compare import fly_law, prove
@@ -172,7 +171,7 @@ def test_a_craft_too_fast_to_be_followed_leaves_even_a_claim_about_every_state()
 
 
 def test_a_fault_ends_the_claims_of_the_first_certificate():
-    scenario = open_scenario("wheels-orbital")
+    scenario = load("wheels-orbital")
     text = (
         scenario.text.replace('duration = "10 min"', "duration = 30.0")
         + '\n[[fault]]\ntime = 10\nwheel = 2\nlost = true\naction = "both"\n'
@@ -205,7 +204,7 @@ def test_the_quaternion_that_is_fed_back_is_that_of_the_loop(cosines, width):
 
 @pytest.fixture(scope="module")
 def deficit():
-    scenario = open_scenario("l2-deficit")
+    scenario = load("l2-deficit")
     entry = scenario.pick("2.786 as printed")
     kind = kind_of(scenario)
     loop = kind.build(scenario, entry)
@@ -223,7 +222,7 @@ def test_a_lost_flight_first_leaves_the_claim_that_it_ends_on_the_circle(deficit
 
 
 def test_no_limit_no_word_of_it():
-    scenario = open_scenario("l2-circle")
+    scenario = load("l2-circle")
     entry = scenario.pick("smooth")
     loop = kind_of(scenario).build(scenario, entry)
     claim = Claim("circle", {}, {}, ("control not limited",), ())

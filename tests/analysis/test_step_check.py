@@ -7,12 +7,12 @@ import pytest
 
 from starhold.algebra.quaternion import multiply
 from starhold.analysis.step_check import halved, step_error
-from starhold.scenario.opening import open_scenario
+from starhold.scenario.reading import load
 from starhold.studies.kinds import kind_of
 
 
 def recordings(name, count=3):
-    scenario = open_scenario(name)
+    scenario = load(name)
     kind = kind_of(scenario)
     loop, found = kind.build(scenario, scenario.laws[0]), []
     for _ in range(count):

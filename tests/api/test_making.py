@@ -119,7 +119,7 @@ def test_station_keeping_is_made_and_changed_alike():
         "law": [{"type": "l2-equilibrium", "form": "degree"}],
     }
     made = sh.scenario(tables).with_({"libration.point": "L1", "control.limit": 4.0})
-    assert made.laws[0].limit == 4.0
+    assert made.laws[0].options.limit == 4.0
     assert made.craft.from_smaller < 0.0
     assert sh.simulate(made).attrs["model"] == "linear"
 

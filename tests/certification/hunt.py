@@ -14,7 +14,7 @@ from starhold.checker import check_file, passed
 from starhold.errors import InputError
 from starhold.parts.craft import check_inertia
 from starhold.scenario.building import build
-from starhold.scenario.opening import open_scenario
+from starhold.scenario.reading import load
 from starhold.studies.certificates import certify_law, start_inside
 
 EARTH, RADIUS = 3.986e14, 6.4e6
@@ -168,7 +168,7 @@ def fault_in(text, folder, flights=2_000):
     path = folder / "hunted.toml"
     path.write_text(text, encoding="utf-8")
     try:
-        scenario = open_scenario(path)
+        scenario = load(path)
         entry = scenario.laws[0]
         loop = build(scenario, entry)
     except InputError:

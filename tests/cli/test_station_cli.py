@@ -63,7 +63,7 @@ def test_run_flies_one_law_and_tells_a_lost_one_by_its_exit_code(short):
 def test_commands_for_bodies_that_turn_say_so(command, short):
     done = starhold(command, "short.toml", cwd=short)
     assert done.returncode == 2
-    assert "short.toml: libration: found a scenario of station keeping" in done.stderr
+    assert "short.toml: libration: found a scenario of a libration-point; allowed: here one of a rigid-body" in done.stderr
     assert done.stderr.count("\n") == 1
 
 
@@ -102,7 +102,7 @@ def test_python_interface_takes_both_kinds(short):
     import starhold as sh
     from starhold.scenario.template import template_text
 
-    (short / "new.toml").write_text(template_text(libration=True))
+    (short / "new.toml").write_text(template_text("libration-point"))
     assert [flight.lost for flight in sh.compare(short / "new.toml")] == [None, None]
 
     scenario = sh.load(short / "short.toml")
@@ -112,5 +112,5 @@ def test_python_interface_takes_both_kinds(short):
     assert flights[1].run.equals(run)
     assert sh.design(scenario)[0].gains["rate"] == pytest.approx(1.393, abs=1e-3)
     assert [c.outcome for c in sh.certify(scenario, law="deficit 10")] == ["refuted"]
-    with pytest.raises(sh.InputError, match="station keeping"):
+    with pytest.raises(sh.InputError, match="a libration-point; allowed: here one of a rigid-body"):
         sh.failures(scenario)

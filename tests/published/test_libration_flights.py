@@ -17,9 +17,7 @@ from starhold.laws.interface import NoMemory
 from starhold.laws.l2_circle import peak_demand
 from starhold.laws.point import PointMeasurement
 from starhold.parts.bodies.libration_point import PointState
-from starhold.scenario.opening import open_scenario
-from starhold.scenario.reading import builtin_text
-from starhold.scenario.station.reading import parse_station
+from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lanes import simulate_many
 from starhold.studies.flight import Flight
 from starhold.studies.station import build, compare, fly_law
@@ -28,7 +26,7 @@ from starhold.studies.station import build, compare, fly_law
 @cache
 def flown(name: str) -> dict[str, Flight]:
     """The flights of a built-in scenario by law."""
-    scenario = open_scenario(name)
+    scenario = load(name)
     return {flight.name: flight for flight in compare(scenario)}
 
 
@@ -62,7 +60,7 @@ def test_a_deficit_bends_the_circle_as_published(name, radius, x, share):
 
 
 def test_the_printed_limit_2_786_does_not_hold_the_circle_and_3_429_does():
-    scenario = open_scenario("l2-deficit")
+    scenario = load("l2-deficit")
     plant, gains = scenario.craft, scenario.laws[0].gains
     assert 2.0 * plant.rate * gains.rate == pytest.approx(2.786, abs=1e-3)
     assert peak_demand(plant, gains.rate) == pytest.approx(3.4296, abs=1e-4)
@@ -78,13 +76,13 @@ def lagging(lag: str) -> Flight:
     text = builtin_text("l2-deficit").split("[[law]]")[0].replace('"4 yr"', '"2 yr"')
     text = text.replace("control_period = 0.001", "control_period = 0.001\nsubsteps = 2")
     law = f'[[law]]\ntype = "l2-circle"\nform = "best"\nradius = 1.0\nmargin = 0.1\nlag = {lag}\n'
-    scenario = parse_station(text + law, "lag")
+    scenario = parse(text + law, "lag")
     return fly_law(scenario, scenario.laws[0], build(scenario, scenario.laws[0]))
 
 
 def test_half_a_day_of_lag_is_0_0086_and_changes_the_circle_by_a_hundredth():
-    scenario = open_scenario("l2-nonlinear")
-    assert scenario.pick("full model with lag").lag == pytest.approx(0.0086, abs=1e-4)
+    scenario = load("l2-nonlinear")
+    assert scenario.pick("full model with lag").options.lag == pytest.approx(0.0086, abs=1e-4)
     # The printed 0.0014 is half a day of a year that is one, not 2 pi.
     assert pytest.approx(0.00137, abs=1e-5) == 0.5 / 365.2565
     none, half_a_day, printed = lagging("0"), lagging('"12 h"'), lagging("0.0014")
@@ -111,12 +109,12 @@ def test_ten_years_in_the_full_problem():
 
 def test_rest_is_kept_within_the_separatrices_and_lost_beyond():
     flights = flown("l2-equilibrium")
-    scenario = open_scenario("l2-equilibrium")
+    scenario = load("l2-equilibrium")
     steep = 1.0 + 2.0 * scenario.craft.stiffness
     for name, flight in flights.items():
-        saddle = scenario.pick(name).limit / steep
+        saddle = scenario.pick(name).options.limit / steep
         assert (flight.lost is None) == (saddle > scenario.table.initial.position[0])
-        assert np.abs(flight.recording["control"]).max() <= scenario.pick(name).limit * (1.0 + 1e-12)
+        assert np.abs(flight.recording["control"]).max() <= scenario.pick(name).options.limit * (1.0 + 1e-12)
     assert flights["beside Y"].metrics["settling_time"] < 150 * 86400
     # Beside Y the feed-forward is C - 1, beside Z it is C.
     assert flights["beside Z"].metrics["effort_per_year"] > 1.3 * flights["beside Y"].metrics["effort_per_year"]
@@ -134,7 +132,7 @@ def test_the_circle_is_reached_from_a_quarter_inwards():
 def test_the_steepest_descent_of_the_published_v_stops_on_a_wrong_circle():
     """Its V' is zero where y' = -rate z and z' = rate y, whatever the radius."""
     text = builtin_text("l2-circle").replace("boundary_layer = 0.005", "boundary_layer = 0.005\npull = 1e-9")
-    scenario = parse_station(text, "greedy")
+    scenario = parse(text, "greedy")
     entry = scenario.pick("l2-optimal")
     assert in_radii(fly_law(scenario, entry, build(scenario, entry)), "deviation") > 0.2
 
@@ -149,7 +147,7 @@ def test_the_steepest_descent_of_the_published_v_stops_on_a_wrong_circle():
     ],
 )
 def test_scipy_flies_the_same_in_the_limit_of_small_periods(scenario_name, law, years):
-    scenario = open_scenario(scenario_name)
+    scenario = load(scenario_name)
     loop = build(scenario, scenario.pick(law))
     plant, length = loop.plant, years * 2.0 * math.pi
     motion, limit, size = loop.composition().motion, loop.composition().limit, loop.limit
@@ -173,7 +171,7 @@ def test_scipy_flies_the_same_in_the_limit_of_small_periods(scenario_name, law, 
 
 @pytest.mark.parametrize("lag", [0.0, 0.0086])
 def test_many_lanes_are_one_lane_bit_for_bit(lag):
-    scenario = open_scenario("l2-deficit")
+    scenario = load("l2-deficit")
     loop = replace(build(scenario, scenario.pick("deficit 10")), lag=lag)
     random = np.random.default_rng(4)
     starts = [

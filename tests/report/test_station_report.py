@@ -14,8 +14,7 @@ from starhold.report.station.figures import draw
 from starhold.report.station.page import render, write_page
 from starhold.report.station.phase import phase_portrait
 from starhold.report.station.plots import collect
-from starhold.scenario.reading import builtin_text
-from starhold.scenario.station.reading import StationScenario, parse_station
+from starhold.scenario.reading import Scenario, builtin_text, parse
 from starhold.simulation.lane import Recording
 from starhold.studies.flight import Flight, colour
 from starhold.studies.station import compare
@@ -24,12 +23,12 @@ from tests.report.test_page import Reader
 
 
 @cache
-def told(name: str, duration: str = "1 yr") -> StationScenario:
+def told(name: str, duration: str = "1 yr") -> Scenario:
     """A built-in scenario, shorter."""
     text = builtin_text(name)
     for years in ("1 yr", "2 yr", "4 yr", "10 yr"):
         text = text.replace(f'duration = "{years}"', f'duration = "{duration}"')
-    return parse_station(text, name)
+    return parse(text, name)
 
 
 @cache
@@ -122,7 +121,7 @@ def test_the_phase_portrait_is_as_the_publication_draws_it() -> None:
     plot = phase_portrait(flights("l2-equilibrium"), scenario.laws, scenario)
     assert plot is not None
     (plane,) = plot.planes
-    saddle = scenario.laws[0].limit / (1.0 + 2.0 * scenario.craft.stiffness)
+    saddle = scenario.laws[0].options.limit / (1.0 + 2.0 * scenario.craft.stiffness)
     points = next(guide for guide in plane.guides if guide.kind == "points")
     assert np.sort(points.x).tolist() == pytest.approx([-saddle, saddle])
     # Scaled by the saddle's distance and the natural rate it is x'' = x + sat(-2x - 2x'): the separatrices are x + x' = +-1,
@@ -145,7 +144,7 @@ def test_curves_over_time_are_in_si() -> None:
     assert plots.times[-1] == pytest.approx(365.25, abs=1.0)
     assert deviation.clock == "days"
     assert deviation.panels[0].curves[0][0] == pytest.approx(-0.25 * 12742, rel=1e-3)
-    assert control.panels[3].levels == pytest.approx([scenario.laws[0].limit * 0.505092], rel=1e-4)
+    assert control.panels[3].levels == pytest.approx([scenario.laws[0].options.limit * 0.505092], rel=1e-4)
 
 
 def recording(position: np.ndarray, control: np.ndarray, **attrs: object) -> Recording:
@@ -155,7 +154,7 @@ def recording(position: np.ndarray, control: np.ndarray, **attrs: object) -> Rec
 
 
 def test_metrics_of_a_run_made_by_hand() -> None:
-    units = told("l2-circle").units
+    units = told("l2-circle").table.libration.units
     position = np.array([[0.5, 1.5, 0.0], [0.0, 0.0, 1.1], [0.1, 0.9, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     control = np.array([[0.0, 2.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 2.0], [0.0, 0.0, 0.0]])
     found = measure_station(recording(position, control), units, Circle(1.0, 1.4), 0.15)

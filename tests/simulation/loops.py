@@ -15,8 +15,7 @@ from starhold.parts.catalogue import fit
 from starhold.parts.effectors.wheels import ALLOCATIONS
 from starhold.parts.targets.history import tabulate
 from starhold.scenario.building import build
-from starhold.scenario.opening import open_scenario
-from starhold.scenario.reading import builtin_names, builtin_text, parse
+from starhold.scenario.reading import builtin_names, builtin_text, load, parse
 from starhold.studies.kinds import kind_of
 from tests.making import ORBITAL, aimed, noise, on_wheels, point_loop
 
@@ -36,7 +35,7 @@ def builtin() -> dict[str, Any]:
     """The loops of the built-in scenarios, one for each kernel that they need."""
     found: dict[Any, tuple[str, Any]] = {}
     for name in builtin_names():
-        scenario = open_scenario(name)
+        scenario = load(name)
         for entry in scenario.laws:
             loop = kind_of(scenario).build(scenario, entry)
             found.setdefault(kernel_of(loop), (f"{name}: {entry.name}", loop))

@@ -13,13 +13,14 @@ from starhold.laws.interface import Measurement, NoMemory
 from starhold.loop.kernels import make_step
 from starhold.parts.craft import make_craft, tensor
 from starhold.parts.effectors.envelope import authority
+from starhold.scenario.bodies.rigid_body.craft import craft_with, torque_limit, wheels_of
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, parse
 from starhold.simulation.lane import fly, label
 from starhold.simulation.lanes import simulate_many
 from starhold.studies.certificates import certify_scenario
 from tests import small
-from tests.making import wheels_of
+from tests.making import wheels_after
 
 WHEELS = builtin_text("wheels-orbital").replace("gravity_gradient = true", "gravity_gradient = false")
 PLAIN = small.CRAFT.replace("rate = [0, 0, 0]", "rate = [0.03, -0.02, 0.04]").replace("duration = 5.0", "duration = 30.0")
@@ -151,19 +152,19 @@ def test_gains_follow_the_inertia_and_the_torque_left(action):
     later = fault("[9.0, 8.0, 6.0]", time=30, action=f'"{action}"')
     scenario, loop = made(WHEELS + fault(WHEELED, wheel=2, lost="true", delay=5, action='"both"') + later)
     entry = scenario.laws[0]
-    share = authority(wheels_of(loop.events[1])) / authority(scenario.wheels)
+    share = authority(wheels_after(loop.events[1])) / authority(wheels_of(scenario))
     spec = entry.spec._replace(torque=entry.spec.torque * share)
     assert 0.0 < share < 1.0
     struck, acted, changed, known = loop.events
     rows = [[float(x) for x in row.split(",")] for row in WHEELED.strip("[]").split("], [")]
-    assert acted.gains == entry.law.design(scenario.craft_of(rows), spec)
-    body, left = scenario.craft_of(rows), scenario.torque_limit(acted.wheels)
+    assert acted.gains == entry.law.design(craft_with(scenario, rows), spec)
+    body, left = craft_with(scenario, rows), torque_limit(scenario.table, acted.wheels)
     assert left < scenario.craft.torque_limit
     assert struck.craft == body
     assert acted.craft == acted.known == body._replace(torque_limit=left)
     assert changed.gains == acted.gains
     # The torque left is not forgotten when only the body changes.
-    assert known.gains == entry.law.design(scenario.craft_of([9.0, 8.0, 6.0]), spec)
+    assert known.gains == entry.law.design(craft_with(scenario, [9.0, 8.0, 6.0]), spec)
     assert known.wheels == acted.wheels
 
 

@@ -15,6 +15,7 @@ from starhold.errors import InputError
 from starhold.parts.effectors.wheels import lose, make_wheels, pyramid
 from starhold.report.failures_picture import draw
 from starhold.report.results import open_folder
+from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import fly, label
@@ -277,7 +278,7 @@ def test_names_among_the_gains_are_told_as_they_are_written(tmp_path, capsys):
     scenario = parse(BUILTIN + law, "here")
     entry, table = scenario.laws[-1], scenario.table.simulation.model_copy(update={"duration": 0.2})
     short = replace(scenario, table=scenario.table.model_copy(update={"simulation": table}))
-    found = [_flown(short, entry, _left(short.wheels, lost, 0.02)) for lost in ((), (1,))]
+    found = [_flown(short, entry, _left(wheels_of(short), lost, 0.02)) for lost in ((), (1,))]
     print_failures(found)
     assert "The gains are the same in all of them." in capsys.readouterr().out
     write_table(found, entry, tmp_path / "table.csv")
@@ -290,7 +291,7 @@ def test_a_law_that_what_is_left_does_not_suit_leaves_the_rest_of_the_study(tmp_
     scenario = parse(BUILTIN + law, "here")
     entry, table = scenario.laws[-1], scenario.table.simulation.model_copy(update={"duration": 0.2})
     short = replace(scenario, table=scenario.table.model_copy(update={"simulation": table}))
-    intact, struck = (_flown(short, entry, _left(short.wheels, lost, 0.02)) for lost in ((), (1,)))
+    intact, struck = (_flown(short, entry, _left(wheels_of(short), lost, 0.02)) for lost in ((), (1,)))
     assert intact.gains is not None
     assert intact.refused == ""
     assert struck.gains is None

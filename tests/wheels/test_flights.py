@@ -10,6 +10,7 @@ from starhold.errors import InputError
 from starhold.parts.craft import make_craft, tensor
 from starhold.parts.effectors.envelope import authority
 from starhold.parts.effectors.wheels import make_wheels, pyramid, wheel_momentum
+from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import fly, label
@@ -41,7 +42,7 @@ def test_the_builtin_scenario_holds_the_orbital_frame_on_its_first_run():
     limits = np.array(loop.wheels.torque_limit)
     assert (np.abs(run["wheel_torque"]) <= limits * (1.0 + 1e-12)).all()
     assert (np.abs(run["wheel_momentum"]) <= np.array(loop.wheels.momentum_limit)).all()
-    assert scenario.wheels is not None
+    assert wheels_of(scenario) is not None
 
 
 @pytest.mark.parametrize("layout", ["orthogonal", "pyramid", "nasa-standard"])
@@ -120,7 +121,7 @@ def test_retuned_gains_are_those_designed_for_the_torque_left():
     struck, acted = loop.events
     assert (struck.step, acted.step) == (200, 250)
     assert struck.gains == entry.gains
-    share = authority(acted.wheels) / authority(scenario.wheels)
+    share = authority(acted.wheels) / authority(wheels_of(scenario))
     assert 0.0 < share < 1.0
     expected = entry.law.design(scenario.craft, entry.spec._replace(torque=entry.spec.torque * share))
     assert acted.gains == expected
@@ -220,7 +221,7 @@ def test_single_wheels_take_what_they_share_and_their_own():
     axes = "".join(f"\n[[wheel]]\naxis = {axis}\n" for axis in ("[1,0,0]", "[0,1,0]"))
     text += axes + '\n[[wheel]]\naxis = [0,0,2]\ntorque_limit = 0.05\nmomentum = -0.2\nunit = "RW0"\n'
     scenario, loop, _ = flight(text, steps=1)
-    assert scenario.wheels.axes[2] == (0.0, 0.0, 1.0)
-    assert scenario.wheels.torque_limit == (0.02, 0.02, 0.05)
-    assert scenario.wheels.momentum_limit == (0.4, 0.4, 0.02)
+    assert wheels_of(scenario).axes[2] == (0.0, 0.0, 1.0)
+    assert wheels_of(scenario).torque_limit == (0.02, 0.02, 0.05)
+    assert wheels_of(scenario).momentum_limit == (0.4, 0.4, 0.02)
     assert loop.rotors == (0.1, 0.1, -0.2)

@@ -13,12 +13,14 @@ from starhold.loop.step import attitude_step
 from starhold.parts.effectors.envelope import authority, with_facets
 from starhold.parts.effectors.wheels import MOST, allocate_peak
 from starhold.report.plots import collect
+from starhold.scenario.bodies.rigid_body.craft import torque_limit
+from starhold.scenario.bodies.rigid_body.faults import fault_times
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
 from starhold.simulation.lane import fly, label
 from starhold.simulation.lanes import simulate_many
 from starhold.studies.flight import Flight
-from tests.making import wheels_of
+from tests.making import wheels_after
 
 CRAFT = """
 name = "on wheels"
@@ -125,7 +127,7 @@ def test_mpc_plans_within_the_wheels_torque_and_after_a_loss_within_what_is_left
     run = flown(loop)
     size = np.abs(run["command"]).max(axis=1) if kind == "axis" else np.linalg.norm(run["command"], axis=1)
     before, after = scenario.craft.torque_limit, loop.events[1].nominal.torque_limit
-    assert after == scenario.torque_limit(wheels_of(loop.events[1])) < before
+    assert after == torque_limit(scenario.table, wheels_after(loop.events[1])) < before
     assert size[:250].max() == pytest.approx(before, rel=1e-9)
     assert size[250:].max() <= after * (1.0 + 1e-12)
     told = np.delete(np.arange(601), np.arange(200, 250))
@@ -190,12 +192,12 @@ def test_laws_that_can_be_retuned_compare_with_laws_that_cannot():
     kept, unaware = (made(*parts, law=law)[1] for law in (1, 2))
     assert [event.gains == retuned.gains for event in retuned.events] == [True, False]
     assert [event.gains == kept.gains for event in kept.events] == [True, True]
-    assert wheels_of(kept.events[1]) == wheels_of(retuned.events[1]) != unaware.wheels
+    assert wheels_after(kept.events[1]) == wheels_after(retuned.events[1]) != unaware.wheels
     assert [event.step for event in unaware.events] == [200]
-    assert scenario.fault_times == (20.0, 25.0)
+    assert fault_times(scenario) == (20.0, 25.0)
     # A law may ask for more than the fault does, too.
     silent = LOST + 'action = "none"\n'
-    assert made(silent, GENTLE)[0].fault_times == (20.0,)
+    assert fault_times(made(silent, GENTLE)[0]) == (20.0,)
     assert [event.step for event in made(silent, GENTLE + 'fault_action = "reallocate"\n')[1].events] == [200, 250]
 
 
@@ -215,7 +217,7 @@ def test_a_law_whose_gains_do_not_fit_what_is_left_is_refused_before_it_flies():
 
 def test_a_motor_that_is_diagnosed_to_give_nothing_is_lost():
     weak = LOST.replace("lost = true", "torque_limit = 0") + 'action = "reallocate"\n'
-    assert wheels_of(made(weak, GENTLE)[1].events[1]) == wheels_of(
+    assert wheels_after(made(weak, GENTLE)[1].events[1]) == wheels_of(
         made(LOST + 'action = "reallocate"\n', GENTLE)[1].events[1]
     )
 

@@ -26,10 +26,10 @@ def certify(
     from starhold.cli.show_certificates import print_certificate
     from starhold.files import atomic_write
     from starhold.report.results import open_folder
-    from starhold.scenario.opening import open_scenario
+    from starhold.scenario.reading import load
     from starhold.studies.kinds import kind_of
 
-    scenario = open_scenario(file, allow_unstable)
+    scenario = load(file, allow_unstable)
     folder = open_folder(output or Path("results") / f"{scenario.name}-certificate", force)
     tried = kind_of(scenario).certify_scenario(scenario, law)
     for found in tried:

@@ -30,7 +30,7 @@ def failures(
     from starhold.scenario.reading import load
     from starhold.studies.failures import require_wheels, study, write_table
 
-    scenario = load(file)
+    scenario = load(file).about("rigid-body")
     entry = scenario.laws[0] if law is None else scenario.pick(law)
     require_wheels(scenario)
     folder = open_folder(output or Path("results") / f"{scenario.name}-failures", force)

@@ -36,7 +36,7 @@ from starhold.errors import InputError
 if TYPE_CHECKING:
     from types import ModuleType
 
-    from starhold.scenario.opening import AnyScenario
+    from starhold.scenario.reading import Scenario
     from starhold.studies.flight import Flight
 
 app = typer.Typer(
@@ -98,10 +98,10 @@ def _fly(
     with Painter() as painter:
         from starhold.cli.show import console, flying, print_outcome
         from starhold.report.results import open_folder, write_run
-        from starhold.scenario.opening import open_scenario
+        from starhold.scenario.reading import load
         from starhold.studies.kinds import kind_of
 
-        scenario = open_scenario(file, allow_unstable)
+        scenario = load(file, allow_unstable)
         kind = kind_of(scenario)
         entries = list(scenario.laws) if nested else [scenario.laws[0] if law is None else scenario.pick(law)]
         # All of them before the first flight, so that what is wrong with the last is said at once.
@@ -136,7 +136,7 @@ def _fly(
     return flights
 
 
-def _step_checked(kind: ModuleType, scenario: AnyScenario, loop: Any, flight: Flight) -> Flight:
+def _step_checked(kind: ModuleType, scenario: Scenario, loop: Any, flight: Flight) -> Flight:
     """The flight with what half the integration step changes among its metrics."""
     from starhold.analysis.step_check import halved, step_error
 
@@ -156,9 +156,9 @@ def design(
     """Print the gains that formulas give: every law of a file that has a `form`."""
     from starhold.cli.show import console, print_design
     from starhold.scenario import designing
-    from starhold.scenario.opening import open_scenario
+    from starhold.scenario.reading import load
 
-    scenario = open_scenario(file, allow_unstable)
+    scenario = load(file, allow_unstable)
     for found in designing.design(scenario, law):
         print_design(found, scenario.pick(found.name).law)
     if map_to is not None:
@@ -209,12 +209,11 @@ def wheels() -> None:
 def scenarios(name: Annotated[str | None, typer.Argument(help="print this scenario's text")] = None) -> None:
     """List the built-in scenarios, or print one."""
     from starhold.cli.show import console
-    from starhold.scenario.opening import open_scenario
-    from starhold.scenario.reading import builtin_names, builtin_text, nearest
+    from starhold.scenario.reading import builtin_names, builtin_text, load, nearest
 
     if name is None:
         for known in builtin_names():
-            console.print(f"[bold]{known}[/bold]  {open_scenario(known).table.description}", soft_wrap=True)
+            console.print(f"[bold]{known}[/bold]  {load(known).table.description}", soft_wrap=True)
     elif name not in builtin_names():
         raise InputError("scenarios", "", name, nearest(name, builtin_names()))
     else:
@@ -243,7 +242,7 @@ def new(
     start = "wheels-orbital" if wheels else start
     if start is not None and start not in builtin_names():
         raise InputError("new", "--from", start, nearest(start, builtin_names()))
-    text = template_text(libration) if start is None else builtin_text(start)
+    text = template_text("libration-point" if libration else "rigid-body") if start is None else builtin_text(start)
     if not path.name or path.is_dir():
         raise InputError(str(path), "", "a folder", "the name of a file to write")
     beside = path.with_name("starhold.schema.json")
@@ -268,7 +267,7 @@ def schema() -> None:
 def _schema_text() -> str:
     import json
 
-    from starhold.scenario.opening import json_schema
+    from starhold.scenario.schema import json_schema
 
     return json.dumps(json_schema(), indent=1) + "\n"
 

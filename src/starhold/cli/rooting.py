@@ -30,7 +30,7 @@ def modal_roots(
     from starhold.scenario.reading import load
     from starhold.studies.modal_roots import law_lines, pick_modal, study, write_table
 
-    scenario = load(file, allow_unstable)
+    scenario = load(file, allow_unstable).about("rigid-body")
     entry = pick_modal(scenario, law)
     folder = open_folder(output or Path("results") / f"{scenario.name}-roots", force)
     table, picture = (folder / name for name in ROOTS)

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from starhold.parts.effectors.wheel_units import WheelUnit
     from starhold.scenario.designing import Design
     from starhold.scenario.reading import LawEntry
-    from starhold.scenario.station.reading import StationEntry
     from starhold.studies.flight import Flight
 
 WIDE = 132
@@ -28,7 +27,7 @@ if not console.is_terminal:
 
 
 @contextmanager
-def flying(entries: Sequence[LawEntry | StationEntry], steps: int) -> Iterator[Callable[[str, int, int], None]]:
+def flying(entries: Sequence[LawEntry], steps: int) -> Iterator[Callable[[str, int, int], None]]:
     """Progress bars, one a law; yields what the simulation calls."""
     columns = (
         TextColumn("{task.description}"),

@@ -15,9 +15,9 @@ from starhold.laws.point import PointMeasurement
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.libration_point import PRIMARIES, PointState
 from starhold.parts.catalogue import fit
-from starhold.scenario.station.building import build
-from starhold.scenario.station.reading import parse_station
-from starhold.scenario.writing import station_scenario_with
+from starhold.scenario.building import build
+from starhold.scenario.reading import parse
+from starhold.scenario.writing import scenario_with
 from starhold.simulation.lane import fly, label
 
 LIMIT = 4.0
@@ -65,15 +65,17 @@ def reads_alike(law: Law) -> None:
 
 def survives_toml(law: Law) -> None:
     """Gains written to a scenario file and read back are the same; unknown keys are refused."""
-    round_trips(law, station_scenario_with, parse_station)
+    round_trips(law, scenario_with, parse)
 
 
 def flies_a_scenario(law: Law) -> None:
     """It flies from a scenario file, is measured and certified, or the certificate says what cannot be read."""
     for gains in law.examples():
-        scenario = parse_station(station_scenario_with(law, gains), law.name)
+        scenario = parse(scenario_with(law, gains), law.name)
         loop = build(scenario, scenario.laws[0])
-        measure_station(label(loop, *fly(loop, STEPS), 1), scenario.units, goal_of(gains), scenario.table.settling.tolerance)
+        table = scenario.table
+        run = label(loop, *fly(loop, STEPS), 1)
+        measure_station(run, table.libration.units, goal_of(gains), table.settling.tolerance)
         for claim in certify_station(loop, law.name).claims:
             for obligation in claim.obligations:
                 told = obligation.outcome == "proved" or bool(obligation.evidence)

@@ -16,7 +16,7 @@ from starhold.report.proved import swatch
 from starhold.studies.flight import Flight, colour, number_text
 
 if TYPE_CHECKING:
-    from starhold.scenario.checking import LawBook
+    from starhold.scenario.reading import Scenario
 
 POINTS = 1500
 """Samples of a curve."""
@@ -28,7 +28,7 @@ _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inl
 
 
 def document(
-    scenario: LawBook[Any], sections: Iterable[str], data: Mapping[str, Any], scripts: Sequence[str], footer: str
+    scenario: Scenario, sections: Iterable[str], data: Mapping[str, Any], scripts: Sequence[str], footer: str
 ) -> str:
     """A page of these sections, headed by the scenario's name and ended by its text; the scripts, of the assets, read the
     data, which names the laws."""
@@ -183,7 +183,7 @@ def laws_table(flights: Sequence[Flight]) -> str:
     )
 
 
-def settings(scenario: LawBook[Any], title: str) -> str:
+def settings(scenario: Scenario, title: str) -> str:
     """All tables of a scenario."""
     from pydantic import BaseModel
 

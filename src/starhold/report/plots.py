@@ -89,6 +89,8 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario | None = 
     def curves(name: str, column: int, scale: float = 1.0) -> list[Curve]:
         return [thin(flight.recording[name][:, column] * scale, factor) for flight in flights]
 
+    from starhold.scenario.bodies.rigid_body.faults import fault_times
+
     rate_scale, rate_unit = _rate_unit(flights)
     levels, dashed = _limit(flights, scenario)
     rates = [Panel(f"{axis}, {rate_unit}", curves("rate_error", i, rate_scale)) for i, axis in enumerate("xyz")]
@@ -104,7 +106,7 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario | None = 
         _angle(flights, factor, scenario),
         _roll_pitch_yaw(flights, factor),
         (*_transient(flights, factor, scenario), *_wheels(flights, factor, scenario)),
-        () if scenario is None else tuple(time for time in scenario.fault_times if time <= end),
+        () if scenario is None else tuple(time for time in fault_times(scenario) if time <= end),
     )
 
 
@@ -246,7 +248,9 @@ def near(levels: tuple[float, ...], curves: list[Curve]) -> tuple[float, ...]:
 def _wheels(flights: Sequence[Flight], factor: int, scenario: Scenario | None) -> tuple[Plot, ...]:
     if not all("wheel_momentum" in flight.recording.arrays for flight in flights):
         return ()
-    wheels = None if scenario is None else scenario.wheels
+    from starhold.scenario.bodies.rigid_body.craft import wheels_of
+
+    wheels = None if scenario is None else wheels_of(scenario)
     plots: list[Plot] = []
     for name, title, unit, limits in (
         ("wheel_momentum", "angular momentum of the wheels", "N m s", None if wheels is None else wheels.momentum_limit),
@@ -292,12 +296,14 @@ def _rate_unit(flights: Sequence[Flight]) -> tuple[float, str]:
 
 def _limit(flights: Sequence[Flight], scenario: Scenario | None) -> tuple[tuple[float, ...], str]:
     """The limit of the torque (N m) that binds first, and what it is."""
+    from starhold.scenario.bodies.rigid_body.craft import torque_limit, wheels_of
+
     attrs: dict[Any, Any] = flights[0].recording.attrs
     limit, kind = float(attrs["torque_limit"]), attrs["limit"]
     limit = math.inf if kind == "none" else limit
     words = f"limit of {'each axis' if kind == 'axis' else 'the norm'}"
-    wheels = None if scenario is None else scenario.wheels
-    sure = math.inf if scenario is None or wheels is None else scenario.torque_limit(wheels)
+    wheels = None if scenario is None else wheels_of(scenario)
+    sure = math.inf if scenario is None or wheels is None else torque_limit(scenario.table, wheels)
     if scenario is not None and sure < limit:
         norm = scenario.table.spacecraft.limit == "norm"
         limit, words = sure, f"what the wheels surely give {'in norm' if norm else 'about each axis at once'}"

@@ -14,7 +14,6 @@ from starhold.errors import InputError
 from starhold.files import atomic_write, claim, clear_unfinished
 from starhold.report.netcdf import write_netcdf
 from starhold.scenario.checking import cut
-from starhold.scenario.opening import AnyScenario
 from starhold.scenario.reading import LONGEST_PATH, Scenario
 
 if TYPE_CHECKING:
@@ -63,10 +62,10 @@ def _clear(folder: Path) -> None:
         (folder / mark).unlink(missing_ok=True)
 
 
-def signed(run: Recording, scenario: AnyScenario) -> Recording:
+def signed(run: Recording, scenario: Scenario) -> Recording:
     """The run with the scenario's text, the version and the seed among its attributes."""
     attrs = {"scenario": scenario.text, "starhold_version": starhold.__version__, **run.attrs}
-    if isinstance(scenario, Scenario):
+    if hasattr(scenario.table.simulation, "seed"):
         attrs["seed"] = scenario.table.simulation.seed
     return replace(run, attrs=attrs)
 
@@ -78,7 +77,7 @@ def write_run(run: Recording, path: Path) -> None:
         write_netcdf(run, hidden)
 
 
-def write_summary(scenario: AnyScenario, results: dict[str, dict[str, Any]], path: Path) -> None:
+def write_summary(scenario: Scenario, results: dict[str, dict[str, Any]], path: Path) -> None:
     """The metrics of each law, SI units, as JSON; a value that does not exist is null."""
     content = {"scenario": scenario.name, "starhold_version": starhold.__version__, "laws": results}
     with atomic_write(path) as hidden:

@@ -13,7 +13,7 @@ from starhold.report.proved import swatch
 from starhold.studies.flight import Flight
 
 if TYPE_CHECKING:
-    from starhold.scenario.transient import TransientTable
+    from starhold.scenario.bodies.rigid_body.transient import TransientTable
     from starhold.simulation.lane import Recording
 
 

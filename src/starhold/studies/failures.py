@@ -19,8 +19,9 @@ from starhold.files import atomic_write
 from starhold.parts.craft import tensor
 from starhold.parts.effectors.envelope import authority
 from starhold.parts.effectors.wheels import Wheels, lose
+from starhold.scenario.bodies.rigid_body.craft import wheels_of
+from starhold.scenario.bodies.rigid_body.tables import FaultTable
 from starhold.scenario.building import build
-from starhold.scenario.schema import FaultTable
 from starhold.simulation.lane import Recording, fly, label
 from starhold.studies.certificates import certify_law
 from starhold.synthesis.stability_degree import degree, scale
@@ -176,7 +177,7 @@ def _numbers(value: Any) -> str:
 
 def require_wheels(scenario: Scenario) -> Wheels:
     """The wheels of a scenario; InputError where it has none."""
-    wheels = scenario.wheels
+    wheels = wheels_of(scenario)
     if wheels is None:
         raise InputError(scenario.where, "wheels", "no wheels", "a scenario with [wheels] or [[wheel]] tables")
     return wheels
@@ -221,7 +222,7 @@ def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
         FaultTable(time=0.0, wheel=wheel, lost=True, action="both" if retune else "reallocate") for wheel in failure.lost
     ]
     # What the law does about faults of the file is no matter here.
-    own = replace(entry, fault_action=None)
+    own = replace(entry, options=entry.options._replace(fault_action=None))
     try:
         loop = build(replace(scenario, table=table.model_copy(update={"fault": faults})), own)
     except InputError as error:

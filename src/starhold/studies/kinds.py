@@ -5,13 +5,12 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from starhold.scenario.opening import AnyScenario
 from starhold.scenario.reading import Scenario
 
 
-def kind_of(scenario: AnyScenario) -> ModuleType:
+def kind_of(scenario: Scenario) -> ModuleType:
     """The module for scenarios of this kind."""
-    return kind_module(isinstance(scenario, Scenario))
+    return kind_module(scenario.body == "rigid-body")
 
 
 def kind_module(turning: bool) -> ModuleType:

@@ -19,8 +19,8 @@ from starhold.files import atomic_write
 from starhold.scenario.building import build
 
 if TYPE_CHECKING:
+    from starhold.scenario.bodies.rigid_body.transient import TransientTable
     from starhold.scenario.reading import LawEntry, Scenario
-    from starhold.scenario.transient import TransientTable
 
 DIGITS = 6
 """Of the fit as it is printed; the roots have three or four."""

@@ -17,21 +17,22 @@ from starhold.parts.bodies.libration_point import Units
 from starhold.parts.craft import vector
 from starhold.report.results import SUMMARY, signed, write_summary
 from starhold.report.station.figures import sketch as sketch
-from starhold.scenario.station.building import build as build
-from starhold.scenario.station.reading import StationEntry, StationScenario
+from starhold.scenario.building import build as build
+from starhold.scenario.reading import LawEntry, Scenario
 from starhold.simulation.lane import Progress, Recording, fly, label
 from starhold.studies.certificates import Tried
 from starhold.studies.compare import Notice, write_proved
 from starhold.studies.flight import Flight, gain_text, number_text
 
 
-def fly_law(scenario: StationScenario, entry: StationEntry, loop: ClosedLoop, notice: Notice | None = None) -> Flight:
+def fly_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, notice: Notice | None = None) -> Flight:
     """One law of the scenario, with the loop that `build` gives for it, flown and measured."""
     progress = None if notice is None else lambda done, total: notice(entry.name, done, total)
     run = record(scenario, loop, progress)
     metrics = metrics_of(run)
     gains = {item.name: gain_text(item, value) for item, value in zip(entry.law.fields(), entry.gains, strict=True)}
-    gains |= {"limit": number_text(entry.limit)} | ({"lag": number_text(entry.lag)} if entry.lag else {})
+    limit, lag = entry.options
+    gains |= {"limit": number_text(limit)} | ({"lag": number_text(lag)} if lag else {})
     return Flight(entry.name, entry.law.name, run, metrics, gains, metric_set=BOARD)
 
 
@@ -40,14 +41,14 @@ def timed(loop: ClosedLoop, flight: Flight) -> Flight:
     return flight
 
 
-def prove(scenario: StationScenario, entry: StationEntry, loop: ClosedLoop, flight: Flight) -> Flight:
+def prove(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, flight: Flight) -> Flight:
     """The flight with the certificate of its law, and how it leaves its claims."""
     certificate = certify_station(loop, entry.name)
-    left = station_departures(certificate, loop, flight.recording, scenario.units.time)
+    left = station_departures(certificate, loop, flight.recording, scenario.table.libration.units.time)
     return replace(flight, certificates=(certificate,), departures=(left,))
 
 
-def certify_scenario(scenario: StationScenario, law: str | None = None) -> list[Tried]:
+def certify_scenario(scenario: Scenario, law: str | None = None) -> list[Tried]:
     """Certificates of all laws of a scenario, or of one. Raises `BrokenClaimError` where a flight contradicts one."""
     found: list[Tried] = []
     for entry in scenario.laws if law is None else (scenario.pick(law),):
@@ -57,15 +58,15 @@ def certify_scenario(scenario: StationScenario, law: str | None = None) -> list[
     return found
 
 
-def record(scenario: StationScenario, loop: ClosedLoop, progress: Progress | None = None) -> Recording:
+def record(scenario: Scenario, loop: ClosedLoop, progress: Progress | None = None) -> Recording:
     """The run of a loop, scaled, with what its units are worth among its attributes."""
     timing = scenario.table.simulation
     return name_samples(scenario, loop, *fly(loop, timing.steps, timing.record_every, progress=progress))
 
 
-def name_samples(scenario: StationScenario, loop: ClosedLoop, samples: Any, carry: Any) -> Recording:
+def name_samples(scenario: Scenario, loop: ClosedLoop, samples: Any, carry: Any) -> Recording:
     """The samples of `fly` under their names, with what they are worth and measured by among the attributes."""
-    units, goal = scenario.units, goal_of(loop.gains)
+    units, goal = scenario.table.libration.units, goal_of(loop.gains)
     run = label(loop, samples, carry, scenario.table.simulation.record_every)
     worth = {"length_unit_m": units.length, "time_unit_s": units.time, "rate_unit_rad_per_s": units.rate}
     worth |= {"velocity_unit_m_per_s": units.velocity, "acceleration_unit_m_per_s2": units.acceleration}
@@ -82,13 +83,13 @@ def metrics_of(run: Recording) -> dict[str, Any]:
     return measure_station(run, units, goal, float(told["settling_tolerance"]))
 
 
-def compare(scenario: StationScenario, notice: Notice | None = None) -> list[Flight]:
+def compare(scenario: Scenario, notice: Notice | None = None) -> list[Flight]:
     """Every law of the scenario flown on it, in the order of the file."""
     loops = [(entry, build(scenario, entry)) for entry in scenario.laws]
     return [prove(scenario, entry, loop, fly_law(scenario, entry, loop, notice)) for entry, loop in loops]
 
 
-def write(scenario: StationScenario, flights: Sequence[Flight], folder: Path) -> Path:
+def write(scenario: Scenario, flights: Sequence[Flight], folder: Path) -> Path:
     """Summary, certificates and page into an existing folder; returns the page's path."""
     from starhold.report.station.page import write_page
 

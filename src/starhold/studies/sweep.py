@@ -11,7 +11,7 @@ import numpy as np
 from starhold.errors import InputError
 from starhold.scenario.checking import show
 from starhold.scenario.making import variants
-from starhold.scenario.opening import AnyScenario
+from starhold.scenario.reading import Scenario
 from starhold.simulation.abreast import Flying, fly_abreast
 from starhold.simulation.lane import Progress
 from starhold.studies.frames import frame_of
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def sweep(
-    scenario: AnyScenario,
+    scenario: Scenario,
     changes: Mapping[str, Iterable[Any]] | Iterable[Mapping[str, Any]],
     law: str | None = None,
     threads: int | None = None,
@@ -33,7 +33,7 @@ def sweep(
     names = [law] if law is not None else _named(scenario, points)
     kind = kind_of(scenario)
     rows: list[dict[str, Any]] = []
-    flown: list[AnyScenario] = []
+    flown: list[Scenario] = []
     flights: list[Flying] = []
     # All of them before the first flight, so that what is wrong with the last is said at once.
     for point, other in zip(points, variants(scenario, points), strict=True):
@@ -51,7 +51,7 @@ def sweep(
     return frame_of([row | metrics for row, metrics in zip(rows, found, strict=True)])
 
 
-def _points(scenario: AnyScenario, changes: Any) -> list[dict[str, Any]]:
+def _points(scenario: Scenario, changes: Any) -> list[dict[str, Any]]:
     """The changes one by one: given so, or every combination of the values of each key."""
     if isinstance(changes, Mapping):
         columns = {key: _values(scenario, key, values) for key, values in changes.items()}
@@ -64,13 +64,13 @@ def _points(scenario: AnyScenario, changes: Any) -> list[dict[str, Any]]:
     return points
 
 
-def _values(scenario: AnyScenario, key: str, values: Any) -> list[Any]:
+def _values(scenario: Scenario, key: str, values: Any) -> list[Any]:
     if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable):
         raise InputError(scenario.where, key, show(values), "a list of values to fly")
     return values.tolist() if isinstance(values, np.ndarray) else list(values)
 
 
-def _named(scenario: AnyScenario, points: list[dict[str, Any]]) -> list[str]:
+def _named(scenario: Scenario, points: list[dict[str, Any]]) -> list[str]:
     """The laws that the changes are about; all where they are about none, or about some by their places."""
     keys = {key for point in points for key in point if key.startswith("law")}
     names = [entry.name for entry in scenario.laws]

@@ -12,7 +12,7 @@ import numpy as np
 from starhold.report.figures import POINTS, headed, over_time, paint, plain, width_of, without_runs
 from starhold.report.station.planes import Guide, Plane, PlanePlot
 from starhold.report.station.plots import StationPlots, collect
-from starhold.scenario.station.reading import StationScenario
+from starhold.scenario.reading import Scenario
 from starhold.studies.flight import Flight, colour
 
 FILLS = {"light": "#e8f1fa", "dark": "#c3dcf1"}
@@ -36,12 +36,12 @@ class StationSketch(NamedTuple):
         return makers | {"space": partial(_space, plots, flights, name)}
 
 
-def sketch(flights: Sequence[Flight], scenario: StationScenario) -> StationSketch:
+def sketch(flights: Sequence[Flight], scenario: Scenario) -> StationSketch:
     """What `figures.paint` needs."""
     return StationSketch(collect(flights, POINTS, scenario), without_runs(flights), scenario.name)
 
 
-def draw(flights: Sequence[Flight], folder: Path, scenario: StationScenario) -> list[Path]:
+def draw(flights: Sequence[Flight], folder: Path, scenario: Scenario) -> list[Path]:
     """Write the figures into `folder`, which exists, and return their paths."""
     return paint(sketch(flights, scenario), folder)
 

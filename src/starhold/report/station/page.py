@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from starhold.analysis.station import DAY
+from starhold.analysis.station import DAY, goal_of
 from starhold.report.page_parts import (
     OVER_TIME,
     POINTS,
@@ -29,7 +29,7 @@ from starhold.report.page_parts import (
 from starhold.report.proved import section as proved
 from starhold.report.station.planes import Guide, PlanePlot
 from starhold.report.station.plots import StationPlots, collect
-from starhold.scenario.station.reading import StationScenario
+from starhold.scenario.reading import Scenario
 from starhold.studies.flight import Flight
 
 FRAMES = 1200
@@ -49,12 +49,12 @@ _VIEWS = (
 )
 
 
-def write_page(path: Path, scenario: StationScenario, flights: Sequence[Flight]) -> None:
+def write_page(path: Path, scenario: Scenario, flights: Sequence[Flight]) -> None:
     """Write the report of a scenario's flights as one HTML file; the same flights give the same bytes."""
     path.write_text(render(scenario, flights), encoding="utf-8", newline="\n")
 
 
-def render(scenario: StationScenario, flights: Sequence[Flight]) -> str:
+def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
     """The report as HTML text. Whatever comes from files is escaped."""
     plots = collect(flights, POINTS, scenario)
     data = _data(scenario, flights, plots)
@@ -80,8 +80,8 @@ def _plane_box(plot: dict[str, Any]) -> str:
     return plot_box(plot) + f'<p class="note">{escape(plot["note"])}</p>'
 
 
-def _units(scenario: StationScenario) -> str:
-    units, plant = scenario.units, scenario.craft
+def _units(scenario: Scenario) -> str:
+    units, plant = scenario.table.libration.units, scenario.craft
     pair = scenario.table.libration.pair
     rows = (
         ("bodies", f"{pair.name}, {pair.separation / 1e3:.6g} km apart, {scenario.table.libration.point}"),
@@ -100,7 +100,7 @@ def _units(scenario: StationScenario) -> str:
     )
 
 
-def _data(scenario: StationScenario, flights: Sequence[Flight], plots: StationPlots) -> dict[str, Any]:
+def _data(scenario: Scenario, flights: Sequence[Flight], plots: StationPlots) -> dict[str, Any]:
     """What the scripts of the page read."""
     return {
         "laws": law_data(flights),
@@ -134,15 +134,15 @@ def _thin(values: Any, most: int = PATH) -> list[float | None]:
     return rounded(values[:: max(1, -(-len(values) // most))], 4)
 
 
-def _scene(scenario: StationScenario, flights: Sequence[Flight], plots: StationPlots) -> dict[str, Any]:
+def _scene(scenario: Scenario, flights: Sequence[Flight], plots: StationPlots) -> dict[str, Any]:
     longest = max((flight.recording["time"] for flight in flights), key=len)
     played = longest[longest <= TURNS * 2.0 * np.pi]
     places = np.unique(np.rint(np.linspace(0.0, len(played) - 1, FRAMES + 1)).astype(int))
-    units = scenario.units
+    units = scenario.table.libration.units
     paths: list[dict[str, Any]] = []
     for flight in flights:
         kept = places[places < len(flight.recording["time"])]
-        goal = scenario.goal(flight.name)
+        goal = goal_of(scenario.pick(flight.name).gains)
         position = flight.recording["position"][kept]
         paths.append(
             {

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from starhold.analysis.station import Equilibrium, goal_of
 from starhold.report.plots import Curve
 from starhold.report.station.planes import Guide, Line, Plane, PlanePlot
-from starhold.scenario.station.reading import StationEntry, StationScenario
+from starhold.scenario.reading import LawEntry, Scenario
 from starhold.studies.flight import Flight, colour
 
 WINDOW = 1.7
@@ -28,10 +28,10 @@ PATH = 4000
 class _Axis:
     """x'' = s^2 x + sat(-k_x x - k_v x'), in x (lengths) and x'/s, over the time s t."""
 
-    def __init__(self, entry: StationEntry, scenario: StationScenario) -> None:
+    def __init__(self, entry: LawEntry, scenario: Scenario) -> None:
         plant, gains = scenario.craft, entry.gains
         self.s = math.sqrt(plant.rate**2 + 2.0 * plant.stiffness)
-        self.saddle = entry.limit / self.s**2
+        self.saddle = entry.options.limit / self.s**2
         self.k_x, self.k_v = gains.k_x / self.s**2, gains.k_velocity[0] / self.s
 
     def slope(self, state: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -61,12 +61,11 @@ class _Axis:
         return x, w
 
 
-def phase_portrait(
-    flights: Sequence[Flight], entries: Sequence[StationEntry], scenario: StationScenario
-) -> PlanePlot | None:
+def phase_portrait(flights: Sequence[Flight], entries: Sequence[LawEntry], scenario: Scenario) -> PlanePlot | None:
     """x and x' of laws that hold a place of rest, among the paths of the X axis alone; None where no law does so or no law's
     X axis has a limit of its own."""
-    resting = [entry for entry in entries if isinstance(goal_of(entry.gains), Equilibrium) and math.isfinite(entry.limit)]
+    limited = [entry for entry in entries if math.isfinite(entry.options.limit)]
+    resting = [entry for entry in limited if isinstance(goal_of(entry.gains), Equilibrium)]
     if not resting or scenario.table.control.limit_kind != "axis":
         return None
     first = _Axis(resting[0], scenario)
@@ -84,11 +83,11 @@ def phase_portrait(
     guides = [area, zone, *guides]
     seen: set[float] = set()
     for entry in resting:
-        if entry.limit in seen:
+        if entry.options.limit in seen:
             continue
-        seen.add(entry.limit)
+        seen.add(entry.options.limit)
         axis = _Axis(entry, scenario)
-        shade = colour(entries.index(entry)) if len({other.limit for other in resting}) > 1 else None
+        shade = colour(entries.index(entry)) if len({other.options.limit for other in resting}) > 1 else None
         guides += [Guide(*axis.separatrix(side), "separatrix", shade) for side in (-1.0, 1.0)]
         guides.append(Guide(np.array([-axis.saddle, axis.saddle]), np.zeros(2), "saddles", shade, "points"))
     lines: list[Line] = []

@@ -14,7 +14,7 @@ from starhold.parts.bodies.libration_point import EARTH_DIAMETER
 from starhold.report.plots import Curve, Panel, Plot, near, positive, sound, thin, thin_times
 from starhold.report.station.phase import phase_portrait
 from starhold.report.station.planes import Guide, Line, Plane, PlanePlot, ring
-from starhold.scenario.station.reading import StationEntry, StationScenario
+from starhold.scenario.reading import LawEntry, Scenario
 from starhold.studies.flight import Flight, colour
 
 LONG = 400.0 * DAY
@@ -40,10 +40,10 @@ class StationPlots:
     unit: str
 
 
-def collect(flights: Sequence[Flight], points: int, scenario: StationScenario) -> StationPlots:
+def collect(flights: Sequence[Flight], points: int, scenario: Scenario) -> StationPlots:
     """The pictures of a comparison, curves over time thinned to about `points` samples."""
     entries = [scenario.pick(flight.name) for flight in flights]
-    units = scenario.units
+    units = scenario.table.libration.units
     longest = max((flight.recording["time"] for flight in flights), key=len)
     factor = 1 if len(longest) <= points else int(np.ceil(2 * len(longest) / points))
     clock, tick = ("years", YEAR) if longest[-1] * units.time > LONG else ("days", DAY)
@@ -59,13 +59,13 @@ def collect(flights: Sequence[Flight], points: int, scenario: StationScenario) -
     )
 
 
-def unit_text(scenario: StationScenario) -> str:
+def unit_text(scenario: Scenario) -> str:
     """What lengths are counted in."""
-    length = scenario.units.length
+    length = scenario.table.libration.units.length
     return "Earth diameters" if length == EARTH_DIAMETER else f"units of {length / 1e3:g} km"
 
 
-def _goal(entry: StationEntry) -> object:
+def _goal(entry: LawEntry) -> object:
     return goal_of(entry.gains)
 
 
@@ -73,11 +73,9 @@ def _path(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return values[:: max(1, -(-len(values) // PATH))]
 
 
-def _away(
-    flights: Sequence[Flight], entries: Sequence[StationEntry], factor: int, scenario: StationScenario, clock: str
-) -> Plot:
+def _away(flights: Sequence[Flight], entries: Sequence[LawEntry], factor: int, scenario: Scenario, clock: str) -> Plot:
     """How far from the circle in its plane and across it, or from the place of rest."""
-    length = scenario.units.length / 1e3
+    length = scenario.table.libration.units.length / 1e3
     x = [thin(flight.recording["position"][:, 0] * length, factor) for flight in flights]
     goals = [goal_of(entry.gains) for entry in entries]
     off: list[Curve] = []
@@ -97,11 +95,9 @@ def _away(
     return Plot("deviation", title, [sound(p, flights) for p in panels], "tolerance", clock=clock)
 
 
-def _control(
-    flights: Sequence[Flight], entries: Sequence[StationEntry], factor: int, scenario: StationScenario, clock: str
-) -> Plot:
-    worth = scenario.units.acceleration * 1e6
-    limits = sorted({entry.limit * worth for entry in entries if math.isfinite(entry.limit)})
+def _control(flights: Sequence[Flight], entries: Sequence[LawEntry], factor: int, scenario: Scenario, clock: str) -> Plot:
+    worth = scenario.table.libration.units.acceleration * 1e6
+    limits = sorted({entry.options.limit * worth for entry in entries if math.isfinite(entry.options.limit)})
     kind = scenario.table.control.limit_kind
     each = tuple(sign * limit for limit in limits for sign in (-1.0, 1.0)) if kind == "axis" else ()
     panels: list[Panel] = []
@@ -115,7 +111,7 @@ def _control(
     return Plot("control", "control acceleration", panels, dashed, True, clock)
 
 
-def _projections(flights: Sequence[Flight], entries: Sequence[StationEntry], scenario: StationScenario) -> PlanePlot:
+def _projections(flights: Sequence[Flight], entries: Sequence[LawEntry], scenario: Scenario) -> PlanePlot:
     """(x, y), (y, z) and (u_y, u_z), as published, and (u_x, u_z), in which the control comes nearest to the limit; with the
     circle and the limit."""
     radii = sorted({goal.radius for goal in map(_goal, entries) if isinstance(goal, Circle)})
@@ -132,8 +128,8 @@ def _projections(flights: Sequence[Flight], entries: Sequence[StationEntry], sce
     across = (1.0 + ROOM) * max([size, *(reach(i) / (1.0 + ROOM) for i in (1, 2))])
     limits: dict[float, str] = {}
     for number, entry in enumerate(entries):
-        if math.isfinite(entry.limit):
-            limits.setdefault(entry.limit, colour(number))
+        if math.isfinite(entry.options.limit):
+            limits.setdefault(entry.options.limit, colour(number))
     same = len(limits) == 1
     most = max((float(np.abs(control).max()) for control in controls), default=1.0)
     bounds = [
@@ -166,7 +162,7 @@ def _projections(flights: Sequence[Flight], entries: Sequence[StationEntry], sce
         ),
     ]
     dashed = " and ".join([*(["circle to be held"] if radii else []), *(["limit"] if bounds else [])])
-    worth = scenario.units
+    worth = scenario.table.libration.units
     note = f"1 = {worth.length / 1e3:g} km; of the control {worth.acceleration * 1e6:.4g} µm/s²"
     return PlanePlot("projections", "projections of motion and control", planes, dashed, note)
 
