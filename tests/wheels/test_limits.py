@@ -217,7 +217,7 @@ def test_a_law_whose_gains_do_not_fit_what_is_left_is_refused_before_it_flies():
 
 def test_a_motor_that_is_diagnosed_to_give_nothing_is_lost():
     weak = LOST.replace("lost = true", "torque_limit = 0") + 'action = "reallocate"\n'
-    assert wheels_after(made(weak, GENTLE)[1].events[1]) == wheels_of(
+    assert wheels_after(made(weak, GENTLE)[1].events[1]) == wheels_after(
         made(LOST + 'action = "reallocate"\n', GENTLE)[1].events[1]
     )
 
