@@ -158,14 +158,14 @@ def test_gains_follow_the_inertia_and_the_torque_left(action):
     struck, acted, changed, known = loop.events
     rows = [[float(x) for x in row.split(",")] for row in WHEELED.strip("[]").split("], [")]
     assert acted.gains == entry.law.design(craft_with(scenario, rows), spec)
-    body, left = craft_with(scenario, rows), torque_limit(scenario.table, acted.wheels)
+    body, left = craft_with(scenario, rows), torque_limit(scenario.table, wheels_after(acted))
     assert left < scenario.craft.torque_limit
     assert struck.craft == body
-    assert acted.craft == acted.known == body._replace(torque_limit=left)
+    assert acted.craft == acted.nominal == body._replace(torque_limit=left)
     assert changed.gains == acted.gains
     # The torque left is not forgotten when only the body changes.
     assert known.gains == entry.law.design(craft_with(scenario, [9.0, 8.0, 6.0]), spec)
-    assert known.wheels == acted.wheels
+    assert wheels_after(known) == wheels_after(acted)
 
 
 def test_what_is_diagnosed_late_does_not_hide_what_came_since():
@@ -173,8 +173,8 @@ def test_what_is_diagnosed_late_does_not_hide_what_came_since():
     scenario, loop = made(PLAIN + LYAPUNOV + slow + fast)
     first, second, known, late = loop.events
     assert (first.step, second.step, known.step, late.step) == (100, 120, 130, 250)
-    assert second.craft == known.craft == known.known == late.known != first.craft
-    assert first.known == second.known == scenario.craft
+    assert second.craft == known.craft == known.nominal == late.nominal != first.craft
+    assert first.nominal == second.nominal == scenario.craft
 
 
 def test_a_fault_that_the_law_never_knows_of_leaves_the_certificate():

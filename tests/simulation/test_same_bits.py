@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from starhold.algebra.structure import flatten
+from starhold.algebra.structure import flatten, places
 from starhold.conformance.bench import random_quaternions, sample_loop
 from starhold.laws.catalogue import catalogue
 from starhold.loop.kernels import fly_plainly
@@ -13,7 +13,7 @@ from starhold.parts.catalogue import fit
 from starhold.parts.craft import make_craft
 from starhold.simulation.lane import fly, simulate
 from starhold.simulation.lanes import alongside, carry_columns, simulate_many
-from tests.making import aimed, noise
+from tests.making import ORBITAL, aimed, noise
 
 STEPS, LANES = 60, 300
 TURNED = (0.6, 0.0, 0.8, 0.0)
@@ -35,14 +35,14 @@ def test_every_lane_equals_its_own_single_flight():
     assert (batch.lost_at == -1).all()
 
 
-@pytest.mark.parametrize("target", ["orbital", (0.6, 0.0, 0.8, 0.0)])
+@pytest.mark.parametrize("target", [ORBITAL, aimed((0.6, 0.0, 0.8, 0.0))], ids=["orbital", "inertial"])
 def test_lanes_start_like_single_flights(target):
-    loop = flown(target=target)
+    loop = flown().with_parts(target) if target != ORBITAL else flown().without("target").with_parts(target)
     starts = [loop.start._replace(attitude=q) for q in random_quaternions(40)]
     columns = carry_columns(loop, np.array([flatten(s) for s in starts]).T)
     for lane, start in enumerate(starts):
         assert columns[:, lane].tolist() == flatten(loop.carry(start))
-    assert set(columns[16 if target != "orbital" else 20]) == {-1.0, 1.0}
+    assert set(columns[places(loop.carry()).h]) == {-1.0, 1.0}
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
