@@ -155,14 +155,19 @@ def switch(s: Scalar, layer: Scalar) -> Scalar:
     return where(inside, clip(s / maximum(layer, 1e-300), 1.0), sign(s))
 
 
-def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
-    """Control torque (N m, body)."""
+def equivalent_torque(measurement: Measurement, surface_gain: Matrix | Vector, craft: Craft) -> Vector:
+    """The torque (N m) under which s = w + K q stays as it is where no torque acts from outside."""
     q = vector_part(measurement.attitude)
     q_rate = scale(0.5, add(scale(measurement.attitude[0], measurement.rate), cross(q, measurement.rate)))
-    wanted = subtract(measurement.target_acceleration, apply(gains.surface_gain, q_rate))
-    equivalent = add(gyroscopic_torque(craft.inertia, measurement.body_rate), apply(craft.inertia, wanted))
+    wanted = subtract(measurement.target_acceleration, apply(surface_gain, q_rate))
+    return add(gyroscopic_torque(craft.inertia, measurement.body_rate), apply(craft.inertia, wanted))
+
+
+def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
+    """Control torque (N m, body)."""
     s = surface(measurement, gains)
     switching = (switch(s[0], gains.boundary_layer), switch(s[1], gains.boundary_layer), switch(s[2], gains.boundary_layer))
+    equivalent = equivalent_torque(measurement, gains.surface_gain, craft)
     return subtract(equivalent, times(gains.switching_gain, switching)), memory
 
 
