@@ -69,12 +69,12 @@ class Intervals:
         return Intervals(np.maximum(found.low, 0.0), found.high)
 
     def sqrt(self) -> Intervals:
-        """Of what is not below zero in it."""
+        """The root is taken of what is not below zero in the interval."""
         found = _outward(np.sqrt(np.maximum(self.low, 0.0)), np.sqrt(np.maximum(self.high, 0.0)))
         return Intervals(np.maximum(found.low, 0.0), found.high)
 
     def clipped(self, low: float, high: float) -> Intervals:
-        """What is known to lie in low .. high as well."""
+        """The result is what is known to lie in low .. high as well."""
         return Intervals(np.clip(self.low, low, high), np.clip(self.high, low, high))
 
 

@@ -78,7 +78,7 @@ def relative(target: Quaternion, q: Quaternion) -> Quaternion:
 
 
 def nearer(q: Quaternion, other: Quaternion) -> Quaternion:
-    """Of q and -q, the same attitude, the one nearer to `other`."""
+    """Choose of q and -q, the same attitude, the one nearer to `other`."""
     return stretch(side(q[0] * other[0] + q[1] * other[1] + q[2] * other[2] + q[3] * other[3]), q)
 
 

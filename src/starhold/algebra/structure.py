@@ -74,7 +74,7 @@ def unflatten(numbers: Any, like: _State) -> _State:
 
 
 def alike(values: Sequence[_State]) -> list[_State]:
-    """The same values, with diagonals written as vectors turned into matrices where another value has a matrix."""
+    """The values come back with diagonals written as vectors turned into matrices where another value has a matrix."""
     return [reduce(_widened, values, value) for value in values]
 
 

@@ -1,4 +1,4 @@
-"""What one call of a law costs: the states of a run are shown to the compiled law again, and timed."""
+"""A call of a law costs the time that it takes when the states of a run are shown to the compiled law again."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ class Found(NamedTuple):
 
 
 class Unmet(NamedTuple):
-    """What no root achieves from an angle: to come to its "end" at all; or, of those that do, to keep the limit of the
+    """No root achieves this from an angle: to come to its "end" at all; or, of those that do, to keep the limit of the
     "rate" or of the "acceleration", where `least` is the least of their peaks (rad/s or rad/s2) and `root` (1/s) has it; or
     to keep "both"."""
 
@@ -95,7 +95,7 @@ class Problem:
     b: float
 
     def watcher(self) -> Watcher:
-        """What flies it."""
+        """The watcher flies the problem's loop and looks at each step."""
         root = (-1.0, -1.0, -1.0)
         # Its gains only say of what form those of the lanes are.
         return Watcher(replace(self.loop, gains=modal.Gains(root, root, self.b)), self.angle_end, self.rate_end)

@@ -256,7 +256,7 @@ def _without_friction(wheels: Wheels) -> Wheels:
 
 
 def _boundless(wheels: Wheels) -> Wheels:
-    """The same wheels without limits and friction; lost ones stay lost."""
+    """The wheels come back without limits and friction; lost ones stay lost."""
     limits = tuple(math.inf if limit > 0.0 else 0.0 for limit in wheels.torque_limit)
     return _without_friction(wheels)._replace(torque_limit=limits, momentum_limit=(math.inf,) * len(limits))
 

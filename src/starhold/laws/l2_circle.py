@@ -67,7 +67,7 @@ def check(gains: Gains, plant: Libration) -> None:
 
 
 def explain(plant: Libration, spec: Best) -> list[tuple[str, Any]]:
-    """What the circle asks of the control."""
+    """A design is judged by what the circle asks of the control."""
     rate = design(plant, spec).rate
     peak = peak_demand(plant, rate) * spec.radius
     return [("rate", rate), ("period (of the turning axes)", plant.rate / abs(rate)), ("peak demand (scaled)", peak)]

@@ -1,4 +1,4 @@
-"""Of all controls within the limit the one that makes a chosen V fall fastest.
+"""The control is, of all within the limit, the one that makes a chosen V fall fastest.
 
 V weighs the velocity against one that leads to the circle, y' = -rate z - pull f1 y and z' = rate y - pull f1 z with
 f1 = y^2 + z^2 - radius^2. With pull = 0 it would be the V of `l2-circle`, and a control of full size would hold any circle

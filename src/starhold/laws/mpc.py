@@ -56,8 +56,8 @@ the optimum, and whether limits shaped the last plan (1) or not (0), which decid
 
 
 class Memory(NamedTuple):
-    """What the law keeps between calls, changed in place and made anew for each trajectory: the numbers of its program,
-    see `predictive.problem`."""
+    """The law keeps the numbers of its program between calls, changed in place and made anew for each trajectory, see
+    `predictive.problem`."""
 
     numbers: Buffer
 

@@ -91,9 +91,10 @@ def peak_required(
 
 
 class Deficit(NamedTuple):
-    """What is left when the control lacks a part of what the circle asks: the largest radius held by formula (m), the part
-    of the Sun seen there, the largest radius when the sail loses that light too (m; 0 for none), the rates at which the
-    full circle is still held (Omega; None for none), and the part of a revolution with the control on its limit there."""
+    """A deficit tells what is left when the control lacks a part of what the circle asks: the largest radius held by formula
+    (m), the part of the Sun seen there, the largest radius when the sail loses that light too (m; 0 for none), the rates at
+    which the full circle is still held (Omega; None for none), and the part of a revolution with the control on its limit
+    there."""
 
     missing: float
     radius: float
@@ -173,7 +174,7 @@ class Station:
         return self.peak(rate) / (self.pressure * ball(mirror, min(self.diffuse, 1.0 - mirror)).radius)
 
     def margin(self, area: float, mass: float, rate: float | None = None) -> float:
-        """What a sail of this area (m2) gives a craft of this mass (kg), over what the circle asks."""
+        """A sail of this area (m2) gives a craft of this mass (kg) so many times what the circle asks."""
         return area / (mass * self.area_per_mass(rate))
 
     def peak_full(self, field: Field) -> float:
@@ -186,7 +187,8 @@ class Station:
         return peak_required(self.rate, self.radius / units.length, plant, field, centre, push) * units.acceleration
 
     def deficit(self, missing: float) -> Deficit:
-        """What is left of the circle at the best rate when this part of what it asks is missing (negative: to spare)."""
+        """The deficit tells what is left of the circle at the best rate when this part of its demand is missing (negative:
+        to spare)."""
         plant, share = self.plant, 1.0 - missing
         least, radius = demand(self.rate, plant), share * self.radius
         return Deficit(

@@ -284,7 +284,7 @@ def _decomposed(
 
 
 def _chosen(name: str, choice: Choice | None, at: int, given: Array, shape: tuple[int, int]) -> Array | None:
-    """What is chosen for a level whose B is `given`, if anything."""
+    """Find the choice that was made for a level whose B is `given`, if there is one."""
     found = choice(at, given) if callable(choice) else choice[at] if choice is not None and at < len(choice) else None
     if found is not None and _real(f"{name} of level {at}", found).shape != shape:
         raise ValueError(f"{name} of level {at} must have shape {shape}, not {np.shape(found)}")

@@ -78,8 +78,8 @@ def complete(spec: Spec, start: Callable[[], Start]) -> Spec:
 
 
 class Turn(NamedTuple):
-    """What came of a turn: when it settled (s; infinite where it did not), and the largest norms of the torque (N m) and of
-    the momentum that wheels store (N m s; 0 without)."""
+    """A slew that was tried tells when it settled (s; infinite where it did not), and the largest norms of the torque (N m)
+    and of the wheel momentum (N m s; 0 without wheels)."""
 
     time: float
     torque: float
@@ -299,7 +299,7 @@ def explained(craft: Craft, k_rate: float, k_attitude: float) -> list[tuple[str,
 
 
 def told(turn: Turn) -> list[tuple[str, Any]]:
-    """What the turn of a design that settles in time comes to."""
+    """A design that settles in time is judged by its slew."""
     return [
         ("settles after (s)", turn.time),
         ("largest torque (N m)", turn.torque),

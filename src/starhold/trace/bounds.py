@@ -97,7 +97,8 @@ def work(program: Program, counts: Mapping[str, int | Interval]) -> Bounds:
 
 
 def check(program: Program, counts: Mapping[str, int | Interval], sizes: Mapping[str, int]) -> Bounds:
-    """The same, where each memory holds so many numbers (for one lane). OutsideError where an address may lie outside."""
+    """Bound the work as `work` does, where each memory holds so many numbers (for one lane). OutsideError where an address
+    may lie outside."""
     known = {memory.name: memory.size for memory in program.memories if memory.size is not None}
     return _Walk(program, counts, {**known, **sizes}).bounds()
 
@@ -214,7 +215,7 @@ def required(form: Form, ranges: Ranges) -> Ranges | None:
 
 
 class _Part(NamedTuple):
-    """What a block does each time, and what it does once in all the turns of the loop of a symbol."""
+    """A part sums up what a block does each time, and what it does once in all the turns of the loop of a symbol."""
 
     each: Work
     once: dict[int, Work]

@@ -33,7 +33,7 @@ class Compiled:
         self._many: Callable[..., None] | None = None
 
     def __call__(self, *values: Any) -> Any:
-        """What the equation gives."""
+        """Call the equation with numbers; the result is shaped as the equation gives it."""
         x = np.array(list(_floats(values)))
         y = np.empty(len(self._leaves))
         self._one(x.ctypes.data, y.ctypes.data, 1)
@@ -83,7 +83,7 @@ def record_call(equation: Callable[..., Any], like: tuple[Any, ...]) -> tuple[Pr
 
 
 def bind(like: Any, cells: Cells, base: Any = 0) -> Any:
-    """The same structure with its floats read from memory, from `base` on, in order; its buffers lie there too."""
+    """Rebuild the structure with its floats read from memory, from `base` on, in order; its buffers lie there too."""
     place = 0
 
     def leaf(value: Any) -> Any:

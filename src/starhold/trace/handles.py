@@ -1,4 +1,4 @@
-"""What equations meet while they are recorded: handles, which note what is done to them, and refuse what cannot be noted."""
+"""Equations meet handles while they are recorded, which note what is done to them, and refuse what cannot be noted."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class RecordingError(InputError):
 
 
 class Handle:
-    """What an equation meets in place of a value while it is recorded."""
+    """A handle stands in place of a value while an equation is recorded."""
 
     __slots__ = ("recorder", "ref")
     reader = "record"
@@ -94,7 +94,7 @@ class Number(Handle):
 
 
 class Truth(Handle):
-    """What a comparison gives."""
+    """A truth is the result of a comparison."""
 
     __slots__ = ()
     kind = TRUTH

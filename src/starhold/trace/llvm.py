@@ -157,7 +157,7 @@ class Llvm:
         self.text += [head, *self.lines, f"  ret {gives} {out}".rstrip(), "}"]
 
     def _begin(self, main: Function) -> None:
-        """What comes first in what is run."""
+        """Add what comes first in the function that is run."""
         for name, kind in main.params:
             if kind == WORD:
                 self._splat("i64", f"%{name}.given", WORD, f"%{name}")

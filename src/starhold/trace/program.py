@@ -1,4 +1,4 @@
-"""What a trace is: a tree of blocks. A block is a list of operations, stores, loops, branches and calls."""
+"""A trace is a tree of blocks. A block is a list of operations, stores, loops, branches and calls."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class Program(NamedTuple):
 
     @property
     def main(self) -> Function:
-        """What is run."""
+        """The last function is the one that is run."""
         return self.functions[-1]
 
     def memory(self, name: str) -> Memory:
@@ -184,7 +184,7 @@ def single_turns(function: Function) -> Function:
 
 
 def renamed(value: Value, names: dict[str, Value]) -> Value:
-    """What stands for a value."""
+    """A value is replaced by what stands for it."""
     return names.get(value, value) if isinstance(value, str) else value
 
 
@@ -218,7 +218,7 @@ def _same(a: Value, b: Value) -> bool:
 
 
 def _live(block: Block, outs: Iterable[Value]) -> set[Value]:
-    """What is read for the sake of the outs, of what is written, or of functions that are called."""
+    """Keep what is read for the sake of the outs, of what is written, or of functions that are called."""
     live, before = set(outs), -1
     # Backwards, so that what is read by what is read is mostly found at once.
     order = [*statements(block)][::-1]

@@ -115,7 +115,7 @@ class Recorder:
             RECORDER.reset(token)
 
     def program(self, name: str, doc: str = "") -> Program:
-        """What has been recorded."""
+        """The notes so far make a program."""
         body, _ = prune(tuple(self._open[0]), ())
         main = Function(self._titles.new(name), doc, tuple(self._inputs), body, ())
         return Program((*(function for function, _, _ in self._functions.values()), main), tuple(self.memories))
@@ -269,7 +269,7 @@ class Recorder:
         return Function(self._titles.new(equation.__name__), doc, tuple(params), body, ends), kept, out
 
     def _parts(self, leaf: Any) -> list[Any]:
-        """What of an argument is passed on: what is not known while recording."""
+        """Yield the parts of an argument that are passed on: those not known while recording."""
         if isinstance(leaf, Buffer):
             return self._parts(leaf.base) + self._parts(leaf.size)
         return [] if type(leaf) in (int, bool) else [leaf]

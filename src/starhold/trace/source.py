@@ -109,7 +109,7 @@ class Source(ABC):
 
     @property
     def name(self) -> str:
-        """What is called."""
+        """The function that is called has this name."""
         return self.titles[self.program.main.name]
 
     def __str__(self) -> str:
@@ -128,7 +128,7 @@ class Source(ABC):
 
     @abstractmethod
     def _opening(self) -> list[str]:
-        """What comes before the functions."""
+        """Add the lines that come before the functions."""
 
     @abstractmethod
     def _define(self, function: Function) -> None:
@@ -185,14 +185,14 @@ class Source(ABC):
             self.lines[-1] += " */"
 
     def use(self, value: Value, kind: str) -> Expression:
-        """What stands for a value."""
+        """A value is written as the text or the name that stands for it."""
         if isinstance(value, str):
             return self._folded.get(value, Expression(value))
         text = self._constant(value, kind)
         return Expression(text, _UNARY if text.startswith("-") else _CALL)
 
     def text(self, value: Value, kind: str) -> str:
-        """The same where no operator is near."""
+        """A value is written as `use` does where no operator is near."""
         return self.use(value, kind).text
 
     # Where names are read.
@@ -229,7 +229,7 @@ class Source(ABC):
         self._folded = {}
 
     def _operands(self, s: Any) -> Iterator[tuple[Value, int]]:
-        """What a statement reads where it stands, and how often its text says it."""
+        """Yield the values that a statement reads where it stands, and how often its text names them."""
         if isinstance(s, Op):
             texts = self._texts(s)
             for place, value in enumerate(s.args):
@@ -352,7 +352,7 @@ def _reached(function: Function, functions: dict[str, Function]) -> dict[str, Fu
 
 
 def _titles(names: list[str], taken: set[str]) -> dict[str, str]:
-    """What functions are called in the text: their names, numbered where those are taken."""
+    """Functions are called by their names in the text, numbered where those are taken."""
     titles: dict[str, str] = {}
     for name in names:
         free = (f"{name}_{number}" if number else name for number in range(len(taken) + len(names) + 1))

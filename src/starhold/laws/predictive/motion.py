@@ -136,7 +136,7 @@ def _times(row: Numbers, c: Scalar) -> Numbers:
 
 
 def _during(rates: Rates, share: Scalar) -> Rates:
-    """The same over that share of the time."""
+    """The rates act over that share of the time."""
     return Rates(
         _scaled(rates.turning, share), rates.half * share, _scaled(rates.stiffness, share), _scaled(rates.damping, share)
     )

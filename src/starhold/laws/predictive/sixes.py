@@ -75,5 +75,5 @@ def triple(buffer: Buffer, k: Index) -> Vector:
 
 
 def matrix(buffer: Buffer, width: int) -> Rows:
-    """What a buffer holds, row after row."""
+    """A buffer holds a matrix row after row."""
     return tuple(buffer.row(i, width) for i in range(buffer.size // width))

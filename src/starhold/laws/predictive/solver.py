@@ -60,7 +60,7 @@ class Progress(NamedTuple):
 
 
 class Attempt(NamedTuple):
-    """What a Newton step gave, and whether the interior-point method is asked for."""
+    """An attempt tells what a Newton step gave, and whether the interior-point method is asked for."""
 
     progress: Progress
     rescue: Truth
