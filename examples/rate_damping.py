@@ -21,8 +21,8 @@ class Gains(NamedTuple):
     k: Annotated[float, Gain("N m s", above=0.0, text="damping")]
 
 
-def torque(seen, gains, craft, memory):
-    return scale(-gains.k, seen.rate), memory
+def torque(measurement, gains, craft, memory):
+    return scale(-gains.k, measurement.rate), memory
 
 
 def examples():

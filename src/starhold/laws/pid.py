@@ -67,9 +67,9 @@ def remember(gains: Gains, craft: Craft, period: float) -> Memory:
 def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: Memory) -> tuple[Vector, Memory]:
     """Control torque (N m, body)."""
     q = vector_part(measurement.attitude)
-    # The integral is clamped, not held while the torque is limited: it winds up in a slew that reaches no limit too, and a
-    # law does not know whether the limit is of each axis, of the norm or of the wheels. The clamp bounds the overshoot in
-    # every case, and holds off no disturbance that it is sized for.
+    # Anti-windup: the integral is clamped, not held while the torque is limited. It winds up in a slew that reaches no limit
+    # too, and a law does not know whether the limit is of each axis, of the norm or of the wheels. The clamp bounds the
+    # overshoot in every case, and leaves enough for the disturbance that it is sized for.
     grown = add(memory.integral, scale(measurement.period, q))
     integral = clip_axes(grown, gains.integral_limit / gains.k_integral)
     proportional = add(scale(gains.k_rate, measurement.rate), scale(gains.k_attitude, q))
