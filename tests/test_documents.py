@@ -5,6 +5,7 @@ import re
 import shlex
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -145,3 +146,48 @@ def test_generated_page_of_laws():
     for law in catalogue() | catalogue("libration-point"):
         assert f"## {law}: " in page
     assert "-k_attitude*q_1 - k_rate*w_1" in page
+
+
+def glossary():
+    """Term, Russian term and meaning of every row."""
+    text = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("| ")]
+    return [row for row in rows if row[0] not in ("term", "---")]
+
+
+def test_glossary_has_each_term_once_in_both_languages():
+    terms = [term for term, _, _ in glossary()]
+    assert len(terms) == len(set(terms)) > 50
+    for term, russian, meaning in glossary():
+        assert re.search("[а-я]{3}", russian), term
+        assert meaning[0].isupper() or meaning[0] == "`", term
+        assert meaning.endswith("."), term
+
+
+@cache
+def written():
+    """The text of README, of the pages but the glossary, and of the source, with the names of its files."""
+    pages = [path for path in (ROOT / "docs").glob("*.md") if path.name != "glossary.md"]
+    files = [ROOT / "README.md", *pages, *(ROOT / "src").rglob("*.py")]
+    return "\n".join(f"{path.relative_to(ROOT)}\n{path.read_text(encoding='utf-8')}" for path in files)
+
+
+@pytest.mark.parametrize("term", [row[0] for row in glossary()])
+def test_word_of_the_glossary_is_used(term):
+    """In another page or in the source, be it as part of a name."""
+    assert re.search(re.escape(term).replace(r"\ ", r"[\s_-]+"), written(), re.IGNORECASE)
+
+
+def test_keys_of_the_glossary_are_keys():
+    """What stands in code type is a key of scenario files, of laws' gains or of certificates."""
+    for term, _, meaning in glossary():
+        for key in re.findall("`(.*?)`", meaning):
+            assert re.search(rf"\b{key}\b *[:=]|\"{key}\"", written()), (term, key)
+
+
+def test_every_role_has_a_word_in_the_glossary():
+    """The folders of `parts` are the roles of a loop."""
+    folders = {path.name for path in (ROOT / "src" / "starhold" / "parts").iterdir() if (path / "__init__.py").is_file()}
+    roles = {{"bodies": "body"}.get(name, name.rstrip("s")) for name in folders}
+    assert len(roles) >= 7
+    assert roles <= {row[0] for row in glossary()}
