@@ -1,4 +1,4 @@
-"""Direction cosines (reference axes to body axes), and Euler-Krylov angles for input and plots.
+"""Direction cosines take reference axes to body axes; Euler-Krylov angles serve for input and plots.
 
 Euler-Krylov angles are yaw, pitch, roll: turns about the third, the new second, the new first axis.
 Trigonometric functions appear only in the angle conversions, which are never part of a simulation step.
@@ -14,7 +14,7 @@ from starhold.algebra.vector import Matrix, Vector
 
 
 def from_quaternion(q: Quaternion) -> Matrix:
-    """The matrix A with R_body = A r_reference. Its rows are the body axes in reference components."""
+    """Return the matrix A with R_body = A r_reference. Its rows are the body axes in reference components."""
     return (
         (
             q[0] * q[0] + q[1] * q[1] - q[2] * q[2] - q[3] * q[3],
@@ -44,7 +44,7 @@ def _choose(condition: bool, a: Quaternion, b: Quaternion) -> Quaternion:
 
 
 def to_quaternion(a: Matrix) -> Quaternion:
-    """The quaternion of a rotation matrix, from the largest of its four squared components (Shepperd's method).
+    """Return the quaternion of a rotation matrix, from the largest of its four squared components (Shepperd's method).
 
     Accurate at every attitude, 180 degrees included; of q and -q it returns the one whose largest component is positive.
     """
@@ -63,7 +63,7 @@ def to_quaternion(a: Matrix) -> Quaternion:
 
 
 def from_angles(yaw: float, pitch: float, roll: float) -> Quaternion:
-    """The quaternion of Euler-Krylov angles (rad)."""
+    """Return the quaternion of Euler-Krylov angles (rad)."""
 
     def turn(axis: int, angle: float) -> Quaternion:
         s = math.sin(0.5 * angle)
@@ -73,7 +73,7 @@ def from_angles(yaw: float, pitch: float, roll: float) -> Quaternion:
 
 
 def to_angles(q: Quaternion) -> Vector:
-    """Euler-Krylov angles (yaw, pitch, roll; rad) of a quaternion; at pitch = +-90 degrees roll is set to zero."""
+    """Return Euler-Krylov angles (yaw, pitch, roll; rad) of a quaternion; at pitch = +-90 degrees roll is set to zero."""
     a = from_quaternion(q)
     pitch = math.asin(max(-1.0, min(1.0, -a[0][2])))
     if abs(a[0][2]) > 1.0 - 1e-14:
@@ -82,7 +82,7 @@ def to_angles(q: Quaternion) -> Vector:
 
 
 def from_axis_angle(axis: Vector, angle: float) -> Quaternion:
-    """The quaternion of a turn by `angle` (rad) about `axis` (any length but zero)."""
+    """Return the quaternion of a rotation by `angle` (rad) about `axis` (any length but zero)."""
     length = math.sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2)
     s = math.sin(0.5 * angle) / length
     return (math.cos(0.5 * angle), s * axis[0], s * axis[1], s * axis[2])

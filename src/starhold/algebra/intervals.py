@@ -1,4 +1,5 @@
-"""Interval arithmetic on whole arrays of boxes: every answer encloses the exact one, as balls do, a few million a second.
+"""Interval arithmetic works on whole arrays of boxes: every answer encloses the exact one, as balls do, a few million a
+second.
 
 IEEE sums, products, quotients and square roots are the float nearest to the exact value, so that the next float outward
 bounds it, and so does any beyond. NaN (an infinity less itself, say) becomes the whole line.
@@ -18,7 +19,7 @@ _SHARE, _LEAST = 2.0**-52, 5e-324
 
 
 class Intervals:
-    """Arrays of intervals low <= high of one shape, which arithmetic broadcasts."""
+    """The arrays hold intervals low <= high of one shape, which arithmetic broadcasts."""
 
     __slots__ = ("high", "low")
     # NumPy arrays on the left leave the operation to this class.
@@ -53,7 +54,7 @@ class Intervals:
     __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> Intervals:
-        """The whole line where the divisor may be zero."""
+        """Return the whole line where the divisor may be zero."""
         b = _read(other)
         found = _hull(np.divide, self, b.low, b.high)
         around = (b.low <= 0.0) & (b.high >= 0.0)
@@ -63,7 +64,7 @@ class Intervals:
         return _read(other) / self
 
     def square(self) -> Intervals:
-        """x x, which is tighter than the product of two intervals."""
+        """Return x x, which is tighter than the product of two intervals."""
         size, least = np.maximum(-self.low, self.high), np.maximum(np.maximum(self.low, -self.high), 0.0)
         found = _outward(least * least, size * size)
         return Intervals(np.maximum(found.low, 0.0), found.high)
@@ -91,7 +92,7 @@ def _outward(low: Array, high: Array) -> Intervals:
 
 
 def _hull(operation: Callable[[Any, Any], Any], a: Intervals, low: Array, high: Array) -> Intervals:
-    """From the operation on the ends, which monotonic ones attain their extremes at."""
+    """Return the hull of the operation on the ends, where monotonic ones attain their extremes."""
     with np.errstate(all="ignore"):
         ends = [operation(x, y) for x in (a.low, a.high) for y in ((low,) if low is high else (low, high))]
     least, most = ends[0], ends[0]

@@ -38,7 +38,7 @@ class Operation(NamedTuple):
     meanings: dict[str, Any]
 
     def missing(self) -> list[str]:
-        """The readers that this operation should mean something to and does not."""
+        """Return the readers that this operation should mean something to and does not."""
         about = {*self.takes, self.gives}
         readers = PRINTED if about & {WORD, INDEX, UNIFORM} else (*PRINTED, *EXACT)
         return [reader for reader in readers if reader not in self.meanings]
@@ -85,7 +85,7 @@ def _read(entry: Operation, values: tuple[Any, ...]) -> Any:
 
 
 def _reader(value: Any) -> str | None:
-    """The reader of a number; None for plain ones."""
+    """Return the reader of a number; None for plain ones."""
     if isinstance(value, (float, int)) or type(value).__name__ == "bool_":
         return None
     if value is None:
@@ -99,8 +99,8 @@ def _reader(value: Any) -> str | None:
 
 
 def written_at() -> tuple[str, str]:
-    """Where the equation that runs now is written, and the text of that line: of a law its name, file and line, rather than
-    those of a library which it calls."""
+    """Return where the equation that runs now is written, and the text of that line: of a law its name, file and line,
+    rather than those of a library which it calls."""
     frame: Any = sys._getframe(1)  # pyright: ignore[reportPrivateUsage]
     frames: list[Any] = []
     while frame is not None:
@@ -114,6 +114,6 @@ def written_at() -> tuple[str, str]:
 
 
 def library(name: str) -> Any:
-    """A reader's module, loaded when a number of its own is met; named at run time because its types are too loose for a
-    strict checker."""
+    """Return a reader's module, loaded when a number of its own is met; named at run time because its types are too loose
+    for a strict checker."""
     return import_module(name)

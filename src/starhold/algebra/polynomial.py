@@ -1,4 +1,4 @@
-"""How exact polynomials read the equations: coefficients are rationals (or balls), floats are taken at their exact value.
+"""Exact polynomials read the equations: coefficients are rationals (or balls), floats are taken at their exact value.
 
 A comparison that depends on a variable splits the result into cases, so that an equation with `clip` or `sign` reads as a
 piecewise polynomial. Nothing is rounded: what two readings have in common holds for all values of the variables.
@@ -28,13 +28,13 @@ class UnreadableError(TypeError):
 
 
 def unreadable(what: str) -> UnreadableError:
-    """The error that names an operation and where it is written."""
+    """Return the error that names an operation and where it is written."""
     place, text = written_at()
     return UnreadableError(f"{place}: {what}, in `{text}`")
 
 
 def exact(number: Any) -> Coefficient:
-    """A number as a rational of the same value; balls stay. ValueError for what is not finite."""
+    """Return a number as a rational of the same value; balls stay. ValueError for what is not finite."""
     if isinstance(number, (fmpq, arb)):
         return number
     try:
@@ -44,7 +44,7 @@ def exact(number: Any) -> Coefficient:
 
 
 def constants(value: Any) -> Any:
-    """A number, tuple or NamedTuple with every number in it made a constant polynomial."""
+    """Return a number, tuple or NamedTuple with every number in it made a constant polynomial."""
     if isinstance(value, tuple):
         parts: list[Any] = [constants(part) for part in value]  # pyright: ignore[reportUnknownVariableType]
         return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)  # pyright: ignore
@@ -52,7 +52,7 @@ def constants(value: Any) -> Any:
 
 
 class Polynomial:
-    """A polynomial; `terms` maps monomials to coefficients, none of them an exact zero."""
+    """A polynomial's `terms` map monomials to coefficients, none of them an exact zero."""
 
     __slots__ = ("terms",)
     reader = "polynomial"
@@ -62,27 +62,27 @@ class Polynomial:
 
     @classmethod
     def constant(cls, value: Any) -> Polynomial:
-        """The polynomial without variables."""
+        """Return the polynomial without variables."""
         return cls({(): exact(value)})
 
     @classmethod
     def variable(cls, name: str) -> Polynomial:
-        """The polynomial `name`."""
+        """Return the polynomial `name`."""
         return cls({(name,): fmpq(1)})
 
     @property
     def value(self) -> Coefficient | None:
-        """The coefficient of a polynomial without variables, else None."""
+        """Return the coefficient of a polynomial without variables, else None."""
         if not self.terms:
             return fmpq(0)
         return self.terms.get(()) if len(self.terms) == 1 else None
 
     def variables(self) -> set[str]:
-        """The names it depends on."""
+        """Return the names it depends on."""
         return {name for monomial in self.terms for name in monomial}
 
     def slope(self, name: str) -> Polynomial:
-        """The partial derivative."""
+        """Return the partial derivative."""
         found: dict[Monomial, Coefficient] = {}
         for monomial, c in self.terms.items():
             power = monomial.count(name)
@@ -92,7 +92,7 @@ class Polynomial:
         return Polynomial(found)
 
     def at(self, values: Mapping[str, Any]) -> Coefficient:
-        """Its value where every variable has one."""
+        """Return its value where every variable has one."""
         total: Coefficient = fmpq(0)
         for monomial, c in self.terms.items():
             for name in monomial:
@@ -101,7 +101,7 @@ class Polynomial:
         return total
 
     def given(self, values: Mapping[str, Any]) -> Polynomial:
-        """The polynomial of the other variables where these have values."""
+        """Return the polynomial of the other variables where these have values."""
         found = Polynomial({})
         for monomial, c in self.terms.items():
             for name in monomial:
@@ -110,7 +110,7 @@ class Polynomial:
         return found
 
     def only(self, keep: Callable[[Monomial], bool]) -> Polynomial:
-        """The terms whose monomials are kept."""
+        """Return the terms whose monomials are kept."""
         return Polynomial({m: c for m, c in self.terms.items() if keep(m)})
 
     def __add__(self, other: Any) -> Any:
@@ -177,26 +177,26 @@ def reciprocal(divisor: Any, name: str) -> Generator[None]:
 
 @dataclass(frozen=True)
 class Condition:
-    """`positive` > 0; as a comparison reads it, a < b is b - a > 0."""
+    """The condition is `positive` > 0; as a comparison reads it, a < b is b - a > 0."""
 
     positive: Polynomial
     reader: ClassVar[str] = "polynomial"
 
     def key(self) -> tuple[Any, ...]:
-        """Equal for equal polynomials."""
+        """Return a key that is equal for equal polynomials."""
         return tuple(sorted((m, str(c)) for m, c in self.positive.terms.items()))
 
 
 @dataclass(frozen=True)
 class Case:
-    """One piece of a piecewise polynomial: the conditions that hold there or not, and its polynomial."""
+    """A piecewise polynomial has cases like this: the conditions that hold there or not, and its polynomial."""
 
     truths: tuple[tuple[Condition, bool], ...]
     value: Polynomial
 
 
 class Cases:
-    """A piecewise polynomial: cases that exclude one another and leave nothing out."""
+    """A piecewise polynomial has cases that exclude one another and leave nothing out."""
 
     __slots__ = ("pieces",)
     reader = "polynomial"
@@ -237,22 +237,22 @@ class Cases:
 
 @dataclass(frozen=True)
 class Split:
-    """A comparison of piecewise polynomials: cases as theirs, each with what the comparison is there."""
+    """A comparison of piecewise polynomials has cases as they have, each with what the comparison is there."""
 
     pieces: tuple[tuple[tuple[tuple[Condition, bool], ...], bool | Condition], ...]
     reader: ClassVar[str] = "polynomial"
 
 
 def pieces(value: Any) -> tuple[Case, ...]:
-    """The cases of a piecewise polynomial; of a polynomial or a number the only one."""
+    """Return the cases of a piecewise polynomial; of a polynomial or a number the only one."""
     return value.pieces if isinstance(value, Cases) else (Case((), _polynomial(value)),)
 
 
 def jointly(
     values: Iterable[Any], most: int | None = None
 ) -> list[tuple[tuple[tuple[Condition, bool], ...], list[Polynomial]]]:
-    """The cases of several piecewise polynomials at once: conditions and one polynomial for each value. ValueError for more
-    than `most` cases."""
+    """Return the cases of several piecewise polynomials at once: conditions and one polynomial for each value. ValueError
+    for more than `most` cases."""
     found: list[tuple[tuple[tuple[Condition, bool], ...], list[Polynomial]]] = [((), [])]
     for value in values:
         found = [
@@ -273,7 +273,7 @@ def _polynomial(value: Any) -> Polynomial:
 def _merged(
     a: tuple[tuple[Condition, bool], ...], b: tuple[tuple[Condition, bool], ...]
 ) -> tuple[tuple[Condition, bool], ...] | None:
-    """Both sets of conditions, None where they contradict one another."""
+    """Return both sets of conditions, None where they contradict one another."""
     held = {condition.key(): (condition, truth) for condition, truth in a}
     for condition, truth in b:
         if held.setdefault(condition.key(), (condition, truth))[1] != truth:

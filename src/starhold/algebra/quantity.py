@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, get_args, get_type_hints
 
 
 class Quantity(NamedTuple):
-    """The unit and the meaning of a field. `dimension` names what its components run over in recordings: "axis" for vectors,
+    """A field has a unit and a meaning. `dimension` names what its components run over in recordings: "axis" for vectors,
     "quaternion", "wheel"; "" for a single number."""
 
     unit: str
@@ -15,6 +15,6 @@ class Quantity(NamedTuple):
 
 
 def quantities(cls: Any) -> dict[str, Quantity]:
-    """The quantities of a NamedTuple whose fields are all annotated with one, by name, in order."""
+    """Return the quantities of a NamedTuple whose fields are all annotated with one, by name, in order."""
     hints = get_type_hints(cls, include_extras=True)
     return {name: next(a for a in get_args(hints[name]) if isinstance(a, Quantity)) for name in cls._fields}

@@ -1,4 +1,4 @@
-"""Unit quaternions, scalar first, Hamilton product.
+"""Quaternions are of unit length, scalar first, with the Hamilton product.
 
 `q` takes reference (usually inertial) axes to body axes: a vector with reference components r has body components
 R = q* r q. The quaternions q and -q are the same attitude.
@@ -17,12 +17,12 @@ NO_TURN: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
 
 def vector_part(q: Quaternion) -> Vector:
-    """(q1, q2, q3)."""
+    """Return (q1, q2, q3)."""
     return (q[1], q[2], q[3])
 
 
 def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
-    """The Hamilton product a b: first the turn a, then the turn b about the axes already turned."""
+    """Return the Hamilton product a b: first the rotation a, then the rotation b about the axes already rotated."""
     return (
         a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
         a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
@@ -32,48 +32,48 @@ def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
 
 
 def conjugate(q: Quaternion) -> Quaternion:
-    """The inverse turn."""
+    """Return the inverse rotation."""
     return (q[0], -q[1], -q[2], -q[3])
 
 
 def stretch(c: Scalar, q: Quaternion) -> Quaternion:
-    """c q."""
+    """Return c q."""
     return (c * q[0], c * q[1], c * q[2], c * q[3])
 
 
 def normalise(q: Quaternion) -> Quaternion:
-    """q / |q|; not defined at zero."""
+    """Return q / |q|; not defined at zero."""
     return stretch(1.0 / sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), q)
 
 
 def renormalise(q: Quaternion) -> Quaternion:
-    """A quaternion of nearly unit length brought back to it by one Newton step: an error e of |q|2 leaves 3/8 e2 of |q|."""
+    """Bring a quaternion of nearly unit length back to it by one Newton step: an error e of |q|2 leaves 3/8 e2 of |q|."""
     return stretch(1.5 - 0.5 * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), q)
 
 
 def to_body(q: Quaternion, r: Vector) -> Vector:
-    """Body components of a vector given in reference axes, R = q* r q."""
+    """Return body components of a vector given in reference axes, R = q* r q."""
     v = vector_part(q)
     t = scale(2.0, cross(r, v))
     return add(add(r, scale(q[0], t)), cross(t, v))
 
 
 def to_reference(q: Quaternion, r: Vector) -> Vector:
-    """Reference components of a vector given in body axes, r = q R q*."""
+    """Return reference components of a vector given in body axes, r = q R q*."""
     v = vector_part(q)
     t = scale(2.0, cross(v, r))
     return add(add(r, scale(q[0], t)), cross(v, t))
 
 
 def derivative(q: Quaternion, rate: Vector) -> Quaternion:
-    """dq/dt for the angular velocity `rate` (rad/s, body axes), q' = q (0, rate) / 2."""
+    """Return dq/dt for the angular velocity `rate` (rad/s, body axes), q' = q (0, rate) / 2."""
     v = vector_part(q)
     d = scale(0.5, add(scale(q[0], rate), cross(v, rate)))
     return (-0.5 * dot(rate, v), d[0], d[1], d[2])
 
 
 def relative(target: Quaternion, q: Quaternion) -> Quaternion:
-    """The turn from the target axes to the body axes, target* q; no turn when the attitudes agree."""
+    """Return the rotation from the target axes to the body axes, target* q; the identity when the attitudes agree."""
     return multiply(conjugate(target), q)
 
 
@@ -83,10 +83,10 @@ def nearer(q: Quaternion, other: Quaternion) -> Quaternion:
 
 
 def half_angle_sine(q: Quaternion) -> Scalar:
-    """|sin(angle/2)|, the length of the vector part."""
+    """Return |sin(angle/2)|, the length of the vector part."""
     return sqrt(dot(vector_part(q), vector_part(q)))
 
 
 def half_angle_cosine(q: Quaternion) -> Scalar:
-    """cos(angle/2) of the shorter turn."""
+    """Return cos(angle/2) of the shorter rotation."""
     return absolute(q[0])

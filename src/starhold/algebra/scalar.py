@@ -1,4 +1,4 @@
-"""Scalar operations that every reader of an equation understands.
+"""Every reader of an equation understands these scalar operations.
 
 An equation is a plain function over numbers and tuples of numbers. Python floats, a trace (which is printed as machine
 code, C and JavaScript), SymPy symbols, balls (python-flint `arb`) and exact polynomials all read the same text, so it may
@@ -23,7 +23,7 @@ Truth: TypeAlias = Any
 
 
 def _native(operator: Any) -> dict[str, Any]:
-    """The meanings of an operator of Python, which the numbers of these readers have of their own."""
+    """Return the meanings of an operator of Python, which the numbers of these readers have of their own."""
     return dict.fromkeys(EXACT, operator)
 
 
@@ -36,7 +36,7 @@ def _polynomial(name: str) -> Any:
 
 
 def _of(module: str, name: str) -> Any:
-    """A function of a module that is loaded when it is first called."""
+    """Return a function of a module that is loaded when it is first called."""
 
     def call(*values: Any) -> Any:
         return getattr(library(module), name)(*values)
@@ -55,28 +55,28 @@ def _ball_sqrt(x: Any) -> Any:
 @operation("number number", "number", llvm="fadd {number} {0}, {1}", c="{0} + {1}", javascript="{0} + {1}",
            **_native(op.add))  # fmt: skip
 def plus(a: Scalar, b: Scalar) -> Scalar:
-    """a + b, as `+` between numbers."""
+    """Return a + b, as `+` between numbers."""
     return a + b
 
 
 @operation("number number", "number", llvm="fsub {number} {0}, {1}", c="{0} - {1}", javascript="{0} - {1}",
            **_native(op.sub))  # fmt: skip
 def minus(a: Scalar, b: Scalar) -> Scalar:
-    """a - b, as `-` between numbers."""
+    """Return a - b, as `-` between numbers."""
     return a - b
 
 
 @operation("number number", "number", llvm="fmul {number} {0}, {1}", c="{0} * {1}", javascript="{0} * {1}",
            **_native(op.mul))  # fmt: skip
 def product(a: Scalar, b: Scalar) -> Scalar:
-    """a b, as `*` between numbers."""
+    """Return a b, as `*` between numbers."""
     return a * b
 
 
 @operation("number number", "number", llvm="fdiv {number} {0}, {1}", c="{0} / {1}", javascript="{0} / {1}",
            **_native(cast(Any, op).truediv))  # fmt: skip
 def divide(a: Scalar, b: Scalar) -> Scalar:
-    """a / b, infinite or NaN where b is zero, as compiled code gives: for quotients that `where` may not choose."""
+    """Return a / b, infinite or NaN where b is zero, as compiled code gives: for quotients that `where` may not choose."""
     if b == 0.0:
         return math.nan if a == 0.0 or math.isnan(a) else math.copysign(math.inf, a) * math.copysign(1.0, b)
     return a / b
@@ -85,7 +85,7 @@ def divide(a: Scalar, b: Scalar) -> Scalar:
 @operation("number", "number", llvm="fneg {number} {0}", c="-{0}", javascript="-{0}",
            **_native(op.neg))  # fmt: skip
 def negative(a: Scalar) -> Scalar:
-    """-a, as `-` before a number."""
+    """Return -a, as `-` before a number."""
     return -a
 
 
@@ -93,7 +93,7 @@ def negative(a: Scalar) -> Scalar:
            javascript="Math.sqrt({0})", symbolic=_sympy("sqrt"), ball=_ball_sqrt,
            polynomial=_polynomial("sqrt"))  # fmt: skip
 def sqrt(x: Scalar) -> Scalar:
-    """Square root; NaN for a negative float, as compiled code gives."""
+    """Return the square root; NaN for a negative float, as compiled code gives."""
     return math.sqrt(x) if x >= 0.0 else math.nan
 
 
@@ -110,7 +110,7 @@ def _ball_less_equal(a: Any, b: Any) -> bool | None:
            symbolic=_sympy("StrictLessThan"), ball=_ball_less,
            polynomial=_polynomial("less"))  # fmt: skip
 def less(a: Scalar, b: Scalar) -> Truth:
-    """a < b."""
+    """Tell whether a < b."""
     return bool(a < b)
 
 
@@ -118,7 +118,7 @@ def less(a: Scalar, b: Scalar) -> Truth:
            symbolic=_sympy("LessThan"), ball=_ball_less_equal,
            polynomial=_polynomial("less_equal"))  # fmt: skip
 def less_equal(a: Scalar, b: Scalar) -> Truth:
-    """a <= b."""
+    """Tell whether a <= b."""
     return bool(a <= b)
 
 
@@ -137,12 +137,12 @@ def _ball_select(condition: bool | None, a: Any, b: Any) -> Any:
            javascript="{0} ? {1} : {2}", symbolic=_symbolic_select,
            ball=_ball_select, polynomial=_polynomial("where"))  # fmt: skip
 def select(condition: Truth, a: Scalar, b: Scalar) -> Scalar:
-    """`where` on a condition that is not known while recording."""
+    """Return as `where` does on a condition that is not known while recording."""
     return a if condition else b
 
 
 def where(condition: Truth, a: Scalar, b: Scalar) -> Scalar:
-    """a where the condition holds, else b; both are always evaluated."""
+    """Return a where the condition holds, else b; both are always evaluated."""
     if condition is True or condition is False:
         return a if condition else b
     return select(condition, a, b)
@@ -165,7 +165,7 @@ def _ball_or(a: bool | None, b: bool | None) -> bool | None:
 @operation("truth truth", "truth", llvm="and {truth} {0}, {1}", c="{0} && {1}", javascript="{0} && {1}",
            symbolic=_sympy("And"), ball=_ball_and, polynomial=_polynomial("both"))  # fmt: skip
 def both(a: Truth, b: Truth) -> Truth:
-    """Logical and, without short circuit."""
+    """Return the logical and, without short circuit."""
     return a and b
 
 
@@ -173,47 +173,47 @@ def both(a: Truth, b: Truth) -> Truth:
            symbolic=_sympy("Or"),
            ball=_ball_or, polynomial=_polynomial("either"))  # fmt: skip
 def either(a: Truth, b: Truth) -> Truth:
-    """Logical or, without short circuit."""
+    """Return the logical or, without short circuit."""
     return a or b
 
 
 @operation("truth", "truth", llvm="xor {truth} {0}, {yes}", c="!{0}", javascript="!{0}",
            symbolic=_sympy("Not"), ball=_ball_not, polynomial=_polynomial("opposite"))  # fmt: skip
 def opposite(a: Truth) -> Truth:
-    """Logical not."""
+    """Return the logical not."""
     return not a
 
 
 def absolute(x: Scalar) -> Scalar:
-    """|x|."""
+    """Return |x|."""
     return where(less(x, 0.0), -x, x)
 
 
 def minimum(a: Scalar, b: Scalar) -> Scalar:
-    """The smaller; NaN in either argument is not hidden when it is the second."""
+    """Return the smaller; NaN in either argument is not hidden when it is the second."""
     return where(less(a, b), a, b)
 
 
 def maximum(a: Scalar, b: Scalar) -> Scalar:
-    """The larger."""
+    """Return the larger."""
     return where(less(b, a), a, b)
 
 
 def sign(x: Scalar) -> Scalar:
-    """-1, 0 or +1; a NaN passes through."""
+    """Return -1, 0 or +1; a NaN passes through."""
     return where(less(x, 0.0), -1.0, where(less(0.0, x), 1.0, x))
 
 
 def side(x: Scalar) -> Scalar:
-    """-1 for negative x, else +1: the sign that never vanishes."""
+    """Return -1 for negative x, else +1: the sign that never vanishes."""
     return where(less(x, 0.0), -1.0, 1.0)
 
 
 def clip(x: Scalar, limit: Scalar) -> Scalar:
-    """x kept within [-limit, limit]; a NaN passes through."""
+    """Keep x within [-limit, limit]; a NaN passes through."""
     return where(less(limit, x), limit, where(less(x, -limit), -limit, x))
 
 
 def is_finite(x: Scalar) -> Truth:
-    """True unless x is infinite or NaN."""
+    """Tell whether x is neither infinite nor NaN."""
     return less(absolute(x - x), 1.0)

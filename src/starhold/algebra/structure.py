@@ -1,4 +1,5 @@
-"""Arithmetic of whole states, and their numbers in order: nested NamedTuples and tuples of floats, of any shape."""
+"""States, which are nested NamedTuples and tuples of floats of any shape, are moved as a whole and written as numbers in
+order."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ _State = TypeVar("_State")
 
 
 def move(state: _State, step: float, rate: Any) -> _State:
-    """state + step * rate, component by component; where the rate is None the state stays."""
+    """Return state + step * rate, component by component; where the rate is None the state stays."""
     if rate is None:
         return state
     if not isinstance(state, tuple):
@@ -39,12 +40,13 @@ def mapped(value: Any, leaf: Callable[[Any], Any]) -> Any:
 
 
 def rebuild(like: Any, parts: Sequence[Any]) -> Any:
-    """A tuple or NamedTuple like this one of other parts."""
+    """Return a tuple or NamedTuple like this one of other parts."""
     return type(like)(*parts) if hasattr(like, "_fields") else tuple(parts)
 
 
 def flatten(state: Any) -> list[float]:
-    """The numbers of a state in order. Buffers, which a law's memory may hold, are not among them: they change in place."""
+    """Return the numbers of a state in order. Buffers, which a law's memory may hold, are not among them: they change in
+    place."""
     return [leaf for leaf in leaves(state) if not isinstance(leaf, Buffer)]
 
 
@@ -55,12 +57,12 @@ def places(state: _State) -> _State:
 
 
 def buffers(state: Any) -> list[Buffer]:
-    """The buffers of a state in order."""
+    """Return the buffers of a state in order."""
     return [leaf for leaf in leaves(state) if isinstance(leaf, Buffer)]
 
 
 def unflatten(numbers: Any, like: _State) -> _State:
-    """The state shaped like `like` that holds these numbers in order (rows of lanes stay arrays), and the buffers of
+    """Return the state shaped like `like` that holds these numbers in order (rows of lanes stay arrays), and the buffers of
     `like`."""
     source = iter(numbers.tolist() if hasattr(numbers, "tolist") else numbers)
 

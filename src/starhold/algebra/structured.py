@@ -1,4 +1,4 @@
-"""Loops, branches and buffers in equations.
+"""Equations have loops, branches and buffers of these forms.
 
 `repeat` counts, `until` watches numbers, `when` and `unless` are branches; what changes is handed from turn to turn, as a
 tuple of states. A `Buffer` holds numbers in memory. In plain Python these are ordinary loops and lists; while a trace is
@@ -29,7 +29,7 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
 class Buffer:
-    """Numbers in memory from `base` on. `cells` is a list of floats, or memory of a trace; size: how many."""
+    """A buffer holds numbers in memory from `base` on. `cells` is a list of floats, or memory of a trace; size: how many."""
 
     __slots__ = ("base", "cells", "size")
 
@@ -50,11 +50,11 @@ class Buffer:
         return self.base + index
 
     def part(self, start: Index, size: Index) -> Buffer:
-        """Some of its numbers as a buffer of their own, in the same memory."""
+        """Return some of its numbers as a buffer of their own, in the same memory."""
         return Buffer(self.cells, self.base + start, size)
 
     def row(self, k: Index, width: int) -> tuple[Scalar, ...]:
-        """The k-th group of so many numbers."""
+        """Return the k-th group of so many numbers."""
         return tuple(self[width * k + i] for i in range(width))
 
     def put(self, k: Index, values: Iterable[Scalar]) -> None:
@@ -65,8 +65,8 @@ class Buffer:
 
 
 def repeat(count: Index, body: Callable[..., Any], *state: Any, stop: Callable[..., Truth] | None = None) -> State:
-    """The state after body(0, *state), body(1, *state), and so on, `count` times; each gives the next, a tuple (None where
-    there is no state). It ends early once stop(*state) holds, which must not write to buffers."""
+    """Return the state after body(0, *state), body(1, *state), and so on, `count` times; each gives the next, a tuple (None
+    where there is no state). It ends early once stop(*state) holds, which must not write to buffers."""
     recorder = RECORDER.get()
     if recorder is not None:
         return recorder.loop(count, stop, body, state, counted=True)
@@ -78,7 +78,7 @@ def repeat(count: Index, body: Callable[..., Any], *state: Any, stop: Callable[.
 
 
 def until(done: Callable[..., Truth], body: Callable[..., Any], *state: Any, at_most: Index) -> State:
-    """The state once done(*state) holds, or after so many turns of body(*state). `done` must not write to buffers."""
+    """Return the state once done(*state) holds, or after so many turns of body(*state). `done` must not write to buffers."""
     recorder = RECORDER.get()
     if recorder is not None:
         return recorder.loop(at_most, done, body, state, counted=False)
@@ -90,7 +90,7 @@ def until(done: Callable[..., Truth], body: Callable[..., Any], *state: Any, at_
 
 
 def unless(truth: Truth, body: Callable[..., Any], *state: Any) -> State:
-    """body(*state) where the truth does not hold, else the state: a branch, taken where a lane needs it. For a few
+    """Return body(*state) where the truth does not hold, else the state: a branch, taken where a lane needs it. For a few
     operations `where` costs less."""
     if truth is True or truth is False:
         return state if truth else body(*state) or ()
@@ -98,7 +98,7 @@ def unless(truth: Truth, body: Callable[..., Any], *state: Any) -> State:
 
 
 def when(truth: Truth, body: Callable[..., Any], *state: Any) -> State:
-    """body(*state) where the truth holds, else the state."""
+    """Return body(*state) where the truth holds, else the state."""
     return unless(opposite(truth), body, *state)
 
 

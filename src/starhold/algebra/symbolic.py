@@ -1,4 +1,4 @@
-"""SymPy, named at run time because its types are too loose for a strict checker."""
+"""SymPy is named at run time because its types are too loose for a strict checker."""
 
 from __future__ import annotations
 

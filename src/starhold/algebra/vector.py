@@ -1,4 +1,4 @@
-"""3-vectors and 3x3 matrices as tuples (a matrix is a tuple of rows)."""
+"""Vectors and 3x3 matrices are tuples (a matrix is a tuple of rows)."""
 
 from __future__ import annotations
 
@@ -14,70 +14,71 @@ IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 def add(a: Vector, b: Vector) -> Vector:
-    """a + b."""
+    """Return a + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 def subtract(a: Vector, b: Vector) -> Vector:
-    """a - b."""
+    """Return a - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 def scale(c: Scalar, a: Vector) -> Vector:
-    """c a."""
+    """Return c a."""
     return (c * a[0], c * a[1], c * a[2])
 
 
 def times(a: Vector, b: Vector) -> Vector:
-    """The product component by component."""
+    """Return the product component by component."""
     return (a[0] * b[0], a[1] * b[1], a[2] * b[2])
 
 
 def dot(a: Vector, b: Vector) -> Scalar:
-    """The scalar product."""
+    """Return the scalar product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """The vector product."""
+    """Return the vector product."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 def norm(a: Vector) -> Scalar:
-    """The Euclidean length."""
+    """Return the Euclidean length."""
     return sqrt(dot(a, a))
 
 
 def unit(a: Vector) -> Vector:
-    """a / |a|; not defined at zero."""
+    """Return a / |a|; not defined at zero."""
     return scale(1.0 / norm(a), a)
 
 
 def signs(a: Vector) -> Vector:
-    """The sign of each component."""
+    """Return the sign of each component."""
     return (sign(a[0]), sign(a[1]), sign(a[2]))
 
 
 def clip_axes(a: Vector, limit: Scalar) -> Vector:
-    """Each component kept within [-limit, limit]."""
+    """Keep each component within [-limit, limit]."""
     return (clip(a[0], limit), clip(a[1], limit), clip(a[2], limit))
 
 
 def clip_norm(a: Vector, limit: Scalar) -> Vector:
-    """a shortened to the given length where it is longer; the direction is kept. The limit must be positive; it may be
+    """Shorten a to the given length where it is longer; the direction is kept. The limit must be positive; it may be
     infinite."""
     length = norm(a)
     return scale(where(less(length, limit), 1.0, limit / maximum(limit, length)), a)
 
 
 def apply(m: Matrix | Vector, a: Vector) -> Vector:
-    """The matrix-vector product; a vector in place of the matrix is a diagonal one."""
+    """Return the matrix-vector product; a vector in place of the matrix is a diagonal one."""
     rows: Any = m
     return times(rows, a) if _is_diagonal(m) else (dot(rows[0], a), dot(rows[1], a), dot(rows[2], a))
 
 
 def gyroscopic_torque(m: Matrix | Vector, a: Vector) -> Vector:
-    """a x (m a) for a symmetric m: the gyroscopic torque is gyroscopic_torque(J, w). A vector stands for a diagonal m."""
+    """Return a x (m a) for a symmetric m: the gyroscopic torque is gyroscopic_torque(J, w). A vector stands for a diagonal
+    m."""
     if _is_diagonal(m):
         j: Any = m
         return ((j[2] - j[1]) * (a[1] * a[2]), (j[0] - j[2]) * (a[2] * a[0]), (j[1] - j[0]) * (a[0] * a[1]))
@@ -85,7 +86,7 @@ def gyroscopic_torque(m: Matrix | Vector, a: Vector) -> Vector:
 
 
 def solve(m: Matrix | Vector, a: Vector) -> Vector:
-    """The x with m x = a; not defined for a singular matrix. A vector in place of the matrix is a diagonal one."""
+    """Return the x with m x = a; not defined for a singular matrix. A vector in place of the matrix is a diagonal one."""
     rows: Any = m
     return (a[0] / rows[0], a[1] / rows[1], a[2] / rows[2]) if _is_diagonal(m) else apply(inverse(rows), a)
 
@@ -95,7 +96,7 @@ def _is_diagonal(m: Matrix | Vector) -> bool:
 
 
 def column(m: Matrix, a: Vector) -> Vector:
-    """The product of the transposed matrix and a vector."""
+    """Return the product of the transposed matrix and a vector."""
     return (
         m[0][0] * a[0] + m[1][0] * a[1] + m[2][0] * a[2],
         m[0][1] * a[0] + m[1][1] * a[1] + m[2][1] * a[2],
@@ -104,7 +105,7 @@ def column(m: Matrix, a: Vector) -> Vector:
 
 
 def transpose(m: Matrix) -> Matrix:
-    """The transposed matrix."""
+    """Return the transposed matrix."""
     return (
         (m[0][0], m[1][0], m[2][0]),
         (m[0][1], m[1][1], m[2][1]),
@@ -113,12 +114,12 @@ def transpose(m: Matrix) -> Matrix:
 
 
 def multiply(a: Matrix, b: Matrix) -> Matrix:
-    """The matrix product a b."""
+    """Return the matrix product a b."""
     return (column(b, a[0]), column(b, a[1]), column(b, a[2]))
 
 
 def combine(c: Scalar, a: Matrix, d: Scalar, b: Matrix) -> Matrix:
-    """c a + d b."""
+    """Return c a + d b."""
     return (
         add(scale(c, a[0]), scale(d, b[0])),
         add(scale(c, a[1]), scale(d, b[1])),
@@ -127,21 +128,21 @@ def combine(c: Scalar, a: Matrix, d: Scalar, b: Matrix) -> Matrix:
 
 
 def skew(a: Vector) -> Matrix:
-    """[a]x, the matrix of the vector product: apply(skew(a), b) = a x b."""
+    """Return [a]x, the matrix of the vector product: apply(skew(a), b) = a x b."""
     return ((0.0, -a[2], a[1]), (a[2], 0.0, -a[0]), (-a[1], a[0], 0.0))
 
 
 def diagonal(a: Vector) -> Matrix:
-    """The diagonal matrix."""
+    """Return the diagonal matrix."""
     return ((a[0], 0.0, 0.0), (0.0, a[1], 0.0), (0.0, 0.0, a[2]))
 
 
 def determinant(m: Matrix) -> Scalar:
-    """The determinant."""
+    """Return the determinant."""
     return dot(m[0], cross(m[1], m[2]))
 
 
 def inverse(m: Matrix) -> Matrix:
-    """The inverse by the adjugate; not defined for a singular matrix."""
+    """Return the inverse by the adjugate; not defined for a singular matrix."""
     c = 1.0 / determinant(m)
     return transpose((scale(c, cross(m[1], m[2])), scale(c, cross(m[2], m[0])), scale(c, cross(m[0], m[1]))))

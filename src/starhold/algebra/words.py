@@ -1,4 +1,4 @@
-"""Operations on 64-bit words, and between them, numbers and the indices of loops: what random numbers are made of.
+"""Random numbers are made by operations on 64-bit words, and between them, numbers and the indices of loops.
 
 In plain Python a word is an int from 0 to 2^64 - 1. JavaScript has no such integers: there a word is two signed ones of 32
 bits, and its texts speak of their halves as {0h} and {0l}. What gives a word has a text for its high half and one for its
@@ -17,7 +17,7 @@ MASK = 0xFFFFFFFFFFFFFFFF
 
 
 def _rotated(count: int) -> tuple[str, str]:
-    """Both halves of a word turned to the left, in JavaScript."""
+    """Return both halves of a word turned to the left, in JavaScript."""
     high, low = ("{0l}", "{0h}") if count >= 32 else ("{0h}", "{0l}")
     count %= 32
     if count == 0:
@@ -27,7 +27,7 @@ def _rotated(count: int) -> tuple[str, str]:
 
 
 def _shifted(count: int) -> tuple[str, str]:
-    """Both halves of a word moved to the right."""
+    """Return both halves of a word moved to the right."""
     if count >= 32:
         return "0", f"{{0h}} >>> {count - 32} ^ 0"
     return f"{{0h}} >>> {count}", f"{{0l}} >>> {count} ^ {{0h}} << {32 - count}"
@@ -36,104 +36,104 @@ def _shifted(count: int) -> tuple[str, str]:
 @operation("word word", "word", llvm="add {word} {0}, {1}", c="{0} + {1}",
            javascript=("{0h} + {1h} + (({low} >>> 0) < ({0l} >>> 0) ? 1 : 0) ^ 0", "{0l} + {1l} ^ 0"))  # fmt: skip
 def word_add(a: int, b: int) -> int:
-    """a + b modulo 2^64."""
+    """Return a + b modulo 2^64."""
     return (a + b) & MASK
 
 
 @operation("word word", "word", llvm="xor {word} {0}, {1}", c="{0} ^ {1}", javascript=("{0h} ^ {1h}", "{0l} ^ {1l}"))
 def word_xor(a: int, b: int) -> int:
-    """Exclusive or, bit by bit."""
+    """Return the exclusive or, bit by bit."""
     return (a ^ b) & MASK
 
 
 @operation("word word", "word", llvm="and {word} {0}, {1}", c="{0} & {1}", javascript=("{0h} & {1h}", "{0l} & {1l}"))
 def word_and(a: int, b: int) -> int:
-    """And, bit by bit."""
+    """Return the and, bit by bit."""
     return a & b
 
 
 @operation("word word", "word", llvm="or {word} {0}, {1}", c="{0} | {1}", javascript=("{0h} | {1h}", "{0l} | {1l}"))
 def word_or(a: int, b: int) -> int:
-    """Or, bit by bit."""
+    """Return the or, bit by bit."""
     return (a | b) & MASK
 
 
 @operation("word static", "word", llvm="call {word} @llvm.fshl.{words}({word} {0}, {word} {0}, {word} {1})",
            c="({0} << {1}) | ({0} >> (64 - {1}))", javascript=_rotated)  # fmt: skip
 def rotate_left(a: int, count: int) -> int:
-    """The bits turned to the left by 0 < count < 64 places."""
+    """Return the bits turned to the left by 0 < count < 64 places."""
     return ((a << count) | (a >> (64 - count))) & MASK
 
 
 @operation("word static", "word", llvm="lshr {word} {0}, {1}", c="{0} >> {1}", javascript=_shifted)
 def shift_right(a: int, count: int) -> int:
-    """The bits moved to the right by 0 < count < 64 places, zeros moved in."""
+    """Return the bits moved to the right by 0 < count < 64 places, zeros moved in."""
     return a >> count
 
 
 @operation("word", "truth", llvm="trunc {word} {0} to {truth}", c="({0} & 1) != 0", javascript="({0l} & 1) !== 0")
 def lowest_bit(a: int) -> Truth:
-    """Whether the lowest bit is set."""
+    """Tell whether the lowest bit is set."""
     return bool(a & 1)
 
 
 @operation("number", "word", llvm="bitcast {number} {0} to {word}", c="bits_of({0})",
            javascript=("high_bits({0})", "low_bits({0})"))  # fmt: skip
 def bits_of(x: Scalar) -> int:
-    """The bits of an IEEE double; of a NaN those of some NaN, not the same on every machine."""
+    """Return the bits of an IEEE double; of a NaN those of some NaN, not the same on every machine."""
     return int(struct.unpack("<Q", struct.pack("<d", x))[0])
 
 
 @operation("word", "number", llvm="bitcast {word} {0} to {number}", c="with_bits({0})", javascript="with_bits({0h}, {0l})")
 def with_bits(a: int) -> Scalar:
-    """The IEEE double with these bits."""
+    """Return the IEEE double with these bits."""
     return float(struct.unpack("<d", struct.pack("<Q", a))[0])
 
 
 @operation("index index", "index", llvm="add i64 {0}, {1}", c="{0} + {1}", javascript="{0} + {1}")
 def index_plus(a: int, b: int) -> int:
-    """a + b, as `+` between indices."""
+    """Return a + b, as `+` between indices."""
     return a + b
 
 
 @operation("index index", "index", llvm="sub i64 {0}, {1}", c="{0} - {1}", javascript="{0} - {1}")
 def index_minus(a: int, b: int) -> int:
-    """a - b, as `-` between indices."""
+    """Return a - b, as `-` between indices."""
     return a - b
 
 
 @operation("index index", "index", llvm="mul i64 {0}, {1}", c="{0} * {1}", javascript="{0} * {1}")
 def index_product(a: int, b: int) -> int:
-    """a b, as `*` between indices."""
+    """Return a b, as `*` between indices."""
     return a * b
 
 
 @operation("index index", "uniform", llvm="icmp eq i64 {0}, {1}", c="{0} == {1}", javascript="{0} === {1}")
 def same_index(a: int, b: int) -> Truth:
-    """Whether two indices are equal; for `when` and `unless`."""
+    """Tell whether two indices are equal; for `when` and `unless`."""
     return a == b
 
 
 # In JavaScript an index is a double: 0 times -1 is a zero with a sign.
 @operation("index", "number", llvm="sitofp i64 {0} to double", c="(double){0}", javascript="{0} + 0")
 def number_of(index: int) -> Scalar:
-    """An index as a number."""
+    """Return an index as a number."""
     return float(index)
 
 
 @operation("index", "word", llvm="add i64 {0}, 0", c="(uint64_t){0}",
            javascript=("Math.floor({0} / 4294967296) ^ 0", "{0} ^ 0"))  # fmt: skip
 def word_of(index: int) -> int:
-    """An index as a word."""
+    """Return an index as a word."""
     return index & MASK
 
 
 def small_number(word: Any) -> Scalar:
-    """A word below 2^52 as a number, by its place in a double's bits: vector units convert no 64-bit integers."""
+    """Return a word below 2^52 as a number, by its place in a double's bits: vector units convert no 64-bit integers."""
     return with_bits(word_or(word, 0x4330000000000000)) - 4503599627370496.0
 
 
 @operation("", "word", llvm="add {word} {lanes}, {zero}", c="UINT64_C(0)", javascript=("0", "0"))
 def lane() -> int:
-    """The number of the lane, from 0; recorded by `Recorder.lane`."""
+    """Return the number of the lane, from 0; recorded by `Recorder.lane`."""
     return 0

@@ -22,9 +22,9 @@ CHUNK = 1e-4
 
 
 class Replay:
-    """The compiled calls of a loop's law on states (number, numbers of a state): from the measured state to the limited
-    torque, models the law needs included, each waiting for the one before. What the law remembers goes on from call to
-    call."""
+    """The compiled calls of a loop's law run again on states (number, numbers of a state): from the measured state to the
+    limited torque, models the law needs included, each waiting for the one before. What the law remembers goes on from call
+    to call."""
 
     def __init__(self, loop: ClosedLoop, states: NDArray[np.float64]) -> None:
         # The noise of the simulation is no part of a call.
@@ -41,7 +41,8 @@ class Replay:
 
 
 def recorded_states(loop: ClosedLoop, recording: Recording) -> NDArray[np.float64]:
-    """The loop's states at the samples of its recording, of a long one at the first of them (number, numbers of a state)."""
+    """Return the loop's states at the samples of its recording, of a long one at the first of them (number, numbers of a
+    state)."""
     carry = loop.carry()
     columns = [recording[name][:CALLS] for name in type(carry.state)._fields]
     for state in carry.effectors:
@@ -56,7 +57,8 @@ def recorded_states(loop: ClosedLoop, recording: Recording) -> NDArray[np.float6
 
 
 def call_costs(loop: ClosedLoop, states: NDArray[np.float64], calls: int = CALLS, seconds: float = 1.0) -> dict[str, float]:
-    """Median and worst processor time (s) of a call, over chunks of calls that replay the states of a flight in order.
+    """Return median and worst processor time (s) of a call, over chunks of calls that replay the states of a flight in
+    order.
 
     The figures are latencies, see `Replay`.
     """

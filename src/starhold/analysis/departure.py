@@ -1,4 +1,4 @@
-"""When and how a flight leaves what is claimed of its law, which is about motions from a set that meet its assumptions."""
+"""A flight leaves what is claimed of its law where it meets an assumption no longer; claims are about motions from a set."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Departure(NamedTuple):
 
 
 class Span:
-    """A recorded run between two control steps, and the loop that flies it."""
+    """A span is a recorded run between two control steps, and the loop that flies it."""
 
     def __init__(self, loop: ClosedLoop, run: Recording, first: int, last: int | None) -> None:
         every = run.attrs["record_every"]
@@ -52,23 +52,23 @@ class Span:
 
     @property
     def begun(self) -> float:
-        """The time of the first sample (s)."""
+        """Return the time of the first sample (s)."""
         return float(self["time"][0])
 
     def first(self, held: Any, how: str) -> list[Departure]:
-        """A departure at the first sample at which something holds (n,)."""
+        """Return a departure at the first sample at which something holds (n,)."""
         places = np.flatnonzero(held)
         return [Departure(float(self["time"][places[0]]), how)] if len(places) else []
 
     def always(self, how: str, holds: bool = True) -> list[Departure]:
-        """A departure from the start on."""
+        """Return a departure from the start on."""
         return [Departure(self.begun, how)] if holds else []
 
 
 def departures(
     certificate: Certificate, loop: ClosedLoop, run: Recording, first: int = 0, last: int | None = None
 ) -> dict[str, tuple[Departure, ...]]:
-    """For each proved kind of claim about motions how a run leaves it, in order of time; empty where it does not.
+    """Tell for each proved kind of claim about motions how a run leaves it, in order of time; empty where it does not.
 
     loop: what the certificate speaks of, flown from control step `first` until it changes at `last` (None: it does not).
     That torque is held between samples counts only where it is refuted that it may be.
@@ -180,7 +180,7 @@ MET: Mapping[str, Callable[[Span], list[Departure]]] = {
 
 
 def cancels(loop: ClosedLoop) -> bool:
-    """Whether the law takes the torque that the models know from what it commands: at the start, whatever that is."""
+    """Tell whether the law takes the torque that the models know from what it commands: at the start, whatever that is."""
     loop = loop.without("sensor", "estimator")
     measurement = make_step(loop.composition()).measure(loop.carry(), 0, 0, loop.craft, loop.setup())
     memory = loop.law.remember(loop.gains, loop.craft, loop.period)
@@ -198,7 +198,7 @@ def cancels(loop: ClosedLoop) -> bool:
 
 
 def _set(claim: Claim, span: Span) -> list[Departure]:
-    """Whether a flight starts outside of the claim's set, and when it leaves that."""
+    """Tell whether a flight starts outside of the claim's set, and when it leaves that."""
     found: list[Departure] = []
     momentum = claim.numbers.get("momentum")
     if momentum is not None:
@@ -218,7 +218,7 @@ def _set(claim: Claim, span: Span) -> list[Departure]:
 
 
 def _function(claim: Claim, span: Span) -> Array | None:
-    """V over time; None for a claim about every state."""
+    """Return V over time; None for a claim about every state."""
     loop = span.loop
     if None in _levels(claim):
         return None
@@ -237,7 +237,7 @@ def _function(claim: Claim, span: Span) -> Array | None:
 
 
 def _levels(claim: Claim) -> tuple[float | None, float | None]:
-    """V at most at the start, and from then on; None for no bound."""
+    """Return the most that V is at the start, and from then on; None for no bound."""
     start = claim.numbers.get("start", claim.numbers.get("level"))
     return start, claim.numbers.get("level", start)
 
@@ -248,7 +248,7 @@ def _stored(span: Span) -> Array:
 
 
 def fed_back(loop: ClosedLoop, error: Array) -> Array:
-    """The quaternions (n, 4) that the law is shown without noise, of the true errors (n, 4)."""
+    """Return the quaternions (n, 4) that the law is shown without noise, of the true errors (n, 4)."""
     if loop.sign_policy == "as_published":
         return error
     if loop.sign_policy == "shortest":

@@ -1,4 +1,5 @@
-"""The root of the modal law that turns fastest within limits, over the initial angle, and the fit through it."""
+"""The root of the modal law that slews fastest within limits is searched over the initial angle, and a fit put through
+it."""
 
 from __future__ import annotations
 
@@ -31,20 +32,20 @@ DECAYS = np.geomspace(0.02, 30.0, 80)
 
 @dataclass(frozen=True)
 class Best:
-    """The root (1/s) with the shortest transient, and that transient."""
+    """The best root (1/s) has the shortest transient, which stands beside it."""
 
     root: float
     transient: Transient
 
     @property
     def time(self) -> float:
-        """How long the transient takes (s)."""
+        """Tell how long the transient takes (s)."""
         return math.inf if self.transient.time is None else self.transient.time
 
 
 class Found(NamedTuple):
-    """The best roots for one initial angle (rad): within the limits, and within those with their tolerances; None where no
-    root that was tried keeps to them and comes to its end."""
+    """The best roots for one initial angle (rad) are those within the limits, and within those with their tolerances; None
+    where no root that was tried keeps to them and comes to its end."""
 
     angle: float
     hard: Best | None
@@ -62,18 +63,18 @@ class Unmet(NamedTuple):
 
 
 class Pieces(NamedTuple):
-    """c, d, e of c exp(d angle) + e (1/s; angle in rad) up to the split (rad) and beyond it."""
+    """The fit is c exp(d angle) + e (1/s; angle in rad), c, d, e up to the split (rad) and beyond it."""
 
     below: tuple[float, float, float]
     above: tuple[float, float, float]
     split: float
 
     def at(self, angles: ArrayLike) -> NDArray[np.float64]:
-        """Roots (n,) at angles (n,)."""
+        """Return roots (n,) at angles (n,)."""
         return fitted(np.asarray(angles, dtype=float), *self)
 
     def errors(self, angles: ArrayLike, roots: ArrayLike) -> NDArray[np.float64]:
-        """Relative errors (n,) against roots (n,) at angles (n,)."""
+        """Return relative errors (n,) against roots (n,) at angles (n,)."""
         return self.at(angles) / np.asarray(roots, dtype=float) - 1.0
 
 
@@ -83,8 +84,8 @@ PUBLISHED = Pieces(*(modal.Fit._field_defaults[name] for name in Pieces._fields)
 
 @dataclass(frozen=True)
 class Problem:
-    """From what turns start and when they are over: the loop of the modal law, flown for `steps` control steps from an angle
-    (rad) about the axis (3,) at a rate (3,) (rad/s); the target is at rest; ends in rad and rad/s; b in s."""
+    """The slews start from an angle (rad) about the axis (3,) at a rate (3,) (rad/s) and are flown for `steps` control steps
+    of the modal law's loop; the target is at rest; they are over within the ends, in rad and rad/s; b in s."""
 
     loop: ClosedLoop
     steps: int
@@ -101,7 +102,7 @@ class Problem:
         return Watcher(replace(self.loop, gains=modal.Gains(root, root, self.b)), self.angle_end, self.rate_end)
 
     def start(self, angle: float) -> list[float]:
-        """The numbers of the state that turns of this angle (rad) start from."""
+        """Return the numbers of the state that slews of this angle (rad) start from."""
         half = math.sin(0.5 * angle) / math.hypot(*self.axis)
         x, y, z = self.axis
         turn = (math.cos(0.5 * angle), half * x, half * y, half * z)
@@ -109,12 +110,12 @@ class Problem:
         return flatten(self.loop.start._replace(attitude=multiply(goal, turn), rate=self.rate))
 
     def gains(self, roots: ArrayLike) -> modal.Gains:
-        """The law's gains, with one number for each of the roots (n,)."""
+        """Return the law's gains, with one number for each of the roots (n,)."""
         root: Any = np.asarray(roots, dtype=float)
         return modal.Gains((root, root, root), (root, root, root), self.b)
 
     def fly(self, angle: float, roots: ArrayLike) -> Transients:
-        """The turn of this angle (rad) with each of roots (n,), all of them to their end."""
+        """Fly the slew of this angle (rad) with each of roots (n,), all of them to their end."""
         starts = np.repeat(np.array([self.start(angle)]).T, len(np.asarray(roots)), axis=1)
         return self.watcher().fly(starts, self.gains(roots), self.steps)
 
@@ -128,7 +129,7 @@ def search(
     notice: Callable[[int, int], None] = lambda done, total: None,
     threads: int | None = None,
 ) -> list[Found]:
-    """The best of all roots (n,) for each angle, within `limits` and within `eased`, which are no narrower.
+    """Return the best of all roots (n,) for each angle, within `limits` and within `eased`, which are no narrower.
 
     Every root is flown: until it leaves the eased limits, or until it has taken longer than the best so far, or to the end.
     `notice` hears how many angles are done, and how many there are.
@@ -147,7 +148,7 @@ def search(
 
 
 def _best(problem: Problem, watcher: Watcher, roots: Any, limits: Limits, eased: Limits, angle: float) -> Found:
-    """The search at one angle: block by block from the fastest roots on."""
+    """Return the search at one angle: block by block from the fastest roots on."""
     start = np.array(problem.start(angle))[:, None]
     best: dict[Limits, Best] = {}
     for at in range(0, len(roots), TOGETHER):
@@ -164,14 +165,14 @@ def _best(problem: Problem, watcher: Watcher, roots: Any, limits: Limits, eased:
 
 
 def _settled(limits: Limits, least: float, period: float, flown: Flown) -> bool:
-    """Whether no lane of a block can be the best any more: it is beyond the limits, lost, or too late."""
+    """Tell whether no lane of a block can be the best any more: it is beyond the limits, lost, or too late."""
     beyond = ~flown.transients(period).within(limits) | flown.lost
     late = flown.outside & (flown.steps * period > least)
     return bool((beyond | late).all())
 
 
 def unmet(problem: Problem, angle: float, roots: ArrayLike, limits: Limits) -> Unmet:
-    """Why `search` finds none of these roots (n,) at an angle (rad)."""
+    """Tell why `search` finds none of these roots (n,) at an angle (rad)."""
     roots = np.asarray(roots, dtype=float)
     flown = problem.fly(angle, roots)
     ended = ~np.isnan(flown.time)
@@ -186,7 +187,8 @@ def unmet(problem: Problem, angle: float, roots: ArrayLike, limits: Limits) -> U
 
 
 def fit(angles: ArrayLike, roots: ArrayLike) -> Pieces | None:
-    """The two pieces, and the split half-way between two angles, of the least rms relative error; None for too few angles.
+    """Return the two pieces, and the split half-way between two angles, of the least rms relative error; None for too few
+    angles.
 
     angles: (n,), increasing (rad); roots: (n,), below zero (1/s).
     """
@@ -202,7 +204,7 @@ def fit(angles: ArrayLike, roots: ArrayLike) -> Pieces | None:
 
 
 def _piece(x: Any, y: Any) -> tuple[tuple[float, float, float], float]:
-    """c, d, e of one piece and the sum of its squared relative errors. For a given d the others are linear."""
+    """Return c, d, e of one piece and the sum of its squared relative errors. For a given d the others are linear."""
 
     def solve(d: float) -> tuple[Any, float]:
         # Weighed by 1/y, so that relative errors count.

@@ -39,13 +39,13 @@ Array = NDArray[np.float64]
 
 
 class BrokenClaimError(Exception):
-    """A flight contradicts what was proved: a fault of starhold."""
+    """A flight contradicts what was proved, which is a fault of starhold."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """flights flown from {V <= level}; the largest V at a look as a share of that at the look before, and the largest
-    torque, of a motor where the claim is about wheels, as a share of the limit (None: no limit is claimed)."""
+    """A trial tells the flights flown from {V <= level}; the largest V at a look as a share of that at the look before, and
+    the largest torque, of a motor where the claim is about wheels, as a share of the limit (None: no limit is claimed)."""
 
     flights: int
     level: float
@@ -112,8 +112,8 @@ def _falling(
     value: Callable[[Array], Array],
     floor: float,
 ) -> Generator[tuple[Batch, float]]:
-    """The flights leg by leg, with the largest V as a share of that a leg before; BrokenClaimError where one rises by more
-    than a little of it and `floor`."""
+    """Return the flights leg by leg, with the largest V as a share of that a leg before; BrokenClaimError where one rises by
+    more than a little of it and `floor`."""
     before = value(states)
     for steps in LEGS:
         batch = simulate_many(free, states, steps)
@@ -132,7 +132,7 @@ def _falling(
 
 
 def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, flights: int, seed: int) -> Trial:
-    """From random states with s.Js/2 <= level, long enough to reach the surface without torque from outside."""
+    """Fly from random states with s.Js/2 <= level, long enough to reach the surface without torque from outside."""
     J = tensor(loop.craft.inertia)
     least, greatest = (float(x) for x in np.linalg.eigvalsh(J)[[0, -1]])
     free = replace(_undisturbed(loop, certificate), sign_policy="as_published")
@@ -174,8 +174,8 @@ def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, fl
 
 
 def _sliding_period(longest: float, K: Array, reach: Array, least: float, greatest: float) -> float:
-    """A period in which the body turns little at the rates of flights to a surface, and in which the torque that holds it
-    there changes by a little of the switching torque."""
+    """Return a period in which the body turns little at the rates of flights to a surface, and in which the torque that
+    holds it there changes by a little of the switching torque."""
     slope, most = float(np.linalg.norm(K, 2)), float(reach.max())
     period = min(longest, TURN / max(slope, 5.0 * math.sqrt(most / least)))
     while True:
@@ -186,7 +186,7 @@ def _sliding_period(longest: float, K: Array, reach: Array, least: float, greate
 
 
 def draw(count: int, P: Array, potential: Potential, level: float, random: np.random.Generator) -> Array:
-    """States (16, count) of {V <= level}, half of them on its surface."""
+    """Return states (16, count) of {V <= level}, half of them on its surface."""
     share = random.uniform(size=count) ** 0.5
     axes = random.normal(size=(count, 3))
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
@@ -205,14 +205,14 @@ def draw(count: int, P: Array, potential: Potential, level: float, random: np.ra
 
 
 def _beyond_floats(loop: ClosedLoop, certificate: Certificate) -> bool:
-    """Whether the loop is linear around rest, but floats find no period of control that it is stable with."""
+    """Tell whether the loop is linear around rest, but floats find no period of control that it is stable with."""
     sampled = certificate.claim("sampling")
     unknown = sampled is not None and sampled.numbers["longest"] is None
     return unknown and stable_period(Motion(make_subject(loop))) is None
 
 
 def _undisturbed(loop: ClosedLoop, certificate: Certificate) -> ClosedLoop:
-    """The loop as the claims assume it, with a torque that is renewed so often that it counts as continuous."""
+    """Return the loop as the claims assume it, with a torque that is renewed so often that it counts as continuous."""
     sampled = certificate.claim("sampling")
     longest = None if sampled is None else sampled.numbers["longest"]
     if longest is None:
@@ -235,7 +235,7 @@ def _undisturbed(loop: ClosedLoop, certificate: Certificate) -> ClosedLoop:
 def _paced(
     loop: ClosedLoop, certificate: Certificate, states: Array, random: np.random.Generator
 ) -> tuple[ClosedLoop, Array]:
-    """The loop with a period in which no flight turns far, and the states with the momenta of their rotors."""
+    """Return the loop with a period in which no flight turns far, and the states with the momenta of their rotors."""
     fastest = float(np.linalg.norm(states[4:7], axis=0).max())
     if loop.wheels is not None:
         states = np.vstack([states, _rotors(loop, certificate, states, random)])
@@ -262,7 +262,7 @@ def _boundless(wheels: Wheels) -> Wheels:
 
 
 def _rotors(loop: ClosedLoop, certificate: Certificate, states: Array, random: np.random.Generator) -> Array:
-    """Rotor momenta (wheels, count) for a total momentum of any direction up to the one that is certified."""
+    """Return rotor momenta (wheels, count) for a total momentum of any direction up to the one that is certified."""
     told = certificate.subject["wheels"]
     axes, shares, begun = (np.array(told[name]) for name in ("axes", "least", "momentum"))
     total = random.normal(size=(3, states.shape[1]))
@@ -272,7 +272,7 @@ def _rotors(loop: ClosedLoop, certificate: Certificate, states: Array, random: n
 
 
 def _value(loop: ClosedLoop, frame: Frame, epsilon: float) -> Callable[[Array], Array]:
-    """V + epsilon q.Jw of the states in the columns of an array, of the quaternion that is fed back."""
+    """Return V + epsilon q.Jw of the states in the columns of an array, of the quaternion that is fed back."""
     P, J, potential = floats(frame.P), tensor(loop.craft.inertia), frame.potential
 
     def value(states: Array) -> Array:
@@ -283,7 +283,7 @@ def _value(loop: ClosedLoop, frame: Frame, epsilon: float) -> Callable[[Array], 
 
 
 def _need(states: Array, loop: ClosedLoop, claim: Claim) -> float:
-    """The largest torque, or of wheels torque and momentum, as a share of what is claimed."""
+    """Return the largest torque, or of wheels torque and momentum, as a share of what is claimed."""
     torque = states[13:16]
     if claim.kind == "wheels":
         wheels = cast(Wheels, loop.wheels)

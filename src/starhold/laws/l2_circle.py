@@ -1,4 +1,4 @@
-"""A circle round the line through the libration point: a set of states is made attractive, not a motion in time."""
+"""A circle round the line through the libration point is made attractive as a set of states, not a motion in time."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CARD = Card(
 
 
 class Gains(NamedTuple):
-    """The circle, how strongly it attracts, and the feedback along X; all scaled."""
+    """The gains give the circle, how strongly it attracts, and the feedback along X; all scaled."""
 
     radius: Annotated[float, Gain(above=0.0, dimension="length", text="of the circle, lengths")]
     rate: Annotated[float, Gain(dimension="rate", text="at which it is run through, from Y to Z; negative the other way")]
@@ -39,7 +39,7 @@ class Gains(NamedTuple):
 
 
 class Best(NamedTuple):
-    """The rate of the least control, and along X the double root of the natural rate."""
+    """The form takes the rate of the least control, and along X the double root of the natural rate."""
 
     radius: Annotated[float, Gain(above=0.0, dimension="length", text="of the circle, lengths")]
     alpha: Annotated[float, Gain(above=0.0, text="weight of the distance from the circle")] = 1.0
@@ -55,14 +55,15 @@ FORMS: dict[str, Any] = {"best": Best}
 
 
 def design(plant: Libration, spec: Best) -> Gains:
-    """rate = sqrt(C - 2 Omega^2), at which the peak demand is 2 Omega sqrt(C - Omega^2) radius. ValueError for less C."""
+    """Take rate = sqrt(C - 2 Omega^2), at which the peak demand is 2 Omega sqrt(C - Omega^2) radius. ValueError for less
+    C."""
     rate, steep = least_rate(plant), plant.rate**2 + 2.0 * plant.stiffness
     x = (2.0 * steep, 2.0 * math.sqrt(steep))
     return Gains(spec.radius, rate, spec.alpha, spec.k, *x, spec.feedback, spec.boundary_layer, spec.model)
 
 
 def check(gains: Gains, plant: Libration) -> None:
-    """ValueError where X is unstable."""
+    """Raise ValueError where X is unstable."""
     check_x(gains.k_x, gains.k_velocity, plant)
 
 
@@ -74,13 +75,13 @@ def explain(plant: Libration, spec: Best) -> list[tuple[str, Any]]:
 
 
 def peak_demand(plant: Libration, rate: float) -> float:
-    """The largest norm of the control on a circle of radius one: sqrt(4 Omega^2 rate^2 + (C - rate^2)^2), or C - Omega^2
-    - rate^2 in the Y direction where that is more."""
+    """Return the largest norm of the control on a circle of radius one: sqrt(4 Omega^2 rate^2 + (C - rate^2)^2), or C -
+    Omega^2 - rate^2 in the Y direction where that is more."""
     return max(demand(rate / plant.rate, plant), abs(plant.stiffness - plant.rate**2 - rate**2))
 
 
 def errors(measurement: PointMeasurement, gains: Gains) -> Vector:
-    """f1 = y^2 + z^2 - radius^2, f2 = y' + rate z, f3 = z' - rate y, which vanish on the circle."""
+    """Return f1 = y^2 + z^2 - radius^2, f2 = y' + rate z, f3 = z' - rate y, which vanish on the circle."""
     y, z = measurement.position[1], measurement.position[2]
     return (
         y * y + z * z - gains.radius * gains.radius,
@@ -90,7 +91,7 @@ def errors(measurement: PointMeasurement, gains: Gains) -> Vector:
 
 
 def neutral(measurement: PointMeasurement, gains: Gains, plant: Libration) -> Vector:
-    """The control under which V stays as it is (scaled)."""
+    """Return the control under which V stays as it is (scaled)."""
     y, z, v = measurement.position[1], measurement.position[2], measurement.velocity
     pull, square = 2.0 * gains.alpha * errors(measurement, gains)[0], plant.rate * plant.rate
     return (
@@ -101,7 +102,7 @@ def neutral(measurement: PointMeasurement, gains: Gains, plant: Libration) -> Ve
 
 
 def feedback(measurement: PointMeasurement, gains: Gains, plant: Libration) -> Vector:
-    """Control acceleration for the linear model (scaled): what keeps V, and what lowers it."""
+    """Return the control acceleration for the linear model (scaled): what keeps V, and what lowers it."""
     off = errors(measurement, gains)
     wrong = (0.0, off[1], off[2])
     smooth, relayed = scale(gains.k, wrong), along(wrong, gains.k, gains.boundary_layer)
@@ -111,17 +112,17 @@ def feedback(measurement: PointMeasurement, gains: Gains, plant: Libration) -> V
 
 
 def control(measurement: PointMeasurement, gains: Gains, plant: Libration, memory: NoMemory) -> tuple[Vector, NoMemory]:
-    """Control acceleration (scaled)."""
+    """Return the control acceleration (scaled)."""
     return subtract(feedback(measurement, gains, plant), nonlinear_remainder(measurement, plant, gains.model)), memory
 
 
 def lyapunov(measurement: PointMeasurement, gains: Gains, plant: Libration) -> Scalar:
-    """V = (alpha f1^2 + f2^2 + f3^2)/2, zero on the circle; V' = -k (f2^2 + f3^2), of a relay -k |(f2, f3)|."""
+    """Return V = (alpha f1^2 + f2^2 + f3^2)/2, zero on the circle; V' = -k (f2^2 + f3^2), of a relay -k |(f2, f3)|."""
     off = errors(measurement, gains)
     return 0.5 * (gains.alpha * off[0] * off[0] + off[1] * off[1] + off[2] * off[2])
 
 
 def examples() -> list[Gains]:
-    """Circles round L2 of the Sun and the Earth, smooth and by relay."""
+    """Return circles round L2 of the Sun and the Earth, smooth and by relay."""
     smooth = Gains(1.0, 1.393, 1.0, 1.0, 17.8, 6.0)
     return [smooth, smooth._replace(feedback=1, k=0.5, boundary_layer=1e-3, model=1)]

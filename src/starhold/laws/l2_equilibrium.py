@@ -1,4 +1,4 @@
-"""Rest beside the libration point, where the panels see the Sun past the smaller body."""
+"""The law holds an equilibrium beside the libration point, where the panels see the Sun past the smaller body."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CARD = Card(
 
 
 class Gains(NamedTuple):
-    """Where it rests, and the feedback of each axis; all scaled."""
+    """The gains give the equilibrium, and the feedback of each axis; all scaled."""
 
     y: Annotated[float, Gain(dimension="length", text="place of rest along Y, lengths")]
     z: Annotated[float, Gain(dimension="length", text="place of rest along Z, lengths")]
@@ -30,7 +30,8 @@ class Gains(NamedTuple):
 
 
 class Degree(NamedTuple):
-    """The feedback of the largest degree of stability that leaves the natural stiffness along Y and Z alone."""
+    """The form takes the feedback of the largest degree of stability that leaves the natural stiffness along Y and Z
+    alone."""
 
     y: Annotated[float, Gain(dimension="length", text="place of rest along Y, lengths")] = 0.0
     z: Annotated[float, Gain(dimension="length", text="place of rest along Z, lengths")] = 0.0
@@ -41,7 +42,7 @@ FORMS: dict[str, Any] = {"degree": Degree}
 
 
 def design(plant: Libration, spec: Degree) -> Gains:
-    """Along X, x'' = s^2 x + u, the double root -s; along Y and Z the natural frequency, critically damped."""
+    """Place the double root -s along X, x'' = s^2 x + u; along Y and Z the natural frequency, critically damped."""
     square = plant.rate**2
     steep = square + 2.0 * plant.stiffness
     slow, out = plant.stiffness - square, plant.stiffness
@@ -50,14 +51,14 @@ def design(plant: Libration, spec: Degree) -> Gains:
 
 
 def check(gains: Gains, plant: Libration) -> None:
-    """ValueError where X is unstable, or the velocity along Y or Z is not fed back."""
+    """Raise ValueError where X is unstable, or the velocity along Y or Z is not fed back."""
     check_x(gains.k_x, gains.k_velocity[0], plant)
     if min(gains.k_velocity) <= 0.0:
         raise ValueError("k_velocity must be above 0 on every axis, or motion along it does not die out")
 
 
 def feedback(measurement: PointMeasurement, gains: Gains, plant: Libration) -> Vector:
-    """Control acceleration for the linear model (scaled)."""
+    """Return the control acceleration for the linear model (scaled)."""
     square = plant.rate * plant.rate
     k = gains.k_velocity
     return (
@@ -68,10 +69,10 @@ def feedback(measurement: PointMeasurement, gains: Gains, plant: Libration) -> V
 
 
 def control(measurement: PointMeasurement, gains: Gains, plant: Libration, memory: NoMemory) -> tuple[Vector, NoMemory]:
-    """Control acceleration (scaled)."""
+    """Return the control acceleration (scaled)."""
     return subtract(feedback(measurement, gains, plant), nonlinear_remainder(measurement, plant, gains.model)), memory
 
 
 def examples() -> list[Gains]:
-    """Gains for the Sun and the Earth, one Earth diameter aside."""
+    """Return gains for the Sun and the Earth, one Earth diameter aside."""
     return [Gains(1.0, 0.0, 17.8, (6.0, 3.4, 4.0)), Gains(0.0, 1.0, 17.8, (6.0, 3.4, 4.0), 1)]

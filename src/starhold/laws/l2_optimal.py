@@ -26,7 +26,7 @@ CARD = Card(
 
 
 class Gains(NamedTuple):
-    """The circle and the weights of V; all scaled."""
+    """The gains give the circle and the weights of V; all scaled."""
 
     radius: Annotated[float, Gain(above=0.0, dimension="length", text="of the circle, lengths")]
     rate: Annotated[float, Gain(dimension="rate", text="at which it is run through, from Y to Z; negative the other way")]
@@ -38,7 +38,7 @@ class Gains(NamedTuple):
 
 
 class Best(NamedTuple):
-    """The rate of the least control on the circle; along X the natural rate."""
+    """The form takes the rate of the least control on the circle; along X the natural rate."""
 
     radius: Annotated[float, Gain(above=0.0, dimension="length", text="of the circle, lengths")]
     alpha: Annotated[float, Gain(above=0.0, text="weight of the distance from the circle")] = 1.0
@@ -51,19 +51,19 @@ FORMS: dict[str, Any] = {"best": Best}
 
 
 def design(plant: Libration, spec: Best) -> Gains:
-    """rate = sqrt(C - 2 Omega^2), slope = sqrt(Omega^2 + 2 C). ValueError where C is less than 2 Omega^2."""
+    """Take rate = sqrt(C - 2 Omega^2), slope = sqrt(Omega^2 + 2 C). ValueError where C is less than 2 Omega^2."""
     rates = least_rate(plant), math.sqrt(plant.rate**2 + 2.0 * plant.stiffness)
     return Gains(spec.radius, rates[0], spec.alpha, spec.beta, rates[1], spec.pull, spec.boundary_layer)
 
 
 def _off(measurement: PointMeasurement, gains: Gains) -> Scalar:
-    """f1."""
+    """Return f1."""
     p = measurement.position
     return p[1] * p[1] + p[2] * p[2] - gains.radius * gains.radius
 
 
 def _slopes(measurement: PointMeasurement, gains: Gains) -> Vector:
-    """dV/dv."""
+    """Return dV/dv."""
     p, v = measurement.position, measurement.velocity
     pull = gains.pull * _off(measurement, gains)
     return (
@@ -74,16 +74,17 @@ def _slopes(measurement: PointMeasurement, gains: Gains) -> Vector:
 
 
 def control(measurement: PointMeasurement, gains: Gains, plant: Libration, memory: NoMemory) -> tuple[Vector, NoMemory]:
-    """Control acceleration (scaled): V' is linear in it, so that the least is on the limit, against dV/dv."""
+    """Return the control acceleration (scaled): V' is linear in it, so that the least is on the limit, against dV/dv."""
     return along(_slopes(measurement, gains), -measurement.limit, gains.boundary_layer), memory
 
 
 def lyapunov(measurement: PointMeasurement, gains: Gains, plant: Libration) -> Scalar:
-    """V = (alpha f1^2 + f2^2 + f3^2 + beta (x' + slope x)^2)/2, f2 and f3 what the velocity is off by along Y and Z."""
+    """Return V = (alpha f1^2 + f2^2 + f3^2 + beta (x' + slope x)^2)/2, f2 and f3 what the velocity is off by along Y and
+    Z."""
     g, f1 = _slopes(measurement, gains), _off(measurement, gains)
     return 0.5 * (gains.alpha * f1 * f1 + g[1] * g[1] + g[2] * g[2] + g[0] * g[0] / gains.beta)
 
 
 def examples() -> list[Gains]:
-    """A circle round L2 of the Sun and the Earth."""
+    """Return a circle round L2 of the Sun and the Earth."""
     return [Gains(1.0, 1.393, 1.0, 1.0, 2.98, 1.0, 0.05)]

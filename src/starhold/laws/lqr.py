@@ -1,4 +1,4 @@
-"""Linear-quadratic regulators with closed-form gains."""
+"""Linear-quadratic regulators have gains in closed form."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ Array = NDArray[np.floating[Any]]
 
 
 class Gains(NamedTuple):
-    """Damping and stiffness matrices, and how much of the gyroscopic torque is cancelled."""
+    """The gains are damping and stiffness matrices, and the share of the gyroscopic torque that is cancelled."""
 
     k_rate: Annotated[Matrix | Vector, Gain("N m s", shape=(3, 3), text="damping")]
     k_attitude: Annotated[Matrix | Vector, Gain("N m", shape=(3, 3), text="stiffness")]
@@ -51,7 +51,8 @@ class Gains(NamedTuple):
 
 
 class FormI(NamedTuple):
-    """Q = blkdiag(a, b^2) Z^-1 with Z = J^-1 R^-1 J^-1: u = -sqrt(a + b) J w - b J q, for any inertia and any R."""
+    """The weights are Q = blkdiag(a, b^2) Z^-1 with Z = J^-1 R^-1 J^-1: u = -sqrt(a + b) J w - b J q, for any inertia and
+    any R."""
 
     a: Annotated[float, Gain("1/s^2", at_least=0.0, text="weight of the rate")]
     b: Annotated[float, Gain("1/s^2", above=0.0, text="weight of the attitude, K_attitude = b J")]
@@ -59,7 +60,8 @@ class FormI(NamedTuple):
 
 
 class FormII(NamedTuple):
-    """Diagonal Q and R for a diagonal inertia, in closed form. Weights of one unit differ by at most 1e12."""
+    """The weights Q and R are diagonal for a diagonal inertia, and the gains in closed form. Weights of one unit differ by
+    at most 1e12."""
 
     q: Annotated[Any, Gain("1", above=0.0, shape=(6,), text="weights of the rate (s^2) and of the quaternion's vector part")]
     r: Annotated[Vector, Gain("1/(N m)^2", above=0.0, shape=(3,), text="weights of the torque")]
@@ -67,8 +69,8 @@ class FormII(NamedTuple):
 
 
 class FormIII(NamedTuple):
-    """Form II about the principal axes of any inertia, which are taken in the order of rising moments; axes of equal
-    moments need equal weights unless the inertia is diagonal."""
+    """The weights are those of form II about the principal axes of any inertia, which are taken in the order of rising
+    moments; axes of equal moments need equal weights unless the inertia is diagonal."""
 
     q: Annotated[Any, Gain("1", above=0.0, shape=(6,), text="weights of the rate (s^2) and of the quaternion's vector part")]
     r: Annotated[Vector, Gain("1/(N m)^2", above=0.0, shape=(3,), text="weights of the torque")]
@@ -76,8 +78,8 @@ class FormIII(NamedTuple):
 
 
 class Numeric(NamedTuple):
-    """Any symmetric positive definite weights, by a numerical solution that is right to the last digit. Eigenvalues of
-    weights of one unit differ by at most 1e12."""
+    """The weights are any symmetric positive definite ones, by a numerical solution that is right to the last digit.
+    Eigenvalues of weights of one unit differ by at most 1e12."""
 
     q: Annotated[Any, Gain("1", shape=(6, 6), text="weight of the rate (s^2) and of the quaternion's vector part")]
     r: Annotated[Any, Gain("1/(N m)^2", shape=(3, 3), text="weight of the torque")]
@@ -87,7 +89,7 @@ FORMS: dict[str, Any] = {"I": FormI, "II": FormII, "III": FormIII, "numeric": Nu
 
 
 def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
-    """Control torque (N m, body)."""
+    """Return the control torque (N m, body)."""
     feedback = add(apply(gains.k_rate, measurement.rate), apply(gains.k_attitude, vector_part(measurement.attitude)))
     gyroscopic = scale(gains.gyroscopic, gyroscopic_torque(craft.inertia, measurement.rate))
     return subtract(add(tracking_torque(measurement, craft), gyroscopic), feedback), memory
@@ -97,7 +99,7 @@ lyapunov = matrix_pd.lyapunov
 
 
 def design(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> Gains:
-    """Gains of a form; ValueError where the weights or the inertia do not allow it.
+    """Return gains of a form; ValueError where the weights or the inertia do not allow it.
 
     The gains of forms I, II and III are exactly symmetric, and so are those of numeric weights that make them so.
     """
@@ -121,8 +123,8 @@ def design(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> Gains:
 
 
 class Solution(NamedTuple):
-    """A closed form's Riccati equation and its solution about the principal axes (the columns of `axes`), where all is
-    diagonal: moments (3,), weights q (6,), rate first, and r (3,), and P's blocks, each (3,)."""
+    """A closed form solves its Riccati equation about the principal axes (the columns of `axes`), where all is diagonal:
+    moments (3,), weights q (6,), rate first, and r (3,), and P's blocks, each (3,)."""
 
     moments: Array
     axes: Array
@@ -134,12 +136,12 @@ class Solution(NamedTuple):
 
     @property
     def p(self) -> Array:
-        """P (6, 6) about the principal axes."""
+        """Return P (6, 6) about the principal axes."""
         return np.block([[np.diag(self.p11), np.diag(self.p12)], [np.diag(self.p12), np.diag(self.p22)]])
 
 
 def solution(craft: Craft, spec: FormI | FormII | FormIII) -> Solution:
-    """The closed form's solution. Form I is the regulator for any R; the identity stands for it here."""
+    """Return the closed form's solution. Form I is the regulator for any R; the identity stands for it here."""
     inertia = tensor(craft.inertia)
     if isinstance(spec, FormI):
         moments, axes = principal(inertia)
@@ -154,7 +156,8 @@ def solution(craft: Craft, spec: FormI | FormII | FormIII) -> Solution:
 
 
 def riccati_problem(craft: Craft, spec: FormI | FormII | FormIII) -> tuple[Array, Array, Array]:
-    """Weights Q (6, 6), rate first, and R (3, 3) of a form and its P (6, 6), in body axes; of form I for R the identity."""
+    """Return weights Q (6, 6), rate first, and R (3, 3) of a form and its P (6, 6), in body axes; of form I for R the
+    identity."""
     found = solution(craft, spec)
     both = np.kron(np.eye(2), found.axes)
     return both * found.q @ both.T, found.axes * found.r @ found.axes.T, both @ found.p @ both.T
@@ -193,7 +196,7 @@ def explain(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> list[tupl
 
 
 def _by_axes(inertia: Array, spec: FormII | FormIII) -> tuple[Array, Array, Array, Array]:
-    """Moments (3,), axes (3, 3) as columns, and the weights q (6,) and r (3,) about them."""
+    """Return moments (3,), axes (3, 3) as columns, and the weights q (6,) and r (3,) about them."""
     if isinstance(spec, FormIII):
         moments, axes = principal(inertia)
         if is_full(inertia):
@@ -211,15 +214,15 @@ def _turned(axes: Array, diagonal: Array) -> Array:
 
 
 def _without_rounding(gain: Array) -> Array:
-    """Symmetric where it is but for the rounding of the weights."""
+    """Return the matrix, symmetric where it is but for the rounding of the weights."""
     if np.abs(gain - gain.T).max() <= 1e-14 * np.abs(gain).max():
         return 0.5 * (gain + gain.T)
     return gain
 
 
 def gyroscopic_residual(inertia: Array, k_attitude: Array) -> float:
-    """The largest |w.K_attitude^-1(w x Jw)| over |w| = 1 rad/s, from its cubic form; zero means that the law is almost
-    globally stable without cancelling the gyroscopic torque. For diagonal matrices it is |kappa| / (3 sqrt 3) with
+    """Return the largest |w.K_attitude^-1(w x Jw)| over |w| = 1 rad/s, from its cubic form; zero means that the law is
+    almost globally stable without cancelling the gyroscopic torque. For diagonal matrices it is |kappa| / (3 sqrt 3) with
     kappa = (J3 - J2)/y1 + (J1 - J3)/y2 + (J2 - J1)/y3."""
     moments, axes = np.linalg.eigh(inertia)
     weight = axes.T @ np.linalg.inv(k_attitude) @ axes
@@ -232,7 +235,7 @@ def gyroscopic_residual(inertia: Array, k_attitude: Array) -> float:
 
 
 def balanced(moments: Array, spec: FormII | FormIII) -> tuple[Array, Array]:
-    """Weights q (6,) and r (3,) for moments (3,), moved to where kappa vanishes if `spec.balance` says so.
+    """Return weights q (6,) and r (3,) for moments (3,), moved to where kappa vanishes if `spec.balance` says so.
 
     ValueError where no value of the weight that is named does it (that of the middle moment's axis always can), and where
     weights, given or moved, are not positive or differ by more than MOST_SPREAD.
@@ -252,7 +255,7 @@ def _numeric_weights(spec: Numeric) -> tuple[Array, Array]:
 
 
 def examples() -> list[Gains]:
-    """Form I with the gyroscopic torque cancelled and forms II for a body of 2, 3, 4 kg m2."""
+    """Return form I with the gyroscopic torque cancelled and forms II for a body of 2, 3, 4 kg m2."""
     root = float(np.sqrt(0.02))
     first = Gains((2.0 * root, 3.0 * root, 4.0 * root), (0.02, 0.03, 0.04), 1.0)
     moments, y = np.array([2.0, 3.0, 4.0]), 0.02

@@ -1,4 +1,4 @@
-"""PD feedback with the gyroscopic and the modelled external torque cancelled."""
+"""PD feedback acts with the gyroscopic and the modelled external torque cancelled."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ CARD = Card(
 
 
 class Gains(NamedTuple):
-    """Damping and stiffness."""
+    """The gains are damping and stiffness."""
 
     k_rate: Annotated[float, Gain("N m s", above=0.0, text="damping")]
     k_attitude: Annotated[float, Gain("N m", above=0.0, text="stiffness against the quaternion's vector part")]
 
 
 def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
-    """Control torque (N m, body)."""
+    """Return the control torque (N m, body)."""
     feedback = add(scale(-gains.k_rate, measurement.rate), scale(-gains.k_attitude, vector_part(measurement.attitude)))
     gyroscopic = gyroscopic_torque(craft.inertia, measurement.body_rate)
     model = add(subtract(gyroscopic, measurement.external_torque), apply(craft.inertia, measurement.target_acceleration))
@@ -41,11 +41,11 @@ design, explain = response.designs(Gains, torque)
 
 
 def lyapunov(measurement: Measurement, gains: Gains, craft: Craft) -> Scalar:
-    """V = w.Jw/2 + 2 k_attitude (1 - q0) (J); V' = -k_rate |w|2."""
+    """Return V = w.Jw/2 + 2 k_attitude (1 - q0) (J); V' = -k_rate |w|2."""
     energy = 0.5 * dot(measurement.rate, apply(craft.inertia, measurement.rate))
     return energy + 2.0 * gains.k_attitude * (1.0 - measurement.attitude[0])
 
 
 def examples() -> list[Gains]:
-    """The published gains, and stiffer ones."""
+    """Return the published gains, and stiffer ones."""
     return [Gains(0.09, 0.009), Gains(0.5, 0.05)]

@@ -1,4 +1,4 @@
-"""PD feedback with matrix gains, and the two classical families that make it stable."""
+"""PD feedback has matrix gains here, with the two classical families that make it stable."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ CARD = Card(
 
 
 class Gains(NamedTuple):
-    """Damping and stiffness matrices."""
+    """The gains are damping and stiffness matrices."""
 
     k_rate: Annotated[Matrix | Vector, Gain("N m s", shape=(3, 3), text="damping")]
     k_attitude: Annotated[Matrix | Vector, Gain("N m", shape=(3, 3), text="stiffness")]
 
 
 class Inertial(NamedTuple):
-    """K_attitude = (a J + b E)^-1, K_rate = d J, for any inertia."""
+    """The family is K_attitude = (a J + b E)^-1, K_rate = d J, for any inertia."""
 
     a: Annotated[float, Gain("1/(N m kg m^2)", at_least=0.0, text="weight of the inertia in K_attitude^-1")]
     b: Annotated[float, Gain("1/(N m)", at_least=0.0, text="weight of the identity in K_attitude^-1")]
@@ -45,7 +45,7 @@ class Inertial(NamedTuple):
 
 
 class Diagonal(NamedTuple):
-    """K_attitude = (a J + b E)^-1, K_rate = diag(d1, d2, d3) J, for a diagonal inertia."""
+    """The family is K_attitude = (a J + b E)^-1, K_rate = diag(d1, d2, d3) J, for a diagonal inertia."""
 
     a: Annotated[float, Gain("1/(N m kg m^2)", at_least=0.0, text="weight of the inertia in K_attitude^-1")]
     b: Annotated[float, Gain("1/(N m)", at_least=0.0, text="weight of the identity in K_attitude^-1")]
@@ -56,7 +56,7 @@ FORMS: dict[str, Any] = {"inertial": Inertial, "diagonal": Diagonal}
 
 
 def design(craft: Craft, spec: Inertial | Diagonal) -> Gains:
-    """Gains of one of the two classical families; ValueError when its condition fails."""
+    """Return gains of one of the two classical families; ValueError when its condition fails."""
     inertia = tensor(craft.inertia)
     if spec.a == 0.0 and spec.b == 0.0:
         raise ValueError("a and b must not both be zero")
@@ -67,19 +67,19 @@ def design(craft: Craft, spec: Inertial | Diagonal) -> Gains:
 
 
 def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
-    """Control torque (N m, body)."""
+    """Return the control torque (N m, body)."""
     feedback = add(apply(gains.k_rate, measurement.rate), apply(gains.k_attitude, vector_part(measurement.attitude)))
     return subtract(tracking_torque(measurement, craft), feedback), memory
 
 
 def lyapunov(measurement: Measurement, gains: Gains, craft: Craft) -> Scalar:
-    """V = w.K_attitude^-1 Jw/2 + 2 (1 - q0); V' = -w.K_attitude^-1 K_rate w under the law's assumptions."""
+    """Return V = w.K_attitude^-1 Jw/2 + 2 (1 - q0); V' = -w.K_attitude^-1 K_rate w under the law's assumptions."""
     weighted = solve(gains.k_attitude, apply(craft.inertia, measurement.rate))
     return 0.5 * dot(measurement.rate, weighted) + 2.0 * (1.0 - measurement.attitude[0])
 
 
 def examples() -> list[Gains]:
-    """Stiffness a multiple of the identity (b alone), for any inertia, with a diagonal and a full damping."""
+    """Return stiffness a multiple of the identity (b alone), for any inertia, with a diagonal and a full damping."""
     stiffness = (0.009, 0.009, 0.009)
     full = ((0.09, 0.01, 0.0), (0.01, 0.12, 0.02), (0.0, 0.02, 0.15))
     return [Gains((0.09, 0.12, 0.15), stiffness), Gains(full, stiffness)]

@@ -1,4 +1,4 @@
-"""Modal control: the poles of the motion linearised anew at every step are placed exactly, by levels."""
+"""Modal control places the poles of the motion, linearised anew at every step, exactly, by levels."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ CARD = Card(
 
 
 class Gains(NamedTuple):
-    """The spectra of the three levels."""
+    """The gains are the spectra of the three levels."""
 
     phi_0: Annotated[Matrix | Vector, Gain("1/s", shape=(3, 3), text="of the rates; a number a stands for a E")]
     phi_1: Annotated[Matrix | Vector, Gain("1/s", shape=(3, 3), text="of the quaternion's vector part")]
@@ -35,14 +35,15 @@ class Gains(NamedTuple):
 
 
 class Equal(NamedTuple):
-    """One real root for rates and attitude alike."""
+    """The form takes one real root for rates and attitude alike."""
 
     a: Annotated[float, Gain("1/s", text="the root, on all axes")]
     b: Annotated[float, Gain("s", text="of the quaternion's scalar part, over |w|2")] = -0.01
 
 
 class Fit(NamedTuple):
-    """The root that turns fastest within limits, from a fit over the initial angle; published is that of the default."""
+    """The form takes the root that slews fastest within limits, from a fit over the initial angle; the default is the
+    published fit."""
 
     angle: Annotated[
         float | None,
@@ -66,12 +67,12 @@ FORMS: dict[str, Any] = {"equal": Equal, "fit": Fit}
 
 
 def complete(spec: Equal | Fit, start: Callable[[], Start]) -> Equal | Fit:
-    """The inputs of a form with the error angle (rad) at the start of a run where they leave it out."""
+    """Return the inputs of a form with the error angle (rad) at the start of a run where they leave it out."""
     return spec._replace(angle=start().angle) if isinstance(spec, Fit) and spec.angle is None else spec
 
 
 def design(craft: Craft, spec: Equal | Fit) -> Gains:
-    """phi_0 = phi_1 = a E. ValueError where a fit is told no angle."""
+    """Set phi_0 = phi_1 = a E. ValueError where a fit is told no angle."""
     if isinstance(spec, Equal):
         a = spec.a
     elif spec.angle is None:
@@ -85,19 +86,20 @@ def design(craft: Craft, spec: Equal | Fit) -> Gains:
 
 
 def fitted(angle: ArrayLike, below: Vector, above: Vector, split: float) -> NDArray[np.float64]:
-    """c exp(d angle) + e (1/s) of an angle (rad; numbers or an array), by one triple up to the split and another beyond."""
+    """Return c exp(d angle) + e (1/s) of an angle (rad; numbers or an array), by one triple up to the split and another
+    beyond."""
     first, second = (c * np.exp(d * np.asarray(angle, dtype=float)) + e for c, d, e in (below, above))
     return np.where(np.asarray(angle) <= split, first, second)
 
 
 def explain(craft: Craft, spec: Equal | Fit) -> list[tuple[str, Any]]:
-    """The root, and how soon it forgets."""
+    """Return the root, and how soon it forgets."""
     a = design(craft, spec).phi_0[0]
     return [("root a (1/s)", a), ("time constant (s)", -1.0 / a)]  # type: ignore[operator]
 
 
 def check(gains: Gains, craft: Craft) -> None:
-    """ValueError where a spectrum is not stable."""
+    """Raise ValueError where a spectrum is not stable."""
     for name in ("phi_0", "phi_1"):
         roots = np.linalg.eigvals(tensor(getattr(gains, name)))
         worst = roots[np.argmax(roots.real)]
@@ -109,20 +111,21 @@ def check(gains: Gains, craft: Craft) -> None:
 
 
 def single_root(gains: Gains) -> tuple[float, float] | None:
-    """a (1/s) and b (s) where phi_0 = phi_1 = a E: the closed loop is then the same for every inertia."""
+    """Return a (1/s) and b (s) where phi_0 = phi_1 = a E: the closed loop is then the same for every inertia."""
     first, second = (tensor(phi) for phi in gains[:2])
     a = float(first[0, 0])
     return (a, gains.b) if (first == a * np.eye(3)).all() and (second == first).all() else None
 
 
 def _straighten(q: Vector, v: Vector) -> Vector:
-    """D^-1 v with D v = v + q x v."""
+    """Return D^-1 v with D v = v + q x v."""
     # D v = v + q x v is regular for every q, and needs no pivot.
     return scale(1.0 / (1.0 + dot(q, q)), add(subtract(v, cross(q, v)), scale(dot(q, v), q)))
 
 
 def _upper(q: Vector, w: Vector, gains: Gains, craft: Craft, first: Scalar, rest: Vector) -> Vector:
-    """K_1 (first, rest): what gives the quaternion the spectra phi_1 and b |w|2, if it could be steered by the momentum."""
+    """Return K_1 (first, rest), which would give the quaternion the spectra phi_1 and b |w|2, if it could be steered by the
+    momentum."""
     half = apply(craft.inertia, _straighten(q, w))
     own = scale(2.0, apply(craft.inertia, _straighten(q, rest)))
     last = scale(4.0 * gains.b, half)
@@ -131,7 +134,7 @@ def _upper(q: Vector, w: Vector, gains: Gains, craft: Craft, first: Scalar, rest
 
 
 def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
-    """Control torque (N m, body).
+    """Return the control torque (N m, body).
 
     With x' = (q0', q') the level above gives K_0 x = K_1 x' - phi_0 (K_1 (q0 - 1, q) + J w) beside the known torque, whose
     Jacobians cancel. Nothing is divided by w: where it vanishes, the scalar part has no pole of its own to place.
@@ -149,6 +152,6 @@ def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemor
 
 
 def examples() -> list[Gains]:
-    """The published spectrum, and one that differs from axis to axis."""
+    """Return the published spectrum, and one that differs from axis to axis."""
     a = (-0.428, -0.428, -0.428)
     return [Gains(a, a, -0.01), Gains((-0.5, -0.6, -0.7), ((-0.4, 0.1, 0.0), (0.0, -0.3, 0.05), (0.0, 0.0, -0.5)), -0.01)]

@@ -1,5 +1,5 @@
-"""Model-predictive control: the best sequence of moves over a horizon inside the torque limit, of which the first is
-applied."""
+"""Model-predictive control plans the best sequence of moves over a horizon inside the torque limit, and applies the
+first."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ BALL, UNLIMITED = LIMITS.index("norm"), LIMITS.index("none")
 
 
 class Gains(NamedTuple):
-    """Weights of the cost, horizon and limits. Choices are given by their place in the list."""
+    """The gains are weights of the cost, the horizon and limits. Choices are given by their place in the list."""
 
     q_attitude: Annotated[Vector, Gain("1", above=0.0, shape=(3,), text="weight of the quaternion's vector part")]
     q_rate: Annotated[Vector, Gain("s^2", at_least=0.0, shape=(3,), text="weight of the rate")]
@@ -63,7 +63,7 @@ class Memory(NamedTuple):
 
 
 def remember(gains: Gains, craft: Craft, period: float) -> Memory:
-    """The memory of one trajectory, for control instants `period` apart (s).
+    """Return the memory of one trajectory, for control instants `period` apart (s).
 
     Raises ValueError where the Riccati equation of the terminal weight has no solution in double precision.
     """
@@ -77,19 +77,19 @@ def remember(gains: Gains, craft: Craft, period: float) -> Memory:
 
 
 def program(gains: Gains, memory: Memory) -> Problem:
-    """The quadratic program of a memory."""
+    """Return the quadratic program of a memory."""
     return Problem(memory.numbers, gains.horizon, gains.limit == BALL)
 
 
 def counters(memory: Memory) -> tuple[int, ...]:
-    """The counters of a memory, outside kernels: see CALLS."""
+    """Return the counters of a memory, outside kernels: see CALLS."""
     return tuple(int(memory.numbers[place]) for place in range(COUNTERS))
 
 
 @np.errstate(all="ignore")
 def terminal_weight(gains: Gains, craft: Craft, period: float) -> tuple[Any, Any]:
-    """The weight P (6, 6) of the state after the last move, and the feedback (3, 6) that is best before it:
-    u = -feedback x. For "riccati" they are those of the endless horizon at w = 0 without gravity.
+    """Return the weight P (6, 6) of the state after the last move, and the feedback (3, 6) that is best before it: u =
+    -feedback x. For "riccati" they are those of the endless horizon at w = 0 without gravity.
 
     Raises ValueError where the Riccati equation has no solution in double precision.
     """
@@ -123,8 +123,8 @@ def terminal_weight(gains: Gains, craft: Craft, period: float) -> tuple[Any, Any
 
 
 def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: Memory) -> tuple[Vector, Memory]:
-    """Control torque (N m, body): the first move of the best plan. Weights and horizon are those the memory was made for;
-    the memory is changed."""
+    """Return the control torque (N m, body): the first move of the best plan. Weights and horizon are those the memory was
+    made for; the memory is changed."""
     problem = program(gains, memory)
     store = carve(problem)
     ahead = tracking_torque(measurement, craft)
@@ -154,6 +154,6 @@ def _count(store: Store, end: Solved) -> None:
 
 
 def examples() -> list[Gains]:
-    """The published weights within a limit on each axis, and within a limit on the norm."""
+    """Return the published weights within a limit on each axis, and within a limit on the norm."""
     q, r = (0.2, 0.2, 0.2), (50.0, 50.0, 50.0)
     return [Gains(q, q, r, limit=LIMITS.index("axis")), Gains(q, q, r, limit=LIMITS.index("norm"))]

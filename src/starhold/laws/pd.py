@@ -1,4 +1,4 @@
-"""Proportional-derivative feedback on the quaternion."""
+"""Proportional-derivative feedback acts on the quaternion."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CARD = Card(
 
 
 class Gains(NamedTuple):
-    """Damping and stiffness."""
+    """The gains are damping and stiffness."""
 
     k_rate: Annotated[float, Gain("N m s", above=0.0, text="damping")]
     k_attitude: Annotated[float, Gain("N m", above=0.0, text="stiffness against the quaternion's vector part")]
@@ -33,7 +33,7 @@ class Gains(NamedTuple):
 
 
 def remember(gains: Gains, craft: Craft, period: float) -> NoMemory:
-    """Nothing; ValueError where stiffness leaves no torque for the damping."""
+    """Remember nothing; ValueError where stiffness leaves no torque for the damping."""
     if gains.limit and not gains.k_attitude < craft.torque_limit < math.inf:
         shown = f"the torque limit of {craft.torque_limit:g} N m"
         raise ValueError(f'limit = "axis" needs k_attitude below {shown}, not {gains.k_attitude:g} N m')
@@ -41,7 +41,7 @@ def remember(gains: Gains, craft: Craft, period: float) -> NoMemory:
 
 
 def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
-    """Control torque (N m, body)."""
+    """Return the control torque (N m, body)."""
     damping = scale(gains.k_rate, measurement.rate)
     within = clip_axes(damping, craft.torque_limit - gains.k_attitude)
     clipped = less(0.5, gains.limit)
@@ -60,11 +60,11 @@ design, explain = response.designs(Gains, torque)
 
 
 def lyapunov(measurement: Measurement, gains: Gains, craft: Craft) -> Scalar:
-    """V = w.Jw/2 + 2 k_attitude (1 - q0) (J); V' = -w.damping."""
+    """Return V = w.Jw/2 + 2 k_attitude (1 - q0) (J); V' = -w.damping."""
     energy = 0.5 * dot(measurement.rate, apply(craft.inertia, measurement.rate))
     return energy + 2.0 * gains.k_attitude * (1.0 - measurement.attitude[0])
 
 
 def examples() -> list[Gains]:
-    """Gains for a body of a few kg m2."""
+    """Return gains for a body of a few kg m2."""
     return [Gains(0.09, 0.009), Gains(0.5, 0.05), Gains(0.09, 0.009, 1)]

@@ -1,4 +1,4 @@
-"""Proportional-integral-derivative feedback on the quaternion: holds the target against a constant torque from outside."""
+"""Proportional-integral-derivative feedback on the quaternion holds the target against a constant torque from outside."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ CARD = Card(
 
 
 class Gains(NamedTuple):
-    """Damping, stiffness, integral gain, and the torque that the integral may ask for."""
+    """The gains are damping, stiffness, the integral gain, and the torque that the integral may ask for."""
 
     k_rate: Annotated[float, Gain("N m s", above=0.0, text="damping")]
     k_attitude: Annotated[float, Gain("N m", above=0.0, text="stiffness against the quaternion's vector part")]
@@ -42,7 +42,7 @@ class Gains(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """The integral of the error quaternion's vector part (s)."""
+    """The law keeps the integral of the error quaternion's vector part (s)."""
 
     integral: Vector
 
@@ -65,7 +65,7 @@ def remember(gains: Gains, craft: Craft, period: float) -> Memory:
 
 
 def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: Memory) -> tuple[Vector, Memory]:
-    """Control torque (N m, body)."""
+    """Return the control torque (N m, body)."""
     q = vector_part(measurement.attitude)
     # Anti-windup: the integral is clamped, not held while the torque is limited. It winds up in a slew that reaches no limit
     # too, and a law does not know whether the limit is of each axis, of the norm or of the wheels. The clamp bounds the
@@ -78,5 +78,5 @@ def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: Memory)
 
 
 def examples() -> list[Gains]:
-    """Gains for a body of a few kg m2, the second near the border of stability and soon at the integral's limit."""
+    """Return gains for a body of a few kg m2, the second near the border of stability and soon at the integral's limit."""
     return [Gains(0.3, 0.03, 3e-4, 2e-3), Gains(0.5, 0.05, 5e-3, 1e-4)]

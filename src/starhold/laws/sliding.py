@@ -1,4 +1,4 @@
-"""Sliding-mode control on the surface w + K q = 0."""
+"""Sliding-mode control holds the surface w + K q = 0."""
 
 from __future__ import annotations
 
@@ -36,7 +36,8 @@ CARD = Card(
 
 
 class Gains(NamedTuple):
-    """Surface slope, reaching torque and, to trade chatter for accuracy, the thickness of a boundary layer."""
+    """The gains are the surface slope, the switching torque and, to trade chatter for accuracy, the thickness of a boundary
+    layer."""
 
     surface_gain: Annotated[
         Matrix | Vector, Gain("1/s", shape=(3, 3), text="K of the surface w + K q = 0, symmetric positive definite")
@@ -46,9 +47,9 @@ class Gains(NamedTuple):
 
 
 class Layered(NamedTuple):
-    """Natural frequency and damping of the linear loop within a boundary layer: two real roots, those of the surface and of
-    the layer. Exact about every axis for a diagonal inertia, whose reaching torques are in proportion to the moments; else
-    exact about the axis of the largest moment, and faster about the others."""
+    """The form asks for the natural frequency and damping of the linear loop within a boundary layer, which has two real
+    roots, those of the surface and of the layer. Exact about every axis for a diagonal inertia, whose reaching torques are
+    in proportion to the moments; else exact about the axis of the largest moment, and faster about the others."""
 
     bandwidth: Annotated[float, Gain("rad/s", above=0.0, text="natural frequency, the least of all axes")]
     switching_gain: Annotated[float, Gain("N m", above=0.0, text="switching torque about the axis of the largest moment")]
@@ -56,8 +57,8 @@ class Layered(NamedTuple):
 
 
 class Settling(NamedTuple):
-    """The least slope that settles in time, within the torque that there is, found by integrating the turn: towards a target
-    at rest, without torque from outside."""
+    """The form asks for the least slope that settles in time, within the torque that there is, found by integrating the
+    slew: towards a target at rest, without torque from outside."""
 
     time: Annotated[float, Gain("s", above=0.0, text="after which angle and rate stay within their tolerances")]
     switching_gain: Annotated[
@@ -84,7 +85,7 @@ FORMS: dict[str, Any] = {"bandwidth": Layered, "settling": Settling}
 
 
 def complete(spec: Layered | Settling, start: Callable[[], Start]) -> Layered | Settling:
-    """The inputs of a form that settles in time, with what they leave to the scenario."""
+    """Return the inputs of a form that settles in time, with what they leave to the scenario."""
     spec = response.complete(spec, start)
     if isinstance(spec, Layered) or spec.switching_gain is not None:
         return spec
@@ -94,8 +95,8 @@ def complete(spec: Layered | Settling, start: Callable[[], Start]) -> Layered | 
 
 
 def design(craft: Craft, spec: Layered | Settling) -> Gains:
-    """Gains of this bandwidth and damping, or the least slope that settles in time; ValueError where the torque does not
-    allow it."""
+    """Return gains of this bandwidth and damping, or the least slope that settles in time; ValueError where the torque does
+    not allow it."""
     if isinstance(spec, Settling):
         return _settled(craft, spec)[0]
     apart = spec.damping + math.sqrt(spec.damping**2 - 1.0)
@@ -129,7 +130,7 @@ def _settled(craft: Craft, spec: Settling) -> tuple[Gains, Turn]:
 
 
 def explain(craft: Craft, spec: Layered | Settling) -> list[tuple[str, Any]]:
-    """How the turn goes; of a boundary layer, the eigenvalues of the linear loop within it, and else on the surface."""
+    """Tell how the slew goes; of a boundary layer, the eigenvalues of the linear loop within it, and else on the surface."""
     found: list[tuple[str, Any]] = []
     if isinstance(spec, Settling):
         gains, turn = _settled(craft, spec)
@@ -145,18 +146,18 @@ def explain(craft: Craft, spec: Layered | Settling) -> list[tuple[str, Any]]:
 
 
 def surface(measurement: Measurement, gains: Gains) -> Vector:
-    """s = w + K q (rad/s)."""
+    """Return s = w + K q (rad/s)."""
     return add(measurement.rate, apply(gains.surface_gain, vector_part(measurement.attitude)))
 
 
 def switch(s: Scalar, layer: Scalar) -> Scalar:
-    """sign(s), or s/layer within the layer."""
+    """Return sign(s), or s/layer within the layer."""
     inside = less(0.0, layer)
     return where(inside, clip(s / maximum(layer, 1e-300), 1.0), sign(s))
 
 
 def equivalent_torque(measurement: Measurement, surface_gain: Matrix | Vector, craft: Craft) -> Vector:
-    """The torque (N m) under which s = w + K q stays as it is where no torque acts from outside."""
+    """Return the torque (N m) under which s = w + K q stays as it is where no torque acts from outside."""
     q = vector_part(measurement.attitude)
     q_rate = scale(0.5, add(scale(measurement.attitude[0], measurement.rate), cross(q, measurement.rate)))
     wanted = subtract(measurement.target_acceleration, apply(surface_gain, q_rate))
@@ -164,7 +165,7 @@ def equivalent_torque(measurement: Measurement, surface_gain: Matrix | Vector, c
 
 
 def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
-    """Control torque (N m, body)."""
+    """Return the control torque (N m, body)."""
     s = surface(measurement, gains)
     switching = (switch(s[0], gains.boundary_layer), switch(s[1], gains.boundary_layer), switch(s[2], gains.boundary_layer))
     equivalent = equivalent_torque(measurement, gains.surface_gain, craft)
@@ -172,7 +173,7 @@ def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemor
 
 
 def examples() -> list[Gains]:
-    """The published slope with the sign, and a full matrix with a boundary layer."""
+    """Return the published slope with the sign, and a full matrix with a boundary layer."""
     reach = (5e-3, 5e-3, 5e-3)
     slanted = ((0.08, 0.01, 0.0), (0.01, 0.1, 0.0), (0.0, 0.0, 0.12))
     return [Gains((0.08, 0.08, 0.08), reach, 0.0), Gains(slanted, reach, 2e-3)]

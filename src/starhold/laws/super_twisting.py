@@ -1,4 +1,4 @@
-"""Super-twisting control: a sliding mode of second order on s = w + K q, whose torque is continuous."""
+"""Super-twisting control is a sliding mode of second order on s = w + K q, whose torque is continuous."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ CARD = Card(
 
 
 class Gains(NamedTuple):
-    """Surface slope, and the two gains of the reaching motion s' = -sqrt(k1 |s|) sign(s) + v + disturbance."""
+    """The gains are the surface slope and those of the reaching motion s' = -sqrt(k1 |s|) sign(s) + v + disturbance."""
 
     surface_gain: Annotated[
         Matrix | Vector, Gain("1/s", shape=(3, 3), text="K of the surface w + K q = 0, symmetric positive definite")
@@ -43,7 +43,7 @@ class Gains(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """v (rad/s2), which on the surface is the negative of the acceleration that the disturbance makes."""
+    """The law keeps v (rad/s2), which on the surface is the negative of the acceleration that the disturbance makes."""
 
     acceleration: Vector
 
@@ -54,13 +54,13 @@ def remember(gains: Gains, craft: Craft, period: float) -> Memory:
 
 
 def check(gains: Gains, craft: Craft) -> None:
-    """ValueError where motion on the surface, q' = -K q/2 near the target, leads away from it."""
+    """Raise ValueError where motion on the surface, q' = -K q/2 near the target, leads away from it."""
     if np.linalg.eigvals(tensor(gains.surface_gain)).real.min() <= 0.0:
         raise ValueError("surface_gain must have eigenvalues with positive real parts, or the surface leads off the target")
 
 
 def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: Memory) -> tuple[Vector, Memory]:
-    """Control torque (N m, body)."""
+    """Return the control torque (N m, body)."""
     s = add(measurement.rate, apply(gains.surface_gain, vector_part(measurement.attitude)))
     direction = signs(s)
     v = subtract(memory.acceleration, scale(measurement.period, times(gains.k2, direction)))
@@ -71,7 +71,7 @@ def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: Memory)
 
 
 def examples() -> list[Gains]:
-    """Gains for a body of a few kg m2 with 1e-2 N m: one slope for all axes, and a full matrix."""
+    """Return gains for a body of a few kg m2 with 1e-2 N m: one slope for all axes, and a full matrix."""
     slanted = ((0.08, 0.01, 0.0), (0.01, 0.1, 0.0), (0.0, 0.0, 0.12))
     plain = Gains((0.08, 0.08, 0.08), (1.2e-4, 1.2e-4, 1.2e-4), (3e-5, 3e-5, 3e-5))
     return [plain, Gains(slanted, (4e-4, 3e-4, 2e-4), (6e-5, 8e-5, 5e-5))]

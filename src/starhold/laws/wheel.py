@@ -1,4 +1,4 @@
-"""Feedback on the direction cosines, with the momentum of the wheels and the modelled torque compensated."""
+"""Feedback acts on the direction cosines, with the momentum of the wheels and the modelled torque compensated."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CARD = Card(
 
 
 class Gains(NamedTuple):
-    """Damping, stiffness, and how much of what the model knows is compensated."""
+    """The gains are damping, stiffness, and the share of the modelled torque that is compensated."""
 
     k_rate: Annotated[float, Gain("N m s", above=0.0, text="damping")]
     k_attitude: Annotated[Vector, Gain("N m", above=0.0, shape=(3,), text="weights of 1 - a_ii, one for all or one each")]
@@ -35,7 +35,7 @@ class Gains(NamedTuple):
 
 
 class Stability(NamedTuple):
-    """The largest degree of stability within the torque of the wheels, in closed form."""
+    """The form asks for the largest degree of stability within the torque of the wheels, in closed form."""
 
     torque: Annotated[float, Gain("N m", above=0.0, text="largest torque about an axis")]
     momentum: Annotated[float, Gain("N m s", above=0.0, text="largest stored momentum about an axis; sets the unit of time")]
@@ -50,14 +50,15 @@ FORMS: dict[str, Any] = {"degree-of-stability": Stability}
 
 
 def design(craft: Craft, spec: Stability) -> Gains:
-    """Gains of the largest degree of stability; ValueError where angle and rate are zero, so that nothing bounds them."""
+    """Return gains of the largest degree of stability; ValueError where angle and rate are zero, so that nothing bounds
+    them."""
     found = _optimum(craft, spec)
     k = found.k_attitude
     return Gains(found.k_rate, (k, k, k), spec.compensation)
 
 
 def explain(craft: Craft, spec: Stability) -> list[tuple[str, Any]]:
-    """The scaled problem, its optimum, and what a search over all gains within the budget finds."""
+    """Return the scaled problem, its optimum, and what a search over all gains within the budget finds."""
     found = _optimum(craft, spec)
     budget = (spec.angle, spec.rate * found.t0, found.L)
     searched = brute_force(found.ratios, *budget)
@@ -74,7 +75,7 @@ def explain(craft: Craft, spec: Stability) -> list[tuple[str, Any]]:
 
 
 def map_inputs(craft: Craft, spec: Stability) -> tuple[Any, float, float, float]:
-    """Ratios, scaled angle and rate, and budget: what a map of the degree of stability is drawn from."""
+    """Return ratios, scaled angle and rate, and budget, which a map of the degree of stability is drawn from."""
     found = _optimum(craft, spec)
     return found.ratios, spec.angle, spec.rate * found.t0, found.L
 
@@ -86,12 +87,12 @@ def _optimum(craft: Craft, spec: Stability) -> Designed:
 
 
 def _twist(k: Vector, q: Vector) -> Vector:
-    """M q with M = tr(k) - diag(k): sum k_i (1 - a_ii) = 2 q.Mq."""
+    """Return M q with M = tr(k) - diag(k): sum k_i (1 - a_ii) = 2 q.Mq."""
     return ((k[1] + k[2]) * q[0], (k[2] + k[0]) * q[1], (k[0] + k[1]) * q[2])
 
 
 def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
-    """Torque asked of the wheels (N m, body)."""
+    """Return the torque asked of the wheels (N m, body)."""
     q = vector_part(measurement.attitude)
     twist = _twist(gains.k_attitude, q)
     # S = 2 (q0 Mq + Mq x q), of which equal weights leave 4 k q0 q.
@@ -104,7 +105,7 @@ def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemor
 
 
 def lyapunov(measurement: Measurement, gains: Gains, craft: Craft) -> Scalar:
-    """V = w.Jw/2 + sum k_i (1 - a_ii) = w.Jw/2 + 2 q.Mq (J); V' = -k_rate |w|2 with full compensation.
+    """Return V = w.Jw/2 + sum k_i (1 - a_ii) = w.Jw/2 + 2 q.Mq (J); V' = -k_rate |w|2 with full compensation.
 
     At rest S = 0 also at half turns: about the three axes, or, where weights are equal, about any axis in their plane. V
     falls from each of them in some direction, so that they are unstable.
@@ -114,5 +115,5 @@ def lyapunov(measurement: Measurement, gains: Gains, craft: Craft) -> Scalar:
 
 
 def examples() -> list[Gains]:
-    """Gains for a body of a few kg m2."""
+    """Return gains for a body of a few kg m2."""
     return [Gains(0.09, (0.0045, 0.0045, 0.0045)), Gains(0.5, (0.02, 0.025, 0.03))]

@@ -1,4 +1,4 @@
-"""Keeping a circle about a libration point by sunlight: what it asks of the control and of the sail, by formula.
+"""A circle about a libration point is kept by sunlight: formulas tell what it asks of the control and of the sail.
 
 The circle lies across the X axis, so that the solar cells see the Sun past the body in front of it, and is flown at a
 constant rate. Rates here are in units of Omega, accelerations in scaled units a unit of the circle's radius, unless said
@@ -30,13 +30,13 @@ Field = Callable[[Vector, Vector, Libration], Vector]
 
 
 def pressure_at(distance: float) -> float:
-    """Pressure of sunlight (N/m2) on a black surface facing the Sun at this distance from it (m)."""
+    """Return the pressure of sunlight (N/m2) on a black surface facing the Sun at this distance from it (m)."""
     return SOLAR_CONSTANT / LIGHT_SPEED * (AU / distance) ** 2
 
 
 def best_rate(plant: Libration) -> float:
-    """The rate w = sqrt(C - 2 Omega2) at which a circle asks least of the control. ValueError where there is none above
-    zero, as at L3."""
+    """Return the rate w = sqrt(C - 2 Omega2) at which a circle asks least of the control. ValueError where there is none
+    above zero, as at L3."""
     square = plant.stiffness / plant.rate**2 - 2.0
     if square <= 0.0:
         raise ValueError(f"no rate is best here: C - 2 Omega^2 = {square:.6g} Omega^2 is not positive")
@@ -44,15 +44,15 @@ def best_rate(plant: Libration) -> float:
 
 
 def demand(rate: float, plant: Libration) -> float:
-    """The largest control acceleration on a circle a unit in radius: sqrt(4 Omega2 w2 + (C - w2)2), met where the circle
-    crosses the plane y = 0. At the best rate it is 2 Omega sqrt(C - Omega2)."""
+    """Return the largest control acceleration on a circle a unit in radius: sqrt(4 Omega2 w2 + (C - w2)2), met where the
+    circle crosses the plane y = 0. At the best rate it is 2 Omega sqrt(C - Omega2)."""
     turning = rate * plant.rate
     return math.hypot(2.0 * plant.rate * turning, plant.stiffness - turning * turning)
 
 
 def rates_held(resource: float, plant: Libration) -> tuple[float, float] | None:
-    """The lowest and the highest rate of a circle a unit in radius that this control acceleration holds; None where it holds
-    no rate at all."""
+    """Return the lowest and the highest rate of a circle a unit in radius that this control acceleration holds; None where
+    it holds no rate at all."""
     best, least = best_rate(plant), demand(best_rate(plant), plant)
     if resource < least:
         return None
@@ -61,7 +61,7 @@ def rates_held(resource: float, plant: Libration) -> tuple[float, float] | None:
 
 
 def time_on_limit(resource: float, rate: float, plant: Libration) -> float:
-    """The part of a revolution in which a circle a unit in radius asks for more than this control acceleration."""
+    """Return the part of a revolution in which a circle a unit in radius asks for more than this control acceleration."""
     turning = rate * plant.rate
     least = plant.stiffness - plant.rate**2 - turning * turning
     # |u|2 is peak2 sin2 + least2 cos2 of the phase.
@@ -73,8 +73,8 @@ def time_on_limit(resource: float, rate: float, plant: Libration) -> float:
 def required(
     phase: float, rate: float, radius: float, plant: Libration, field: Field = linear, centre: float = 0.0
 ) -> Vector:
-    """The control acceleration (scaled) that keeps the craft on a circle of this radius (scaled) about a place on the X
-    axis, at this phase from Y towards Z."""
+    """Return the control acceleration (scaled) that keeps the craft on a circle of this radius (scaled) about a place on the
+    X axis, at this phase from Y towards Z."""
     turning = rate * plant.rate
     y, z = radius * math.cos(phase), radius * math.sin(phase)
     inward = (0.0, -turning * turning * y, -turning * turning * z)
@@ -84,7 +84,8 @@ def required(
 def peak_required(
     rate: float, radius: float, plant: Libration, field: Field = linear, centre: float = 0.0, push: float = 0.0
 ) -> float:
-    """The largest control acceleration (scaled) round the circle, next to a steady push along X (scaled), by going round."""
+    """Return the largest control acceleration (scaled) round the circle, next to a steady push along X (scaled), by going
+    round."""
     phases: list[float] = np.linspace(0.0, 2.0 * math.pi, 3601).tolist()
     steady = (push, 0.0, 0.0)
     return max(norm(subtract(required(phase, rate, radius, plant, field, centre), steady)) for phase in phases)
@@ -106,9 +107,9 @@ class Deficit(NamedTuple):
 
 @dataclass(frozen=True)
 class Station:
-    """A circle about a libration point and the sail that keeps it: two bodies of which the larger is the Sun, the name of
-    the point (L1 or L2), the circle's radius (m), the parts of light reflected as by a mirror and in all directions, and the
-    pressure of the whole Sun's light (N/m2; None for what there is at the point)."""
+    """A station is a circle about a libration point and the sail that keeps it: two bodies of which the larger is the Sun,
+    the name of the point (L1 or L2), the circle's radius (m), the parts of light reflected as by a mirror and in all
+    directions, and the pressure of the whole Sun's light (N/m2; None for what there is at the point)."""
 
     pair: Primaries
     point: str
@@ -119,16 +120,16 @@ class Station:
 
     @property
     def plant(self) -> Libration:
-        """The libration point, lengths in Earth diameters."""
+        """Return the libration point, lengths in Earth diameters."""
         return self.pair.point(self.point)
 
     @property
     def units(self) -> Units:
-        """The scaled units of `plant`."""
+        """Return the scaled units of `plant`."""
         return self.pair.units()
 
     def light(self, offset: float) -> float:
-        """The part of the Sun that is seen at this distance from the X axis (m), real sizes of both discs."""
+        """Return the part of the Sun that is seen at this distance from the X axis (m), real sizes of both discs."""
         plant = self.plant
         if plant.from_smaller <= 0.0:
             return 1.0
@@ -138,7 +139,8 @@ class Station:
 
     @property
     def clear_radius(self) -> float:
-        """From this distance from the X axis on (m) the whole Sun is seen; 0 where nothing stands in front of it."""
+        """Return the distance from the X axis (m) from which on the whole Sun is seen; 0 where nothing stands in front of
+        it."""
         plant = self.plant
         if plant.from_smaller <= 0.0:
             return 0.0
@@ -147,7 +149,7 @@ class Station:
 
     @property
     def pressure(self) -> float:
-        """Pressure of the light that reaches the circle (N/m2)."""
+        """Return the pressure of the light that reaches the circle (N/m2)."""
         full = (
             pressure_at(abs(self.plant.from_larger) * EARTH_DIAMETER) if self.full_pressure is None else self.full_pressure
         )
@@ -155,21 +157,21 @@ class Station:
 
     @property
     def rate(self) -> float:
-        """The best rate (Omega)."""
+        """Return the best rate (Omega)."""
         return best_rate(self.plant)
 
     def period(self, rate: float | None = None) -> float:
-        """One revolution of the circle (s), at the best rate if none is given."""
+        """Return the time of one revolution of the circle (s), at the best rate if none is given."""
         return self.pair.period / (self.rate if rate is None else rate)
 
     def peak(self, rate: float | None = None) -> float:
-        """Peak demand (m/s2), at the best rate if none is given."""
+        """Return the peak demand (m/s2), at the best rate if none is given."""
         scaled = demand(self.rate if rate is None else rate, self.plant)
         return scaled * self.radius * self.units.rate**2
 
     def area_per_mass(self, rate: float | None = None, specular: float | None = None) -> float:
-        """The least sail for this circle (m2/kg), at the best rate if none is given: peak demand over pressure times the
-        radius of the largest ball of forces. With another specular part the diffuse one keeps to what is left."""
+        """Return the least sail for this circle (m2/kg), at the best rate if none is given: peak demand over pressure times
+        the radius of the largest ball of forces. With another specular part the diffuse one keeps to what is left."""
         mirror = self.specular if specular is None else specular
         return self.peak(rate) / (self.pressure * ball(mirror, min(self.diffuse, 1.0 - mirror)).radius)
 
@@ -178,8 +180,8 @@ class Station:
         return area / (mass * self.area_per_mass(rate))
 
     def peak_full(self, field: Field) -> float:
-        """Peak demand (m/s2) at the best rate as one goes round the circle in a given field, moved towards the Sun by what
-        the steady push of the smallest sail asks in the linear one."""
+        """Return the peak demand (m/s2) at the best rate as one goes round the circle in a given field, moved towards the
+        Sun by what the steady push of the smallest sail asks in the linear one."""
         plant, units = self.plant, self.units
         steady = ball(self.specular, self.diffuse)
         push = self.peak() * steady.centre / steady.radius / units.acceleration
@@ -201,8 +203,8 @@ class Station:
         )
 
     def _dimmed(self, radius: float) -> float:
-        """The largest radius at which a sail holds the circle in the light of that place, if in the light of the planned
-        circle it holds `radius`."""
+        """Return the largest radius at which a sail holds the circle in the light of that place, if in the light of the
+        planned circle it holds `radius`."""
         here = self.light(self.radius)
         # The light grows with the radius, so going on from above the steps only ever shrink, towards the largest answer.
         found = radius if radius <= self.radius else radius / here

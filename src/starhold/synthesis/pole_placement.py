@@ -1,4 +1,4 @@
-"""Exact pole placement by multi-level decomposition: u = -K x gives A - B K any spectrum, for any controllable A, B.
+"""Poles are placed exactly by multi-level decomposition: u = -K x gives A - B K any spectrum, for any controllable A, B.
 
 Level k is a pair A_k (n_k, n_k), B_k; the first is A, B. Its inputs act through r_k = rank B_k independent directions, the
 columns of R_k: Bhat_k = B_k R_k has full column rank r_k. With P_k the annihilator of B_k (full row rank, P_k B_k = 0),
@@ -69,7 +69,7 @@ class UncontrollableError(ValueError):
 
 
 class Placement(NamedTuple):
-    """A feedback u = -K x, K (m, n), and how it was made.
+    """A placement is a feedback u = -K x, K (m, n), and how it was made.
 
     spectra: Phi_k (r_k, r_k) of each level, the inputs' first, complex only where two levels share a pair of poles;
     directions: R_k; strength: the smallest singular value of each B_k beside the size of the balanced A (of the first:
@@ -84,7 +84,7 @@ class Placement(NamedTuple):
 
 
 class _Level(NamedTuple):
-    """One level in bases where Bhat is `rows` transposed: a (size, size), rows (r, size), p (size - r, size).
+    """A level is written in bases where Bhat is `rows` transposed: a (size, size), rows (r, size), p (size - r, size).
 
     B = Bhat across and across right = E (r, r). The Bhat_k of the formulas is Bhat scale, up to a positive factor.
     """
@@ -100,12 +100,12 @@ class _Level(NamedTuple):
 
 
 def levels(A: ArrayLike, B: ArrayLike) -> list[int]:
-    """How many poles each level takes, the inputs' first, n in all. A: (n, n), B: (n, m). Errors as those of `place`."""
+    """Tell how many poles each level takes, the inputs' first, n in all. A: (n, n), B: (n, m). Errors as of `place`."""
     return [len(level.rows) for level in _decomposed(*_pair(A, B), None, None)[0]]
 
 
 def is_stable(poles: ArrayLike) -> bool:
-    """Whether all poles have a negative real part."""
+    """Tell whether all poles have a negative real part."""
     return bool((np.real(poles) < 0.0).all())
 
 
@@ -119,7 +119,7 @@ def place(
     directions: Choice | None = None,
     allowed: float = ALLOWED,
 ) -> Placement:
-    """K that gives A - B K these poles. A: (n, n), B: (n, m), real; poles in the unit of A.
+    """Return K that gives A - B K these poles. A: (n, n), B: (n, m), real; poles in the unit of A.
 
     Either poles: (n,), real or in conjugate pairs, in any order, each as often as wanted. The slower ones go farther from
     the inputs; pairs are real 2x2 blocks in one level, where a distribution allows it, else shared by two. Or spectra: real
@@ -165,7 +165,7 @@ def place(
 
 
 def reached(A: ArrayLike, B: ArrayLike, K: ArrayLike) -> Complexes:
-    """Eigenvalues (n,) of A - B K for the very numbers given, A (n, n), B (n, m), K (m, n), by their real part.
+    """Return eigenvalues (n,) of A - B K for the very numbers given, A (n, n), B (n, m), K (m, n), by their real part.
 
     Rounding of K alone spreads a pole of multiplicity k by about the k-th root of that rounding.
     """
@@ -177,7 +177,7 @@ def reached(A: ArrayLike, B: ArrayLike, K: ArrayLike) -> Complexes:
 
 
 def displacement(A: ArrayLike, B: ArrayLike, K: ArrayLike, poles: ArrayLike) -> float:
-    """How far the eigenvalues of A - B K are from poles (n,), relative, to first order, without rounding but that of K.
+    """Tell how far the eigenvalues of A - B K are from poles (n,), relative, to first order, without rounding but that of K.
 
     Simple poles: the largest distance, by the pole's size. Poles closer than NEAR, equal ones above all, are no such smooth
     functions of K, but the polynomial with these roots is: of k of them, about their mean, the change of its coefficient of
@@ -217,7 +217,7 @@ def _displacement(a: Array, b: Array, gain: Array, poles: Sequence[complex | acb
 
 
 def _clusters(poles: list[complex]) -> list[list[int]]:
-    """Places of poles that are near one another, directly or by others between them."""
+    """Return places of poles that are near one another, directly or by others between them."""
     found: list[list[int]] = []
     for i, pole in enumerate(poles):
         near = [old for old in found if any(abs(pole - poles[j]) <= NEAR * max(abs(pole), abs(poles[j])) for j in old)]
@@ -226,7 +226,7 @@ def _clusters(poles: list[complex]) -> list[list[int]]:
 
 
 def _closed(a: Array, b: Array, gain: Array) -> arb_mat:
-    """A - B K in working precision."""
+    """Return A - B K in working precision."""
     from flint import arb_mat
 
     if gain.shape != b.T.shape or not np.isfinite(gain).all():
@@ -235,7 +235,7 @@ def _closed(a: Array, b: Array, gain: Array) -> arb_mat:
 
 
 def _roots(spectra: Sequence[Array]) -> list[acb]:
-    """Eigenvalues of all the matrices, in working precision: doubles know those of Jordan blocks to few digits."""
+    """Return eigenvalues of all the matrices, in working precision: doubles know those of Jordan blocks to few digits."""
     from flint import acb_mat, arb_mat, ctx
 
     with ctx.workprec(BITS):
@@ -245,7 +245,7 @@ def _roots(spectra: Sequence[Array]) -> list[acb]:
 def _decomposed(
     a: Array, b: Array, annihilators: Choice | None, directions: Choice | None
 ) -> tuple[list[_Level], Array, Array]:
-    """The levels, and the units of the states (n,) and of the inputs (m,) in which they are written."""
+    """Return the levels, and the units of the states (n,) and of the inputs (m,) in which they are written."""
     # By name, for the types of the library are too loose for a strict checker.
     library: Any = import_module("scipy.linalg")
     a, (units, _) = library.matrix_balance(a, permute=False, separate=True)
@@ -292,7 +292,7 @@ def _chosen(name: str, choice: Choice | None, at: int, given: Array, shape: tupl
 
 
 def _chosen_directions(choice: Choice | None, at: int, given: Array, reply: Array) -> Array:
-    """R (m, r) of a level whose B is `given` (n, m), an orthonormal basis times `reply` (r, m)."""
+    """Return R (m, r) of a level whose B is `given` (n, m), an orthonormal basis times `reply` (r, m)."""
     rank, inputs = reply.shape
     turn = _chosen("directions", choice, at, given, (inputs, rank))
     if turn is None:
@@ -304,7 +304,8 @@ def _chosen_directions(choice: Choice | None, at: int, given: Array, reply: Arra
 
 
 def _chosen_annihilator(choice: Choice | None, at: int, given: Array, unit: Array, rows: Array, usual: Array) -> Array:
-    """P (rest, n) of a level, in units (n,), whose B, `given`, spans the orthonormal `rows` (r, n) and leaves `usual`."""
+    """Return P (rest, n) of a level, in units (n,), whose B, `given`, spans the orthonormal `rows` (r, n) and leaves
+    `usual`."""
     p = _chosen("annihilators", choice, at, given, usual.shape) if len(usual) else None
     if p is None:
         return usual
@@ -319,8 +320,8 @@ def _chosen_annihilator(choice: Choice | None, at: int, given: Array, unit: Arra
 
 
 def _dealt(poles: list[complex], sizes: list[int]) -> list[list[complex]]:
-    """The poles of each level, the inputs' first: p, p* side by side, but one of a shared pair last in the level below and
-    first in the level above. Real poles are kept for the levels that have an odd place."""
+    """Return the poles of each level, the inputs' first: p, p* side by side, but one of a shared pair last in the level
+    below and first in the level above. Real poles are kept for the levels that have an odd place."""
     slow = sorted(poles, key=lambda pole: (abs(pole), pole.real, pole.imag))
     reals, pairs = ([p for p in slow if p.imag == 0.0], [p for p in slow if p.imag > 0.0])
     dealt: list[list[complex]] = []
@@ -341,7 +342,7 @@ def _dealt(poles: list[complex], sizes: list[int]) -> list[list[complex]]:
 
 
 def _blocks(dealt: list[list[complex]], found: list[_Level]) -> list[NDArray[Any]]:
-    """A matrix with the poles dealt to each level, real but for shared pairs."""
+    """Return a matrix with the poles dealt to each level, real but for shared pairs."""
     blocks: list[NDArray[Any]] = []
     along: tuple[Array, Array] | None = None
     for poles, level in zip(reversed(dealt), reversed(found), strict=True):

@@ -1,4 +1,4 @@
-"""Gains of feedback on rate and quaternion from what the closed loop is to do: bandwidth and damping, or when it settles.
+"""Gains of feedback on rate and quaternion follow from requirements: bandwidth and damping, or when the loop settles.
 
 The linear loop J a'' + k_rate a' + k_attitude a/2 = 0 (a an angle, q = a/2) has about a principal axis of moment J_i the
 natural frequency sqrt(k_attitude/(2 J_i)) and the damping ratio k_rate/sqrt(2 J_i k_attitude): with one number for all axes
@@ -36,16 +36,16 @@ IN_HAND = 0.99
 
 
 class Bandwidth(NamedTuple):
-    """Natural frequency and damping of the linear loop: exact about the axis of the largest moment of inertia, more about
-    the others."""
+    """The form asks for the natural frequency and damping of the linear loop: exact about the axis of the largest moment of
+    inertia, more about the others."""
 
     bandwidth: Annotated[float, Gain("rad/s", above=0.0, text="natural frequency, the least of all axes")]
     damping: Annotated[float, Gain("1", above=0.0, text="damping ratio, the least of all axes")] = 0.7
 
 
 class Settling(NamedTuple):
-    """The lowest gains that settle in time, within the torque that there is, found by integrating the turn: towards a target
-    at rest, without torque from outside."""
+    """The form asks for the lowest gains that settle in time, within the torque that there is, found by integrating the
+    slew: towards a target at rest, without torque from outside."""
 
     time: Annotated[float, Gain("s", above=0.0, text="after which angle and rate stay within their tolerances")]
     damping: Annotated[float, Gain("1", above=0.0, text="damping ratio, the least of all axes")] = 0.7
@@ -72,7 +72,7 @@ Spec = TypeVar("Spec", bound=NamedTuple)
 
 
 def complete(spec: Spec, start: Callable[[], Start]) -> Spec:
-    """The inputs of a form that settles in time, with what they leave to the scenario."""
+    """Return the inputs of a form that settles in time, with what they leave to the scenario."""
     left = [name for name in Start.__dataclass_fields__ if getattr(spec, name, 0) is None]
     return spec._replace(**{name: getattr(start(), name) for name in left}) if left else spec
 
@@ -87,12 +87,12 @@ class Turn(NamedTuple):
 
 
 def largest_moment(craft: Craft) -> float:
-    """The largest principal moment of inertia (kg m2)."""
+    """Return the largest principal moment of inertia (kg m2)."""
     return float(np.linalg.eigvalsh(tensor(craft.inertia))[-1])
 
 
 def feedback(craft: Craft, bandwidth: float, damping: float) -> tuple[float, float]:
-    """k_rate (N m s) and k_attitude (N m); ValueError where they are no finite positive numbers."""
+    """Return k_rate (N m s) and k_attitude (N m); ValueError where they are no finite positive numbers."""
     moment = largest_moment(craft)
     gains = 2.0 * damping * bandwidth * moment, 2.0 * bandwidth * bandwidth * moment
     if not all(math.isfinite(gain) and gain > 0.0 for gain in gains):
@@ -101,7 +101,7 @@ def feedback(craft: Craft, bandwidth: float, damping: float) -> tuple[float, flo
 
 
 def fastest(craft: Craft, gains: Any) -> float:
-    """A bound on the fastest rate (1/s) of the linear loop with k_rate and k_attitude."""
+    """Return a bound on the fastest rate (1/s) of the linear loop with k_rate and k_attitude."""
     least = float(np.linalg.eigvalsh(tensor(craft.inertia))[0])
     return max(gains.k_rate / least, math.sqrt(0.5 * gains.k_attitude / least))
 
@@ -113,7 +113,7 @@ def settle(
     craft: Craft,
     spec: Any,
 ) -> tuple[Any, Turn]:
-    """The gains of the least scale x (1/s) that settle in time, and their turn.
+    """Return the gains of the least scale x (1/s) that settle in time, and their slew.
 
     gains_of(x): the gains; rate_of(gains): the fastest rate (1/s) of the loop, which the integration must resolve.
     ValueError says what time can be had where the torque or the momentum does not allow the one that is asked for.
@@ -149,7 +149,7 @@ def settle(
 
 
 def _border(turn: Callable[..., Turn], allowed: Callable[[Turn], bool], low: float, high: float) -> float:
-    """The largest scale that is allowed, between one that is (or zero) and one that is not."""
+    """Return the largest scale that is allowed, between one that is (or zero) and one that is not."""
     while low == 0.0 and high > 0.0 and not allowed(turn(0.5 * high)):
         high *= 0.5
     for _ in range(30):
@@ -159,7 +159,7 @@ def _border(turn: Callable[..., Turn], allowed: Callable[[Turn], bool], low: flo
 
 
 def _soonest(turn: Callable[..., Turn], allowed: Callable[[Turn], bool], most: float) -> float:
-    """About the shortest time in which any scale up to `most` settles."""
+    """Return about the shortest time in which any scale up to `most` settles."""
     best = math.inf
     for x in (most / 1.1**k for k in range(80) if most > 0.0):
         settled = None
@@ -182,8 +182,8 @@ def _refusal(spec: Any, best: float, found: Turn) -> str:
 
 
 def fly(torque: Callable[..., Any], gains: Any, craft: Craft, spec: Any, horizon: float, rate: float) -> Turn:
-    """The turn of a body under a law, which acts on it without pause, from the start of a form over a horizon (s). `rate`:
-    the fastest (1/s) of the loop. ValueError where that is too fast to be followed."""
+    """Fly the slew of a body under a law, which acts on it without pause, from the start of a form over a horizon (s).
+    `rate`: the fastest (1/s) of the loop. ValueError where that is too fast to be followed."""
     speed = math.hypot(*spec.rate)
     least = max(rate, speed) * horizon / (STEPS * RESOLVED)
     many = next((m for m in (1, 4, 16, MOST) if m >= least), None)
@@ -203,7 +203,7 @@ def fly(torque: Callable[..., Any], gains: Any, craft: Craft, spec: Any, horizon
 
 
 class _Like:
-    """Arguments of a kernel, equal to others of the same form."""
+    """Arguments of a kernel are equal to others of the same form."""
 
     def __init__(self, values: Any) -> None:
         self.values, self.form = values, _form(values)
@@ -223,8 +223,8 @@ def _form(value: Any) -> Any:
 
 @cache
 def _flight(torque: Callable[..., Any], count: int, wheels: bool, like: _Like) -> Compiled:
-    """The turn, compiled: gains, craft, start, step and squared ends give the last step at which angle or rate was outside
-    (-1: at none), and the largest squares of torque and of the momentum that wheels store."""
+    """Compile the slew: gains, craft, start, step and squared ends give the last step at which angle or rate was outside
+    (-1: at none), and the largest squares of torque and of the wheel momentum."""
 
     def motion(state: Any, gains: Any, craft: Craft, step: Scalar) -> Any:
         attitude, rate, stored = state
@@ -263,7 +263,8 @@ def _flight(torque: Callable[..., Any], count: int, wheels: bool, like: _Like) -
 def designs(
     make: Callable[[float, float], Any], torque: Callable[..., Any]
 ) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """`design` and `explain` of a law with these two forms: `make` gives its gains of damping and stiffness (N m s, N m)."""
+    """Return `design` and `explain` of a law with these two forms: `make` gives its gains of damping and stiffness (N m s, N
+    m)."""
 
     @lru_cache(maxsize=64)
     def settled(craft: Craft, spec: Settling) -> tuple[Any, Turn]:
@@ -286,7 +287,7 @@ def designs(
 
 
 def explained(craft: Craft, k_rate: float, k_attitude: float) -> list[tuple[str, Any]]:
-    """Natural frequency and damping about each principal axis, and the linear loop's eigenvalues."""
+    """Return natural frequency and damping about each principal axis, and the linear loop's eigenvalues."""
     moments = np.linalg.eigvalsh(tensor(craft.inertia))
     roots = np.array([np.roots([moment, k_rate, 0.5 * k_attitude]) for moment in moments]).ravel()
     return [

@@ -1,4 +1,5 @@
-"""The Riccati equation of regulators at rest on target, for any inertia and any weights, and what judges its solution.
+"""The Riccati equation of regulators is solved at rest on target, for any inertia and any weights, and its solution is
+judged.
 
 State (w; q) of body rate (rad/s) and the quaternion's vector part, J w' = u, q' = w/2, cost x'Qx + u'Ru: Q is (6, 6) with
 the rate first, R (3, 3). Weights and moments may span so many orders of magnitude that doubles lose every digit on the way,
@@ -32,21 +33,22 @@ OUT_OF_RANGE = "the weights are too large or too small for gains to be computed"
 
 
 class Regulator(NamedTuple):
-    """P (6, 6) of the Riccati equation, rate first, and the feedback [K_rate, K_attitude] (3, 6) of u = -K x."""
+    """A regulator holds P (6, 6) of the Riccati equation, rate first, and the feedback [K_rate, K_attitude] (3, 6) of u = -K
+    x."""
 
     p: Array
     feedback: Array
 
 
 def closed_form(moments: Array, q: Array, r: Array) -> tuple[Array, Array]:
-    """Diagonal gains for principal moments (3,), weights q (6,), rate first, and r (3,):
-    K_attitude = y = sqrt(q_attitude / r), K_rate = sqrt(J y + q_rate / r)."""
+    """Return diagonal gains for principal moments (3,), weights q (6,), rate first, and r (3,): K_attitude = y =
+    sqrt(q_attitude / r), K_rate = sqrt(J y + q_rate / r)."""
     y = np.sqrt(q[3:] / r)
     return np.sqrt(moments * y + q[:3] / r), y
 
 
 def linear_model(inertia: Array) -> tuple[Array, Array]:
-    """A (6, 6) and B (6, 3) of the motion near rest on target, state (w; q): w' = J^-1 u, q' = w/2."""
+    """Return A (6, 6) and B (6, 3) of the motion near rest on target, state (w; q): w' = J^-1 u, q' = w/2."""
     a, b = np.zeros((6, 6)), np.zeros((6, 3))
     a[3:, :3] = 0.5 * np.eye(3)
     b[:3] = np.linalg.inv(inertia)
@@ -54,12 +56,13 @@ def linear_model(inertia: Array) -> tuple[Array, Array]:
 
 
 def is_full(inertia: Array) -> bool:
-    """Whether anything stands beside the diagonal."""
+    """Tell whether anything stands beside the diagonal."""
     return bool(np.count_nonzero(inertia - np.diag(np.diagonal(inertia))))
 
 
 def principal(inertia: Array) -> tuple[Array, Array]:
-    """Principal moments (3,), rising, and their axes as columns (3, 3) of a symmetric inertia (3, 3), to the last digit.
+    """Return principal moments (3,), rising, and their axes as columns (3, 3) of a symmetric inertia (3, 3), to the last
+    digit.
 
     Doubles know a small moment only to the rounding of the largest, and axes to that over the difference of their moments.
     So they are refined as by Ogita and Aishima (Japan Journal of Industrial and Applied Mathematics 35, 2018). Axes of
@@ -90,7 +93,7 @@ def principal(inertia: Array) -> tuple[Array, Array]:
 
 
 def solve_riccati(inertia: Array, q: Array, r: Array) -> Regulator:
-    """The regulator of positive definite Q and R, right to the last digit for the numbers given.
+    """Return the regulator of positive definite Q and R, right to the last digit for the numbers given.
 
     Newton's method in Kleinman's form (IEEE Transactions on Automatic Control 13, 1968): each step solves a Lyapunov
     equation for the cost P of a stable feedback and goes on with that of P, which falls and in the end converges
@@ -114,8 +117,8 @@ def solve_riccati(inertia: Array, q: Array, r: Array) -> Regulator:
 
 
 def _stable_feedback(inertia: Array, q: Array, r: Array) -> arb_mat:
-    """The closed form for the weights' diagonals about the principal axes. With any symmetric positive definite gains the
-    motion is that of a damped spring, hence stable, whatever the weights beside the diagonals are."""
+    """Return the closed form for the weights' diagonals about the principal axes. With any symmetric positive definite gains
+    the motion is that of a damped spring, hence stable, whatever the weights beside the diagonals are."""
     from flint import arb_mat
 
     with np.errstate(all="ignore"):
@@ -132,8 +135,8 @@ def _stable_feedback(inertia: Array, q: Array, r: Array) -> arb_mat:
 
 
 def riccati_residual(p: Array, inertia: Array, q: Array, r: Array) -> float:
-    """The largest entry of A'P + PA - P B R^-1 B'P + Q, relative to the terms on the diagonal of its row and column, so that
-    units do not matter; without rounding but that of P itself."""
+    """Return the largest entry of A'P + PA - P B R^-1 B'P + Q, relative to the terms on the diagonal of its row and column,
+    so that units do not matter; without rounding but that of P itself."""
     from flint import ctx
 
     with ctx.workprec(BITS):
@@ -149,7 +152,7 @@ def riccati_residual(p: Array, inertia: Array, q: Array, r: Array) -> float:
 
 
 def linear_modes(inertia: Array, feedback: Array) -> NDArray[np.complexfloating[Any]]:
-    """Eigenvalues (6,) of the motion near rest on target under u = -feedback x (1/s), the slowest first."""
+    """Return eigenvalues (6,) of the motion near rest on target under u = -feedback x (1/s), the slowest first."""
     from flint import acb_mat, ctx
 
     with ctx.workprec(BITS):
@@ -159,8 +162,8 @@ def linear_modes(inertia: Array, feedback: Array) -> NDArray[np.complexfloating[
 
 
 def scipy_axes(moments: Array, q: Array, r: Array) -> tuple[Array, Array, Array]:
-    """P11, P12, P22 (each (3,)) for principal moments (3,) and diagonal weights q (6,) and r (3,), by SciPy: the axes, which
-    do not touch one another, one by one, each in units in which r, J and the weight of the attitude are one."""
+    """Return P11, P12, P22 (each (3,)) for principal moments (3,) and diagonal weights q (6,) and r (3,), by SciPy: the
+    axes, which do not touch one another, one by one, each in units in which r, J and the weight of the attitude are one."""
     # By name, for the types of the library are too loose for a strict checker.
     library: Any = import_module("scipy.linalg")
     found = np.zeros((3, 3))
@@ -175,7 +178,7 @@ def scipy_axes(moments: Array, q: Array, r: Array) -> tuple[Array, Array, Array]
 
 
 def _lyapunov(a: arb_mat, weight: arb_mat) -> arb_mat:
-    """P of A'P + PA + weight = 0, symmetric."""
+    """Return P of A'P + PA + weight = 0, symmetric."""
     from flint import arb_mat
 
     size = a.nrows()
@@ -191,14 +194,14 @@ def _lyapunov(a: arb_mat, weight: arb_mat) -> arb_mat:
 
 
 def _moved(p: arb_mat, before: arb_mat) -> float:
-    """The largest change of an entry, relative to the root of the diagonal entries of its row and column."""
+    """Return the largest change of an entry, relative to the root of the diagonal entries of its row and column."""
     size = range(p.nrows())
     shares = [(p[i, j] - before[i, j]) ** 2 / (p[i, i] * p[j, j]) for i in size for j in size]
     return float(max(float(share) for share in shares)) ** 0.5
 
 
 def _exact_model(body: arb_mat) -> tuple[arb_mat, arb_mat]:
-    """`linear_model` in working precision."""
+    """Return `linear_model` in working precision."""
     a, _ = linear_model(np.eye(3))
     zero = np.zeros((3, 3))
     return _exact(a), (_exact(np.vstack([np.eye(3), zero])) * body.inv()).mid()

@@ -1,5 +1,5 @@
-"""Control by sunlight: the force on a flat reflecting panel, how to set a panel to get a wanted force, the forces that can
-be had at all, and how much of the Sun a body in front of it leaves to see.
+"""Sunlight gives the control: the force on a flat reflecting panel, how to set a panel to get a wanted force, the forces
+that can be had at all, and how much of the Sun a body in front of it leaves to see.
 
 Light travels along +X (at L1 and L2 the X axis of `libration`). A panel is set by its area, by the cone angle between the
 light and the panel's normal on its dark side, and by the clock angle of that normal about X, from Y towards Z.
@@ -28,9 +28,9 @@ MIRROR_CENTRE = 4.0 / 3.0 * math.sqrt(2.0 / 3.0)
 
 
 class Sail(NamedTuple):
-    """Pressure of sunlight on a black surface facing it (N/m2), area (m2), mass of the craft (kg), and the parts of the
-    light that are reflected as by a mirror and in all directions; the rest is absorbed, and given off on both sides alike.
-    """
+    """A sail has the pressure of sunlight on a black surface facing it (N/m2), area (m2), mass of the craft (kg), and the
+    parts of the light that are reflected as by a mirror and in all directions; the rest is absorbed, and given off on both
+    sides alike."""
 
     pressure: float
     area: float
@@ -40,7 +40,7 @@ class Sail(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """Area turned to the Sun (m2), cone angle (rad, 0 to pi/2) and clock angle (rad, -pi to pi)."""
+    """A setting is the area turned to the Sun (m2), cone angle (rad, 0 to pi/2) and clock angle (rad, -pi to pi)."""
 
     area: float
     cone: float
@@ -48,14 +48,14 @@ class Setting(NamedTuple):
 
 
 class Ball(NamedTuple):
-    """A ball of forces about a point on the X axis, in units of pressure times area."""
+    """The ball of forces lies about a point on the X axis, in units of pressure times area."""
 
     centre: float
     radius: float
 
 
 def make_sail(pressure: float, area: float, mass: float, specular: float = 1.0, diffuse: float = 0.0) -> Sail:
-    """A validated sail; ValueError where a number is out of range or more light is reflected than comes."""
+    """Return a validated sail; ValueError where a number is out of range or more light is reflected than comes."""
     for name, number in {"pressure": pressure, "area": area, "mass": mass}.items():
         if not 0.0 < number < math.inf:
             raise ValueError(f"the {name} must be positive and finite, not {number:g}")
@@ -64,7 +64,7 @@ def make_sail(pressure: float, area: float, mass: float, specular: float = 1.0, 
 
 
 def check_optics(specular: float, diffuse: float) -> None:
-    """ValueError unless the two are parts of the light that leave something to control with."""
+    """Raise ValueError unless the two are parts of the light that leave something to control with."""
     for name, number in {"specular": specular, "diffuse": diffuse}.items():
         if not 0.0 <= number <= 1.0:
             raise ValueError(f"the {name} reflectivity must be between 0 and 1, not {number:g}")
@@ -75,7 +75,7 @@ def check_optics(specular: float, diffuse: float) -> None:
 
 
 def force(normal: Vector, area: Scalar, sail: Sail) -> Vector:
-    """Force (N) on a flat panel of this area (m2) whose unit normal points away from the Sun, normal_x >= 0.
+    """Return the force (N) on a flat panel of this area (m2) whose unit normal points away from the Sun, normal_x >= 0.
 
     With c the cosine of the cone angle: pressure area c ((1 - specular) X + (2 specular c + 2/3 diffuse) normal)
     (McInnes, Solar Sailing, 2.6; without the recoil of its heat).
@@ -87,25 +87,26 @@ def force(normal: Vector, area: Scalar, sail: Sail) -> Vector:
 
 
 def mirror(wanted: Vector, pressure: Scalar) -> tuple[Scalar, Vector]:
-    """Area (m2) and unit normal of a perfect mirror that give this force (N) at this pressure (N/m2); the force must have a
-    part away from the Sun."""
+    """Return the area (m2) and unit normal of a perfect mirror that give this force (N) at this pressure (N/m2); the force
+    must have a part away from the Sun."""
     size = norm(wanted)
     return size * size * size / (2.0 * pressure * (wanted[0] * wanted[0])), scale(1.0 / size, wanted)
 
 
 def normal_of(setting: Setting) -> Vector:
-    """The unit normal of a panel."""
+    """Return the unit normal of a panel."""
     across = math.sin(setting.cone)
     return (math.cos(setting.cone), across * math.cos(setting.clock), across * math.sin(setting.clock))
 
 
 def given(setting: Setting, sail: Sail) -> Vector:
-    """The force (N) of a panel."""
+    """Return the force (N) of a panel."""
     return force(normal_of(setting), setting.area, sail)
 
 
 def set_for(wanted: Vector, sail: Sail) -> Setting:
-    """The panel of the least area that gives this force (N). In closed form for a mirror, else by halving the cone angle.
+    """Return the panel of the least area that gives this force (N). In closed form for a mirror, else by halving the cone
+    angle.
 
     ValueError where the force points too far from the light, or takes more area than there is.
     """
@@ -125,37 +126,38 @@ def set_for(wanted: Vector, sail: Sail) -> Setting:
 
 
 def steer(control: Vector, sail: Sail) -> Setting:
-    """The panel for a control acceleration (m/s2) reckoned from the centre of the ball of forces: the sail gives it and the
-    steady push `push(sail)` away from the Sun together. Every control within `reach(sail)` can be had. ValueError: see
-    `set_for`."""
+    """Return the panel for a control acceleration (m/s2) reckoned from the centre of the ball of forces: the sail gives it
+    and the steady push `push(sail)` away from the Sun together. Every control within `reach(sail)` can be had. ValueError:
+    see `set_for`."""
     return set_for(scale(sail.mass, (control[0] + push(sail), control[1], control[2])), sail)
 
 
 def steered(setting: Setting, sail: Sail) -> Vector:
-    """The control acceleration (m/s2) that a panel gives, the reverse of `steer`."""
+    """Return the control acceleration (m/s2) that a panel gives, the reverse of `steer`."""
     x, y, z = scale(1.0 / sail.mass, given(setting, sail))
     return (x - push(sail), y, z)
 
 
 def push(sail: Sail) -> float:
-    """Acceleration (m/s2) at the centre of the ball of forces: by push/(Omega2 + 2 C) the origin moves towards the Sun."""
+    """Return the acceleration (m/s2) at the centre of the ball of forces: by push/(Omega2 + 2 C) the origin moves towards
+    the Sun."""
     return ball(sail.specular, sail.diffuse).centre * sail.pressure * sail.area / sail.mass
 
 
 def reach(sail: Sail) -> float:
-    """Radius (m/s2) of the largest ball of control accelerations."""
+    """Return the radius (m/s2) of the largest ball of control accelerations."""
     return ball(sail.specular, sail.diffuse).radius * sail.pressure * sail.area / sail.mass
 
 
 def lean_of(cone: float, specular: float, diffuse: float) -> float:
-    """Angle between light and force (rad) for this cone angle."""
+    """Return the angle between light and force (rad) for this cone angle."""
     c, along = math.cos(cone), 2.0 * specular * math.cos(cone) + LAMBERT * diffuse
     return math.atan2(along * math.sin(cone), 1.0 - specular + along * c)
 
 
 def widest_cosine(specular: float, diffuse: float) -> float:
-    """Cosine of the cone angle at which the force leans farthest from the light. Beyond it the same directions come again,
-    with less force."""
+    """Return the cosine of the cone angle at which the force leans farthest from the light. Beyond it the same directions
+    come again, with less force."""
     a, b, e = 1.0 - specular, 2.0 * specular, LAMBERT * diffuse
     # The sign of d(lean)/d(cone) is that of (b2 + 2ab) c2 + (2be + ae) c + e2 - ab, which grows with c.
     if e * e >= a * b:
@@ -165,12 +167,12 @@ def widest_cosine(specular: float, diffuse: float) -> float:
 
 
 def max_lean(specular: float, diffuse: float) -> float:
-    """The farthest that a force can lean from the light (rad)."""
+    """Return the farthest that a force can lean from the light (rad)."""
     return lean_of(math.acos(widest_cosine(specular, diffuse)), specular, diffuse)
 
 
 def cone_for(lean: float, specular: float, diffuse: float) -> float:
-    """The smallest cone angle (rad) at which the force leans this far from the light (rad, at most `max_lean`)."""
+    """Return the smallest cone angle (rad) at which the force leans this far from the light (rad, at most `max_lean`)."""
     if specular == 1.0:
         return lean
     widest = math.acos(widest_cosine(specular, diffuse))
@@ -178,8 +180,9 @@ def cone_for(lean: float, specular: float, diffuse: float) -> float:
 
 
 def outline(specular: float, diffuse: float, count: int = 181) -> NDArray[np.float64]:
-    """The outline (count, 2) of the forces with all the area, along X and across it, in units of pressure times area: from
-    no lean to the widest. The set of all forces is what lies between it and the origin, turned about X; it is convex."""
+    """Return the outline (count, 2) of the forces with all the area, along X and across it, in units of pressure times area:
+    from no lean to the widest. The set of all forces is what lies between it and the origin, turned about X; it is
+    convex."""
     cone = np.linspace(0.0, math.acos(widest_cosine(specular, diffuse)), count)
     c, along = np.cos(cone), 2.0 * specular * np.cos(cone) + LAMBERT * diffuse
     return np.stack([c * (1.0 - specular + along * c), c * along * np.sin(cone)], axis=1)
@@ -187,9 +190,9 @@ def outline(specular: float, diffuse: float, count: int = 181) -> NDArray[np.flo
 
 @cache
 def ball(specular: float, diffuse: float) -> Ball:
-    """The largest ball about a point of the X axis within the forces that a sail can give. Exact for a mirror, else to ten
-    digits: the radius is a concave function of the centre, because the set is convex. Where nothing is scattered it is
-    `specular` times that of a mirror."""
+    """Return the largest ball about a point of the X axis within the forces that a sail can give. Exact for a mirror, else
+    to ten digits: the radius is a concave function of the centre, because the set is convex. Where nothing is scattered it
+    is `specular` times that of a mirror."""
     check_optics(specular, diffuse)
     if specular == 1.0:
         return Ball(MIRROR_CENTRE, MIRROR_RADIUS)
@@ -206,7 +209,8 @@ def ball(specular: float, diffuse: float) -> Ball:
 
 
 def room(centre: float, specular: float, diffuse: float) -> float:
-    """Distance from a point of the X axis to the nearest force that cannot be had (units of pressure times area)."""
+    """Return the distance from a point of the X axis to the nearest force that cannot be had (units of pressure times
+    area)."""
     a, b, e = 1.0 - specular, 2.0 * specular, LAMBERT * diffuse
     # The squared distance to the outline is a polynomial in the cosine c of the cone angle. Between the bends of its slope,
     # the slope changes its sign once at most: to try all such places finds every minimum.
@@ -225,7 +229,7 @@ def room(centre: float, specular: float, diffuse: float) -> float:
 
 
 def _quadratic(a: float, b: float, c: float) -> list[float]:
-    """The real roots of a x2 + b x + c, also where a is next to nothing."""
+    """Return the real roots of a x2 + b x + c, also where a is next to nothing."""
     inside = b * b - 4.0 * a * c
     if inside < 0.0:
         return []
@@ -234,15 +238,15 @@ def _quadratic(a: float, b: float, c: float) -> list[float]:
 
 
 def lit(offset: Any) -> NDArray[np.float64]:
-    """The part of the Sun's disc that can be seen at an offset from the axis in radii of the body before it (any shape),
-    where both discs look equal, as they nearly do at the Earth's L2: 1 - (2/pi)(arccos s - s sqrt(1 - s2)), s = offset/2.
-    """
+    """Return the part of the Sun's disc that can be seen at an offset from the axis in radii of the body before it (any
+    shape), where both discs look equal, as they nearly do at the Earth's L2: 1 - (2/pi)(arccos s - s sqrt(1 - s2)), s =
+    offset/2."""
     s = np.minimum(0.5 * np.abs(np.asarray(offset, dtype=float)), 1.0)
     return 1.0 - (2.0 / math.pi) * (np.arccos(s) - s * np.sqrt(1.0 - s * s))
 
 
 def lit_discs(separation: Any, sun: float, body: float) -> NDArray[np.float64]:
-    """The part of the Sun's disc (angular radius `sun`) that a disc of angular radius `body` leaves to see when their
+    """Return the part of the Sun's disc (angular radius `sun`) that a disc of angular radius `body` leaves to see when their
     centres are this far apart (any shape); angles in one unit, small, the Sun equally bright all over."""
     t = np.clip(np.abs(np.asarray(separation, dtype=float)), max(abs(sun - body), 1e-300), sun + body)
     ours = sun * sun * np.arccos(np.clip((t * t + (sun - body) * (sun + body)) / (2.0 * t * sun), -1.0, 1.0))

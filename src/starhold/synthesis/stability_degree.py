@@ -1,4 +1,5 @@
-"""Gains of u = -k_rate w - k_attitude S, S = 4 q0 q, with the largest degree of stability that a wheel's torque allows.
+"""Gains of u = -k_rate w - k_attitude S, S = 4 q0 q, are designed for the largest degree of stability that a wheel's torque
+allows.
 
 With the gyroscopic torque compensated, each axis obeys, near the target and with time in units of t0,
 
@@ -39,7 +40,7 @@ OUT_OF_RANGE = "the gains leave the range of floating-point numbers"
 
 
 class Optimum(NamedTuple):
-    """Scaled gains and the scaled degree of stability that they give."""
+    """An optimum is scaled gains and the scaled degree of stability that they give."""
 
     K_a: float
     K_w: float
@@ -47,7 +48,7 @@ class Optimum(NamedTuple):
 
 
 class Scale(NamedTuple):
-    """Units in which the equations have no dimension.
+    """The equations have no dimension in these units.
 
     moment: J_x (kg m2); t0: H_max / Hdot_max (s); L: the wheel's torque, Hdot_max t0^2 / J_x, which is also its momentum
     in units of J_x / t0; ratios: J_axis / J_x of the three axes.
@@ -59,16 +60,17 @@ class Scale(NamedTuple):
     ratios: tuple[float, float, float]
 
     def gains(self, K_a: float, K_w: float) -> tuple[float, float]:
-        """k_attitude (N m) and k_rate (N m s) of scaled gains."""
+        """Return k_attitude (N m) and k_rate (N m s) of scaled gains."""
         return K_a * self.moment / self.t0 / self.t0, K_w * self.moment / self.t0
 
     def scaled(self, k_attitude: float, k_rate: float) -> tuple[float, float]:
-        """K_a and K_w of gains in N m and N m s."""
+        """Return k_a and K_w of gains in N m and N m s."""
         return k_attitude * self.t0 * self.t0 / self.moment, k_rate * self.t0 / self.moment
 
 
 class Designed(NamedTuple):
-    """A design: t0 (s), L, ratios (3,), K_a, K_w and eta, all scaled, then eta in 1/s, k_attitude (N m), k_rate (N m s)."""
+    """A design is t0 (s), L, ratios (3,), K_a, K_w and eta, all scaled, then eta in 1/s, k_attitude (N m), k_rate (N m
+    s)."""
 
     t0: float
     L: float
@@ -82,7 +84,7 @@ class Designed(NamedTuple):
 
 
 def degree(K_a: ArrayLike, K_w: ArrayLike, ratios: ArrayLike) -> Array:
-    """Degree of stability, -max Re l over the axes (1/t0), of scaled gains of any sign.
+    """Return the degree of stability, -max Re l over the axes (1/t0), of scaled gains of any sign.
 
     K_a and K_w have any shapes (...) that broadcast; ratios is (n,), or (..., n) with one set of ratios for each pair of
     gains. Returns (...). ValueError where a ratio is not positive.
@@ -101,14 +103,14 @@ def degree(K_a: ArrayLike, K_w: ArrayLike, ratios: ArrayLike) -> Array:
 
 
 def boundary(ratios: ArrayLike) -> float:
-    """c of the curve K_a = c K_w^2: above it the oscillation of the largest moment's axis decides eta, below it the slow
-    aperiodic motion of the smallest's. ratios: (3,), positive, else ValueError."""
+    """Return c of the curve K_a = c K_w^2: above it the oscillation of the largest moment's axis decides eta, below it the
+    slow aperiodic motion of the smallest's. ratios: (3,), positive, else ValueError."""
     a, b = _extremes(ratios)
     return (2.0 - a / b) / (8.0 * b)
 
 
 def optimum(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> Optimum:
-    """The scaled gains with the largest degree of stability within 2 K_a alpha + K_w omega <= budget.
+    """Return the scaled gains with the largest degree of stability within 2 K_a alpha + K_w omega <= budget.
 
     ratios: (3,), J_axis / J_x in any order; alpha: largest initial error (rad); omega: largest initial rate (1/t0);
     budget: L. ValueError where ratios or the budget are not positive, where alpha or omega are negative or both zero, for
@@ -127,7 +129,8 @@ def optimum(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> Opt
 
 
 def brute_force(ratios: ArrayLike, alpha: float, omega: float, budget: float, points: int = 41, rounds: int = 8) -> Optimum:
-    """The best of a grid of gains along and below the budget line, `points` each way, refined `rounds` times around it.
+    """Return the best of a grid of gains along and below the budget line, `points` each way, refined `rounds` times around
+    it.
 
     Knows `degree` and the budget, nothing of `optimum`, whose arguments and errors it shares. Sets of equal or larger eta
     are convex, so the best lies beside the best point of a line and of the grid: eta is right to about 1e-9, relative.
@@ -156,7 +159,7 @@ def brute_force(ratios: ArrayLike, alpha: float, omega: float, budget: float, po
 
 
 def scale(moments: ArrayLike, torque: float, momentum: float) -> Scale:
-    """Units for principal moments (3,) (kg m2), a wheel's largest torque Hdot_max (N m) and momentum H_max (N m s).
+    """Return units for principal moments (3,) (kg m2), a wheel's largest torque Hdot_max (N m) and momentum H_max (N m s).
 
     ValueError where these are not positive and finite, or no rigid body has these moments.
     """
@@ -172,7 +175,7 @@ def scale(moments: ArrayLike, torque: float, momentum: float) -> Scale:
 
 
 def design_gains(moments: ArrayLike, torque: float, momentum: float, angle: float, rate: float) -> Designed:
-    """The gains with the largest degree of stability that ask, in the initial state, for no more than the torque.
+    """Return the gains with the largest degree of stability that ask, in the initial state, for no more than the torque.
 
     moments: principal, (3,) (kg m2); torque: Hdot_max (N m) and momentum: H_max (N m s) of each axis' wheel; angle: largest
     initial error (rad, at most pi); rate: largest initial rate (rad/s). ValueError as `scale` and `optimum` raise it. A
@@ -193,7 +196,7 @@ def design_gains(moments: ArrayLike, torque: float, momentum: float, angle: floa
 
 
 def _extremes(ratios: ArrayLike) -> tuple[float, float]:
-    """The smallest and the largest ratio."""
+    """Return the smallest and the largest ratio."""
     values = np.asarray(ratios, dtype=float)
     if values.shape != (3,) or not (np.isfinite(values).all() and (values > 0.0).all()):
         raise ValueError("ratios must be three positive numbers, J_axis / J_x")
@@ -201,7 +204,7 @@ def _extremes(ratios: ArrayLike) -> tuple[float, float]:
 
 
 def _demands(alpha: float, omega: float, budget: float) -> tuple[float, float, float]:
-    """The three as plain floats; ValueError where they bound no gain."""
+    """Return the three as plain floats; ValueError where they bound no gain."""
     given = _not_negative("alpha", alpha), _not_negative("omega", omega), _positive("budget", budget)
     if given[0] == 0.0 and given[1] == 0.0:
         raise ValueError("alpha and omega are both 0: the budget bounds no gain")
@@ -221,7 +224,7 @@ def _not_negative(name: str, value: float) -> float:
 
 
 def _best_stiffness(K_w: Array, most: Array, ratios: ArrayLike, points: int, rounds: int) -> tuple[Array, Array]:
-    """For each damping (n,) the best stiffness up to `most` (n,), from a grid refined around its best, and its eta."""
+    """Find for each damping (n,) the best stiffness up to `most` (n,), from a grid refined around its best, and its eta."""
     low, high = np.zeros_like(most), most
     rows = np.arange(len(K_w))
     found = low, low

@@ -1,4 +1,4 @@
-"""Weights of regulators: what is refused, and what balances them onto the globally stable family."""
+"""Weights of regulators are refused where they make no sense, and balanced onto the globally stable family."""
 
 from __future__ import annotations
 
@@ -22,12 +22,13 @@ BALANCES = ("none", "least", "q4", "q5", "q6", "r1", "r2", "r3")
 
 
 def kappa(moments: Array, y: Array) -> float:
-    """(J3 - J2)/y1 + (J1 - J3)/y2 + (J2 - J1)/y3 (s2): zero exactly where the gyroscopic torque does no work on V."""
+    """Return (J3 - J2)/y1 + (J1 - J3)/y2 + (J2 - J1)/y3 (s2): zero exactly where the gyroscopic torque does no work on V."""
     return float(((np.roll(moments, -2) - np.roll(moments, -1)) / y).sum())
 
 
 def balance(moments: Array, q: Array, r: Array, how: str) -> tuple[Array, Array]:
-    """Weights q (6,) and r (3,) for moments (3,) moved to where kappa vanishes: the one that `how` names, or all least.
+    """Return weights q (6,) and r (3,) for moments (3,) moved to where kappa vanishes: the one that `how` names, or all
+    least.
 
     ValueError where no value of the weight that is named does it; that of the middle moment's axis always can.
     """
@@ -54,7 +55,7 @@ def balance(moments: Array, q: Array, r: Array, how: str) -> tuple[Array, Array]
 
 
 def _least_shift(parts: Array, middle: int) -> Array:
-    """The least change of log y (3,) that makes the sum of `parts` exp(-change) vanish."""
+    """Return the least change of log y (3,) that makes the sum of `parts` exp(-change) vanish."""
     library: Any = import_module("scipy.optimize")
     # The middle one's change follows from those of the others, whose parts have the other sign.
     others = [axis for axis in range(3) if axis != middle and parts[axis]]
@@ -83,7 +84,7 @@ def _least_shift(parts: Array, middle: int) -> Array:
 
 
 def positive(given: Any, size: int, name: str) -> Array:
-    """The weights as an array of `size`; ValueError, which calls them `name`, where they are not positive."""
+    """Return the weights as an array of `size`; ValueError, which calls them `name`, where they are not positive."""
     array = np.array(given, dtype=float)
     if array.shape != (size,) or not np.isfinite(array).all() or not (array > 0.0).all():
         raise ValueError(f"{name} must be {size} numbers above 0")
@@ -91,8 +92,8 @@ def positive(given: Any, size: int, name: str) -> Array:
 
 
 def positive_definite(given: Any, size: int, name: str) -> Array:
-    """The weights, a matrix or its diagonal, as a symmetric array (size, size); ValueError, which calls them `name`, where
-    they are not symmetric and positive definite."""
+    """Return the weights, a matrix or its diagonal, as a symmetric array (size, size); ValueError, which calls them `name`,
+    where they are not symmetric and positive definite."""
     array = np.array(given, dtype=float)
     if array.shape == (size,):
         array = np.diag(array)
@@ -113,7 +114,7 @@ def positive_definite(given: Any, size: int, name: str) -> Array:
 
 
 def check_spreads(rate: Array, attitude: Array, cost: Array, *, kind: str = "") -> None:
-    """ValueError where eigenvalues of q's rate part, of its attitude part or of r, each (3,), differ by more than
+    """Raise ValueError where eigenvalues of q's rate part, of its attitude part or of r, each (3,), differ by more than
     MOST_SPREAD; `kind` stands before the name in the message."""
     for name, part, values in (("q", "rate", rate), ("q", "attitude", attitude), ("r", "torque", cost)):
         # Of a full matrix the least eigenvalue is known to the rounding of the largest: a thousandth is forgiven.
@@ -124,8 +125,8 @@ def check_spreads(rate: Array, attitude: Array, cost: Array, *, kind: str = "") 
 
 
 def check_axes(moments: Array, q: Array, r: Array) -> None:
-    """ValueError where weights q (6,), r (3,) differ about principal axes that only rounding tells apart; `moments` (3,) are
-    in rising order."""
+    """Raise ValueError where weights q (6,), r (3,) differ about principal axes that only rounding tells apart; `moments`
+    (3,) are in rising order."""
     for one, other in ((0, 1), (1, 2)):
         weights = np.array([q[:3], q[3:], r])
         if moments[other] - moments[one] <= SAME * moments[2] and (weights[:, one] != weights[:, other]).any():

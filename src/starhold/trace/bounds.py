@@ -38,11 +38,11 @@ _TRIED = 256
 
 
 class OutsideError(Exception):
-    """A load or a store that may lie outside its memory; the text names the function, the address and the memory."""
+    """A load or a store may lie outside its memory; the text names the function, the address and the memory."""
 
 
 class Work(NamedTuple):
-    """How often something is done, at the most."""
+    """The counts tell how often something is done, at the most."""
 
     additions: int = 0
     multiplications: int = 0
@@ -59,20 +59,21 @@ class Work(NamedTuple):
 
     @property
     def arithmetic(self) -> int:
-        """Additions, multiplications, divisions and roots of numbers."""
+        """Return additions, multiplications, divisions and roots of numbers."""
         return self.additions + self.multiplications + self.divisions + self.roots
 
     def plus(self, other: Work) -> Work:
-        """Both."""
+        """Add both."""
         return Work(*(a + b for a, b in zip(self, other, strict=True)))
 
     def times(self, count: int) -> Work:
-        """So many times as much."""
+        """Multiply the work by so many times."""
         return Work(*(count * a for a in self))
 
 
 class Turns(NamedTuple):
-    """A loop of what is run that is not within another: its counter, its most turns, and the most that one of them does."""
+    """A loop of what is run that is not within another has a counter, a largest number of turns, and a bound of what one of
+    them does."""
 
     counter: str
     most: int
@@ -80,8 +81,8 @@ class Turns(NamedTuple):
 
 
 class Bounds(NamedTuple):
-    """The most that a program does; its loops, in order; and the lowest and the highest place that it uses of each
-    memory."""
+    """A program does at most so much work; its loops stand in order, with the lowest and the highest place that it uses of
+    each memory."""
 
     work: Work
     loops: tuple[Turns, ...]
@@ -89,7 +90,7 @@ class Bounds(NamedTuple):
 
 
 def work(program: Program, counts: Mapping[str, int | Interval]) -> Bounds:
-    """The bounds of a program for such counts, each a number or an interval, whatever the memories hold.
+    """Return the bounds of a program for such counts, each a number or an interval, whatever the memories hold.
 
     Work is that of plain Python and C, which do not ask whether a loop is done when its turns are used up.
     """
@@ -104,7 +105,7 @@ def check(program: Program, counts: Mapping[str, int | Interval], sizes: Mapping
 
 
 class Form:
-    """A polynomial with integer coefficients in symbols, which are numbered from the outside in."""
+    """A form is a polynomial with integer coefficients in symbols, which are numbered from the outside in."""
 
     __slots__ = ("terms",)
 
@@ -129,25 +130,25 @@ class Form:
 
     @property
     def last(self) -> int | None:
-        """The innermost symbol."""
+        """Return the innermost symbol."""
         return max((symbols[-1] for symbols in self.terms if symbols), default=None)
 
     @property
     def value(self) -> int:
-        """Its value where it has no symbols."""
+        """Return its value where it has no symbols."""
         return self.terms.get((), 0)
 
     def power(self, symbol: int) -> int:
-        """The highest power of a symbol."""
+        """Return the highest power of a symbol."""
         return max((symbols.count(symbol) for symbols in self.terms), default=0)
 
     def slope(self, symbol: int) -> int | None:
-        """The coefficient of a symbol that it is linear in; None where that is not a number."""
+        """Return the coefficient of a symbol that it is linear in; None where that is not a number."""
         mixed = any(symbol in symbols and symbols != (symbol,) for symbols in self.terms)
         return None if mixed else self.terms.get((symbol,), 0)
 
     def at(self, symbol: int, value: Form) -> Form:
-        """The polynomial where a symbol is another polynomial."""
+        """Return the polynomial where a symbol is another polynomial."""
         found = Form({})
         for symbols, c in self.terms.items():
             part = Form({tuple(s for s in symbols if s != symbol): c})
@@ -158,7 +159,7 @@ class Form:
 
 
 def constant(value: int) -> Form:
-    """A polynomial without symbols."""
+    """Return a polynomial without symbols."""
     return Form({(): value})
 
 
@@ -167,7 +168,7 @@ Ranges: TypeAlias = dict[int, tuple[Form, Form]]
 
 
 def extreme(form: Form, ranges: Ranges, highest: bool) -> int:
-    """A bound of a polynomial: the highest or the lowest of its values, or beyond."""
+    """Return a bound of a polynomial: the highest or the lowest of its values, or beyond."""
     symbol = form.last
     if symbol is None:
         return form.value
@@ -182,7 +183,8 @@ def extreme(form: Form, ranges: Ranges, highest: bool) -> int:
 
 
 def _by_intervals(form: Form, ranges: Ranges, highest: bool) -> int:
-    """A bound term by term, in how far each symbol lies above its lowest value: that of a sum of terms of one sign."""
+    """Return a bound term by term, in how far each symbol lies above its lowest value: that of a sum of terms of one
+    sign."""
     above: dict[int, int] = {}
     for symbol in {symbol for symbols in form.terms for symbol in symbols}:
         low, high = extreme(ranges[symbol][0], ranges, False), extreme(ranges[symbol][1], ranges, True)
@@ -194,7 +196,7 @@ def _by_intervals(form: Form, ranges: Ranges, highest: bool) -> int:
 
 
 def required(form: Form, ranges: Ranges) -> Ranges | None:
-    """The ranges where a polynomial is not negative, as narrow as they are known to be; None where it always is."""
+    """Return the ranges where a polynomial is not negative, as narrow as they are known to be; None where it always is."""
     if extreme(form, ranges, highest=True) < 0:
         return None
     symbol = form.last
@@ -354,7 +356,7 @@ class _Walk:
 
 
 def sum_of(parts: list[Work]) -> Work:
-    """All of it together."""
+    """Sum all of it up."""
     total = Work()
     for part in parts:
         total = total.plus(part)

@@ -52,14 +52,15 @@ _HELPERS = {"bits_of": _BITS_OF, "with_bits": _WITH_BITS}
 
 
 class C99(Source):
-    """The text of a program. What a function gives, it returns, or writes to pointers where that is more than one value."""
+    """The printer makes the text of a program. What a function gives, it returns, or writes to pointers where that is more
+    than one value."""
 
     language = "c"
     taken = frozenset(name + end for name in _MATH.split() for end in ("", "f", "l")) | frozenset((*_STRING.split(), "main"))
 
     @property
     def prototype(self) -> str:
-        """The declaration of what is called, for a header."""
+        """Return the declaration of what is called, for a header."""
         return self._head(self.program.main).replace(TIE, " ") + ";"
 
     def _opening(self) -> list[str]:
@@ -85,7 +86,7 @@ class C99(Source):
         return f"{'' if main else 'static '}{gives} {self.titles[function.name]}({', '.join(given) or 'void'})"
 
     def _pointers(self, function: Function) -> list[str]:
-        """Names of the pointers that a function's values are written to."""
+        """Return names of the pointers that a function's values are written to."""
         used, mark = {*names(function), *self.titles.values(), *(memory.name for memory in self.program.memories)}, "out"
         count = len(function.outs)
         while not used.isdisjoint(f"{mark}{place}" for place in range(count)):

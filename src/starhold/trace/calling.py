@@ -1,4 +1,4 @@
-"""One equation, compiled: called with numbers, or over columns of them."""
+"""One equation is compiled, to be called with numbers or over columns of them."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ WIDTH = 8
 
 
 class Compiled:
-    """An equation for arguments shaped like the ones given: their floats, and those in buffers, are arguments, all else is a
-    constant of it."""
+    """An equation is compiled for arguments shaped like the ones given: their floats, and those in buffers, are arguments,
+    all else is a constant of it."""
 
     def __init__(self, equation: Callable[..., Any], *like: Any) -> None:
         self.program, self._like = record_call(equation, like)
@@ -41,8 +41,8 @@ class Compiled:
         return mapped(self._like, lambda leaf: _told(leaf, next(source)))
 
     def over(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The numbers it gives, (numbers, lanes), for arguments whose floats are the columns of (floats, lanes); truths are
-        1 and 0."""
+        """Return the numbers it gives, (numbers, lanes), for arguments whose floats are the columns of (floats, lanes);
+        truths are 1 and 0."""
         if self._many is None:
             self._many = load(self.program, WIDTH)
         count = columns.shape[1]
@@ -61,8 +61,8 @@ def _told(leaf: Any, number: float) -> Any:
 
 
 def record_call(equation: Callable[..., Any], like: tuple[Any, ...]) -> tuple[Program, Any]:
-    """A program that reads the floats of the arguments from the memory `x` and writes what the equation gives to `y`, both
-    `count` times over; and what it gives, with handles for numbers."""
+    """Return a program that reads the floats of the arguments from the memory `x` and writes what the equation gives to `y`,
+    both `count` times over; and what it gives, with handles for numbers."""
     recorder = Recorder()
     x = recorder.memory("x", lanes=True)
     y = recorder.memory("y", lanes=True, writable=True)

@@ -77,7 +77,7 @@ def _binary(name: str, turned: bool = False) -> Any:
 
 
 class Number(Handle):
-    """A number."""
+    """This handle stands for a number."""
 
     __slots__ = ()
     kind = NUMBER
@@ -101,14 +101,14 @@ class Truth(Handle):
 
 
 class Word(Handle):
-    """A 64-bit unsigned integer."""
+    """This handle stands for a 64-bit unsigned integer."""
 
     __slots__ = ()
     kind = WORD
 
 
 class Index(Handle):
-    """An integer that all lanes share: a count, a loop's counter, or made of such by + - *."""
+    """All lanes share this integer: a count, a loop's counter, or made of such by + - *."""
 
     __slots__ = ()
     kind = INDEX
@@ -118,7 +118,7 @@ class Index(Handle):
 
 
 class Uniform(Handle):
-    """A truth about indices, which all lanes share."""
+    """All lanes share this truth about indices."""
 
     __slots__ = ()
     kind = UNIFORM
@@ -134,7 +134,7 @@ def refuse(found: str, allowed: str) -> NoReturn:
 
 
 def kind_of(value: Any) -> str:
-    """The kind of a recorded value or a constant."""
+    """Return the kind of a recorded value or a constant."""
     if isinstance(value, Handle):
         return value.kind
     if isinstance(value, bool):

@@ -39,7 +39,7 @@ function with_bits(high, low) {
 
 
 class JavaScript(Source):
-    """The text of a program. A function gives a value, or an array of them where there are more."""
+    """The printer makes the text of a program. A function gives a value, or an array of them where there are more."""
 
     language = "javascript"
     taken = frozenset(("double_view", "half_view", "high_place"))
@@ -81,7 +81,7 @@ class JavaScript(Source):
         return repr(number)
 
     def _both(self, value: Value, kind: str) -> list[str]:
-        """The texts of a value: of a word that of each half."""
+        """Return the texts of a value: of a word that of each half."""
         if kind != WORD:
             return [self.text(value, kind)]
         if isinstance(value, str):
@@ -143,11 +143,11 @@ class JavaScript(Source):
 
 
 def _parts(name: str, kind: str) -> list[str]:
-    """The names of a value's parts; no name of a trace holds a dollar."""
+    """Return the names of a value's parts; no name of a trace holds a dollar."""
     return [f"{name}$high", f"{name}$low"] if kind == WORD else [name]
 
 
 def _signed(half: int) -> int:
-    """Thirty-two bits as a signed integer, which operators on bits give."""
+    """Return thirty-two bits as a signed integer, which operators on bits give."""
     half &= 0xFFFFFFFF
     return half - (1 << 32) if half >= 1 << 31 else half

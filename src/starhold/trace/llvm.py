@@ -16,18 +16,18 @@ ATTRIBUTES = 'attributes #0 = { nounwind "prefer-vector-width"="512" "min-legal-
 
 
 def hexadecimal(number: float) -> str:
-    """The bits of a double, as LLVM writes a constant of any value."""
+    """Return the bits of a double, as LLVM writes a constant of any value."""
     return "0x" + struct.pack(">d", number).hex().upper()
 
 
 def check_apart(program: Program) -> None:
-    """ValueError for a program whose lanes would write to the same memory."""
+    """Raise ValueError for a program whose lanes would write to the same memory."""
     if common := [memory.name for memory in program.memories if memory.writable and not memory.lanes]:
         raise ValueError(f"{', '.join(common)}: all lanes write to the same memory")
 
 
 class Types:
-    """Names of types and constants for so many lanes."""
+    """Types and constants have these names for so many lanes."""
 
     def __init__(self, width: int, lane: str = "0") -> None:
         self.width = width
@@ -47,7 +47,7 @@ class Types:
         }
 
     def constant(self, value: Any, kind: str) -> str:
-        """A Python number as a constant."""
+        """Return a Python number as a constant."""
         if kind == NUMBER:
             single, text = "double", hexadecimal(float(value))
         elif kind == TRUTH:
@@ -58,7 +58,7 @@ class Types:
 
 
 class Llvm:
-    """The text of a program. Memories are pointers: a memory of lanes holds W numbers for each index."""
+    """The printer makes the text of a program. Memories are pointers: a memory of lanes holds W numbers for each index."""
 
     convention: ClassVar[str] = ""
     """How what is run is called, where not as C calls it."""
@@ -115,7 +115,7 @@ class Llvm:
         return f"{self.types.names[kind]} {self._value(value, kind)}"
 
     def _splat(self, single: str, value: str, kind: str, name: str | None = None) -> str:
-        """A value for all lanes from one that they share."""
+        """Return a value for all lanes from one that they share."""
         name = name or self._new()
         if self.types.width == 1:
             self._put(f"{name} = bitcast {single} {value} to {single}")

@@ -20,7 +20,7 @@ ALIGNMENT = 64
 
 @cache
 def _llvm() -> Any:
-    """The library, loaded when the first kernel is compiled."""
+    """Return the library, loaded when the first kernel is compiled."""
     llvm: Any = import_module("llvmlite.binding")
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
@@ -28,7 +28,7 @@ def _llvm() -> Any:
 
 
 def _machine() -> Any:
-    """This processor, with all it can do. An engine takes the description over, so each needs its own."""
+    """Return this processor, with all it can do. An engine takes the description over, so each needs its own."""
     llvm = _llvm()
     target, features = llvm.Target.from_default_triple(), llvm.get_host_cpu_features().flatten()
     return target.create_target_machine(opt=3, cpu=llvm.get_host_cpu_name(), features=features)
@@ -39,21 +39,21 @@ FEW = 16
 
 
 def widest(carried: int) -> int:
-    """Lanes in flight at once on this processor that fly fastest, where each carries so many numbers: two of its widest
-    registers for a number where there are 32 of them, or where few numbers are carried; else one."""
+    """Return the number of lanes in flight at once on this processor that fly fastest, where each carries so many numbers:
+    two of its widest registers for a number where there are 32 of them, or where few numbers are carried; else one."""
     if _is_wide():
         return 16
     return 8 if carried <= FEW else 4
 
 
 def _is_wide() -> bool:
-    """Whether there are 32 registers of 512 bits."""
+    """Tell whether there are 32 registers of 512 bits."""
     return bool(_llvm().get_host_cpu_features().get("avx512f"))
 
 
 def load(program: Program, width: int, passes: bool | None = None) -> Callable[..., None]:
-    """The program as a function of this process, for so many lanes at once: addresses of the memories (a memory of lanes
-    holds `width` numbers for each index, aligned to their size), then counts and words. It lets go of the interpreter.
+    """Return the program as a function of this process, for so many lanes at once: addresses of the memories (a memory of
+    lanes holds `width` numbers for each index, aligned to their size), then counts and words. It lets go of the interpreter.
 
     passes: whether LLVM reworks what is printed before it makes code of it; left open, where that has been measured to bring
     more than it costs: on one lane, and on many where registers are plenty and nothing is called.
@@ -80,7 +80,7 @@ def load(program: Program, width: int, passes: bool | None = None) -> Callable[.
 
 
 def aligned(*shape: int) -> NDArray[np.float64]:
-    """An array of zeros that begins where a whole vector may be read at once."""
+    """Return an array of zeros that begins where a whole vector may be read at once."""
     size = int(np.prod(shape))
     step = max(ALIGNMENT, 8 * shape[-1]) // 8 if shape else 8
     store = np.zeros(size + step)
@@ -89,6 +89,6 @@ def aligned(*shape: int) -> NDArray[np.float64]:
 
 
 def word(number: int) -> int:
-    """A seed or a run's number as the signed integer that a kernel takes."""
+    """Return a seed or a run's number as the signed integer that a kernel takes."""
     number &= 0xFFFFFFFFFFFFFFFF
     return number - (1 << 64) if number >= 1 << 63 else number

@@ -12,7 +12,7 @@ Value: TypeAlias = Any
 
 
 class Op(NamedTuple):
-    """ref = operation(args)."""
+    """The operation sets ref = operation(args)."""
 
     ref: str
     operation: Operation
@@ -20,7 +20,7 @@ class Op(NamedTuple):
 
 
 class Load(NamedTuple):
-    """ref = memory[index]."""
+    """The load sets ref = memory[index]."""
 
     ref: str
     memory: str
@@ -28,7 +28,7 @@ class Load(NamedTuple):
 
 
 class Store(NamedTuple):
-    """memory[index] = value."""
+    """The store sets memory[index] = value."""
 
     memory: str
     index: Value
@@ -36,8 +36,8 @@ class Store(NamedTuple):
 
 
 class Slot(NamedTuple):
-    """A variable of a loop: called `name` within it and `name` with an underscore after it; what it holds before the first
-    turn, and what each turn makes of it."""
+    """A variable of a loop is called `name` within it and `name` with an underscore after it; `before` is what it holds
+    before the first turn, `after` what each turn makes of it."""
 
     name: str
     kind: str
@@ -46,7 +46,7 @@ class Slot(NamedTuple):
 
     @property
     def end(self) -> str:
-        """Its name after the loop."""
+        """Return its name after the loop."""
         return self.name + "_"
 
 
@@ -69,7 +69,7 @@ class Branch(NamedTuple):
 
 
 class Call(NamedTuple):
-    """refs = function(args)."""
+    """The call sets refs = function(args)."""
 
     refs: tuple[tuple[str, str], ...]
     function: Function
@@ -80,7 +80,7 @@ Block: TypeAlias = tuple[Any, ...]
 
 
 class Function(NamedTuple):
-    """A block of its own; params and outs are pairs of a name (or constant) and a kind."""
+    """A function is a block of its own; params and outs are pairs of a name (or constant) and a kind."""
 
     name: str
     doc: str
@@ -90,7 +90,7 @@ class Function(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """Numbers that a program is given: a block of them for each lane, or one for all; size, where it is known."""
+    """A program is given numbers: a block of them for each lane, or one for all; size, where it is known."""
 
     name: str
     lanes: bool
@@ -99,7 +99,8 @@ class Memory(NamedTuple):
 
 
 class Program(NamedTuple):
-    """Functions in the order of their definition, the last of which is what is run; the memories it is given, in order."""
+    """A program has functions in the order of their definition, the last of which is what is run, and the memories it is
+    given, in order."""
 
     functions: tuple[Function, ...]
     memories: tuple[Memory, ...]
@@ -110,12 +111,12 @@ class Program(NamedTuple):
         return self.functions[-1]
 
     def memory(self, name: str) -> Memory:
-        """The memory of this name."""
+        """Return the memory of this name."""
         return next(memory for memory in self.memories if memory.name == name)
 
 
 def statements(block: Block) -> Iterator[Any]:
-    """All statements of a block and of those within it, but not of the functions it calls."""
+    """Yield all statements of a block and of those within it, but not of the functions it calls."""
     for s in block:
         yield s
         if isinstance(s, Loop):
@@ -125,7 +126,7 @@ def statements(block: Block) -> Iterator[Any]:
 
 
 def reads(block: Block) -> Iterator[Value]:
-    """The names that a block reads, with repetitions, and constants."""
+    """Return the names that a block reads, with repetitions, and constants."""
     for s in statements(block):
         if isinstance(s, (Op, Call)):
             yield from s.args
@@ -140,12 +141,12 @@ def reads(block: Block) -> Iterator[Value]:
 
 
 def writes(block: Block) -> bool:
-    """Whether a block, or a function that it calls, writes to memory."""
+    """Tell whether a block, or a function that it calls, writes to memory."""
     return any(isinstance(s, Store) or (isinstance(s, Call) and writes(s.function.body)) for s in statements(block))
 
 
 def touched(program: Program, function: Function) -> list[Memory]:
-    """The memories that a function or those it calls use, in the program's order."""
+    """Return the memories that a function or those it calls use, in the program's order."""
     names: set[str] = set()
     for s in statements(function.body):
         if isinstance(s, (Load, Store)):
@@ -156,8 +157,8 @@ def touched(program: Program, function: Function) -> list[Memory]:
 
 
 def prune(block: Block, outs: Iterable[Value]) -> tuple[Block, dict[str, Value]]:
-    """The block without operations and slots that nobody reads, and with slots that never change replaced by what they
-    hold; and what stands for their names now."""
+    """Return the block without operations and slots that nobody reads, and with slots that never change replaced by what
+    they hold; and what stands for their names now."""
     wanted, names = set(outs), dict[str, Value]()
     # A loop within may show that a slot of the loop round it never changes either.
     while True:
@@ -171,8 +172,8 @@ def prune(block: Block, outs: Iterable[Value]) -> tuple[Block, dict[str, Value]]
 
 
 def single_turns(function: Function) -> Function:
-    """The function with what the loops of one turn hold in it read where it comes from: such a loop is a branch, and what
-    only its slots read is gone."""
+    """Return the function with what the loops of one turn hold in it read where it comes from: such a loop is a branch, and
+    what only its slots read is gone."""
     names: dict[str, Value] = {}
     for s in statements(function.body):
         if isinstance(s, Loop) and s.most == 1:
@@ -189,7 +190,7 @@ def renamed(value: Value, names: dict[str, Value]) -> Value:
 
 
 def _settled(block: Block, names: dict[str, Value]) -> Block:
-    """The block with settled slots replaced; `names` says by what, and grows."""
+    """Return the block with settled slots replaced; `names` says by what, and grows."""
     found: list[Any] = []
     for s in block:
         if isinstance(s, Loop):
@@ -241,7 +242,7 @@ def _live(block: Block, outs: Iterable[Value]) -> set[Value]:
 
 
 def _acts(block: Block) -> bool:
-    """Whether a block does anything but compute."""
+    """Tell whether a block does anything but compute."""
     return any(isinstance(s, (Store, Call)) for s in statements(block))
 
 

@@ -19,7 +19,7 @@ _REGISTERS = ("tid.x", "ctaid.x", "ntid.x")
 
 
 class Threads(Llvm):
-    """The text of a program whose lanes are the threads of a kernel; threads beyond the number of lanes do nothing.
+    """The lanes of this program are the threads of a kernel; threads beyond the number of lanes do nothing.
 
     It is given the memories (a memory of lanes holds a number of each lane for each index), counts and words, and last the
     number of lanes, which may be started in blocks along x of any size.
@@ -61,13 +61,13 @@ class Threads(Llvm):
 
 
 def ptx(program: Program, processor: str = "sm_80") -> str:
-    """The program as PTX for a GPU (sm_80 is an A100, sm_90 an H100 or H200) and those after it."""
+    """Return the program as PTX for a GPU (sm_80 is an A100, sm_90 an H100 or H200) and those after it."""
     return assembly(Threads(program), TRIPLE, processor)
 
 
 def assembly(text: Llvm, triple: str, processor: str = "", features: str = "") -> str:
-    """The assembly of a printed program for a machine, with LLVM's passes run over it. RuntimeError where LLVM was built
-    without that machine."""
+    """Return the assembly of a printed program for a machine, with LLVM's passes run over it. RuntimeError where LLVM was
+    built without that machine."""
     llvm: Any = import_module("llvmlite.binding")
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()

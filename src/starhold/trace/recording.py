@@ -50,7 +50,7 @@ def _ref(value: Any) -> Value:
 
 
 class Cells:
-    """Memory of a trace, as the cells of a buffer."""
+    """The cells of a buffer lie in a memory of the trace."""
 
     def __init__(self, recorder: Recorder, memory: Memory) -> None:
         self.recorder, self.memory = recorder, memory
@@ -69,7 +69,7 @@ class _Names:
         self._taken, self._counts = {*taken, *RESERVED}, Counter[str]()
 
     def new(self, hint: str) -> str:
-        """The hint, or with a number. Names never end in an underscore: that marks what a loop leaves."""
+        """Return the hint, or with a number. Names never end in an underscore: that marks what a loop leaves."""
         name = hint = hint.strip("_") or "x"
         while name in self._taken or name == "t":
             self._counts[hint] += 1
@@ -92,17 +92,17 @@ class Recorder:
         self._inputs: list[tuple[str, str]] = []
 
     def input(self, name: str, kind: str) -> Any:
-        """A count (`index`) or a `word` that the program is given."""
+        """Return a count (`index`) or a `word` that the program is given."""
         self._inputs.append((self._names.new(name), kind))
         return HANDLES[kind](self, self._inputs[-1][0])
 
     def memory(self, name: str, *, lanes: bool = False, writable: bool = False, size: int | None = None) -> Cells:
-        """Memory that the program is given."""
+        """Return memory that the program is given."""
         self.memories.append(Memory(self._names.new(name), lanes, writable, size))
         return Cells(self, self.memories[-1])
 
     def lane(self) -> Any:
-        """The number of the lane."""
+        """Return the number of the lane."""
         return self.apply(OPERATIONS["lane"], ())
 
     @contextmanager
@@ -115,7 +115,7 @@ class Recorder:
             RECORDER.reset(token)
 
     def program(self, name: str, doc: str = "") -> Program:
-        """The notes so far make a program."""
+        """Return the notes so far make a program."""
         body, _ = prune(tuple(self._open[0]), ())
         main = Function(self._titles.new(name), doc, tuple(self._inputs), body, ())
         return Program((*(function for function, _, _ in self._functions.values()), main), tuple(self.memories))
@@ -275,7 +275,7 @@ class Recorder:
         return [] if type(leaf) in (int, bool) else [leaf]
 
     def _form(self, value: Any) -> Any:
-        """Equal for arguments that one recording serves."""
+        """Return a form that is equal for arguments that one recording serves."""
         if isinstance(value, tuple):
             return (type(value), *(self._form(part) for part in value))  # pyright: ignore
         if isinstance(value, Buffer):
@@ -315,7 +315,7 @@ class Recorder:
 
 
 def _labelled(value: Any, label: str) -> Generator[tuple[str, Any]]:
-    """The leaves of a nested value, each under the name of its field."""
+    """Return the leaves of a nested value, each under the name of its field."""
     if isinstance(value, tuple):
         names = getattr(value, "_fields", [label] * len(value))  # pyright: ignore
         for part, name in zip(value, names, strict=True):  # pyright: ignore

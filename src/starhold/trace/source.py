@@ -46,7 +46,7 @@ _BITS = ("&", "|", "^", ">>")
 
 
 class Expression(NamedTuple):
-    """A text, and the operator that binds it least."""
+    """An expression is a text, and the operator that binds it least."""
 
     text: str
     operator: str = _CALL
@@ -54,7 +54,7 @@ class Expression(NamedTuple):
 
 @cache
 def operator_of(text: str) -> str:
-    """The operator of a text with places for its operands."""
+    """Return the operator of a text with places for its operands."""
     if found := re.fullmatch(r"\{0\} (\S+) (?:\{1\}|\d+)", text):
         return found[1] if found[1] in _LEVELS else _OTHER
     if re.fullmatch(r"(-|!|\(\w+\))\{0\}", text):
@@ -65,7 +65,7 @@ def operator_of(text: str) -> str:
 
 
 def _stands(inner: str, outer: str, place: int) -> bool:
-    """Whether an operand needs no parentheses; they are also written where only a compiler's warning asks for them."""
+    """Tell whether an operand needs no parentheses; they are also written where only a compiler's warning asks for them."""
     if outer == _CALL:
         return True
     if outer in _BITS:
@@ -80,12 +80,13 @@ def _stands(inner: str, outer: str, place: int) -> bool:
 
 
 def fitted(inner: Expression, outer: str, place: int) -> str:
-    """The text of an operand, in parentheses where it needs them."""
+    """Return the text of an operand, in parentheses where it needs them."""
     return inner.text if _stands(inner.operator, outer, place) else f"({inner.text})"
 
 
 class Source(ABC):
-    """The text of a program in a language with braces. Memories keep their order, and counts and words come last."""
+    """The printer makes the text of a program in a language with braces. Memories keep their order, and counts and words
+    come last."""
 
     language: ClassVar[str]
     taken: ClassVar[frozenset[str]]
@@ -116,7 +117,7 @@ class Source(ABC):
         return "\n".join([*self._opening(), *self.lines]) + "\n"
 
     def is_main(self, function: Function) -> bool:
-        """Whether a function is what is called."""
+        """Tell whether a function is what is called."""
         return function.name == self.program.main.name
 
     def _touched(self, function: Function) -> list[Memory]:
@@ -136,7 +137,7 @@ class Source(ABC):
 
     @abstractmethod
     def _constant(self, value: Any, kind: str) -> str:
-        """A Python number as a constant."""
+        """Return a Python number as a constant."""
 
     @abstractmethod
     def _let(self, kind: str, name: str, text: str) -> None:
@@ -152,7 +153,7 @@ class Source(ABC):
 
     @abstractmethod
     def _counted(self, counter: str, most: str) -> str:
-        """The head of a loop."""
+        """Return the head of a loop."""
 
     @abstractmethod
     def _call(self, s: Call) -> None:
@@ -243,11 +244,11 @@ class Source(ABC):
             yield from ((value, 1) for value in reads((s._replace(body=()),) if isinstance(s, Branch) else (s,)))
 
     def _halves(self, kind: str) -> int:
-        """How many texts a value is made of."""
+        """Tell how many texts a value is made of."""
         return 1
 
     def _texts(self, s: Op) -> Sequence[str]:
-        """The texts of an operation."""
+        """Return the texts of an operation."""
         return (s.operation.meanings[self.language],)
 
     # Statements.
@@ -275,7 +276,7 @@ class Source(ABC):
         self._keep(s.ref, s.operation.gives, self.written(s, text))
 
     def written(self, s: Op, text: str, names: Mapping[str, str] = MappingProxyType({})) -> Expression:
-        """An operation with its operands in place; names: what else its text speaks of."""
+        """Return an operation with its operands in place; names: what else its text speaks of."""
         if s.operation.name == "same_index" and (s.args[0] == s.args[1] or not any(isinstance(x, str) for x in s.args)):
             # Compilers warn of what is known.
             return Expression(self._constant(s.args[0] == s.args[1], UNIFORM))
@@ -320,14 +321,14 @@ class Source(ABC):
         self._let(kind, name, end)
 
     def _denied(self, truth: Expression) -> str:
-        """The opposite of a truth."""
+        """Return the opposite of a truth."""
         if truth.text.startswith("!") and truth.operator == _UNARY:
             return re.sub(r"^\((.*)\)$", r"\1", truth.text[1:])
         return "!" + fitted(truth, _UNARY, 0)
 
 
 def names(function: Function) -> Iterator[str]:
-    """All names within a function."""
+    """Return all names within a function."""
     yield from (name for name, _ in function.params)
     for s in statements(function.body):
         if isinstance(s, (Op, Load)):
@@ -340,7 +341,7 @@ def names(function: Function) -> Iterator[str]:
 
 
 def _reached(function: Function, functions: dict[str, Function]) -> dict[str, Function]:
-    """A function and those that it calls, by name."""
+    """Return a function and those that it calls, by name."""
     found: dict[str, Function] = {}
     left = [function.name]
     while left:

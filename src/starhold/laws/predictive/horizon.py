@@ -1,4 +1,4 @@
-"""Passes over the horizon of a predictive program, each in time proportional to its length: states under a plan, the
+"""Each pass over the horizon of a predictive program takes time proportional to its length: states under a plan, the
 gradient, the Newton step by a backward Riccati sweep, and flights of a step through the limits."""
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ REST: Numbers = (0.0,) * 6
 
 
 def transition(a: Rows, b: Rows, x: Numbers, v: Vector) -> Numbers:
-    """A x + B v."""
+    """Return A x + B v."""
     return tuple(sixes.dot(row, x, dot(cast(Vector, push), v)) for row, push in zip(a, b, strict=True))
 
 
@@ -67,12 +67,12 @@ def adjoint(problem: Problem) -> Scalar:
 
 
 def _weighed(r: Any, v: Vector) -> Vector:
-    """R v."""
+    """Return R v."""
     return (r[0] * v[0], r[1] * v[1], r[2] * v[2]) if is_diagonal(r) else (dot(r[0], v), dot(r[1], v), dot(r[2], v))
 
 
 def _costate(q: Any, columns: Rows, x: Numbers, y: Numbers) -> Numbers:
-    """Q x + A'y, summed up together."""
+    """Return Q x + A'y, summed up together."""
 
     def component(i: int) -> Scalar:
         total = 0.0
@@ -87,8 +87,8 @@ def _costate(q: Any, columns: Rows, x: Numbers, y: Numbers) -> Numbers:
 
 
 class Value(NamedTuple):
-    """Half the best cost from a state on: x'curvature x / 2 + slope'x + constant, and what is known of the moves so far:
-    the Newton decrement and the number of limits held."""
+    """Half the best cost from a state on is x'curvature x / 2 + slope'x + constant; beside it stands what is known of the
+    moves so far: the Newton decrement and the number of limits held."""
 
     curvature: Rows
     slope: Numbers
@@ -141,7 +141,7 @@ def sweep(problem: Problem, barrier: Scalar) -> tuple[Scalar, Scalar]:
 
 
 def _held_inverse(bounds: Limits, v: Vector, g: Vector, m: Symmetric, holds: Truth) -> tuple[Symmetric, Scalar]:
-    """The inverse of m on what no limit holds, and the number of limits that hold."""
+    """Return the inverse of m on what no limit holds, and the number of limits that hold."""
     if bounds.ball:
         normal, multiplier = pressure(bounds, v, g)
         pressed = both(holds, less(0.0, multiplier))
@@ -154,7 +154,7 @@ def _held_inverse(bounds: Limits, v: Vector, g: Vector, m: Symmetric, holds: Tru
 
 
 def _curvature(r: Any, pushes: Rows, pushed: Rows) -> Symmetric:
-    """R + B'P B."""
+    """Return R + B'P B."""
 
     def at(i: int, j: int) -> Scalar:
         return sixes.dot(pushes[i], pushed[j], entry(r, i, j))
@@ -163,7 +163,7 @@ def _curvature(r: Any, pushes: Rows, pushed: Rows) -> Symmetric:
 
 
 def _minus(w: Symmetric, x: Vector) -> Vector:
-    """-w x."""
+    """Return -w x."""
     return (
         -(w[0] * x[0] + w[1] * x[1] + w[2] * x[2]),
         -(w[1] * x[0] + w[3] * x[1] + w[4] * x[2]),
@@ -172,7 +172,7 @@ def _minus(w: Symmetric, x: Vector) -> Vector:
 
 
 def _symmetric(m: Rows) -> Rows:
-    """Kept symmetric against rounding, which long horizons would amplify."""
+    """Keep the matrix symmetric against rounding, which long horizons would amplify."""
 
     def at(i: int, j: int) -> Scalar:
         return m[i][i] if i == j else 0.5 * (m[max(i, j)][min(i, j)] + m[min(i, j)][max(i, j)])
@@ -181,7 +181,7 @@ def _symmetric(m: Rows) -> Rows:
 
 
 def policy(store: Store, k: Index, x: Numbers, start: Vector) -> Vector:
-    """start + feedback x."""
+    """Return start + feedback x."""
 
     def component(i: int) -> Scalar:
         return sixes.dot(store.feedback.row(3 * k + i, 6), x, start[i])
@@ -203,7 +203,7 @@ def unroll(problem: Problem) -> None:
 
 
 class Trial(NamedTuple):
-    """A trial plan: whether a limit cut anything, and half the cost towards it, which changes by slope + curvature / 2,
+    """A trial plan tells whether a limit cut anything, and half the cost towards it, which changes by slope + curvature / 2,
     free of the cancellation that a difference of two costs suffers."""
 
     cut: Truth

@@ -1,4 +1,4 @@
-"""The interior-point method of the predictive law, for programs on which the projected Newton method is slow."""
+"""The interior-point method of the predictive law serves programs on which the projected Newton method is slow."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SHORT_OF = 0.95
 
 
 class Turn(NamedTuple):
-    """The barrier's height, the sweeps so far, and whether the end is reached."""
+    """The state of the method is the barrier's height, the sweeps so far, and whether the end is reached."""
 
     barrier: Scalar
     sweeps: Scalar
@@ -56,7 +56,7 @@ def interior(problem: Problem, half: Scalar, most: Scalar) -> tuple[Scalar, Scal
 
 
 def _pairs(problem: Problem) -> int:
-    """Pairs of a multiplier and a slack for each move."""
+    """Return pairs of a multiplier and a slack for each move."""
     return 1 if problem.ball else 3
 
 
@@ -75,7 +75,7 @@ def _begin(problem: Problem, barrier: Scalar) -> None:
 
 
 def _turn(problem: Problem, now: Turn, count: Scalar, most: Scalar) -> Turn:
-    """One step: towards the optimum that the barrier allows, which is then lowered."""
+    """Take one step: towards the optimum that the barrier allows, which is then lowered."""
     adjoint(problem)
     sweep(problem, now.barrier)
     unroll(problem)
@@ -89,7 +89,7 @@ def _turn(problem: Problem, now: Turn, count: Scalar, most: Scalar) -> Turn:
 
 
 def _length(problem: Problem, barrier: Scalar) -> Scalar:
-    """The share of the step that keeps slacks and multipliers positive; steps of the multipliers go to `trial`."""
+    """Return the share of the step that keeps slacks and multipliers positive; steps of the multipliers go to `trial`."""
     store, bounds = carve(problem), limits(problem)
 
     def stage(k: Index, length: Scalar) -> tuple[Scalar]:
@@ -113,7 +113,7 @@ def _length(problem: Problem, barrier: Scalar) -> Scalar:
 
 
 def _joined(problem: Problem, x: Vector) -> Vector:
-    """For a ball the sum, thrice."""
+    """Return for a ball the sum, thrice."""
     total = x[0] + x[1] + x[2]
     return (total, total, total) if problem.ball else x
 

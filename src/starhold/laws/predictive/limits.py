@@ -1,4 +1,4 @@
-"""The limits of a move, a box or a ball round a centre, and the small inverses that respect them."""
+"""A move is limited to a box or a ball round a centre, which small inverses respect."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Truths: TypeAlias = tuple[Truth, Truth, Truth]
 
 
 class Limits(NamedTuple):
-    """|v - centre| <= bound (N m; inf: none), in norm (ball) or on each axis, which is low <= v <= high."""
+    """A move v keeps |v - centre| <= bound (N m; inf: none), in norm (ball) or on each axis, which is low <= v <= high."""
 
     centre: Vector
     bound: Scalar
@@ -41,18 +41,18 @@ class Limits(NamedTuple):
 
 
 def make_limits(centre: Vector, bound: Scalar, *, ball: bool) -> Limits:
-    """Limits of that size round that centre."""
+    """Return limits of that size round that centre."""
     wide = (bound, bound, bound)
     return Limits(centre, bound, subtract(centre, wide), add(centre, wide), ball)
 
 
 def choose(truth: Truth, a: Vector, b: Vector) -> Vector:
-    """a where the truth holds, else b."""
+    """Return a where the truth holds, else b."""
     return (where(truth, a[0], b[0]), where(truth, a[1], b[1]), where(truth, a[2], b[2]))
 
 
 def project(limits: Limits, v: Vector) -> tuple[Vector, Truth]:
-    """The point within the limits nearest to v, and whether v was outside."""
+    """Return the point within the limits nearest to v, and whether v was outside."""
     if limits.ball:
         d = subtract(v, limits.centre)
         square = dot(d, d)
@@ -70,7 +70,7 @@ def project(limits: Limits, v: Vector) -> tuple[Vector, Truth]:
 
 
 def held(limits: Limits, v: Vector, g: Vector) -> Truths:
-    """Which axes of a box press against a limit, for the gradient g."""
+    """Tell which axes of a box press against a limit, for the gradient g."""
 
     def presses(i: int) -> Truth:
         above = both(less(g[i], 0.0), less_equal(limits.high[i], v[i]))
@@ -80,7 +80,7 @@ def held(limits: Limits, v: Vector, g: Vector) -> Truths:
 
 
 def pressure(limits: Limits, v: Vector, g: Vector) -> tuple[Vector, Scalar]:
-    """For a ball: the outward normal (zero inside) and the multiplier of (|v - centre|2 - bound2)/2, zero when not
+    """Return for a ball the outward normal (zero inside) and the multiplier of (|v - centre|2 - bound2)/2, zero when not
     pressing."""
     d = subtract(v, limits.centre)
     square = dot(d, d)
@@ -92,7 +92,7 @@ def pressure(limits: Limits, v: Vector, g: Vector) -> tuple[Vector, Scalar]:
 
 
 def loose(limits: Limits, v: Vector, g: Vector) -> Vector:
-    """The part of the gradient that no limit holds."""
+    """Return the part of the gradient that no limit holds."""
     if limits.ball:
         normal, multiplier = pressure(limits, v, g)
         along = add(g, scale(multiplier * limits.bound, normal))
@@ -102,7 +102,7 @@ def loose(limits: Limits, v: Vector, g: Vector) -> Vector:
 
 
 def slack(limits: Limits, v: Vector) -> Vector:
-    """(bound2 - d2)/2 for d = v - centre: on each axis of a box, or thrice that of a ball; positive inside."""
+    """Return (bound2 - d2)/2 for d = v - centre: on each axis of a box, or thrice that of a ball; positive inside."""
     d, bound = subtract(v, limits.centre), limits.bound
 
     def room(away: Scalar) -> Scalar:
@@ -116,7 +116,7 @@ def slack(limits: Limits, v: Vector) -> Vector:
 
 
 def repelled(limits: Limits, v: Vector, multipliers: Vector, barrier: Scalar, m: Symmetric) -> tuple[Symmetric, Vector]:
-    """A symmetric matrix with the curvature of the limits added, and their push: the interior-point step."""
+    """Return a symmetric matrix with the curvature of the limits added, and their push: the interior-point step."""
     d, s = subtract(v, limits.centre), slack(limits, v)
     push = times((divide(barrier, s[0]), divide(barrier, s[1]), divide(barrier, s[2])), d)
     y0, y1, y2 = multipliers
@@ -142,7 +142,7 @@ def repelled(limits: Limits, v: Vector, multipliers: Vector, barrier: Scalar, m:
 
 
 def inverse(m: Symmetric) -> Symmetric:
-    """The inverse of a symmetric matrix."""
+    """Return the inverse of a symmetric matrix."""
     c0 = m[3] * m[5] - m[4] * m[4]
     c1 = m[2] * m[4] - m[1] * m[5]
     c2 = m[1] * m[4] - m[2] * m[3]
@@ -153,7 +153,7 @@ def inverse(m: Symmetric) -> Symmetric:
 
 
 def box_inverse(m: Symmetric, fixed: Truths) -> Symmetric:
-    """Inverse of a symmetric matrix on the axes that are not fixed, zero on the others."""
+    """Return the inverse of a symmetric matrix on the axes that are not fixed, zero on the others."""
     f0, f1, f2 = fixed
     w = inverse(
         (
@@ -169,7 +169,7 @@ def box_inverse(m: Symmetric, fixed: Truths) -> Symmetric:
 
 
 def plane_inverse(m: Symmetric, n: Vector, multiplier: Scalar) -> Symmetric:
-    """Inverse of a symmetric matrix plus multiplier on the plane normal to n, zero along n."""
+    """Return the inverse of a symmetric matrix plus multiplier on the plane normal to n, zero along n."""
     t = _tangent(n)
     u = cross(n, t)
     mt, mu = apply(m, t), apply(m, u)
@@ -189,7 +189,7 @@ def plane_inverse(m: Symmetric, n: Vector, multiplier: Scalar) -> Symmetric:
 
 
 def _tangent(n: Vector) -> Vector:
-    """A unit vector across n: n crossed with the axis it is farthest from."""
+    """Return a unit vector across n: n crossed with the axis it is farthest from."""
     a0, a1, a2 = absolute(n[0]), absolute(n[1]), absolute(n[2])
     first = both(less_equal(a0, a1), less_equal(a0, a2))
     other = choose(less_equal(a1, a2), (-n[2], 0.0, n[0]), (n[1], -n[0], 0.0))
@@ -198,7 +198,7 @@ def _tangent(n: Vector) -> Vector:
 
 
 def apply(m: Symmetric, x: Vector) -> Vector:
-    """m x."""
+    """Return m x."""
     return (
         m[0] * x[0] + m[1] * x[1] + m[2] * x[2],
         m[1] * x[0] + m[3] * x[1] + m[4] * x[2],

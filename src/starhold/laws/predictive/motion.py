@@ -1,4 +1,4 @@
-"""The motion that the predictive law plans with: linearised about what is seen, and sampled with a held torque."""
+"""The predictive law plans with a motion that is linearised about the measurement, and sampled with a held torque."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ DOUBLINGS = 60
 
 
 class Linear(NamedTuple):
-    """x' = A x + B u for x = (q; w), small about the motion seen, in blocks of three: A = [[turning, E/2], [stiffness,
-    damping]], B = [0; push]."""
+    """The motion is x' = A x + B u for x = (q; w), small about the measured motion, in blocks of three: A = [[turning, E/2],
+    [stiffness, damping]], B = [0; push]."""
 
     turning: Matrix
     stiffness: Matrix
@@ -47,7 +47,7 @@ class Linear(NamedTuple):
 
 
 def linearise(measurement: Measurement, craft: Craft) -> Linear:
-    """The motion near what is seen (SI units).
+    """Return the motion near the measurement (SI units).
 
     A = [[-[w]x, E/2], [J^-1 G, J^-1 ([Jw]x - [w]x J)]], B = [0; J^-1], G = 6 (mu/R^5) ([R]x J - [JR]x) [R]x with R from
     the centre of attraction in body axes; G = 0 where there is none (R = 0).
@@ -75,13 +75,13 @@ def linearise(measurement: Measurement, craft: Craft) -> Linear:
 
 
 def _by_columns(column: Callable[[Vector], Vector]) -> Matrix:
-    """The matrix of a linear function."""
+    """Return the matrix of a linear function."""
     e0, e1, e2 = IDENTITY
     return transpose((column(e0), column(e1), column(e2)))
 
 
 class Rates(NamedTuple):
-    """A of `Linear` over some time: [[turning, half E], [stiffness, damping]]."""
+    """The blocks are those of A of `Linear` over some time: [[turning, half E], [stiffness, damping]]."""
 
     turning: Matrix
     half: Scalar
@@ -143,7 +143,7 @@ def _during(rates: Rates, share: Scalar) -> Rates:
 
 
 def _share(rates: Rates) -> tuple[Scalar, Scalar]:
-    """The share of the period, halved until no row's absolute sum passes 1, and how often that was."""
+    """Return the share of the period, halved until no row's absolute sum passes 1, and how often that was."""
     size = 0.0
     for row in _rows(rates):
         total = 0.0
@@ -162,7 +162,7 @@ def _share(rates: Rates) -> tuple[Scalar, Scalar]:
 
 
 def _rows(rates: Rates) -> Rows:
-    """The whole matrix."""
+    """Return the whole matrix."""
     t, h = rates.turning, rates.half
     return (
         (0.0, t[0][1], t[0][2], h, 0.0, 0.0),
@@ -173,7 +173,7 @@ def _rows(rates: Rates) -> Rows:
 
 
 def _product(rates: Rates, x: Numbers) -> Numbers:
-    """The matrix times a column, without its zeros."""
+    """Return the matrix times a column, without its zeros."""
     t, h = rates.turning, rates.half
     return (
         sixes.dot((t[0][1], t[0][2], h), (x[1], x[2], x[3])),
@@ -208,7 +208,7 @@ def _sum_up(rates: Rates, mean: Buffer, term: Buffer) -> None:
 
 
 def _double(rates: Rates, mean: Buffer, term: Buffer) -> None:
-    """Over twice the time: S becomes (S + exp(A) S) / 2 when each is divided by its own time."""
+    """Double the time: S becomes (S + exp(A) S) / 2 when each is divided by its own time."""
 
     def turn(j: Index) -> None:
         term.put(j, _product(rates, mean.row(j, 6)))

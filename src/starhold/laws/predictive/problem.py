@@ -1,4 +1,4 @@
-"""The quadratic program of predictive control, and where its numbers lie.
+"""The quadratic program of predictive control lies in one memory; here is where its numbers lie.
 
     minimise   sum over k < N of x_k'Q x_k + v_k'R v_k,  plus x_N'P x_N,   x_{k+1} = A x_k + B v_k,
     subject to |v_k - centre| <= bound, on each axis (box) or in norm (ball).
@@ -23,7 +23,7 @@ COUNTERS = 5
 
 
 class Problem(NamedTuple):
-    """A program of `horizon` moves: its numbers, limits in norm (ball) or on each axis, and Q and R full (dense) or
+    """A program has `horizon` moves, its numbers, limits in norm (ball) or on each axis, and Q and R full (dense) or
     diagonal."""
 
     numbers: Buffer
@@ -33,8 +33,8 @@ class Problem(NamedTuple):
 
 
 class Store(NamedTuple):
-    """The parts of a program's numbers. Counters, weights, tail, plan and states are kept from call to call; the rest is
-    written before it is read. Matrices lie row after row, of a diagonal Q or R the diagonal alone."""
+    """A program's numbers fall into these parts. Counters, weights, tail, plan and states are kept from call to call; the
+    rest is written before it is read. Matrices lie row after row, of a diagonal Q or R the diagonal alone."""
 
     counters: Any
     """Numbers of the law's own; they come first."""
@@ -96,20 +96,20 @@ def _sizes(n: Index, *, dense: bool) -> Store:
 
 
 def carve(problem: Problem) -> Store:
-    """The parts of a program's numbers: nothing is copied."""
+    """Return the parts of a program's numbers: nothing is copied."""
     sizes = _sizes(problem.horizon, dense=problem.dense)
     starts = accumulate(sizes, initial=0)
     return Store(*(problem.numbers.part(start, size) for start, size in zip(starts, sizes, strict=False)))
 
 
 def size(horizon: int, *, dense: bool = False) -> int:
-    """How many numbers a program of that many moves has."""
+    """Tell how many numbers a program of that many moves has."""
     *_, end = accumulate(_sizes(horizon, dense=dense))
     return end
 
 
 class Weights(NamedTuple):
-    """Q and R, full or as their diagonals, the inverse of R, and P."""
+    """The weights are Q and R, full or as their diagonals, the inverse of R, and P."""
 
     q: Weight
     r: Weight
@@ -118,7 +118,7 @@ class Weights(NamedTuple):
 
 
 def weights(problem: Problem) -> Weights:
-    """The weights of the cost."""
+    """Return the weights of the cost."""
     numbers = carve(problem).weights
     q, r = (36, 9) if problem.dense else (6, 3)
     parts = [numbers.part(start, length) for start, length in ((0, q), (q, r), (q + r, r), (q + r + r, 36))]
@@ -128,13 +128,13 @@ def weights(problem: Problem) -> Weights:
 
 
 def motion(problem: Problem) -> tuple[Rows, Rows]:
-    """A (6, 6) and B (6, 3)."""
+    """Return A (6, 6) and B (6, 3)."""
     numbers = carve(problem).motion
     return matrix(numbers.part(0, 36), 6), matrix(numbers.part(36, 18), 3)
 
 
 def limits(problem: Problem) -> Limits:
-    """The limits of every move."""
+    """Return the limits of every move."""
     numbers = carve(problem).limits
     return make_limits(triple(numbers, 0), numbers[3], ball=problem.ball)
 

@@ -1,4 +1,4 @@
-"""A predictive program solved by itself, outside any flight."""
+"""A predictive program is solved by itself, outside any flight."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from starhold.trace.recording import Recorder
 
 
 class Solution(NamedTuple):
-    """plan (N, 3), its cost, the number of Riccati sweeps, and whether the optimum was reached."""
+    """A solution is the plan (N, 3), its cost, the number of Riccati sweeps, and whether the optimum was reached."""
 
     plan: NDArray[np.float64]
     cost: float
@@ -44,7 +44,7 @@ def solve(
 
 
 def pose(a: Any, b: Any, q: Any, r: Any, p: Any, x: Any, horizon: int, bound: float, centre: Vector, ball: bool) -> Problem:
-    """The program of these numbers, see `solve`, with limits and weights and its first state set."""
+    """Return the program of these numbers, see `solve`, with limits and weights and its first state set."""
     problem = Problem(Buffer([0.0] * size(horizon, dense=True)), horizon, ball, dense=True)
     store = carve(problem)
     store.weights.put(0, _numbers(q, r, np.linalg.inv(r), p))
@@ -65,8 +65,8 @@ def work_out(problem: Problem, budget: Index) -> tuple[Scalar, Scalar, Truth]:
 
 
 def record_solver(*, ball: bool) -> Program:
-    """The solver as a program: memories `numbers`, of `pose`, and `report` (3), what `work_out` gives; then the horizon
-    and the budget."""
+    """Return the solver as a program: memories `numbers`, of `pose`, and `report` (3), what `work_out` gives; then the
+    horizon and the budget."""
     recorder = Recorder()
     numbers = recorder.memory("numbers", lanes=True, writable=True)
     report = recorder.memory("report", lanes=True, writable=True)

@@ -1,4 +1,4 @@
-"""Matrices and vectors of six and three numbers as tuples, written out term by term.
+"""Matrices and vectors of six and three numbers are tuples, written out term by term.
 
 Sums of six begin with what they are added to, and run in order of the columns; those of three are the plain ones of
 `algebra.vector`. A vector in place of a matrix of weights stands for a diagonal one.
@@ -20,7 +20,7 @@ Weight: TypeAlias = Numbers | Rows
 
 
 def dot(a: Sequence[Scalar], b: Sequence[Scalar], start: Scalar = 0.0) -> Scalar:
-    """start + a'b."""
+    """Return start + a'b."""
     total = start
     for x, y in zip(a, b, strict=True):
         total = total + x * y
@@ -28,33 +28,33 @@ def dot(a: Sequence[Scalar], b: Sequence[Scalar], start: Scalar = 0.0) -> Scalar
 
 
 def plus(a: Sequence[Scalar], b: Sequence[Scalar]) -> Numbers:
-    """a + b."""
+    """Return a + b."""
     return tuple(x + y for x, y in zip(a, b, strict=True))
 
 
 def transposed(m: Rows) -> Rows:
-    """The transposed matrix."""
+    """Return the transposed matrix."""
     return tuple(zip(*m, strict=True))
 
 
 def apply(m: Rows, x: Sequence[Scalar]) -> Numbers:
-    """m x."""
+    """Return m x."""
     return tuple(dot(row, x) for row in m)
 
 
 def product(m: Rows, n: Rows) -> Rows:
-    """m n."""
+    """Return m n."""
     columns = transposed(n)
     return tuple(apply(columns, row) for row in m)
 
 
 def is_diagonal(m: Weight) -> bool:
-    """Whether only the diagonal is given."""
+    """Tell whether only the diagonal is given."""
     return not isinstance(m[0], tuple)
 
 
 def entry(m: Weight, i: int, j: int) -> Scalar:
-    """The number in row i and column j."""
+    """Return the number in row i and column j."""
     weight: Any = m
     if is_diagonal(m):
         return weight[i] if i == j else 0.0
@@ -62,7 +62,7 @@ def entry(m: Weight, i: int, j: int) -> Scalar:
 
 
 def form(m: Weight, x: Sequence[Scalar]) -> Scalar:
-    """x'm x."""
+    """Return x'm x."""
     weight: Any = m
     if is_diagonal(m):
         return dot([w * y for w, y in zip(weight, x, strict=True)], x)
@@ -70,7 +70,7 @@ def form(m: Weight, x: Sequence[Scalar]) -> Scalar:
 
 
 def triple(buffer: Buffer, k: Index) -> Vector:
-    """The k-th three numbers of a buffer."""
+    """Return the k-th three numbers of a buffer."""
     return (buffer[3 * k], buffer[3 * k + 1], buffer[3 * k + 2])
 
 

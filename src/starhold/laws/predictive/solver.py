@@ -1,4 +1,4 @@
-"""Quadratic programs of predictive control, solved by equations: no allocation, no library, and a bound on the work.
+"""Quadratic programs of predictive control are solved by equations: no allocation, no library, and a bound on the work.
 
 The method is a projected Newton method of two metrics (Bertsekas 1982, "Projected Newton methods for optimization
 problems with simple constraints"). What presses against a limit is held there, for a ball with the curvature of the
@@ -40,7 +40,7 @@ PATIENCE = 12
 
 
 class Solved(NamedTuple):
-    """The number of Riccati sweeps, whether the optimum was reached, and whether limits shape it."""
+    """A run gives the number of Riccati sweeps, whether the optimum was reached, and whether limits shape it."""
 
     sweeps: Scalar
     solved: Truth
@@ -48,8 +48,8 @@ class Solved(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """Half the cost of the plan, the sweeps so far, whether the interior-point method has been used, whether the run is
-    over, and what `Solved` says then."""
+    """A run stands at half the cost of the plan, the sweeps so far, whether the interior-point method has been used, whether
+    the run is over, and what `Solved` says then."""
 
     half: Scalar
     sweeps: Scalar
@@ -117,7 +117,7 @@ def _descend(problem: Problem, budget: Index, sweeps: Scalar) -> Solved:
 
 
 def _turn(problem: Problem, budget: Index, now: Progress) -> Progress:
-    """One turn: ends the run or improves the plan."""
+    """End the run or improve the plan in one turn."""
     optimal = less_equal(adjoint(problem), TOLERANCE * now.half)
     used_up = less_equal(number_of(budget), now.sweeps)
 
@@ -129,7 +129,7 @@ def _turn(problem: Problem, budget: Index, now: Progress) -> Progress:
 
 
 def _better(problem: Problem, budget: Index, now: Progress) -> Progress:
-    """A Newton step, or the interior-point method where that does not serve."""
+    """Return A Newton step, or the interior-point method where that does not serve."""
 
     def newton(_tried: Attempt) -> tuple[Attempt]:
         return (_newton(problem, budget, now),)
@@ -145,7 +145,7 @@ def _better(problem: Problem, budget: Index, now: Progress) -> Progress:
 
 
 def _newton(problem: Problem, budget: Index, now: Progress) -> Attempt:
-    """The projected Newton step, a search along it, or a gradient step, whichever first brings the cost down."""
+    """Return the projected Newton step, a search along it, or a gradient step, whichever first brings the cost down."""
 
     def search(_change: Scalar) -> tuple[Scalar]:
         return (_search(problem),)
@@ -183,13 +183,14 @@ def _is_zero(x: Scalar) -> Truth:
 
 
 def _search(problem: Problem) -> Scalar:
-    """A trial plan along the Newton step without limits; gives the change of half the cost, zero where none was found."""
+    """Return a trial plan along the Newton step without limits; gives the change of half the cost, zero where none was
+    found."""
     unroll(problem)
     return shorten(problem, float(HALVINGS))
 
 
 def _gradient_step(problem: Problem) -> Scalar:
-    """A trial plan along the gradient, each move in its own scale: the projection guarantees descent for short steps.
+    """Return a trial plan along the gradient, each move in its own scale: the projection guarantees descent for short steps.
     Gives the change of half the cost, zero where rounding hides any."""
     store = carve(problem)
 
