@@ -6,6 +6,7 @@ from __future__ import annotations
 import ast
 import inspect
 import re
+from dataclasses import is_dataclass
 from itertools import pairwise
 from pathlib import Path
 from textwrap import dedent
@@ -20,7 +21,6 @@ from starhold.algebra.quantity import quantities
 from starhold.laws.catalogue import Law, catalogue
 from starhold.laws.interface import Card, Gain, Measurement, NoMemory, Start
 from starhold.laws.point import PointMeasurement
-from starhold.laws.catalogue import catalogue
 from starhold.parts.bodies.libration_point import Libration
 from starhold.parts.craft import Craft, make_craft
 
@@ -102,14 +102,16 @@ def fields_table(cls: Any) -> str:
 
 
 def attributes_table(cls: Any) -> str:
-    """The fields of a dataclass, each told by the docstring that follows it."""
-    body = ast.parse(dedent(inspect.getsource(cls))).body[0].body  # type: ignore[attr-defined]
-    rows: list[list[str]] = []
-    for statement, told in pairwise(body):
-        if isinstance(statement, ast.AnnAssign):
-            default = "required" if statement.value is None else f"`{ast.unparse(statement.value)}`"
-            rows.append([f"`{ast.unparse(statement.target)}`", default, " ".join(told.value.value.split())])
-    return table(["keyword", "default", "meaning"], rows)
+    """The fields of a dataclass and of those it derives from, each told by the docstring that follows it."""
+    rows: dict[str, list[str]] = {}
+    for base in filter(is_dataclass, reversed(cls.__mro__)):
+        body = ast.parse(dedent(inspect.getsource(base))).body[0].body  # type: ignore[attr-defined]
+        for statement, told in pairwise(body):
+            if isinstance(statement, ast.AnnAssign):
+                default = "required" if statement.value is None else f"`{ast.unparse(statement.value)}`"
+                name = ast.unparse(statement.target)
+                rows[name] = [f"`{name}`", default, " ".join(told.value.value.split())]
+    return table(["keyword", "default", "meaning"], [*rows.values()])
 
 
 def functions_table(module: ModuleType) -> str:
