@@ -46,7 +46,7 @@ class Law(Part):
 
     @property
     def equation(self) -> str:
-        """What the module calls the equation of the command."""
+        """The module calls the equation of the command by this name."""
         return _commands()[self.body]
 
     @property
@@ -82,7 +82,7 @@ class Law(Part):
         return self.module.design(craft, spec)
 
     def explain(self, craft: Any, spec: Any) -> list[tuple[str, Any]]:
-        """What a design can be judged by, name and value; empty for a law that has nothing to add."""
+        """A design can be judged by these figures, name and value; there are none for a law that has nothing to add."""
         teller = getattr(self.module, "explain", None)
         return [] if teller is None else teller(craft, spec)
 
@@ -106,7 +106,7 @@ class Law(Part):
 
 @cache
 def _commands() -> dict[str, str]:
-    """Of each body what its laws call the equation of the command."""
+    """Return for each body the name by which its laws call the equation of the command."""
     return {name: part.module.COMMAND for name, part in parts.parts("body").items()}
 
 

@@ -3,8 +3,8 @@
 A law file holds `CARD`, `class Gains(NamedTuple)`, the equation
 `torque(measurement, gains, craft, memory) -> (torque, memory)` and `examples()`. It may add
 `lyapunov(measurement, gains, craft)`, design forms (`FORMS` with `design(craft, spec)`, and `complete(spec, start)` for
-inputs that the scenario gives), `check(gains)` that refuses what cannot be stable, and `remember(gains, craft, period)` for
-a memory that is not empty.
+inputs that the scenario gives), `check(gains, craft)` that refuses what cannot be stable, and
+`remember(gains, craft, period)` for a memory that is not empty.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from starhold.parts.craft import Craft
 
 @dataclass(frozen=True)
 class Start:
-    """What a scenario tells a design: turn from the target axes to the body axes, rate relative to the target (rad/s) and
-    what wheels store (N m s, body axes; None for a craft without) at the start; the torque (N m) and, of wheels, the angular
-    momentum (N m s) that there is about every axis, infinite for no limit; and the angle (rad) and rate (rad/s) at which the
-    target counts as reached."""
+    """A scenario tells a design the rotation from the target axes to the body axes, the rate relative to the target (rad/s)
+    and the wheel momentum (N m s, body axes; None for a craft without) at the start; the torque (N m) and, of wheels, the
+    angular momentum (N m s) that there is about every axis, infinite for no limit; and the angle (rad) and rate (rad/s) at
+    which the target counts as reached."""
 
     attitude: Quaternion
     rate: Vector

@@ -23,7 +23,7 @@ def least_rate(plant: Libration) -> float:
 
 
 def nonlinear_remainder(measurement: PointMeasurement, plant: Libration, model: Scalar) -> Vector:
-    """What the full problem adds to the linear acceleration here, where `model` asks for it, else zero."""
+    """Return what the full problem adds to the linear acceleration here, where `model` asks for it, else zero."""
     more = subtract(
         nonlinear(measurement.position, measurement.velocity, plant),
         linear(measurement.position, measurement.velocity, plant),
