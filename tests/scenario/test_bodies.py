@@ -6,7 +6,6 @@ import pytest
 
 from starhold.errors import InputError
 from starhold.laws.catalogue import catalogue
-from starhold.laws.point import station_laws
 from starhold.scenario import bodies as package
 from starhold.scenario.bodies import bodies, body_for
 from starhold.scenario.building import build
@@ -48,7 +47,7 @@ def test_no_two_tables_share_a_name_in_the_schema():
     assert set.union(*known) <= set(json_schema()["$defs"])
 
 
-@pytest.mark.parametrize("law", [*catalogue().values(), *station_laws().values()], ids=lambda law: law.name)
+@pytest.mark.parametrize("law", [*catalogue().values(), *catalogue("libration-point").values()], ids=lambda law: law.name)
 def test_a_law_is_written_into_a_scenario_of_its_body(law):
     for gains in law.examples():
         scenario = parse(scenario_with(law, gains), "written", allow_unstable=True)
@@ -156,8 +155,8 @@ from pydantic import create_model
 
 from starhold.algebra.vector import ZERO
 from starhold.laws.interface import Gain, fields
-from starhold.laws.point import StationLaw, station_laws
-from starhold.loop.station import StationLoop
+from starhold.laws.catalogue import catalogue
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.libration_point import Libration, PointState, Units
 from starhold.scenario.bodies.interface import Body
 from starhold.scenario.schema import LawTable, ScenarioTable, Timing, columns
@@ -186,11 +185,10 @@ class Asteroid(Body):
     marker = "asteroid"
     tables = Tables
     law_table = LawTable
-    law_kind = StationLaw
     example = ""
 
     def laws(self):
-        return station_laws()
+        return catalogue("libration-point")
 
     def context(self, tables, where):
         return Units(1.0, 1.0)
@@ -199,15 +197,12 @@ class Asteroid(Body):
         given = table.asteroid
         return Made(Libration(1.0, given.stiffness, 10.0 * given.distance, given.distance, 0.9, 3.0))
 
-    def check(self, law, gains, craft):
-        law.check(gains, craft)
-
     def options(self, scenario, own, gains, key):
         return None
 
     def build(self, scenario, entry):
         start = PointState((0.1, 0.0, 0.0), ZERO, ZERO)
-        return StationLoop(scenario.craft, entry.law, entry.gains, start, scenario.table.simulation.control_period)
+        return ClosedLoop(scenario.craft, entry.law, entry.gains, start, scenario.table.simulation.control_period)
 
     def examine(self, scenario, entry, loop):
         pass
@@ -227,7 +222,7 @@ def test_a_body_is_one_file_that_is_named_nowhere_else(tmp_path, monkeypatch):
         text = f"{head}[asteroid]\nstiffness = 3.0\ndistance = '1 km'\n{law}"
         scenario = parse(text, "my.toml")
         assert (scenario.body, scenario.craft.from_smaller) == ("asteroid", 1000.0)
-        assert build(scenario, scenario.laws[0]).plant is scenario.craft
+        assert build(scenario, scenario.laws[0]).craft is scenario.craft
         assert scenario.with_({"asteroid.stiffness": 4.0}).craft.stiffness == 4.0
         assert "asteroid.stifness: found an unknown key; did you mean stiffness?" in message(text.replace("ff", "f"))
         assert "asteroid.distance" in message(text.replace("1 km", "-1 km"))

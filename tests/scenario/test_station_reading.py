@@ -155,7 +155,7 @@ def test_a_limit_in_the_law_comes_before_the_common_one():
     assert scenario.laws[3].options.limit == 2.786
     free = parse(builtin_text("l2-deficit").replace("deficit = 0.0\n", ""), "my.toml")
     assert math.isinf(free.laws[0].options.limit)
-    assert build(free, free.laws[0]).limit_kind == "none"
+    assert build(free, free.laws[0]).limit == "none"
 
 
 def test_starts_on_the_circle_of_each_law_and_at_its_place_of_rest():

@@ -15,7 +15,7 @@ from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import fly, label
 from starhold.simulation.lanes import simulate_many
-from tests.making import rotors
+from tests.making import rotors, wheels_after
 
 BUILTIN = builtin_text("wheels-orbital")
 STRUCK = "\n[[fault]]\ntime = 20\nwheel = 2\nlost = true\ndelay = 5\n"
@@ -121,7 +121,7 @@ def test_retuned_gains_are_those_designed_for_the_torque_left():
     struck, acted = loop.events
     assert (struck.step, acted.step) == (200, 250)
     assert struck.gains == entry.gains
-    share = authority(acted.wheels) / authority(wheels_of(scenario))
+    share = authority(wheels_after(acted)) / authority(wheels_of(scenario))
     assert 0.0 < share < 1.0
     expected = entry.law.design(scenario.craft, entry.spec._replace(torque=entry.spec.torque * share))
     assert acted.gains == expected

@@ -9,7 +9,11 @@ import pytest
 from starhold.analysis.metrics import measure
 from starhold.errors import InputError
 from starhold.loop.kernels import fly_plainly
-from starhold.loop.step import attitude_step
+from types import ModuleType
+
+from starhold.algebra.vector import ZERO
+from starhold.loop.kernels import make_step
+from starhold.parts.part import Fitted, Part
 from starhold.parts.effectors.envelope import authority, with_facets
 from starhold.parts.effectors.wheels import MOST, allocate_peak
 from starhold.report.plots import collect
@@ -158,11 +162,13 @@ def test_a_lagging_torque_is_shared_out_as_it_changes():
 @pytest.mark.parametrize("allocation", ["least-squares", "least-peak"])
 def test_a_held_torque_shared_out_once_is_that_shared_out_at_every_stage(allocation):
     _, loop = made(STIFF, allocation=allocation)
-    once = attitude_step(loop.composition())
-    always = attitude_step(loop.composition()._replace(response=lambda *_: None))
-    setup = loop.setup()
-    carry = once.decide(loop.carry(), 0, (1, 0), loop.gains, loop.craft, setup)
-    assert once.hold(carry, loop.craft, setup) == always.hold(carry, loop.craft, setup)
+    held = ModuleType("held")
+    vars(held).update(CARD=None, ROLE="actuator", rates=lambda *_: ZERO)
+    idle = loop.with_parts(Fitted(Part("held", held)))
+    once, always = make_step(loop.composition()), make_step(idle.composition())
+    carry = once.update(loop.carry(), 0, (1, 0), loop.gains, loop.craft, loop.setup())
+    after = always.propagate(carry, loop.craft, idle.setup())
+    assert once.propagate(carry, loop.craft, loop.setup()) == after
 
 
 def test_pictures_draw_the_limit_that_binds_first():

@@ -50,7 +50,7 @@ def flatten(state: Any) -> list[float]:
     return [leaf for leaf in leaves(state) if not isinstance(leaf, Buffer)]
 
 
-def places(state: _State) -> _State:
+def places(state: Any) -> Any:
     """The state with the place of each number among `flatten(state)` in its stead: rows of a table of states by name."""
     count = iter(range(1 << 40))
     return mapped(state, lambda leaf: leaf if isinstance(leaf, Buffer) else next(count))

@@ -106,7 +106,7 @@ class Problem:
         half = math.sin(0.5 * angle) / math.hypot(*self.axis)
         x, y, z = self.axis
         turn = (math.cos(0.5 * angle), half * x, half * y, half * z)
-        goal: Any = self.loop.target
+        goal: Any = self.loop.target.params.attitude
         return flatten(self.loop.start._replace(attitude=multiply(goal, turn), rate=self.rate))
 
     def gains(self, roots: ArrayLike) -> modal.Gains:

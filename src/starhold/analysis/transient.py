@@ -148,10 +148,10 @@ class Watcher:
         return flown.transients(self.loop.period)
 
     def _fleet(self, starts: Array, gains: Any, steps: int) -> tuple[Fleet, Any]:
-        state, goal = unflatten(list(starts), self.loop.start), self.loop.target
-        if not isinstance(goal, tuple):
+        state, target = unflatten(list(starts), self.loop.start), self.loop.target
+        if not target.part.flag("STILL"):
             raise ValueError("transients are watched towards a target at rest alone")
-        error, none = relative(goal, state.attitude), np.zeros(starts.shape[1])
+        error, none = relative(self.loop.first_attitude(), state.attitude), np.zeros(starts.shape[1])
         angle, square = self.ends.angle * dot(error[1:], error[1:]), dot(state.rate, state.rate)
         noted = np.array([angle, self.ends.rate * square, none, none, square, none, none, none])
         observer = Observer(watch(self.loop.composition()), Watched(0.0, 0.0, 0.0, 0.0, 0.0, ZERO), self.ends)
@@ -161,4 +161,4 @@ class Watcher:
         return Fleet(self.loop, carries, 0, widest(len(carries)), observer, noted), phase
 
     def _flown(self, fleet: Fleet, steps: int) -> Flown:
-        return Flown(steps, fleet.notes(), fleet.carries()[fleet.lost_row] >= 0.0)
+        return Flown(steps, fleet.notes(), fleet.carries()[fleet.rows.lost_at] >= 0.0)

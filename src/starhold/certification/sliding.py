@@ -195,7 +195,7 @@ def _layer_bound(subject: Subject, found: Surface, torque: list[Any]) -> Any:
 def _overpowered(subject: Subject, found: Surface, axis: int) -> tuple[str, dict[str, Any]]:
     """A place on the orbit and a state at which the torque pushes the surface variable away."""
     loop, push, where = subject.loop, subject.disturbance, dict[str, Any]()
-    if loop.gravity_gradient:
+    if loop.has("gravity-gradient"):
         distance = number(exact(float(perigee(loop)[0].mid())))
         random = np.random.default_rng(0)
         directions = random.normal(size=(2000, 3))

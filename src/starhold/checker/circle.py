@@ -173,7 +173,7 @@ def _agrees(law: Any, size: Any, layer: Any, full: bool) -> bool:
     gains, measurement, velocity = loop.gains, loop.measurement, loop.measurement.velocity
     wrong = (velocity[1] + gains.rate * measurement.position[2], velocity[2] - gains.rate * measurement.position[1])
     share = gains.k if not relay else gains.k / (size if layer == 0 or (size - layer).is_positive else layer)
-    flown, meant = loop.flown(law, full), add(loop.natural, law.neutral(measurement, gains, loop.craft))
+    flown, meant = loop.flown(law, full), add(loop.natural, law.neutral(measurement, gains, loop.plant))
     damping: Sequence[Any] = (sympy.Integer(0), share * wrong[0], share * wrong[1])
     for have, want, taken in zip(flown, meant, damping, strict=True):
         left = have - want + taken

@@ -86,7 +86,7 @@ def _flies(law: Any, full: bool) -> bool:
     """Whether, for all states and numbers, the command is the feedback and, in the full problem, takes off what the linear
     model leaves out; but for the centres of the bodies, where neither is a number."""
     loop = in_symbols(law, {"model": int(full)}, ("k_velocity",))
-    meant = add(loop.natural, law.feedback(loop.measurement, loop.gains, loop.craft))
+    meant = add(loop.natural, law.feedback(loop.measurement, loop.gains, loop.plant))
     return all(expanded(have - want) == 0 for have, want in zip(loop.flown(law, full), meant, strict=True))
 
 
@@ -112,7 +112,7 @@ class LimitedAxis:
         still = Polynomial({})
         speed: Any = (v, still, still)
         measurement: Any = PointMeasurement((x, *constants(loop.place[1:])), speed, *variables(("period", "limit")))  # pyright: ignore
-        gains, plant = constants(loop.gains), constants(loop.craft)
+        gains, plant = constants(loop.gains), constants(loop.plant)
         pull: Any = linear(measurement.position, measurement.velocity, plant)[0]
         command: Any = loop.law.module.feedback(measurement, gains, plant)
         p, k, c = pull.terms.get(("x1",), ZERO), -command[0].terms.get(("x1",), ZERO), -command[0].terms.get(("v1",), ZERO)

@@ -122,7 +122,7 @@ def _kinetic(loop: Loop, own: Polynomial) -> tuple[Rows, list[Rows]]:
         P = times(2, quadratic(own.terms, RATE))
         return P, [P]
     g = own.terms.get(("d11", "w1", "w1"), ZERO) * 2
-    kinetic: Any = dot(W, apply(loop.craft[0].inertia, W))
+    kinetic: Any = dot(W, apply(loop.plant[0].inertia, W))
     rest: Any = own - kinetic * (g / 2)
     demand(not rest.terms, "P is not a multiple of the inertia")
     # x.Jx is largest in a box where each entry deviates with the sign of x_i x_j.
@@ -138,7 +138,7 @@ def _kinetic(loop: Loop, own: Polynomial) -> tuple[Rows, list[Rows]]:
 def crossed(loop: Loop) -> Crossed:
     """The parts of C = q.Jw, and of C' around rest; a CheckError where they have others."""
     measurement = loop.moving
-    C: Any = dot(vector_part(measurement.attitude), apply(dual(loop.craft[0].inertia), measurement.rate))
+    C: Any = dot(vector_part(measurement.attitude), apply(dual(loop.plant[0].inertia), measurement.rate))
     slope = replaced(C.slope, loop.resting()[1])
     demand(not any(set(letters(m)) & set("ra") for m in slope.terms), "C' depends on the target's motion")
     kinds = by_kind(slope)

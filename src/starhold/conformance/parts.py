@@ -117,7 +117,7 @@ def is_pure(part: Part) -> None:
     _loops_only(part)
     for params in part.examples():
         flights = [fly(loop_with(part, params), STEPS)[0] for _ in range(2)]
-        require(bool(np.array_equal(*flights)), "two flights of the same loop differ")
+        require(bool(np.array_equal(flights[0], flights[1])), "two flights of the same loop differ")
 
 
 def stays_finite(part: Part) -> None:

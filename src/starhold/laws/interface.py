@@ -54,7 +54,8 @@ class Card(contract.Card):
     """Title, formula, sources and assumptions of a law, the stability that it claims, and what its readers must know."""
 
     claims: Claim
-    """The stability that is claimed: global, almost-global, local or none; where it is any, the assumptions are not empty."""
+    """The stability that is claimed: global, almost-global, local or none; where it is any, the assumptions are not
+    empty."""
     quaternion_sign: Literal["odd", "even"] = "odd"
     """odd: feeding back -q in place of q changes the torque; even: it does not."""
     rest_tolerance: float = 0.0

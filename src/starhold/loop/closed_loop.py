@@ -24,8 +24,9 @@ ON_TARGET = Fitted(find("target", "inertial"), Inertial())
 
 
 class Setup(NamedTuple):
-    """The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. Those of parts stand
-    in the order in which a loop has them; limit: of the command; far: the distance at which the motion counts as lost."""
+    """The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. Those of parts
+    stand in the order in which a loop has them; limit: of the command; far: the distance at which the motion counts as
+    lost."""
 
     period: float
     substep: float
@@ -41,10 +42,11 @@ class Setup(NamedTuple):
 
 
 class Composition(NamedTuple):
-    """The parts whose equations a loop is made of; equal for loops that one kernel flies, but for the form of their numbers."""
+    """The parts whose equations a loop is made of; equal for loops that one kernel flies, but for the form of their
+    numbers."""
 
     body: Part
-    law: Part
+    law: Law
     target: Part | None
     environments: tuple[Part, ...]
     effectors: tuple[Part, ...]
@@ -68,9 +70,9 @@ class Memories(NamedTuple):
 
 
 class Carry(NamedTuple):
-    """What a trajectory carries from step to step: the states of the body, of the effectors, and of actuators that another one
-    follows; the law's memory, those of other parts, the sign h = +-1 of the quaternion policy, the command, and the control
-    step at which the motion was lost (-1: not lost)."""
+    """What a trajectory carries from step to step: the states of the body, of the effectors, and of actuators that another
+    one follows; the law's memory, those of other parts, the sign h = +-1 of the quaternion policy, the command, and the
+    control step at which the motion was lost (-1: not lost)."""
 
     state: Any
     effectors: tuple[Any, ...]
@@ -249,7 +251,7 @@ class ClosedLoop:
             prepared("environment"),
             prepared("effector"),
             prepared("sensor"),
-            *(prepared("estimator") or ((),)),
+            next(iter(prepared("estimator")), ()),
             prepared("actuator"),
         )
 

@@ -1,5 +1,5 @@
-"""The equations of one control step, which all readers share: `measure` (what a law is told), `update` (what it commands at a
-control instant) and `propagate` (the motion under the held command), composed of the equations of a loop's parts."""
+"""The equations of one control step, which all readers share: `measure` (what a law is told), `update` (what it commands at
+a control instant) and `propagate` (the motion under the held command), composed of the equations of a loop's parts."""
 
 from __future__ import annotations
 
@@ -56,6 +56,7 @@ def make_equations(parts: Composition) -> Step:
     policy = body.SIGN_POLICIES.get(parts.sign_policy)
     named = _Named(parts)
     still = target is None or target.flag("STILL")
+    follows = target is not None and target.flag("FOLLOWS")
 
     def goal_of(carry, state, step, setup):
         return None if target is None else target.module.goal(setup.target, state, step, carry.memories.followed)
@@ -93,7 +94,7 @@ def make_equations(parts: Composition) -> Step:
             setup.period,
             setup.limit,
         )
-        followed = goal.attitude if target is not None and target.flag("FOLLOWS") else memories.followed
+        followed = goal.attitude if goal is not None and follows else memories.followed
         return body.observe(found, scene), memories._replace(
             followed=followed, sensors=tuple(kept), readings=tuple(shown), estimator=own, estimate=estimate
         )

@@ -50,8 +50,8 @@ AnyPart = TypeVar("AnyPart", bound=Part)
 
 @cache
 def parts(role: str) -> dict[str, Part]:
-    """All parts of a role but laws that are installed, by name. One of another package that does not load is left out, with a
-    warning that names it."""
+    """All parts of a role but laws that are installed, by name. One of another package that does not load is left out, with
+    a warning that names it."""
     return installed(PACKAGES[role], role, as_part)
 
 

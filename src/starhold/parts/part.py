@@ -1,4 +1,5 @@
-"""Parts of a loop as objects, whatever their role: a part file under its name, and a part with the numbers it has in a loop."""
+"""Parts of a loop as objects, whatever their role: a part file under its name, and a part with the numbers it has in a
+loop."""
 
 from __future__ import annotations
 
@@ -69,8 +70,8 @@ class Part:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A part in a loop: its parameters, the name that recordings and errors call it by, and the state that it starts with (of
-    effectors; None for what the part says)."""
+    """A part in a loop: its parameters, the name that recordings and errors call it by, and the state that it starts with
+    (of effectors; None for what the part says)."""
 
     part: Part
     params: Any = ()

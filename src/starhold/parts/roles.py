@@ -55,9 +55,9 @@ class Scene(NamedTuple):
 
 
 class Body(Protocol):
-    """What moves. `State` has a field named `COMMAND` for the command that acts; `Measurement` is what laws are told, `Sample`
-    what is recorded, its fields annotated with `Quantity`. `SIGN_POLICIES`: by name, which of equivalent measurements a law is
-    shown; empty where there is no choice."""
+    """What moves. `State` has a field named `COMMAND` for the command that acts; `Measurement` is what laws are told,
+    `Sample` what is recorded, its fields annotated with `Quantity`. `SIGN_POLICIES`: by name, which of equivalent
+    measurements a law is shown; empty where there is no choice."""
 
     COMMAND: str
     TIME_UNIT: str
@@ -88,8 +88,8 @@ class Body(Protocol):
 
 
 class Environment(Protocol):
-    """A torque (N m, body), a force or a field; at least one of `torque` and `acceleration`. `MODELLED`: whether laws are told
-    of the torque. With a memory, `remember` and `update` renew it at each control step."""
+    """A torque (N m, body), a force or a field; at least one of `torque` and `acceleration`. `MODELLED`: whether laws are
+    told of the torque. With a memory, `remember` and `update` renew it at each control step."""
 
     MODELLED: bool
 
@@ -111,8 +111,8 @@ class Environment(Protocol):
 
 
 class Effector(Protocol):
-    """A mechanism that moves with the body and shares its momentum. None knows another: each adds its reaction, and inertia if
-    it has to, and gets the body's angular acceleration for its own rates. With `ACTS` it takes the command of the law."""
+    """A mechanism that moves with the body and shares its momentum. None knows another: each adds its reaction, and inertia
+    if it has to, and gets the body's angular acceleration for its own rates. With `ACTS` it takes the command of the law."""
 
     ACTS: bool
 
@@ -158,14 +158,15 @@ class Sensor(Protocol):
 
 
 class Estimator(Protocol):
-    """The state as it is computed from readings. `NEEDS`: the readings that it takes, by name; `Estimate` is a NamedTuple whose
-    fields are called as those of the body's state that it tells of."""
+    """The state as it is computed from readings. `NEEDS`: the readings that it takes, by name; `Estimate` is a NamedTuple
+    whose fields are called as those of the body's state that it tells of."""
 
     NEEDS: tuple[str, ...]
     Estimate: type
 
     def estimate(self, readings: Any, memory: Any, params: Any, craft: Any, period: Scalar, /) -> tuple[Any, Any]:
-        """The estimate and the memory for the next; `readings` has an attribute for each name, craft is the nominal model."""
+        """The estimate and the memory for the next; `readings` has an attribute for each name, craft is the nominal
+        model."""
         ...
 
     def remember(self, params: Any, state: State, /) -> Any:
@@ -186,8 +187,8 @@ class Target(Protocol):
 
 
 class Actuator(Protocol):
-    """From the command of a law to what acts. One without `rates` changes the command at control instants alone; one with them
-    has an output of its own that follows its input."""
+    """From the command of a law to what acts. One without `rates` changes the command at control instants alone; one with
+    them has an output of its own that follows its input."""
 
     def command(self, command: Vector, params: Any, /) -> Vector:
         """The command that is passed on."""

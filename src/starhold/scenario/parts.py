@@ -1,4 +1,5 @@
-"""Reads the [[part]] tables of a scenario: parts of any role that stand in a file of their own, here or in another package."""
+"""Reads the [[part]] tables of a scenario: parts of any role that stand in a file of their own, here or in another
+package."""
 
 from __future__ import annotations
 
@@ -54,8 +55,8 @@ def part_model(part: Part) -> type[Any]:
 
 
 def read_parts(tables: Any, body: str, folder: Path, where: str, units: Any = None) -> tuple[Fitted, ...]:
-    """The parts of the [[part]] tables of a file, for a body; file names in them are relative to a folder; units: of a body whose
-    numbers are scaled. InputError for the first that is wrong in itself; `check_fit` looks at all of them together."""
+    """The parts of the [[part]] tables of a file, for a body; file names in them are relative to a folder; units: of a body
+    whose numbers are scaled. InputError for the first that is wrong in itself; `check_fit` looks at all of them together."""
     if tables is None:
         return ()
     if not isinstance(tables, list):
@@ -104,10 +105,10 @@ def _in_file(table: dict[str, Any], folder: Path, where: str, key: str) -> Part:
         check_name(part.name)
     except OSError as error:
         raise InputError(where, key, f"{show(given)}: {error.strerror}", "a Python file that holds a part") from None
-    except ValueError as error:
-        raise InputError(where, key, "", f"{show(given)}: {error}") from None
     except PydanticCustomError as error:
         raise InputError(where, key, show(given), f"a file named with {error.message()}") from None
+    except ValueError as error:
+        raise InputError(where, key, "", f"{show(given)}: {error}") from None
     return part
 
 

@@ -73,6 +73,5 @@ def part_table(part: Part, params: Any) -> dict[str, Any]:
     for item, value in zip(part.fields(), params, strict=True):
         if isinstance(value, float) and not math.isfinite(value):
             continue
-        plain = json.loads(json.dumps(value))
-        table[item.name] = item.gain.choices[value] if item.gain.choices else plain
+        table[item.name] = item.gain.choices[int(value)] if item.gain.choices else json.loads(json.dumps(value))
     return table

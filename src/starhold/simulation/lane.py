@@ -179,8 +179,8 @@ def label(loop: ClosedLoop, samples: NDArray[np.float64], carry: Carry, record_e
 
 
 def recorded(loop: ClosedLoop) -> list[tuple[str, Quantity, int]]:
-    """The recorded quantities in the order of samples: name, quantity and how many numbers it has. Those of sensors and of an
-    estimator are called after the part; so are those of effectors where a name would stand twice."""
+    """The recorded quantities in the order of samples: name, quantity and how many numbers it has. Those of sensors and of
+    an estimator are called after the part; so are those of effectors where a name would stand twice."""
     sample = make_step(loop.composition()).sample(loop.carry(), 0, loop.setup())
     own, records, readings, estimate = sample
     effectors = [f for f in loop.used("effector") if f.part.hook("record") is not None]

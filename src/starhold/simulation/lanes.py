@@ -23,8 +23,8 @@ PIECES = 16
 
 @dataclass(frozen=True)
 class Batch:
-    """Where many trajectories ended. states: (numbers of a state, lanes), rows in the order of the loop's `start` and then of
-    its effectors; lost_at: (lanes,) control step at which the motion was lost, -1 where it was not."""
+    """Where many trajectories ended. states: (numbers of a state, lanes), rows in the order of the loop's `start` and then
+    of its effectors; lost_at: (lanes,) control step at which the motion was lost, -1 where it was not."""
 
     states: NDArray[np.float64]
     lost_at: NDArray[np.float64]
@@ -47,9 +47,10 @@ def simulate_many(
 ) -> Batch:
     """Fly `loop` from each of many states for `steps` control periods.
 
-    starts: states of the body, or an array (numbers of a state, lanes), with the effectors' below or without; first_run: the run number of lane 0, which with the seed fixes
-    its random numbers; phases: those of the loop, `loop.phases(steps)`, with an array (lanes,) in place of every number that
-    differs between lanes, whole numbers excepted, see `alongside`; width: lanes in flight at once on a core.
+    starts: states of the body, or an array (numbers of a state, lanes), with the effectors' below or without; first_run:
+    the run number of lane 0, which with the seed fixes its random numbers; phases: those of the loop, `loop.phases(steps)`,
+    with an array (lanes,) in place of every number that differs between lanes, whole numbers excepted, see `alongside`;
+    width: lanes in flight at once on a core.
 
     The result is the same, bit for bit, for any number of threads and any width, and equals that of `simulate` lane by lane
     while the motion is not lost.

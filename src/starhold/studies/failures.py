@@ -284,7 +284,7 @@ def _steps(scenario: Scenario, loop: ClosedLoop, period: float | None) -> int:
     """Control steps to fly: an orbit more than the scenario's where that can be, for what the wheels store swings with the
     orbit, and over less than one orbit nobody tells that from growth."""
     steps = scenario.table.simulation.steps
-    if period is None or isinstance(loop.target, np.ndarray) or loop.remembers:
+    if period is None or loop.target.part.name == "history" or loop.remembers:
         return steps
     every = scenario.table.simulation.record_every
     more = math.ceil(period / loop.period / every + 1.0) * every

@@ -85,7 +85,8 @@ def motion(
 
 
 def rates(state: State, loads: Loads, torque_rate: Vector | None, craft: Craft) -> Any:
-    """d(state)/dt under what acts on the body. Where an effector takes the command, the actuators' torque acts on it alone."""
+    """d(state)/dt under what acts on the body. Where an effector takes the command, the actuators' torque acts on it
+    alone."""
     torque = state.torque if loads.reaction is None else loads.reaction
     if loads.reaction is not None and loads.direct:
         torque = add(state.torque, torque)

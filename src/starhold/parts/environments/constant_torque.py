@@ -1,4 +1,5 @@
-"""A torque that never changes, in body or inertial axes: a leak, a residual dipole in a steady field, a thruster left open."""
+"""A torque that never changes, in body or inertial axes: a leak, a residual dipole in a steady field, a thruster left
+open."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, NamedTuple, TypeAlias
+from typing import Annotated, Any, NamedTuple, TypeAlias, cast
 
 import numpy as np
 
@@ -63,7 +63,8 @@ def update(memory: Vector, state: Any, params: Numbers, dice: Dice, step: int) -
     def piece(k: Any, found: Vector) -> tuple[Vector]:
         (begin, *first), (end, *last) = params.rows.row(k, 4), params.rows.row(k + 1, 4)
         share = (time - begin) / (end - begin)
-        here: Any = add(tuple(first), scale(share, subtract(tuple(last), tuple(first))))
+        start, stop = cast(Vector, tuple(first)), cast(Vector, tuple(last))
+        here = add(start, scale(share, subtract(stop, start)))
         inside = both(less_equal(begin, time), less(time, end))
         return (tuple(where(inside, x, y) for x, y in zip(here, found, strict=True)),)  # type: ignore[return-value]
 

@@ -1,4 +1,5 @@
-"""Attitude and gyro bias by a filter of fixed gains: the gyro carries the attitude on, and each new attitude corrects both."""
+"""Attitude and gyro bias by a filter of fixed gains: the gyro carries the attitude on, and each new attitude corrects
+both."""
 
 from __future__ import annotations
 

@@ -36,8 +36,8 @@ class Knots(NamedTuple):
 
 
 class Params(NamedTuple):
-    """A table of `tabulate` with a row for each control step and one more, and the knots of the spline that it was taken from
-    (() for a table that comes without)."""
+    """A table of `tabulate` with a row for each control step and one more, and the knots of the spline that it was taken
+    from (() for a table that comes without)."""
 
     table: NDArray[np.float64]
     knots: Knots | tuple[()] = ()
