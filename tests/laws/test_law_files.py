@@ -242,7 +242,7 @@ def test_a_file_with_the_name_of_another_law_is_refused_and_the_law_s_own_is_it(
     assert sh.load(folder / "own.toml").laws[0].law is catalogue()["pd"]
 
 
-@pytest.fixture()
+@pytest.fixture
 def offer(monkeypatch):
     """Give other packages' entry points, and forget what they gave afterwards."""
 

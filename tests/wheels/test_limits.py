@@ -2,20 +2,18 @@
 
 import math
 from dataclasses import replace
+from types import ModuleType
 
 import numpy as np
 import pytest
 
+from starhold.algebra.vector import ZERO
 from starhold.analysis.metrics import measure
 from starhold.errors import InputError
-from starhold.loop.kernels import fly_plainly
-from types import ModuleType
-
-from starhold.algebra.vector import ZERO
-from starhold.loop.kernels import make_step
-from starhold.parts.part import Fitted, Part
+from starhold.loop.kernels import fly_plainly, make_step
 from starhold.parts.effectors.envelope import authority, with_facets
 from starhold.parts.effectors.wheels import MOST, allocate_peak
+from starhold.parts.part import Fitted, Part
 from starhold.report.plots import collect
 from starhold.scenario.bodies.rigid_body.craft import torque_limit
 from starhold.scenario.bodies.rigid_body.faults import fault_times
