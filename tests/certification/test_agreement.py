@@ -57,7 +57,7 @@ def test_many_random_scenarios(first, tmp_path):
 @pytest.mark.parametrize("wheels", [False, True])
 @pytest.mark.parametrize("law", ["sliding", "modal"])
 def test_what_cannot_be_shown_is_undecided_for_the_checker_too(law, wheels, tmp_path):
-    wanted = Wanted(rate=math.inf, turn=1.0, inertia_tolerance=0.1)
+    wanted = Wanted(rate=math.inf, slew_angle=1.0, inertia_tolerance=0.1)
     gains = catalogue()[law].examples()[0]
     certificate = certify(rotors(law, gains) if wheels else free(loop_of(law, gains)), law, wanted)
     assert [claim.outcome for claim in certificate.claims].count("undecided") == 3
@@ -81,12 +81,12 @@ def test_a_law_may_cancel_a_part_of_the_modelled_torque(compensation, wheels, tm
 
 @pytest.mark.parametrize("law", ["pd", "wheel"])
 @pytest.mark.parametrize("slew_angle", [1e-100, 1e-12, 1e-8, 1e-4, 0.02, 1.0])
-def test_the_set_of_a_turn_holds_it(law, turn, tmp_path):
+def test_the_set_of_a_turn_holds_it(law, slew_angle, tmp_path):
     gains = {"pd": pd.Gains(0.09, 0.009), "wheel": wheel.Gains(0.09, (0.0045,) * 3)}[law]
-    certificate = certify(free(loop_of(law, gains)), law, Wanted(slew_angle=turn))
+    certificate = certify(free(loop_of(law, gains)), law, Wanted(slew_angle=slew_angle))
     claim = certificate.claim("torque-limit")
     assert claim.outcome == "proved"
-    size = 0.018 * 2 * (arb(turn) / 4).sin() ** 2 if law == "pd" else 0.018 * (arb(turn) / 2).sin() ** 2
+    size = 0.018 * 2 * (arb(slew_angle) / 4).sin() ** 2 if law == "pd" else 0.018 * (arb(slew_angle) / 2).sin() ** 2
     assert arb(claim.numbers["start"]) >= size * (1 - arb(2) ** -45)
     # And hardly more.
     assert claim.numbers["start"] <= float(size.mid()) * (1.0 + 1e-9)

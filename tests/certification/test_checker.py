@@ -710,7 +710,7 @@ def test_the_checker_imports_nothing_of_the_certifier():
     above = (
         "starhold.checker.",
         "starhold.algebra.",
-        "starhold.models.",
+        "starhold.parts.",
         "starhold.laws.",
         "starhold.errors",
     )

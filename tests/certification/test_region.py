@@ -147,7 +147,7 @@ def test_another_motion_is_not_taken_for_this_one(monkeypatch):
 
 
 def test_what_is_asked_for_and_not_shown_is_told():
-    wanted = Wanted(rate=0.1, turn=1.0, inertia_tolerance=0.1)
+    wanted = Wanted(rate=0.1, slew_angle=1.0, inertia_tolerance=0.1)
     found = certify(loop_of(), wanted=wanted)
     assert found.outcome == "undecided"
     assert {c.kind: c.outcome for c in found.claims}["inertia"] == "undecided"

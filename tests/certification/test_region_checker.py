@@ -85,8 +85,8 @@ def read(content):
     ],
 )
 def test_levels_up_to_where_v_may_rise_hold(a, witness, held, missed):
-    assert faults(file(region(held, witness, a=a, turn=0.0, rate=0.0), a)) == {}
-    assert "descent" in faults(file(region(missed, witness, a=a, turn=0.0, rate=0.0), a))
+    assert faults(file(region(held, witness, a=a, slew_angle=0.0, rate=0.0), a)) == {}
+    assert "descent" in faults(file(region(missed, witness, a=a, slew_angle=0.0, rate=0.0), a))
 
 
 @settings(max_examples=40)
@@ -95,7 +95,7 @@ def test_v_falls_at_random_states_of_what_holds(a, b, seed):
     random = np.random.default_rng(seed)
     witness = (random.uniform(4.0, 6.0), random.uniform(-0.3, 0.2), random.uniform(1.0, 2.5), random.uniform(-0.2, 1.0))
     c = random.uniform(0.3, 1.0) * (2.0 * witness[0] + 4.0 * witness[1])
-    found = faults(file(region(c, witness, a=a, turn=0.0, rate=0.0), a, b))
+    found = faults(file(region(c, witness, a=a, slew_angle=0.0, rate=0.0), a, b))
     u, w, x = random.uniform(0.0, [[2.0], [12.0], [2.0]], size=(3, 20_000))
     x = np.where(random.random(x.size) < 0.3, np.sign(x - 1.0), x - 1.0)
     V, slope = by_formula(a, b, witness, u, w, x)
@@ -153,7 +153,7 @@ def test_so_do_the_target_torque_that_is_known_and_what_wheels_store(target):
 
 @pytest.mark.parametrize(("c", "witness"), [(3.5829, PLAIN), (9.0605, BETTER)])
 def test_a_number_that_says_more_fails(c, witness):
-    content = file(region(c, witness, turn=0.999999 * highest_turn(c, witness)))
+    content = file(region(c, witness, slew_angle=0.999999 * highest_turn(c, witness)))
     assert faults(content) == {}
     place = ("certificates", 0, "claims", 0, "numbers")
     for key, where in (("level", "descent"), ("slew_angle", ""), ("rate", "")):
@@ -167,9 +167,9 @@ def test_a_number_that_says_more_fails(c, witness):
 def test_a_turn_beyond_where_v_is_largest_fails():
     # p u + c2 u2 is largest at u = 1.25, and lower again at the other rest.
     witness = (5.0, -2.0, 2.0, 0.9)
-    assert "" not in faults(file(region(3.13, witness, turn=2.0 * math.acos(1.0 - 1.9), rate=0.0)))
-    assert "" in faults(file(region(3.12, witness, turn=2.0 * math.acos(1.0 - 1.9), rate=0.0)))
-    assert "" in faults(file(region(3.12, witness, turn=math.tau * 1.001, rate=0.0)))
+    assert "" not in faults(file(region(3.13, witness, slew_angle=2.0 * math.acos(1.0 - 1.9), rate=0.0)))
+    assert "" in faults(file(region(3.12, witness, slew_angle=2.0 * math.acos(1.0 - 1.9), rate=0.0)))
+    assert "" in faults(file(region(3.12, witness, slew_angle=math.tau * 1.001, rate=0.0)))
 
 
 def test_another_witness_fails():
@@ -363,7 +363,7 @@ def test_v_falls_as_the_law_turns_the_body(seed):
         return v @ v / 2.0 + a * a * (p * u + c2 * u * u) - a * (g + m * u) * (v @ x[1:])
 
     expected = float(energy(1e-30).imag) / 1e-30
-    claim = region(1.0, (p, c2, g, m), a=a, turn=0.0, rate=0.0)
+    claim = region(1.0, (p, c2, g, m), a=a, slew_angle=0.0, rate=0.0)
     own = read(file(claim, a, b, inertia=tensor(craft.inertia).tolist()))
     own.form()
     alpha = floating(own.alpha)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from starhold.loop.station import StationLoop
 
 from starhold.algebra.vector import ZERO
 from starhold.certification.station import certify_station
@@ -13,7 +14,6 @@ from starhold.laws import l2_equilibrium as l2_equilibrium
 from starhold.laws.catalogue import catalogue
 from starhold.parts.bodies.libration_point import PRIMARIES, PointState, make_libration
 from starhold.simulation.lanes import simulate_many
-from tests.making import point_loop
 
 EARTH = PRIMARIES["sun-earth"]
 PLANT = make_libration(EARTH.larger, EARTH.smaller, EARTH.separation)
@@ -23,8 +23,8 @@ REST = PointState((0.0, 1.0, 0.0), (0.0, 0.0, 0.0), ZERO)
 
 
 def loop_of(gains=GAINS, limit=math.inf, kind="axis", **changes):
-    return point_loop(
-        PLANT, catalogue("libration-point")["l2-equilibrium"], gains, REST, 1e-3, limit=limit, kind=kind, **changes
+    return StationLoop(
+        PLANT, catalogue("libration-point")["l2-equilibrium"], gains, REST, 1e-3, limit=limit, limit_kind=kind, **changes
     )
 
 

@@ -8,6 +8,7 @@ import math
 
 import pytest
 from flint import arb, ctx
+from starhold.loop.station import StationLoop
 
 from starhold.algebra.vector import ZERO
 from starhold.certification.certificate import write
@@ -19,7 +20,6 @@ from starhold.laws import l2_equilibrium as l2_equilibrium
 from starhold.laws.catalogue import catalogue
 from starhold.parts.bodies.libration_point import POINTS, PRIMARIES, PointState, make_libration
 from tests.certification.test_station_checker import by_hand, changed, faults, outcomes
-from tests.making import point_loop
 
 EARTH = PRIMARIES["sun-earth"]
 PLANT = make_libration(EARTH.larger, EARTH.smaller, EARTH.separation)
@@ -35,8 +35,8 @@ OFF = GAINS._replace(k_x=GAINS.k_x * (1.0 + 1e-8))
 
 def loop_of(gains=GAINS, limit=math.inf, kind="axis", plant=PLANT, **changes):
     start = PointState((0.0, gains.y, gains.z), ZERO, ZERO)
-    return point_loop(
-        plant, catalogue("libration-point")["l2-equilibrium"], gains, start, 1e-3, limit=limit, kind=kind, **changes
+    return StationLoop(
+        plant, catalogue("libration-point")["l2-equilibrium"], gains, start, 1e-3, limit=limit, limit_kind=kind, **changes
     )
 
 
@@ -113,7 +113,7 @@ def test_a_number_that_says_more_fails(made, gains):
     for key, share, where_ in (
         ("width", 1.0011, "stays"),
         ("boundary", 1.0 - 1e-13, "nothing returns from beyond"),
-        ("switching_gain", 1e-4, "stays"),
+        ("reach", 1e-4, "stays"),
         ("limit", 1.0 + 1e-15, ""),
         ("limit", 1.0 - 1e-15, ""),
     ):
@@ -124,7 +124,7 @@ def test_a_number_that_says_more_fails(made, gains):
     assert faults(changed(content, (*place, "slew_angle"), 1.0))
     assert faults(changed(content, (*place, "width"), numbers["boundary"]))
     # What says less holds.
-    for key, share in (("width", 0.9), ("switching_gain", 0.9), ("boundary", 2.0)):
+    for key, share in (("width", 0.9), ("reach", 0.9), ("boundary", 2.0)):
         assert not faults(changed(content, (*place, key), numbers[key] * share)), (key, share)
 
 
@@ -133,7 +133,7 @@ def test_gains_off_the_separatrix_hold_up_to_a_reach(made):
     content = made(OFF, 4.0)
     width = content["certificates"][0]["claims"][1]["numbers"]["width"]
     reach = width / (OFF.k_x / STEEP - 2.0)
-    at = (*AXIS, "numbers", "switching_gain")
+    at = (*AXIS, "numbers", "reach")
     assert not faults(changed(content, at, 0.999999 * reach))
     assert ("saturated-axis", "stays") in faults(changed(content, at, 1.000001 * reach))
     rounded = made(GAINS, 4.0)
@@ -196,7 +196,7 @@ def test_other_laws_do_not_come_to_rest(made):
     content = made(GAINS, 4.0)
     for law in catalogue("libration-point").values():
         for gains in law.examples():
-            loop = point_loop(PLANT, law, gains, loop_of().start, 1e-3, limit=4.0, kind="axis")
+            loop = StationLoop(PLANT, law, gains, loop_of().start, 1e-3, limit=4.0, limit_kind="axis")
             other = changed(content, SUBJECT, json.loads(json.dumps(described_station(loop))))
             if law.name != "l2-equilibrium":
                 assert set(faults(other).values()) == {f"the law {law.name} does not come to rest"}

@@ -180,7 +180,7 @@ def test_flights_agree(gains):
     numbers = certify_station(loop_of(gains, limit)).claims[1].numbers
     random = np.random.default_rng(3)
     x, side = random.uniform(-1.0, 1.0, 400), np.where(np.arange(400) % 2 == 0, 1.0, -1.0)
-    x = np.where(np.arange(400) < 300, 5.0 * numbers["width"], numbers["switching_gain"]) * x
+    x = np.where(np.arange(400) < 300, 5.0 * numbers["width"], numbers["reach"]) * x
     for size, returns in ((0.98 * numbers["width"], True), (1.002 * numbers["boundary"], False)):
         end, speed = flown_along_x(gains, limit, x, STEEPNESS * (side * size - x))
         if returns:

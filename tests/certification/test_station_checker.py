@@ -7,6 +7,7 @@ import json
 import math
 
 import pytest
+from starhold.loop.station import StationLoop
 
 from starhold.algebra.vector import ZERO
 from starhold.certification.certificate import write
@@ -18,14 +19,13 @@ from starhold.laws import l2_circle
 from starhold.laws.catalogue import catalogue
 from starhold.parts.bodies.libration_point import POINTS, PRIMARIES, PointState, make_libration
 from tests.certification.test_checker import by_hand, replaced
-from tests.making import point_loop
 
 EARTH = PRIMARIES["sun-earth"]
 PLANT = make_libration(EARTH.larger, EARTH.smaller, EARTH.separation)
 BEST = l2_circle.design(PLANT, l2_circle.Best(1.0))
 PEAK = l2_circle.peak_demand(PLANT, BEST.rate)
 RELAY = BEST._replace(feedback=1, k=0.3)
-SOFT = RELAY._replace(layer=0.1)
+SOFT = RELAY._replace(boundary_layer=0.1)
 WIDE = BEST._replace(alpha=3.0, k=0.2, radius=2.0)
 BACK = BEST._replace(rate=-2.0, radius=5.0)
 CLAIM, NUMBERS = ("certificates", 0, "claims", -1), ("certificates", 0, "claims", -1, "numbers")
@@ -34,8 +34,8 @@ SUBJECT = ("certificates", 0, "subject")
 
 def loop_of(gains=BEST, limit=math.inf, kind="norm", plant=PLANT, **changes):
     start = PointState((0.0, gains.radius, 0.0), (0.0, 0.0, gains.rate * gains.radius), ZERO)
-    return point_loop(
-        plant, catalogue("libration-point")["l2-circle"], gains, start, 1e-3, limit=limit, kind=kind, **changes
+    return StationLoop(
+        plant, catalogue("libration-point")["l2-circle"], gains, start, 1e-3, limit=limit, limit_kind=kind, **changes
     )
 
 
@@ -94,8 +94,8 @@ def station(gains=BEST, limit=math.inf, kind="norm", **changes):
         (BEST, 1.5, "axis"),
         (SOFT, 1.2, "norm"),
         (SOFT, 1.2, "axis"),
-        (RELAY._replace(layer=1e-3, k=0.05), 1.02, "norm"),
-        (RELAY._replace(layer=5.0), 1.3, "norm"),
+        (RELAY._replace(boundary_layer=1e-3, k=0.05), 1.02, "norm"),
+        (RELAY._replace(boundary_layer=5.0), 1.3, "norm"),
         (WIDE, 1.05, "norm"),
         (WIDE, 1.3, "axis"),
         (BACK, 1.3, "norm"),
@@ -129,7 +129,7 @@ def test_other_laws_are_read_and_claim_no_circle(made):
     content = made()
     for law in catalogue("libration-point").values():
         for gains in law.examples():
-            loop = point_loop(PLANT, law, gains, loop_of().start, 1e-3)
+            loop = StationLoop(PLANT, law, gains, loop_of().start, 1e-3)
             other = changed(content, SUBJECT, json.loads(json.dumps(described_station(loop))))
             if law.name != "l2-circle":
                 assert "makes no circle attractive" in " ".join(faults(other).values())

@@ -41,7 +41,7 @@ def drawn_gains(random):
         alpha=float(random.uniform(low, high)),
         k=float(random.uniform(0.1, 2.0)),
         feedback=feedback,
-        layer=layer,
+        boundary_layer=layer,
     )
 
 

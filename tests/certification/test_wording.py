@@ -61,11 +61,11 @@ def test_a_torque_that_is_withstood_is_not_rounded_up():
         (math.radians(179.0), "shortest", "lqr", False),
     ],
 )
-def test_every_attitude_is_said_of_both_its_quaternions(turn, cover, law, every):
-    numbers = {"slew_angle": turn, "rate": 0.1, "rate_everywhere": None, "everything": False}
+def test_every_attitude_is_said_of_both_its_quaternions(slew_angle, cover, law, every):
+    numbers = {"slew_angle": slew_angle, "rate": 0.1, "rate_everywhere": None, "everything": False}
     told = sentence(claim("convergence", **numbers), {**SUBJECT, "quaternion_sign": cover, "law": law})
     assert ("rest at every attitude and" in told) == every
-    assert every or f"up to {shown(math.degrees(turn))}°" in told
+    assert every or f"up to {shown(math.degrees(slew_angle))}°" in told
     assert "global on rotations" not in told
 
 
