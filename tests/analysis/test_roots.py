@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from starhold.analysis.roots import PUBLISHED, Pieces, fit, search, unmet
 from starhold.analysis.transient import Limits
-from tests.analysis.test_transient import problem
+from tests.analysis.turns import problem
 
 ROOTS = np.linspace(-2.6, -0.02, 160)
 WIDE = Limits(0.7, 1.2)

@@ -1,6 +1,7 @@
 """Closed loops that certificates are made of in these tests."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from starhold.parts.effectors.wheeled_body import WheeledState
@@ -33,6 +34,7 @@ def free(loop):
     return replace(loop, orbit=False, gravity_gradient=False, start=still)
 
 
+@cache
 def textbook():
     """A loop of every law that can be certified, under the assumptions of its textbook: name to loop."""
     formed = {

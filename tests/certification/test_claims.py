@@ -35,14 +35,14 @@ def test_every_law_is_certified_under_its_textbook_assumptions(name):
 
 
 @pytest.mark.parametrize("name", sorted(n for n in LOOPS if not n.startswith(("sliding", "wheel"))))
-@pytest.mark.parametrize("cover", ["shortest", "hysteresis"])
-def test_the_quaternion_sign_is_in_the_claim(name, cover):
-    loop = loop_of(LOOPS[name].law.name, LOOPS[name].gains, LOOPS[name].craft, sign_policy=cover)
+@pytest.mark.parametrize("sign_policy", ["shortest", "hysteresis"])
+def test_the_quaternion_sign_is_in_the_claim(name, sign_policy):
+    loop = loop_of(LOOPS[name].law.name, LOOPS[name].gains, LOOPS[name].craft, sign_policy=sign_policy)
     certificate = certify(loop, name)
     main = certificate.claim("convergence")
     assert main.outcome == "proved"
     names = [o.name for o in main.obligations]
-    if cover == "hysteresis":
+    if sign_policy == "hysteresis":
         assert names[-1] == "jumps lower V"
     else:
         # The switch at half a turn is outside the set, and all that is less than half a turn at rest is inside.
@@ -167,10 +167,10 @@ def test_modelled_torque_is_bounded_over_the_whole_orbit():
 
 
 @pytest.mark.parametrize("name", ["pd-0", "lqr-I", "lqr-II", "lqr-III", "matrix-pd-inertial"])
-@pytest.mark.parametrize("cover", ["as_published", pytest.param("hysteresis", marks=pytest.mark.slow)])
-def test_disturbed_flights_end_within_the_ultimate_bound(name, cover):
+@pytest.mark.parametrize("sign_policy", ["as_published", pytest.param("hysteresis", marks=pytest.mark.slow)])
+def test_disturbed_flights_end_within_the_ultimate_bound(name, sign_policy):
     """A torque of the claimed size that always pushes away cannot leave the claimed ball, nor one that is constant."""
-    loop = loop_of(LOOPS[name].law.name, LOOPS[name].gains, LOOPS[name].craft, sign_policy=cover)
+    loop = loop_of(LOOPS[name].law.name, LOOPS[name].gains, LOOPS[name].craft, sign_policy=sign_policy)
     certificate = certify(loop, name, Wanted(disturbance=1e-4))
     claim = certificate.claim("disturbance")
     assert claim.outcome == "proved"

@@ -68,8 +68,8 @@ def test_the_energy_alone_has_the_level_that_was_found_for_it(root):
 def test_the_published_start_is_outside_the_one_and_inside_the_other():
     start = 'attitude = [0.1414213562373095, 0.3, -0.5, 0.8]\nrate = ["-10 deg/s", "-7 deg/s", "11 deg/s"]'
     craft = CRAFT.replace("attitude = [1, 0, 0, 0.1]\nrate = [0, 0, 0]", start)
-    for cover, inside in (("hysteresis", False), ("shortest", False), ("as_published", True)):
-        loop = loop_of(f'a = {ROOT}\nquaternion_sign = "{cover}"', craft)
+    for sign_policy, inside in (("hysteresis", False), ("shortest", False), ("as_published", True)):
+        loop = loop_of(f'a = {ROOT}\nquaternion_sign = "{sign_policy}"', craft)
         certificate = certify(loop)
         assert start_inside(certificate, loop) == {"region": inside}
         # The start is where it is, whatever sensors with errors see.
@@ -82,9 +82,9 @@ def test_the_published_start_is_outside_the_one_and_inside_the_other():
 
 
 @pytest.mark.parametrize(("root", "b"), [(ROOT, -0.01), (-2.0, -0.01), (-1.0, -0.1), (-0.4, -1.0), (-1.5, -0.7)])
-@pytest.mark.parametrize("cover", ["as_published", "shortest", "hysteresis"])
-def test_v_falls_at_random_states_of_the_set_and_at_the_worst(root, b, cover):
-    loop = loop_of(f'a = {root}\nb = {b}\nquaternion_sign = "{cover}"')
+@pytest.mark.parametrize("sign_policy", ["as_published", "shortest", "hysteresis"])
+def test_v_falls_at_random_states_of_the_set_and_at_the_worst(root, b, sign_policy):
+    loop = loop_of(f'a = {root}\nb = {b}\nquaternion_sign = "{sign_policy}"')
     claim = claim_of(loop)
     assert claim.outcome == "proved"
     shape, level = Shape(**claim.witness), claim.numbers["level"]
@@ -154,9 +154,9 @@ def test_what_is_asked_for_and_not_shown_is_told():
     assert {c.kind: c.outcome for c in found.claims}["region"] == "proved"
 
 
-@pytest.mark.parametrize("cover", ["as_published", "shortest", "hysteresis"])
-def test_flights_from_the_set_do_not_contradict_it(cover):
-    loop = loop_of(f'a = {ROOT}\nquaternion_sign = "{cover}"')
+@pytest.mark.parametrize("sign_policy", ["as_published", "shortest", "hysteresis"])
+def test_flights_from_the_set_do_not_contradict_it(sign_policy):
+    loop = loop_of(f'a = {ROOT}\nquaternion_sign = "{sign_policy}"')
     trial = fly_claims(loop, certify(loop), flights=1000)
     assert trial is not None
     assert trial.highest_share <= 1.0 + 1e-9

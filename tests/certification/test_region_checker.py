@@ -4,61 +4,22 @@ import math
 
 import numpy as np
 import pytest
-from flint import fmpq
 from hypothesis import given, settings
 from hypothesis import strategies as some
 
-from starhold.algebra.quaternion import derivative
-from starhold.algebra.vector import ZERO
 from starhold.certification.subject import described, make_subject
 from starhold.checker import check, passed
-from starhold.checker import modal as reading
-from starhold.checker.exact import CheckError, floating, rational
-from starhold.checker.modal import ModalRegion, Shares
-from starhold.checker.subject import read_subject
 from starhold.laws import modal
-from starhold.laws.interface import Measurement, NoMemory
-from starhold.parts.bodies.rigid_body import angular_acceleration
-from starhold.parts.craft import tensor
-from tests.certification.loops import random_craft, rotors
-from tests.certification.test_checker import TEXTBOOK, by_hand, content_at, proved_by_hand, replaced, spots
+from tests.certification.by_hand import TEXTBOOK, by_hand, proved_by_hand
+from tests.certification.edits import content_at, replaced, spots
+from tests.certification.loops import rotors
+from tests.certification.regions import BETTER, PLAIN, A, B, by_formula, file, highest_turn, region
 
-PLAIN, BETTER = (4.0, 0.0, 0.0, 0.0), (5.0, -0.2, 2.0, 0.9)
-A, B = -0.428, -0.01
 ON_WHEELS = ["neither torque nor wheels limited, wheels without friction" if a == TEXTBOOK[4] else a for a in TEXTBOOK]
-
-
-def highest_turn(level, witness):
-    """The largest turn of a witness that is in {V <= level a2}, where V grows with it."""
-    p, c2 = witness[:2]
-    u = level / p if c2 == 0.0 else (math.sqrt(max(p * p + 4.0 * c2 * level, 0.0)) - p) / (2.0 * c2)
-    return 2.0 * math.acos(1.0 - min(max(u, 0.0), 2.0))
-
-
-def region(c, witness=PLAIN, sign_policy="as_published", a=A, assumptions=TEXTBOOK, **changes):
-    """A claim with level = c a2, and turn and rate as large as these can be up to rounding."""
-    names = [("form", "exact identity"), ("descent", "ball arithmetic")]
-    if witness[2] == witness[3] == 0.0:
-        names.append(("only rest", "LaSalle"))
-    names.append(("jumps lower V" if sign_policy == "hysteresis" else "single rest in the set", "exact inequality"))
-    level = c * a * a
-    numbers = {"level": level, "slew_angle": 0.999999 * highest_turn(c, witness), "rate": 0.999999 * math.sqrt(2.0 * level)}
-    return proved_by_hand(
-        "region", names, numbers | changes, dict(zip(("p", "c2", "g", "m"), witness, strict=True)), assumptions
-    )
-
-
-def file(claim, a=A, b=B, **changes):
-    return by_hand("modal", {"phi_0": a, "phi_1": a, "b": b}, [claim], **changes)
 
 
 def faults(content):
     return {f.obligation: f.reason for f in check(content) if f.verdict == "fails"}
-
-
-def read(content):
-    given = content["certificates"][0]
-    return ModalRegion(read_subject(given["subject"]), given["claims"][0]["numbers"], given["claims"][0]["witness"])
 
 
 # --- what holds -------------------------------------------------------------------------------------------------------
@@ -101,16 +62,6 @@ def test_v_falls_at_random_states_of_what_holds(a, b, seed):
     V, slope = by_formula(a, b, witness, u, w, x)
     rises = bool((slope[c >= V] >= 0.0).any())
     assert not rises or "descent" in found
-
-
-def by_formula(a, b, witness, u, w, x):
-    """V/alpha2 and V'/alpha3 at u = 1 - q0, |w|/alpha and the cosine between w and q."""
-    p, c2, g, m = witness
-    beta, q0, long, G = a * b, 1.0 - u, np.sqrt(u * (2.0 - u)), g + m * u
-    K = 2.0 * (1.0 - 2.0 * beta) * u + (1.0 - 8.0 * beta) / 2.0 * w * long * x - beta * q0 * w * w
-    f1 = -2.0 + K * (1.0 + long * long * x * x) / (1.0 + long * long) + G * q0 / 2.0 + m * long * long * x * x / 2.0
-    f2 = -2.0 + (p + 2.0 * c2 * u) / 2.0 + G * (K - 2.0)
-    return w * w / 2.0 + p * u + c2 * u * u + G * w * long * x, w * w * f1 + w * long * x * f2 - 2.0 * G * long * long
 
 
 @pytest.mark.parametrize("sign_policy", ["as_published", "shortest", "hysteresis"])
@@ -333,102 +284,3 @@ def test_held_between_samples():
     assert passed(check(content))
     content["certificates"][0]["subject"]["control_period"] = 0.25
     assert not passed(check(content))
-
-
-# --- its mathematics --------------------------------------------------------------------------------------------------
-
-UNIT = some.floats(-1.0, 1.0)
-
-
-@given(some.integers(0, 2**32 - 1))
-def test_v_falls_as_the_law_turns_the_body(seed):
-    """The checker's V' against the derivative of V along the law's own equations, in floats."""
-    random = np.random.default_rng(seed)
-    craft = random_craft(random)
-    a, b = -random.uniform(0.1, 2.0), -random.uniform(0.001, 0.1)
-    p, c2, g, m = random.normal(size=4)
-    q = random.normal(size=4)
-    q /= np.linalg.norm(q)
-    w = random.normal(size=3) * random.uniform(0.1, 3.0)
-    q, w = tuple(q.tolist()), tuple(w.tolist())
-    gains = modal.Gains((a,) * 3, (a,) * 3, b)
-    measurement = Measurement(q, w, w, ZERO, ZERO, ZERO, ZERO, 0.25, ZERO)
-    swing = angular_acceleration(w, modal.torque(measurement, gains, craft, NoMemory())[0], craft)
-    turning = derivative(q, w)
-
-    def energy(step):
-        # A complex step differentiates a polynomial up to rounding.
-        x, v = np.array(q) + 1j * step * np.array(turning), np.array(w) + 1j * step * np.array(swing)
-        u = 1.0 - x[0]
-        return v @ v / 2.0 + a * a * (p * u + c2 * u * u) - a * (g + m * u) * (v @ x[1:])
-
-    expected = float(energy(1e-30).imag) / 1e-30
-    claim = region(1.0, (p, c2, g, m), a=a, slew_angle=0.0, rate=0.0)
-    own = read(file(claim, a, b, inertia=tensor(craft.inertia).tolist()))
-    own.form()
-    alpha = floating(own.alpha)
-    u, y, s = 1.0 - q[0], float(np.dot(w, w)) / alpha**2, float(np.dot(w, q[1:])) / alpha
-    u, y, s = rational(u), rational(y), rational(s)
-    l2 = u * (2 - u)
-    found = floating(own.fall(u, y, s, Shares(y, s * s, s, l2)) / (1 + l2)) * alpha**3
-    size = alpha**3 * (1.0 + floating(y)) ** 2 * (1.0 + sum(map(abs, (p, c2, g, m))))
-    assert found == pytest.approx(expected, abs=1e-12 * size)
-    assert floating(own.height(u, y, s)) * alpha**2 == pytest.approx(float(energy(0.0).real), abs=1e-12 * size)
-
-
-def test_another_motion_or_another_slope_is_noticed():
-    for name in ("a", "b", "beta", "alpha", "m", "g", "p", "c2"):
-        own = read(file(region(1.0, BETTER)))
-        own.form()
-        setattr(own, name, getattr(own, name) + fmpq(1, 10**12))
-        if name in ("m", "g", "p", "c2"):
-            own.height = read(file(region(1.0, BETTER))).height
-        with pytest.raises(CheckError):
-            own.form()
-
-
-def test_every_state_of_the_set_is_in_a_box(monkeypatch):
-    """What is shown of boxes is shown of states: the same V and, but for a positive factor, the same V'."""
-    for witness, c in ((BETTER, 9.0), (PLAIN, 3.58), ((4.5, 0.1, 1.5, -0.3), 5.0)):
-        asked = []
-        monkeypatch.setattr(reading, "negative_where", lambda *given, to=asked: to.append(given) or True)
-        assert read(file(region(c, witness)))._falls(fmpq(8))
-        (slow, slow_room, slow_box), (fast, fast_room, fast_box) = asked
-        random = np.random.default_rng(5)
-        kinds = set()
-        for _ in range(4000):
-            u, w, x = 2.0 * random.random() ** random.choice([1, 8]), 9.0 * random.random(), 2.0 * random.random() - 1.0
-            V, slope = by_formula(A, B, witness, u, w, x)
-            if c < V:
-                continue
-            long = math.sqrt(u * (2.0 - u))
-            if w <= 8.0 * long:
-                kinds.add("slow")
-                given, fall, room, box, over = {"u": u, "r": w / long, "x": x}, slow, slow_room, slow_box, long**2
-            else:
-                kinds.add("fast")
-                given = {"y": w * w, "n": math.sqrt(u / 2.0) / w, "x": x * math.sqrt(1.0 - u / 2.0)}
-                fall, room, box, over = fast, fast_room, fast_box, w * w
-            if witness is PLAIN:
-                over = w * w
-            assert all(floating(low) <= given[name] <= floating(high) for name, (low, high) in box.items())
-            values = {name: rational(value) for name, value in given.items()}
-            assert floating(room.at(values)) == pytest.approx(c - V, rel=1e-6, abs=1e-9)
-            assert floating(fall.at(values)) == pytest.approx((1.0 + long**2) * slope / over, rel=1e-6, abs=1e-9)
-        assert kinds == {"slow", "fast"}
-
-
-def test_each_box_is_looked_at():
-    for c, witness, missed in (
-        (9.15, BETTER, "_slow"),
-        # Without attitude V' is |w|2 (g/2 - 2).
-        (1e-3, (5.0, 0.0, 4.1, 0.0), "_fast"),
-        (9.21, BETTER, "_beyond"),
-    ):
-        assert not getattr(read(file(region(c, witness))), missed)(fmpq(8))
-    own = read(file(region(9.0, BETTER)))
-    assert own._slow(fmpq(8))
-    assert own._fast(fmpq(8))
-    assert own._beyond(fmpq(8))
-    # A bound of |w| that the strength of the product exceeds is none.
-    assert not own._beyond(fmpq(3))

@@ -9,41 +9,18 @@ import math
 import pytest
 from starhold.loop.station import StationLoop
 
-from starhold.algebra.vector import ZERO
 from starhold.certification.certificate import write
 from starhold.certification.station import certify_station, described_station
 from starhold.checker import check, check_file, passed
 from starhold.checker.exact import floating
-from starhold.checker.station import read_station
-from starhold.laws import l2_circle
 from starhold.laws.catalogue import catalogue
-from starhold.parts.bodies.libration_point import POINTS, PRIMARIES, PointState, make_libration
-from tests.certification.test_checker import by_hand, replaced
+from starhold.parts.bodies.libration_point import POINTS, PRIMARIES
+from tests.certification.by_hand import by_hand
+from tests.certification.circles import BACK, BEST, PLANT, RELAY, SOFT, WIDE, loop_of, peak, station
+from tests.certification.edits import changed, faults, outcomes
 
-EARTH = PRIMARIES["sun-earth"]
-PLANT = make_libration(EARTH.larger, EARTH.smaller, EARTH.separation)
-BEST = l2_circle.design(PLANT, l2_circle.Best(1.0))
-PEAK = l2_circle.peak_demand(PLANT, BEST.rate)
-RELAY = BEST._replace(feedback=1, k=0.3)
-SOFT = RELAY._replace(boundary_layer=0.1)
-WIDE = BEST._replace(alpha=3.0, k=0.2, radius=2.0)
-BACK = BEST._replace(rate=-2.0, radius=5.0)
 CLAIM, NUMBERS = ("certificates", 0, "claims", -1), ("certificates", 0, "claims", -1, "numbers")
 SUBJECT = ("certificates", 0, "subject")
-
-
-def loop_of(gains=BEST, limit=math.inf, kind="norm", plant=PLANT, **changes):
-    start = PointState((0.0, gains.radius, 0.0), (0.0, 0.0, gains.rate * gains.radius), ZERO)
-    return StationLoop(
-        plant, catalogue("libration-point")["l2-circle"], gains, start, 1e-3, limit=limit, limit_kind=kind, **changes
-    )
-
-
-def peak(gains, kind="norm", plant=PLANT):
-    """What the circle itself needs."""
-    y = abs(plant.stiffness - 1.0 - gains.rate**2)
-    x, z = 2.0 * abs(gains.rate), abs(plant.stiffness - gains.rate**2)
-    return gains.radius * (max(x, y, z) if kind == "axis" else max(math.hypot(x, z), y))
 
 
 @pytest.fixture(scope="session")
@@ -62,22 +39,6 @@ def made(tmp_path_factory):
         return json.loads(done[key])
 
     return make
-
-
-def changed(content, place, value):
-    return replaced(content, place, lambda spot, key: spot.__setitem__(key, value))
-
-
-def faults(content):
-    return {(f.claim, f.obligation): f.reason for f in check(content) if f.verdict == "fails"}
-
-
-def outcomes(content):
-    return {claim["kind"]: claim["outcome"] for claim in content["certificates"][0]["claims"]}
-
-
-def station(gains=BEST, limit=math.inf, kind="norm", **changes):
-    return read_station(json.loads(json.dumps(described_station(loop_of(gains, limit, kind, **changes)))))
 
 
 # --- what holds -------------------------------------------------------------------------------------------------------

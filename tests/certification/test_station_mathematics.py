@@ -21,7 +21,7 @@ from starhold.laws import l2_circle
 from starhold.laws.catalogue import Law
 from starhold.laws.interface import NoMemory
 from starhold.laws.point import PointMeasurement, along
-from tests.certification.test_station_checker import BACK, BEST, PLANT, RELAY, SOFT, WIDE, peak, station
+from tests.certification.circles import BACK, BEST, PLANT, RELAY, SOFT, WIDE, peak, station
 
 
 def within(gains, kind, limit, level):

@@ -101,10 +101,10 @@ def test_two_equal_weights_leave_one_axis_and_a_circle():
 
 
 @pytest.mark.parametrize("gains", [EVEN, UNEVEN])
-@pytest.mark.parametrize("cover", ["as_published", "shortest", "hysteresis"])
+@pytest.mark.parametrize("sign_policy", ["as_published", "shortest", "hysteresis"])
 @pytest.mark.parametrize("target", ["orbital", (1.0, 0.0, 0.0, 0.0)])
-def test_the_wheel_law_converges_almost_always_whatever_the_wheels_store(gains, cover, target):
-    loop = rotors("wheel", gains, target, sign_policy=cover)
+def test_the_wheel_law_converges_almost_always_whatever_the_wheels_store(gains, sign_policy, target):
+    loop = rotors("wheel", gains, target, sign_policy=sign_policy)
     certificate = certify(loop)
     assert certificate.outcome == "proved"
     main = certificate.claim("convergence")

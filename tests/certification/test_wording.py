@@ -49,7 +49,7 @@ def test_a_torque_that_is_withstood_is_not_rounded_up():
 
 
 @pytest.mark.parametrize(
-    ("slew_angle", "cover", "law", "every"),
+    ("slew_angle", "sign_policy", "law", "every"),
     [
         (math.radians(186.0), "as_published", "lqr", False),
         (math.radians(359.0), "as_published", "lqr", False),
@@ -61,9 +61,9 @@ def test_a_torque_that_is_withstood_is_not_rounded_up():
         (math.radians(179.0), "shortest", "lqr", False),
     ],
 )
-def test_every_attitude_is_said_of_both_its_quaternions(slew_angle, cover, law, every):
+def test_every_attitude_is_said_of_both_its_quaternions(slew_angle, sign_policy, law, every):
     numbers = {"slew_angle": slew_angle, "rate": 0.1, "rate_everywhere": None, "everything": False}
-    told = sentence(claim("convergence", **numbers), {**SUBJECT, "quaternion_sign": cover, "law": law})
+    told = sentence(claim("convergence", **numbers), {**SUBJECT, "quaternion_sign": sign_policy, "law": law})
     assert ("rest at every attitude and" in told) == every
     assert every or f"up to {shown(math.degrees(slew_angle))}°" in told
     assert "global on rotations" not in told

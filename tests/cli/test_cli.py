@@ -15,9 +15,8 @@ from starhold.errors import InputError
 from starhold.laws.catalogue import catalogue
 from starhold.report.results import open_folder
 from starhold.scenario.reading import builtin_text
+from tests.cli.short import SHORT
 from tests.running import starhold
-
-SHORT = builtin_text("three-laws").replace("duration = 2000.0", "duration = 20.0")
 
 
 @pytest.fixture

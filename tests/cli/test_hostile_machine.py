@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from tests.cli.test_cli import SHORT
+from tests.cli.short import SHORT
 
 pytestmark = pytest.mark.xdist_group("cli")
 COMMAND = [sys.executable, "-m", "starhold"]

@@ -17,7 +17,7 @@ from starhold.report.proved import section
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
 from tests.report import flown
-from tests.report.test_page import Reader
+from tests.report.reader import Reader
 from tests.small import CRAFT, MPC, PD, WEAK
 
 

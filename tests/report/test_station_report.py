@@ -19,7 +19,7 @@ from starhold.simulation.lane import Recording
 from starhold.studies.flight import Flight, colour
 from starhold.studies.station import compare
 from tests.report import flown
-from tests.report.test_page import Reader
+from tests.report.reader import Reader
 
 
 @cache

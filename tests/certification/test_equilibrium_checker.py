@@ -10,34 +10,20 @@ import pytest
 from flint import arb, ctx
 from starhold.loop.station import StationLoop
 
-from starhold.algebra.vector import ZERO
 from starhold.certification.certificate import write
 from starhold.certification.station import certify_station, described_station
 from starhold.checker import check, check_file, passed
 from starhold.checker.exact import rational
-from starhold.checker.station import HELD, read_station
-from starhold.laws import l2_equilibrium as l2_equilibrium
+from starhold.checker.station import HELD
+from starhold.laws import l2_equilibrium
 from starhold.laws.catalogue import catalogue
-from starhold.parts.bodies.libration_point import POINTS, PRIMARIES, PointState, make_libration
-from tests.certification.test_station_checker import by_hand, changed, faults, outcomes
+from starhold.parts.bodies.libration_point import POINTS, PRIMARIES
+from tests.certification.by_hand import by_hand
+from tests.certification.edits import changed, faults, outcomes
+from tests.certification.equilibria import GAINS, OFF, PLANT, STEEP, STEEPNESS, STRONG, WEAK, loop_of
 
-EARTH = PRIMARIES["sun-earth"]
-PLANT = make_libration(EARTH.larger, EARTH.smaller, EARTH.separation)
-GAINS = l2_equilibrium.design(PLANT, l2_equilibrium.Degree(y=1.0, z=-0.5))
-STEEP = 1.0 + 2.0 * PLANT.stiffness
-STEEPNESS = math.sqrt(STEEP)
 REST, AXIS = (("certificates", 0, "claims", place) for place in (0, 1))
 SUBJECT = ("certificates", 0, "subject")
-STRONG = GAINS._replace(k_x=6.0 * STEEP, k_velocity=(6.0 * STEEPNESS, 1.0, 1.0))
-WEAK = GAINS._replace(k_x=1.2 * STEEP, k_velocity=(1.2 * STEEPNESS, 1.0, 1.0))
-OFF = GAINS._replace(k_x=GAINS.k_x * (1.0 + 1e-8))
-
-
-def loop_of(gains=GAINS, limit=math.inf, kind="axis", plant=PLANT, **changes):
-    start = PointState((0.0, gains.y, gains.z), ZERO, ZERO)
-    return StationLoop(
-        plant, catalogue("libration-point")["l2-equilibrium"], gains, start, 1e-3, limit=limit, limit_kind=kind, **changes
-    )
 
 
 @pytest.fixture(scope="session")
@@ -55,10 +41,6 @@ def made(tmp_path_factory):
         return json.loads(done[key])
 
     return make
-
-
-def station(gains=GAINS, limit=math.inf, kind="axis", **changes):
-    return read_station(json.loads(json.dumps(described_station(loop_of(gains, limit, kind, **changes)))))
 
 
 # --- what holds -------------------------------------------------------------------------------------------------------

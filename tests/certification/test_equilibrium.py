@@ -10,7 +10,7 @@ from starhold.loop.station import StationLoop
 
 from starhold.algebra.vector import ZERO
 from starhold.certification.station import certify_station
-from starhold.laws import l2_equilibrium as l2_equilibrium
+from starhold.laws import l2_equilibrium
 from starhold.laws.catalogue import catalogue
 from starhold.parts.bodies.libration_point import PRIMARIES, PointState, make_libration
 from starhold.simulation.lanes import simulate_many

@@ -16,12 +16,12 @@ from starhold.algebra.vector import add, scale
 from starhold.certification.station import certify_station
 from starhold.checker.equilibrium import Equilibrium, LimitedAxis
 from starhold.checker.exact import CheckError, floating, rational
-from starhold.laws import l2_equilibrium as l2_equilibrium
+from starhold.laws import l2_equilibrium
 from starhold.laws.catalogue import Law
 from starhold.laws.point import PointMeasurement
 from starhold.parts.bodies.libration_point import linear
 from starhold.simulation.lanes import simulate_many
-from tests.certification.test_rest_checker import GAINS, PLANT, STEEP, STEEPNESS, STRONG, WEAK, loop_of, station
+from tests.certification.equilibria import GAINS, PLANT, STEEP, STEEPNESS, STRONG, WEAK, loop_of, station
 
 
 def axis(gains, limit):

@@ -1,0 +1,75 @@
+"""Files of certificates, and ways to change them, for the tests of their checker."""
+
+import copy
+
+from starhold.checker import check
+
+
+def claims_of(content):
+    """The claims of the first certificate by their kinds."""
+    return {claim["kind"]: claim for claim in content["certificates"][0]["claims"]}
+
+
+def alone(content, kind):
+    """The content with one claim, which is enough to see whether that claim fails."""
+    certificate = content["certificates"][0]
+    claim = claims_of(content)[kind]
+    # The linear loop alone proves nothing of where the motion ends.
+    outcome = "undecided" if (kind, claim["outcome"]) == ("sampling", "proved") else claim["outcome"]
+    return {**content, "certificates": [{**certificate, "outcome": outcome, "claims": [claim]}]}
+
+
+def edited(content, place, value):
+    """The content with another value in the claim of a kind, or, without one, in the subject."""
+    changed = copy.deepcopy(content)
+    kind, *path = place
+    spot = claims_of(changed)[kind] if kind else changed["certificates"][0]["subject"]
+    for key in path[:-1]:
+        spot = spot[key]
+    spot[path[-1]] = value
+    return changed
+
+
+def spots(value, path=()):
+    """The paths of all values in a file."""
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, inner in items:
+        yield (*path, key)
+        yield from spots(inner, (*path, key))
+
+
+def content_at(content, path):
+    """The value at a path."""
+    for key in path:
+        content = content[key]
+    return content
+
+
+def replaced(content, path, change):
+    """The content after a change at a path, made of the object or list that holds it and the key."""
+    changed = copy.deepcopy(content)
+    spot = changed
+    for key in path[:-1]:
+        spot = spot[key]
+    change(spot, path[-1])
+    return changed
+
+
+def changed(content, place, value):
+    """The content with another value at a place."""
+    return replaced(content, place, lambda spot, key: spot.__setitem__(key, value))
+
+
+def outcomes(content):
+    """Kinds of claims to their outcomes."""
+    return {claim["kind"]: claim["outcome"] for claim in content["certificates"][0]["claims"]}
+
+
+def reasons(content):
+    """Why something in a file fails."""
+    return [finding.reason for finding in check(content) if finding.verdict == "fails"]
+
+
+def faults(content):
+    """Claim and obligation to the reason why it fails."""
+    return {(f.claim, f.obligation): f.reason for f in check(content) if f.verdict == "fails"}
