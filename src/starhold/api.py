@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from starhold.certification.certificate import Certificate
-    from starhold.certification.invariant import Problem
+    from starhold.certification.invariant import InvariantProblem
     from starhold.studies.failures import Failure
     from starhold.studies.flight import Flight
     from starhold.studies.modal_roots import Study
@@ -126,7 +126,7 @@ def _turning(scenario: reading.Scenario | str | Path) -> reading.Scenario:
     return _opened(scenario).about("rigid-body")
 
 
-def invariant(problem: Problem | str | Path) -> Certificate:
+def invariant(problem: InvariantProblem | str | Path) -> Certificate:
     """What is proved of invariant sets: of a problem made in Python (`starhold.certification.invariant`), of a TOML file, or
     of the built-in problem of that name. Each claim has an `outcome`, numbers (`level`, the set's size) and evidence."""
     from starhold.certification import invariant as sets

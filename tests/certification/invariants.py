@@ -4,7 +4,7 @@ from fractions import Fraction
 from functools import cache
 
 from starhold.algebra.polynomial import Polynomial
-from starhold.certification.invariant import System, Wanted, certify, load, prove
+from starhold.certification.invariant import System, WantedSet, certify, load, prove
 from starhold.certification.invariant.text import read
 
 SQUARE = ((-2.0, 2.0), (-2.0, 2.0))
@@ -29,7 +29,7 @@ def claim(rates, theorem, V, box=SQUARE, rest=None, level=None, escape=None, var
     every = f"{variables} {parameters}"
     indicator = tuple(expression(v, every) for v in V) if isinstance(V, (tuple, list)) else expression(V, every)
     tool = None if escape is None else expression(escape, every)
-    return prove(system(rates, variables, parameters), Wanted(theorem, indicator, box, rest, level, tool, **more))
+    return prove(system(rates, variables, parameters), WantedSet(theorem, indicator, box, rest, level, tool, **more))
 
 
 def outcomes(found):

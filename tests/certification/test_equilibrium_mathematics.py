@@ -14,7 +14,7 @@ from hypothesis import strategies as some
 
 from starhold.algebra.vector import add, scale
 from starhold.certification.station import certify_station
-from starhold.checker.equilibrium import Equilibrium, LimitedAxis
+from starhold.checker.equilibrium import EquilibriumLoop, LimitedAxis
 from starhold.checker.exact import CheckError, floating, rational
 from starhold.laws import l2_equilibrium
 from starhold.laws.catalogue import Law
@@ -80,7 +80,7 @@ def test_another_law_is_noticed(parts):
             memory,
         )
     with pytest.raises(CheckError):
-        Equilibrium(law, rest.gains, rest.plant, False).form()
+        EquilibriumLoop(law, rest.gains, rest.plant, False).form()
 
 
 def test_the_form_is_that_of_the_motion():
@@ -88,7 +88,7 @@ def test_the_form_is_that_of_the_motion():
     full.form()
     for one, other in ((full, False), (plain, True)):
         with pytest.raises(CheckError, match="undoes"):
-            Equilibrium(one.law, one.gains, one.plant, other).form()
+            EquilibriumLoop(one.law, one.gains, one.plant, other).form()
     for k, (stiff, damp) in enumerate(plain.axes):
         assert (stiff, damp) == full.axes[k]
         assert damp == rational(GAINS.k_velocity[k])

@@ -7,7 +7,7 @@ import pytest
 
 from starhold.algebra.polynomial import exact
 from starhold.algebra.scalar import clip, less, maximum, where
-from starhold.certification.invariant import Problem, System, Wanted, builtin_names, certify, enclosure, prove
+from starhold.certification.invariant import InvariantProblem, System, WantedSet, builtin_names, certify, enclosure, prove
 from starhold.certification.invariant.descent import Candidate, falls, jumps, leaves, switches
 from starhold.certification.invariant.wording import OBLIGATIONS, evidence, limit, sentence, size
 from tests.certification.invariants import SQUARE, claim, expression, fractions, outcomes, proved, system
@@ -282,11 +282,11 @@ def test_published_example_with_the_function_as_it_is_printed():
 def test_a_python_function_is_a_system():
     saturated = System.of(("x", "v"), lambda x, v: (v, x + clip(-2.0 * x - 2.0 * v, 1.0)))
     V = saturated.function(lambda x, v: maximum((x + v) * (x + v), x * x / 9.0))
-    found = prove(saturated, Wanted("region", V, ((-4.0, 4.0), (-6.0, 6.0)), (0, 0), level=0.9))
+    found = prove(saturated, WantedSet("region", V, ((-4.0, 4.0), (-6.0, 6.0)), (0, 0), level=0.9))
     assert found.outcome == "proved"
     pieces = System.of(("x", "y"), lambda x, y: (y, where(less(0.0, y), 1.0 - x, -2.0 * x - 3.0 * y)))
-    wanted = Wanted("unstable", pieces.function(lambda x, y: y), ((-0.5, 0.5), (-0.5, 0.5)), (0, 0))
-    assert certify(Problem("origin", pieces, (wanted,))).outcome == "proved"
+    wanted = WantedSet("unstable", pieces.function(lambda x, y: y), ((-0.5, 0.5), (-0.5, 0.5)), (0, 0))
+    assert certify(InvariantProblem("origin", pieces, (wanted,))).outcome == "proved"
     with pytest.raises(ValueError, match="derivatives"):
         System.of(("x", "y"), lambda x, y: (y,))
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from starhold.algebra.intervals import Intervals
 from starhold.algebra.polynomial import Polynomial, exact, pieces
 from starhold.certification.invariant import System, load, parse
-from starhold.certification.invariant.enclosure import Boxes, Form
+from starhold.certification.invariant.enclosure import Boxes, EnclosedPolynomial
 from starhold.certification.invariant.system import split
 from starhold.certification.invariant.text import ExpressionError, as_written, read
 from starhold.errors import InputError
@@ -85,7 +85,7 @@ def test_enclosures_hold_floats_and_exact_values(text, x, y, width):
     size = width / 40
     sides = tuple(Intervals(np.array([float(c) - size]), np.array([float(c) + size])) for c in (x, y))
     for cell in cells:
-        form = Form(cell.V)
+        form = EnclosedPolynomial(cell.V)
         for sharp in (False, True):
             box = form.on(Boxes(sides, sharp))
             for dx in (-size, 0.0, size):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from starhold.algebra.polynomial import exact
-from starhold.certification.invariant import Problem, System, Wanted, certify, enclosure, parse, write
+from starhold.certification.invariant import InvariantProblem, System, WantedSet, certify, enclosure, parse, write
 from starhold.certification.invariant.descent import Candidate, jumps, switches
 from starhold.certification.invariant.search import closed_cells
 from starhold.checker import check, cover, passed
@@ -155,8 +155,8 @@ def test_a_python_function_may_have_them_too():
     from starhold.algebra.scalar import sign
 
     jumping = System.of(("x", "y"), lambda x, y: (-1.0 * x, -1.0 * y + 5.0 * (1.0 - sign(x) * sign(x)) * y))
-    wanted = Wanted("region", jumping.function(lambda x, y: x * x + y * y), SQUARE, ORIGIN)
-    assert certify(Problem("thin", jumping, (wanted,))).outcome != "proved"
+    wanted = WantedSet("region", jumping.function(lambda x, y: x * x + y * y), SQUARE, ORIGIN)
+    assert certify(InvariantProblem("thin", jumping, (wanted,))).outcome != "proved"
 
 
 # --- random systems against motions -------------------------------------------------------------------------------------

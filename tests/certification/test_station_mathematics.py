@@ -14,7 +14,7 @@ from starhold.loop.station import MODELS
 
 from starhold.algebra.scalar import where
 from starhold.algebra.vector import add, scale, subtract
-from starhold.checker.circle import Circle
+from starhold.checker.circle import CircleLoop
 from starhold.checker.exact import CheckError, floating, rational
 from starhold.checker.polar import keeps_within, phases
 from starhold.laws import l2_circle
@@ -111,7 +111,7 @@ def wrong_of(measurement, gains):
 def test_other_damping_is_noticed(gains, taken):
     circle = station(gains).circle
     circle.form()
-    other = Circle(altered(control=with_damping(taken)), circle.gains, circle.plant, False)
+    other = CircleLoop(altered(control=with_damping(taken)), circle.gains, circle.plant, False)
     with pytest.raises(CheckError, match="damps in another way"):
         other.form()
 
@@ -127,7 +127,7 @@ def test_the_damping_as_published_is_taken():
             )
             return tuple(where(gains.feedback == 1, a, b) for a, b in zip(relayed, smooth, strict=True))
 
-        Circle(altered(control=with_damping(taken)), circle.gains, circle.plant, False).form()
+        CircleLoop(altered(control=with_damping(taken)), circle.gains, circle.plant, False).form()
 
 
 @pytest.mark.parametrize(
@@ -172,7 +172,7 @@ def test_the_damping_as_published_is_taken():
 def test_another_v_or_neutral_control_is_noticed(parts, reason):
     circle = station().circle
     with pytest.raises(CheckError, match=reason):
-        Circle(altered(**parts), circle.gains, circle.plant, False).form()
+        CircleLoop(altered(**parts), circle.gains, circle.plant, False).form()
 
 
 # --- its mathematics: the control -------------------------------------------------------------------------------------

@@ -27,7 +27,7 @@ from starhold.certification.certificate import BALLS, EXACT, EXACT_SIGN, LASALLE
 from starhold.certification.convergence import ALMOST, Obligations
 from starhold.certification.matrices import number, root_float
 from starhold.certification.station_terms import UNLIMITED, assumed, mismatch, point_measurement
-from starhold.certification.subject import above, below
+from starhold.certification.subject import above, below, enclosed
 from starhold.laws import l2_circle as law
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.libration_point import linear
@@ -40,7 +40,7 @@ LESS = (1e-2, 0.03, 0.1, 0.2, 0.4, 0.7)
 
 
 @dataclass(frozen=True)
-class Circle:
+class CircleNumbers:
     """The numbers of the law and the plant, exact."""
 
     plant: Any
@@ -52,13 +52,13 @@ class Circle:
         return self.gains.alpha * self.gains.radius**4 / 2
 
 
-def _circle(loop: ClosedLoop) -> Circle:
-    return Circle(*(type(values)(*map(exact, values)) for values in (loop.craft, loop.gains)))
+def _numbers(loop: ClosedLoop) -> CircleNumbers:
+    return CircleNumbers(*(type(values)(*map(exact, values)) for values in (loop.craft, loop.gains)))
 
 
 def attracts(loop: ClosedLoop) -> Claim:
     """That all motions from {V <= level} end on the circle."""
-    found, told, circle = Obligations(), dict[str, Any](), _circle(loop)
+    found, told, circle = Obligations(), dict[str, Any](), _numbers(loop)
 
     def finish() -> Claim:
         return Claim("circle", told, {}, assumed(loop, UNLIMITED), tuple(found))
@@ -92,7 +92,7 @@ def attracts(loop: ClosedLoop) -> Claim:
 
 def control_limit(loop: ClosedLoop) -> Claim:
     """That the control stays within its limit on motions from a smaller set, in the plane x = 0."""
-    found, circle = Obligations(), _circle(loop)
+    found, circle = Obligations(), _numbers(loop)
     told: dict[str, Any] = {"limit": loop.cutoff(), "kind": loop.limit}
 
     def finish() -> Claim:
@@ -119,7 +119,7 @@ def control_limit(loop: ClosedLoop) -> Claim:
     return finish()
 
 
-def _told(circle: Circle, level: float) -> dict[str, Any]:
+def _told(circle: CircleNumbers, level: float) -> dict[str, Any]:
     """The level; the radii between which all circles at the right rate are in its set, and the largest velocity error on
     the circle, all rounded inward."""
     square, reach = circle.gains.radius**2, root_float(2 * exact(level) / circle.gains.alpha)
@@ -132,7 +132,7 @@ def _told(circle: Circle, level: float) -> dict[str, Any]:
     }
 
 
-def _is_neutral(circle: Circle) -> bool:
+def _is_neutral(circle: CircleNumbers) -> bool:
     """Whether, along the linear model under the neutral control, V' = 0, f2' = -2 alpha f1 y, f3' = -2 alpha f1 z, and x''
     is a linear function of x and x' alone with the coefficients of the feedback."""
     measurement, plant, gains = point_measurement(), constants(circle.plant), constants(circle.gains)
@@ -162,7 +162,7 @@ def _is_neutral(circle: Circle) -> bool:
     return not any(part.terms for part in parts)
 
 
-def _held_circle(circle: Circle) -> dict[str, Any]:
+def _held_circle(circle: CircleNumbers) -> dict[str, Any]:
     """Another circle that a relay without a layer holds, and how much of the relay that takes."""
     g = circle.gains
     # Half of what the relay could hold near the circle, where f1 is 2 radius (r - radius).
@@ -172,7 +172,7 @@ def _held_circle(circle: Circle) -> dict[str, Any]:
     return {"radius": r, "needs": number(held), "of": number(g.k)}
 
 
-def _on_circle(circle: Circle, kind: str) -> tuple[Any, float]:
+def _on_circle(circle: CircleNumbers, kind: str) -> tuple[Any, float]:
     """The largest square of the control on the circle itself, of its norm or of an axis, and at which angle from Y."""
     p, g = circle.plant, circle.gains
     x = 2 * p.rate * g.rate * g.radius
@@ -187,7 +187,7 @@ def _on_circle(circle: Circle, kind: str) -> tuple[Any, float]:
 class _Demand:
     """The control on the plane x = 0, x' = 0 as a function of y, f1, f2, f3 and the sign of z."""
 
-    circle: Circle
+    circle: CircleNumbers
     limit: float
     kind: str
 
@@ -226,7 +226,7 @@ class _Demand:
     def _at(self, sides: Sides, sign: float) -> tuple[Intervals, Intervals, NDArray[np.bool_]]:
         """V, the square of the control's norm or largest axis, and whether there is no such place."""
         y, f1, f2, f3 = sides
-        p, g = (type(values)(*map(_enclosed, values)) for values in (self.circle.plant, self.circle.gains))
+        p, g = (type(values)(*map(enclosed, values)) for values in (self.circle.plant, self.circle.gains))
         square = g.radius.square() + f1 - y.square()
         z = sign * square.sqrt()
         wrong = f2.square() + f3.square()
@@ -248,7 +248,3 @@ class _Demand:
             return v, x2 + y2 + z2, square.high < 0.0
         low, high = (np.maximum(np.maximum(a, b), c) for a, b, c in ((x2.low, y2.low, z2.low), (x2.high, y2.high, z2.high)))
         return v, Intervals(low, high), square.high < 0.0
-
-
-def _enclosed(x: Any) -> Intervals:
-    return Intervals(below(x), above(x))

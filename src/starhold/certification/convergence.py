@@ -28,11 +28,11 @@ from starhold.certification.matrices import (
     identity,
     inverse,
     least,
+    matmul,
     number,
-    product,
-    scaled,
-    symmetric,
-    transposed,
+    symmetric_part,
+    times,
+    transpose,
 )
 from starhold.certification.motion import AXES, RATE, Motion, ShapeError, at_rest, cases
 from starhold.certification.refutation import rising_state, unlike_positive
@@ -99,7 +99,7 @@ def converge(subject: Subject, rate: Any = "best") -> tuple[Claim, Basin | None,
 def stiffnesses(motion: Motion) -> list[Any]:
     """Stiffnesses for which the attitude's part of V' nearly cancels: between the law's smallest and its largest."""
     try:
-        K = symmetric(motion.linear()[1])
+        K = symmetric_part(motion.linear()[1])
     except ShapeError:
         return []
     values = np.linalg.eigvalsh(floats(K))
@@ -138,19 +138,19 @@ def convergence(motion: Motion, rate: Any = "best") -> tuple[Claim, Basin | None
     def rising(reason: str) -> None:
         # Where no set is asked for, only a V that rises however near the target is refuted; of a claim up to a rate, a state
         # that turns faster is no refutation.
-        near = not (frame.exact and definite(symmetric(frame.D)))
+        near = not (frame.exact and definite(symmetric_part(frame.D)))
         most, tries = None if rate in ("best", None) else exact(rate), max(200 // len(slopes), 10)
         states = (rising_state(*piece, most, tries) for piece in slopes if rate != "best" or near)
         evidence = next((state for state in states if state is not None), None)
         found.add("descent", EXACT_SIGN, False if evidence else None, evidence or {"reason": reason})
 
-    if not (definite(symmetric(frame.D)) if frame.whole else all(_falls(*piece) for piece in slopes)):
+    if not (definite(symmetric_part(frame.D)) if frame.whole else all(_falls(*piece) for piece in slopes)):
         rising("V' may be positive")
         return finish()
     cross, epsilon, rho, bound = None, fmpq(0), fmpq(0), None
     if frame.exact:
         if frame.K.terms:
-            bound = exact(below(least(symmetric(frame.D)) * ALMOST / frame.cubic))
+            bound = exact(below(least(symmetric_part(frame.D)) * ALMOST / frame.cubic))
             if bound <= 0:
                 rising("the damping around rest is not definite, or too weak for what is cubic in the rate")
                 return finish()
@@ -246,7 +246,7 @@ def _strict(motion: Motion, frame: Frame) -> tuple[Cross, Any, Any, Any | None] 
     except ShapeError:
         return None
     most = np.linalg.norm(np.linalg.solve(np.linalg.cholesky(floats(frame.P)), floats(cross.J)), 2)
-    bound = exact(below(least(symmetric(frame.D)) / 2 / frame.cubic)) if frame.K.terms else None
+    bound = exact(below(least(symmetric_part(frame.D)) / 2 / frame.cubic)) if frame.K.terms else None
     if bound is not None and bound <= 0:
         return None
     for rho in (*(fmpq(1, 2**power) for power in range(20, 0, -1)), fmpq(3, 4), fmpq(9, 10)):
@@ -293,7 +293,7 @@ def _quaternion_sign(motion: Motion, frame: Frame, stay: Any | None) -> tuple[st
     if loop.wheels is not None and frame.exact:
         # Whatever momentum the wheels store, by the same argument as for any inertia.
         stiffness = motion.linear(-1)[1]
-        held = stiffness == transposed(stiffness) and definite(stiffness)
+        held = stiffness == transpose(stiffness) and definite(stiffness)
         return "other rest repels", EXACT_SIGN, held or None, {} if held else {"reason": "the stiffness is not symmetric"}
     return ("other rest repels", "certified roots", *_repels(motion))
 
@@ -302,10 +302,10 @@ def _repels(motion: Motion) -> tuple[bool | None, dict[str, Any]]:
     """Whether the linear loop around q0 = -1 has roots on the right of the imaginary axis and none on it."""
     rate, attitude = motion.linear(-1)
     turn = inverse(motion.subject.inertia)
-    zero, half = scaled(identity(3), 0), identity(3, fmpq(-1, 2))
-    upper = [[*a, *b] for a, b in zip(product(turn, rate), product(turn, attitude), strict=True)]
+    zero, half = times(0, identity(3)), identity(3, fmpq(-1, 2))
+    upper = [[*a, *b] for a, b in zip(matmul(turn, rate), matmul(turn, attitude), strict=True)]
     lower = [[*a, *b] for a, b in zip(half, zero, strict=True)]
-    roots = characteristic_roots([*scaled(upper, -1), *lower])
+    roots = characteristic_roots([*times(-1, upper), *lower])
     if any(root.real.contains(0) for root, _ in roots):
         return None, {"reason": "a root on the imaginary axis is not excluded"}
     if any(root.real > 0 for root, _ in roots):

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from starhold.algebra.polynomial import exact
 from starhold.certification.certificate import EXACT_SIGN, Claim, Obligation
 from starhold.certification.convergence import ALMOST, Basin, assumed
-from starhold.certification.ending import Nearby, Step
+from starhold.certification.ending import Nearby, ShrinkingStep
 from starhold.certification.frame import (
     Cross,
     Frame,
@@ -32,21 +32,21 @@ from starhold.certification.frame import (
 )
 from starhold.certification.matrices import (
     Rows,
-    blocks,
+    block,
     definite,
     floats,
     greatest,
     identity,
     inverse,
     least,
+    matmul,
     number,
     plus,
-    product,
     root_above,
     root_below,
-    scaled,
-    symmetric,
-    transposed,
+    symmetric_part,
+    times,
+    transpose,
 )
 from starhold.certification.motion import at_rest
 from starhold.certification.subject import above, below
@@ -56,7 +56,7 @@ WIDE = 2.0
 
 
 @dataclass(frozen=True)
-class Ball:
+class EndBall:
     """What the first bound is made of, and what |w| and |q| do not exceed in the end."""
 
     epsilon: Any
@@ -126,13 +126,13 @@ def disturbance(basin: Basin) -> Claim | None:
 class End(NamedTuple):
     """A ball, the steps that make it smaller, and the bounds of |w| and |q| that they leave."""
 
-    ball: Ball
-    steps: list[Step]
+    ball: EndBall
+    steps: list[ShrinkingStep]
     rate: Any
     turn: Any
 
 
-def _shrunk(near: Nearby, ball: Ball) -> End:
+def _shrunk(near: Nearby, ball: EndBall) -> End:
     try:
         return End(ball, *near.steps(ball.rate, ball.turn))
     except ShapeError:
@@ -144,7 +144,7 @@ def _rate_bound(frame: Frame) -> Any | None:
     """The rate up to which V' has the form that is used and keeps half of its damping."""
     bound = frame.reach
     if frame.K.terms:
-        cubic = least(symmetric(frame.D)) / 2 / frame.cubic
+        cubic = least(symmetric_part(frame.D)) / 2 / frame.cubic
         bound = cubic if bound is None else min(bound, cubic)
     return None if bound is None else exact(below(bound))
 
@@ -152,12 +152,12 @@ def _rate_bound(frame: Frame) -> Any | None:
 def _push(frame: Frame, epsilon: Any) -> Rows:
     """R with |W'w + epsilon q|2 = x.Rx, W'w + epsilon q being what a torque from outside does work on."""
     W = frame.W
-    return blocks(product(W, transposed(W)), scaled(W, epsilon), identity(3, epsilon * epsilon))
+    return block(matmul(W, transpose(W)), times(epsilon, W), identity(3, epsilon * epsilon))
 
 
 def _size(frame: Frame, cross: Cross, epsilon: Any, share: Any) -> Rows:
     """H with x.Hx = w.Pw/2 + epsilon q.Jw + share s q2."""
-    return blocks(scaled(frame.P, fmpq(1, 2)), scaled(transposed(cross.J), epsilon / 2), identity(3, share * frame.s))
+    return block(times(fmpq(1, 2), frame.P), times(epsilon / 2, transpose(cross.J)), identity(3, share * frame.s))
 
 
 def _guesses(frame: Frame, cross: Cross, bound: Any | None) -> Iterator[list[tuple[Any, Any, Any]]]:
@@ -190,7 +190,7 @@ def _guesses(frame: Frame, cross: Cross, bound: Any | None) -> Iterator[list[tup
     yield [guess for _, guess in sorted(found, key=lambda pair: pair[0])]
 
 
-def _ball(basin: Basin, cross: Cross, torque: Any, bound: Any | None, epsilon: Any, rho: Any, tau: Any) -> Ball | None:
+def _ball(basin: Basin, cross: Cross, torque: Any, bound: Any | None, epsilon: Any, rho: Any, tau: Any) -> EndBall | None:
     """What these numbers show, if anything."""
     frame, loop = basin.frame, basin.motion.subject.loop
     left = plus(decrease(frame, cross, epsilon, bound), _push(frame, epsilon), -tau)
@@ -218,8 +218,8 @@ def _ball(basin: Basin, cross: Cross, torque: Any, bound: Any | None, epsilon: A
     start = exact(below(level * (1 - rho) / (1 + rho)))
     # What V + epsilon C is at least: over every w (spring)(1 - q0), and over every q w.(lean)w/2.
     J, square = cross.J, epsilon * epsilon
-    spring = frame.s - square * greatest(product(product(J, inverse(frame.P)), transposed(J)))
-    lean = least(plus(frame.P, scaled(product(transposed(J), J), square / frame.s), -1))
+    spring = frame.s - square * greatest(matmul(matmul(J, inverse(frame.P)), transpose(J)))
+    lean = least(plus(frame.P, times(square / frame.s, matmul(transpose(J), J)), -1))
     if end >= (1 + rho) * start or end >= spring or lean <= 0:
         return None
     held = contents(start, frame.P, frame.potential)
@@ -231,7 +231,7 @@ def _ball(basin: Basin, cross: Cross, torque: Any, bound: Any | None, epsilon: A
         "rate_everywhere": held["rate_everywhere"],
     }
     cosine = 1 - end / spring
-    return Ball(epsilon, rho, tau, beta, told, root_above(2 * end / lean), root_above(1 - cosine * cosine))
+    return EndBall(epsilon, rho, tau, beta, told, root_above(2 * end / lean), root_above(1 - cosine * cosine))
 
 
 def _share(left: Rows, H: Rows) -> Any | None:

@@ -29,19 +29,19 @@ from starhold.algebra.polynomial import Polynomial, exact
 from starhold.certification.gyroscopic import Swing, gyroscopic_torque
 from starhold.certification.matrices import (
     Rows,
-    blocks,
+    block,
     definite,
     floats,
     greatest,
     identity,
     inverse,
+    matmul,
     number,
     plus,
-    product,
     root_above,
     root_below,
-    scaled,
-    transposed,
+    times,
+    transpose,
 )
 from starhold.certification.motion import AXES, RATE, Motion, ShapeError, at_rest
 
@@ -55,7 +55,7 @@ HELD = 1.0 + 1e-7
 
 
 @dataclass(frozen=True)
-class Step:
+class ShrinkingStep:
     """x.Sx falls where it exceeds 1, with a the `decay` and c the `spread`."""
 
     S: Rows
@@ -90,7 +90,7 @@ class Nearby:
     def turned(self) -> Rows:
         """J^-2."""
         found = inverse(self.motion.subject.inertia)
-        return product(found, found)
+        return matmul(found, found)
 
     @cached_property
     def gyroscopic_torque(self) -> Swing:
@@ -103,21 +103,21 @@ class Nearby:
         """What |m + g| and 1 - q0 do not exceed."""
         return self.torque + self.gyroscopic_torque.most * rate * rate, 1 - root_below(1 - turn * turn)
 
-    def holds(self, step: Step, rate: Any, turn: Any) -> bool:
+    def holds(self, step: ShrinkingStep, rate: Any, turn: Any) -> bool:
         """Whether the step's inequality does."""
         push, lost = self.outside(rate, turn)
         S, a, c = step.S, step.decay, step.spread
-        fed = blocks(scaled(self.turned, push * push / a), identity(3, 0), identity(3, c))
-        swept = blocks(identity(3, lost / (2 * c)), identity(3, 0), identity(3, 0))
-        total = plus(product(transposed(self.linear), S), product(S, self.linear))
-        for more in (scaled(S, a), product(product(S, fed), S), swept):
+        fed = block(times(push * push / a, self.turned), identity(3, 0), identity(3, c))
+        swept = block(identity(3, lost / (2 * c)), identity(3, 0), identity(3, 0))
+        total = plus(matmul(transpose(self.linear), S), matmul(S, self.linear))
+        for more in (times(a, S), matmul(matmul(S, fed), S), swept):
             total = plus(total, more)
-        return definite(S) and definite(scaled(total, -1))
+        return definite(S) and definite(times(-1, total))
 
-    def steps(self, rate: Any, turn: Any) -> tuple[list[Step], Any, Any]:
+    def steps(self, rate: Any, turn: Any) -> tuple[list[ShrinkingStep], Any, Any]:
         """Steps from bounds of |w| and |q|, and those that they leave."""
         A, turned = floats(self.linear), floats(self.turned)
-        found: list[Step] = []
+        found: list[ShrinkingStep] = []
 
         def shrink(place: slice) -> None:
             nonlocal rate, turn
@@ -149,7 +149,7 @@ class Nearby:
         return found, rate, turn
 
 
-def _guess(A: Array, pushed: Array, lost: float, place: slice) -> Step | None:
+def _guess(A: Array, pushed: Array, lost: float, place: slice) -> ShrinkingStep | None:
     """An ellipsoid with a small bound of a part of x, in floats; None where none was found."""
     most = -2.0 * float(np.linalg.eigvals(A).real.max())
     if most <= 0.0:
@@ -182,7 +182,7 @@ def _guess(A: Array, pushed: Array, lost: float, place: slice) -> Step | None:
         size, c, X = inner(a, ROUNDS)
         if math.isfinite(size):
             S = np.linalg.inv(X)
-            return Step([[exact(float(x)) for x in row] for row in 0.5 * (S + S.T)], exact(a), exact(c))
+            return ShrinkingStep([[exact(float(x)) for x in row] for row in 0.5 * (S + S.T)], exact(a), exact(c))
     return None
 
 

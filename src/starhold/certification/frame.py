@@ -16,16 +16,16 @@ from flint import fmpq
 from starhold.algebra.polynomial import Polynomial, pieces
 from starhold.certification.matrices import (
     Rows,
-    blocks,
+    block,
     greatest,
     identity,
     matrix_of,
     plus,
     root_above,
     root_below,
-    scaled,
-    symmetric,
-    transposed,
+    symmetric_part,
+    times,
+    transpose,
 )
 from starhold.certification.motion import ATTITUDE, AXES, RATE, Motion, ShapeError, Truths, at_rest
 from starhold.certification.potential import Potential, potential_of
@@ -91,8 +91,8 @@ def take_apart(motion: Motion) -> Frame:
     truths, slope = at_rest(falling)
     damping, cubic, mixed, work = parts_of_slope(slope)
     felt_share(slope)
-    P = scaled(matrix_of(function, RATE, RATE), 2)
-    found = Frame(P, potential, scaled(damping, -1), cubic, mixed, work, _reach(truths), len(pieces(falling)) == 1)
+    P = times(2, matrix_of(function, RATE, RATE))
+    found = Frame(P, potential, times(-1, damping), cubic, mixed, work, _reach(truths), len(pieces(falling)) == 1)
     if potential.even and not (found.exact and found.whole):
         raise ShapeError("V is even in q, but V' mixes rate and attitude, or the law switches")
     return found
@@ -182,8 +182,8 @@ def cross_parts(function: Polynomial, slope: Polynomial) -> Cross:
     others = slope.only(lambda m: kind(m) == "other")
     if others.terms:
         raise ShapeError(f"the derivative of q.Jw has the terms {others}")
-    A = scaled(matrix_of(slope.only(lambda m: kind(m) == "A"), AXES, AXES), -1)
-    B = scaled(matrix_of(slope.only(lambda m: kind(m) == "B"), AXES, RATE), -1)
+    A = times(-1, matrix_of(slope.only(lambda m: kind(m) == "A"), AXES, AXES))
+    B = times(-1, matrix_of(slope.only(lambda m: kind(m) == "B"), AXES, RATE))
     forms: list[Rows] = []
     for name in ATTITUDE:
         own = {tuple(x for x in m if x != name): c for m, c in slope.terms.items() if kind(m) == "F" and name in m}
@@ -195,20 +195,20 @@ def cross_parts(function: Polynomial, slope: Polynomial) -> Cross:
 
 def quadratic_sizes(cross: Cross) -> list[Any]:
     """Bounds of |w.F_k w| over |w| = 1."""
-    return [max(greatest(form), greatest(scaled(form, -1)), fmpq(0)) for form in cross.forms]
+    return [max(greatest(form), greatest(times(-1, form)), fmpq(0)) for form in cross.forms]
 
 
 def decrease(frame: Frame, cross: Cross, epsilon: Any, rate: Any | None) -> Rows:
     """Q with (V + epsilon C)' <= -(w, q).Q(w, q) while |w| <= rate."""
     taken = epsilon * cross.sigma + (fmpq(0) if rate is None else frame.cubic * rate)
-    damping = plus(symmetric(frame.D), identity(3, taken), -1)
-    mixed = scaled(plus(scaled(transposed(cross.B), epsilon), frame.E, -1), fmpq(1, 2))
-    return blocks(damping, mixed, symmetric(scaled(cross.A, epsilon)))
+    damping = plus(symmetric_part(frame.D), identity(3, taken), -1)
+    mixed = times(fmpq(1, 2), plus(times(epsilon, transpose(cross.B)), frame.E, -1))
+    return block(damping, mixed, symmetric_part(times(epsilon, cross.A)))
 
 
 def margin(frame: Frame, cross: Cross, epsilon: Any, rho: Any) -> Rows:
     """A matrix whose definiteness says (1 - rho) V <= V + epsilon C <= (1 + rho) V."""
-    return blocks(scaled(frame.P, rho), scaled(transposed(cross.J), epsilon), identity(3, rho * frame.s))
+    return block(times(rho, frame.P), times(epsilon, transpose(cross.J)), identity(3, rho * frame.s))
 
 
 def contents(start: Any | None, P: Rows, potential: Potential) -> dict[str, Any]:

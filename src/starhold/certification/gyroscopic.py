@@ -16,13 +16,13 @@ from starhold.certification.matrices import (
     definite,
     floats,
     identity,
+    matmul,
     matrix_of,
     plus,
-    product,
     root_above,
-    scaled,
-    symmetric,
-    transposed,
+    symmetric_part,
+    times,
+    transpose,
 )
 from starhold.certification.motion import RATE
 
@@ -45,7 +45,7 @@ def gyroscopic_torque(parts: Sequence[Polynomial], P: Rows) -> Swing:
     P = 1, (J3 - J1)/(2 sqrt(J1 J3)) for P = J.
     """
     forms = [matrix_of(part.only(is_swing), RATE, RATE) for part in parts]
-    each = [max(relative_greatest(scaled(form, sign), P) for sign in (1, -1)) for form in forms]
+    each = [max(relative_greatest(times(sign, form), P) for sign in (1, -1)) for form in forms]
     found = Swing(each[0] if len(each) == 1 else root_above(sum((x * x for x in each), fmpq(0))))
     A = crossed(forms)
     if A is None or found.most == 0:
@@ -59,7 +59,7 @@ def gyroscopic_torque(parts: Sequence[Polynomial], P: Rows) -> Swing:
 
     def both(p: float, c: float) -> Rows:
         moved = plus(A, identity(3, p))
-        return plus(product(transposed(moved), moved), identity(3, exact(c) ** 2))
+        return plus(matmul(transpose(moved), moved), identity(3, exact(c) ** 2))
 
     def most(x: Any) -> float:
         moved = full + x[0] * size * np.eye(3)
@@ -89,7 +89,7 @@ def crossed(forms: Sequence[Rows]) -> Rows | None:
     for i, form in enumerate(forms):
         j, k = (i + 1) % 3, (i + 2) % 3
         one, other = ([A[row] if unit == axis else [fmpq(0)] * 3 for axis in range(3)] for unit, row in ((j, k), (k, j)))
-        if symmetric(plus(one, other, -1)) != form:
+        if symmetric_part(plus(one, other, -1)) != form:
             return None
     return A
 
@@ -101,6 +101,6 @@ def relative_greatest(a: Rows, b: Rows) -> Any:
     guess = float(np.linalg.eigvals(np.linalg.solve(floats(b), floats(a))).real.max())
     for step in (1e-13, 1e-11, 1e-9, 1e-6, 1e-3, 1.0):
         mu = exact(max(guess, 1e-300) * (1.0 + step))
-        if definite(plus(scaled(b, mu), a, -1)):
+        if definite(plus(times(mu, b), a, -1)):
             return mu
     raise ArithmeticError("no bound of the damping was found")

@@ -16,7 +16,7 @@ from starhold.algebra.polynomial import Polynomial, exact
 from starhold.certification.certificate import EXACT, EXACT_SIGN, LASALLE, Claim, Obligation
 from starhold.certification.convergence import ALMOST, Basin, assumed, stiffnesses
 from starhold.certification.frame import Cross, contents, cross_parts, decrease, quadratic_sizes, take_apart
-from starhold.certification.matrices import definite, floats, greatest, identity, number, root_above, symmetric
+from starhold.certification.matrices import definite, floats, greatest, identity, number, root_above, symmetric_part
 from starhold.certification.motion import ATTITUDE, RATE, Motion, ShapeError, at_rest, cases
 from starhold.certification.refutation import rational_turn, state_evidence
 from starhold.certification.subject import Subject, below
@@ -69,7 +69,7 @@ class Family:
 
     def any_inertia(self) -> bool:
         """Whether V' has only damping, in which no inertia occurs."""
-        return self.frame.exact and (self.frame.potential.even or definite(symmetric(self.nominal.linear()[1])))
+        return self.frame.exact and (self.frame.potential.even or definite(symmetric_part(self.nominal.linear()[1])))
 
     def _same_potential(self) -> bool:
         """Whether V is the kinetic energy of whatever inertia and a function of the attitude."""

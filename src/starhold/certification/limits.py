@@ -20,13 +20,13 @@ from starhold.certification.matrices import (
     floats,
     greatest,
     inverse,
+    matmul,
     matrix_of,
     number,
     plus,
-    product,
     root_above,
-    scaled,
-    transposed,
+    times,
+    transpose,
 )
 from starhold.certification.motion import ATTITUDE, AXES, RATE, Truths
 from starhold.certification.refutation import rational_turn, state_evidence
@@ -44,7 +44,7 @@ Terms: TypeAlias = tuple[tuple[tuple[int, int, int], int, Any], ...]
 
 
 @dataclass(frozen=True)
-class Load:
+class LimitedLoad:
     """What bounds one axis of the torque (or its norm, or a motor's). Of its part Bw, linear in the rate, the square of the
     greatest norm for w.Pw = 1; `swing` of the part G(w) that is quadratic, and `mixed`, what |Bw.G(w)| does not exceed: so
     |Bw + G(w)|2 <= rate z2 + 2 mixed z3 + swing2 z4 for w.Pw = z2. Of what is linear in the attitude the square; of each
@@ -153,22 +153,22 @@ def _root_above_sum(linear: Polynomial) -> Any:
     return root_above(sum((c * c for c in values), fmpq(0)))
 
 
-def loads(basin: Basin, parts: list[Polynomial], kind: str, limit: Any) -> list[Load]:
+def loads(basin: Basin, parts: list[Polynomial], kind: str, limit: Any) -> list[LimitedLoad]:
     """The loads of each axis, or of the norm, with their common limit."""
     return [load_of(basin, group, limit) for group in ([[part] for part in parts] if kind == "axis" else [parts])]
 
 
-def load_of(basin: Basin, parts: list[Polynomial], limit: Any) -> Load:
+def load_of(basin: Basin, parts: list[Polynomial], limit: Any) -> LimitedLoad:
     """The load of one component, or of the norm of several."""
     rows = [_linear(basin, part) for part in parts]
     rates, attitudes = [row[0] for row in rows], [row[1] for row in rows]
     inverse_of = inverse(basin.frame.P)
-    rate = greatest(product(product(rates, inverse_of), transposed(rates)))
-    attitude = greatest(product(attitudes, transposed(attitudes)))
+    rate = greatest(matmul(matmul(rates, inverse_of), transpose(rates)))
+    attitude = greatest(matmul(attitudes, transpose(attitudes)))
     turning = gyroscopic_torque(parts, basin.frame.P)
     mixed = min(_mixed(parts, rates, inverse_of), root_above(rate) * turning.most)
     lines = _lines(parts[0], rates[0], basin.frame.P, turning.most) if len(parts) == 1 else ()
-    return Load(rate, attitude, turning, mixed, lines, tuple(_rest(basin, part) for part in parts), limit)
+    return LimitedLoad(rate, attitude, turning, mixed, lines, tuple(_rest(basin, part) for part in parts), limit)
 
 
 def _lines(part: Polynomial, row: list[Any], P: Rows, most: Any) -> tuple[tuple[Any, Any], ...]:
@@ -179,8 +179,8 @@ def _lines(part: Polynomial, row: list[Any], P: Rows, most: Any) -> tuple[tuple[
     F, found = matrix_of(part.only(is_swing), RATE, RATE), list[tuple[Any, Any]]()
     for k in LINES:
         slope = most * (1 + exact(2.0 ** (k / 2)))
-        turned = [inverse(plus(scaled(P, slope), F, sign)) for sign in (1, -1)]
-        found.append((slope, max(product(product([row], form), transposed([row]))[0][0] for form in turned) / 4))
+        turned = [inverse(plus(times(slope, P), F, sign)) for sign in (1, -1)]
+        found.append((slope, max(matmul(matmul([row], form), transpose([row]))[0][0] for form in turned) / 4))
     return tuple(found)
 
 
@@ -227,7 +227,7 @@ def _rest(basin: Basin, component: Polynomial) -> Terms:
 class Bound:
     """The bound of a load on {V = level, potential = t}, as balls."""
 
-    def __init__(self, load: Load, basin: Basin, level: Any) -> None:
+    def __init__(self, load: LimitedLoad, basin: Basin, level: Any) -> None:
         turned = inverse(basin.frame.P)
         self.load, self.potential, self.level = load, basin.frame.potential, arb(level)
         self.rate, self.attitude, self.mixed = arb(load.rate), arb(load.attitude).sqrt(), 2 * arb(load.mixed)
@@ -262,13 +262,15 @@ class Bound:
         return self.below(limit, first, middle, depth + 1) and self.below(limit, middle, last, depth + 1)
 
 
-def within(basin: Basin, carried: list[Load], level: Any) -> bool:
+def within(basin: Basin, carried: list[LimitedLoad], level: Any) -> bool:
     """Whether every load is within its limit on {V <= level}."""
     last = min(level, basin.frame.potential.top)
     return all(Bound(load, basin, level).below(load.limit, fmpq(0), last) for load in carried)
 
 
-def largest_level(basin: Basin, carried: list[Load], cap: Any | None = None, tries: tuple[float, ...] = TRIES) -> Any | None:
+def largest_level(
+    basin: Basin, carried: list[LimitedLoad], cap: Any | None = None, tries: tuple[float, ...] = TRIES
+) -> Any | None:
     """The largest level, no more than `cap`, that is shown to keep every load within its limit; `tries`: what share of the
     largest by floats is given away for that, the first that will do."""
     size = guesser(basin, carried)
@@ -294,7 +296,7 @@ def largest_level(basin: Basin, carried: list[Load], cap: Any | None = None, tri
     return None
 
 
-def guesser(basin: Basin, carried: list[Load]) -> Callable[[float], NDArray[np.float64]]:
+def guesser(basin: Basin, carried: list[LimitedLoad]) -> Callable[[float], NDArray[np.float64]]:
     """The bounds of the loads on {V <= level} in floats, on a grid."""
     potential = basin.frame.potential
     top = number(potential.top)

@@ -50,30 +50,30 @@ def plus(a: Rows, b: Rows, c: Any = 1) -> Rows:
     return [[x + y * c for x, y in zip(s, t, strict=True)] for s, t in zip(a, b, strict=True)]
 
 
-def scaled(a: Rows, c: Any) -> Rows:
+def times(c: Any, a: Rows) -> Rows:
     """c a."""
     return [[x * c for x in row] for row in a]
 
 
-def transposed(a: Rows) -> Rows:
+def transpose(a: Rows) -> Rows:
     """The transposed matrix."""
     return [list(column) for column in zip(*a, strict=True)]
 
 
-def product(a: Rows, b: Rows) -> Rows:
+def matmul(a: Rows, b: Rows) -> Rows:
     """a b."""
-    columns = transposed(b)
+    columns = transpose(b)
     return [[_dot(row, column) for column in columns] for row in a]
 
 
-def symmetric(a: Rows) -> Rows:
+def symmetric_part(a: Rows) -> Rows:
     """(a + a')/2."""
-    return scaled(plus(a, transposed(a)), fmpq(1, 2))
+    return times(fmpq(1, 2), plus(a, transpose(a)))
 
 
-def blocks(a: Rows, b: Rows, d: Rows) -> Rows:
+def block(a: Rows, b: Rows, d: Rows) -> Rows:
     """[[a, b], [b', d]]."""
-    return [[*s, *t] for s, t in zip(a, b, strict=True)] + [[*s, *t] for s, t in zip(transposed(b), d, strict=True)]
+    return [[*s, *t] for s, t in zip(a, b, strict=True)] + [[*s, *t] for s, t in zip(transpose(b), d, strict=True)]
 
 
 def inverse(a: Rows) -> Rows:
@@ -109,7 +109,7 @@ def least(a: Rows) -> Any:
 def greatest(a: Rows) -> Any:
     """A rational just above the largest eigenvalue of a symmetric matrix."""
     values = np.linalg.eigvalsh(floats(a))
-    return -_just_below(-float(values[-1]), float(np.abs(values).max()), scaled(a, -1))
+    return -_just_below(-float(values[-1]), float(np.abs(values).max()), times(-1, a))
 
 
 def _just_below(guess: float, size: float, a: Rows) -> Any:
@@ -168,7 +168,7 @@ def _dot(a: list[Any], b: list[Any]) -> Any:
 
 def spectral_norm_above(a: Rows) -> Any:
     """A rational above the largest singular value."""
-    return root_above(greatest(product(transposed(a), a)))
+    return root_above(greatest(matmul(transpose(a), a)))
 
 
 def root_float(square: Any, up: bool = False) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 from flint import fmpq
 
 from starhold.algebra.polynomial import Polynomial, exact
-from starhold.certification.matrices import floats, number, symmetric
+from starhold.certification.matrices import floats, number, symmetric_part
 from starhold.certification.motion import ATTITUDE, RATE, Truths
 from starhold.certification.potential import Cosines
 
@@ -84,7 +84,7 @@ def _verified(truths: Truths, slope: Polynomial, attitude: Any, rate: Any, limit
 def unlike_positive(frame: Frame) -> dict[str, Any]:
     """A state at which V is not positive, or why none is told."""
     still, on_target = (fmpq(0),) * 3, (fmpq(1), *(fmpq(0),) * 3)
-    values, axes = np.linalg.eigh(floats(symmetric(frame.P)))
+    values, axes = np.linalg.eigh(floats(symmetric_part(frame.P)))
     w = [exact(float(f"{x:.9g}")) for x in axes[:, 0]]
     tried: list[tuple[Any, Any]] = [(on_target, w), ((fmpq(0), fmpq(1), *still[:2]), still)]
     if isinstance(frame.potential, Cosines):

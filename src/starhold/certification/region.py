@@ -33,7 +33,7 @@ from starhold.certification.certificate import BALLS, EXACT, EXACT_SIGN, LASALLE
 from starhold.certification.convergence import Obligations, assumed
 from starhold.certification.matrices import number, root_float
 from starhold.certification.motion import Motion
-from starhold.certification.subject import Subject, above, below, direction
+from starhold.certification.subject import Subject, above, below, direction, enclosed
 
 MOST = 300_000
 """Boxes that one proof may take: a fraction of a second."""
@@ -142,7 +142,7 @@ def holds(shape: Shape, beta: Any, bound: Any) -> bool:
     rationals."""
     mixed = max(abs(shape.g), abs(shape.g + 2.0 * shape.m))
     fastest = (mixed + math.sqrt(mixed * mixed + 2.0 * number(bound))) * (1.0 + 1e-12)
-    ceiling, around = above(bound), _enclosed(beta)
+    ceiling, around = above(bound), enclosed(beta)
 
     def shown(sides: Sides) -> NDArray[np.bool_]:
         v, slope, form = _scaled(shape, around, sides)
@@ -191,7 +191,7 @@ def _guess(shape: Shape, beta: Any, count: int = 60) -> float:
     grids = (2.0, count), (2.0, count // 2), (mixed + math.sqrt(mixed * mixed + 2.0 * least), count)
     sides = np.meshgrid(*(np.linspace(0.0, size, n + 1)[1:] for size, n in grids))
     points = tuple(Intervals(side.ravel()) for side in (sides[0], sides[1] - 1.0, sides[2]))
-    v, slope, form = _scaled(shape, _enclosed(beta), points)
+    v, slope, form = _scaled(shape, enclosed(beta), points)
     rising = (form[0] if shape == ENERGY else slope).high >= 0.0
     return min(least, float(v.low[rising].min(initial=np.inf)))
 
@@ -213,10 +213,6 @@ def _turn(shape: Shape, bound: Any) -> float:
         if p * most + c2 * most * most <= arb(bound):
             return turn
         turn *= 1.0 - 1e-12
-
-
-def _enclosed(x: Any) -> Intervals:
-    return Intervals(below(x), above(x))
 
 
 def _same_motion(motion: Motion, a: Any, b: Any) -> bool:

@@ -16,11 +16,11 @@ from starhold.certification.matrices import (
     floats,
     identity,
     inverse,
+    matmul,
     number,
     plus,
-    product,
-    scaled,
-    transposed,
+    times,
+    transpose,
 )
 from starhold.certification.motion import Motion
 from starhold.certification.subject import above
@@ -93,9 +93,9 @@ def sampling(motion: Motion) -> Claim | None:
 def stepped(J: Rows, rate: Rows, attitude: Rows, period: Any) -> Rows:
     """The matrix of a step: w+ = w + h J^-1 u, q+ = q + h w/2 + h2 J^-1 u/4 with u = -rate w - attitude q."""
     turn = inverse(J)
-    pull = [[*a, *b] for a, b in zip(product(turn, rate), product(turn, attitude), strict=True)]
+    pull = [[*a, *b] for a, b in zip(matmul(turn, rate), matmul(turn, attitude), strict=True)]
     still = [[*a, *b] for a, b in zip(identity(3, period / 2), identity(3), strict=True)]
-    turning = [[*a, *b] for a, b in zip(identity(3), scaled(identity(3), 0), strict=True)]
+    turning = [[*a, *b] for a, b in zip(identity(3), times(0, identity(3)), strict=True)]
     return [*plus(turning, pull, -period), *plus(still, pull, -period * period / 4)]
 
 
@@ -162,8 +162,8 @@ def dissipative(J: Rows, rate: Rows, attitude: Rows, period: Any) -> bool:
     """Whether the loop is surely stable for every period up to this one: with z = (1 + x)/(1 - x) up to a factor it is
     (J - h rate/2) x2 + (rate - h attitude/4) x + attitude/2 = 0, whose coefficients are then symmetric and definite."""
     return (
-        rate == transposed(rate)
-        and attitude == transposed(attitude)
+        rate == transpose(rate)
+        and attitude == transpose(attitude)
         and definite(attitude)
         and definite(plus(J, rate, -period / 2))
         and definite(plus(rate, attitude, -period / 4))

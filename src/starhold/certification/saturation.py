@@ -13,7 +13,7 @@ from starhold.certification.convergence import Basin, assumed, reached
 from starhold.certification.limits import (
     UNEQUAL,
     Bound,
-    Load,
+    LimitedLoad,
     guesser,
     largest_level,
     level_of_turn,
@@ -21,7 +21,7 @@ from starhold.certification.limits import (
     told_set,
     within,
 )
-from starhold.certification.matrices import greatest, inverse, least, number, product, root_above
+from starhold.certification.matrices import greatest, inverse, least, matmul, number, root_above
 from starhold.certification.subject import above, below
 from starhold.parts.effectors.wheels import BAND, Wheels
 
@@ -80,7 +80,7 @@ def saturation(basin: Basin, turn: float | None = None) -> Claim | None:
     return Claim("wheels", numbers, witness, assumed(basin.motion.subject, limits=FREE), (*before, *shown))
 
 
-def _load(basin: Basin, torque: list[Polynomial], wheels: Wheels, i: int) -> Load | None:
+def _load(basin: Basin, torque: list[Polynomial], wheels: Wheels, i: int) -> LimitedLoad | None:
     """What bounds a motor's torque; None for a lost wheel."""
     limit = wheels.torque_limit[i]
     if limit == 0.0:
@@ -91,7 +91,7 @@ def _load(basin: Basin, torque: list[Polynomial], wheels: Wheels, i: int) -> Loa
     return load_of(basin, [total], exact(min(limit, 1e300)))
 
 
-def _needs(basin: Basin, carried: list[Load | None], level: Any) -> list[float]:
+def _needs(basin: Basin, carried: list[LimitedLoad | None], level: Any) -> list[float]:
     """The torque of each motor that is shown to be enough, near the least."""
     known = [load for load in carried if load is not None]
     guessed = iter(guesser(basin, known)(number(level)))
@@ -122,7 +122,7 @@ def _momentum(basin: Basin, level: Any) -> Any:
 def _inertia(basin: Basin) -> tuple[Any, Any]:
     """The greatest |Jw|2 for w.Pw = 1, and the greatest moment."""
     J = basin.motion.subject.inertia
-    return greatest(product(product(J, inverse(basin.frame.P)), J)), greatest(J)
+    return greatest(matmul(matmul(J, inverse(basin.frame.P)), J)), greatest(J)
 
 
 def _shares(basin: Basin, wheels: Wheels) -> list[tuple[Any, Any]]:

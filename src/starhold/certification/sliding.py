@@ -22,7 +22,7 @@ from starhold.certification.matrices import (
     root_above,
     root_below,
     spectral_norm_above,
-    symmetric,
+    symmetric_part,
 )
 from starhold.certification.motion import AXES, RATE, Motion, Truths
 from starhold.certification.subject import Subject, above, as_tuple, below, perigee
@@ -77,8 +77,8 @@ def surface_claim(subject: Subject) -> Claim | None:
         add("reach exceeds torque", EXACT_SIGN, *_overpowered(subject, found, axis))
         return finish()
     add("reach exceeds torque", EXACT_SIGN, "proved")
-    if not definite(symmetric(found.K)):
-        values, axes = np.linalg.eigh(np.array([[number(x) for x in row] for row in symmetric(found.K)]))
+    if not definite(symmetric_part(found.K)):
+        values, axes = np.linalg.eigh(np.array([[number(x) for x in row] for row in symmetric_part(found.K)]))
         axis = axes[:, 0].tolist()
         form: Any = sum(
             (exact(a) * exact(b) * k for a, row in zip(axis, found.K, strict=True) for b, k in zip(axis, row, strict=True)),
@@ -89,7 +89,7 @@ def surface_claim(subject: Subject) -> Claim | None:
         return finish()
     add("surface holds the target", EXACT_SIGN, "proved")
     size = _layer_bound(subject, found, torque)
-    stiff = least(symmetric(found.K))
+    stiff = least(symmetric_part(found.K))
     turn = size / stiff
     if size > 0:
         add(

@@ -45,7 +45,7 @@ def spline_bounds(knots: Knots) -> tuple[Any, Any]:
     turns = [k for k, cubic in enumerate(cubics) if any(not x.is_zero() for v in cubic for x in v)]
     if not turns:
         return fmpq(0), fmpq(0)
-    cubic = tuple(tuple(_enclosed([cubics[k][i][j] for k in turns]) for j in range(3)) for i in range(3))
+    cubic = tuple(tuple(_enclosing([cubics[k][i][j] for k in turns]) for j in range(3)) for i in range(3))
     times = Intervals(knots.times)
     lengths = Intervals(times.low[1:][turns]) - Intervals(times.low[:-1][turns])
     rate, acceleration = _peaks(cubic, spans[turns])
@@ -79,7 +79,7 @@ def _cubic(knots: Knots, k: int) -> tuple[Any, Any, Any]:
     return a, b, subtract(add(a, end), scale(2, rest))  # pyright: ignore
 
 
-def _enclosed(balls: list[Any]) -> Intervals:
+def _enclosing(balls: list[Any]) -> Intervals:
     middles = np.array([number(ball) for ball in balls])
     zero = np.array([bool(ball.is_zero()) for ball in balls])
     low, high = (np.where(zero, 0.0, np.nextafter(middles, end)) for end in (-np.inf, np.inf))

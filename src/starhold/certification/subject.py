@@ -8,9 +8,10 @@ from typing import Any, cast
 import numpy as np
 from flint import arb, fmpq
 
+from starhold.algebra.intervals import Intervals
 from starhold.algebra.polynomial import Polynomial, constants, exact
 from starhold.algebra.vector import Matrix, Vector
-from starhold.certification.matrices import Rows, greatest, inverse, least, matrix_of, number, plus, rows, scaled
+from starhold.certification.matrices import Rows, greatest, inverse, least, matrix_of, number, plus, rows, times
 from starhold.certification.spline import spline_bounds
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law
@@ -150,6 +151,12 @@ def below(x: Any) -> float:
     return -above(-x)
 
 
+def enclosed(x: Any) -> Intervals:
+    """The narrowest interval of floats around a rational."""
+    low, high = below(x), above(x)
+    return Intervals(low) if low == high else Intervals(low, high)
+
+
 def exact_craft(inertia: Any, torque_limit: Any, gravity: Any) -> Craft:
     """A craft of constant polynomials with the exact inverse of its inertia; a limit that is infinite stays a variable."""
     full = rows(tensor(inertia))
@@ -220,7 +227,7 @@ def _largest_form(quadratic: Polynomial) -> Any:
     """A bound of |quadratic form| over the unit sphere."""
     names = ("p1", "p2", "p3")
     form = matrix_of(quadratic, names, names)
-    return max(greatest(form), greatest(scaled(form, -1)), fmpq(0))
+    return max(greatest(form), greatest(times(-1, form)), fmpq(0))
 
 
 def direction(name: str, first: int = 1, count: int = 3) -> Any:

@@ -27,7 +27,7 @@ FEW = 2_000
 
 
 @dataclass(frozen=True)
-class Cell:
+class ClosedCell:
     """Where surfaces times their signs are not negative, and those in `on`, of a thin cell, are zero."""
 
     sides: Sequence[tuple[Poly, int]]
@@ -43,7 +43,7 @@ class Cell:
         """Its derivative along the motion."""
         return sum((function.derivative(k) * rate for k, rate in enumerate(self.rates)), function * 0)
 
-    def between(self, other: Cell) -> list[Poly]:
+    def between(self, other: ClosedCell) -> list[Poly]:
         """The surfaces that part two cells: all that both have, when closed, lies in each of them."""
         return [
             *(p for p, side in self.sides if any(p == q and side * way < 0 for q, way in other.sides)),
@@ -76,22 +76,22 @@ class Chart:
 
 
 @dataclass(frozen=True)
-class Pieces:
+class Partition:
     """All cells, those with an inside and thin ones. `rest`: coordinates, None for parameters; None if M is {V <= 0}."""
 
     names: tuple[str, ...]
     moving: int
     box: tuple[tuple[Any, Any], ...]
-    cells: tuple[Cell, ...]
+    cells: tuple[ClosedCell, ...]
     rest: tuple[Any, ...] | None
-    thin: tuple[Cell, ...] = ()
+    thin: tuple[ClosedCell, ...] = ()
 
     @property
-    def every(self) -> tuple[Cell, ...]:
+    def every(self) -> tuple[ClosedCell, ...]:
         return (*self.cells, *self.thin)
 
     @property
-    def pairs(self) -> Iterator[tuple[Cell, Cell]]:
+    def pairs(self) -> Iterator[tuple[ClosedCell, ClosedCell]]:
         """Cells with each other, and thin ones with all of them."""
         for place, one in enumerate(self.every):
             for other in self.cells[place + 1 :] if place < len(self.cells) else self.cells:
@@ -109,7 +109,7 @@ class Pieces:
         demand(all(low <= x <= high for x, (low, high) in zip(found, self.box, strict=True)), "a state is outside the box")
         return found
 
-    def around(self, state: Sequence[Any]) -> list[Cell]:
+    def around(self, state: Sequence[Any]) -> list[ClosedCell]:
         """The closed cells that hold a state."""
         return [cell for cell in self.every if all(guard(*state) >= 0 for guard in cell.guards)]
 
@@ -162,7 +162,7 @@ class Pieces:
                 curved.append(left)
         return tuple(steps), gone, [Chart({}, tuple(steps)).of(h) for h in curved]
 
-    def same(self, one: Cell, other: Cell, gaps: Sequence[Poly]) -> bool:
+    def same(self, one: ClosedCell, other: ClosedCell, gaps: Sequence[Poly]) -> bool:
         """Whether polynomials are shown to vanish wherever two closed cells meet."""
         if all(gap.is_zero() for gap in gaps):
             return True
@@ -176,7 +176,7 @@ class Pieces:
             # What is not negative in one and not positive in the other vanishes where they meet.
             if any(negative_multiple(a, b) and all(divides(a, gap) for gap in left) for a in mine for b in yours):
                 return True
-            chart = next(iter(Pieces(self.names, self.moving, self.box, self.cells, None).charts([surface])))
+            chart = next(iter(Partition(self.names, self.moving, self.box, self.cells, None).charts([surface])))
             if answer(Question(chart.box, [*chart.rooms, *mine, *yours], most=FEW)):
                 return True
         return False
@@ -187,11 +187,11 @@ def _on(surface: Poly, p: Poly, steps: tuple[Sequence[Poly], ...]) -> Poly:
     return Chart({}, steps).of(p) if steps else divmod(p, surface)[1]
 
 
-def split(names: Sequence[str], moving: int, box: Any, rest: Any, rates: Sequence[Any], V: Any) -> Pieces:
+def split(names: Sequence[str], moving: int, box: Any, rest: Any, rates: Sequence[Any], V: Any) -> Partition:
     """The cells of rates and V; what holds on a surface alone (neither p > 0 nor -p > 0) is a thin one."""
     ring = fmpq_mpoly_ctx.get(tuple(names), Ordering.degrevlex)
-    cells: list[Cell] = []
-    thin: list[Cell] = []
+    cells: list[ClosedCell] = []
+    thin: list[ClosedCell] = []
     still = [Polynomial({}) for _ in names[moving:]]
     try:
         joined = jointly([*rates, *still, V], MOST)
@@ -210,11 +210,11 @@ def split(names: Sequence[str], moving: int, box: Any, rest: Any, rates: Sequenc
         sides = [(p, next(iter(ways))[0]) for torn, (p, ways) in zip(both, asked.values(), strict=True) if not torn]
         on = [p for torn, (p, _) in zip(both, asked.values(), strict=True) if torn]
         own = [polynomial(ring, names, value) for value in values]
-        (thin if on else cells).append(Cell(sides, tuple(own[:-1]), own[-1], on))
+        (thin if on else cells).append(ClosedCell(sides, tuple(own[:-1]), own[-1], on))
     demand(bool(cells), "a system has no cells")
     degree = max(0, *(cell.V.total_degree() + rate.total_degree() for cell in (*cells, *thin) for rate in cell.rates))
     demand(comb(len(names) + degree, degree) <= TERMS, "the system is too large: V' has too many terms")
-    return Pieces(tuple(names), moving, tuple(box), tuple(cells), rest, tuple(thin))
+    return Partition(tuple(names), moving, tuple(box), tuple(cells), rest, tuple(thin))
 
 
 def polynomial(ring: Any, names: Sequence[str], p: Any) -> Poly:

@@ -29,10 +29,11 @@ from starhold.checker.shapes import (
     STATION,
     SUBJECT,
     WITNESS,
+    outcome_of,
     shaped,
 )
-from starhold.checker.station import STATION_CLAIMS, Station, read_station, station_refutation
-from starhold.checker.subject import Subject, read_subject
+from starhold.checker.station import STATION_CLAIMS, StationSubject, read_station, station_refutation
+from starhold.checker.subject import LoopSubject, read_subject
 
 FORMAT = "starhold certificate 1"
 ENDS = ("convergence", "region", "torque-limit", "wheels", "inertia", "disturbance", "sliding", "circle", "rest")
@@ -112,12 +113,12 @@ def _guarded(work: Callable[[], Any]) -> tuple[Any, str]:
         return None, f"cannot be verified: {error}"
 
 
-def _subject(given: Any) -> Subject | Station:
+def _subject(given: Any) -> LoopSubject | StationSubject:
     shaped(given, CERTIFICATE, "the certificate")
     station = "plant" in given["subject"]
     shaped(given["subject"], STATION if station else SUBJECT, "the subject")
     outcomes = [claim.get("outcome") for claim in given["claims"]]
-    follows = _follows(outcomes)
+    follows = outcome_of(outcomes)
     kinds = [str(claim.get("kind")) for claim in given["claims"]]
     if follows == "proved" and not set(kinds) & set(ENDS):
         follows = "undecided"
@@ -126,15 +127,15 @@ def _subject(given: Any) -> Subject | Station:
     return (read_station if station else read_subject)(given["subject"])
 
 
-def _claim(subject: Subject | Station, claim: Any) -> list[tuple[str, Verdict, str]]:
+def _claim(subject: LoopSubject | StationSubject, claim: Any) -> list[tuple[str, Verdict, str]]:
     """Verdict and reason for each obligation of a claim."""
     shaped(claim, CLAIM, "the claim")
-    kinds = STATION_CLAIMS if isinstance(subject, Station) else CLAIMS
+    kinds = STATION_CLAIMS if isinstance(subject, StationSubject) else CLAIMS
     demand(claim["kind"] in kinds, f"there is no kind of claim {claim['kind']} about such a loop")
     for obligation in claim["obligations"]:
         shaped(obligation, OBLIGATION, "an obligation")
     outcomes = [obligation["outcome"] for obligation in claim["obligations"]]
-    demand(claim["outcome"] == _follows(outcomes), "the outcome does not follow from the obligations")
+    demand(claim["outcome"] == outcome_of(outcomes), "the outcome does not follow from the obligations")
     told, proofs = _obliges(subject, claim)
     demand(claim["assumptions"] == told, "the assumptions are not those of such a claim")
     if claim["outcome"] != "proved":
@@ -149,9 +150,9 @@ def _claim(subject: Subject | Station, claim: Any) -> list[tuple[str, Verdict, s
     return [_verdict(proof) for proof in shown]
 
 
-def _obliges(subject: Subject | Station, claim: Any) -> tuple[list[str], Callable[[], list[Obligation]]]:
+def _obliges(subject: LoopSubject | StationSubject, claim: Any) -> tuple[list[str], Callable[[], list[Obligation]]]:
     """The assumptions of a claim, and what makes the list of what has to be shown."""
-    if isinstance(subject, Station):
+    if isinstance(subject, StationSubject):
         about = STATION_CLAIMS[claim["kind"]]
         return about.assumptions(subject), partial(about.proofs, subject, claim)
     kind, wheels = CLAIMS[claim["kind"]], subject.wheels is not None
@@ -165,7 +166,7 @@ def _verdict(proof: Obligation) -> tuple[str, Verdict, str]:
     return (name if how else "", "fails", fault) if reason is None else (name if how else "", "holds", reason)
 
 
-def _unproved(subject: Subject | Station, claim: Mapping[str, Any]) -> list[tuple[str, Verdict, str]]:
+def _unproved(subject: LoopSubject | StationSubject, claim: Mapping[str, Any]) -> list[tuple[str, Verdict, str]]:
     """Nothing of such a claim counts as proved; a refutation must be one."""
     for part, shapes in (("numbers", NUMBERS), ("witness", WITNESS)):
         shape, given = shapes[claim["kind"]], claim[part]
@@ -187,13 +188,7 @@ def _unproved(subject: Subject | Station, claim: Mapping[str, Any]) -> list[tupl
     return found
 
 
-def _refutes(subject: Subject | Station, claim: Mapping[str, Any], obligation: Mapping[str, Any]) -> str:
-    if isinstance(subject, Station):
+def _refutes(subject: LoopSubject | StationSubject, claim: Mapping[str, Any], obligation: Mapping[str, Any]) -> str:
+    if isinstance(subject, StationSubject):
         return station_refutation(subject, claim, obligation)
     return refutation(subject, claim, obligation)
-
-
-def _follows(outcomes: Sequence[Any]) -> str:
-    if "refuted" in outcomes:
-        return "refuted"
-    return "proved" if outcomes and all(outcome == "proved" for outcome in outcomes) else "undecided"

@@ -28,7 +28,7 @@ TAKEN = ("t2", "t3")
 
 
 @dataclass(frozen=True)
-class Circle:
+class CircleLoop:
     """Law, gains, plant and motion of a loop, all numbers exact."""
 
     law: Law

@@ -18,20 +18,20 @@ from starhold.checker.exact import (
     definite,
     demand,
     has_root_near,
-    inverted,
+    identity,
+    inverse,
     plus,
     rational,
-    root_up,
+    root_above,
     transpose,
-    unit,
     within_circle,
 )
 from starhold.checker.frame import is_even
-from starhold.checker.loop import Loop
+from starhold.checker.loop import ExactLoop
 from starhold.checker.modal import ModalRegion
 from starhold.checker.odd import OddRegion
 from starhold.checker.region import BALLS, EXACT, ROOTS, SIGN, Numbers, Region, optional
-from starhold.checker.subject import Subject
+from starhold.checker.subject import LoopSubject
 from starhold.checker.surface import Sliding
 from starhold.checker.torque import bounded, keeps_within
 from starhold.checker.wheels import holds_target, keeps_momenta
@@ -44,7 +44,7 @@ class Kind:
     loops (None: for any)."""
 
     assumed: tuple[str, ...]
-    proofs: Callable[[Subject, Numbers], list[Obligation]]
+    proofs: Callable[[LoopSubject, Numbers], list[Obligation]]
     untold: str = ""
     beside: tuple[str, ...] = ()
     wheels: bool | None = None
@@ -56,14 +56,14 @@ class Kind:
         return [_FREE if told == _UNLIMITED else told for told in (*kept, *self.beside)] if wheels else kept
 
 
-def _region(loop: Loop, level: Any | None, start: Any | None, witness: Numbers) -> OddRegion | EvenRegion:
+def _region(loop: ExactLoop, level: Any | None, start: Any | None, witness: Numbers) -> OddRegion | EvenRegion:
     return (EvenRegion if is_even(loop) else OddRegion)(loop, level, start, witness)
 
 
-def claimed(subject: Subject, claim: Numbers) -> OddRegion | EvenRegion:
+def claimed(subject: LoopSubject, claim: Numbers) -> OddRegion | EvenRegion:
     """The set that a claim speaks of, with its V."""
     numbers, witness = claim["numbers"], claim["witness"]
-    return _region(Loop(subject, optional(witness["stiffness"])), numbers["level"], numbers["start"], witness)
+    return _region(ExactLoop(subject, optional(witness["stiffness"])), numbers["level"], numbers["start"], witness)
 
 
 def _names(claim: Numbers) -> list[str]:
@@ -90,13 +90,13 @@ def _converges(region: Region[Any], claim: Numbers, bounded: bool = False) -> li
     ]
 
 
-def convergence(subject: Subject, claim: Numbers) -> list[Obligation]:
+def convergence(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
     """Every motion from {V <= start} comes to rest on target."""
     region = claimed(subject, claim)
     return [*_converges(region, claim), _told(region, claim["numbers"])]
 
 
-def torque_limit(subject: Subject, claim: Numbers) -> list[Obligation]:
+def torque_limit(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
     """Motions from {V <= start} keep the torque within the limit, and so come to rest on target as told."""
     region, numbers = claimed(subject, claim), claim["numbers"]
 
@@ -111,7 +111,7 @@ def torque_limit(subject: Subject, claim: Numbers) -> list[Obligation]:
     return [*_converges(region, claim), ("torque", BALLS, torque), _told(region, numbers)]
 
 
-def wheels_limits(subject: Subject, claim: Numbers) -> list[Obligation]:
+def wheels_limits(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
     """Motions from {V <= start} keep every motor's torque and every wheel's momentum within its limit, and so come to rest
     on target as told."""
     region, numbers, wheels = claimed(subject, claim), claim["numbers"], subject.wheels
@@ -145,12 +145,12 @@ def wheels_limits(subject: Subject, claim: Numbers) -> list[Obligation]:
     return [*_converges(region, claim, bounded=True), *proofs, _told(region, numbers)]
 
 
-def inertia(subject: Subject, claim: Numbers) -> list[Obligation]:
+def inertia(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
     """Convergence for every inertia of a box, or for every inertia."""
     numbers, witness = claim["numbers"], claim["witness"]
     tolerance, stiffness = optional(numbers["tolerance"]), optional(witness["stiffness"])
     demand(tolerance is None or 0 < tolerance <= 1, "the tolerance is not between 0 and 1")
-    loop = Loop(subject, stiffness, shifted=True, tolerance=tolerance)
+    loop = ExactLoop(subject, stiffness, shifted=True, tolerance=tolerance)
     region = _region(loop, witness["level"], numbers["start"], witness)
     demand(stiffness is not None or isinstance(region, EvenRegion), "there is no stiffness")
     demand((tolerance is None) == (region.epsilon == 0), "a cross term is for a tolerance, and only for one")
@@ -164,7 +164,7 @@ def inertia(subject: Subject, claim: Numbers) -> list[Obligation]:
     ]
 
 
-def disturbance(subject: Subject, claim: Numbers) -> list[Obligation]:
+def disturbance(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
     """With any torque from outside up to a bound, motions from {V <= start} end near the target."""
     region, numbers, witness = claimed(subject, claim), claim["numbers"], claim["witness"]
     if isinstance(region, EvenRegion):
@@ -179,9 +179,9 @@ def disturbance(subject: Subject, claim: Numbers) -> list[Obligation]:
     ]
 
 
-def sampling(subject: Subject, claim: Numbers) -> list[Obligation]:
+def sampling(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
     """The linear loop with the torque held for a period is stable."""
-    loop, numbers = Loop(subject, quotient=True), claim["numbers"]
+    loop, numbers = ExactLoop(subject, quotient=True), claim["numbers"]
     radius, longest = rational(numbers["radius"]), rational(numbers["longest"])
 
     def at_period() -> str:
@@ -220,7 +220,7 @@ def eigenvalues_of(coefficients: Sequence[Any], told: Sequence[Sequence[float]])
     product, sizes = acb_poly([1]), fmpq_poly([1])
     for pair in told:
         real, imaginary = map(rational, pair)
-        size = root_up(real**2 + imaginary**2)
+        size = root_above(real**2 + imaginary**2)
         near = has_root_near(coefficients, real, imaginary, max(ONE, size) / 10**6)
         demand(near, f"no eigenvalue is near {pair[0]:g} {pair[1]:+g}i")
         product, sizes = product * acb_poly([-acb(arb(real), arb(imaginary)), 1]), sizes * fmpq_poly([size, 1])
@@ -228,17 +228,17 @@ def eigenvalues_of(coefficients: Sequence[Any], told: Sequence[Sequence[float]])
         demand(bool(abs(found - arb(c)) <= arb(size / 10**9)), "an eigenvalue is told too often, or left out")
 
 
-def stepped(loop: Loop, period: Any) -> list[Any]:
+def stepped(loop: ExactLoop, period: Any) -> list[Any]:
     """The characteristic polynomial of the step over a period, lowest coefficient first: near rest J w' = u is constant and
     q' = w/2, so that q gains period w/2 + period2 J^-1 u/4."""
-    pulls = [(fmpq_mat(inverted(loop.subject.inertia)) * fmpq_mat(gain) * -period).tolist() for gain in loop.linear()]
-    upper = [[*a, *b] for a, b in zip(plus(unit(3), pulls[0]), pulls[1], strict=True)]
-    left = plus(unit(3, period / 2), pulls[0], period / 4)
-    lower = [[*a, *b] for a, b in zip(left, plus(unit(3), pulls[1], period / 4), strict=True)]
+    pulls = [(fmpq_mat(inverse(loop.subject.inertia)) * fmpq_mat(gain) * -period).tolist() for gain in loop.linear()]
+    upper = [[*a, *b] for a, b in zip(plus(identity(3), pulls[0]), pulls[1], strict=True)]
+    left = plus(identity(3, period / 2), pulls[0], period / 4)
+    lower = [[*a, *b] for a, b in zip(left, plus(identity(3), pulls[1], period / 4), strict=True)]
     return fmpq_mat(upper + lower).charpoly().coeffs()
 
 
-def sliding(subject: Subject, claim: Numbers) -> list[Obligation]:
+def sliding(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
     """A law with a surface reaches it against torque from outside, and ends on target or near it."""
     proof = Sliding(subject, claim["numbers"])
     found: list[Obligation] = [
@@ -252,7 +252,7 @@ def sliding(subject: Subject, claim: Numbers) -> list[Obligation]:
     return [*found, (last, SIGN, proof.cover), ("numbers", "", proof.ends)]
 
 
-def region(subject: Subject, claim: Numbers) -> list[Obligation]:
+def region(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
     """Every motion of a loop of the law `modal` from {V <= level} stays there and comes to rest on target."""
     return ModalRegion(subject, claim["numbers"], claim["witness"]).proofs()
 

@@ -19,29 +19,29 @@ from starhold.checker.exact import (
     demand,
     down,
     greatest,
-    inverted,
+    identity,
+    inverse,
     matmul,
     plus,
     rational,
     replaced,
-    root_up,
+    root_above,
     times,
     transpose,
-    unit,
 )
 from starhold.checker.gyroscopic import swung
 from starhold.checker.loop import RATE, TURN, letters
 from starhold.checker.odd import OddRegion
 from starhold.checker.region import Numbers, optional
 from starhold.checker.shapes import STEP, shaped
-from starhold.checker.subject import Subject, named, variables
+from starhold.checker.subject import LoopSubject, named, variables
 
 
 class Disturbed:
     """A torque m does work m.(W'w + epsilon q) on V + epsilon C, of which the square is x.Rx, x = (w, q): at most
     tau x.Rx + m2/(4 tau). So V + epsilon C falls outside {x.(Q - tau R)x <= m2/(4 tau)}, the ball."""
 
-    def __init__(self, subject: Subject, region: OddRegion, numbers: Numbers, witness: Numbers) -> None:
+    def __init__(self, subject: LoopSubject, region: OddRegion, numbers: Numbers, witness: Numbers) -> None:
         self.subject, self.region, self.numbers, self.witness = subject, region, numbers, witness
         self.torque, self.tau, self.beta = (rational(x) for x in (numbers["torque"], witness["tau"], witness["beta"]))
 
@@ -49,14 +49,14 @@ class Disturbed:
     def left(self) -> Rows:
         """Q - tau R."""
         epsilon, W = self.region.epsilon, self.region.frame.W
-        pushed = block(matmul(W, transpose(W)), times(epsilon, W), unit(3, epsilon**2))
+        pushed = block(matmul(W, transpose(W)), times(epsilon, W), identity(3, epsilon**2))
         return plus(self.region.fall(), pushed, -self.tau)
 
     @cached_property
     def turn(self) -> Any:
         """What |q| does not exceed in the ball."""
         demand(self.tau > 0, "tau is not positive")
-        return root_up(self.torque**2 / (4 * self.tau) * greatest([row[3:] for row in inverted(self.left)[3:]]))
+        return root_above(self.torque**2 / (4 * self.tau) * greatest([row[3:] for row in inverse(self.left)[3:]]))
 
     def descent(self) -> str:
         """V + epsilon C falls outside the ball."""
@@ -101,15 +101,15 @@ class Disturbed:
         demand(self.turn < 1, "the ball reaches every attitude")
         # In the ball s (1 - q0) = s q2/(1 + q0), q0 being at least the root of 1 - turn2.
         spring = s / (1 + down(arb(1 - self.turn**2).sqrt()))
-        whole = block(times(fmpq(1, 2), P), times(epsilon / 2, transpose(J)), unit(3, spring))
+        whole = block(times(fmpq(1, 2), P), times(epsilon / 2, transpose(J)), identity(3, spring))
         demand(definite(plus(self.left, whole, -self.beta), strictly=False), "V + epsilon C may be larger in the ball")
         end = self.torque**2 / (4 * self.tau * self.beta)
         demand(region.start is not None and end < (1 + region.rho) * region.start, "the end is no lower than the start")
         # Over every w V + epsilon C is at least held (1 - q0), and over every q at least w.(lean)w/2, as q2 <= 2 (1 - q0).
-        held = s - epsilon**2 * greatest(matmul(matmul(J, inverted(P)), transpose(J)))
+        held = s - epsilon**2 * greatest(matmul(matmul(J, inverse(P)), transpose(J)))
         lean = plus(P, times(epsilon**2 / s, matmul(transpose(J), J)), -1)
         demand(end < held and definite(lean), "the end reaches half a turn, or has no bound")
-        return root_up(2 * end * greatest(inverted(lean))), root_up(1 - (1 - end / held) ** 2)
+        return root_above(2 * end * greatest(inverse(lean))), root_above(1 - (1 - end / held) ** 2)
 
     def _step(self, step: Mapping[str, Any], rate: Any, turn: Any) -> tuple[Any, Any]:
         """The smaller bounds that a form S leaves: with x' = Ax + (J^-1 (m + g), n), |m + g| <= push and n the rest of the
@@ -118,16 +118,16 @@ class Disturbed:
         demand(transpose(S) == S and definite(S), "a form is not symmetric or not positive")
         decay, spread = rational(step["decay"]), rational(step["spread"])
         demand(decay > 0 and spread > 0, "decay or spread is not positive")
-        A, inverse, gamma = self._nearby
+        A, J_inverse, gamma = self._nearby
         push, lost = self.torque + gamma * rate**2, 1 - down(arb(1 - turn**2).sqrt())
-        fed = block(times(push**2 / decay, matmul(inverse, transpose(inverse))), unit(3, ZERO), unit(3, spread))
-        swept = block(unit(3, lost / (2 * spread)), unit(3, ZERO), unit(3, ZERO))
+        fed = block(times(push**2 / decay, matmul(J_inverse, transpose(J_inverse))), identity(3, ZERO), identity(3, spread))
+        swept = block(identity(3, lost / (2 * spread)), identity(3, ZERO), identity(3, ZERO))
         rising = matmul(transpose(A), S)
         for more in (transpose(rising), times(decay, S), matmul(matmul(S, fed), S), swept):
             rising = plus(rising, more)
         demand(definite(times(-ONE, rising)), "x.Sx may rise where it exceeds 1")
-        inner = inverted(S)
-        sizes = [root_up(greatest([row[k : k + 3] for row in inner[k : k + 3]])) for k in (0, 3)]
+        inner = inverse(S)
+        sizes = [root_above(greatest([row[k : k + 3] for row in inner[k : k + 3]])) for k in (0, 3)]
         return min(rate, sizes[0]), min(turn, sizes[1])
 
     @cached_property
@@ -137,15 +137,15 @@ class Disturbed:
         found = loop.accelerations(loop.resting()[1])
         kinds = {letters(m) for part in found for m in part.terms}
         demand(not kinds - {"q", "w", "ww", "e", "m"}, f"the acceleration has the terms {', '.join(sorted(kinds))}")
-        inverse = inverted(J)
+        J_inverse = inverse(J)
         known, unknown = ([part.only(lambda m, k=kind: letters(m) == k) for part in found] for kind in "em")
         acts = [[part.terms.get((name,), ZERO) for name in named("m")] for part in unknown]
-        demand(acts == inverse, "torque from outside acts on the rate in another way")
+        demand(acts == J_inverse, "torque from outside acts on the rate in another way")
         as_unknown = [replaced(part, dict(zip(named("e"), variables(named("m")), strict=True))) for part in known]
         felt, pairs = self.region.frame.felt, list(zip(as_unknown, unknown, strict=True))
         same = any(not any((one - share * other).terms for one, other in pairs) for share in (felt, -felt))
         demand(same, "the modelled torque acts on the rate in another way than on V")
         upper = [[part.terms.get((name,), ZERO) for name in (*RATE, *TURN)] for part in found]
-        lower = [[*half, *none] for half, none in zip(unit(3, fmpq(1, 2)), unit(3, ZERO), strict=True)]
+        lower = [[*half, *none] for half, none in zip(identity(3, fmpq(1, 2)), identity(3, ZERO), strict=True)]
         torques = [sum((c * part for c, part in zip(row, found, strict=True)), Polynomial({})) for row in J]
-        return upper + lower, inverse, swung(torques, unit(3), optional(self.witness["shift"]))
+        return upper + lower, J_inverse, swung(torques, identity(3), optional(self.witness["shift"]))

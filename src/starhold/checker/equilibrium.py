@@ -28,7 +28,7 @@ from starhold.parts.bodies.libration_point import Libration, linear
 
 
 @dataclass(frozen=True)
-class Equilibrium:
+class EquilibriumLoop:
     """Law, gains, plant and motion of a loop, all numbers exact."""
 
     law: Law
@@ -103,7 +103,7 @@ class LimitedAxis:
     limit: Any
 
     @classmethod
-    def of(cls, loop: Equilibrium, limit: Any) -> LimitedAxis:
+    def of(cls, loop: EquilibriumLoop, limit: Any) -> LimitedAxis:
         """That of a loop in the linear model, with the others at rest, as model, law and limit make it piece by piece."""
         # The full problem would spend control on what the linear model leaves out.
         demand(not loop.full, "the limited control is read for the linear model alone")

@@ -15,10 +15,10 @@ from starhold.checker.exact import (
     demand,
     down,
     greatest,
+    identity,
     matmul,
     plus,
     times,
-    unit,
     up,
 )
 from starhold.checker.frame import EvenFrame, even_frame
@@ -50,12 +50,12 @@ class EvenRegion(Region[EvenFrame]):
 
     def well(self) -> tuple[Any, Well]:
         s = self.frame.N[0][0]
-        demand(unit(3, s) == self.frame.N, "the stiffness is not the same about every axis")
+        demand(identity(3, s) == self.frame.N, "the stiffness is not the same about every axis")
         return s, EVEN
 
     def holds_turn(self, turn: Any) -> bool:
         square = up((arb(turn) / 2).sin() ** 2)
-        left = plus(unit(3, self.start), times(square, self.frame.N), -1)
+        left = plus(identity(3, self.start), times(square, self.frame.N), -1)
         return turn <= down(self.around) and definite(left, strictly=False)
 
     def positive(self) -> str:
@@ -99,7 +99,7 @@ class EvenRegion(Region[EvenFrame]):
     def single(self) -> str:
         """V is larger at every half turn than on the level set."""
         demand(self.level is not None, "without a level there are half turns in the set")
-        demand(definite(plus(self.frame.N, unit(3, self.level), -1)), "the level set reaches half turns")
+        demand(definite(plus(self.frame.N, identity(3, self.level), -1)), "the level set reaches half turns")
         return "the level is below the least eigenvalue of N"
 
     def repels(self) -> str:

@@ -67,7 +67,7 @@ def down(x: Any) -> Any:
     return -up(-x)
 
 
-def root_up(x: Any) -> Any:
+def root_above(x: Any) -> Any:
     """A rational not below the square root of a rational."""
     return up(arb(x).sqrt()) if x > 0 else ZERO
 
@@ -75,7 +75,7 @@ def root_up(x: Any) -> Any:
 # --- matrices ---------------------------------------------------------------------------------------------------------
 
 
-def unit(count: int, c: Any = ONE) -> Rows:
+def identity(count: int, c: Any = ONE) -> Rows:
     """c times the unit matrix."""
     return [[c if i == j else ZERO for j in range(count)] for i in range(count)]
 
@@ -110,7 +110,7 @@ def block(a: Rows, b: Rows, d: Rows) -> Rows:
     return [s + t for s, t in zip(a, b, strict=True)] + [s + t for s, t in zip(transpose(b), d, strict=True)]
 
 
-def inverted(a: Rows) -> Rows:
+def inverse(a: Rows) -> Rows:
     """The exact inverse of a matrix of rationals."""
     found = fmpq_mat(a).inv()
     return [[found[i, j] for j in range(len(a))] for i in range(len(a))]
@@ -140,14 +140,14 @@ def greatest(a: Rows) -> Any:
     values = np.linalg.eigvalsh([[floating(x) for x in row] for row in a])
     guesses = (rational(float(values[-1]) + share * float(np.abs(values).max())) for share in SHARES)
     for bound in (max(row[k] for k, row in enumerate(a)), *guesses):
-        if definite(plus(unit(len(a), bound), a, -ONE), strictly=False):
+        if definite(plus(identity(len(a), bound), a, -ONE), strictly=False):
             return bound
     raise CheckError("no bound of an eigenvalue was found")
 
 
 def least(a: Rows) -> Any:
     """A rational that no eigenvalue of a symmetric matrix falls below; positive where all of them are."""
-    return 1 / greatest(inverted(a)) if definite(a) else -greatest(times(-ONE, a))
+    return 1 / greatest(inverse(a)) if definite(a) else -greatest(times(-ONE, a))
 
 
 def radius_of(a: Rows) -> Any:

@@ -18,18 +18,18 @@ from starhold.checker.exact import (
     Rows,
     demand,
     dual,
+    identity,
     radius_of,
     replaced,
-    root_up,
+    root_above,
     times,
-    unit,
 )
-from starhold.checker.loop import ATTITUDE, RATE, TURN, Loop, W, by_kind, letters, without
+from starhold.checker.loop import ATTITUDE, RATE, TURN, ExactLoop, W, by_kind, letters, without
 from starhold.checker.subject import mixed, named, quadratic, variables
 
 
 @dataclass(frozen=True)
-class Frame:
+class CommonFrame:
     """V = w.Pw/2 + (a function of the attitude), V' = -w.Dw + (at most kappa |w|3) + w.Wm + ...; felt: the share of the
     modelled torque that acts as m does; tops: P is nowhere larger than the largest of these, for any inertia the loop may
     have."""
@@ -43,7 +43,7 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class OddFrame(Frame):
+class OddFrame(CommonFrame):
     """V = ... + s (1 - q0), V' = ... + w.Eq."""
 
     s: Any
@@ -51,7 +51,7 @@ class OddFrame(Frame):
 
 
 @dataclass(frozen=True)
-class EvenFrame(Frame):
+class EvenFrame(CommonFrame):
     """V = ... + q.Nq, the same at q and -q; nothing more in V'."""
 
     N: Rows
@@ -67,12 +67,12 @@ class Crossed:
     felt: Any
 
 
-def is_even(loop: Loop) -> bool:
+def is_even(loop: ExactLoop) -> bool:
     """Whether V is to be read as one that is even in q."""
     return any(letters(m) == "qq" for m in loop.lyapunov.value.terms)
 
 
-def odd_frame(loop: Loop) -> OddFrame:
+def odd_frame(loop: ExactLoop) -> OddFrame:
     """The parts of a V that is not the same at -q; a CheckError where it has others."""
     V = loop.lyapunov.value
     kinds = by_kind(V)
@@ -86,7 +86,7 @@ def odd_frame(loop: Loop) -> OddFrame:
     return OddFrame(**vars(frame), s=s, E=mixed(terms, RATE, TURN))
 
 
-def even_frame(loop: Loop) -> EvenFrame:
+def even_frame(loop: ExactLoop) -> EvenFrame:
     """The parts of a V that is even in q; a CheckError where it has others."""
     kinds = by_kind(loop.lyapunov.value)
     demand(set(kinds) <= {"qq", "ww"}, "V has terms it must not have")
@@ -97,7 +97,7 @@ def even_frame(loop: Loop) -> EvenFrame:
     return EvenFrame(**vars(_common(loop, kinds)[0]), N=N)
 
 
-def _common(loop: Loop, kinds: Mapping[str, Polynomial], *mixing: str) -> tuple[Frame, dict[Monomial, Any]]:
+def _common(loop: ExactLoop, kinds: Mapping[str, Polynomial], *mixing: str) -> tuple[CommonFrame, dict[Monomial, Any]]:
     """What any V has, of its terms by kind, and the terms of V' around rest; `mixing`: kinds of them that may be beside."""
     P, tops = _kinetic(loop, kinds.get("ww", Polynomial({})))
     slope = loop.slope(loop.resting()[1]).only(lambda m: not set(letters(m)) & set("ra"))
@@ -111,12 +111,12 @@ def _common(loop: Loop, kinds: Mapping[str, Polynomial], *mixing: str) -> tuple[
             share = fmpq(1, 27)
             for name in set(monomial):
                 share *= monomial.count(name) ** monomial.count(name)
-            kappa += abs(c) * root_up(share)
+            kappa += abs(c) * root_above(share)
     D = times(-1, quadratic(terms, RATE))
-    return Frame(P, tops, D, kappa, mixed(terms, RATE, named("m")), _felt(found, "w")), terms
+    return CommonFrame(P, tops, D, kappa, mixed(terms, RATE, named("m")), _felt(found, "w")), terms
 
 
-def _kinetic(loop: Loop, own: Polynomial) -> tuple[Rows, list[Rows]]:
+def _kinetic(loop: ExactLoop, own: Polynomial) -> tuple[Rows, list[Rows]]:
     """P, and what it is nowhere larger than the largest of."""
     if not loop.shifted:
         P = times(2, quadratic(own.terms, RATE))
@@ -127,7 +127,7 @@ def _kinetic(loop: Loop, own: Polynomial) -> tuple[Rows, list[Rows]]:
     demand(not rest.terms, "P is not a multiple of the inertia")
     # x.Jx is largest in a box where each entry deviates with the sign of x_i x_j.
     signs = [(1, a, b) for a in (1, -1) for b in (1, -1)]
-    reaches = loop.reaches or unit(3, ZERO)
+    reaches = loop.reaches or identity(3, ZERO)
     tops = [
         [[g * (c + e[i] * e[j] * reaches[i][j]) for j, c in enumerate(row)] for i, row in enumerate(loop.inertia)]
         for e in signs
@@ -135,7 +135,7 @@ def _kinetic(loop: Loop, own: Polynomial) -> tuple[Rows, list[Rows]]:
     return times(g, loop.inertia), tops
 
 
-def crossed(loop: Loop) -> Crossed:
+def crossed(loop: ExactLoop) -> Crossed:
     """The parts of C = q.Jw, and of C' around rest; a CheckError where they have others."""
     measurement = loop.moving
     C: Any = dot(vector_part(measurement.attitude), apply(dual(loop.plant[0].inertia), measurement.rate))
@@ -145,17 +145,17 @@ def crossed(loop: Loop) -> Crossed:
     strange = set(kinds) - {"qq", "qw", "qww", "oww", "mq", "eq"}
     demand(not strange, f"C' has the terms {', '.join(sorted(strange))}")
     terms = loop.plain(slope.only(lambda m: len(letters(m)) == 2))
-    demand(mixed(terms, TURN, named("m")) == unit(3), "torque from outside acts on C in another way")
+    demand(mixed(terms, TURN, named("m")) == identity(3), "torque from outside acts on C in another way")
     felt = _felt(kinds, "q")
     forms = loop.over(slope.only(lambda m: len(letters(m)) == 3))
     total = ZERO
     for name in ATTITUDE:
         # |(q0, q)| = 1, so that the sum of q_k w.F_k w is at most the root of the sum of squares.
         total += _largest(loop, {without(m, name): share for m, share in forms.items() if name in m}) ** 2
-    return Crossed(times(-1, quadratic(terms, TURN)), times(-1, mixed(terms, TURN, RATE)), root_up(total), felt)
+    return Crossed(times(-1, quadratic(terms, TURN)), times(-1, mixed(terms, TURN, RATE)), root_above(total), felt)
 
 
-def _largest(loop: Loop, form: Mapping[Monomial, Polynomial]) -> Any:
+def _largest(loop: ExactLoop, form: Mapping[Monomial, Polynomial]) -> Any:
     """The largest eigenvalue in modulus of a quadratic form over the box, which is at a corner: it is convex."""
     names = sorted({name for share in form.values() for name in share.variables()})
     if names and loop.reaches is None:

@@ -18,13 +18,13 @@ from starhold.checker.exact import (
     demand,
     floating,
     greatest,
+    identity,
     matmul,
     plus,
     rational,
-    root_up,
+    root_above,
     times,
     transpose,
-    unit,
 )
 from starhold.checker.loop import RATE, W, letters
 from starhold.checker.subject import quadratic
@@ -38,16 +38,16 @@ def swung(parts: Sequence[Polynomial], P: Rows, shift: Any | None, weight: Any |
     """
     forms = [part.only(lambda m: letters(m) == "ww") for part in parts]
     if shift is None:
-        return root_up(sum((_ratio(quadratic(form.terms, RATE), P) ** 2 for form in forms), ZERO))
+        return root_above(sum((_ratio(quadratic(form.terms, RATE), P) ** 2 for form in forms), ZERO))
     demand(len(forms) == 3, "there is a shift, but not three components")
-    A = plus(_matrix(forms), unit(3, shift))
+    A = plus(_matrix(forms), identity(3, shift))
     vector: Any = W
     again: Any = cross(vector, apply(tuple(map(tuple, A)), vector))  # pyright: ignore
     demand(not any((form - other).terms for form, other in zip(forms, again, strict=True)), "it is not a cross product")
     square = matmul(transpose(A), A)
-    c = root_up(greatest(square)) if weight is None else weight
+    c = root_above(greatest(square)) if weight is None else weight
     demand(c > 0, "the weight is not positive")
-    return _ratio(plus(square, unit(3, c * c)), P) / (2 * c)
+    return _ratio(plus(square, identity(3, c * c)), P) / (2 * c)
 
 
 def _matrix(forms: Sequence[Polynomial]) -> Rows:

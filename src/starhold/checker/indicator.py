@@ -11,7 +11,7 @@ from typing import Any
 
 from flint import fmpq_mat
 
-from starhold.checker.cells import Cell, Pieces, one_sign, signed_like
+from starhold.checker.cells import ClosedCell, Partition, one_sign, signed_like
 from starhold.checker.cover import Options, Poly, Question, answer
 from starhold.checker.exact import CheckError, NotCheckedError, demand
 
@@ -23,7 +23,7 @@ class Indicator:
     """V of a claim. `level`: None for instability, where all of the box counts. `escape` and `squares`: hints of the file.
     `told`: the obligations that the claim lists."""
 
-    pieces: Pieces
+    pieces: Partition
     theorem: str
     level: Any
     escape: Poly | None
@@ -35,7 +35,7 @@ class Indicator:
         return -1 if self.theorem == "unstable" else 1
 
     def ask(
-        self, cells: Sequence[Cell], wanted: Callable[[Callable[[Poly], list[Poly]]], Options], zeros: Any = ()
+        self, cells: Sequence[ClosedCell], wanted: Callable[[Callable[[Poly], list[Poly]]], Options], zeros: Any = ()
     ) -> bool | None:
         """Whether options are met wherever 0 < V <= level in all of these closed cells at once, and polynomials vanish.
         `wanted` makes the options, with a function that takes a polynomial to the goal that it is positive."""
@@ -66,8 +66,8 @@ class Indicator:
             raise NotCheckedError("a rest that is one only by a mean of rates")
         raise CheckError("the rates do not vanish there")
 
-    def _at_rest(self) -> list[Cell]:
-        found: list[Cell] = []
+    def _at_rest(self) -> list[ClosedCell]:
+        found: list[ClosedCell] = []
         for cell in self.pieces.every:
             sides = [self.pieces.at_rest(guard) for guard in cell.guards]
             if any(not side.is_constant() for side in sides):
@@ -108,11 +108,11 @@ class Indicator:
         )
         return "V on a way out of the rest"
 
-    def _starts(self, cell: Cell, direction: Sequence[Any]) -> bool:
+    def _starts(self, cell: ClosedCell, direction: Sequence[Any]) -> bool:
         """Whether the first of a way out of the rest is inside a cell."""
         return all(self._leading(cell, guard, direction) > 0 for guard in cell.guards)
 
-    def _leading(self, cell: Cell, p: Poly, direction: Sequence[Any]) -> Any:
+    def _leading(self, cell: ClosedCell, p: Poly, direction: Sequence[Any]) -> Any:
         """The first coefficient that is not zero of a polynomial on the way rest + t direction."""
         context = cell.V.context()
         rest = self.pieces.rest or ()
@@ -142,22 +142,22 @@ class Indicator:
         return _told(found, "on every side of the box", "V does not exceed the level all over the border")
 
     @property
-    def _weak(self) -> list[tuple[Cell, tuple[Poly, ...]]]:
+    def _weak(self) -> list[tuple[ClosedCell, tuple[Poly, ...]]]:
         """Cells in which V' is shown only not to have the wrong sign, and what vanishes with it; else a CheckError."""
         if isinstance(self._looked, CheckError):
             raise self._looked
         return self._looked
 
     @cached_property
-    def _looked(self) -> list[tuple[Cell, tuple[Poly, ...]]] | CheckError:
+    def _looked(self) -> list[tuple[ClosedCell, tuple[Poly, ...]]] | CheckError:
         """The same, or the error, so that nothing is looked for twice."""
         try:
             return self._look()
         except CheckError as fault:
             return fault
 
-    def _look(self) -> list[tuple[Cell, tuple[Poly, ...]]]:
-        weak: list[tuple[Cell, tuple[Poly, ...]]] = []
+    def _look(self) -> list[tuple[ClosedCell, tuple[Poly, ...]]]:
+        weak: list[tuple[ClosedCell, tuple[Poly, ...]]] = []
         may = self.theorem in ("stable", "attracts", "region", "intersection")
         for cell in self.pieces.cells:
             q = cell.slope(cell.V) * -self.sense
@@ -189,7 +189,7 @@ class Indicator:
         single = all(tuple(j == k for j in range(len(rest))) in alone for k in range(len(rest)))
         return single and all(c > 0 and all(int(e) % 2 == 0 for e in powers) for powers, c in terms.items())
 
-    def _not_negative(self, cell: Cell, q: Poly) -> list[tuple[Poly, ...]] | None:
+    def _not_negative(self, cell: ClosedCell, q: Poly) -> list[tuple[Poly, ...]] | None:
         """What vanishes where q does, if q is nowhere negative: what it is a sum of squares of, or even factors."""
         if self.squares and _sum_of(q, [h * h for h in self.squares]):
             return [self.squares]
@@ -225,7 +225,7 @@ class Indicator:
         return "what vanishes with V' does not stay zero"
 
     @cached_property
-    def jumps(self) -> list[tuple[Cell, Cell]]:
+    def jumps(self) -> list[tuple[ClosedCell, ClosedCell]]:
         """Pairs of cells whose rates are not shown to agree where they meet."""
         return [
             (one, other)

@@ -5,7 +5,7 @@ What these methods do not reach is "not checked", and such a certificate does no
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from functools import reduce
 from typing import Any, TypeAlias
 
@@ -17,7 +17,7 @@ from starhold.checker.cells import polynomial, split
 from starhold.checker.exact import CheckError, NotCheckedError, Verdict, demand, rational
 from starhold.checker.indicator import Indicator
 from starhold.checker.reading import limited, number, read, read_names
-from starhold.checker.shapes import CERTIFICATE, CLAIM, OBLIGATION, shaped
+from starhold.checker.shapes import CERTIFICATE, CLAIM, OBLIGATION, outcome_of, shaped
 
 FORMAT = "starhold invariant certificate 1"
 THEOREMS = ("stable", "attracts", "region", "unstable", "intersection")
@@ -77,16 +77,10 @@ def invariant_findings(given: Any) -> Iterator[Told]:
 def _shape(given: Any) -> str:
     shaped(given, CERTIFICATE, "the certificate")
     demand(len(given["claims"]) > 0, "there are no claims")
-    demand(given["outcome"] == _follows([c.get("outcome") for c in given["claims"]]), "the outcome does not follow")
+    demand(given["outcome"] == outcome_of([c.get("outcome") for c in given["claims"]]), "the outcome does not follow")
     allowed = {"variables", "parameters", "define", "rates", "V", "rest", "escape", "squares"}
     demand(set(given["subject"]) <= allowed and {"variables", "parameters", "rates"} <= set(given["subject"]), "the subject")
     return ""
-
-
-def _follows(outcomes: Sequence[Any]) -> str:
-    if "refuted" in outcomes:
-        return "refuted"
-    return "proved" if outcomes and all(outcome == "proved" for outcome in outcomes) else "undecided"
 
 
 def _claim(subject: Mapping[str, Any], place: int, claim: Any, found: list[Told]) -> str:
@@ -94,7 +88,7 @@ def _claim(subject: Mapping[str, Any], place: int, claim: Any, found: list[Told]
     for obligation in claim["obligations"]:
         shaped(obligation, OBLIGATION, "an obligation")
         demand(obligation["name"] in NAMES and obligation["how"] in HOW, "an obligation is none of such a claim")
-    demand(claim["outcome"] == _follows([o["outcome"] for o in claim["obligations"]]), "the outcome does not follow")
+    demand(claim["outcome"] == outcome_of([o["outcome"] for o in claim["obligations"]]), "the outcome does not follow")
     what = _indicator(subject, place, claim)
     named = ASSUMED if len(claim["assumptions"]) > 1 else ASSUMED[:1]
     demand(claim["assumptions"] == named, "the assumptions are not those of such a claim")

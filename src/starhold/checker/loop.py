@@ -30,13 +30,13 @@ from starhold.checker.exact import (
     dual,
     falls,
     intervals,
-    inverted,
+    inverse,
     replaced,
-    root_up,
+    root_above,
     sorted_by,
     transpose,
 )
-from starhold.checker.subject import Subject, named, variables
+from starhold.checker.subject import LoopSubject, named, variables
 from starhold.laws.interface import Measurement
 from starhold.parts.bodies.rigid_body import angular_acceleration, kinetic_energy
 from starhold.parts.craft import Craft
@@ -47,7 +47,7 @@ QUOTIENT = "z"
 SHIFTS = (("d11", "d12", "d13"), ("d12", "d22", "d23"), ("d13", "d23", "d33"))
 
 
-class Loop:
+class ExactLoop:
     """The loop of a subject, for its inertia, for another plant of `inertia` that the law does not know, or, with `shifted`,
     for every inertia at once. The last two have a target at rest. `tolerance`: how far entries of the inertia may be from
     those given, of the roots of the moments; None in a shifted loop lets them be anything. `stiffness`: V is the kinetic
@@ -56,7 +56,7 @@ class Loop:
 
     def __init__(
         self,
-        subject: Subject,
+        subject: LoopSubject,
         stiffness: Any | None = None,
         inertia: Rows | None = None,
         shifted: bool = False,
@@ -69,13 +69,13 @@ class Loop:
         self.reaches: Rows | None = None
         if tolerance is not None:
             J = subject.inertia
-            self.reaches = [[tolerance * root_up(J[i][i] * J[j][j]) for j in range(3)] for i in range(3)]
+            self.reaches = [[tolerance * root_above(J[i][i] * J[j][j]) for j in range(3)] for i in range(3)]
 
     @cached_property
     def plant(self) -> tuple[Craft, Polynomial]:
         """The craft that moves, with its inverse inertia times a factor, and that factor."""
         if not self.shifted:
-            return self._craft(self.inertia, inverted(self.inertia)), Polynomial.constant(1)
+            return self._craft(self.inertia, inverse(self.inertia)), Polynomial.constant(1)
         J: Any = [
             [c + Polynomial.variable(d) for c, d in zip(*rows, strict=True)]
             for rows in zip(self.inertia, SHIFTS, strict=True)
@@ -125,7 +125,7 @@ class Loop:
         """The law's torque on each of its pieces."""
         subject = self.subject
         demand(not any(True for _ in leaves(subject.memory)), "the law keeps a memory")
-        craft = self._craft(subject.inertia, inverted(subject.inertia))
+        craft = self._craft(subject.inertia, inverse(subject.inertia))
         q: Any = vector_part(self.measurement.attitude)
         with reciprocal(1 + dot(q, q), QUOTIENT):
             found = jointly(subject.law.command(self.measurement, subject.gains, craft, subject.memory)[0])

@@ -28,14 +28,14 @@ from starhold.checker.exact import (
     demand,
     down,
     dual,
-    inverted,
+    inverse,
     rational,
-    root_up,
+    root_above,
     up,
 )
-from starhold.checker.loop import ATTITUDE, QUOTIENT, Loop, W
+from starhold.checker.loop import ATTITUDE, QUOTIENT, ExactLoop, W
 from starhold.checker.region import BALLS, EXACT, LASALLE, SIGN, Numbers
-from starhold.checker.subject import Subject, named, variables
+from starhold.checker.subject import LoopSubject, named, variables
 
 RATIOS = (8, 16, 32)
 """Up to which multiple of alpha l a rate |w| is taken for small; the first that suffices."""
@@ -53,9 +53,9 @@ class Shares(NamedTuple):
 class ModalRegion:
     """{V <= level}, of a loop where phi_0 = phi_1 = a E, a < 0 and b < 0."""
 
-    def __init__(self, subject: Subject, numbers: Numbers, witness: Numbers) -> None:
+    def __init__(self, subject: LoopSubject, numbers: Numbers, witness: Numbers) -> None:
         demand(subject.law.name == "modal", "such a claim is for the law modal")
-        self.subject, self.loop, self.numbers = subject, Loop(subject, quotient=True), numbers
+        self.subject, self.loop, self.numbers = subject, ExactLoop(subject, quotient=True), numbers
         gains = subject.gains
         # A matrix with anything beside its diagonal is made of rows.
         roots: list[Any] = [p.value if isinstance(p, Polynomial) else None for p in (*gains.phi_0, *gains.phi_1)]
@@ -112,8 +112,8 @@ class ModalRegion:
         straight: Any = scale(z, add(subtract(W, cross(q, W)), scale(dot(q, W), q)))
         k = (q0 - 1) * (2 * self.a * (1 - 2 * self.beta)) + dot(q, W) * ((1 - 8 * self.beta) / 2) + q0 * dot(W, W) * self.b
         own: Any = add(scale(2 * self.a, subtract(W, scale(self.a, q))), scale(k, straight))
-        inverse: Any = constants(tuple(map(tuple, inverted(self.subject.inertia))))
-        wanted: Any = add(own, apply(inverse, variables(named("m"))))
+        J_inverse: Any = constants(tuple(map(tuple, inverse(self.subject.inertia))))
+        wanted: Any = add(own, apply(J_inverse, variables(named("m"))))
         for found, part in zip(loop.accelerations(loop.pieces[0][1]), wanted, strict=True):
             demand(not _on_unit_quaternions(found - part).terms, "the motion is not that of such a loop")
         attitude = loop.moving.attitude
@@ -173,7 +173,7 @@ class ModalRegion:
         # y/2 - |G| sqrt(y) + potential <= c, with l <= 1.
         strength = max(abs(self.g), abs(self.g + self.m))
         room = 2 * (self.c - min(ZERO, self.p, self.p + self.c2)) + strength**2
-        box = {"y": (ZERO, (strength + root_up(room)) ** 2), "n": (ZERO, fmpq(5, 7) / ratio), "x": (-ONE, ONE)}
+        box = {"y": (ZERO, (strength + root_above(room)) ** 2), "n": (ZERO, fmpq(5, 7) / ratio), "x": (-ONE, ONE)}
         return negative_where(self.fall(u, y, s, over), self.c - self.height(u, y, s), box)
 
     def only_rest(self) -> str:

@@ -17,13 +17,13 @@ from starhold.checker.exact import (
     demand,
     determinant,
     down,
-    inverted,
+    identity,
+    inverse,
     plus,
     saddle,
     symmetric_part,
     times,
     transpose,
-    unit,
     up,
 )
 from starhold.checker.frame import Crossed, OddFrame, crossed, odd_frame
@@ -68,7 +68,7 @@ class OddRegion(Region[OddFrame]):
         self.positive()
         if self.epsilon == 0:
             damping = self.damping()
-            demand(unit(3, ZERO) == frame.E, "V' mixes rate and attitude")
+            demand(identity(3, ZERO) == frame.E, "V' mixes rate and attitude")
             if len(loop.pieces) > 1:
                 demand(loop.falls, "V' may be positive on a piece of the law")
             else:
@@ -83,7 +83,7 @@ class OddRegion(Region[OddFrame]):
         loop, frame, cross = self.loop, self.frame, self.crossed
         if len(loop.pieces) > 1 and loop.reach is not None:
             demand(self.bound is not None and self.bound <= loop.reach, "the law clips within the level set")
-        damping = plus(self.damping(), unit(3, self.epsilon * cross.sigma), -1)
+        damping = plus(self.damping(), identity(3, self.epsilon * cross.sigma), -1)
         mixing = times(fmpq(1, 2), plus(times(self.epsilon, transpose(cross.B)), frame.E, -1))
         return block(damping, mixing, times(self.epsilon, symmetric_part(cross.A)))
 
@@ -101,10 +101,10 @@ class OddRegion(Region[OddFrame]):
         demand(0 < self.rho < 1, "rho is not between 0 and 1")
         if self.loop.shifted:
             # rho P = rho g J > 0 leaves rho s - epsilon2 J/(rho g) > 0 of the whole, the same J in V and C.
-            room = unit(3, (self.rho * frame.P[0][0] / J[0][0]) ** 2 * frame.s)
+            room = identity(3, (self.rho * frame.P[0][0] / J[0][0]) ** 2 * frame.s)
             kept = all(definite(plus(room, top, -(self.epsilon**2))) for top in frame.tops)
         else:
-            P, s = times(self.rho, frame.P), unit(3, self.rho * frame.s)
+            P, s = times(self.rho, frame.P), identity(3, self.rho * frame.s)
             kept = definite(block(P, times(self.epsilon, transpose(J)), s))
         demand(kept, "C exceeds its share of V")
         demand((self.start is None) == (self.level is None), "level and start do not belong together")
@@ -155,10 +155,10 @@ class OddRegion(Region[OddFrame]):
     def repels(self) -> str:
         """Of the linear motion around the other rest no root is imaginary and some have a positive real part."""
         rate, attitude = self.loop.linear(-1)
-        inverse = fmpq_mat(inverted(self.loop.subject.inertia))
+        J_inverse = fmpq_mat(inverse(self.loop.subject.inertia))
         pull = [fmpq_mat(gain) for gain in (rate, attitude)]
-        matrix = block((-inverse * pull[0]).tolist(), (-inverse * pull[1]).tolist(), unit(3, ZERO))
-        matrix[3:] = [[*row, *zeros] for row, zeros in zip(unit(3, fmpq(-1, 2)), unit(3, ZERO), strict=True)]
+        matrix = block((-J_inverse * pull[0]).tolist(), (-J_inverse * pull[1]).tolist(), identity(3, ZERO))
+        matrix[3:] = [[*row, *zeros] for row, zeros in zip(identity(3, fmpq(-1, 2)), identity(3, ZERO), strict=True)]
         demand(saddle(fmpq_mat(matrix).charpoly().coeffs()), "the other rest may attract")
         return "by Routh's array, and no root common to both halves of the polynomial"
 

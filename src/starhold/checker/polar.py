@@ -17,7 +17,7 @@ from flint import arb
 
 from starhold.algebra.polynomial import Polynomial
 from starhold.checker.bernstein import negative_where
-from starhold.checker.circle import Circle
+from starhold.checker.circle import CircleLoop
 from starhold.checker.exact import ZERO, demand, down, floating, rational, replaced, sorted_by, up
 from starhold.checker.subject import variables
 
@@ -25,7 +25,7 @@ SPAN = 1 + rational(2.0**-40)
 """By how much the ends of a box are moved outward, so that they can be short numbers."""
 
 
-def keeps_within(circle: Circle, level: Any, limit: Any, each_axis: bool) -> bool:
+def keeps_within(circle: CircleLoop, level: Any, limit: Any, each_axis: bool) -> bool:
     """Whether the norm of the control, or each axis, is below the limit wherever V <= level and x = x' = 0."""
     gains = circle.gains
     r, n = variables(("r", "n"))
@@ -44,7 +44,7 @@ def keeps_within(circle: Circle, level: Any, limit: Any, each_axis: bool) -> boo
     return True
 
 
-def phases(circle: Circle) -> list[tuple[Polynomial, Polynomial]]:
+def phases(circle: CircleLoop) -> list[tuple[Polynomial, Polynomial]]:
     """C and S of each axis of the control."""
     r, c, s, a, b, p, q = variables(("r", "c", "s", "a", "b", "p", "q"))
     rate = circle.gains.rate

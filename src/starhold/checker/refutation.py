@@ -21,27 +21,27 @@ from starhold.checker.exact import (
     Rows,
     definite,
     demand,
+    identity,
     matmul,
     rational,
     symmetric_part,
     transpose,
-    unit,
     up,
     within_circle,
 )
 from starhold.checker.frame import EvenFrame, OddFrame, even_frame, is_even, odd_frame
-from starhold.checker.loop import ATTITUDE, RATE, TURN, Loop, W
+from starhold.checker.loop import ATTITUDE, RATE, TURN, ExactLoop, W
 from starhold.checker.odd import OddRegion
 from starhold.checker.region import Numbers, optional
 from starhold.checker.shapes import NUMBERS, WITNESS, shaped
-from starhold.checker.subject import Subject, gradient, named
+from starhold.checker.subject import LoopSubject, gradient, named
 from starhold.checker.surface import Sliding
 
 CLOSE = fmpq(1, 10**9)
 """How far a number that is told may be from what is found, as a share of the sizes that it is made of."""
 
 
-def refutation(subject: Subject, claim: Mapping[str, Any], obligation: Mapping[str, Any]) -> str:
+def refutation(subject: LoopSubject, claim: Mapping[str, Any], obligation: Mapping[str, Any]) -> str:
     """What the evidence of an obligation shows; a CheckError where it does not refute."""
     name, evidence = obligation["name"], obligation["evidence"]
     match claim["kind"], name:
@@ -94,7 +94,7 @@ def _state(given: Any) -> dict[str, Any]:
     return outside | dict(zip((*ATTITUDE, *RATE), (*exact, *w), strict=True))
 
 
-def _torque(loop: Loop, values: Mapping[str, Any]) -> Any:
+def _torque(loop: ExactLoop, values: Mapping[str, Any]) -> Any:
     for truths, torque in loop.pieces:
         if all((condition.positive.at(values) > 0) == truth for condition, truth in truths):
             return torque
@@ -114,15 +114,15 @@ def _asked(claim: Mapping[str, Any]) -> Any | None:
     return bound
 
 
-def _frame(loop: Loop) -> EvenFrame | OddFrame:
+def _frame(loop: ExactLoop) -> EvenFrame | OddFrame:
     return even_frame(loop) if is_even(loop) else odd_frame(loop)
 
 
-def _not_positive(subject: Subject, claim: Mapping[str, Any], evidence: Numbers) -> str:
+def _not_positive(subject: LoopSubject, claim: Mapping[str, Any], evidence: Numbers) -> str:
     """A form that is not positive somewhere is so however near the target: no set is left."""
     _has(evidence, "state", "V")
     _asked(claim)
-    loop, values = Loop(subject), _state(evidence["state"])
+    loop, values = ExactLoop(subject), _state(evidence["state"])
     V = loop.lyapunov.value
     _frame(loop)
     on_target = not any(values[name] for name in (*TURN, *RATE)) and (values[ATTITUDE[0]] > 0 or is_even(loop))
@@ -132,10 +132,10 @@ def _not_positive(subject: Subject, claim: Mapping[str, Any], evidence: Numbers)
     return "V is not positive at the state"
 
 
-def _rises(subject: Subject, claim: Mapping[str, Any], evidence: Numbers) -> str:
+def _rises(subject: LoopSubject, claim: Mapping[str, Any], evidence: Numbers) -> str:
     """V rises at a state of the set; where none is told, at states as near the target as one likes."""
     _has(evidence, "state", "V'")
-    bound, loop, values = _asked(claim), Loop(subject), _state(evidence["state"])
+    bound, loop, values = _asked(claim), ExactLoop(subject), _state(evidence["state"])
     slope = loop.slope(_torque(loop, values))
     demand(slope.at(values) > 0, "V falls there")
     _told(evidence["V'"], slope.at(values), _size(slope, values))
@@ -143,12 +143,12 @@ def _rises(subject: Subject, claim: Mapping[str, Any], evidence: Numbers) -> str
     demand(bound is None or square <= bound**2, "the rate is larger than claimed")
     if not claim["numbers"]:
         frame = _frame(loop)
-        mixes = getattr(frame, "E", unit(3, ZERO)) != unit(3, ZERO)
+        mixes = getattr(frame, "E", identity(3, ZERO)) != identity(3, ZERO)
         demand(mixes or not definite(symmetric_part(frame.D)), "V falls near the target")
     return "V rises at the state"
 
 
-def _exceeds(subject: Subject, claim: Mapping[str, Any], evidence: Numbers) -> str:
+def _exceeds(subject: LoopSubject, claim: Mapping[str, Any], evidence: Numbers) -> str:
     """The torque exceeds the loop's own limit at a state of the set that holds the turn that was asked for, and no more;
     what else is told of that set holds."""
     _has(evidence, "state", "torque")
@@ -193,12 +193,12 @@ def _height(region: OddRegion | EvenRegion, turn: float) -> Any:
 # --- a held torque ----------------------------------------------------------------------------------------------------
 
 
-def _unstable(subject: Subject, numbers: Numbers, evidence: Numbers) -> str:
+def _unstable(subject: LoopSubject, numbers: Numbers, evidence: Numbers) -> str:
     _has(evidence, "eigenvalue")
     demand(set(numbers) == set(NUMBERS["sampling"]), "the numbers are not those of such a claim")
     demand(rational(numbers["period"]) == subject.period, "the period is not that of the loop")
     demand(numbers["longest"] is None and not numbers["every_shorter"], "an unstable loop has no longest period")
-    roots = stepped(Loop(subject, quotient=True), subject.period)
+    roots = stepped(ExactLoop(subject, quotient=True), subject.period)
     demand(not within_circle(roots, ONE), "all eigenvalues are within the circle")
     eigenvalues_of(roots, numbers["eigenvalues"])
     demand(within_circle(roots, rational(numbers["radius"]) * (1 + CLOSE)), "an eigenvalue may be larger than the radius")
@@ -211,7 +211,7 @@ def _unstable(subject: Subject, numbers: Numbers, evidence: Numbers) -> str:
 # --- a surface --------------------------------------------------------------------------------------------------------
 
 
-def _surface(subject: Subject, numbers: Numbers) -> Sliding:
+def _surface(subject: LoopSubject, numbers: Numbers) -> Sliding:
     """The surface, against what the loop has to stand and no more."""
     demand(set(numbers) == {"torque", "margin"}, "the numbers are not those of such a claim")
     proof = Sliding(subject, {"surface": 0, "angle": 0, "rate": 0, **numbers})
@@ -225,7 +225,7 @@ def _surface(subject: Subject, numbers: Numbers) -> Sliding:
     return proof
 
 
-def _overpowered(subject: Subject, numbers: Numbers, evidence: Numbers) -> str:
+def _overpowered(subject: LoopSubject, numbers: Numbers, evidence: Numbers) -> str:
     """The disturbance, with the gravity gradient at a place on the orbit, pushes s_i away from zero where it switches."""
     _has(evidence, "axis", "reach", "torque", "state", *(["position"] if "position" in evidence else []))
     proof, place = _surface(subject, numbers), evidence["axis"]
@@ -243,7 +243,7 @@ def _overpowered(subject: Subject, numbers: Numbers, evidence: Numbers) -> str:
     return "the torque from outside exceeds the switching torque"
 
 
-def _gravity(subject: Subject, position: Sequence[float], place: int) -> Any:
+def _gravity(subject: LoopSubject, position: Sequence[float], place: int) -> Any:
     """The gravity gradient about an axis for a direction in the body, no nearer than the orbit's perigee."""
     p, perigee = [rational(x) for x in position], subject.perigee
     square: Any = sum((x * x for x in p), ZERO)
@@ -255,7 +255,7 @@ def _gravity(subject: Subject, position: Sequence[float], place: int) -> Any:
     return 3 * arb(subject.gravity) * arb(form) / arb(square) / distance**3
 
 
-def _leads_away(subject: Subject, numbers: Numbers, evidence: Numbers) -> str:
+def _leads_away(subject: LoopSubject, numbers: Numbers, evidence: Numbers) -> str:
     _has(evidence, "axis", "q.Kq")
     proof, axis = _surface(subject, numbers), [rational(x) for x in evidence["axis"]]
     demand(len(axis) == 3, "there is no such axis")

@@ -17,22 +17,22 @@ from starhold.checker.exact import (
     Rows,
     definite,
     demand,
+    identity,
     least,
     plus,
     rational,
-    root_up,
+    root_above,
     symmetric_part,
     times,
-    unit,
     up,
 )
-from starhold.checker.frame import Frame
-from starhold.checker.loop import Loop, letters
+from starhold.checker.frame import CommonFrame
+from starhold.checker.loop import ExactLoop, letters
 from starhold.checker.well import Well
 
 Numbers: TypeAlias = Mapping[str, Any]
 EXACT, SIGN, BALLS, LASALLE, ROOTS = "exact identity", "exact inequality", "ball arithmetic", "LaSalle", "certified roots"
-F = TypeVar("F", bound=Frame)
+F = TypeVar("F", bound=CommonFrame)
 
 
 def optional(x: Any) -> Any | None:
@@ -47,7 +47,7 @@ class Region(ABC, Generic[F]):
     around: Any
     """The largest turn there is, from one rest to the same."""
 
-    def __init__(self, loop: Loop, level: Any | None, start: Any | None, witness: Numbers) -> None:
+    def __init__(self, loop: ExactLoop, level: Any | None, start: Any | None, witness: Numbers) -> None:
         self.loop, self.level, self.start = loop, optional(level), optional(start)
         self.epsilon, self.rho = rational(witness["epsilon"]), rational(witness["rho"])
         self.given = optional(witness.get("rate_bound"))
@@ -96,7 +96,7 @@ class Region(ABC, Generic[F]):
         """What |w| does not exceed on the level set: as the witness says, else as the least eigenvalue of P tells."""
         if self.given is not None or self.level is None or self.loop.shifted:
             return self.given
-        return root_up(2 * self.level / least(self.frame.P))
+        return root_above(2 * self.level / least(self.frame.P))
 
     def form(self) -> str:
         """V and V' have the terms of a frame and no others."""
@@ -112,9 +112,9 @@ class Region(ABC, Generic[F]):
         if self.level is not None and bound is not None:
             demand(self.level > 0, "the level is not positive")
             # |w| <= bound wherever V <= level.
-            held = plus(frame.P, unit(3, 2 * self.level / bound**2), -1)
+            held = plus(frame.P, identity(3, 2 * self.level / bound**2), -1)
             demand(definite(held, strictly=False), "the rate may exceed its bound on the level set")
-        return plus(symmetric_part(frame.D), unit(3, ZERO if bound is None else frame.kappa * bound), -1)
+        return plus(symmetric_part(frame.D), identity(3, ZERO if bound is None else frame.kappa * bound), -1)
 
     def target(self, bounded: bool = False) -> str:
         """How the target moves drops out of the motion relative to it; if it moves, so does the momentum of the wheels.
@@ -150,9 +150,9 @@ class Region(ABC, Generic[F]):
         if any_inertia:
             demand(rate == 0 and everywhere is None, "any inertia leaves no rate")
         for P in tops:
-            demand(definite(plus(unit(3, 2 * start), times(rate**2, P), -1), strictly=False), "the rate is not in it")
+            demand(definite(plus(identity(3, 2 * start), times(rate**2, P), -1), strictly=False), "the rate is not in it")
             if everywhere is not None:
-                left = plus(unit(3, 2 * (start - self.highest)), times(everywhere**2, P), -1)
+                left = plus(identity(3, 2 * (start - self.highest)), times(everywhere**2, P), -1)
                 held = high and everywhere >= 0 and definite(left, strictly=False)
                 demand(held, "the rate at every attitude is not in it")
         return "turn and rates are in {V <= start}"

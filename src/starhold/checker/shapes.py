@@ -4,7 +4,7 @@ certifier."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 from starhold.checker.exact import demand
@@ -18,6 +18,13 @@ def shaped(given: Any, shape: Mapping[str, Test], where: str) -> None:
     demand(set(given) == set(shape), f"{where} has not the keys {', '.join(shape) or '(none)'}")
     for key, test in shape.items():
         demand(test(given[key]), f"{where} has something else than it may under {key}")
+
+
+def outcome_of(parts: Sequence[Any]) -> str:
+    """The outcome of a whole whose parts have these: refuted if one is, proved if there are some and all are."""
+    if "refuted" in parts:
+        return "refuted"
+    return "proved" if parts and all(outcome == "proved" for outcome in parts) else "undecided"
 
 
 def _number(x: Any) -> bool:

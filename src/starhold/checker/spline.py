@@ -20,7 +20,7 @@ from flint import acb, arb, fmpq
 
 from starhold.algebra.quaternion import relative
 from starhold.algebra.vector import add, cross, dot, scale, subtract
-from starhold.checker.exact import ONE, ZERO, demand, rational, root_up, up
+from starhold.checker.exact import ONE, ZERO, demand, rational, root_above, up
 
 MOST = 4096
 """Points of a stretch between two knots that may be looked at."""
@@ -109,7 +109,7 @@ def _bend(b: Any, c: Any, s: Any) -> Any:
 
 
 def _longest(*vectors: Any) -> Any:
-    return root_up(max(up(dot(v, v)) for v in vectors))  # pyright: ignore
+    return root_above(max(up(dot(v, v)) for v in vectors))  # pyright: ignore
 
 
 def _motion(a: Any, b: Any, c: Any, s: Any, terms: int) -> tuple[Any, Any]:

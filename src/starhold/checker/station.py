@@ -11,8 +11,8 @@ from typing import Any
 from flint import fmpq
 
 from starhold.algebra.polynomial import exact
-from starhold.checker.circle import Circle
-from starhold.checker.equilibrium import Equilibrium, LimitedAxis
+from starhold.checker.circle import CircleLoop
+from starhold.checker.equilibrium import EquilibriumLoop, LimitedAxis
 from starhold.checker.exact import ZERO, CheckError, Obligation, demand, rational
 from starhold.checker.polar import keeps_within
 from starhold.checker.region import BALLS, EXACT, LASALLE, SIGN, Numbers
@@ -30,7 +30,7 @@ CLEAR = "never at the centre of one of the two bodies"
 
 
 @dataclass(frozen=True)
-class Station:
+class StationSubject:
     """The subject of a certificate, its numbers exact. `full`: the motion is that of the full problem."""
 
     law: Law
@@ -41,19 +41,19 @@ class Station:
     control_limit: Any | None
 
     @property
-    def circle(self) -> Circle:
+    def circle(self) -> CircleLoop:
         """The loop of a law that makes a circle attractive."""
         demand(self.law.name == "l2-circle", f"the law {self.law.name} makes no circle attractive")
-        return Circle(self.law, self.gains, self.plant, self.full)
+        return CircleLoop(self.law, self.gains, self.plant, self.full)
 
     @property
-    def rest(self) -> Equilibrium:
+    def rest(self) -> EquilibriumLoop:
         """The loop of a law that comes to rest."""
         demand(self.law.name == "l2-equilibrium", f"the law {self.law.name} does not come to rest")
-        return Equilibrium(self.law, self.gains, self.plant, self.full)
+        return EquilibriumLoop(self.law, self.gains, self.plant, self.full)
 
 
-def read_station(given: Mapping[str, Any]) -> Station:
+def read_station(given: Mapping[str, Any]) -> StationSubject:
     """The subject in a certificate whose keys and types are in order; a CheckError where it says what cannot be."""
     law = catalogue("libration-point").get(given["law"])
     if law is None:
@@ -67,7 +67,7 @@ def read_station(given: Mapping[str, Any]) -> Station:
     limit = given["control_limit"]
     demand(limit is None or limit > 0, "the limit of the control is not positive")
     demand(given["control_period"] > 0 and given["lag"] >= 0, "the period is not positive, or the lag negative")
-    return Station(
+    return StationSubject(
         law=law,
         gains=gains,
         plant=plant,
@@ -114,10 +114,10 @@ class StationKind:
     speaks of every place, so that in the full problem the bodies must be left out."""
 
     beside: str
-    proofs: Callable[[Station, Numbers], list[Obligation]]
+    proofs: Callable[[StationSubject, Numbers], list[Obligation]]
     anywhere: bool = False
 
-    def assumptions(self, subject: Station) -> list[str]:
+    def assumptions(self, subject: StationSubject) -> list[str]:
         """What a claim about this subject assumes."""
         motion = "motion exactly as modelled" if subject.full else "linear motion near the point"
         return [
@@ -130,7 +130,7 @@ class StationKind:
         ]
 
 
-def _attracts(circle: Circle, numbers: Numbers) -> list[Obligation]:
+def _attracts(circle: CircleLoop, numbers: Numbers) -> list[Obligation]:
     return [
         ("form", EXACT, circle.form),
         ("descent", SIGN, circle.descent),
@@ -139,7 +139,7 @@ def _attracts(circle: Circle, numbers: Numbers) -> list[Obligation]:
     ]
 
 
-def attracts(subject: Station, claim: Numbers) -> list[Obligation]:
+def attracts(subject: StationSubject, claim: Numbers) -> list[Obligation]:
     """All motions from {V <= level}, whatever x and x', end on the circle and run through it at the rate."""
     circle, numbers = subject.circle, claim["numbers"]
     return [
@@ -149,7 +149,7 @@ def attracts(subject: Station, claim: Numbers) -> list[Obligation]:
     ]
 
 
-def control_limit(subject: Station, claim: Numbers) -> list[Obligation]:
+def control_limit(subject: StationSubject, claim: Numbers) -> list[Obligation]:
     """Motions from {V <= level} with x = x' = 0 keep the control within the limit, and so end on the circle."""
     circle, numbers = subject.circle, claim["numbers"]
 
@@ -170,13 +170,13 @@ def control_limit(subject: Station, claim: Numbers) -> list[Obligation]:
     ]
 
 
-def rests(subject: Station, claim: Numbers) -> list[Obligation]:
+def rests(subject: StationSubject, claim: Numbers) -> list[Obligation]:
     """Every motion comes to rest where the law says."""
     rest = subject.rest
     return [("form", EXACT, rest.form), ("each axis returns", SIGN, rest.returns)]
 
 
-def saturated_axis(subject: Station, claim: Numbers) -> list[Obligation]:
+def saturated_axis(subject: StationSubject, claim: Numbers) -> list[Obligation]:
     """With S = x + x'/s, motions from {|S| <= width, |x| <= reach} stay there and end at x = x' = 0, though the control
     along X is limited; from |S| >= boundary none does, wherever it is."""
     limit, width, reach, boundary = (rational(claim["numbers"][key]) for key in ("limit", "width", "reach", "boundary"))
@@ -192,13 +192,13 @@ def saturated_axis(subject: Station, claim: Numbers) -> list[Obligation]:
     ]
 
 
-def _same_limit(subject: Station, numbers: Numbers) -> None:
+def _same_limit(subject: StationSubject, numbers: Numbers) -> None:
     demand(numbers["kind"] == subject.limit != "none", "the limit is of another kind than the loop's")
     limit = rational(numbers["limit"])
     demand(subject.control_limit is not None and 0 < limit <= subject.control_limit, "the loop's limit is lower")
 
 
-def _contents(circle: Circle, numbers: Numbers) -> str:
+def _contents(circle: CircleLoop, numbers: Numbers) -> str:
     """Circles between the radii, run through at the rate, are in {V <= level}, and so are errors of the velocity on the
     circle itself."""
     level, inner, outer, error = (rational(numbers[key]) for key in ("level", "inner", "outer", "velocity"))
@@ -221,7 +221,7 @@ STATION_CLAIMS: dict[str, StationKind] = {
 # --- what refutes it --------------------------------------------------------------------------------------------------
 
 
-def station_refutation(subject: Station, claim: Numbers, obligation: Mapping[str, Any]) -> str:
+def station_refutation(subject: StationSubject, claim: Numbers, obligation: Mapping[str, Any]) -> str:
     """What the evidence of an obligation shows; a CheckError where it does not refute."""
     name, evidence = obligation["name"], obligation["evidence"]
     match claim["kind"], name:
@@ -237,7 +237,7 @@ def station_refutation(subject: Station, claim: Numbers, obligation: Mapping[str
             raise CheckError(f"nothing refutes {name}")
 
 
-def _holds_another(circle: Circle, evidence: Numbers) -> str:
+def _holds_another(circle: CircleLoop, evidence: Numbers) -> str:
     """A relay holds f2 = f3 = 0 where it has to be 2 alpha |f1| r at most its size; on the circle of evidence, and then on
     all nearer ones: outside of the circle and down to radius/sqrt(3) this falls towards it."""
     demand(set(evidence) == {"radius", "needs", "of"}, "the evidence is not that of another circle")
@@ -251,7 +251,7 @@ def _holds_another(circle: Circle, evidence: Numbers) -> str:
     return "the relay holds another circle"
 
 
-def _leaves(circle: Circle, evidence: Numbers) -> str:
+def _leaves(circle: CircleLoop, evidence: Numbers) -> str:
     """A negative or no coefficient lets x be anywhere and stay, or grow; this needs no state to show it."""
     demand(not evidence, "the evidence is not that of a motion along X")
     circle.form()
@@ -260,7 +260,7 @@ def _leaves(circle: Circle, evidence: Numbers) -> str:
     return "x does not return"
 
 
-def _needs_more(subject: Station, numbers: Numbers, evidence: Numbers) -> str:
+def _needs_more(subject: StationSubject, numbers: Numbers, evidence: Numbers) -> str:
     """What the law commands on the circle itself, near an angle from Y at which all is rational."""
     demand(set(evidence) == {"control", "angle"}, "the evidence is not that of a control")
     _same_limit(subject, numbers)
@@ -278,7 +278,7 @@ def _needs_more(subject: Station, numbers: Numbers, evidence: Numbers) -> str:
     return "the circle itself needs more than the limit"
 
 
-def _does_not_rest(rest: Equilibrium, evidence: Numbers) -> str:
+def _does_not_rest(rest: EquilibriumLoop, evidence: Numbers) -> str:
     """An axis r^2 + c r + k with c or k not positive has a root that is not on the left, and a motion that does not decay,
     as near the rest as one likes; this needs no state to show it."""
     demand(not evidence, "the evidence is not that of an axis")

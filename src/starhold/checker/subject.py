@@ -23,16 +23,16 @@ from starhold.checker.exact import (
     demand,
     down,
     floating,
+    identity,
     plus,
     radius_of,
     rational,
-    root_up,
+    root_above,
     transpose,
-    unit,
     up,
 )
 from starhold.checker.spline import moves_within
-from starhold.checker.wheels import Wheels, read_wheels
+from starhold.checker.wheels import SubjectWheels, read_wheels
 from starhold.laws.catalogue import Law, catalogue
 from starhold.parts.craft import EARTH, Craft, check_inertia, compact
 from starhold.parts.environments.gravity_gradient import gravity_gradient
@@ -49,7 +49,7 @@ def variables(names: Sequence[str]) -> Any:
 
 
 @dataclass(frozen=True)
-class Subject:
+class LoopSubject:
     """The subject of a certificate, its numbers exact; `memory` is what the law starts with, `whole` the inertia with that
     of rotors about their axes, `perigee` the orbit's where the gravity gradient is felt."""
 
@@ -70,11 +70,11 @@ class Subject:
     modelled_norm: Any
     disturbance: Any
     period: Any
-    wheels: Wheels | None
+    wheels: SubjectWheels | None
     perigee: Any | None
 
 
-def read_subject(given: Mapping[str, Any]) -> Subject:
+def read_subject(given: Mapping[str, Any]) -> LoopSubject:
     """The subject in a certificate whose keys and types are in order; a CheckError where it says what cannot be."""
     law = catalogue().get(given["law"])
     if law is None:
@@ -100,7 +100,7 @@ def read_subject(given: Mapping[str, Any]) -> Subject:
     memory = law.remember(gains, craft, given["control_period"])
     perigee = _check_bounds(given, whole)
     exact = {name: rational(given[name]) for name in ("target_rate", "target_acceleration", "disturbance")}
-    return Subject(
+    return LoopSubject(
         law=law,
         gains=constants(gains),
         memory=memory,
@@ -151,7 +151,7 @@ def _check_bounds(given: Mapping[str, Any], whole: Rows) -> Any | None:
     # The eccentricity vector, v x h/mu - r/|r|; the perigee is at p/(1 + e) also of a parabola or hyperbola.
     apse = subtract(scale(1 / mu, cross(tuple(v), h)), scale(1 / distance, tuple(r)))  # pyright: ignore
     square = arb(dot(apse, apse))  # pyright: ignore
-    eccentricity = arb(root_up(up(square)))
+    eccentricity = arb(root_above(up(square)))
     perigee = arb(down(momentum / mu / (1 + eccentricity)))
     demand(bool(perigee > 0), "the orbit falls into the centre")
     if given["target"] == "orbital":
@@ -167,7 +167,7 @@ def _check_bounds(given: Mapping[str, Any], whole: Rows) -> Any | None:
         half = rational(given["modelled_torque_norm"]) / strength
         moments = np.linalg.eigvalsh([[floating(x) for x in row] for row in whole])
         mean = rational(float(moments[0] + moments[2]) / 2)
-        demand(radius_of(plus(whole, unit(3, mean), -ONE)) <= half, "the norm of the modelled torque is larger")
+        demand(radius_of(plus(whole, identity(3, mean), -ONE)) <= half, "the norm of the modelled torque is larger")
         return up(momentum / mu / (1 + square.nonnegative_part().sqrt()))
     return None
 

@@ -19,37 +19,37 @@ from starhold.checker.exact import (
     down,
     dual,
     greatest,
+    identity,
     intervals,
     least,
     matmul,
     plus,
     rational,
     replaced,
-    root_up,
+    root_above,
     symmetric_part,
     times,
     transpose,
-    unit,
     up,
 )
-from starhold.checker.loop import TURN, Loop, W
-from starhold.checker.subject import Subject, named, variables
+from starhold.checker.loop import TURN, ExactLoop, W
+from starhold.checker.subject import LoopSubject, named, variables
 
 
 class Sliding:
     """The proof for one subject: s = w + Kq, J s' = (torque from outside) - T, T_i = reach_i where s_i >= width_i, minus
     that where s_i <= -width_i, in between proportional to s_i."""
 
-    def __init__(self, subject: Subject, numbers: Mapping[str, Any]) -> None:
+    def __init__(self, subject: LoopSubject, numbers: Mapping[str, Any]) -> None:
         self.subject, self.told = subject, numbers
         self.torque = [rational(x) for x in numbers["torque"]]
         self.size, self.angle, self.rate = (rational(numbers[key]) for key in ("surface", "angle", "rate"))
         self.K: Rows = []
         self.reach: list[Any] = []
         self.width: list[Any] = []
-        self._read(Loop(subject))
+        self._read(ExactLoop(subject))
 
-    def _read(self, loop: Loop) -> None:
+    def _read(self, loop: ExactLoop) -> None:
         surface = getattr(self.subject.law.module, "surface", None)
         demand(surface is not None, "the law has no surface")
         s: Any = surface(loop.measurement, self.subject.gains)  # pyright: ignore
@@ -127,13 +127,12 @@ class Sliding:
         square = ZERO
         for m, g, width in axes:
             inside = width > 0 and added <= (g - m) * width
-            far = width * (m + root_up(m**2 + 4 * g * added / width)) / (2 * g) if inside else added / (g - m)
+            far = width * (m + root_above(m**2 + 4 * g * added / width)) / (2 * g) if inside else added / (g - m)
             square += far**2
         moments = greatest(self.subject.inertia), least(self.subject.inertia)
         demand(self.size >= 0 and self.size**2 * moments[1] >= moments[0] * square, "|s| may stay larger")
-        demand(
-            definite(plus(symmetric_part(self.K), unit(3, self.size), -1)), "the layer is too thick for the surface's slope"
-        )
+        thin = definite(plus(symmetric_part(self.K), identity(3, self.size), -1))
+        demand(thin, "the layer is too thick for the surface's slope")
         return "s.Js falls but where every |s_i| is small"
 
     def least(self) -> Any:
@@ -147,7 +146,7 @@ class Sliding:
             turn = self.size / self.least()
             demand(turn < 1 and down((arb(self.angle) / 2).sin()) >= turn, "the angle may end larger")
             square = matmul(transpose(self.K), self.K)
-            within = plus(unit(3, (self.rate - self.size) ** 2), times(turn**2, square), -1)
+            within = plus(identity(3, (self.rate - self.size) ** 2), times(turn**2, square), -1)
             demand(definite(within, strictly=False), "the rate may end larger")
         return "angle and rate follow from the bound of |s|"
 
@@ -164,9 +163,9 @@ class Sliding:
         start, rate, J = rational(told["start"]), rational(told["rate_start"]), self.subject.inertia
         slowest = least(J) * self.least() ** 2
         demand(self.least() > 0 and 0 < 2 * start < slowest, "the double cover may switch on the way")
-        demand(definite(plus(symmetric_part(self.K), unit(3, self.size), -1)), "the layer lets the double cover switch")
+        demand(definite(plus(symmetric_part(self.K), identity(3, self.size), -1)), "the layer lets the double cover switch")
         demand(rate >= 0 and 0 <= turn <= down(arb.pi()), "turn or rate is out of range")
-        demand(definite(plus(unit(3, 2 * start), times(rate**2, J), -1), strictly=False), "the rate is not in it")
+        demand(definite(plus(identity(3, 2 * start), times(rate**2, J), -1), strictly=False), "the rate is not in it")
         sine = up((arb(turn) / 2).sin() ** 2)
         most = greatest(J) * greatest(matmul(transpose(self.K), self.K)) * sine
         demand(most <= 2 * start, "the turn is not in it")

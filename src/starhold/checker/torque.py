@@ -16,16 +16,16 @@ from starhold.checker.exact import (
     demand,
     greatest,
     intervals,
-    inverted,
+    inverse,
     matmul,
     plus,
     rational,
-    root_up,
+    root_above,
     times,
     transpose,
 )
 from starhold.checker.gyroscopic import swung
-from starhold.checker.loop import RATE, TURN, Loop, W, letters
+from starhold.checker.loop import RATE, TURN, ExactLoop, W, letters
 from starhold.checker.region import Region
 from starhold.checker.subject import quadratic
 from starhold.checker.well import SHAPES, keeps_below
@@ -55,7 +55,7 @@ def bounded(
     """Whether the norm of polynomials in the state keeps within a limit on the region's level set."""
     s, well = region.well()
     P = region.frame.P
-    inverse = inverted(P)
+    P_inverse = inverse(P)
     springs = [(*well.beside, name) for name in TURN]
     dampers = [(name,) for name in RATE]
     stiffness, damping = ([[p.terms.get(m, ZERO) for m in own] for p in parts] for own in (springs, dampers))
@@ -63,13 +63,13 @@ def bounded(
     # The greatest |Aq| for |q| = 1, and for w.Pw = z2 the greatest |Bw + G(w)|, G quadratic, of which the square is at most
     # damped2 z2 + 2 mixed z3 + swing2 z4 = (swing z2 + along z)2 + (damped2 - along2) z2.
     common: list[Any] = [ZERO] * len(well.shapes)
-    common[well.spring] = root_up(greatest(matmul(stiffness, transpose(stiffness))))
-    damped, swing = greatest(matmul(matmul(damping, inverse), transpose(damping))), swung(parts, P, shift, weight)
-    along = ZERO if swing == 0 else min(_mixed(parts, damping, inverse) / swing, root_up(damped))
+    common[well.spring] = root_above(greatest(matmul(stiffness, transpose(stiffness))))
+    damped, swing = greatest(matmul(matmul(damping, P_inverse), transpose(damping))), swung(parts, P, shift, weight)
+    along = ZERO if swing == 0 else min(_mixed(parts, damping, P_inverse) / swing, root_above(damped))
     moving: list[list[Any]] = [[ZERO] * len(well.shapes) for _ in range(2)]
     moving[0][SHAPES.index((0, 2))], moving[0][SHAPES.index((0, 1))] = swing, along
-    moving[1][SHAPES.index((0, 1))] = root_up(max(damped - along**2, ZERO))
-    loads = [_load(region.loop, p.terms, inverse, len(well.shapes)) for p in rest]
+    moving[1][SHAPES.index((0, 1))] = root_above(max(damped - along**2, ZERO))
+    loads = [_load(region.loop, p.terms, P_inverse, len(well.shapes)) for p in rest]
     ways: list[Any] = [((moving, loads), common)]
     if len(parts) == 1 and swing > 0:
         for slope, offset in _lines(
@@ -87,20 +87,20 @@ def _lines(F: Rows, b: list[Any], P: Rows, swing: Any) -> Iterator[tuple[Any, An
         slope = swing * (1 + rational(2.0 ** (k / 2)))
         forms = [plus(times(slope, P), F, sign) for sign in (1, -1)]
         demand(all(definite(form) for form in forms), "a form of the rate is not positive")
-        yield slope, max(matmul(matmul([b], inverted(form)), transpose([b]))[0][0] for form in forms) / 4
+        yield slope, max(matmul(matmul([b], inverse(form)), transpose([b]))[0][0] for form in forms) / 4
 
 
-def _mixed(parts: Sequence[Polynomial], damping: Rows, inverse: Rows) -> Any:
+def _mixed(parts: Sequence[Polynomial], damping: Rows, P_inverse: Rows) -> Any:
     """What |Bw.G(w)| does not exceed where w.Pw = 1, its monomials bounded one by one."""
     product = Polynomial({})
     for part, row in zip(parts, damping, strict=True):
         linear: Any = sum((c * w for c, w in zip(row, W, strict=True)), Polynomial({}))
         product = product + linear * part.only(lambda m: letters(m) == "ww")
-    most = {name: root_up(inverse[k][k]) for k, name in enumerate(RATE)}
+    most = {name: root_above(P_inverse[k][k]) for k, name in enumerate(RATE)}
     return sum((abs(c) * prod(most[name] for name in m) for m, c in product.terms.items()), ZERO)
 
 
-def _load(loop: Loop, terms: Mapping[Monomial, Any], inverse: Rows, count: int) -> list[Any]:
+def _load(loop: ExactLoop, terms: Mapping[Monomial, Any], P_inverse: Rows, count: int) -> list[Any]:
     """Coefficients of so many shapes that bound a sum of monomials one by one: |w_j| <= z sqrt((P^-1)_jj), |q_j| <= |q|."""
     found: list[Any] = [ZERO] * count
     for monomial, c in terms.items():
@@ -110,7 +110,7 @@ def _load(loop: Loop, terms: Mapping[Monomial, Any], inverse: Rows, count: int) 
                 powers[0] += 1
             elif name in RATE:
                 powers[1] += 1
-                most *= root_up(inverse[RATE.index(name)][RATE.index(name)])
+                most *= root_above(P_inverse[RATE.index(name)][RATE.index(name)])
             else:
                 most *= _outside(loop, name)
         demand(tuple(powers) in SHAPES, f"the torque has the term {' '.join(monomial)}")
@@ -118,7 +118,7 @@ def _load(loop: Loop, terms: Mapping[Monomial, Any], inverse: Rows, count: int) 
     return found
 
 
-def _outside(loop: Loop, name: str) -> Any:
+def _outside(loop: ExactLoop, name: str) -> Any:
     """What a variable that is neither a rate nor of the vector part does not exceed."""
     subject = loop.subject
     if name[0] == "e":
@@ -130,7 +130,9 @@ def _outside(loop: Loop, name: str) -> Any:
     return known[name[0]]
 
 
-def _everywhere(loop: Loop, found: Sequence[Interval], parts: Sequence[Polynomial], limit: Any, each_axis: bool) -> bool:
+def _everywhere(
+    loop: ExactLoop, found: Sequence[Interval], parts: Sequence[Polynomial], limit: Any, each_axis: bool
+) -> bool:
     """The same on a piece where the rates are in intervals, whatever the attitude."""
     bounds = [_bound(loop, found, part) for part in parts]
     if each_axis:
@@ -138,11 +140,11 @@ def _everywhere(loop: Loop, found: Sequence[Interval], parts: Sequence[Polynomia
     return sum((bound**2 for bound in bounds), ZERO) <= limit**2
 
 
-def _bound(loop: Loop, found: Sequence[Interval], part: Polynomial) -> Any:
+def _bound(loop: ExactLoop, found: Sequence[Interval], part: Polynomial) -> Any:
     still = part.only(lambda m: len(m) == 1 and m[0] in TURN)
     # A single one needs no root, so that a stiffness and what it leaves to the damping fill the limit exactly.
     values = [abs(c) for c in still.terms.values()]
-    total = sum(values, ZERO) if len(values) < 2 else root_up(sum((c * c for c in values), ZERO))
+    total = sum(values, ZERO) if len(values) < 2 else root_above(sum((c * c for c in values), ZERO))
     low = high = part.terms.get((), ZERO)
     for monomial, c in (part - still).terms.items():
         if len(monomial) == 1 and monomial[0] in RATE:

@@ -14,14 +14,14 @@ from starhold.checker.exact import (
     definite,
     demand,
     greatest,
-    inverted,
+    identity,
+    inverse,
     matmul,
     plus,
     rational,
-    root_up,
+    root_above,
     times,
     transpose,
-    unit,
 )
 
 CLOSE = fmpq(1, 10**9)
@@ -31,7 +31,7 @@ FREE = fmpq(99, 100)
 
 
 @dataclass(frozen=True)
-class Wheels:
+class SubjectWheels:
     """Wheels, their numbers exact: unit axes, limits (None: no limit; a torque limit of 0: a lost wheel), moments of
     the rotors, the rows that share out a torque by least squares, momenta at the start, and what the momentum of the whole
     does not exceed."""
@@ -58,12 +58,12 @@ class Wheels:
         )
 
 
-def read_wheels(given: Mapping[str, Any]) -> Wheels:
+def read_wheels(given: Mapping[str, Any]) -> SubjectWheels:
     """The wheels in a subject whose keys and types are in order; a CheckError where they say what cannot be."""
     columns = ("axes", "torque_limit", "momentum_limit", "inertia", "least", "momentum")
     demand(len(given["axes"]) >= 3, "there are fewer than three wheels")
     demand(len({len(given[name]) for name in columns}) == 1, "the wheels are not equally many everywhere")
-    wheels = Wheels(
+    wheels = SubjectWheels(
         axes=[[rational(x) for x in row] for row in given["axes"]],
         torque_limit=[None if x is None else rational(x) for x in given["torque_limit"]],
         momentum_limit=[None if x is None else rational(x) for x in given["momentum_limit"]],
@@ -84,15 +84,15 @@ def read_wheels(given: Mapping[str, Any]) -> Wheels:
     return wheels
 
 
-def _check_shares(wheels: Wheels) -> None:
+def _check_shares(wheels: SubjectWheels) -> None:
     """That the rows give the torque that is asked for, and with the least sum of squares: -A'(A A')^-1."""
     axes, rows = ([matrix[k] for k in wheels.working] for matrix in (wheels.axes, wheels.least))
     lost = [row for k, row in enumerate(wheels.least) if k not in wheels.working]
     demand(not any(x for row in lost for x in row), "a lost wheel takes a share")
     demand(len(axes) >= 3, "fewer than three wheels work")
     given = matmul(transpose(axes), times(-1, rows))
-    demand(_near(given, unit(3), CLOSE), "the shares do not add up to the torque")
-    least = matmul(times(-1, axes), inverted(matmul(transpose(axes), axes)))
+    demand(_near(given, identity(3), CLOSE), "the shares do not add up to the torque")
+    least = matmul(times(-1, axes), inverse(matmul(transpose(axes), axes)))
     largest = max(abs(x) for row in least for x in row)
     demand(_near(rows, least, CLOSE * largest), "the shares are not those of least squares")
 
@@ -101,17 +101,17 @@ def _near(a: Rows, b: Rows, distance: Any) -> bool:
     return all(abs(x) <= distance for row in plus(a, b, -1) for x in row)
 
 
-def holds_target(wheels: Wheels, J: Rows, target_rate: Any) -> None:
+def holds_target(wheels: SubjectWheels, J: Rows, target_rate: Any) -> None:
     """A CheckError where no craft with these wheels that is at rest on target has as little momentum as told: there it is
     J r + n, n that of the wheels at the start."""
     stored = matmul([wheels.momentum], wheels.axes)[0]
-    most = root_up(sum((n * n for n in stored), ZERO)) + wheels.total
+    most = root_above(sum((n * n for n in stored), ZERO)) + wheels.total
     demand(
         most >= -greatest(times(-1, J)) * target_rate, "nothing at rest on target has so little momentum: the claim is empty"
     )
 
 
-def keeps_momenta(wheels: Wheels, told: Sequence[Any], J: Rows, P: Rows, level: Any, target_rate: Any) -> None:
+def keeps_momenta(wheels: SubjectWheels, told: Sequence[Any], J: Rows, P: Rows, level: Any, target_rate: Any) -> None:
     """A CheckError unless no wheel's momentum exceeds what is told and its limit, while w.Pw <= 2 level and the momentum of
     the whole is at most as told.
 
@@ -120,7 +120,7 @@ def keeps_momenta(wheels: Wheels, told: Sequence[Any], J: Rows, P: Rows, level: 
     """
     stored = matmul([wheels.momentum], wheels.axes)[0]
     fastest = ZERO if target_rate == 0 else greatest(J) * target_rate
-    swung = matmul(matmul(J, inverted(P)), J)
+    swung = matmul(matmul(J, inverse(P)), J)
     for k, (row, momentum, most, limit) in enumerate(
         zip(wheels.least, wheels.momentum, told, wheels.momentum_limit, strict=True)
     ):
@@ -129,8 +129,8 @@ def keeps_momenta(wheels: Wheels, told: Sequence[Any], J: Rows, P: Rows, level: 
             continue
         demand(limit is None or most <= FREE * limit, f"wheel {k + 1} may reach its momentum limit")
         kept = abs(momentum + sum((g * n for g, n in zip(row, stored, strict=True)), ZERO))
-        share = root_up(sum((g * g for g in row), ZERO))
+        share = root_above(sum((g * g for g in row), ZERO))
         # What is left for |Jw|, the square of which is at most 2 level times the greatest eigenvalue of J P^-1 J.
         room = (most - kept) / share - wheels.total - fastest
-        held = room >= 0 and definite(plus(unit(3, room**2), swung, -2 * level), strictly=False)
+        held = room >= 0 and definite(plus(identity(3, room**2), swung, -2 * level), strictly=False)
         demand(held, f"wheel {k + 1} may store more than told")

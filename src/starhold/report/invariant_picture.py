@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from starhold.certification.certificate import Certificate, Claim
-from starhold.certification.invariant import Problem, Wanted
+from starhold.certification.invariant import InvariantProblem, WantedSet
 from starhold.certification.invariant.descent import Candidate
-from starhold.certification.invariant.enclosure import Form
+from starhold.certification.invariant.enclosure import EnclosedPolynomial
 from starhold.certification.invariant.search import Values
 from starhold.certification.invariant.theorems import indicator
 from starhold.certification.invariant.wording import down
@@ -51,13 +51,13 @@ class Sketch:
     rest: tuple[float, float] | None = None
 
 
-def sketch(problem: Problem, certificate: Certificate) -> list[Sketch]:
+def sketch(problem: InvariantProblem, certificate: Certificate) -> list[Sketch]:
     """All that is drawn, and what orbits say, in floats."""
     pairs = zip(problem.claims, certificate.claims, strict=True)
     return [_sketch(problem, wanted, claim, problem.orbit(k)) for k, (wanted, claim) in enumerate(pairs)]
 
 
-def _sketch(problem: Problem, wanted: Wanted, claim: Claim, start: tuple[float, ...] | None) -> Sketch:
+def _sketch(problem: InvariantProblem, wanted: WantedSet, claim: Claim, start: tuple[float, ...] | None) -> Sketch:
     names = problem.system.names
     if len(problem.system.variables) < 2:
         return Sketch(claim, names)
@@ -108,7 +108,7 @@ def _rates(what: Candidate, values: Values) -> Any:
     for place, cell in enumerate(what.pieces.cells):
         here = values.cell == place
         for k, rate in enumerate(cell.rates):
-            found[k, here] = Form(rate).at(values.points[:, here])
+            found[k, here] = EnclosedPolynomial(rate).at(values.points[:, here])
     return found
 
 
@@ -116,8 +116,8 @@ def _orbit(what: Candidate, start: Any) -> Any:
     """One turn of the closed motion that the motion from a state comes to backwards in time; None if it comes to none."""
     from scipy.integrate import solve_ivp
 
-    cells = [(cell.signs, [Form(rate) for rate in cell.rates[:2]]) for cell in what.pieces.cells]
-    surfaces = [Form(s) for s in what.pieces.surfaces]
+    cells = [(cell.signs, [EnclosedPolynomial(rate) for rate in cell.rates[:2]]) for cell in what.pieces.cells]
+    surfaces = [EnclosedPolynomial(s) for s in what.pieces.surfaces]
     others = [0.5 * (low + high) for low, high in what.box[2:]]
 
     def back(time: float, state: Any) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 from starhold.certification.certificate import EXACT
 from starhold.certification.invariant import search
 from starhold.certification.invariant.descent import Candidate, Guarded
-from starhold.certification.invariant.enclosure import Boxes, Form, Mask, everywhere
+from starhold.certification.invariant.enclosure import Boxes, EnclosedPolynomial, Mask, everywhere
 from starhold.certification.invariant.system import solve
 
 
@@ -34,7 +34,7 @@ def continuous(what: Candidate) -> tuple[str, bool | None, dict[str, Any]]:
 
 def _apart(what: Candidate, one: Guarded, other: Guarded, between: Sequence[int]) -> bool:
     """Whether two closed cells have no point of the box in common."""
-    surfaces = [Form(what.pieces.surfaces[k]) for k in between]
+    surfaces = [EnclosedPolynomial(what.pieces.surfaces[k]) for k in between]
 
     def shown(boxes: Boxes) -> Mask:
         done = ~one.inside(boxes) | ~other.inside(boxes)
@@ -55,7 +55,7 @@ def _jump(what: Candidate, one: Guarded, other: Guarded, between: Sequence[int])
     place, instead = solved
     onto = [surface]
     points = search.grid([(0.0, 0.0) if k == place else side for k, side in enumerate(what.box)], 41)
-    gaps = np.abs(Form(what.pieces.reduced(one.cell.V - other.cell.V, onto)).at(points))
+    gaps = np.abs(EnclosedPolynomial(what.pieces.reduced(one.cell.V - other.cell.V, onto)).at(points))
     for k in np.argsort(-gaps, kind="stable"):
         state = list(next(search.rounded(points[:, k])))
         state[place] = instead(*state)

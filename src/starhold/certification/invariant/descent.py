@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from starhold.algebra.intervals import Intervals
-from starhold.certification.invariant.enclosure import Boxes, Form, Mask, determinant, everywhere
+from starhold.certification.invariant.enclosure import Boxes, EnclosedPolynomial, Mask, determinant, everywhere
 from starhold.certification.invariant.signs import Positive, is_sum, sign_between, squares
-from starhold.certification.invariant.system import Cell, Pieces, Poly, System, along, plain, solve, split
+from starhold.certification.invariant.system import Cell, Cells, Poly, System, along, plain, solve, split
 from starhold.certification.matrices import number
 
 FEW = 4_000
@@ -38,7 +38,7 @@ class Candidate:
     squares: tuple[Any, ...] = ()
 
     @cached_property
-    def pieces(self) -> Pieces:
+    def pieces(self) -> Cells:
         """The cells of rates and V together."""
         return split(self.system, self.V)
 
@@ -62,17 +62,17 @@ class Guarded:
     """A cell with its surfaces and V made ready; `guards` are not negative in it. `never`: V is not positive in it."""
 
     cell: Cell
-    guards: tuple[Form, ...]
-    V: Form
+    guards: tuple[EnclosedPolynomial, ...]
+    V: EnclosedPolynomial
     never: bool
 
     @classmethod
-    def of(cls, cell: Cell, pieces: Pieces, onto: Sequence[Poly] = ()) -> Guarded:
+    def of(cls, cell: Cell, pieces: Cells, onto: Sequence[Poly] = ()) -> Guarded:
         """Of a cell; its part where polynomials vanish."""
         guards = pieces.guards(cell, onto)
         V = pieces.reduced(cell.V, onto)
         never = V.is_zero() or sign_between(V, guards) < 0
-        return cls(cell, tuple(Form(guard) for guard in guards), Form(V), never)
+        return cls(cell, tuple(EnclosedPolynomial(guard) for guard in guards), EnclosedPolynomial(V), never)
 
     @property
     def known(self) -> list[Poly]:
@@ -163,7 +163,7 @@ def _positive_on(what: Candidate, cell: Guarded, q: Poly, level: float, most: in
         done = ~cell.active(boxes, level)
         return done if done.all() else done | test.on(boxes)
 
-    value = Form(q)
+    value = EnclosedPolynomial(q)
 
     def against(points: Any) -> Mask:
         V, values = cell.V.at(points), value.at(points)
@@ -176,7 +176,7 @@ def _positive_on(what: Candidate, cell: Guarded, q: Poly, level: float, most: in
     return everywhere(what.box, shown, most, against=against)
 
 
-def jumps(pieces: Pieces) -> list[int]:
+def jumps(pieces: Cells) -> list[int]:
     """Surfaces across which the rates are not shown to agree."""
     found: set[int] = set()
     several: list[set[int]] = []
@@ -219,7 +219,7 @@ def _switch(what: Candidate, place: int, level: float, sense: int) -> bool:
     sides = [[i for i in whole if cells[i].cell.signs[place] != -side] for side in (1, -1)]
     lying = [k for k, cell in enumerate(cells) if place in cell.cell.on]
     sides.append(list(whole))
-    gradient = [Form(surface.derivative(k)) for k in range(len(pieces.names))]
+    gradient = [EnclosedPolynomial(surface.derivative(k)) for k in range(len(pieces.names))]
 
     def test(q: Poly, cell: Guarded) -> Positive:
         return Positive(pieces.reduced(q, onto), cell.V.polynomial, rest, cell.known)
@@ -232,7 +232,7 @@ def _switch(what: Candidate, place: int, level: float, sense: int) -> bool:
     def two_sided(boxes: Boxes) -> Mask:
         return np.any([_not_zero(slope.on(boxes)) for slope in gradient], axis=0)
 
-    eliminated = None if solved is None else (Form(solved[1]), what.box[solved[0]])
+    eliminated = None if solved is None else (EnclosedPolynomial(solved[1]), what.box[solved[0]])
 
     def shown(boxes: Boxes) -> Mask:
         active = [cell.active(boxes, level) for cell in cells]
@@ -242,7 +242,7 @@ def _switch(what: Candidate, place: int, level: float, sense: int) -> bool:
         for k in lying:
             both |= active[k]
         if eliminated is None:
-            values = Form(surface).on(boxes)
+            values = EnclosedPolynomial(surface).on(boxes)
             both &= (values.low <= 0.0) & (values.high >= 0.0)
         else:
             values, (low, high) = eliminated[0].on(boxes), eliminated[1]
@@ -261,7 +261,7 @@ def _switch(what: Candidate, place: int, level: float, sense: int) -> bool:
     return everywhere(box, shown)
 
 
-def _at(pieces: Pieces, rest: Sequence[Any] | None) -> list[Poly]:
+def _at(pieces: Cells, rest: Sequence[Any] | None) -> list[Poly]:
     assert rest is not None
     gens = pieces.context.gens()
     return [g if x is None else pieces.context.constant(x) for g, x in zip(gens, rest, strict=True)]
@@ -291,7 +291,7 @@ def _grows(what: Candidate, cell: Cell, zeros: Sequence[Poly], level: float, esc
     there = Guarded.of(cell, pieces, zeros)
     q = pieces.reduced(along(escape, cell.rates), zeros)
     test = Positive(q, there.V.polynomial, _rest_on(what, zeros), there.known)
-    left = [Form(h) for h in (pieces.reduced(zero, zeros) for zero in zeros) if not h.is_zero()]
+    left = [EnclosedPolynomial(h) for h in (pieces.reduced(zero, zeros) for zero in zeros) if not h.is_zero()]
 
     def shown(boxes: Boxes) -> Mask:
         done = ~there.active(boxes, level)
@@ -310,9 +310,9 @@ def _not_for_long(what: Candidate, cell: Cell, zeros: Sequence[Poly], level: flo
     for _ in range(moving - 1):
         chain += [along(h, cell.rates) for h in chain[-len(zeros) :]]
     guarded = Guarded.of(cell, what.pieces)
-    forms = [Form(g) for g in chain]
+    forms = [EnclosedPolynomial(g) for g in chain]
     signed = [Positive(g * way, cell.V) for g in chain for way in (1, -1) if not g.is_zero()]
-    rows: list[list[Form]] = []
+    rows: list[list[EnclosedPolynomial]] = []
     if what.rest is not None and all(g.compose(*_at(what.pieces, what.rest)).is_zero() for g in chain):
         # Where the Jacobian is regular all over a box that holds the rest, they vanish together nowhere else in it.
         rows = _independent([[g.derivative(k) for k in range(moving)] for g in chain], what.rest)
@@ -332,7 +332,7 @@ def _not_for_long(what: Candidate, cell: Cell, zeros: Sequence[Poly], level: flo
     return everywhere(what.box, shown)
 
 
-def _independent(rows: list[list[Poly]], rest: Sequence[Any]) -> list[list[Form]]:
+def _independent(rows: list[list[Poly]], rest: Sequence[Any]) -> list[list[EnclosedPolynomial]]:
     """As many rows as there are columns, independent at the rest (parameters at zero); none if there are too few."""
     point = [x if x is not None else 0 for x in rest]
     found: list[list[Poly]] = []
@@ -340,7 +340,7 @@ def _independent(rows: list[list[Poly]], rest: Sequence[Any]) -> list[list[Form]
         numbers = np.array([[number(entry(*point)) for entry in own] for own in [*found, row]])
         if np.linalg.matrix_rank(numbers) > len(found):
             found.append(row)
-    return [[Form(entry) for entry in row] for row in found] if found and len(found) == len(found[0]) else []
+    return [[EnclosedPolynomial(entry) for entry in row] for row in found] if found and len(found) == len(found[0]) else []
 
 
 def _with(boxes: Boxes, rest: Any) -> Boxes:

@@ -12,26 +12,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.intervals import Intervals
-from starhold.algebra.polynomial import exact
 from starhold.certification.boxes import Sides, holds_on
 from starhold.certification.invariant.system import Poly
 from starhold.certification.matrices import number
+from starhold.certification.subject import enclosed
 
 Mask = NDArray[np.bool_]
 
 
-class Form:
+class EnclosedPolynomial:
     """A polynomial made ready to be enclosed."""
 
     def __init__(self, polynomial: Poly) -> None:
         self.polynomial = polynomial
         terms = [(tuple(int(power) for power in powers), c) for powers, c in polynomial.to_dict().items()]
-        self._terms = [(powers, _enclosed(c)) for powers, c in terms]
+        self._terms = [(powers, enclosed(c)) for powers, c in terms]
         self._floats = [(powers, number(c)) for powers, c in terms]
 
     @cached_property
-    def _gradient(self) -> list[Form]:
-        return [Form(self.polynomial.derivative(k)) for k in range(len(self.polynomial.context().gens()))]
+    def _gradient(self) -> list[EnclosedPolynomial]:
+        return [EnclosedPolynomial(self.polynomial.derivative(k)) for k in range(len(self.polynomial.context().gens()))]
 
     def on(self, boxes: Boxes) -> Intervals:
         """What its values on each box lie in."""
@@ -175,7 +175,7 @@ def everywhere(
         return False
 
 
-def definite(form: Sequence[Sequence[Form]], boxes: Boxes) -> Mask:
+def definite(form: Sequence[Sequence[EnclosedPolynomial]], boxes: Boxes) -> Mask:
     """On which boxes a symmetric matrix of polynomials is positive definite throughout, by its pivots."""
     rest = [[entry.on(boxes) for entry in row] for row in form]
     found = np.ones(boxes.count, dtype=bool)
@@ -199,10 +199,3 @@ def determinant(rows: Sequence[Sequence[Intervals]]) -> Intervals:
         minor = determinant([[*row[:k], *row[k + 1 :]] for row in rows[1:]])
         total = total + entry * minor if k % 2 == 0 else total - entry * minor
     return total
-
-
-def _enclosed(c: Any) -> Intervals | float:
-    near = number(c)
-    if exact(near) == c:
-        return near
-    return Intervals(np.nextafter(near, -np.inf), np.nextafter(near, np.inf))

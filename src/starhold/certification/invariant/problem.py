@@ -18,7 +18,7 @@ from starhold.certification.certificate import Certificate
 from starhold.certification.certificate import write as write_certificates
 from starhold.certification.invariant.system import System, split
 from starhold.certification.invariant.text import MOST_DIGITS, RESERVED, ExpressionError, as_written, read
-from starhold.certification.invariant.theorems import THEOREMS, Wanted, indicator, prove
+from starhold.certification.invariant.theorems import THEOREMS, WantedSet, indicator, prove
 from starhold.errors import InputError
 
 FORMAT = "starhold invariant certificate 1"
@@ -30,13 +30,13 @@ _CLAIM = ("name", "theorem", "V", "box", "rest", "level", "escape", "squares", "
 
 
 @dataclass(frozen=True)
-class Problem:
+class InvariantProblem:
     """A system with what is to be shown of it. `written`: what the certificate says the system is; `orbits`: for each claim
     a state whose motion backwards in time goes to the border of the true region, or None."""
 
     name: str
     system: System
-    claims: tuple[Wanted, ...]
+    claims: tuple[WantedSet, ...]
     description: str = ""
     written: dict[str, Any] = field(default_factory=dict[str, Any])
     orbits: tuple[tuple[float, ...] | None, ...] = ()
@@ -46,7 +46,7 @@ class Problem:
         return self.orbits[place] if place < len(self.orbits) else None
 
 
-def certify(problem: Problem) -> Certificate:
+def certify(problem: InvariantProblem) -> Certificate:
     """What is shown of each claim."""
     system = problem.system
     rates = zip(system.variables, system.rates, strict=True)
@@ -69,7 +69,7 @@ def builtin_names() -> list[str]:
     return sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
 
 
-def load(source: str | Path) -> Problem:
+def load(source: str | Path) -> InvariantProblem:
     """The problem in a file, or the built-in one of that name. InputError says what is wrong with it."""
     path = Path(source)
     if not path.exists() and str(source) in builtin_names():
@@ -86,7 +86,7 @@ def load(source: str | Path) -> Problem:
     return parse(text, str(source))
 
 
-def parse(text: str, where: str) -> Problem:
+def parse(text: str, where: str) -> InvariantProblem:
     """The problem of a TOML text; `where` names it in errors."""
     try:
         data = tomllib.loads(text)
@@ -105,7 +105,7 @@ class _File:
         self.variables: tuple[str, ...] = ()
         self.parameters: dict[str, tuple[float, float]] = {}
 
-    def problem(self) -> Problem:
+    def problem(self) -> InvariantProblem:
         """All of it."""
         self._known(self.data, _KEYS, "")
         self._variables()
@@ -131,7 +131,7 @@ class _File:
         for key in ("escape", "squares"):
             if any(key in table for table in tables):
                 written[key] = [table.get(key) for table in tables]
-        return Problem(
+        return InvariantProblem(
             self._text(self.data, "name", "", Path(self.where).stem),
             system,
             tuple(item[0] for item in wanted),
@@ -154,7 +154,7 @@ class _File:
         self.variables = tuple(cast(list[str], names))
         self.parameters = {name: self._interval(value, f"parameters.{name}") for name, value in parameters.items()}
 
-    def _claim(self, table: dict[str, Any], key: str, system: System) -> tuple[Wanted, tuple[float, ...] | None]:
+    def _claim(self, table: dict[str, Any], key: str, system: System) -> tuple[WantedSet, tuple[float, ...] | None]:
         self._known(table, _CLAIM, key)
         theorem = self._required(table, "theorem", key)
         if theorem not in THEOREMS:
@@ -168,7 +168,7 @@ class _File:
         orbit = tuple(float(x) for x in self._state(table["orbit"], f"{key}.orbit")) if "orbit" in table else None
         exactly = None if rest is None else tuple(exact(x) for x in rest)
         name = self._text(table, "name", key, "")
-        wanted = Wanted(theorem, V, self._box(table, key), exactly, level, escape, squares, known, name)
+        wanted = WantedSet(theorem, V, self._box(table, key), exactly, level, escape, squares, known, name)
         try:
             split(system, indicator(wanted))
         except ValueError as error:

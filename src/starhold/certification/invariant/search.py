@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
 from starhold.certification.invariant.descent import Candidate, Guarded
-from starhold.certification.invariant.enclosure import Boxes, Form
+from starhold.certification.invariant.enclosure import Boxes, EnclosedPolynomial
 from starhold.certification.invariant.signs import from_rest, lowest
 from starhold.certification.invariant.system import Cell, Poly, along
 from starhold.certification.matrices import number
@@ -33,14 +33,14 @@ class Values:
         self.points = points
         self.V, self.slope = np.full(count, np.nan), np.full(count, np.nan)
         self.cell = np.full(count, -1)
-        surfaces = [Form(s).at(points) for s in what.pieces.surfaces]
+        surfaces = [EnclosedPolynomial(s).at(points) for s in what.pieces.surfaces]
         for place, cell in enumerate(what.pieces.cells):
             here = self.cell < 0
             for side, values in zip(cell.signs, surfaces, strict=True):
                 here &= side * values >= 0.0
             self.cell[here] = place
-            self.V[here] = Form(cell.V).at(points[:, here])
-            self.slope[here] = Form(cell.slope).at(points[:, here])
+            self.V[here] = EnclosedPolynomial(cell.V).at(points[:, here])
+            self.slope[here] = EnclosedPolynomial(cell.slope).at(points[:, here])
 
 
 def grid(box: Sequence[tuple[float, float]], count: int | None = None) -> Array:
@@ -87,8 +87,8 @@ def stuck(what: Candidate) -> list[Array]:
     found: list[Array] = []
     moving = what.pieces.moving
     for place, cell in enumerate(what.pieces.cells):
-        rates = [Form(rate) for rate in cell.rates[:moving]]
-        slopes = [[Form(rate.derivative(k)) for k in range(moving)] for rate in cell.rates[:moving]]
+        rates = [EnclosedPolynomial(rate) for rate in cell.rates[:moving]]
+        slopes = [[EnclosedPolynomial(rate.derivative(k)) for k in range(moving)] for rate in cell.rates[:moving]]
         points = grid(what.box, 7)
         for _ in range(12):
             f = np.array([rate.at(points) for rate in rates])
@@ -238,7 +238,7 @@ def leaving(what: Candidate) -> dict[str, Any] | None:
 
 
 def _border(what: Candidate, cell: Guarded, point: Array) -> dict[str, Any] | None:
-    gradient = [Form(cell.cell.V.derivative(k)) for k in range(len(point))]
+    gradient = [EnclosedPolynomial(cell.cell.V.derivative(k)) for k in range(len(point))]
     g = np.zeros(len(point))
     for _ in range(8):
         g = np.array([float(slope.at(point[:, None])[0]) for slope in gradient])
@@ -258,7 +258,7 @@ def _border(what: Candidate, cell: Guarded, point: Array) -> dict[str, Any] | No
         here = [other for other in what.guarded if other.inside(boxes)[0]]
         if any(other.cell.rates != cell.cell.rates for other in here):
             continue
-        least = float(Form(along(cell.cell.V, cell.cell.rates)).on(boxes).low[0])
+        least = float(EnclosedPolynomial(along(cell.cell.V, cell.cell.rates)).on(boxes).low[0])
         if least > 0.0 and all(_same_or_less(what, other.cell, cell.cell.V) for other in here):
             return {"state": named(what, ends[0]), "outside": named(what, ends[1]), "V' between": least}
     return None

@@ -11,7 +11,7 @@ from flint import fmpq
 from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
-from starhold.certification.invariant.enclosure import Boxes, Form, Mask, definite
+from starhold.certification.invariant.enclosure import Boxes, EnclosedPolynomial, Mask, definite
 from starhold.certification.invariant.system import Poly, opposite, solve
 from starhold.certification.matrices import number
 
@@ -31,8 +31,9 @@ class Positive:
 
     def __init__(self, q: Poly, V: Poly, rest: Sequence[Any] | None = None, guards: Sequence[Poly] = ()) -> None:
         q = _divided(q, V, guards)
-        self._direct = Form(q)
-        self._relative: list[Form] = [] if q.is_zero() or V.is_zero() else [Form(part) for part in _without_common(q, V)]
+        self._direct = EnclosedPolynomial(q)
+        parts = [] if q.is_zero() or V.is_zero() else _without_common(q, V)
+        self._relative = [EnclosedPolynomial(part) for part in parts]
         self._definite = None if rest is None or q.is_zero() else Definite(q, rest, guards)
 
     def on(self, boxes: Boxes) -> Mask:
@@ -59,8 +60,8 @@ class Definite:
         about = from_rest(q, rest)
         moving = [k for k, x in enumerate(rest) if x is not None]
         self.always = _even_powers(about, moving)
-        self._matrices: list[list[list[Form]]] = []
-        self._sloping: list[tuple[Form, Definite]] = []
+        self._matrices: list[list[list[EnclosedPolynomial]]] = []
+        self._sloping: list[tuple[EnclosedPolynomial, Definite]] = []
         if self.always or not moving:
             return
         matrix = _quadratic(about, moving)
@@ -68,7 +69,7 @@ class Definite:
             back = to_rest(q.context(), rest)
             extra = (_quadratic(from_rest(guard, rest), moving) for guard in guards)
             for found in _definite_with(matrix, [m for m in extra if m is not None]):
-                self._matrices.append([[Form(entry.compose(*back)) for entry in row] for row in found])
+                self._matrices.append([[EnclosedPolynomial(entry.compose(*back)) for entry in row] for row in found])
             return
         for guard in guards:
             solved = solve(guard)
@@ -78,7 +79,7 @@ class Definite:
             on_it = q.compose(*(solved[1] if k == solved[0] else g for k, g in enumerate(generators)))
             share, _ = divmod(q - on_it, guard)
             others = [None if k == solved[0] else x for k, x in enumerate(rest)]
-            self._sloping.append((Form(share), Definite(on_it, others, ())))
+            self._sloping.append((EnclosedPolynomial(share), Definite(on_it, others, ())))
 
     def on(self, boxes: Boxes) -> Mask:
         """On which boxes it is shown."""

@@ -82,7 +82,7 @@ def along(function: Poly, rates: Sequence[Poly]) -> Poly:
 
 
 @dataclass(frozen=True)
-class Pieces:
+class Cells:
     """All cells of a system together with a function V; those that lie in surfaces are `thin`."""
 
     names: tuple[str, ...]
@@ -164,7 +164,7 @@ def solve(surface: Poly) -> tuple[int, Poly] | None:
     return place, generators[place] - surface / slopes[place].leading_coefficient()
 
 
-def split(system: System, V: Any) -> Pieces:
+def split(system: System, V: Any) -> Cells:
     """The cells of a system and a function, polynomial or piecewise. ValueError where they are too many or too large."""
     names = system.names
     ring = fmpq_mpoly_ctx.get(names, Ordering.degrevlex)
@@ -188,7 +188,7 @@ def split(system: System, V: Any) -> Pieces:
     if math.comb(len(names) + degree, degree) > MOST_TERMS:
         raise ValueError(f"V' of degree {degree} in {len(names)} variables")
     whole, thin = ([cell for cell in cells if bool(cell.on) == lies] for lies in (False, True))
-    return Pieces(names, len(system.variables), tuple(surfaces), tuple(whole), tuple(thin))
+    return Cells(names, len(system.variables), tuple(surfaces), tuple(whole), tuple(thin))
 
 
 def _sides(

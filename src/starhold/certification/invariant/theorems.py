@@ -43,7 +43,7 @@ ASSUMPTIONS = (
 
 
 @dataclass(frozen=True)
-class Wanted:
+class WantedSet:
     """One claim to be shown. `V`: a polynomial or piecewise one, for `intersection` several; `box`: where, in the order of
     variables and parameters; `rest`: the point that M is, a number for every variable, else None, and M is {V <= 0};
     `level`: the level to be shown, None: the largest that is found; `escape`: a function that grows wherever V' = 0 outside
@@ -65,7 +65,7 @@ class Wanted:
 class _Proof:
     """What is gathered on the way to a claim."""
 
-    wanted: Wanted
+    wanted: WantedSet
     what: Candidate
     found: list[Obligation] = field(default_factory=list[Obligation])
     numbers: dict[str, Any] = field(default_factory=dict[str, Any])
@@ -90,12 +90,12 @@ class _Proof:
         return Claim(f"invariant-{self.wanted.theorem}", told, witness, assumptions, tuple(self.found))
 
 
-def indicator(wanted: Wanted) -> Any:
+def indicator(wanted: WantedSet) -> Any:
     """The V of a claim; of several functions the largest, or zero."""
     return reduce(maximum, (*wanted.V, 0)) if wanted.theorem == "intersection" else wanted.V
 
 
-def prove(system: System, wanted: Wanted) -> Claim:
+def prove(system: System, wanted: WantedSet) -> Claim:
     """The claim with what was shown of it."""
     if wanted.theorem not in THEOREMS:
         raise ValueError(f"no theorem {wanted.theorem}")
