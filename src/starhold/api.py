@@ -131,4 +131,4 @@ def invariant(problem: InvariantProblem | str | Path) -> Certificate:
     of the built-in problem of that name. Each claim has an `outcome`, numbers (`level`, the set's size) and evidence."""
     from starhold.certification import invariant as sets
 
-    return sets.certify(problem if isinstance(problem, sets.Problem) else sets.load(problem))
+    return sets.certify(problem if isinstance(problem, sets.InvariantProblem) else sets.load(problem))

@@ -49,7 +49,7 @@ def by_hand(law, gains, claims, **changes):
     }
     outcome = "undecided" if [claim["kind"] for claim in claims] == ["sampling"] else "proved"
     certificate = {"name": law, "outcome": outcome, "subject": subject, "claims": claims}
-    return {"format": "starhold certificate 1", "scenario": "hand", "versions": {}, "certificates": [certificate]}
+    return {"format": "starhold certificate 2", "scenario": "hand", "versions": {}, "certificates": [certificate]}
 
 
 HOWS = {
@@ -57,15 +57,15 @@ HOWS = {
     "positive": "exact inequality",
     "descent": "exact inequality",
     "target": "exact identity",
-    "only rest": "LaSalle",
+    "only equilibrium": "LaSalle",
     "strict": "exact inequality",
-    "single rest in the set": "exact inequality",
+    "single equilibrium in the set": "exact inequality",
     "jumps lower V": "exact inequality",
-    "other rest repels": "certified roots",
+    "other equilibrium repels": "certified roots",
 }
 
 
-def converging(last="other rest repels", middle="only rest", **changes):
+def converging(last="other equilibrium repels", middle="only equilibrium", **changes):
     names = [(n, HOWS[n]) for n in ("form", "positive", "descent", "target", middle, last)]
     numbers = {
         "level": None,

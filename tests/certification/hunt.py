@@ -125,7 +125,7 @@ def write_history(random, path, duration):
 
 
 def random_law(random, some, size, numbers, J, scale):
-    """The lines of a law, its double cover included."""
+    """The lines of a law, its quaternion sign included."""
     w = size(1e-3, 3.0)
     k, d = w * w * scale, 2.0 * w * scale * random.uniform(0.05, 2.0)
     spread = random.uniform(0.5, 2.0, size=3)

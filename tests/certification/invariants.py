@@ -24,12 +24,12 @@ def expression(text, variables="x y"):
     return read(text, names(variables))
 
 
-def claim(rates, theorem, V, box=SQUARE, rest=None, level=None, escape=None, variables="x y", parameters="", **more):
+def claim(rates, theorem, V, box=SQUARE, equilibrium=None, level=None, escape=None, variables="x y", parameters="", **more):
     """What is shown of a claim that is written as texts."""
     every = f"{variables} {parameters}"
     indicator = tuple(expression(v, every) for v in V) if isinstance(V, (tuple, list)) else expression(V, every)
     tool = None if escape is None else expression(escape, every)
-    return prove(system(rates, variables, parameters), WantedSet(theorem, indicator, box, rest, level, tool, **more))
+    return prove(system(rates, variables, parameters), WantedSet(theorem, indicator, box, equilibrium, level, tool, **more))
 
 
 def outcomes(found):

@@ -23,8 +23,8 @@ def region(c, witness=PLAIN, sign_policy="as_published", a=A, assumptions=TEXTBO
     """A claim with level = c a2, and turn and rate as large as these can be up to rounding."""
     names = [("form", "exact identity"), ("descent", "ball arithmetic")]
     if witness[2] == witness[3] == 0.0:
-        names.append(("only rest", "LaSalle"))
-    names.append(("jumps lower V" if sign_policy == "hysteresis" else "single rest in the set", "exact inequality"))
+        names.append(("only equilibrium", "LaSalle"))
+    names.append(("jumps lower V" if sign_policy == "hysteresis" else "single equilibrium in the set", "exact inequality"))
     level = c * a * a
     numbers = {"level": level, "slew_angle": 0.999999 * highest_turn(c, witness), "rate": 0.999999 * math.sqrt(2.0 * level)}
     return proved_by_hand(

@@ -53,16 +53,16 @@ def test_a_certificate_written_by_hand(inertia):
     jumping = converging("jumps lower V")
     assert passed(check(by_hand("pd", PD, [jumping], quaternion_sign="hysteresis", **changes)))
     low = {"level": 0.017, "start": 0.017, "everything": False, "slew_angle": 2.9, "rate": 0.05}
-    shorter = converging("single rest in the set", **low)
+    shorter = converging("single equilibrium in the set", **low)
     assert passed(check(by_hand("pd", PD, [shorter], quaternion_sign="shortest", **changes)))
 
 
 def test_false_claims_written_by_hand():
     everything = converging()
     # The feedback switches at q0 = 0, which V = s bounds.
-    assert reasons(by_hand("pd", PD, [converging("single rest in the set")], quaternion_sign="shortest"))
+    assert reasons(by_hand("pd", PD, [converging("single equilibrium in the set")], quaternion_sign="shortest"))
     wide = {"level": 0.019, "start": 0.019, "everything": False, "slew_angle": 2.9, "rate": 0.05}
-    assert reasons(by_hand("pd", PD, [converging("single rest in the set", **wide)], quaternion_sign="shortest"))
+    assert reasons(by_hand("pd", PD, [converging("single equilibrium in the set", **wide)], quaternion_sign="shortest"))
     # Unequal stiffness and gyroscopic torque leave a cubic term in V'.
     assert reasons(by_hand("lqr", SPUN, [everything]))
     assert reasons(by_hand("matrix-pd", {k: SPUN[k] for k in ("k_rate", "k_attitude")}, [everything]))
@@ -81,7 +81,7 @@ def test_a_skew_stiffness_may_attract_the_other_rest():
 
 def test_a_clipped_damping_must_leave_the_stiffness_its_torque():
     clipped = {**PD, "limit": "axis"}
-    names = [(n, HOWS[n]) for n in ("form", "positive", "descent", "target", "only rest", "other rest repels")]
+    names = [(n, HOWS[n]) for n in ("form", "positive", "descent", "target", "only equilibrium", "other equilibrium repels")]
     numbers = {**converging()["numbers"], "limit": 0.05, "kind": "axis"}
     told = [a for a in TEXTBOOK if a != "torque not limited"]
     witness = {**converging()["witness"], "shift": None, "weight": None}

@@ -30,7 +30,7 @@ def test_unknown_keys_fail_everywhere(made):
         assert not passed(check(changed)), path
 
 
-@pytest.mark.parametrize("content", [None, [], {}, 3, {"format": "starhold certificate 1"}])
+@pytest.mark.parametrize("content", [None, [], {}, 3, {"format": "starhold certificate 2"}])
 def test_what_is_no_certificate_fails(content):
     assert not passed(check(content))
 
@@ -56,9 +56,15 @@ def test_a_readable_file_with_a_fault_fails(tmp_path, made):
     period = f'"control_period": {content["certificates"][0]["subject"]["control_period"]}'
     assert period in plain
     texts = [twice, plain.replace(period, '"control_period": NaN'), plain.replace(period, '"control_period": 1e999')]
-    for text in [*texts, plain.replace("certificate 1", "certificate 2"), "[]", "null", '"x"']:
+    for text in [*texts, plain.replace("certificate 2", "certificate 3"), "[]", "null", '"x"']:
         path.write_text(text, encoding="utf-8")
         assert not passed(check_file(path)), text[:60]
+
+
+@pytest.mark.parametrize("kind", ["", "invariant "])
+def test_a_file_of_an_earlier_version_is_refused_in_one_line(made, kind):
+    content = {**made("pd-0"), "format": f"starhold {kind}certificate 1"}
+    assert reasons(content) == [f"the format is 'starhold {kind}certificate 1', of an earlier version: certify again"]
 
 
 def test_limits_of_a_file_are_refused_each_with_its_line(tmp_path, made):

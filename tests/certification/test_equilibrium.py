@@ -64,10 +64,10 @@ def test_flights_return_from_inside_and_from_nowhere_else():
 
 
 def test_rest_attracts_without_a_limit():
-    assert claims_of()["rest"].outcome == "proved"
-    assert claims_of(GAINS._replace(model=1), model="nonlinear")["rest"].outcome == "proved"
-    assert claims_of(model="nonlinear")["rest"].outcome == "undecided"
-    assert claims_of(GAINS._replace(k_x=0.9 * STEEP))["rest"].outcome == "refuted"
+    assert claims_of()["equilibrium"].outcome == "proved"
+    assert claims_of(GAINS._replace(model=1), model="nonlinear")["equilibrium"].outcome == "proved"
+    assert claims_of(model="nonlinear")["equilibrium"].outcome == "undecided"
+    assert claims_of(GAINS._replace(k_x=0.9 * STEEP))["equilibrium"].outcome == "refuted"
     assert "saturated-axis" not in claims_of(GAINS._replace(k_x=0.9 * STEEP), 1.0)
 
 

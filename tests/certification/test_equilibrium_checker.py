@@ -1,4 +1,5 @@
-"""The checker's reading of certificates about rest beside a libration point, and about the X axis with limited control."""
+"""The checker's reading of certificates about equilibria beside a libration point and about the X axis with limited
+control."""
 
 from __future__ import annotations
 
@@ -50,14 +51,14 @@ def made(tmp_path_factory):
 @pytest.mark.parametrize("limit", [4.0, 8.0, 1e4])
 def test_what_the_certifier_claims_holds(made, gains, limit):
     content = made(gains, limit)
-    assert outcomes(content) == {"rest": "proved", "saturated-axis": "proved"}
+    assert outcomes(content) == {"equilibrium": "proved", "saturated-axis": "proved"}
     assert {f.verdict for f in check(content)} == {"holds"}
 
 
 def test_feedback_far_off_the_separatrix_is_not_claimed(made):
     content = made(GAINS._replace(k_x=1.1 * GAINS.k_x), 4.0)
-    assert outcomes(content) == {"rest": "proved", "saturated-axis": "undecided"}
-    assert {(f.claim, f.verdict) for f in check(content)} == {("rest", "holds"), ("saturated-axis", "not claimed")}
+    assert outcomes(content) == {"equilibrium": "proved", "saturated-axis": "undecided"}
+    assert {(f.claim, f.verdict) for f in check(content)} == {("equilibrium", "holds"), ("saturated-axis", "not claimed")}
 
 
 @pytest.mark.parametrize("name", sorted(PRIMARIES))
@@ -65,20 +66,20 @@ def test_all_points_hold(made, name):
     for point in POINTS:
         plant = PRIMARIES[name].point(point)
         content = made(l2_equilibrium.design(plant, l2_equilibrium.Degree(y=0.3)), 5.0, plant=plant)
-        assert outcomes(content) == {"rest": "proved", "saturated-axis": "proved"}
+        assert outcomes(content) == {"equilibrium": "proved", "saturated-axis": "proved"}
         assert {f.verdict for f in check(content)} == {"holds"}
 
 
 @pytest.mark.parametrize(("limit", "kind"), [(math.inf, "axis"), (math.inf, "norm"), (3.0, "norm"), (3.0, "none")])
 def test_without_a_limit_by_axis_rest_alone_is_claimed(made, limit, kind):
     content = made(GAINS, limit, kind)
-    assert outcomes(content) == {"rest": "proved"}
+    assert outcomes(content) == {"equilibrium": "proved"}
     assert {f.verdict for f in check(content)} == {"holds"}
 
 
 def test_the_full_problem_holds_away_from_the_bodies(made):
     content = made(GAINS._replace(model=1), model="nonlinear")
-    assert outcomes(content) == {"rest": "proved"}
+    assert outcomes(content) == {"equilibrium": "proved"}
     assert {f.verdict for f in check(content)} == {"holds"}
     assert content["certificates"][0]["claims"][0]["assumptions"][-1] == "never at the centre of one of the two bodies"
     assert faults(changed(content, (*REST, "assumptions"), content["certificates"][0]["claims"][0]["assumptions"][:-1]))
@@ -165,23 +166,23 @@ def test_obligations_and_assumptions_are_those_of_the_claim(made):
 
 def test_a_claim_of_the_other_kind_fails(made):
     content = made(GAINS, 4.0)
-    rest, limited = content["certificates"][0]["claims"]
-    for one, kind in ((rest, "saturated-axis"), (limited, "rest"), (rest, "circle"), (limited, "control-limit")):
+    main, limited = content["certificates"][0]["claims"]
+    for one, kind in ((main, "saturated-axis"), (limited, "equilibrium"), (main, "circle"), (limited, "control-limit")):
         renamed = copy.deepcopy(content)
         renamed["certificates"][0]["claims"] = [{**one, "kind": kind}]
         assert faults(renamed)
-    attitude = by_hand("lyapunov", {"k_attitude": 0.1, "k_rate": 0.5}, [rest])
-    assert "there is no kind of claim rest about such a loop" in faults(attitude).values()
+    attitude = by_hand("lyapunov", {"k_attitude": 0.1, "k_rate": 0.5}, [main])
+    assert "there is no kind of claim equilibrium about such a loop" in faults(attitude).values()
 
 
-def test_other_laws_do_not_come_to_rest(made):
+def test_other_laws_make_no_equilibrium_attractive(made):
     content = made(GAINS, 4.0)
     for law in catalogue("libration-point").values():
         for gains in law.examples():
             loop = StationLoop(PLANT, law, gains, loop_of().start, 1e-3, limit=4.0, limit_kind="axis")
             other = changed(content, SUBJECT, json.loads(json.dumps(described_station(loop))))
             if law.name != "l2-equilibrium":
-                assert set(faults(other).values()) == {f"the law {law.name} does not come to rest"}
+                assert set(faults(other).values()) == {f"the law {law.name} makes no equilibrium attractive"}
 
 
 @pytest.mark.parametrize(
@@ -189,17 +190,17 @@ def test_other_laws_do_not_come_to_rest(made):
     [
         (("gains", "k_x"), 1.1 * GAINS.k_x, ("saturated-axis", "stays")),
         (("gains", "k_x"), 0.9 * GAINS.k_x, ("saturated-axis", "stays")),
-        (("gains", "k_x"), 0.9 * STEEP, ("rest", "each axis returns")),
+        (("gains", "k_x"), 0.9 * STEEP, ("equilibrium", "each axis returns")),
         (("gains", "k_x"), -1.0, ("", "")),
         (("gains", "k_velocity"), [0.5 * STEEPNESS, 1.0, 1.0], ("saturated-axis", "stays")),
-        (("gains", "k_velocity"), [0.0, 1.0, 1.0], ("rest", "each axis returns")),
-        (("gains", "k_velocity"), [6.0, 0.0, 1.0], ("rest", "each axis returns")),
-        (("gains", "k_velocity"), [6.0, 1.0, -1.0], ("rest", "each axis returns")),
+        (("gains", "k_velocity"), [0.0, 1.0, 1.0], ("equilibrium", "each axis returns")),
+        (("gains", "k_velocity"), [6.0, 0.0, 1.0], ("equilibrium", "each axis returns")),
+        (("gains", "k_velocity"), [6.0, 1.0, -1.0], ("equilibrium", "each axis returns")),
         (("gains", "k_velocity"), [6.0, 1.0], ("", "")),
-        (("gains", "model"), "nonlinear", ("rest", "form")),
+        (("gains", "model"), "nonlinear", ("equilibrium", "form")),
         (("gains", "model"), "nonlinear", ("saturated-axis", "")),
         (("gains", "other"), 1.0, ("", "")),
-        (("model",), "nonlinear", ("rest", "")),
+        (("model",), "nonlinear", ("equilibrium", "")),
         (("law",), "l2-circle", ("", "")),
         (("limit",), "norm", ("saturated-axis", "")),
         (("limit",), "none", ("saturated-axis", "")),
@@ -252,7 +253,7 @@ def test_the_limited_axis_of_the_full_problem_is_not_claimed(made):
 )
 def test_what_does_not_return_is_refuted(made, gains):
     content = made(gains, 4.0)
-    assert outcomes(content) == {"rest": "refuted"}
+    assert outcomes(content) == {"equilibrium": "refuted"}
     assert [(f.obligation, f.verdict) for f in check(content)] == [
         ("form", "not claimed"),
         ("each axis returns", "not claimed"),
@@ -263,7 +264,7 @@ def test_what_does_not_return_is_refuted(made, gains):
     proved = copy.deepcopy(content)
     proved["certificates"][0]["outcome"] = proved["certificates"][0]["claims"][0]["outcome"] = "proved"
     proved["certificates"][0]["claims"][0]["obligations"][1]["outcome"] = "proved"
-    assert set(faults(proved)) == {("rest", "each axis returns")}
+    assert set(faults(proved)) == {("equilibrium", "each axis returns")}
 
 
 def test_nothing_refutes_what_holds(made):

@@ -1,5 +1,5 @@
-"""The mathematics of the checker of rest beside a libration point: the loop it reads and the sets it accepts, against states
-and flights."""
+"""The mathematics of the checker of equilibria beside a libration point: the loop it reads and the sets it accepts, against
+states and flights."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tests.certification.equilibria import GAINS, PLANT, STEEP, STEEPNESS, STRON
 
 
 def axis(gains, limit):
-    return LimitedAxis.of(station(gains).rest, rational(limit))
+    return LimitedAxis.of(station(gains).equilibrium, rational(limit))
 
 
 def refused(claim):
@@ -70,8 +70,8 @@ def nothing(measurement, gains, plant):
     ],
 )
 def test_another_law_is_noticed(parts):
-    rest = station().rest
-    rest.form()
+    loop = station().equilibrium
+    loop.form()
     law = altered(**parts)
     if "feedback" in parts:
         # What flies is the altered feedback as well.
@@ -80,11 +80,11 @@ def test_another_law_is_noticed(parts):
             memory,
         )
     with pytest.raises(CheckError):
-        EquilibriumLoop(law, rest.gains, rest.plant, False).form()
+        EquilibriumLoop(law, loop.gains, loop.plant, False).form()
 
 
 def test_the_form_is_that_of_the_motion():
-    full, plain = station(GAINS._replace(model=1), model="nonlinear").rest, station().rest
+    full, plain = station(GAINS._replace(model=1), model="nonlinear").equilibrium, station().equilibrium
     full.form()
     for one, other in ((full, False), (plain, True)):
         with pytest.raises(CheckError, match="undoes"):

@@ -133,7 +133,7 @@ def test_torque_limit_ignored(kind):
     u = np.array(loop.law.command(seen_at(state), loop.gains, PRINCIPAL, NoMemory())[0])
     assert (np.linalg.norm(u) if kind == "norm" else np.abs(u).max()) > PRINCIPAL.torque_limit
     value = loop.law.lyapunov(seen_at(state), loop.gains, PRINCIPAL)
-    # The state is in the set: no higher than a rest turned by 120 degrees.
+    # The state is in the set: no higher than a body at rest turned by 120 degrees.
     assert value <= 2.0 * (1.0 - math.cos(math.radians(60.0))) * (1.0 + 1e-9)
 
 

@@ -27,11 +27,11 @@ def impatient(monkeypatch):
 
 
 def test_a_centre_is_stable():
-    assert claim(TURNS, "stable", ROUND, rest=ORIGIN).outcome == "proved"
+    assert claim(TURNS, "stable", ROUND, equilibrium=ORIGIN).outcome == "proved"
 
 
 def test_what_spirals_out_is_refuted_however_near_the_rest():
-    found = claim(SPIRALS, "stable", ROUND, rest=ORIGIN)
+    found = claim(SPIRALS, "stable", ROUND, equilibrium=ORIGIN)
     assert found.outcome == "refuted"
     d = found.refutation().evidence["direction"]
     # V' = y^2/5 on the whole ray.
@@ -57,34 +57,34 @@ def test_a_form_is_semidefinite_as_a_sum_of_squares():
 
 
 def test_strict_descent_needs_nothing_else():
-    found = claim(("-x + y", "-x - y"), "attracts", ROUND, rest=ORIGIN)
+    found = claim(("-x + y", "-x - y"), "attracts", ROUND, equilibrium=ORIGIN)
     assert found.outcome == "proved"
     assert "leaves" not in outcomes(found)
 
 
 def test_energy_of_the_damped_oscillator_by_what_cannot_vanish_all_at_once():
-    found = claim(DAMPED, "attracts", ROUND, rest=ORIGIN)
+    found = claim(DAMPED, "attracts", ROUND, equilibrium=ORIGIN)
     assert found.outcome == "proved"
     assert outcomes(found)["leaves"] == "proved"
 
 
 def test_a_centre_does_not_attract_and_that_is_not_known():
-    found = claim(TURNS, "attracts", ROUND, rest=ORIGIN)
+    found = claim(TURNS, "attracts", ROUND, equilibrium=ORIGIN)
     assert found.outcome == "undecided"
     assert outcomes(found)["leaves"] == "undecided"
 
 
 @pytest.mark.parametrize("power", [3, 5])
 def test_descent_of_any_even_power(power):
-    assert claim((f"-x**{power}", "-y"), "region", ROUND, rest=ORIGIN).outcome == "proved"
+    assert claim((f"-x**{power}", "-y"), "region", ROUND, equilibrium=ORIGIN).outcome == "proved"
 
 
 def test_largest_level_is_bounded_by_the_box_or_by_v():
-    free = claim(("-x", "-y"), "region", ROUND, rest=ORIGIN)
+    free = claim(("-x", "-y"), "region", ROUND, equilibrium=ORIGIN)
     assert 3.9 < free.numbers["level"] < 4.0
     assert free.numbers["limited_by"] == "border"
     # x' = -x + x^3: everything up to |x| = 1.
-    held = claim(("-x + x**3", "-y"), "region", ROUND, rest=ORIGIN)
+    held = claim(("-x + x**3", "-y"), "region", ROUND, equilibrium=ORIGIN)
     assert 0.99 < held.numbers["level"] < 1.0 <= held.numbers["refuted_level"] < 1.001
     low, high = held.numbers["size"]
     assert low < np.pi * held.numbers["level"] < high < 1.01 * low
@@ -93,12 +93,12 @@ def test_largest_level_is_bounded_by_the_box_or_by_v():
 
 @pytest.mark.parametrize("level", [0.5, 0.9, 0.99])
 def test_given_level_that_holds(level):
-    found = claim(("-x + x**3", "-y"), "region", ROUND, rest=ORIGIN, level=level)
+    found = claim(("-x + x**3", "-y"), "region", ROUND, equilibrium=ORIGIN, level=level)
     assert (found.outcome, found.numbers["level"]) == ("proved", level)
 
 
 def test_too_large_a_level_is_refuted_by_an_exact_state():
-    found = claim(("-x + x**3", "-y"), "region", ROUND, rest=ORIGIN, level=1.5)
+    found = claim(("-x + x**3", "-y"), "region", ROUND, equilibrium=ORIGIN, level=1.5)
     assert found.outcome == "refuted"
     s = fractions(found.refutation().evidence["state"])
     x, y = s["x"], s["y"]
@@ -107,7 +107,7 @@ def test_too_large_a_level_is_refuted_by_an_exact_state():
 
 
 def test_level_that_reaches_the_border_is_refuted_there():
-    found = claim(("-x", "-y"), "region", ROUND, rest=ORIGIN, level=4.5)
+    found = claim(("-x", "-y"), "region", ROUND, equilibrium=ORIGIN, level=4.5)
     s = fractions(found.refutation().evidence["state"])
     assert found.refutation().name == "bounded"
     assert max(abs(s["x"]), abs(s["y"])) == 2
@@ -126,14 +126,14 @@ def test_set_that_motions_leave_is_refuted_between_two_states():
 
 
 def test_false_indicators_are_refuted():
-    not_positive = claim(("-x", "-y"), "region", "x**2 - y**2", rest=ORIGIN)
+    not_positive = claim(("-x", "-y"), "region", "x**2 - y**2", equilibrium=ORIGIN)
     assert outcomes(not_positive)["positive"] == "refuted"
     s = fractions(not_positive.refutation().evidence["state"])
     assert s["x"] ** 2 - s["y"] ** 2 <= 0
-    shifted = claim(("-x", "-y"), "region", f"{ROUND} + 1", rest=ORIGIN)
+    shifted = claim(("-x", "-y"), "region", f"{ROUND} + 1", equilibrium=ORIGIN)
     assert outcomes(shifted)["set"] == "refuted"
-    no_rest = claim(("1 - x", "-y"), "region", ROUND, rest=ORIGIN)
-    assert outcomes(no_rest)["rest"] == "refuted"
+    no_equilibrium = claim(("1 - x", "-y"), "region", ROUND, equilibrium=ORIGIN)
+    assert outcomes(no_equilibrium)["equilibrium"] == "refuted"
     jumps_at_zero = claim(("-x", "-y"), "region", "max(where(y <= 0, 1, 2)*(x**2 + y**2) - 1, 0)")
     assert outcomes(jumps_at_zero)["continuous"] == "refuted"
     s = fractions(jumps_at_zero.refutation().evidence["state"])
@@ -169,26 +169,26 @@ def test_parameters_take_all_their_values():
 
 
 def test_a_saddle_is_unstable_by_an_indefinite_function():
-    found = claim(("x", "-y"), "unstable", "x**2 - y**2", rest=ORIGIN)
+    found = claim(("x", "-y"), "unstable", "x**2 - y**2", equilibrium=ORIGIN)
     assert found.outcome == "proved"
 
 
 def test_a_stable_node_is_not_unstable():
-    found = claim(("-x", "-y"), "unstable", ROUND, rest=ORIGIN)
+    found = claim(("-x", "-y"), "unstable", ROUND, equilibrium=ORIGIN)
     assert found.outcome == "refuted"
     s = fractions(found.refutation().evidence["state"])
     assert -2 * s["x"] ** 2 - 2 * s["y"] ** 2 <= 0 < s["x"] ** 2 + s["y"] ** 2
 
 
 def test_rest_outside_of_the_box_is_undecided():
-    assert claim(("x", "y"), "unstable", ROUND, ((1.0, 2.0), (1.0, 2.0)), rest=ORIGIN).outcome == "undecided"
+    assert claim(("x", "y"), "unstable", ROUND, ((1.0, 2.0), (1.0, 2.0)), equilibrium=ORIGIN).outcome == "undecided"
 
 
 @pytest.mark.usefixtures("impatient")
 def test_a_set_that_repels():
     f = f"({ROUND} - 1)"
     found = claim((f"-y + x*{f}", f"x + y*{f}"), "unstable", f"{f}**2", ((-2.0, 2.0), (-2.0, 2.0)))
-    # The centre is at rest, with V = 1.
+    # The centre is at equilibrium, with V = 1.
     assert found.outcome == "refuted"
     outer = claim((f"-y + x*{f}", f"x + y*{f}"), "unstable", f"{ROUND} - 1")
     assert outer.outcome == "proved"
@@ -223,7 +223,7 @@ def test_sliding_to_rest():
     assert outcomes(found)["switching"] == "proved"
     assert any("in the sense of Filippov" in assumption for assumption in found.assumptions)
     assert "all motions, in Filippov's sense, that start in" in sentence(found)
-    assert "Filippov" not in sentence(claim(DAMPED, "attracts", ROUND, rest=ORIGIN))
+    assert "Filippov" not in sentence(claim(DAMPED, "attracts", ROUND, equilibrium=ORIGIN))
 
 
 def test_v_may_fall_on_both_sides_and_rise_in_between():

@@ -180,7 +180,7 @@ def test_states_beyond_the_limit_cycle_escape():
 
 
 def test_the_unstable_rest_of_the_switching_system_attracts():
-    """Which no claim says: motions inside of the set go out from the rest's neighbourhood and come back to it."""
+    """Which no claim says: motions inside of the set go out from the equilibrium's neighbourhood and come back to it."""
     flown = turned(0.25, 1e-3)
     assert flown[0].max() == pytest.approx(0.5, rel=1e-3)
     assert np.abs(flown[:, -1]).max() < 1e-6

@@ -9,7 +9,7 @@ from flint import Ordering, fmpq, fmpq_mpoly_ctx
 from starhold.certification.invariant import builtin_names, certify, parse, write
 from starhold.checker import check, passed
 from starhold.checker.cells import divides, linear, negative_multiple, signed_like
-from starhold.checker.cover import Question, answer
+from starhold.checker.covering import Question, answer
 from starhold.checker.exact import CheckError
 from starhold.checker.reading import read, read_names
 from tests.certification.invariants import proved
@@ -29,7 +29,7 @@ theorem = "{theorem}"
 V = {V}
 {more}
 """
-ORIGIN = "rest = { x = 0, y = 0 }"
+ORIGIN = "equilibrium = { x = 0, y = 0 }"
 ROUND = '"x**2 + y**2"'
 
 
@@ -93,7 +93,7 @@ def test_a_level_above_what_is_true_fails(name, made):
             numbers["level"] = 1.01 * numbers["refuted_level"]
             claims[place]["numbers"] = {key: numbers[key] for key in ("theorem", "level")}
 
-        # Without the remarks the obligations alone have to give it away. A rest at which V' = 0 is not looked for.
+        # Without the remarks the obligations alone have to give it away. An equilibrium at which V' = 0 is not looked for.
         found = check(changed(made[name], bare))
         assert not passed(found)
         assert name == "orbit" or any(f.verdict == "fails" for f in found)
@@ -166,8 +166,8 @@ def test_what_else_a_file_may_have_wrong(made):
         lambda subject, claims: claims[0]["witness"]["limit"].__setitem__("x", 0.5),
         lambda subject, claims: claims[0].__setitem__("outcome", "refuted"),
         lambda subject, claims: claims[0].__setitem__("assumptions", []),
-        lambda subject, claims: subject["rest"].__setitem__(0, None),
-        lambda subject, claims: subject["rest"].__setitem__(0, {"x": "1/7", "y": "0"}),
+        lambda subject, claims: subject["equilibrium"].__setitem__(0, None),
+        lambda subject, claims: subject["equilibrium"].__setitem__(0, {"x": "1/7", "y": "0"}),
         lambda subject, claims: subject["variables"].append("z"),
         lambda subject, claims: subject.pop("rates"),
         lambda subject, claims: subject["rates"].__setitem__("x", "__import__('os').getcwd()"),

@@ -170,14 +170,14 @@ y = [-1, 1]
 [[claim]]
 theorem = "region"
 V = "x**2 + y**2"
-rest = { x = 0, y = 0 }
+equilibrium = { x = 0, y = 0 }
 """
 
 
 def test_a_small_file_is_read():
     problem = parse(GOOD, "small.toml")
     assert problem.name == "small"
-    assert problem.claims[0].rest == (0, 0)
+    assert problem.claims[0].equilibrium == (0, 0)
 
 
 @pytest.mark.parametrize(
@@ -193,11 +193,12 @@ def test_a_small_file_is_read():
         ('"region"', '"regoin"', "claim[1].theorem", "did you mean region?"),
         ('V = "x**2 + y**2"', 'V = "x**2 + w"', "claim[1].V", 'found the name "w"'),
         ('V = "x**2 + y**2"\n', "", "claim[1].V", "this key is required"),
-        ("rest = { x = 0, y = 0 }", "rest = { x = 0 }", "claim[1].rest.y", "this key is required"),
-        ("rest = { x = 0, y = 0 }", 'rest = { x = 0, y = "1/0" }', "claim[1].rest.y", "a fraction"),
-        ("rest = { x = 0, y = 0 }", "level = -1", "claim[1].level", "a positive number"),
-        ("rest = { x = 0, y = 0 }", "escapes = 1", "claim[1].escapes", "did you mean escape?"),
-        ("rest = { x = 0, y = 0 }", 'escape = "abs(x)"', "claim[1].escape", "one polynomial"),
+        ("equilibrium = { x = 0, y = 0 }", "rest = { x = 0, y = 0 }", "claim[1].rest", "it is called equilibrium"),
+        ("equilibrium = { x = 0, y = 0 }", "equilibrium = { x = 0 }", "claim[1].equilibrium.y", "this key is required"),
+        ("equilibrium = { x = 0, y = 0 }", 'equilibrium = { x = 0, y = "1/0" }', "claim[1].equilibrium.y", "a fraction"),
+        ("equilibrium = { x = 0, y = 0 }", "level = -1", "claim[1].level", "a positive number"),
+        ("equilibrium = { x = 0, y = 0 }", "escapes = 1", "claim[1].escapes", "did you mean escape?"),
+        ("equilibrium = { x = 0, y = 0 }", 'escape = "abs(x)"', "claim[1].escape", "one polynomial"),
         ('["x", "y"]', '["x", "max"]', "variables", "a name of letters"),
         ('["x", "y"]', '["x", "x"]', "variables", "a name that is not taken"),
         ('["x", "y"]', "[]", "variables", "a list of 1 to 6 names"),
@@ -213,8 +214,8 @@ def test_a_small_file_is_read():
         ('x = "-x"', "x = 0x" + "f" * 5000, "rates.x", "1000 digits"),
         ('x = "-x"', "x = " + "9" * 5000, "", "not TOML"),
         ('V = "x**2 + y**2"', "V = " + "[" * 400 + "]" * 400, "", "claim[1].V"),
-        ("rest = { x = 0, y = 0 }", "level = 1e300", "claim[1].level", "at most 1e+100"),
-        ("rest = { x = 0, y = 0 }", f'name = "{"n" * 300}"', "claim[1].name", "at most 100 characters"),
+        ("equilibrium = { x = 0, y = 0 }", "level = 1e300", "claim[1].level", "at most 1e+100"),
+        ("equilibrium = { x = 0, y = 0 }", f'name = "{"n" * 300}"', "claim[1].name", "at most 100 characters"),
         ('name = "small"', f'name = "{"n" * 300}"', "name", "at most 100 characters"),
     ],
 )

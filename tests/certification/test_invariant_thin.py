@@ -26,7 +26,7 @@ y = [-1.5, 1.5]
 [[claim]]
 theorem = "{theorem}"
 V = "{V}"
-{rest}
+{equilibrium}
 """
 ON = (
     "(1 if {0} <= 0 and {0} >= 0 else 0)",
@@ -42,9 +42,9 @@ ON = (
 """Texts for what is 1 where something is zero, else 0."""
 
 
-def written(folder, x="-x", y="-y", V=ROUND, theorem="region", rest="rest = { x = 0, y = 0 }"):
+def written(folder, x="-x", y="-y", V=ROUND, theorem="region", equilibrium="equilibrium = { x = 0, y = 0 }"):
     """A certificate, as the file holds it."""
-    found = certify(parse(FILE.format(x=x, y=y, V=V, theorem=theorem, rest=rest), "mine.toml"))
+    found = certify(parse(FILE.format(x=x, y=y, V=V, theorem=theorem, equilibrium=equilibrium), "mine.toml"))
     write(found, folder / "c.json")
     return found, json.loads((folder / "c.json").read_text(encoding="utf-8"))
 
@@ -116,10 +116,10 @@ def test_the_checker_shows_what_is_the_same_on_a_surface(tmp_path):
 
 
 def test_a_rest_may_be_one_on_its_surface_only():
-    found = claim(("-sign(x) - x", "-y"), "region", ROUND, rest=ORIGIN)
-    assert outcomes(found)["rest"] == "proved"
-    still = claim(("1 - 2*where(x < 0, 0, 1) + (1 if x <= 0 <= x else 0)", "-y"), "region", ROUND, rest=ORIGIN)
-    assert outcomes(still)["rest"] == "proved"
+    found = claim(("-sign(x) - x", "-y"), "region", ROUND, equilibrium=ORIGIN)
+    assert outcomes(found)["equilibrium"] == "proved"
+    still = claim(("1 - 2*where(x < 0, 0, 1) + (1 if x <= 0 <= x else 0)", "-y"), "region", ROUND, equilibrium=ORIGIN)
+    assert outcomes(still)["equilibrium"] == "proved"
 
 
 def test_rates_on_a_surface_have_to_lead_through_it_too():
@@ -177,7 +177,7 @@ PYTHON["where"] = lambda c, a, b: a if c else b
 
 
 def made(random):
-    """Rates, V, theorem and rest, with something thin in one of them."""
+    """Rates, V, theorem and equilibrium, with something thin in one of them."""
 
     def one(texts):
         return texts[random.integers(len(texts))]
@@ -195,7 +195,7 @@ def made(random):
     theorem = one(("region", "stable", "attracts", "unstable"))
     if theorem == "unstable":
         rates = [f"-({rate})" for rate in rates]
-    return rates, V, theorem, "rest = { x = 0, y = 0 }" if random.random() < 0.6 else ""
+    return rates, V, theorem, "equilibrium = { x = 0, y = 0 }" if random.random() < 0.6 else ""
 
 
 def on_lines(random):
@@ -211,8 +211,8 @@ def on_lines(random):
 def test_what_is_proved_holds_on_surfaces_too(seed, tmp_path):
     """By exact values of the texts, and by motions that keep to a line while the rates there point along it."""
     random = np.random.default_rng(seed)
-    rates, V, theorem, rest = made(random)
-    found, content = written(tmp_path, *rates, V, theorem, rest)
+    rates, V, theorem, equilibrium = made(random)
+    found, content = written(tmp_path, *rates, V, theorem, equilibrium)
     verdicts = {f.verdict for f in check(content)}
     assert "fails" not in verdicts
     assert found.outcome == "proved" or verdicts <= {"not claimed", "not checked"}

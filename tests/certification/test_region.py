@@ -106,13 +106,13 @@ def test_v_falls_at_random_states_of_the_set_and_at_the_worst(root, b, sign_poli
 
 
 def test_nothing_larger_is_shown():
-    """The level is within a few percent of where V does not fall, or of the other quaternion's rest."""
+    """The level is within a few percent of where V does not fall, or of the other quaternion's equilibrium."""
     beta = fmpq(428, 100000)
     assert holds(ENERGY, beta, fmpq(356, 100))
     assert not holds(ENERGY, beta, fmpq(37, 10))
     assert holds(SHAPES[0], beta, fmpq(99, 10))
     assert not holds(SHAPES[0], beta, fmpq(103, 10))
-    # Beyond the other quaternion's rest, where V' = 0.
+    # Beyond the other quaternion's equilibrium, where V' = 0.
     assert not holds(Shape(5.0, -0.2, 2.0, 0.9), beta, fmpq(93, 10))
     # A mixed term that outweighs the damping.
     assert not holds(Shape(5.0, 0.0, 4.1, 0.0), beta, fmpq(1, 100))

@@ -37,7 +37,7 @@ def faults(content):
         (-0.2, PLAIN, 3.5528, 3.5530),
         (-0.2, BETTER, 8.8976, 8.8978),
         (-1.0, PLAIN, 3.6593, 3.6595),
-        # The other rest bounds the level.
+        # The other equilibrium bounds the level.
         (-1.0, BETTER, 9.1999, 9.2001),
         (-2.0, PLAIN, 3.7956, 3.7958),
         (-2.0, BETTER, 9.1999, 9.2001),
@@ -73,7 +73,7 @@ def test_the_quaternion_sign(sign_policy):
     )
     # With another root V falls beyond half a turn, where the shorter way switches.
     wide = file(region(4.5, sign_policy=sign_policy, a=-2.0), -2.0, -0.05, quaternion_sign=sign_policy)
-    assert list(faults(wide)) == (["single rest in the set"] if sign_policy == "shortest" else [])
+    assert list(faults(wide)) == (["single equilibrium in the set"] if sign_policy == "shortest" else [])
     other = "hysteresis" if sign_policy != "hysteresis" else "as_published"
     assert faults(file(region(3.58, sign_policy=other), quaternion_sign=sign_policy))
     for width in (0.0, 1.0, 2.0):
@@ -116,7 +116,7 @@ def test_a_number_that_says_more_fails(c, witness):
 
 
 def test_a_turn_beyond_where_v_is_largest_fails():
-    # p u + c2 u2 is largest at u = 1.25, and lower again at the other rest.
+    # p u + c2 u2 is largest at u = 1.25, and lower again at the other equilibrium.
     witness = (5.0, -2.0, 2.0, 0.9)
     assert "" not in faults(file(region(3.13, witness, slew_angle=2.0 * math.acos(1.0 - 1.9), rate=0.0)))
     assert "" in faults(file(region(3.12, witness, slew_angle=2.0 * math.acos(1.0 - 1.9), rate=0.0)))
@@ -188,8 +188,8 @@ def test_another_law_is_refused():
 UNREAD = "the law divides by 1 + |q|2, which such a claim does not take"
 PROOF = {"stiffness": 0.1, "epsilon": 0.0, "rho": 0.0, "rate_bound": None}
 CONTENTS = {"start": 0.01, "everything": False, "slew_angle": 0.1, "rate": 0.01, "rate_everywhere": None}
-EASY = {"form": "exact identity", "target": "exact identity", "only rest": "LaSalle", "torque": "ball arithmetic"}
-CONVERGES = ("form", "positive", "descent", "target", "only rest", "single rest in the set")
+EASY = {"form": "exact identity", "target": "exact identity", "only equilibrium": "LaSalle", "torque": "ball arithmetic"}
+CONVERGES = ("form", "positive", "descent", "target", "only equilibrium", "single equilibrium in the set")
 END = {"torque": 1e-6, "start": 0.01, "level": 0.01, "slew_angle": 0.1, "rate_start": 0.01, "angle": 0.1, "rate": 0.01}
 SURFACE = {
     "torque": [0.0] * 3,
@@ -209,7 +209,7 @@ OTHERS = {
         [a for a in TEXTBOOK if a != TEXTBOOK[4]],
     ),
     "inertia": (
-        ("form", "positive", "descent", "strict", "single rest in the set"),
+        ("form", "positive", "descent", "strict", "single equilibrium in the set"),
         CONTENTS | {"tolerance": 0.05},
         {"stiffness": 0.1, "epsilon": 1e-3, "rho": 0.5, "level": 0.01},
         [TEXTBOOK[0], "inertia within the tolerance", *TEXTBOOK[2:5], "no torque from outside", "target at rest"],

@@ -155,7 +155,7 @@ def test_the_damping_as_published_is_taken():
                     l2_circle.neutral(measurement, gains, plant), (measurement.position[1], 0.0, 0.0)
                 )
             },
-            "along X depends on the rest",
+            "along X depends on the other axes",
         ),
         # What turns (f2, f3) keeps V, and moves them in another way.
         (

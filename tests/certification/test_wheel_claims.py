@@ -109,7 +109,7 @@ def test_the_wheel_law_converges_almost_always_whatever_the_wheels_store(gains, 
     assert certificate.outcome == "proved"
     main = certificate.claim("convergence")
     assert main.numbers["everything"]
-    assert [o.name for o in main.obligations][-2:] == ["only rest", "half turns repel"]
+    assert [o.name for o in main.obligations][-2:] == ["only equilibrium", "half turns repel"]
     assert certificate.claim("inertia").numbers["tolerance"] is None
     assert "half turns" in sentence(main, certificate.subject)
 

@@ -20,7 +20,7 @@ def proved(tmp_path_factory):
 
 def outcomes(path):
     content = json.loads(path.read_text())
-    assert content["format"] == "starhold certificate 1"
+    assert content["format"] == "starhold certificate 2"
     return {c["name"]: {claim["kind"]: claim["outcome"] for claim in c["claims"]} for c in content["certificates"]}
 
 
@@ -89,7 +89,7 @@ def test_what_nobody_can_prove_is_undecided(tmp_path):
     [
         ('rate = "-1 deg/s"', "certify.rate"),
         ('rate = "anything"', "certify.rate"),
-        ('slew_angle = "181 deg"', "certify.turn"),
+        ('slew_angle = "181 deg"', "certify.slew_angle"),
         ("inertia_tolerance = 1.5", "certify.inertia_tolerance"),
         ("disturbance = -1e-5", "certify.disturbance"),
         ("speed = 1.0", "certify.speed"),

@@ -22,7 +22,7 @@ y = [-2, 2]
 [[claim]]
 theorem = "{theorem}"
 V = "x**2 + y**2"
-rest = {{ x = 0, y = 0 }}
+equilibrium = {{ x = 0, y = 0 }}
 {more}
 """
 
@@ -38,7 +38,7 @@ def test_what_is_proved(tmp_path):
     for word in (
         "proved",
         "region of attraction (theorem 2)",
-        "come to the rest",
+        "come to the equilibrium",
         "no level reaches 1",
         "interval arithmetic",
     ):

@@ -139,8 +139,8 @@ def test_every_kind_of_claim_can_be_told_where_it_is_undecided(kind: str) -> Non
         "wheels": {"momentum": 0.1},
         "region": {},
         "circle": {},
-        "rest": {},
-        "saturated-axis": {"limit": 1.0, "width": 0.1, "switching_gain": 100.0, "boundary": 0.11},
+        "equilibrium": {},
+        "saturated-axis": {"limit": 1.0, "width": 0.1, "reach": 100.0, "boundary": 0.11},
         "control-limit": {"kind": "norm", "limit": 3.5},
         "sliding": {"torque": [0.0, 0.0, 0.0], "margin": 1e-3},
     }[kind]

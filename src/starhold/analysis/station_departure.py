@@ -51,7 +51,7 @@ def station_departures(
 def _conditions(claim: Claim, loop: ClosedLoop, run: Recording) -> list[tuple[Any, str]]:
     """The samples (n,) that a claim assumes not to be, beside lag and its set, each with its sentence."""
     command, limit, kind = run["command"], loop.cutoff(), loop.limit
-    if claim.kind in ("circle", "rest"):
+    if claim.kind in ("circle", "equilibrium"):
         return [(on_limit(command, limit, kind), "the control reaches its limit")]
     if claim.kind == "saturated-axis" and kind != "none":
         return [(on_limit(command[:, 1:], limit, "axis"), "the control along Y or Z reaches its limit")]

@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 import starhold
 
-FORMAT = "starhold certificate 1"
+FORMAT = "starhold certificate 2"
 FILE = "certificate.json"
 Outcome = Literal["proved", "refuted", "undecided"]
 EXACT, BALLS, LASALLE = "exact identity", "ball arithmetic", "LaSalle"

@@ -1,4 +1,4 @@
-"""The claim that every motion from {V <= start} comes to rest on target, and which part the double cover plays in it."""
+"""The claim that every motion from {V <= start} comes to rest on target, and which part the quaternion sign plays in it."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ def convergence(motion: Motion, rate: Any = "best") -> tuple[Claim, Basin | None
         if frame.K.terms:
             bound = exact(below(least(symmetric_part(frame.D)) * ALMOST / frame.cubic))
             if bound <= 0:
-                rising("the damping around rest is not definite, or too weak for what is cubic in the rate")
+                rising("the damping around the equilibrium is not definite, or too weak for what is cubic in the rate")
                 return finish()
     else:
         strict = _strict(motion, frame)
@@ -186,7 +186,7 @@ def reached(basin: Basin, level: Any | None, bounded: bool = False) -> tuple[lis
     found.add("target", EXACT, None if reason else True, {"reason": reason} if reason else {})
     if basin.cross is None:
         # Without terms of V' that are linear in the rate, the torque at rest is the slope of the potential.
-        found.add("only rest", LASALLE, *((True, None) if basin.frame.potential.even else _rests_only_there(motion)))
+        found.add("only equilibrium", LASALLE, *((True, None) if basin.frame.potential.even else _only_equilibrium(motion)))
     else:
         found.add("strict", EXACT_SIGN, True)
     found.add(*_quaternion_sign(motion, basin.frame, level))
@@ -258,7 +258,7 @@ def _strict(motion: Motion, frame: Frame) -> tuple[Cross, Any, Any, Any | None] 
 
 
 def _capped(stay: Any | None, motion: Motion, frame: Frame, rho: Any) -> Any | None:
-    """The level, no higher than the treatment of the double cover allows."""
+    """The level, no higher than the treatment of the quaternion sign allows."""
     loop = motion.subject.loop
     if frame.potential.even:
         return stay
@@ -283,7 +283,7 @@ def _quaternion_sign(motion: Motion, frame: Frame, stay: Any | None) -> tuple[st
     loop = motion.subject.loop
     even = frame.potential.even
     if stay is not None and stay < frame.potential.barrier and (even or loop.sign_policy != "hysteresis"):
-        return "single rest in the set", EXACT_SIGN, True, {}
+        return "single equilibrium in the set", EXACT_SIGN, True, {}
     if even:
         # V has no minimum there, and falls wherever the body turns.
         return "half turns repel", EXACT_SIGN, True, {}
@@ -294,8 +294,13 @@ def _quaternion_sign(motion: Motion, frame: Frame, stay: Any | None) -> tuple[st
         # Whatever momentum the wheels store, by the same argument as for any inertia.
         stiffness = motion.linear(-1)[1]
         held = stiffness == transpose(stiffness) and definite(stiffness)
-        return "other rest repels", EXACT_SIGN, held or None, {} if held else {"reason": "the stiffness is not symmetric"}
-    return ("other rest repels", "certified roots", *_repels(motion))
+        return (
+            "other equilibrium repels",
+            EXACT_SIGN,
+            held or None,
+            {} if held else {"reason": "the stiffness is not symmetric"},
+        )
+    return ("other equilibrium repels", "certified roots", *_repels(motion))
 
 
 def _repels(motion: Motion) -> tuple[bool | None, dict[str, Any]]:
@@ -330,7 +335,7 @@ def _depends_on(motion: Motion, bounded: bool) -> str:
     return ""
 
 
-def _rests_only_there(motion: Motion) -> tuple[bool | None, dict[str, Any]]:
+def _only_equilibrium(motion: Motion) -> tuple[bool | None, dict[str, Any]]:
     """Whether a body without rate stays so only where q = 0: there the acceleration must be -J^-1 K q with a regular K."""
     K = motion.linear()[1]
     for component in motion.acceleration:

@@ -26,7 +26,7 @@ from flint import fmpq
 from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import Polynomial, exact
-from starhold.certification.gyroscopic import Swing, gyroscopic_torque
+from starhold.certification.gyroscopic import GyroscopicTorque, gyroscopic_torque
 from starhold.certification.matrices import (
     Rows,
     block,
@@ -65,14 +65,14 @@ class ShrinkingStep:
 
 @dataclass(frozen=True)
 class Nearby:
-    """The motion near rest on target, of a torque from outside up to `torque`; bounds: |w| and |q|."""
+    """The motion near the equilibrium on target, of a torque from outside up to `torque`; bounds: |w| and |q|."""
 
     motion: Motion
     torque: Any
 
     @cached_property
     def accelerations(self) -> list[Polynomial]:
-        """Those of the piece that holds around rest; ShapeError where they have other terms than told above."""
+        """Those of the piece that holds around the equilibrium; ShapeError where they have other terms than told above."""
         found = [at_rest(component)[1] for component in self.motion.acceleration]
         kinds = {"".join(name[0] for name in m) for component in found for m in component.terms}
         if kinds - {"q", "w", "ww", "e", "m"} or any("q0" in component.variables() for component in found):
@@ -93,7 +93,7 @@ class Nearby:
         return matmul(found, found)
 
     @cached_property
-    def gyroscopic_torque(self) -> Swing:
+    def gyroscopic_torque(self) -> GyroscopicTorque:
         """The bound of |g| over |w|2."""
         J, zero = self.motion.subject.inertia, Polynomial.constant(0)
         turned = [sum((c * part for c, part in zip(row, self.accelerations, strict=True)), zero) for row in J]

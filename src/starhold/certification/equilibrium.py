@@ -46,13 +46,13 @@ class Axis(NamedTuple):
     limit: Any
 
 
-def rests(loop: ClosedLoop) -> Claim:
-    """That every motion ends at rest where the law wants it."""
+def returns(loop: ClosedLoop) -> Claim:
+    """The claim that every motion ends at the equilibrium that the law makes."""
     found = Obligations()
 
     def finish() -> Claim:
         clear = () if model_of(loop) == "linear" else (CLEAR,)
-        return Claim("rest", {}, {}, assumed(loop, UNLIMITED, *clear), tuple(found))
+        return Claim("equilibrium", {}, {}, assumed(loop, UNLIMITED, *clear), tuple(found))
 
     reason = mismatch(loop)
     if reason or not _separate(loop):

@@ -36,8 +36,8 @@ OUTSIDE = ("e", "m")
 
 @dataclass(frozen=True)
 class Frame:
-    """The parts of V and V' around rest; `reach`: the rate up to which they hold (rad/s), None for any; `whole`: whether
-    V' is made of one piece."""
+    """The parts of V and V' around the equilibrium; `reach`: the rate up to which they hold (rad/s), None for any; `whole`:
+    whether V' is made of one piece."""
 
     P: Rows
     potential: Potential

@@ -28,25 +28,25 @@ from starhold.certification.motion import RATE
 
 
 @dataclass(frozen=True)
-class Swing:
-    """|G(w)| <= most w.Pw for a vector G of quadratic forms; `shift` and `weight`: what showed it, see `swing`; None where
-    the forms were bounded one by one."""
+class GyroscopicTorque:
+    """|G(w)| <= most w.Pw for a vector G of quadratic forms; `shift` and `weight`: what showed it, see `gyroscopic_torque`;
+    None where the forms were bounded one by one."""
 
     most: Any
     shift: Any | None = None
     weight: Any | None = None
 
 
-def gyroscopic_torque(parts: Sequence[Polynomial], P: Rows) -> Swing:
+def gyroscopic_torque(parts: Sequence[Polynomial], P: Rows) -> GyroscopicTorque:
     """The least bound that was found of the part of polynomials that is quadratic in the rate.
 
     If G(w) = w x Aw, so G(w) = w x (A + p)w for every p, and |G(w)| <= |w||(A + p)w| <= (c|w|2 + |(A + p)w|2/c)/2, which is
     at most most w.Pw if (A + p)'(A + p) + c2 <= 2 c most P. Of w x Jw this is sharp: half the range of the moments for
     P = 1, (J3 - J1)/(2 sqrt(J1 J3)) for P = J.
     """
-    forms = [matrix_of(part.only(is_swing), RATE, RATE) for part in parts]
+    forms = [matrix_of(part.only(is_gyroscopic), RATE, RATE) for part in parts]
     each = [max(relative_greatest(times(sign, form), P) for sign in (1, -1)) for form in forms]
-    found = Swing(each[0] if len(each) == 1 else root_above(sum((x * x for x in each), fmpq(0))))
+    found = GyroscopicTorque(each[0] if len(each) == 1 else root_above(sum((x * x for x in each), fmpq(0))))
     A = crossed(forms)
     if A is None or found.most == 0:
         return found
@@ -72,10 +72,10 @@ def gyroscopic_torque(parts: Sequence[Polynomial], P: Rows) -> Swing:
     best = min(tried, key=lambda found: found.fun).x
     p, c = float(best[0] * size), float(size * np.exp(best[1]))
     other = relative_greatest(both(p, c), P) / (2 * exact(c))
-    return found if found.most <= other else Swing(other, exact(p), exact(c))
+    return found if found.most <= other else GyroscopicTorque(other, exact(p), exact(c))
 
 
-def is_swing(monomial: Monomial) -> bool:
+def is_gyroscopic(monomial: Monomial) -> bool:
     """Whether a monomial is quadratic in the rate and holds nothing else."""
     return len(monomial) == 2 and set(monomial) <= set(RATE)
 

@@ -110,7 +110,7 @@ class Family:
             ("form", EXACT),
             ("positive", EXACT_SIGN),
             ("descent", EXACT_SIGN),
-            ("only rest", LASALLE),
+            ("only equilibrium", LASALLE),
             ("half turns repel", EXACT_SIGN) if even else _cover(cover),
         ]
         held = contents(start, self.frame.P, self.frame.potential)
@@ -158,7 +158,7 @@ class Family:
         return self._proved(numbers, witness | {"level": None if level is None else number(level)}, obligations)
 
     def _levels(self, rho: Any) -> tuple[Any | None, Any | None]:
-        """The level that the double cover allows, and that from which motions stay below it."""
+        """The level that the quaternion sign allows, and that from which motions stay below it."""
         loop, s = self.nominal.subject.loop, self.frame.s
         if loop.sign_policy == "as_published":
             return None, None
@@ -239,7 +239,11 @@ class Family:
 def _cover(cover: str) -> tuple[str, str]:
     """Near q0 = -1 the function falls as it does near the target but is no minimum there, hence by the inertia theorem
     for Lyapunov's equation that rest has unstable directions and none that is neutral."""
-    names = {"hysteresis": "jumps lower V", "shortest": "single rest in the set", "as_published": "other rest repels"}
+    names = {
+        "hysteresis": "jumps lower V",
+        "shortest": "single equilibrium in the set",
+        "as_published": "other equilibrium repels",
+    }
     return names[cover], EXACT_SIGN
 
 

@@ -14,7 +14,7 @@ from starhold.algebra.polynomial import Polynomial, exact, jointly
 from starhold.certification.certificate import BALLS, Claim, Obligation
 from starhold.certification.convergence import Basin, assumed, reached
 from starhold.certification.frame import contents
-from starhold.certification.gyroscopic import Swing, gyroscopic_torque, is_swing
+from starhold.certification.gyroscopic import GyroscopicTorque, gyroscopic_torque, is_gyroscopic
 from starhold.certification.matrices import (
     Rows,
     floats,
@@ -45,15 +45,17 @@ Terms: TypeAlias = tuple[tuple[tuple[int, int, int], int, Any], ...]
 
 @dataclass(frozen=True)
 class LimitedLoad:
-    """What bounds one axis of the torque (or its norm, or a motor's). Of its part Bw, linear in the rate, the square of the
-    greatest norm for w.Pw = 1; `swing` of the part G(w) that is quadratic, and `mixed`, what |Bw.G(w)| does not exceed: so
-    |Bw + G(w)|2 <= rate z2 + 2 mixed z3 + swing2 z4 for w.Pw = z2. Of what is linear in the attitude the square; of each
-    component the other monomials as (powers of |w_j|, power of |q|, size). `lines`: of a single component pairs l, r with
-    |Bw + G(w)| <= l z2 + r too. `limit`: what it has to keep below."""
+    """Bounds of one axis of the torque (or of its norm, or of a motor's), with z2 = w.Pw.
+
+    `rate`, of the part Bw that is linear in the rate: the square of its greatest norm for z = 1. `gyroscopic`: of the part
+    G(w) that is quadratic. `mixed`: what |Bw.G(w)| does not exceed, so that |Bw + G(w)|2 is at most
+    rate z2 + 2 mixed z3 + gyroscopic2 z4. `lines`: of a single component pairs l, r with |Bw + G(w)| <= l z2 + r too.
+    `attitude`, of what is linear in the attitude: the square of its size. `rest`: of each component the other monomials as
+    (powers of |w_j|, power of |q|, size). `limit`: what the whole has to keep below."""
 
     rate: Any
     attitude: Any
-    swing: Swing
+    gyroscopic: GyroscopicTorque
     mixed: Any
     lines: tuple[tuple[Any, Any], ...]
     rest: tuple[Terms, ...]
@@ -68,7 +70,7 @@ def torque_limit(basin: Basin, turn: float | None = None) -> Claim | None:
         return None
     pieces = jointly(basin.motion.torque)
     numbers: dict[str, Any] = {"limit": limit, "kind": kind}
-    shown_by = Swing(fmpq(0))
+    shown_by = GyroscopicTorque(fmpq(0))
 
     def claim(level: Any | None, holds: bool, evidence: dict[str, Any] | None = None) -> Claim:
         told = told_set(basin, level, turn)
@@ -87,7 +89,7 @@ def torque_limit(basin: Basin, turn: float | None = None) -> Claim | None:
     parts = pieces[0][1]
     carried = loads(basin, parts, kind, exact(limit))
     if kind == "norm":
-        shown_by = carried[0].swing
+        shown_by = carried[0].gyroscopic
     if turn is None:
         level = largest_level(basin, carried)
         return claim(fmpq(0), False, {"reason": "no level is small enough"}) if level is None else claim(level, True)
@@ -176,7 +178,7 @@ def _lines(part: Polynomial, row: list[Any], P: Rows, most: Any) -> tuple[tuple[
     exceeds l w.Pw by b.(l P -+ F)^-1 b/4 at most. The least over all l is its maximum on w.Pw = z2 (S-procedure)."""
     if most == 0 or not any(row):
         return ()
-    F, found = matrix_of(part.only(is_swing), RATE, RATE), list[tuple[Any, Any]]()
+    F, found = matrix_of(part.only(is_gyroscopic), RATE, RATE), list[tuple[Any, Any]]()
     for k in LINES:
         slope = most * (1 + exact(2.0 ** (k / 2)))
         turned = [inverse(plus(times(slope, P), F, sign)) for sign in (1, -1)]
@@ -189,7 +191,7 @@ def _mixed(parts: list[Polynomial], rates: Rows, inverse_of: Rows) -> Any:
     total: Any = Polynomial.constant(0)
     for part, row in zip(parts, rates, strict=True):
         linear = Polynomial({(name,): c for name, c in zip(RATE, row, strict=True) if c != 0})
-        total = total + linear * part.only(is_swing)
+        total = total + linear * part.only(is_gyroscopic)
     sizes = {name: root_above(inverse_of[j][j]) for j, name in enumerate(RATE)}
     return sum((abs(c) * sizes[m[0]] * sizes[m[1]] * sizes[m[2]] for m, c in total.terms.items()), fmpq(0))
 
@@ -209,7 +211,11 @@ def _rest(basin: Basin, component: Polynomial) -> Terms:
     }
     found: list[tuple[tuple[int, int, int], int, Any]] = []
     for monomial, c in component.terms.items():
-        if monomial in basin.frame.potential.linear or (len(monomial) == 1 and monomial[0] in RATE) or is_swing(monomial):
+        if (
+            monomial in basin.frame.potential.linear
+            or (len(monomial) == 1 and monomial[0] in RATE)
+            or is_gyroscopic(monomial)
+        ):
             continue
         size, attitude = abs(c), 0
         for name in monomial:
@@ -231,7 +237,7 @@ class Bound:
         turned = inverse(basin.frame.P)
         self.load, self.potential, self.level = load, basin.frame.potential, arb(level)
         self.rate, self.attitude, self.mixed = arb(load.rate), arb(load.attitude).sqrt(), 2 * arb(load.mixed)
-        self.square = arb(load.swing.most) ** 2
+        self.square = arb(load.gyroscopic.most) ** 2
         self.axes = [arb(turned[j][j]).sqrt() for j in range(3)]
 
     def between(self, first: Any, last: Any) -> arb:
@@ -313,7 +319,7 @@ def guesser(basin: Basin, carried: list[LimitedLoad]) -> Callable[[float], NDArr
         linear, turned = potential.grid(t)
         found: list[float] = []
         for load in carried:
-            rate, attitude, mixed, most = (number(x) for x in (load.rate, load.attitude, load.mixed, load.swing.most))
+            rate, attitude, mixed, most = (number(x) for x in (load.rate, load.attitude, load.mixed, load.gyroscopic.most))
             moving = energy * np.sqrt(rate + 2.0 * mixed * energy + (most * energy) ** 2)
             for slope, offset in load.lines:
                 moving = np.minimum(moving, number(slope) * energy**2 + number(offset))

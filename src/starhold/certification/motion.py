@@ -150,7 +150,7 @@ def _entries() -> Any:
 
 
 def near_rest(truths: Truths) -> bool:
-    """Whether a piece of a law holds around rest on target: none of its conditions is on its border there."""
+    """Whether a piece of a law holds around the equilibrium on target: none of its conditions is on its border there."""
     for condition, truth in truths:
         value = condition.positive.only(lambda monomial: all(name == "q0" for name in monomial))
         at_rest = value.at({"q0": fmpq(1)})
@@ -160,7 +160,7 @@ def near_rest(truths: Truths) -> bool:
 
 
 def at_rest(value: Any) -> tuple[Truths, Polynomial]:
-    """The piece that holds around rest on target, with its conditions; ShapeError where several meet there."""
+    """The piece that holds around the equilibrium on target, with its conditions; ShapeError where several meet there."""
     found = [(case.truths, case.value) for case in pieces(value) if near_rest(case.truths)]
     if len(found) != 1:
         raise ShapeError("the law switches at rest on target")

@@ -41,7 +41,7 @@ class Spring:
 
     @property
     def barrier(self) -> Any:
-        """A rational not above its value at any rest but the target's."""
+        """A rational not above its value at any equilibrium but the target's."""
         return 2 * self.s
 
     def turn(self, level: Any) -> float:
@@ -84,7 +84,7 @@ class Spring:
 
 @dataclass(frozen=True)
 class Cosines:
-    """q.Nq, the weighted sum of 1 - a_ii over the direction cosines: equal at q and -q, with further rests at half turns."""
+    """q.Nq, the weighted sum of 1 - a_ii over the direction cosines: equal at q and -q, with equilibria at half turns."""
 
     N: Rows
     even: ClassVar[bool] = True
@@ -107,7 +107,7 @@ class Cosines:
 
     @cached_property
     def barrier(self) -> Any:
-        """A rational not above its value at any rest but the target's."""
+        """A rational not above its value at any equilibrium but the target's."""
         return least(self.N) if self.s is None else self.s
 
     def turn(self, level: Any) -> float:

@@ -11,7 +11,7 @@ With l = |q|, G = g + m u, beta = ab and K = k/alpha = 2 (1 - 2 beta) u + (1 - 8
     V'/alpha^3 = W^2 f1 + W l x f2 + l^2 f3,    f1 = -2 + K (1 + l^2 x^2)/(1 + l^2) + G q0/2 + m l^2 x^2/2,
     f2 = -2 + (p + 2 c2 u)/2 + G (K - 2),    f3 = -2 G,
 
-for D^-1 v = (v - q x v + q (q.v))/(1 + l^2). On a bounded set {V <= level} on which V' is negative but at the rest on
+for D^-1 v = (v - q x v + q (q.v))/(1 + l^2). On a bounded set {V <= level} on which V' is negative but at the equilibrium on
 target, no motion leaves, V has no other critical point, so that it is positive, and all motions end on target.
 p = 4 with c2 = g = m = 0 leaves W^2 f1 alone.
 """
@@ -50,7 +50,7 @@ class Shape(NamedTuple):
     m: float
 
     @property
-    def other_rest(self) -> float:
+    def other_equilibrium(self) -> float:
         """V/alpha^2 at rest on the other quaternion of the target."""
         return 2.0 * self.p + 4.0 * self.c2
 
@@ -126,14 +126,14 @@ def region(subject: Subject) -> Claim | None:
     told |= {"level": level, "slew_angle": _turn(shape, exact(level) / (a * a)), "rate": root_float(2 * exact(level))}
     found.add("descent", BALLS, True)
     if shape == ENERGY:
-        found.add("only rest", LASALLE, True)
+        found.add("only equilibrium", LASALLE, True)
     if subject.loop.sign_policy == "hysteresis":
         narrow = 0.0 < subject.loop.hysteresis_width < 1.0
         found.add(
             "jumps lower V", EXACT_SIGN, narrow or None, {} if narrow else {"reason": "the width is not between 0 and 1"}
         )
     else:
-        found.add("single rest in the set", EXACT_SIGN, True)
+        found.add("single equilibrium in the set", EXACT_SIGN, True)
     return finish()
 
 
@@ -175,7 +175,7 @@ def _largest(a: Any, beta: Any, cover: str) -> tuple[Shape, float] | None:
     shapes = SHAPES if cover == "as_published" else (ENERGY,)
     # At q0 = 0, where the feedback of the shorter way switches, V is at least half of that on the other quaternion.
     ceiling = 0.5 if cover == "shortest" else 1.0
-    guesses = [(shape, min(_guess(shape, beta), ceiling * shape.other_rest)) for shape in shapes]
+    guesses = [(shape, min(_guess(shape, beta), ceiling * shape.other_equilibrium)) for shape in shapes]
     for shape, guess in sorted(guesses, key=lambda found: -_volume(*found))[:TRIED]:
         for less in LESS:
             level = below(exact(guess * (1.0 - less)) * a * a)
@@ -185,8 +185,8 @@ def _largest(a: Any, beta: Any, cover: str) -> tuple[Shape, float] | None:
 
 
 def _guess(shape: Shape, beta: Any, count: int = 60) -> float:
-    """The least V/alpha^2 at which points of a grid have V' >= 0, at most that of the other quaternion's rest."""
-    least = shape.other_rest
+    """The least V/alpha^2 at which points of a grid have V' >= 0, at most that of the other quaternion's equilibrium."""
+    least = shape.other_equilibrium
     mixed = max(abs(shape.g), abs(shape.g + 2.0 * shape.m))
     grids = (2.0, count), (2.0, count // 2), (mixed + math.sqrt(mixed * mixed + 2.0 * least), count)
     sides = np.meshgrid(*(np.linspace(0.0, size, n + 1)[1:] for size, n in grids))
@@ -203,7 +203,7 @@ def _volume(shape: Shape, bound: float) -> float:
 
 
 def _turn(shape: Shape, bound: Any) -> float:
-    """A turn (rad) up to which all rests are in {V <= bound alpha^2}, bound below the other rest's."""
+    """A turn (rad) up to which all states at rest are in {V <= bound alpha^2}, bound below the other equilibrium's."""
     p, c2 = exact(shape.p), exact(shape.c2)
     size = number(bound)
     u = 2.0 * size / (shape.p + math.sqrt(shape.p**2 + 4.0 * shape.c2 * size))

@@ -42,7 +42,7 @@ they have 4000, which takes minutes."""
 
 
 def sampling(motion: Motion) -> Claim | None:
-    """The claim for the loop's own period, and the longest period; None for a law that is not linear around rest."""
+    """The claim for the loop's own period, and the longest period; None for a law not linear around the equilibrium."""
     try:
         rate, attitude = motion.linear()
     except ArithmeticError:
@@ -141,7 +141,7 @@ def _longest(J: Rows, rate: Rows, attitude: Rows, period: Any) -> Any:
 
 def stable_period(motion: Motion) -> float | None:
     """A period (s) near the longest that floats find stable, the loop's own if that is; None for a law that is not linear
-    around rest, and where there is none. No part of any proof."""
+    around the equilibrium, and where there is none. No part of any proof."""
     try:
         rate, attitude = motion.linear()
     except ArithmeticError:

@@ -99,7 +99,7 @@ def surface_claim(subject: Subject) -> Claim | None:
             {} if turn < 1 else {"reason": "the layer is too thick"},
         )
     steep, cover = spectral_norm_above(found.K), subject.loop.sign_policy
-    add("other rest repels" if cover == "as_published" else "no switch of the double cover", EXACT_SIGN, "proved")
+    add("other equilibrium repels" if cover == "as_published" else "no switch of the quaternion sign", EXACT_SIGN, "proved")
     numbers["surface"] = above(size)
     numbers["angle"] = float((2 * arb(min(turn, fmpq(1))).asin()).upper().mid()) * (1.0 + 1e-15)
     numbers["rate"] = above(size + steep * turn)

@@ -9,7 +9,7 @@ import numpy as np
 
 from starhold.certification.certificate import EXACT, Certificate, Claim, Obligation
 from starhold.certification.circle import attracts, control_limit
-from starhold.certification.equilibrium import rests, saturated_axis
+from starhold.certification.equilibrium import returns, saturated_axis
 from starhold.certification.station_terms import UNLIMITED, assumed, lag_of, model_of
 from starhold.certification.subject import described_gains
 from starhold.loop.closed_loop import ClosedLoop
@@ -25,7 +25,7 @@ def certify_station(loop: ClosedLoop, name: str = "") -> Certificate:
             refused = Obligation(
                 "form", EXACT, "undecided", {"reason": f"gains and plant are too far apart in size: {reason}"}
             )
-            kind = "circle" if loop.law.name == "l2-circle" else "rest"
+            kind = "circle" if loop.law.name == "l2-circle" else "equilibrium"
             claims = [Claim(kind, {}, {}, assumed(loop, UNLIMITED), (refused,))]
     return Certificate(name or loop.law.name, described_station(loop), tuple(claims))
 
@@ -38,7 +38,7 @@ def _claims(loop: ClosedLoop) -> list[Claim]:
         if limited and claims[0].outcome == "proved":
             claims.append(control_limit(loop))
     elif loop.law.name == "l2-equilibrium":
-        claims.append(rests(loop))
+        claims.append(returns(loop))
         if limited and loop.limit == "axis" and model_of(loop) == "linear" and claims[0].outcome == "proved":
             claims.append(saturated_axis(loop))
     return claims

@@ -21,7 +21,7 @@ HEADINGS = {
     "sliding": "reaches its surface",
     "circle": "ends on the circle",
     "control-limit": "within the control's limit",
-    "rest": "comes to rest",
+    "equilibrium": "comes to rest",
     "saturated-axis": "X with limited control",
 }
 
@@ -30,12 +30,12 @@ OBLIGATIONS = {
     "positive": "V is zero on target at rest and positive elsewhere",
     "descent": "V falls wherever the body turns, on the whole set",
     "target": "how the target moves drops out of the error's motion",
-    "only rest": "the body can stay at rest on target only, or on the other quaternion of the same attitude",
+    "only equilibrium": "the body can stay at rest on target only, or on the other quaternion of the same attitude",
     "strict": "a second function falls strictly and stays within a known share of V",
-    "single rest in the set": "the set does not hold the other quaternion's rest",
-    "other rest repels": "rest on the other quaternion is unstable, so that only a set of measure zero ends there",
-    "half turns repel": "half turns, about every axis where weights are equal and about three where they differ, are rests "
-    "too, but unstable, so that only a set of measure zero ends there",
+    "single equilibrium in the set": "the set does not hold the other quaternion's equilibrium",
+    "other equilibrium repels": "rest on the other quaternion is unstable, so that only a set of measure zero ends there",
+    "half turns repel": "half turns, about every axis where weights are equal and about three where they differ, are "
+    "equilibria too, but unstable, so that only a set of measure zero ends there",
     "jumps lower V": "every switch of the hysteresis lowers V",
     "convergence": "the set lies in the region of convergence",
     "torque": "the torque is within the limit on the whole set",
@@ -55,7 +55,7 @@ OBLIGATIONS = {
     "stays": "no motion leaves the strip, although the control is limited",
     "nothing returns from beyond": "beyond the boundary no admissible control brings the motion back",
     "control": "the control is within its limit on the whole set",
-    "no switch of the double cover": "the quaternion that is fed back does not switch on the way",
+    "no switch of the quaternion sign": "the quaternion that is fed back does not switch on the way",
 }
 
 
@@ -118,7 +118,7 @@ def place(numbers: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 
 
 def _rests(turn: float, subject: Mapping[str, Any], more: bool) -> str:
-    """The rests turned up to an angle; an attitude has two quaternions, of which the other is turned by 360° less."""
+    """States at rest turned up to an angle; an attitude has two quaternions, of which the other is turned by 360° less."""
     if turn < math.pi:
         return f"rest at up to {angle(turn, more)}"
     most = {"shortest": math.pi, "hysteresis": 2.0 * math.acos(-min(subject["hysteresis_width"], 1.0)) * (1.0 + 1e-15)}
@@ -244,7 +244,7 @@ def _control_limit(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     return f"{_circles(n)} with x = 0, the control never exceeds {limit} {kind}".strip()
 
 
-def _rest(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
+def _equilibrium(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     return "from everywhere the motion comes to rest where it is wanted"
 
 
@@ -270,7 +270,7 @@ _SENTENCES = {
     "sliding": _sliding,
     "circle": _circle,
     "control-limit": _control_limit,
-    "rest": _rest,
+    "equilibrium": _equilibrium,
     "saturated-axis": _saturated_axis,
 }
 

@@ -9,7 +9,7 @@ import numpy as np
 from flint import fmpq
 
 from starhold.checker.bernstein import halves, stacked, steepest
-from starhold.checker.cover import as_terms, highest
+from starhold.checker.covering import as_terms, highest
 from starhold.checker.exact import ONE, NotCheckedError, demand
 from starhold.checker.indicator import Indicator
 

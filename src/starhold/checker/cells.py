@@ -1,9 +1,9 @@
 """A piecewise system with a function V, as the checker sees it: closed cells on which all is a polynomial, and the ways to
-look at them: on surfaces by elimination, about a rest in pyramids. Nothing here is shared with the certifier.
+look at them: on surfaces by elimination, about an equilibrium in pyramids. Nothing here is shared with the certifier.
 
-A pyramid has its top at the rest and its base on a side of the box: x = rest + r (base - rest), 0 <= r <= 1. All of them
-fill the box. What vanishes at the rest has a power of r as a factor there; without it its sign is the same for r > 0, and
-may be shown down to r = 0.
+A pyramid has its top at the equilibrium x0 and its base on a side of the box: x = x0 + r (base - x0), 0 <= r <= 1. All of
+them fill the box. What vanishes at x0 has a power of r as a factor there; without it its sign is the same for r > 0, and may
+be shown down to r = 0.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 from flint import Ordering, fmpq_mpoly_ctx
 
 from starhold.algebra.polynomial import Polynomial, jointly
-from starhold.checker.cover import Poly, Question, answer
+from starhold.checker.covering import Poly, Question, answer
 from starhold.checker.exact import ONE, ZERO, CheckError, demand
 from starhold.checker.reading import in_time
 
@@ -55,7 +55,7 @@ class ClosedCell:
 @dataclass(frozen=True)
 class Chart:
     """Variables to look at a part of the box in: `box` and a substitution. `rooms`: what is not negative there beside, the
-    first `strict` of them positive but at the rest itself. `power`: the place of r, by whose powers one may divide."""
+    first `strict` of them positive but at the equilibrium. `power`: the place of r, by whose powers one may divide."""
 
     box: Mapping[str, tuple[Any, Any]]
     steps: tuple[Sequence[Poly], ...]
@@ -77,13 +77,14 @@ class Chart:
 
 @dataclass(frozen=True)
 class Partition:
-    """All cells, those with an inside and thin ones. `rest`: coordinates, None for parameters; None if M is {V <= 0}."""
+    """All cells, those with an inside and thin ones. `equilibrium`: its coordinates, None for parameters; None if M is
+    {V <= 0}."""
 
     names: tuple[str, ...]
     moving: int
     box: tuple[tuple[Any, Any], ...]
     cells: tuple[ClosedCell, ...]
-    rest: tuple[Any, ...] | None
+    equilibrium: tuple[Any, ...] | None
     thin: tuple[ClosedCell, ...] = ()
 
     @property
@@ -119,10 +120,10 @@ class Partition:
         demand(bool(found) and all(v == found[0] for v in found), "V has no one value at a state")
         return found[0]
 
-    def at_rest(self, p: Poly) -> Poly:
-        """A polynomial at the rest: one of the parameters."""
+    def at_equilibrium(self, p: Poly) -> Poly:
+        """A polynomial at the equilibrium: one of the parameters."""
         context = p.context()
-        pairs = zip(self.generators, self.rest or (), strict=True)
+        pairs = zip(self.generators, self.equilibrium or (), strict=True)
         return p.compose(*(g if x is None else context.constant(x) for g, x in pairs))
 
     def charts(self, zeros: Sequence[Poly] = ()) -> Iterator[Chart]:
@@ -134,13 +135,13 @@ class Partition:
         for k in gone:
             place, (low, high) = flat.of(self.generators[k]), self.box[k]
             rooms += [place - low, high - place]
-        if self.rest is None or any(not self.at_rest(zero).is_zero() for zero in zeros):
+        if self.equilibrium is None or any(not self.at_equilibrium(zero).is_zero() for zero in zeros):
             yield Chart(box, steps, tuple(rooms))
             return
         for k in range(self.moving):
             for end in () if k in gone else self.box[k]:
                 pyramid, r = list(self.generators), self.generators[k]
-                for j, x in enumerate(self.rest):
+                for j, x in enumerate(self.equilibrium):
                     if x is not None and j not in gone:
                         pyramid[j] = x + r * (end - x if j == k else self.generators[j] - x)
                 found = Chart(box | {self.names[k]: (ZERO, ONE)}, (*steps, pyramid), power=k)
@@ -187,7 +188,7 @@ def _on(surface: Poly, p: Poly, steps: tuple[Sequence[Poly], ...]) -> Poly:
     return Chart({}, steps).of(p) if steps else divmod(p, surface)[1]
 
 
-def split(names: Sequence[str], moving: int, box: Any, rest: Any, rates: Sequence[Any], V: Any) -> Partition:
+def split(names: Sequence[str], moving: int, box: Any, equilibrium: Any, rates: Sequence[Any], V: Any) -> Partition:
     """The cells of rates and V; what holds on a surface alone (neither p > 0 nor -p > 0) is a thin one."""
     ring = fmpq_mpoly_ctx.get(tuple(names), Ordering.degrevlex)
     cells: list[ClosedCell] = []
@@ -214,7 +215,7 @@ def split(names: Sequence[str], moving: int, box: Any, rest: Any, rates: Sequenc
     demand(bool(cells), "a system has no cells")
     degree = max(0, *(cell.V.total_degree() + rate.total_degree() for cell in (*cells, *thin) for rate in cell.rates))
     demand(comb(len(names) + degree, degree) <= TERMS, "the system is too large: V' has too many terms")
-    return Partition(tuple(names), moving, tuple(box), tuple(cells), rest, tuple(thin))
+    return Partition(tuple(names), moving, tuple(box), tuple(cells), equilibrium, tuple(thin))
 
 
 def polynomial(ring: Any, names: Sequence[str], p: Any) -> Poly:

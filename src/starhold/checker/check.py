@@ -35,8 +35,10 @@ from starhold.checker.shapes import (
 from starhold.checker.station import STATION_CLAIMS, StationSubject, read_station, station_refutation
 from starhold.checker.subject import LoopSubject, read_subject
 
-FORMAT = "starhold certificate 1"
-ENDS = ("convergence", "region", "torque-limit", "wheels", "inertia", "disturbance", "sliding", "circle", "rest")
+FORMAT = "starhold certificate 2"
+FORMER = ("starhold certificate 1", "starhold invariant certificate 1")
+"""Formats of earlier versions, whose keys had other names."""
+ENDS = ("convergence", "region", "torque-limit", "wheels", "inertia", "disturbance", "sliding", "circle", "equilibrium")
 """Kinds of claims about where the motion ends, one of which a certificate that counts as proved must hold."""
 BITS = 192
 """Precision of balls: enough that they are far narrower than the margins of a certificate."""
@@ -71,6 +73,8 @@ def check(content: Any) -> list[Finding]:
         try:
             shallow(content)
             shaped(content, FILE, "the file")
+            former = content["format"] in FORMER
+            demand(not former, f"the format is {content['format']!r}, of an earlier version: certify again")
             demand(content["format"] in (FORMAT, INVARIANT), f"the format is not {FORMAT!r} or {INVARIANT!r}")
             demand(len(content["certificates"]) > 0, "there are no certificates")
         except CheckError as fault:

@@ -78,7 +78,7 @@ class CircleLoop:
     def across(self) -> tuple[Any, Any]:
         """What pulls x back: its coefficients of the position and the velocity along X, on which alone x'' must depend."""
         swing: Any = self.moving.velocity[0]
-        demand(set(swing.slope.terms) <= {("x1",), ("v1",)}, "the motion along X depends on the rest")
+        demand(set(swing.slope.terms) <= {("x1",), ("v1",)}, "the motion along X depends on the other axes")
         return -swing.slope.terms.get(("x1",), ZERO), -swing.slope.terms.get(("v1",), ZERO)
 
     def form(self) -> str:
@@ -105,7 +105,7 @@ class CircleLoop:
         return "V' = -(f2, f3).(t2, t3), and t is a positive multiple of f"
 
     def only(self) -> str:
-        """Motions with V' = 0 for all time are on the circle or rest in its middle: where f2 = f3 = 0 and so t2 = t3 = 0,
+        """Motions with V' = 0 for all time are on the circle or at rest in its middle: where f2 = f3 = 0 and so t2 = t3 = 0,
         `form` has left f1 y = f1 z = 0."""
         gains = self.gains
         demand(not self.bare, "a relay without a layer holds other circles")

@@ -10,7 +10,7 @@ from typing import Any
 from flint import acb, acb_poly, arb, fmpq, fmpq_mat, fmpq_poly
 
 from starhold.checker.disturbed import Disturbed
-from starhold.checker.even import EvenRegion
+from starhold.checker.even_region import EvenRegion
 from starhold.checker.exact import (
     ONE,
     CheckError,
@@ -29,7 +29,7 @@ from starhold.checker.exact import (
 from starhold.checker.frame import is_even
 from starhold.checker.loop import ExactLoop
 from starhold.checker.modal import ModalRegion
-from starhold.checker.odd import OddRegion
+from starhold.checker.odd_region import OddRegion
 from starhold.checker.region import BALLS, EXACT, ROOTS, SIGN, Numbers, Region, optional
 from starhold.checker.subject import LoopSubject
 from starhold.checker.surface import Sliding
@@ -229,8 +229,8 @@ def eigenvalues_of(coefficients: Sequence[Any], told: Sequence[Sequence[float]])
 
 
 def stepped(loop: ExactLoop, period: Any) -> list[Any]:
-    """The characteristic polynomial of the step over a period, lowest coefficient first: near rest J w' = u is constant and
-    q' = w/2, so that q gains period w/2 + period2 J^-1 u/4."""
+    """The characteristic polynomial of the step over a period, lowest first: near equilibrium J w' = u is constant
+    and q' = w/2, so that q gains period w/2 + period2 J^-1 u/4."""
     pulls = [(fmpq_mat(inverse(loop.subject.inertia)) * fmpq_mat(gain) * -period).tolist() for gain in loop.linear()]
     upper = [[*a, *b] for a, b in zip(plus(identity(3), pulls[0]), pulls[1], strict=True)]
     left = plus(identity(3, period / 2), pulls[0], period / 4)
@@ -248,7 +248,7 @@ def sliding(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
     ]
     if proof.layered():
         found.append(("layer", SIGN, proof.layer))
-    last = "other rest repels" if subject.sign_policy == "as_published" else "no switch of the double cover"
+    last = "other equilibrium repels" if subject.sign_policy == "as_published" else "no switch of the quaternion sign"
     return [*found, (last, SIGN, proof.cover), ("numbers", "", proof.ends)]
 
 

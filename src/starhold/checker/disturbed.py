@@ -1,4 +1,4 @@
-"""Where motions end that a torque from outside, bounded in norm, keeps from rest. Nothing here is shared with the
+"""Where motions end that a torque from outside, bounded in norm, keeps from equilibrium. Nothing here is shared with the
 certifier."""
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from starhold.checker.exact import (
     times,
     transpose,
 )
-from starhold.checker.gyroscopic import swung
+from starhold.checker.gyroscopic import gyroscopic_bound
 from starhold.checker.loop import RATE, TURN, letters
-from starhold.checker.odd import OddRegion
+from starhold.checker.odd_region import OddRegion
 from starhold.checker.region import Numbers, optional
 from starhold.checker.shapes import STEP, shaped
 from starhold.checker.subject import LoopSubject, named, variables
@@ -74,10 +74,10 @@ class Disturbed:
             region.single()
         elif cover == "hysteresis":
             region.jumps()
-            demand(self.turn**2 < 1 - self.subject.width**2, "the ball around the other rest may be reached")
+            demand(self.turn**2 < 1 - self.subject.width**2, "the ball around the other equilibrium may be reached")
         else:
-            # Near the other rest, |q| <= turn and q0 < 0, V is at least s (1 + sqrt(1 - turn2)).
-            demand(region.level is not None and region.level < s * (2 - self.turn**2), "the other rest's ball may be met")
+            # Near the other equilibrium, |q| <= turn and q0 < 0, V is at least s (1 + sqrt(1 - turn2)).
+            demand(region.level is not None and region.level < s * (2 - self.turn**2), "the other ball may be met")
         return "the level set holds one ball only"
 
     def end(self) -> str:
@@ -132,7 +132,7 @@ class Disturbed:
 
     @cached_property
     def _nearby(self) -> tuple[Rows, Rows, Any]:
-        """A, J^-1 and what |g| does not exceed over |w|2, of the piece around rest."""
+        """A, J^-1 and what |g| does not exceed over |w|2, of the piece around the equilibrium."""
         loop, J = self.region.loop, self.region.loop.inertia
         found = loop.accelerations(loop.resting()[1])
         kinds = {letters(m) for part in found for m in part.terms}
@@ -148,4 +148,4 @@ class Disturbed:
         upper = [[part.terms.get((name,), ZERO) for name in (*RATE, *TURN)] for part in found]
         lower = [[*half, *none] for half, none in zip(identity(3, fmpq(1, 2)), identity(3, ZERO), strict=True)]
         torques = [sum((c * part for c, part in zip(row, found, strict=True)), Polynomial({})) for row in J]
-        return upper + lower, J_inverse, swung(torques, identity(3), optional(self.witness["shift"]))
+        return upper + lower, J_inverse, gyroscopic_bound(torques, identity(3), optional(self.witness["shift"]))

@@ -38,7 +38,7 @@ class EquilibriumLoop:
 
     @property
     def place(self) -> tuple[Any, Any, Any]:
-        """Where the law says that it rests."""
+        """Where the law puts the equilibrium."""
         return (ZERO, self.gains.y, self.gains.z)
 
     def flies(self) -> str:
@@ -50,17 +50,17 @@ class EquilibriumLoop:
 
     @cached_property
     def axes(self) -> list[tuple[Any, Any]]:
-        """k and c of each axis: x'' = -k (x - rest) - c x', and nothing else in it."""
+        """k and c of each axis: x'' = -k (x - place) - c x', and nothing else in it."""
         measurement: Any = PointMeasurement(variables(named("x")), variables(named("v")), *variables(("period", "limit")))
         gains, plant = constants(self.gains), constants(self.plant)
-        swings: Any = add(
+        accelerations: Any = add(
             linear(measurement.position, measurement.velocity, plant), self.law.module.feedback(measurement, gains, plant)
         )
         found: list[tuple[Any, Any]] = []
-        for swing, x, v, rest in zip(swings, named("x"), named("v"), self.place, strict=True):
-            k, c = (-swing.terms.get((name,), ZERO) for name in (x, v))
-            alone = -k * (Polynomial.variable(x) - rest) - c * Polynomial.variable(v)
-            demand(not (swing - alone).terms, "an axis depends on the others, or rests elsewhere")
+        for acceleration, x, v, place in zip(accelerations, named("x"), named("v"), self.place, strict=True):
+            k, c = (-acceleration.terms.get((name,), ZERO) for name in (x, v))
+            alone = -k * (Polynomial.variable(x) - place) - c * Polynomial.variable(v)
+            demand(not (acceleration - alone).terms, "an axis depends on the others, or has its equilibrium elsewhere")
             found.append((k, c))
         return found
 

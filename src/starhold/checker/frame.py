@@ -98,7 +98,8 @@ def even_frame(loop: ExactLoop) -> EvenFrame:
 
 
 def _common(loop: ExactLoop, kinds: Mapping[str, Polynomial], *mixing: str) -> tuple[CommonFrame, dict[Monomial, Any]]:
-    """What any V has, of its terms by kind, and the terms of V' around rest; `mixing`: kinds of them that may be beside."""
+    """What any V has, of its terms by kind, and the terms of V' around the equilibrium; `mixing`: kinds that
+    may be among them."""
     P, tops = _kinetic(loop, kinds.get("ww", Polynomial({})))
     slope = loop.slope(loop.resting()[1]).only(lambda m: not set(letters(m)) & set("ra"))
     found = by_kind(slope)
@@ -136,7 +137,7 @@ def _kinetic(loop: ExactLoop, own: Polynomial) -> tuple[Rows, list[Rows]]:
 
 
 def crossed(loop: ExactLoop) -> Crossed:
-    """The parts of C = q.Jw, and of C' around rest; a CheckError where they have others."""
+    """The parts of C = q.Jw, and of C' around the equilibrium; a CheckError where they have others."""
     measurement = loop.moving
     C: Any = dot(vector_part(measurement.attitude), apply(dual(loop.plant[0].inertia), measurement.rate))
     slope = replaced(C.slope, loop.resting()[1])

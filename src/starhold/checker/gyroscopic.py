@@ -30,7 +30,7 @@ from starhold.checker.loop import RATE, W, letters
 from starhold.checker.subject import quadratic
 
 
-def swung(parts: Sequence[Polynomial], P: Rows, shift: Any | None, weight: Any | None = None) -> Any:
+def gyroscopic_bound(parts: Sequence[Polynomial], P: Rows, shift: Any | None, weight: Any | None = None) -> Any:
     """A rational that the norm of what is quadratic in the rate does not exceed where w.Pw = 1.
 
     With a shift p those parts have to be w x Aw, so w x (A + p)w, of norm |w||(A + p)w| at most: with weight c at most

@@ -12,7 +12,7 @@ from typing import Any
 from flint import fmpq_mat
 
 from starhold.checker.cells import ClosedCell, Partition, one_sign, signed_like
-from starhold.checker.cover import Options, Poly, Question, answer
+from starhold.checker.covering import Options, Poly, Question, answer
 from starhold.checker.exact import CheckError, NotCheckedError, demand
 
 OPEN = "neither shown nor found false with the parts of the box that were looked at"
@@ -54,24 +54,24 @@ class Indicator:
             found = found and here
         return found
 
-    def rest(self) -> str:
-        """That nothing moves at the rest."""
-        point = self.pieces.rest or ()
+    def equilibrium(self) -> str:
+        """That nothing moves at the equilibrium."""
+        point = self.pieces.equilibrium or ()
         sides = zip(point, self.pieces.box, strict=True)
-        demand(all(x is None or low < x < high for x, (low, high) in sides), "the rest is not inside the box")
-        for cell in self._at_rest():
-            if all(self.pieces.at_rest(rate).is_zero() for rate in cell.rates):
+        demand(all(x is None or low < x < high for x, (low, high) in sides), "the equilibrium is not inside the box")
+        for cell in self._at_equilibrium():
+            if all(self.pieces.at_equilibrium(rate).is_zero() for rate in cell.rates):
                 return "the rates of a cell vanish there"
-        if len(self._at_rest()) > 1:
-            raise NotCheckedError("a rest that is one only by a mean of rates")
+        if len(self._at_equilibrium()) > 1:
+            raise NotCheckedError("an equilibrium that is one only by a mean of rates")
         raise CheckError("the rates do not vanish there")
 
-    def _at_rest(self) -> list[ClosedCell]:
+    def _at_equilibrium(self) -> list[ClosedCell]:
         found: list[ClosedCell] = []
         for cell in self.pieces.every:
-            sides = [self.pieces.at_rest(guard) for guard in cell.guards]
+            sides = [self.pieces.at_equilibrium(guard) for guard in cell.guards]
             if any(not side.is_constant() for side in sides):
-                raise NotCheckedError("which cells hold the rest depends on a parameter")
+                raise NotCheckedError("which cells hold the equilibrium depends on a parameter")
             if all(side.is_zero() or side.leading_coefficient() > 0 for side in sides):
                 found.append(cell)
         return found
@@ -84,46 +84,47 @@ class Indicator:
         return f"the same from all sides in {len(self.pieces.every)} cells"
 
     def set(self, evidence: Mapping[str, Any]) -> str:
-        """That V is zero at the rest; that there is a state with V at most the level, for stability and instability 0."""
-        if self.pieces.rest is not None:
-            demand(all(self.pieces.at_rest(cell.V).is_zero() for cell in self._at_rest()), "V is not zero at the rest")
-            return "V is zero at the rest"
+        """V is zero at the equilibrium; or a state has V at most the level, for stability and instability at most 0."""
+        if self.pieces.equilibrium is not None:
+            there = (self.pieces.at_equilibrium(cell.V) for cell in self._at_equilibrium())
+            demand(all(V.is_zero() for V in there), "V is not zero at the equilibrium")
+            return "V is zero at the equilibrium"
         most = 0 if self.theorem in ("stable", "unstable") else self.level
         demand(self.pieces.value(self.pieces.state(evidence)) <= most, "V is above the level at the state")
         return "V at the state"
 
     def positive(self) -> str:
-        """That V > 0 but at the rest."""
+        """That V > 0 but at the equilibrium."""
         found: list[bool | None] = []
         for cell in self.pieces.cells:
             for chart in self.pieces.charts():
                 rooms = [*chart.rooms, *map(chart.of, cell.guards)]
                 found.append(answer(Question(chart.box, rooms, [[[chart.of(cell.V)]]], chart.strict)))
-        return _told(found, "in pyramids about the rest", "V is not positive somewhere")
+        return _told(found, "in pyramids about the equilibrium", "V is not positive somewhere")
 
     def positive_nearby(self, direction: Sequence[Any]) -> str:
-        """That V > 0 however near the rest, on a way out of it."""
+        """That V > 0 however near the equilibrium, on a way out of it."""
         demand(
             any(self._leading(c, c.V, direction) > 0 for c in self.pieces.cells if self._starts(c, direction)), "V is not"
         )
-        return "V on a way out of the rest"
+        return "V on a way out of the equilibrium"
 
     def _starts(self, cell: ClosedCell, direction: Sequence[Any]) -> bool:
-        """Whether the first of a way out of the rest is inside a cell."""
+        """Whether the first of a way out of the equilibrium is inside a cell."""
         return all(self._leading(cell, guard, direction) > 0 for guard in cell.guards)
 
     def _leading(self, cell: ClosedCell, p: Poly, direction: Sequence[Any]) -> Any:
-        """The first coefficient that is not zero of a polynomial on the way rest + t direction."""
+        """The first coefficient that is not zero of a polynomial on the way equilibrium + t direction."""
         context = cell.V.context()
-        rest = self.pieces.rest or ()
-        if any(x is None for x in rest):
-            raise NotCheckedError("a way out of a rest with parameters")
+        equilibrium = self.pieces.equilibrium or ()
+        if any(x is None for x in equilibrium):
+            raise NotCheckedError("a way out of an equilibrium with parameters")
         t = context.gens()[0]
-        terms = p.compose(*(context.constant(x) + t * d for x, d in zip(rest, direction, strict=True))).to_dict()
+        terms = p.compose(*(context.constant(x) + t * d for x, d in zip(equilibrium, direction, strict=True))).to_dict()
         return min(((int(powers[0]), c) for powers, c in terms.items()), key=lambda term: term[0], default=(0, 0))[1]
 
     def grows_near(self, direction: Sequence[Any]) -> bool:
-        """Whether V' > 0 however near the rest on a way out of it."""
+        """Whether V' > 0 however near the equilibrium on a way out of it."""
         cells = [cell for cell in self.pieces.cells if self._starts(cell, direction)]
         return any(self._leading(cell, cell.slope(cell.V), direction) > 0 for cell in cells)
 
@@ -180,13 +181,14 @@ class Indicator:
         return weak
 
     def _even(self, q: Poly) -> bool:
-        """Whether q, about the rest, is a sum of even powers with positive coefficients that all vanish there only."""
-        rest = self.pieces.rest
-        if rest is None or any(x is None for x in rest):
+        """Whether q is a sum of even powers of the distances from the equilibrium, with positive coefficients, zero only
+        there."""
+        equilibrium = self.pieces.equilibrium
+        if equilibrium is None or any(x is None for x in equilibrium):
             return False
-        terms = q.compose(*(g + x for g, x in zip(self.pieces.generators, rest, strict=True))).to_dict()
+        terms = q.compose(*(g + x for g, x in zip(self.pieces.generators, equilibrium, strict=True))).to_dict()
         alone = {tuple(int(e) > 0 for e in powers) for powers in terms}
-        single = all(tuple(j == k for j in range(len(rest))) in alone for k in range(len(rest)))
+        single = all(tuple(j == k for j in range(len(equilibrium))) in alone for k in range(len(equilibrium)))
         return single and all(c > 0 and all(int(e) % 2 == 0 for e in powers) for powers, c in terms.items())
 
     def _not_negative(self, cell: ClosedCell, q: Poly) -> list[tuple[Poly, ...]] | None:

@@ -19,7 +19,7 @@ from starhold.checker.indicator import Indicator
 from starhold.checker.reading import limited, number, read, read_names
 from starhold.checker.shapes import CERTIFICATE, CLAIM, OBLIGATION, outcome_of, shaped
 
-FORMAT = "starhold invariant certificate 1"
+FORMAT = "starhold invariant certificate 2"
 THEOREMS = ("stable", "attracts", "region", "unstable", "intersection")
 HOW = ("exact identity", "exact inequality", "interval arithmetic")
 ASSUMED = [
@@ -29,7 +29,7 @@ ASSUMED = [
 ]
 MOST = 6
 NAMES = (
-    "rest",
+    "equilibrium",
     "continuous",
     "set",
     "positive",
@@ -78,7 +78,7 @@ def _shape(given: Any) -> str:
     shaped(given, CERTIFICATE, "the certificate")
     demand(len(given["claims"]) > 0, "there are no claims")
     demand(given["outcome"] == outcome_of([c.get("outcome") for c in given["claims"]]), "the outcome does not follow")
-    allowed = {"variables", "parameters", "define", "rates", "V", "rest", "escape", "squares"}
+    allowed = {"variables", "parameters", "define", "rates", "V", "equilibrium", "escape", "squares"}
     demand(set(given["subject"]) <= allowed and {"variables", "parameters", "rates"} <= set(given["subject"]), "the subject")
     return ""
 
@@ -130,13 +130,14 @@ def _indicator(subject: Mapping[str, Any], place: int, claim: Mapping[str, Any])
     V = reduce(maximum, (*(read(t, known) for t in text), 0)) if theorem == "intersection" else read(text, known)
     box = [(rational(low), rational(high)) for low, high in witness["box"]]
     demand(len(box) == len(names) and all(low < high for low, high in box), "the box has not a side for every name")
-    rest = _of(subject, "rest", place)
-    if rest is not None:
-        demand(set(rest) == set(variables), "the rest has not the names of the variables")
-        rest = (*(fmpq(*number(rest[name]).as_integer_ratio()) for name in variables), *(None for _ in parameters))
+    at = _of(subject, "equilibrium", place)
+    if at is not None:
+        demand(set(at) == set(variables), "the equilibrium has not the names of the variables")
+        at = (*(fmpq(*number(at[name]).as_integer_ratio()) for name in variables), *(None for _ in parameters))
     listed = [o["name"] for o in claim["obligations"]]
-    demand(rest is not None or not {"rest", "positive", "positive nearby"} & set(listed), "there is no rest in the subject")
-    pieces = split(names, len(variables), box, rest, rates, V)
+    named = {"equilibrium", "positive", "positive nearby"} & set(listed)
+    demand(at is not None or not named, "there is no equilibrium in the subject")
+    pieces = split(names, len(variables), box, at, rates, V)
     ring = pieces.cells[0].V.context()
     escape, squares = _of(subject, "escape", place), _of(subject, "squares", place) or ()
     level = numbers.get("level")
@@ -159,17 +160,17 @@ def _of(subject: Mapping[str, Any], key: str, place: int) -> Any:
 
 def _needed(what: Indicator) -> list[str]:
     """The obligations of a proved claim, in their order. What more is told where the checker can do without is shown too."""
-    unstable, rest = what.theorem == "unstable", what.pieces.rest is not None
-    names = ["rest", "continuous", "set"] if rest else ["continuous", "set"]
+    unstable, point = what.theorem == "unstable", what.pieces.equilibrium is not None
+    names = ["equilibrium", "continuous", "set"] if point else ["continuous", "set"]
     if unstable:
-        names += ["positive nearby" if rest else "bounded", "grows"]
+        names += ["positive nearby" if point else "bounded", "grows"]
     else:
-        names += ["positive", "bounded", "falls"] if rest else ["bounded", "falls"]
+        names += ["positive", "bounded", "falls"] if point else ["bounded", "falls"]
     if what.jumps or "switching" in what.told:
         names.append("switching")
     if "leaves" in what.told and what.theorem in ("attracts", "region", "intersection"):
         names.append("leaves")
-    return names if rest or unstable else [*names, "invariant"]
+    return names if point or unstable else [*names, "invariant"]
 
 
 def _proof(what: Indicator, obligation: Mapping[str, Any]) -> str:
@@ -184,7 +185,7 @@ def _proof(what: Indicator, obligation: Mapping[str, Any]) -> str:
     if name == "positive nearby":
         return what.positive_nearby(_ordered(what, evidence["direction"]))
     return {
-        "rest": what.rest,
+        "equilibrium": what.equilibrium,
         "continuous": what.continuous,
         "positive": what.positive,
         "bounded": what.bounded,
@@ -225,7 +226,7 @@ def _limit(what: Indicator, numbers: Mapping[str, Any], state: Any) -> str:
 
 
 def _rises(what: Indicator, values: Mapping[str, Any], level: Any) -> str:
-    """That V does not fall (for instability: grow) at a state with 0 < V <= level, or that the state is a rest."""
+    """That V does not fall (for instability: grow) at a state with 0 < V <= level, or that the state is an equilibrium."""
     sense = what.sense
     state = what.pieces.state(values)
     cells = what.pieces.around(state)
@@ -251,11 +252,11 @@ def refuted(what: Indicator, obligation: Mapping[str, Any]) -> str:
     name, evidence = obligation["name"], obligation["evidence"]
     if "direction" in evidence and name == "falls":
         demand(what.grows_near(_ordered(what, evidence["direction"])), "V does not rise on the way")
-        return "V rises however near the rest"
+        return "V rises however near the equilibrium"
     if "state" not in evidence or name in ("invariant", "leaves", "switching", "positive nearby"):
         raise NotCheckedError("a refutation of this form")
-    if name in ("rest", "set"):
-        return _at_the_rest(what, name)
+    if name in ("equilibrium", "set"):
+        return _at_the_equilibrium(what, name)
     values = _numbers(evidence["state"])
     if name in ("falls", "grows"):
         return _rises(what, values, what.level)
@@ -266,15 +267,15 @@ def refuted(what: Indicator, obligation: Mapping[str, Any]) -> str:
         found = {str(cell.V(*state)) for cell in what.pieces.around(state)}
         demand(len(found) > 1, "V is the same from all sides at the state")
         return "V jumps at a state"
-    rest = what.pieces.rest or ()
-    demand(any(r is not None and r != x for r, x in zip(rest, state, strict=True)), "the state is the rest")
+    point = what.pieces.equilibrium or ()
+    demand(any(p is not None and p != x for p, x in zip(point, state, strict=True)), "the state is the equilibrium")
     demand(what.pieces.value(state) <= 0, "V is positive at the state")
     return "V is not positive at a state"
 
 
-def _at_the_rest(what: Indicator, name: str) -> str:
+def _at_the_equilibrium(what: Indicator, name: str) -> str:
     try:
-        what.rest() if name == "rest" else what.set({})
+        what.equilibrium() if name == "equilibrium" else what.set({})
     except NotCheckedError:
         raise
     except CheckError as fault:

@@ -141,7 +141,7 @@ class ExactLoop:
         return [(truths, dict(zip(named("t"), parts, strict=True))) for truths, parts in found]
 
     def resting(self, sign: int = 1) -> tuple[Truths, dict[str, Polynomial]]:
-        """The piece around rest at attitude (sign, 0, 0, 0)."""
+        """The piece around the equilibrium at attitude (sign, 0, 0, 0)."""
         around = [
             (truths, torque)
             for truths, torque in self.pieces
@@ -152,7 +152,7 @@ class ExactLoop:
 
     @cached_property
     def reach(self) -> Any | None:
-        """The rate up to which the piece around rest holds; None for any."""
+        """The rate up to which the piece around the equilibrium holds; None for any."""
         found = intervals(self.resting()[0], W) or []
         return min((abs(end) for ends in found for end in ends if end is not None), default=None)
 

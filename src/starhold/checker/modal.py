@@ -77,11 +77,11 @@ class ModalRegion:
         """What has to be shown."""
         found: list[Obligation] = [("form", EXACT, self.form), ("descent", BALLS, self.descent)]
         if self.plain:
-            found.append(("only rest", LASALLE, self.only_rest))
+            found.append(("only equilibrium", LASALLE, self.only_equilibrium))
         if self.subject.sign_policy == "hysteresis":
             found.append(("jumps lower V", SIGN, self.jumps))
         else:
-            found.append(("single rest in the set", SIGN, self.single))
+            found.append(("single equilibrium in the set", SIGN, self.single))
         return [*found, ("numbers", "", self.contents)]
 
     # --- V and V' -----------------------------------------------------------------------------------------------------
@@ -176,18 +176,18 @@ class ModalRegion:
         box = {"y": (ZERO, (strength + root_above(room)) ** 2), "n": (ZERO, fmpq(5, 7) / ratio), "x": (-ONE, ONE)}
         return negative_where(self.fall(u, y, s, over), self.c - self.height(u, y, s), box)
 
-    def only_rest(self) -> str:
+    def only_equilibrium(self) -> str:
         """At w = 0 the rate's derivative is -2 a2 q, as `form` shows: zero at q = 0 only, of which q0 = -1 is outside."""
         self.form()
-        demand(self.c < 8, "the other rest is in the level set")
-        return "at rest the torque is a multiple of q, and the level is below that of the other rest"
+        demand(self.c < 8, "the other equilibrium is in the level set")
+        return "at rest the torque is a multiple of q, and the level is below that of the other equilibrium"
 
     def single(self) -> str:
-        """The other rest, and for the shorter way the half turn where the feedback switches, are outside the level set."""
-        demand(self.c < self.potential(2 * ONE), "the level set reaches the other rest")
+        """The other equilibrium and, for the shorter way, half turns, where the feedback switches, are outside the set."""
+        demand(self.c < self.potential(2 * ONE), "the level set reaches the other equilibrium")
         if self.subject.sign_policy == "shortest":
             demand(self.plain and self.c < 4, "the level set reaches half turns, or V says nothing of them")
-        return "the level is below that of the other rest and of a switch"
+        return "the level is below that of the other equilibrium and of a switch"
 
     def jumps(self) -> str:
         """A jump turns q0 <= -width into its opposite, and leaves the rate."""
@@ -196,7 +196,7 @@ class ModalRegion:
         return "a jump lowers V by 8 a2 times the width at least"
 
     def contents(self) -> str:
-        """Every rest turned up to the turn, and every rate up to the rate on target, is in {V <= level}."""
+        """Every state at rest turned up to the turn, and every rate up to the rate on target, is in {V <= level}."""
         turn, rate = rational(self.numbers["slew_angle"]), rational(self.numbers["rate"])
         demand(0 <= turn <= down(2 * arb.pi()), "the turn is not between 0 and a full one")
         most = up(2 * (arb(turn) / 4).sin() ** 2)

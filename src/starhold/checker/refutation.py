@@ -13,7 +13,7 @@ from flint import arb, fmpq
 
 from starhold.algebra.polynomial import Polynomial
 from starhold.checker.claims import claimed, eigenvalues_of, stepped, torque_limit
-from starhold.checker.even import EvenRegion
+from starhold.checker.even_region import EvenRegion
 from starhold.checker.exact import (
     ONE,
     ZERO,
@@ -31,7 +31,7 @@ from starhold.checker.exact import (
 )
 from starhold.checker.frame import EvenFrame, OddFrame, even_frame, is_even, odd_frame
 from starhold.checker.loop import ATTITUDE, RATE, TURN, ExactLoop, W
-from starhold.checker.odd import OddRegion
+from starhold.checker.odd_region import OddRegion
 from starhold.checker.region import Numbers, optional
 from starhold.checker.shapes import NUMBERS, WITNESS, shaped
 from starhold.checker.subject import LoopSubject, gradient, named

@@ -45,7 +45,7 @@ class Region(ABC, Generic[F]):
     where |w| <= bound, and differs from V by rho V at most."""
 
     around: Any
-    """The largest turn there is, from one rest to the same."""
+    """The largest turn there is, from one equilibrium to the same."""
 
     def __init__(self, loop: ExactLoop, level: Any | None, start: Any | None, witness: Numbers) -> None:
         self.loop, self.level, self.start = loop, optional(level), optional(start)
@@ -70,8 +70,8 @@ class Region(ABC, Generic[F]):
 
     @abstractmethod
     def cover(self, said: Collection[str], how: str = ROOTS) -> Obligation:
-        """The part that rests other than q = 0, q0 = 1 play, under the one of its names that is said; `how` the rest on the
-        other quaternion is shown to repel."""
+        """The part that equilibria other than q = 0, q0 = 1 play, under the one of its names that is said; `how` the one on
+        the other quaternion is shown to repel."""
 
     @abstractmethod
     def well(self) -> tuple[Any, Well]:
@@ -84,7 +84,7 @@ class Region(ABC, Generic[F]):
 
     @abstractmethod
     def holds_turn(self, turn: Any) -> bool:
-        """Whether every rest turned up to this is in {V <= start}."""
+        """Whether every state at rest turned up to this is in {V <= start}."""
 
     @cached_property
     def frame(self) -> F:

@@ -111,14 +111,15 @@ _EXACT, _SIGN, _BALLS, _ROOTS = ("exact identity",), ("exact inequality",), ("ba
 HOWS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(("form", "target"), _EXACT),
     "descent": _SIGN + _BALLS,
-    **dict.fromkeys(("only rest", "only the circle"), ("LaSalle",)),
+    **dict.fromkeys(("only equilibrium", "only the circle"), ("LaSalle",)),
     **dict.fromkeys(("torque", "control", "stays", "nothing returns from beyond"), _BALLS),
     "strict": _SIGN + _BALLS,
-    "other rest repels": _SIGN + _ROOTS,
+    "other equilibrium repels": _SIGN + _ROOTS,
     **dict.fromkeys(("stable at the period", "stable at the longest"), _ROOTS),
-    **dict.fromkeys(("positive", "single rest in the set", "half turns repel", "jumps lower V", "momentum", "end"), _SIGN),
+    **dict.fromkeys(("positive", "single equilibrium in the set", "half turns repel", "jumps lower V"), _SIGN),
+    **dict.fromkeys(("momentum", "end"), _SIGN),
     **dict.fromkeys(("start", "stable in between", "reach exceeds torque", "surface holds the target", "layer"), _SIGN),
-    **dict.fromkeys(("no switch of the double cover", "centre outside", "x returns", "each axis returns"), _SIGN),
+    **dict.fromkeys(("no switch of the quaternion sign", "centre outside", "x returns", "each axis returns"), _SIGN),
 }
 """How each obligation may be shown, whatever the claim."""
 _WHEELS: dict[str, Test] = {
@@ -205,7 +206,7 @@ NUMBERS: dict[str, dict[str, Test]] = {
     "region": dict.fromkeys(("level", "slew_angle", "rate"), _number),
     "circle": _CIRCLE,
     "control-limit": {**_CIRCLE, "limit": _number, "kind": _one("axis", "norm")},
-    "rest": {},
+    "equilibrium": {},
     "saturated-axis": dict.fromkeys(("limit", "width", "reach", "boundary"), _number),
 }
 STEP: dict[str, Test] = {"form": _list(_list(_number, 6), 6), "decay": _number, "spread": _number}
@@ -228,6 +229,6 @@ WITNESS: dict[str, dict[str, Test]] = {
     "region": dict.fromkeys(("p", "c2", "g", "m"), _number),
     "circle": {},
     "control-limit": {},
-    "rest": {},
+    "equilibrium": {},
     "saturated-axis": {"mu": _number},
 }

@@ -47,9 +47,9 @@ class StationSubject:
         return CircleLoop(self.law, self.gains, self.plant, self.full)
 
     @property
-    def rest(self) -> EquilibriumLoop:
-        """The loop of a law that comes to rest."""
-        demand(self.law.name == "l2-equilibrium", f"the law {self.law.name} does not come to rest")
+    def equilibrium(self) -> EquilibriumLoop:
+        """The loop of a law that makes an equilibrium attractive."""
+        demand(self.law.name == "l2-equilibrium", f"the law {self.law.name} makes no equilibrium attractive")
         return EquilibriumLoop(self.law, self.gains, self.plant, self.full)
 
 
@@ -85,7 +85,7 @@ def _exactly(value: Any) -> Any:
 
 
 def _check_point(plant: Libration) -> None:
-    """That two bodies, on circles about each other by Kepler's third law, have a collinear point of rest here: where the
+    """That two bodies, on circles about each other by Kepler's third law, have a collinear equilibrium here: where the
     pulls balance what the turning asks for, and with the stiffness that the pulls make."""
     pulls: tuple[Any, Any] = (plant.pull_larger, plant.pull_smaller)
     places: tuple[Any, Any] = (plant.from_larger, plant.from_smaller)
@@ -97,7 +97,7 @@ def _check_point(plant: Libration) -> None:
     demand(_near(kepler, masses[0] + masses[1]), "the bodies do not turn at the rate of the axes")
     turning = square * (masses[0] * places[0] + masses[1] * places[1]) / (masses[0] + masses[1])
     larger, smaller = (pull * place for pull, place in zip(pulls, places, strict=True))
-    demand(abs(turning - larger - smaller) <= CLOSE * (abs(larger) + abs(smaller)), "the point is no point of rest")
+    demand(abs(turning - larger - smaller) <= CLOSE * (abs(larger) + abs(smaller)), "the point is no equilibrium")
     demand(_near(plant.stiffness, pulls[0] + pulls[1]), "the stiffness is not that of the point")
 
 
@@ -170,10 +170,10 @@ def control_limit(subject: StationSubject, claim: Numbers) -> list[Obligation]:
     ]
 
 
-def rests(subject: StationSubject, claim: Numbers) -> list[Obligation]:
-    """Every motion comes to rest where the law says."""
-    rest = subject.rest
-    return [("form", EXACT, rest.form), ("each axis returns", SIGN, rest.returns)]
+def returns(subject: StationSubject, claim: Numbers) -> list[Obligation]:
+    """Every motion ends at the equilibrium that the law names."""
+    loop = subject.equilibrium
+    return [("form", EXACT, loop.form), ("each axis returns", SIGN, loop.returns)]
 
 
 def saturated_axis(subject: StationSubject, claim: Numbers) -> list[Obligation]:
@@ -184,7 +184,7 @@ def saturated_axis(subject: StationSubject, claim: Numbers) -> list[Obligation]:
     demand(subject.limit == "axis", "the control along X is not limited by itself")
     # One side needs that the loop's limit is not lower, the other that it is not higher.
     demand(limit == subject.control_limit, "the limit is not the loop's")
-    axis = LimitedAxis.of(subject.rest, limit)
+    axis = LimitedAxis.of(subject.equilibrium, limit)
     return [
         ("stays", BALLS, partial(axis.stays, width, reach)),
         ("strict", BALLS, partial(axis.strict, width, reach, mu)),
@@ -213,7 +213,7 @@ def _contents(circle: CircleLoop, numbers: Numbers) -> str:
 STATION_CLAIMS: dict[str, StationKind] = {
     "circle": StationKind("control not limited", attracts),
     "control-limit": StationKind("starts in the plane x = 0 without a rate along X", control_limit),
-    "rest": StationKind("control not limited", rests, anywhere=True),
+    "equilibrium": StationKind("control not limited", returns, anywhere=True),
     "saturated-axis": StationKind(HELD, saturated_axis),
 }
 
@@ -231,8 +231,8 @@ def station_refutation(subject: StationSubject, claim: Numbers, obligation: Mapp
             return _leaves(subject.circle, evidence)
         case "control-limit", "control":
             return _needs_more(subject, claim["numbers"], evidence)
-        case "rest", "each axis returns":
-            return _does_not_rest(subject.rest, evidence)
+        case "equilibrium", "each axis returns":
+            return _does_not_return(subject.equilibrium, evidence)
         case _:
             raise CheckError(f"nothing refutes {name}")
 
@@ -278,10 +278,10 @@ def _needs_more(subject: StationSubject, numbers: Numbers, evidence: Numbers) ->
     return "the circle itself needs more than the limit"
 
 
-def _does_not_rest(rest: EquilibriumLoop, evidence: Numbers) -> str:
+def _does_not_return(loop: EquilibriumLoop, evidence: Numbers) -> str:
     """An axis r^2 + c r + k with c or k not positive has a root that is not on the left, and a motion that does not decay,
-    as near the rest as one likes; this needs no state to show it."""
+    as near the equilibrium as one likes; this needs no state to show it."""
     demand(not evidence, "the evidence is not that of an axis")
-    rest.form()
-    demand(not all(rest.stable), "every axis returns")
+    loop.form()
+    demand(not all(loop.stable), "every axis returns")
     return "an axis does not return"

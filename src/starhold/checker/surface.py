@@ -162,8 +162,9 @@ class Sliding:
         demand(not told["everything"] and told["start"] is not None and told["rate_start"] is not None, "there is no start")
         start, rate, J = rational(told["start"]), rational(told["rate_start"]), self.subject.inertia
         slowest = least(J) * self.least() ** 2
-        demand(self.least() > 0 and 0 < 2 * start < slowest, "the double cover may switch on the way")
-        demand(definite(plus(symmetric_part(self.K), identity(3, self.size), -1)), "the layer lets the double cover switch")
+        demand(self.least() > 0 and 0 < 2 * start < slowest, "the quaternion sign may switch on the way")
+        thin = definite(plus(symmetric_part(self.K), identity(3, self.size), -1))
+        demand(thin, "the layer lets the quaternion sign switch")
         demand(rate >= 0 and 0 <= turn <= down(arb.pi()), "turn or rate is out of range")
         demand(definite(plus(identity(3, 2 * start), times(rate**2, J), -1), strictly=False), "the rate is not in it")
         sine = up((arb(turn) / 2).sin() ** 2)

@@ -24,7 +24,7 @@ from starhold.checker.exact import (
     times,
     transpose,
 )
-from starhold.checker.gyroscopic import swung
+from starhold.checker.gyroscopic import gyroscopic_bound
 from starhold.checker.loop import RATE, TURN, ExactLoop, W, letters
 from starhold.checker.region import Region
 from starhold.checker.subject import quadratic
@@ -61,30 +61,31 @@ def bounded(
     stiffness, damping = ([[p.terms.get(m, ZERO) for m in own] for p in parts] for own in (springs, dampers))
     rest = [p.only(lambda m: m not in springs and m not in dampers and letters(m) != "ww") for p in parts]
     # The greatest |Aq| for |q| = 1, and for w.Pw = z2 the greatest |Bw + G(w)|, G quadratic, of which the square is at most
-    # damped2 z2 + 2 mixed z3 + swing2 z4 = (swing z2 + along z)2 + (damped2 - along2) z2.
+    # damped2 z2 + 2 mixed z3 + gyro2 z4 = (gyro z2 + along z)2 + (damped2 - along2) z2.
     common: list[Any] = [ZERO] * len(well.shapes)
     common[well.spring] = root_above(greatest(matmul(stiffness, transpose(stiffness))))
-    damped, swing = greatest(matmul(matmul(damping, P_inverse), transpose(damping))), swung(parts, P, shift, weight)
-    along = ZERO if swing == 0 else min(_mixed(parts, damping, P_inverse) / swing, root_above(damped))
+    damped, gyro = (
+        greatest(matmul(matmul(damping, P_inverse), transpose(damping))),
+        gyroscopic_bound(parts, P, shift, weight),
+    )
+    along = ZERO if gyro == 0 else min(_mixed(parts, damping, P_inverse) / gyro, root_above(damped))
     moving: list[list[Any]] = [[ZERO] * len(well.shapes) for _ in range(2)]
-    moving[0][SHAPES.index((0, 2))], moving[0][SHAPES.index((0, 1))] = swing, along
+    moving[0][SHAPES.index((0, 2))], moving[0][SHAPES.index((0, 1))] = gyro, along
     moving[1][SHAPES.index((0, 1))] = root_above(max(damped - along**2, ZERO))
     loads = [_load(region.loop, p.terms, P_inverse, len(well.shapes)) for p in rest]
     ways: list[Any] = [((moving, loads), common)]
-    if len(parts) == 1 and swing > 0:
-        for slope, offset in _lines(
-            quadratic(parts[0].only(lambda m: letters(m) == "ww").terms, RATE), damping[0], P, swing
-        ):
+    if len(parts) == 1 and gyro > 0:
+        for slope, offset in _lines(quadratic(parts[0].only(lambda m: letters(m) == "ww").terms, RATE), damping[0], P, gyro):
             line = list(common)
             line[SHAPES.index((0, 2))], line[SHAPES.index((0, 0))] = slope, offset
             ways.append(((loads,), line))
     return keeps_below(ways, limit, region.level, s, well)
 
 
-def _lines(F: Rows, b: list[Any], P: Rows, swing: Any) -> Iterator[tuple[Any, Any]]:
+def _lines(F: Rows, b: list[Any], P: Rows, gyro: Any) -> Iterator[tuple[Any, Any]]:
     """l and r with |b.w + w.Fw| <= l w.Pw + r: where [[l P -+ F, -+ b/2], [., r]] is nowhere negative."""
     for k in range(-8, 15):
-        slope = swing * (1 + rational(2.0 ** (k / 2)))
+        slope = gyro * (1 + rational(2.0 ** (k / 2)))
         forms = [plus(times(slope, P), F, sign) for sign in (1, -1)]
         demand(all(definite(form) for form in forms), "a form of the rate is not positive")
         yield slope, max(matmul(matmul([b], inverse(form)), transpose([b]))[0][0] for form in forms) / 4

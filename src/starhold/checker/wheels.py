@@ -120,7 +120,7 @@ def keeps_momenta(wheels: SubjectWheels, told: Sequence[Any], J: Rows, P: Rows, 
     """
     stored = matmul([wheels.momentum], wheels.axes)[0]
     fastest = ZERO if target_rate == 0 else greatest(J) * target_rate
-    swung = matmul(matmul(J, inverse(P)), J)
+    form = matmul(matmul(J, inverse(P)), J)
     for k, (row, momentum, most, limit) in enumerate(
         zip(wheels.least, wheels.momentum, told, wheels.momentum_limit, strict=True)
     ):
@@ -132,5 +132,5 @@ def keeps_momenta(wheels: SubjectWheels, told: Sequence[Any], J: Rows, P: Rows, 
         share = root_above(sum((g * g for g in row), ZERO))
         # What is left for |Jw|, the square of which is at most 2 level times the greatest eigenvalue of J P^-1 J.
         room = (most - kept) / share - wheels.total - fastest
-        held = room >= 0 and definite(plus(identity(3, room**2), swung, -2 * level), strictly=False)
+        held = room >= 0 and definite(plus(identity(3, room**2), form, -2 * level), strictly=False)
         demand(held, f"wheel {k + 1} may store more than told")

@@ -48,7 +48,7 @@ class Sketch:
     orbit: Any = None
     orbit_area: float | None = None
     marks: tuple[tuple[float, float], ...] = ()
-    rest: tuple[float, float] | None = None
+    equilibrium: tuple[float, float] | None = None
 
 
 def sketch(problem: InvariantProblem, certificate: Certificate) -> list[Sketch]:
@@ -81,9 +81,9 @@ def _sketch(problem: InvariantProblem, wanted: WantedSet, claim: Claim, start: t
     ]
     orbit = None if start is None or len(problem.system.variables) != 2 else _orbit(what, np.array(start))
     marked = tuple((mark[names[0]], mark[names[1]]) for mark in marks)
-    rest = None if wanted.rest is None else (float(wanted.rest[0]), float(wanted.rest[1]))
+    equilibrium = None if wanted.equilibrium is None else (float(wanted.equilibrium[0]), float(wanted.equilibrium[1]))
     area = None if orbit is None else _area(orbit)
-    return Sketch(claim, names, x, y, V, u, v, orbit, area, marked, rest)
+    return Sketch(claim, names, x, y, V, u, v, orbit, area, marked, equilibrium)
 
 
 def _least(what: Candidate, points: Any, moving: int, sign: float) -> Any:
@@ -208,15 +208,15 @@ def _panel(axis: Any, item: Sketch) -> None:
         axis.contour(
             item.x, item.y, item.V, levels=[level], colors=[SET], linewidths=1.6, linestyles="-" if proved else "--"
         )
-    if item.rest is None and not unstable:
+    if item.equilibrium is None and not unstable:
         # A little more than M, which may have no width.
         floor = (1e-4 if item.u is not None else 2e-3) * (level or top)
         axis.contourf(item.x, item.y, item.V, levels=[-np.inf, floor], colors=[SET], alpha=0.5)
         axis.contour(item.x, item.y, item.V, levels=[floor], colors=[SET], linewidths=0.9)
     if item.u is not None:
         axis.streamplot(item.x, item.y, item.u, item.v, density=1.25, color="0.45", linewidth=0.6, arrowsize=0.7)
-    if item.rest is not None:
-        axis.plot(*item.rest, marker="o", markersize=6, color=SET, markeredgecolor="white")
+    if item.equilibrium is not None:
+        axis.plot(*item.equilibrium, marker="o", markersize=6, color=SET, markeredgecolor="white")
     if item.orbit is not None:
         axis.plot(*np.append(item.orbit, item.orbit[:, :1], axis=1), color=TRUE, linewidth=1.4, linestyle=(0, (5, 2)))
     for mark in item.marks:
@@ -244,10 +244,10 @@ def _handles(drawn: Sequence[Sketch]) -> list[Any]:
     found: list[Any] = []
     if any(item.claim.numbers.get("level") for item in drawn):
         found.append(Patch(facecolor=INSIDE, alpha=0.6, edgecolor=SET, label="{V ≤ level}"))
-    if any(item.rest is None and item.claim.numbers["theorem"] != "unstable" for item in drawn):
+    if any(item.equilibrium is None and item.claim.numbers["theorem"] != "unstable" for item in drawn):
         found.append(Patch(facecolor=SET, alpha=0.6, label="M"))
-    if any(item.rest is not None for item in drawn):
-        found.append(Line2D([], [], color=SET, marker="o", linestyle="", label="M, a rest"))
+    if any(item.equilibrium is not None for item in drawn):
+        found.append(Line2D([], [], color=SET, marker="o", linestyle="", label="M, an equilibrium"))
     if "unstable" in theorems:
         found.append(Patch(facecolor=AGAINST, alpha=0.2, label="V > 0: left by every motion"))
     if any(item.orbit is not None for item in drawn):

@@ -4,7 +4,7 @@ from starhold.algebra.scalar import less, where
 from starhold.certification.invariant import InvariantProblem, System, WantedSet, certify
 
 system = System.of(("x", "y"), lambda x, y: (y, where(less(0.0, y), 1.0 - x, -2.0 * x - 3.0 * y)))
-wanted = WantedSet("unstable", system.function(lambda x, y: y), ((-0.5, 0.5), (-0.5, 0.5)), rest=(0, 0))
+wanted = WantedSet("unstable", system.function(lambda x, y: y), ((-0.5, 0.5), (-0.5, 0.5)), equilibrium=(0, 0))
 certificate = certify(InvariantProblem("origin", system, (wanted,)))
 """
 

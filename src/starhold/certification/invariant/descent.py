@@ -28,13 +28,13 @@ FEW = 4_000
 
 @dataclass(frozen=True)
 class Candidate:
-    """A system, a function V and a box; M is {V <= 0} in it. `rest`: the point that M is told to be, coordinates of the
-    variables, None for parameters; else None. `squares`: functions of which V' is told to be a sum of squares, times -1."""
+    """A system, a function V and a box; M is {V <= 0} in it. `equilibrium`: the point that M is told to be, its
+    coordinates, None for parameters; else None. `squares`: functions such that -V' is told to be a sum of their squares."""
 
     system: System
     V: Any
     box: tuple[tuple[float, float], ...]
-    rest: tuple[Any, ...] | None = None
+    equilibrium: tuple[Any, ...] | None = None
     squares: tuple[Any, ...] = ()
 
     @cached_property
@@ -113,10 +113,10 @@ def bounded(what: Candidate, level: float) -> bool:
 
 
 def positive(what: Candidate) -> bool:
-    """Whether V > 0 in the whole box but at the rest."""
+    """Whether V > 0 in the whole box but at the equilibrium."""
     nothing = what.pieces.cells[0].V * 0
     for cell in what.guarded:
-        test = Positive(cell.cell.V, nothing, what.rest, cell.known)
+        test = Positive(cell.cell.V, nothing, what.equilibrium, cell.known)
         if not everywhere(what.box, lambda boxes, cell=cell, test=test: ~cell.inside(boxes) | test.on(boxes)):
             return False
     return True
@@ -157,7 +157,7 @@ def falls(what: Candidate, level: float, sense: int = 1) -> list[Weak] | None:
 
 def _positive_on(what: Candidate, cell: Guarded, q: Poly, level: float, most: int | None = None) -> bool:
     """Whether q > 0 where 0 < V <= level in a cell."""
-    test = Positive(q, cell.cell.V, what.rest, cell.known)
+    test = Positive(q, cell.cell.V, what.equilibrium, cell.known)
 
     def shown(boxes: Boxes) -> Mask:
         done = ~cell.active(boxes, level)
@@ -199,11 +199,11 @@ def switches(what: Candidate, level: float, sense: int = 1) -> bool:
     return all(_switch(what, surface, level, sense) for surface in jumps(what.pieces))
 
 
-def _rest_on(what: Candidate, zeros: Sequence[Poly]) -> tuple[Any, ...] | None:
-    """The rest among points where polynomials vanish, without the variables that they eliminate; None if it is none."""
-    if what.rest is None or any(not h.compose(*_at(what.pieces, what.rest)).is_zero() for h in zeros):
+def _equilibrium_on(what: Candidate, zeros: Sequence[Poly]) -> tuple[Any, ...] | None:
+    """The equilibrium, if polynomials vanish there, without the variables that they eliminate; else None."""
+    if what.equilibrium is None or any(not h.compose(*_at(what.pieces, what.equilibrium)).is_zero() for h in zeros):
         return None
-    instead = zip(what.rest, what.pieces.instead(zeros), what.pieces.context.gens(), strict=True)
+    instead = zip(what.equilibrium, what.pieces.instead(zeros), what.pieces.context.gens(), strict=True)
     return tuple(x if found == g else None for x, found, g in instead)
 
 
@@ -212,7 +212,7 @@ def _switch(what: Candidate, place: int, level: float, sense: int) -> bool:
     surface = pieces.surfaces[place]
     solved = solve(surface)
     onto = [surface]
-    rest = _rest_on(what, onto)
+    equilibrium = _equilibrium_on(what, onto)
     cells = [Guarded.of(cell, pieces, onto) for cell in (*pieces.cells, *pieces.thin)]
     whole = range(len(pieces.cells))
     # The cells of one side fill it near the surface; where this may have a side only, those of all sides are looked at.
@@ -222,7 +222,7 @@ def _switch(what: Candidate, place: int, level: float, sense: int) -> bool:
     gradient = [EnclosedPolynomial(surface.derivative(k)) for k in range(len(pieces.names))]
 
     def test(q: Poly, cell: Guarded) -> Positive:
-        return Positive(pieces.reduced(q, onto), cell.V.polynomial, rest, cell.known)
+        return Positive(pieces.reduced(q, onto), cell.V.polynomial, equilibrium, cell.known)
 
     through = [along(surface, cell.cell.rates) for cell in cells]
     ways = [[test(q * way, cell) for q, cell in zip(through, cells, strict=True)] for way in (1, -1)]
@@ -261,10 +261,10 @@ def _switch(what: Candidate, place: int, level: float, sense: int) -> bool:
     return everywhere(box, shown)
 
 
-def _at(pieces: Cells, rest: Sequence[Any] | None) -> list[Poly]:
-    assert rest is not None
+def _at(pieces: Cells, equilibrium: Sequence[Any] | None) -> list[Poly]:
+    assert equilibrium is not None
     gens = pieces.context.gens()
-    return [g if x is None else pieces.context.constant(x) for g, x in zip(gens, rest, strict=True)]
+    return [g if x is None else pieces.context.constant(x) for g, x in zip(gens, equilibrium, strict=True)]
 
 
 def _all(masks: Any) -> Mask:
@@ -290,7 +290,7 @@ def _grows(what: Candidate, cell: Cell, zeros: Sequence[Poly], level: float, esc
     pieces = what.pieces
     there = Guarded.of(cell, pieces, zeros)
     q = pieces.reduced(along(escape, cell.rates), zeros)
-    test = Positive(q, there.V.polynomial, _rest_on(what, zeros), there.known)
+    test = Positive(q, there.V.polynomial, _equilibrium_on(what, zeros), there.known)
     left = [EnclosedPolynomial(h) for h in (pieces.reduced(zero, zeros) for zero in zeros) if not h.is_zero()]
 
     def shown(boxes: Boxes) -> Mask:
@@ -313,9 +313,9 @@ def _not_for_long(what: Candidate, cell: Cell, zeros: Sequence[Poly], level: flo
     forms = [EnclosedPolynomial(g) for g in chain]
     signed = [Positive(g * way, cell.V) for g in chain for way in (1, -1) if not g.is_zero()]
     rows: list[list[EnclosedPolynomial]] = []
-    if what.rest is not None and all(g.compose(*_at(what.pieces, what.rest)).is_zero() for g in chain):
-        # Where the Jacobian is regular all over a box that holds the rest, they vanish together nowhere else in it.
-        rows = _independent([[g.derivative(k) for k in range(moving)] for g in chain], what.rest)
+    if what.equilibrium is not None and all(g.compose(*_at(what.pieces, what.equilibrium)).is_zero() for g in chain):
+        # Where the Jacobian is regular all over a box that holds the equilibrium, they vanish together nowhere else in it.
+        rows = _independent([[g.derivative(k) for k in range(moving)] for g in chain], what.equilibrium)
 
     def shown(boxes: Boxes) -> Mask:
         done = ~guarded.active(boxes, level)
@@ -325,16 +325,16 @@ def _not_for_long(what: Candidate, cell: Cell, zeros: Sequence[Poly], level: flo
             if not done.all():
                 done |= test.on(boxes)
         if rows and not done.all():
-            around = _with(boxes, what.rest)
+            around = _with(boxes, what.equilibrium)
             done |= _not_zero(determinant([[entry.on(around) for entry in row] for row in rows]))
         return done
 
     return everywhere(what.box, shown)
 
 
-def _independent(rows: list[list[Poly]], rest: Sequence[Any]) -> list[list[EnclosedPolynomial]]:
-    """As many rows as there are columns, independent at the rest (parameters at zero); none if there are too few."""
-    point = [x if x is not None else 0 for x in rest]
+def _independent(rows: list[list[Poly]], equilibrium: Sequence[Any]) -> list[list[EnclosedPolynomial]]:
+    """As many rows as there are columns, independent at the equilibrium (parameters at zero); none if there are too few."""
+    point = [x if x is not None else 0 for x in equilibrium]
     found: list[list[Poly]] = []
     for row in rows:
         numbers = np.array([[number(entry(*point)) for entry in own] for own in [*found, row]])
@@ -343,10 +343,10 @@ def _independent(rows: list[list[Poly]], rest: Sequence[Any]) -> list[list[Enclo
     return [[EnclosedPolynomial(entry) for entry in row] for row in found] if found and len(found) == len(found[0]) else []
 
 
-def _with(boxes: Boxes, rest: Any) -> Boxes:
-    """Each box made as large as it takes to hold the rest."""
+def _with(boxes: Boxes, equilibrium: Any) -> Boxes:
+    """Each box made as large as it takes to hold the equilibrium."""
     sides: list[Intervals] = []
-    for side, x in zip(boxes.sides, rest, strict=True):
+    for side, x in zip(boxes.sides, equilibrium, strict=True):
         if x is None:
             sides.append(side)
         else:

@@ -21,12 +21,12 @@ from starhold.certification.invariant.text import MOST_DIGITS, RESERVED, Express
 from starhold.certification.invariant.theorems import THEOREMS, WantedSet, indicator, prove
 from starhold.errors import InputError
 
-FORMAT = "starhold invariant certificate 1"
+FORMAT = "starhold invariant certificate 2"
 MOST, LARGEST, LONGEST = 6, 1e100, 100
 """Variables and parameters together, beyond which branch and bound would not end; numbers of a box, of which floats hold
 the powers; characters of a name."""
 _KEYS = ("name", "description", "variables", "parameters", "define", "rates", "box", "claim")
-_CLAIM = ("name", "theorem", "V", "box", "rest", "level", "escape", "squares", "known", "orbit")
+_CLAIM = ("name", "theorem", "V", "box", "equilibrium", "level", "escape", "squares", "known", "orbit")
 
 
 @dataclass(frozen=True)
@@ -124,10 +124,10 @@ class _File:
         written: dict[str, Any] = {name: self.data[name] for name in ("define", "rates") if name in self.data}
         written["V"] = [table["V"] for table in tables]
         # Whatever a claim is made of, so that it can be checked from the certificate alone.
-        rests = [item[0].rest for item in wanted]
-        if any(rest is not None for rest in rests):
+        points = [item[0].equilibrium for item in wanted]
+        if any(point is not None for point in points):
             names = self.variables
-            written["rest"] = [rest and {n: str(x) for n, x in zip(names, rest, strict=True)} for rest in rests]
+            written["equilibrium"] = [at and {n: str(x) for n, x in zip(names, at, strict=True)} for at in points]
         for key in ("escape", "squares"):
             if any(key in table for table in tables):
                 written[key] = [table.get(key) for table in tables]
@@ -155,18 +155,20 @@ class _File:
         self.parameters = {name: self._interval(value, f"parameters.{name}") for name, value in parameters.items()}
 
     def _claim(self, table: dict[str, Any], key: str, system: System) -> tuple[WantedSet, tuple[float, ...] | None]:
+        if "rest" in table:
+            raise InputError(self.where, f"{key}.rest", "an unknown key", "it is called equilibrium")
         self._known(table, _CLAIM, key)
         theorem = self._required(table, "theorem", key)
         if theorem not in THEOREMS:
             raise InputError(self.where, f"{key}.theorem", _show(theorem), _nearest(str(theorem), THEOREMS))
         V = self._indicator(self._required(table, "V", key), theorem, f"{key}.V")
-        rest = self._state(table["rest"], f"{key}.rest") if "rest" in table else None
+        at = self._state(table["equilibrium"], f"{key}.equilibrium") if "equilibrium" in table else None
         escape = self._polynomial(table["escape"], f"{key}.escape") if "escape" in table else None
         listed = self._list(table.get("squares", []), f"{key}.squares")
         squares = tuple(self._polynomial(h, f"{key}.squares[{k}]") for k, h in enumerate(listed, 1))
         level, known = (self._positive(table, name, key) for name in ("level", "known"))
         orbit = tuple(float(x) for x in self._state(table["orbit"], f"{key}.orbit")) if "orbit" in table else None
-        exactly = None if rest is None else tuple(exact(x) for x in rest)
+        exactly = None if at is None else tuple(exact(x) for x in at)
         name = self._text(table, "name", key, "")
         wanted = WantedSet(theorem, V, self._box(table, key), exactly, level, escape, squares, known, name)
         try:

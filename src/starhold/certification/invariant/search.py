@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from starhold.algebra.polynomial import exact
 from starhold.certification.invariant.descent import Candidate, Guarded
 from starhold.certification.invariant.enclosure import Boxes, EnclosedPolynomial
-from starhold.certification.invariant.signs import from_rest, lowest
+from starhold.certification.invariant.signs import from_equilibrium, lowest
 from starhold.certification.invariant.system import Cell, Poly, along
 from starhold.certification.matrices import number
 
@@ -105,16 +105,16 @@ def stuck(what: Candidate) -> list[Array]:
     return found
 
 
-def ceiling(what: Candidate, rests: bool = True) -> float:
+def ceiling(what: Candidate, equilibria: bool = True) -> float:
     """The least V that points of a grid give for a state that no set may hold: on the border of the box, where V rises, or
-    (if `rests`) at rest. Infinite if there is none."""
+    (if `equilibria`) at an equilibrium. Infinite if there is none."""
     least = math.inf
     for k in range(what.pieces.moving):
         for end in what.box[k]:
             face = [(end, end) if j == k else side for j, side in enumerate(what.box)]
             count = POINTS.get(len(face) - 1, 9)
             least = min(least, float(np.nanmin(Values(what, grid(face, count)).V)))
-    states = [*wrong(what, 1, 3), *(stuck(what) if rests else ())]
+    states = [*wrong(what, 1, 3), *(stuck(what) if equilibria else ())]
     return min([least, *(float(Values(what, x[:, None]).V[0]) for x in states)])
 
 
@@ -149,17 +149,18 @@ def closed_cells(what: Candidate, state: Sequence[Any]) -> list[Cell]:
     return [c for c in cells if all(s * v >= 0 for s, v in zip(c.signs, sides, strict=True))]
 
 
-def at(polynomial: Poly, rest: Sequence[Any]) -> Poly:
-    """A polynomial at a rest: one of the parameters."""
+def at(polynomial: Poly, equilibrium: Sequence[Any]) -> Poly:
+    """A polynomial at an equilibrium: one of the parameters."""
     context = polynomial.context()
-    return polynomial.compose(*(g if x is None else context.constant(x) for g, x in zip(context.gens(), rest, strict=True)))
+    pairs = zip(context.gens(), equilibrium, strict=True)
+    return polynomial.compose(*(g if x is None else context.constant(x) for g, x in pairs))
 
 
-def cells_at(what: Candidate, rest: Sequence[Any]) -> list[Cell]:
-    """The cells, thin ones too, whose closures hold a rest for some of the parameters."""
+def cells_at(what: Candidate, equilibrium: Sequence[Any]) -> list[Cell]:
+    """The cells, thin ones too, whose closures hold an equilibrium for some of the parameters."""
     found: list[Cell] = []
     for cell in (*what.pieces.cells, *what.pieces.thin):
-        sides = [at(guard, rest) for guard in what.pieces.guards(cell)]
+        sides = [at(guard, equilibrium) for guard in what.pieces.guards(cell)]
         if not any(side.is_constant() and not side.is_zero() and side.leading_coefficient() < 0 for side in sides):
             found.append(cell)
     return found
@@ -172,7 +173,7 @@ def value(what: Candidate, state: Sequence[Any]) -> Any:
 
 
 def rising(what: Candidate, level: float, sense: int = 1, digits: Sequence[int] = SIMPLE) -> dict[str, Any] | None:
-    """A state with 0 < V <= level at which V rises (sense -1: does not grow) or that is a rest, verified; or None."""
+    """A state with 0 < V <= level, verified, where V rises (sense -1: does not grow) or that is an equilibrium; or None."""
     for point in islice([*wrong(what, sense), *stuck(what)], TRIES):
         for state in rounded(point, digits):
             cell = cell_of(what, state)
@@ -202,13 +203,14 @@ def reaching(what: Candidate, level: float, digits: Sequence[int] = SIMPLE) -> d
 
 
 def not_positive(what: Candidate) -> dict[str, Any] | None:
-    """A state of the box that is not the rest and has V <= 0, verified; None if none is found."""
+    """A state of the box that is not the equilibrium and has V <= 0, verified; None if none is found."""
     values = Values(what, grid(what.box))
     for place in np.argsort(values.V, kind="stable")[:TRIES]:
         for state in rounded(values.points[:, place]):
             V = value(what, state)
-            rest = what.rest is not None and all(r is None or r == x for r, x in zip(what.rest, state, strict=True))
-            if V is not None and V <= 0 and not rest and closed_cells(what, state):
+            point = what.equilibrium
+            there = point is not None and all(p is None or p == x for p, x in zip(point, state, strict=True))
+            if V is not None and V <= 0 and not there and closed_cells(what, state):
                 return {"state": named(what, state), "V": number(V)}
     return None
 
@@ -278,28 +280,28 @@ def _interval(low: float, high: float) -> Any:
 
 
 def ray(what: Candidate, wanted: Callable[[Poly, Poly], Poly | None]) -> dict[str, Any] | None:
-    """A direction from the rest in which a polynomial that `wanted` makes of V and V' of the cell there is positive however
-    near the rest, by its terms of the lowest degree; None if none is found."""
-    rest = what.rest
-    if rest is None or any(x is None for x in rest):
+    """A direction from the equilibrium in which a polynomial that `wanted` makes of V and V' of the cell there is positive
+    however near, by its terms of the lowest degree; None if none is found."""
+    equilibrium = what.equilibrium
+    if equilibrium is None or any(x is None for x in equilibrium):
         return None
     moving = range(what.pieces.moving)
     random = np.random.default_rng(0)
-    choices = [*np.eye(len(rest)), *-np.eye(len(rest)), *random.integers(-9, 10, size=(300, len(rest)))]
+    choices = [*np.eye(len(equilibrium)), *-np.eye(len(equilibrium)), *random.integers(-9, 10, size=(300, len(equilibrium)))]
     directions = [tuple(fmpq(int(x)) for x in choice) for choice in choices]
     for cell in what.pieces.cells:
         asked = wanted(cell.V, cell.slope)
         if asked is None or asked.is_zero():
             continue
-        leading = [_lowest_part(q, rest, moving) for q in (asked, *what.pieces.guards(cell))]
+        leading = [_lowest_part(q, equilibrium, moving) for q in (asked, *what.pieces.guards(cell))]
         for d in directions:
             if all(part(*d) > 0 for part in leading):
                 return {"direction": dict(zip(what.pieces.names, map(number, d), strict=True))}
     return None
 
 
-def _lowest_part(q: Poly, rest: Sequence[Any], moving: Sequence[int]) -> Poly:
-    about = from_rest(q, rest)
+def _lowest_part(q: Poly, equilibrium: Sequence[Any], moving: Sequence[int]) -> Poly:
+    about = from_equilibrium(q, equilibrium)
     degree = lowest(about, moving)
     return q.context().from_dict({p: c for p, c in about.to_dict().items() if sum(p[k] for k in moving) == degree})
 

@@ -1,4 +1,4 @@
-"""The sign of a polynomial where V > 0, also where both vanish together: on the border of a set, or at a rest."""
+"""The sign of a polynomial where V > 0, also where both vanish together: on the border of a set, or at an equilibrium."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ class Positive:
     * q > 0 on the box;
     * q and V share factors: none of them vanishes where V > 0, those of q to an even power do not matter, and those that
       both have to an odd power have, together with what is left of V, a sign. So what is left of q V has to be positive;
-    * q is definite about a rest (`Definite`).
+    * q is definite about an equilibrium (`Definite`).
 
     Before, q is divided by what is positive where V is: factors of V that do not change sign in the cell, and sums of even
     powers that vanish at one point only, where V <= 0.
 
-    `rest`: the point, coordinates of all variables, None for parameters; `guards`: what is not negative in the cell."""
+    `equilibrium`: its coordinates, None for parameters; `guards`: what is not negative in the cell."""
 
-    def __init__(self, q: Poly, V: Poly, rest: Sequence[Any] | None = None, guards: Sequence[Poly] = ()) -> None:
+    def __init__(self, q: Poly, V: Poly, equilibrium: Sequence[Any] | None = None, guards: Sequence[Poly] = ()) -> None:
         q = _divided(q, V, guards)
         self._direct = EnclosedPolynomial(q)
         parts = [] if q.is_zero() or V.is_zero() else _without_common(q, V)
         self._relative = [EnclosedPolynomial(part) for part in parts]
-        self._definite = None if rest is None or q.is_zero() else Definite(q, rest, guards)
+        self._definite = None if equilibrium is None or q.is_zero() else Definite(q, equilibrium, guards)
 
     def on(self, boxes: Boxes) -> Mask:
         """On which boxes it is shown."""
@@ -50,15 +50,16 @@ class Positive:
 
 
 class Definite:
-    """Whether q > 0 in a cell but at a rest, z the distance from it, is shown on boxes in one of these ways:
+    """Whether q > 0 in a cell but at an equilibrium, z the distance from it, is shown on boxes in one of these ways:
 
     * q is a sum of even powers of all the z, with positive factors: then it is `always`;
     * q, or q less a multiple of what is not negative in the cell, is a form z.Q(x)z, and Q is positive definite on the box;
-    * q = a g + r with a > 0 on the box, g linear, zero at the rest, not negative in the cell, and r definite where g = 0."""
+    * q = a g + r with a > 0 on the box, g linear, zero at the equilibrium, not negative in the cell, and r definite where
+      g = 0."""
 
-    def __init__(self, q: Poly, rest: Sequence[Any], guards: Sequence[Poly]) -> None:
-        about = from_rest(q, rest)
-        moving = [k for k, x in enumerate(rest) if x is not None]
+    def __init__(self, q: Poly, equilibrium: Sequence[Any], guards: Sequence[Poly]) -> None:
+        about = from_equilibrium(q, equilibrium)
+        moving = [k for k, x in enumerate(equilibrium) if x is not None]
         self.always = _even_powers(about, moving)
         self._matrices: list[list[list[EnclosedPolynomial]]] = []
         self._sloping: list[tuple[EnclosedPolynomial, Definite]] = []
@@ -66,19 +67,19 @@ class Definite:
             return
         matrix = _quadratic(about, moving)
         if matrix is not None:
-            back = to_rest(q.context(), rest)
-            extra = (_quadratic(from_rest(guard, rest), moving) for guard in guards)
+            back = to_equilibrium(q.context(), equilibrium)
+            extra = (_quadratic(from_equilibrium(guard, equilibrium), moving) for guard in guards)
             for found in _definite_with(matrix, [m for m in extra if m is not None]):
                 self._matrices.append([[EnclosedPolynomial(entry.compose(*back)) for entry in row] for row in found])
             return
         for guard in guards:
             solved = solve(guard)
-            if solved is None or rest[solved[0]] is None or lowest(from_rest(guard, rest), moving) < 1:
+            if solved is None or equilibrium[solved[0]] is None or lowest(from_equilibrium(guard, equilibrium), moving) < 1:
                 continue
             generators = q.context().gens()
             on_it = q.compose(*(solved[1] if k == solved[0] else g for k, g in enumerate(generators)))
             share, _ = divmod(q - on_it, guard)
-            others = [None if k == solved[0] else x for k, x in enumerate(rest)]
+            others = [None if k == solved[0] else x for k, x in enumerate(equilibrium)]
             self._sloping.append((EnclosedPolynomial(share), Definite(on_it, others, ())))
 
     def on(self, boxes: Boxes) -> Mask:
@@ -118,15 +119,15 @@ def is_sum(q: Poly, functions: Sequence[Poly]) -> bool:
     return all(c > 0 for c in factors) and (q - sum((p * c for p, c in zip(parts, factors, strict=True)), q * 0)).is_zero()
 
 
-def from_rest(q: Poly, rest: Sequence[Any]) -> Poly:
-    """The polynomial in the distance from a rest."""
+def from_equilibrium(q: Poly, equilibrium: Sequence[Any]) -> Poly:
+    """The polynomial in the distance from an equilibrium."""
     generators = q.context().gens()
-    return q.compose(*(g if x is None else g + x for g, x in zip(generators, rest, strict=True)))
+    return q.compose(*(g if x is None else g + x for g, x in zip(generators, equilibrium, strict=True)))
 
 
-def to_rest(context: Any, rest: Sequence[Any]) -> list[Poly]:
-    """What stands for the distance from a rest."""
-    return [g if x is None else g - x for g, x in zip(context.gens(), rest, strict=True)]
+def to_equilibrium(context: Any, equilibrium: Sequence[Any]) -> list[Poly]:
+    """What stands for the distance from an equilibrium."""
+    return [g if x is None else g - x for g, x in zip(context.gens(), equilibrium, strict=True)]
 
 
 def lowest(q: Poly, moving: Sequence[int]) -> int:
@@ -209,7 +210,7 @@ def _quadratic(q: Poly, moving: Sequence[int]) -> list[list[Poly]] | None:
 
 
 def _definite_with(matrix: list[list[Poly]], guards: Sequence[list[list[Poly]]]) -> list[list[list[Poly]]]:
-    """The matrix, and less the multiple of each guard's that leaves it the most definite at the rest, where it is at all."""
+    """The matrix, and less the multiple of each guard's that leaves it the most definite at the equilibrium, if definite."""
     found = [matrix]
     own = _constants(matrix)
     for guard in guards:
@@ -227,7 +228,7 @@ def _definite_with(matrix: list[list[Poly]], guards: Sequence[list[list[Poly]]])
 
 
 def _constants(matrix: list[list[Poly]]) -> NDArray[np.float64]:
-    """What a matrix is at the rest, parameters in the middle of nowhere: zero."""
+    """What a matrix is at the equilibrium, parameters in the middle of nowhere: zero."""
     zero = [fmpq(0)] * len(matrix[0][0].context().gens())
     return np.array([[number(entry(*zero)) for entry in row] for row in matrix])
 

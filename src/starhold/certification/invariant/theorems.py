@@ -45,7 +45,7 @@ ASSUMPTIONS = (
 @dataclass(frozen=True)
 class WantedSet:
     """One claim to be shown. `V`: a polynomial or piecewise one, for `intersection` several; `box`: where, in the order of
-    variables and parameters; `rest`: the point that M is, a number for every variable, else None, and M is {V <= 0};
+    variables and parameters; `equilibrium`: the point that M is, a number for every variable, else None, and M is {V <= 0};
     `level`: the level to be shown, None: the largest that is found; `escape`: a function that grows wherever V' = 0 outside
     of M; `squares`: functions such that V' is a sum of their squares with negative factors; `known`: the area (or
     volume) of the true region, if somebody knows it."""
@@ -53,7 +53,7 @@ class WantedSet:
     theorem: str
     V: Any
     box: tuple[tuple[float, float], ...]
-    rest: tuple[Any, ...] | None = None
+    equilibrium: tuple[Any, ...] | None = None
     level: float | None = None
     escape: Any = None
     squares: tuple[Any, ...] = ()
@@ -101,12 +101,12 @@ def prove(system: System, wanted: WantedSet) -> Claim:
         raise ValueError(f"no theorem {wanted.theorem}")
     if len(wanted.box) != len(system.names):
         raise ValueError(f"a box of {len(wanted.box)} sides for {len(system.names)} variables and parameters")
-    if wanted.rest is not None and len(wanted.rest) != len(system.variables):
-        raise ValueError(f"a rest of {len(wanted.rest)} numbers for {len(system.variables)} variables")
-    rest = None if wanted.rest is None else (*map(exact, wanted.rest), *(None for _ in system.parameters))
-    proof = _Proof(wanted, Candidate(system, indicator(wanted), wanted.box, rest, wanted.squares))
+    if wanted.equilibrium is not None and len(wanted.equilibrium) != len(system.variables):
+        raise ValueError(f"an equilibrium of {len(wanted.equilibrium)} numbers for {len(system.variables)} variables")
+    point = None if wanted.equilibrium is None else (*map(exact, wanted.equilibrium), *(None for _ in system.parameters))
+    proof = _Proof(wanted, Candidate(system, indicator(wanted), wanted.box, point, wanted.squares))
     # In this order: what comes later makes no sense without what comes before.
-    steps = [_rest, _continuous, _member]
+    steps = [_equilibrium, _continuous, _member]
     steps += [_unstable] if wanted.theorem == "unstable" else [_positive, _falling]
     with enclosure.allowed(enclosure.ALL):
         for step in steps:
@@ -115,23 +115,24 @@ def prove(system: System, wanted: WantedSet) -> Claim:
         return proof.claim()
 
 
-def _rest(proof: _Proof) -> bool:
+def _equilibrium(proof: _Proof) -> bool:
     """That the point can be stayed at."""
-    rest, what = proof.what.rest, proof.what
-    if rest is None:
+    equilibrium, what = proof.what.equilibrium, proof.what
+    if equilibrium is None:
         return True
-    if not all(x is None or low < number(x) < high for x, (low, high) in zip(rest, what.box, strict=True)):
-        return proof.add("rest", EXACT, None, {"reason": "the rest is not inside the box"})
-    cells = search.cells_at(what, rest)
-    rates = [[search.at(rate, rest) for rate in cell.rates] for cell in cells]
+    if not all(x is None or low < number(x) < high for x, (low, high) in zip(equilibrium, what.box, strict=True)):
+        return proof.add("equilibrium", EXACT, None, {"reason": "the equilibrium is not inside the box"})
+    cells = search.cells_at(what, equilibrium)
+    rates = [[search.at(rate, equilibrium) for rate in cell.rates] for cell in cells]
     # A mean of two rates is zero where one is a negative multiple of the other: then a motion can stay by sliding.
     if any(all(rate.is_zero() for rate in own) for own in rates) or any(
         _balanced(one, other) for one in rates for other in rates
     ):
-        return proof.add("rest", EXACT, True)
+        return proof.add("equilibrium", EXACT, True)
     if len(cells) > 1:
-        return proof.add("rest", EXACT, None, {"reason": "no mean of the rates of two sides is zero there"})
-    return proof.add("rest", EXACT, False, {"state": search.named(what, rest), "rates": [str(rate) for rate in rates[0]]})
+        return proof.add("equilibrium", EXACT, None, {"reason": "no mean of the rates of two sides is zero there"})
+    evidence = {"state": search.named(what, equilibrium), "rates": [str(rate) for rate in rates[0]]}
+    return proof.add("equilibrium", EXACT, False, evidence)
 
 
 def _balanced(one: list[Poly], other: list[Poly]) -> bool:
@@ -154,10 +155,10 @@ def _continuous(proof: _Proof) -> bool:
 
 def _member(proof: _Proof) -> bool:
     what = proof.what
-    if what.rest is not None:
-        found = [search.at(cell.V, what.rest) for cell in search.cells_at(what, what.rest)]
+    if what.equilibrium is not None:
+        found = [search.at(cell.V, what.equilibrium) for cell in search.cells_at(what, what.equilibrium)]
         holds = all(V.is_zero() for V in found)
-        evidence = {} if holds else {"state": search.named(what, what.rest), "V": [str(V) for V in found]}
+        evidence = {} if holds else {"state": search.named(what, what.equilibrium), "V": [str(V) for V in found]}
         return proof.add("set", EXACT, holds, evidence)
     if proof.wanted.theorem not in ("stable", "unstable"):
         # Shown by any state of {V <= level}, for the least V of that set cannot be positive where V falls.
@@ -173,12 +174,12 @@ def _inhabited(proof: _Proof, level: float) -> bool:
 
 
 def _positive(proof: _Proof) -> bool:
-    """V > 0 outside of M: by definition, unless M is told to be a rest."""
+    """V > 0 outside of M: by definition, unless M is told to be an equilibrium."""
     what = proof.what
-    if what.rest is not None and not positive(what):
+    if what.equilibrium is not None and not positive(what):
         refuted = search.not_positive(what)
         return proof.add("positive", INTERVALS, False if refuted else None, refuted or _exhausted())
-    if what.rest is not None:
+    if what.equilibrium is not None:
         return proof.add("positive", INTERVALS, True)
     if bounded(what, 0.0):
         return True
@@ -188,7 +189,7 @@ def _positive(proof: _Proof) -> bool:
 
 def _unstable(proof: _Proof) -> bool:
     what = proof.what
-    if what.rest is None:
+    if what.equilibrium is None:
         holds = bounded(what, 0.0)
         refuted = None if holds else search.reaching(what, 0.0)
         near = proof.add("bounded", INTERVALS, True if holds else False if refuted else None, refuted or {})
@@ -226,9 +227,9 @@ def _falling(proof: _Proof) -> bool:
             return False
         shown = _largest(proof)
         if shown is None:
-            hint = "" if what.rest is not None else "; where M is one point, say so by `rest`"
+            hint = "" if what.equilibrium is not None else "; where M is one point, say so by `equilibrium`"
             return proof.add("falls", INTERVALS, None, {"reason": _exhausted()["reason"] + hint})
-    if what.rest is None and wanted.theorem != "stable":
+    if what.equilibrium is None and wanted.theorem != "stable":
         _inhabited(proof, shown.level)
     proof.add("bounded", INTERVALS, True)
     proof.add("falls", INTERVALS, True)
@@ -237,7 +238,7 @@ def _falling(proof: _Proof) -> bool:
         proof.perhaps("switching", shown.crossed, SLIDES)
     if shown.crossed and shown.left is not None:
         proof.perhaps("leaves", shown.left, STAYS)
-    if what.rest is None and shown.crossed:
+    if what.equilibrium is None and shown.crossed:
         # Where V cannot rise it cannot become positive.
         proof.add("invariant", INTERVALS, True)
     _tell(proof, shown.level)
@@ -286,7 +287,7 @@ def _not_at(proof: _Proof, level: float) -> bool:
 
 def _refuted_near(proof: _Proof) -> bool:
     """Whether motions are found to leave M, or V to rise however near M, so that there is no level."""
-    leaving = search.leaving(proof.what) if proof.what.rest is None else None
+    leaving = search.leaving(proof.what) if proof.what.equilibrium is None else None
     if leaving is not None:
         proof.add("invariant", INTERVALS, False, leaving)
         return True

@@ -16,11 +16,11 @@ HEADINGS = {
 }
 
 OBLIGATIONS = {
-    "rest": "the point is a rest of the system",
+    "equilibrium": "the point is an equilibrium of the system",
     "continuous": "V is continuous",
     "set": "M is not empty, and V is zero on it",
-    "positive": "V > 0 everywhere in the box but at the rest",
-    "positive nearby": "V > 0 somewhere in every neighbourhood of the rest",
+    "positive": "V > 0 everywhere in the box but at the equilibrium",
+    "positive nearby": "V > 0 somewhere in every neighbourhood of the equilibrium",
     "bounded": "V is above the level all over the border of the box, so that the set is compact and inside",
     "falls": "V never rises on the set, and falls but where told",
     "grows": "V grows wherever it is positive in the box",
@@ -35,7 +35,7 @@ def sentence(claim: Claim) -> str:
     n = claim.numbers
     theorem, level = n["theorem"], n.get("level")
     where = "a level set of V" if level is None else f"{{V <= {down(level)}}}"
-    M = "the rest" if any(o.name == "rest" for o in claim.obligations) else "M"
+    M = "the equilibrium" if any(o.name == "equilibrium" for o in claim.obligations) else "M"
     sense = ", in Filippov's sense," if len(claim.assumptions) > 1 else ""
     if theorem == "unstable":
         return f"{M} is unstable: every motion{sense} that starts in the box where V > 0 leaves the box"

@@ -27,11 +27,11 @@ from starhold.checker.region import LASALLE, ROOTS, SIGN, Region
 from starhold.checker.subject import variables
 from starhold.checker.well import EVEN, Well
 
-SINGLE = "single rest in the set"
+SINGLE = "single equilibrium in the set"
 
 
 class EvenRegion(Region[EvenFrame]):
-    """Both quaternions of the target are rest on it, half a turn is the largest: about an eigenvector of N a rest too."""
+    """Both quaternions of the target are equilibria; half a turn is the largest, an equilibrium too about axes of N."""
 
     @property
     def around(self) -> Any:
@@ -68,9 +68,9 @@ class EvenRegion(Region[EvenFrame]):
         return "definite by its minors"
 
     def settles(self) -> Obligation:
-        return "only rest", LASALLE, self.only_rest
+        return "only equilibrium", LASALLE, self.only_equilibrium
 
-    def only_rest(self) -> str:
+    def only_equilibrium(self) -> str:
         """Staying at w = 0 takes P J^-1 (torque) = -(q0 Nq + Nq x q) to be zero: its product with Nq is -q0 |Nq|2, so that
         q = 0, or q0 = 0 and q is an eigenvector of N."""
         demand(self.epsilon == 0 and self.rho == 0, "a V even in q takes no cross term")
@@ -103,8 +103,8 @@ class EvenRegion(Region[EvenFrame]):
         return "the level is below the least eigenvalue of N"
 
     def repels(self) -> str:
-        """Around a half turn V falls towards q0 = 1, and stays the same only along other rests. As w.Dw > 0, no root but
-        those along them is imaginary, and as many are on the right as directions in which V falls (inertia theorem)."""
+        """Around a half turn V falls towards q0 = 1, and stays the same only along other equilibria. As w.Dw > 0, no root
+        but those along them is imaginary, and as many are on the right as directions in which V falls (inertia theorem)."""
         self.descent()
-        self.only_rest()
+        self.only_equilibrium()
         return "V falls there and is indefinite"

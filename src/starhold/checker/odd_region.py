@@ -89,7 +89,7 @@ class OddRegion(Region[OddFrame]):
 
     def settles(self) -> Obligation:
         if self.epsilon == 0:
-            return "only rest", LASALLE, self.only_rest
+            return "only equilibrium", LASALLE, self.only_equilibrium
         return "strict", SIGN, self.strict
 
     def strict(self) -> str:
@@ -112,7 +112,7 @@ class OddRegion(Region[OddFrame]):
             demand(self.start * (1 + self.rho) <= self.level * (1 - self.rho), "the motion may leave the level set")
         return "definite by its minors"
 
-    def only_rest(self) -> str:
+    def only_equilibrium(self) -> str:
         """Staying at w = 0 takes a torque of zero, thus q = 0."""
         self.strict()
         torque = self.loop.resting()[1]
@@ -122,7 +122,7 @@ class OddRegion(Region[OddFrame]):
             own = found.only(lambda m: not set(letters(m)) & set("wem"))
             demand(all(letters(m) == "q" for m in own.terms), "the torque at rest is not linear in the attitude")
             rows.append([own.terms.get((name,), ZERO) for name in TURN])
-        demand(determinant(rows) != 0, "another attitude is at rest")
+        demand(determinant(rows) != 0, "another attitude is an equilibrium")
         return "the stiffness has a determinant other than zero"
 
     def cover(self, said: Collection[str], how: str = ROOTS) -> Obligation:
@@ -132,20 +132,20 @@ class OddRegion(Region[OddFrame]):
         # Of a law without s, to be found when it is verified, the name does not matter.
         s = self.loop.lyapunov.value.terms.get((), ZERO)
         if cover == "shortest" or (level is not None and level < 2 * s):
-            return "single rest in the set", SIGN, self.single
+            return "single equilibrium in the set", SIGN, self.single
         # Whatever momentum wheels store is in that motion, so there is no one polynomial.
         always = how != ROOTS or self.loop.subject.wheels is not None
-        return "other rest repels", SIGN if always else ROOTS, self.repels_always if always else self.repels
+        return "other equilibrium repels", SIGN if always else ROOTS, self.repels_always if always else self.repels
 
     def single(self) -> str:
-        """The other rest, and for the shorter way the half turn where the feedback switches, are outside the level set."""
+        """The other equilibrium and, for the shorter way, half turns, where the feedback switches, are outside the set."""
         highest = self.frame.s * (1 if self.loop.subject.sign_policy == "shortest" else 2)
         demand(self.level is not None and self.level < highest, "the level set reaches too far")
-        return "the level is below that of the other rest and of a switch"
+        return "the level is below that of the other equilibrium and of a switch"
 
     def jumps(self) -> str:
         """Jumps lower V + epsilon C: V by 2 s width at least, and |epsilon C| <= rho V after them; and they do not end at
-        the other rest."""
+        the other equilibrium."""
         width, s = self.loop.subject.width, self.frame.s
         demand(0 < width < 1, "the width of the hysteresis is not between 0 and 1")
         if self.epsilon != 0:
@@ -153,20 +153,20 @@ class OddRegion(Region[OddFrame]):
         return "a jump lowers V by 2 s times the width at least"
 
     def repels(self) -> str:
-        """Of the linear motion around the other rest no root is imaginary and some have a positive real part."""
+        """Of the linear motion around the other equilibrium no root is imaginary and some have a positive real part."""
         rate, attitude = self.loop.linear(-1)
         J_inverse = fmpq_mat(inverse(self.loop.subject.inertia))
         pull = [fmpq_mat(gain) for gain in (rate, attitude)]
         matrix = block((-J_inverse * pull[0]).tolist(), (-J_inverse * pull[1]).tolist(), identity(3, ZERO))
         matrix[3:] = [[*row, *zeros] for row, zeros in zip(identity(3, fmpq(-1, 2)), identity(3, ZERO), strict=True)]
-        demand(saddle(fmpq_mat(matrix).charpoly().coeffs()), "the other rest may attract")
+        demand(saddle(fmpq_mat(matrix).charpoly().coeffs()), "the other equilibrium may attract")
         return "by Routh's array, and no root common to both halves of the polynomial"
 
     def repels_always(self) -> str:
-        """The same for every inertia and stored momentum. Where V + epsilon C falls strictly around the other rest it is
-        indefinite there, so by Lyapunov's equation no root is imaginary and as many are on the right as it has negative
+        """The same for every inertia and stored momentum. Where V + epsilon C falls strictly around the other equilibrium it
+        is indefinite there, so by Lyapunov's equation no root is imaginary and as many are on the right as it has negative
         eigenvalues. Without a cross term V' = -w.Dw: what an imaginary root moves would stay at w = 0, so q = 0."""
         self.descent()
         if self.epsilon == 0:
-            self.only_rest()
+            self.only_equilibrium()
         return "V, or V + epsilon C, falls there and is indefinite"
