@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 import math
 
-from starhold.loop.station import StationLoop
-
 from starhold.algebra.vector import ZERO
 from starhold.certification.station import described_station
 from starhold.checker.station import read_station
 from starhold.laws import l2_circle
 from starhold.laws.catalogue import catalogue
 from starhold.parts.bodies.libration_point import PRIMARIES, PointState, make_libration
+from tests.making import point_loop
 
 EARTH = PRIMARIES["sun-earth"]
 PLANT = make_libration(EARTH.larger, EARTH.smaller, EARTH.separation)
@@ -25,8 +24,8 @@ BACK = BEST._replace(rate=-2.0, radius=5.0)
 
 def loop_of(gains=BEST, limit=math.inf, kind="norm", plant=PLANT, **changes):
     start = PointState((0.0, gains.radius, 0.0), (0.0, 0.0, gains.rate * gains.radius), ZERO)
-    return StationLoop(
-        plant, catalogue("libration-point")["l2-circle"], gains, start, 1e-3, limit=limit, limit_kind=kind, **changes
+    return point_loop(
+        plant, catalogue("libration-point")["l2-circle"], gains, start, 1e-3, limit=limit, kind=kind, **changes
     )
 
 

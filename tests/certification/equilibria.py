@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 import math
 
-from starhold.loop.station import StationLoop
-
 from starhold.algebra.vector import ZERO
 from starhold.certification.station import described_station
 from starhold.checker.station import read_station
 from starhold.laws import l2_equilibrium
 from starhold.laws.catalogue import catalogue
 from starhold.parts.bodies.libration_point import PRIMARIES, PointState, make_libration
+from tests.making import point_loop
 
 EARTH = PRIMARIES["sun-earth"]
 PLANT = make_libration(EARTH.larger, EARTH.smaller, EARTH.separation)
@@ -26,8 +25,8 @@ OFF = GAINS._replace(k_x=GAINS.k_x * (1.0 + 1e-8))
 
 def loop_of(gains=GAINS, limit=math.inf, kind="axis", plant=PLANT, **changes):
     start = PointState((0.0, gains.y, gains.z), ZERO, ZERO)
-    return StationLoop(
-        plant, catalogue("libration-point")["l2-equilibrium"], gains, start, 1e-3, limit=limit, limit_kind=kind, **changes
+    return point_loop(
+        plant, catalogue("libration-point")["l2-equilibrium"], gains, start, 1e-3, limit=limit, kind=kind, **changes
     )
 
 

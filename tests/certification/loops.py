@@ -4,7 +4,6 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from starhold.parts.effectors.wheeled_body import WheeledState
 
 from starhold.algebra.quaternion import NO_TURN
 from starhold.algebra.vector import ZERO
@@ -14,6 +13,8 @@ from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import fields
 from starhold.parts.craft import make_craft, tensor
 from starhold.parts.effectors.wheels import body_inertia, make_wheels, pyramid
+from tests import making
+from tests.making import ORBITAL, aimed
 
 FULL = make_craft([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]], torque_limit=0.05)
 PRINCIPAL = make_craft([2.0, 3.0, 4.0], torque_limit=0.05)
@@ -24,14 +25,16 @@ LOPSIDED = lqr.FormII((1e-4, 1e-4, 1e-4, 1.0, 4e4, 1.0), (1e3, 1e3, 1e3))
 
 def loop_of(law, gains, craft=FULL, **changes):
     """A law in orbit under the gravity gradient, at an inertial target, feeding back q as it is."""
-    given = {"sign_policy": "as_published", "target": NO_TURN, **changes}
-    return replace(sample_loop(catalogue()[law], gains), craft=craft, **given)
+    target = changes.pop("target", aimed(NO_TURN))
+    given = {"sign_policy": "as_published", **changes}
+    loop = sample_loop(catalogue()[law], gains).without("target")
+    return replace(loop.with_parts(target), craft=craft, **given)
 
 
 def free(loop):
     """The loop without torque from outside."""
     still = loop.start._replace(position=ZERO, velocity=ZERO)
-    return replace(loop, orbit=False, gravity_gradient=False, start=still)
+    return replace(loop.without("environment"), start=still)
 
 
 @cache
@@ -57,15 +60,15 @@ def textbook():
     return found
 
 
-def rotors(law, gains, target=NO_TURN, layout=pyramid, **changes):
+def rotors(law, gains, target=None, layout=pyramid, **changes):
     """A law on reaction wheels that hold some momentum at the start; in orbit, under the gravity gradient, if the target is
     there."""
     axes = layout()
     wheels = make_wheels(axes, 1e-3, changes.pop("torque_limit", 0.05), changes.pop("momentum_limit", 1.0))
     body = body_inertia(tensor(FULL.inertia), wheels)
-    loop = loop_of(law, gains, make_craft(body), target=target, limit="none", wheels=wheels, **changes)
-    loop = replace(loop, start=WheeledState(*loop.start, tuple(0.01 * (-1.0) ** i for i in range(len(axes)))))
-    return loop if target == "orbital" else free(loop)
+    loop = loop_of(law, gains, make_craft(body), target=target or aimed(NO_TURN), limit="none", **changes)
+    loop = loop.with_parts(making.rotors(wheels, [0.01 * (-1.0) ** i for i in range(len(axes))]))
+    return loop if target == ORBITAL else free(loop)
 
 
 def random_craft(random):

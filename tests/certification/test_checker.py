@@ -13,7 +13,7 @@ from starhold.laws.sliding import Gains as Sliding
 from tests.certification.by_hand import HOWS, PD, SPUN, TEXTBOOK, by_hand, converging, proved_by_hand
 from tests.certification.edits import claims_of, edited, reasons
 from tests.certification.loops import FULL, LOPSIDED, PRINCIPAL, loop_of, textbook
-from tests.making import ORBITAL
+from tests.making import ORBITAL, aimed
 
 LOOPS = textbook()
 NAMES = sorted(LOOPS)
@@ -35,7 +35,7 @@ def test_what_the_certifier_proves_holds(made, name, sign_policy):
 
 
 @pytest.mark.parametrize("sign_policy", ["as_published", "shortest", "hysteresis"])
-@pytest.mark.parametrize(("target", "limit"), [("orbital", "axis"), ("orbital", "norm"), ((1.0, 0.0, 0.0, 0.0), "norm")])
+@pytest.mark.parametrize(("target", "limit"), [(ORBITAL, "axis"), (ORBITAL, "norm"), (aimed((1.0, 0.0, 0.0, 0.0)), "norm")])
 def test_moving_targets_and_limits_of_the_norm(tmp_path, sign_policy, target, limit):
     chosen = [LOOPS[name] for name in ("pd-0", "pd-2", "lyapunov-0", "lqr-I", "sliding-1")]
     loops = [loop_of(o.law.name, o.gains, o.craft, sign_policy=sign_policy, target=target, limit=limit) for o in chosen]

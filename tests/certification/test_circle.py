@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from starhold.loop.station import StationLoop
 
 from starhold.algebra.vector import ZERO
 from starhold.certification.station import certify_station
@@ -15,6 +14,7 @@ from starhold.laws.catalogue import catalogue
 from starhold.laws.point import PointMeasurement
 from starhold.parts.bodies.libration_point import PRIMARIES, PointState, linear, make_libration
 from starhold.simulation.lanes import simulate_many
+from tests.making import point_loop
 
 EARTH = PRIMARIES["sun-earth"]
 PLANT = make_libration(EARTH.larger, EARTH.smaller, EARTH.separation)
@@ -25,8 +25,8 @@ RELAY = BEST._replace(feedback=1, k=0.3)
 
 def loop_of(gains=BEST, limit=math.inf, kind="norm", **changes):
     start = PointState((0.0, gains.radius, 0.0), (0.0, 0.0, gains.rate * gains.radius), ZERO)
-    return StationLoop(
-        PLANT, catalogue("libration-point")["l2-circle"], gains, start, 1e-3, limit=limit, limit_kind=kind, **changes
+    return point_loop(
+        PLANT, catalogue("libration-point")["l2-circle"], gains, start, 1e-3, limit=limit, kind=kind, **changes
     )
 
 
@@ -104,7 +104,7 @@ def test_a_relay_without_a_layer_holds_other_circles():
     assert 2.0 * abs(r * r - 1.0) * r == pytest.approx(evidence["needs"])
     start = PointState((0.0, r, 0.0), (0.0, 0.0, BEST.rate * r), ZERO)
     held, drawn_in = (
-        simulate_many(StationLoop(PLANT, catalogue("libration-point")["l2-circle"], gains, start, 1e-4), [start], 63_000)
+        simulate_many(point_loop(PLANT, catalogue("libration-point")["l2-circle"], gains, start, 1e-4), [start], 63_000)
         for gains in (RELAY, RELAY._replace(boundary_layer=0.3))
     )
     # One revolution of the axes: the relay alone leaves it there but for its chatter, a layer lets it come home.
@@ -142,4 +142,4 @@ def test_what_the_law_does_not_undo_is_told():
     assert claims_of(BEST._replace(model=1), model="nonlinear")["circle"].outcome == "proved"
     assert claims_of(BEST._replace(k_x=8.0))["circle"].outcome == "refuted"
     optimal = catalogue("libration-point")["l2-optimal"]
-    assert certify_station(StationLoop(PLANT, optimal, optimal.examples()[0], loop_of().start, 1e-3)).outcome == "undecided"
+    assert certify_station(point_loop(PLANT, optimal, optimal.examples()[0], loop_of().start, 1e-3)).outcome == "undecided"

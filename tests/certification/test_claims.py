@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 from scipy.optimize import minimize
-from starhold.parts.environments.gravity import two_body_gravity_gradient
 
 from starhold.algebra.quaternion import derivative
 from starhold.analysis.trial import draw, fly_claims

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from starhold.loop.station import StationLoop
 
 from starhold.algebra.vector import ZERO
 from starhold.certification.station import certify_station
@@ -14,6 +14,7 @@ from starhold.laws import l2_equilibrium
 from starhold.laws.catalogue import catalogue
 from starhold.parts.bodies.libration_point import PRIMARIES, PointState, make_libration
 from starhold.simulation.lanes import simulate_many
+from tests.making import point_loop
 
 EARTH = PRIMARIES["sun-earth"]
 PLANT = make_libration(EARTH.larger, EARTH.smaller, EARTH.separation)
@@ -23,8 +24,8 @@ REST = PointState((0.0, 1.0, 0.0), (0.0, 0.0, 0.0), ZERO)
 
 
 def loop_of(gains=GAINS, limit=math.inf, kind="axis", **changes):
-    return StationLoop(
-        PLANT, catalogue("libration-point")["l2-equilibrium"], gains, REST, 1e-3, limit=limit, limit_kind=kind, **changes
+    return point_loop(
+        PLANT, catalogue("libration-point")["l2-equilibrium"], gains, REST, 1e-3, limit=limit, kind=kind, **changes
     )
 
 
@@ -55,7 +56,7 @@ def test_flights_return_from_inside_and_from_nowhere_else():
         # The Coriolis acceleration that X makes along Y is undone, within the limit, while x' is small enough.
         states = states[:, 2.0 * np.abs(states[3]) + (PLANT.stiffness - 1.0) < limit]
         assert states.shape[1] > 20
-        batch = simulate_many(loop_of(limit=limit, far=50.0), states, 12_000)
+        batch = simulate_many(replace(loop_of(limit=limit), far=50.0), states, 12_000)
         if returns:
             assert (batch.lost_at < 0.0).all()
             np.testing.assert_allclose(batch.states[0], 0.0, atol=1e-6)

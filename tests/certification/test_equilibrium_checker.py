@@ -9,7 +9,6 @@ import math
 
 import pytest
 from flint import arb, ctx
-from starhold.loop.station import StationLoop
 
 from starhold.certification.certificate import write
 from starhold.certification.station import certify_station, described_station
@@ -22,6 +21,7 @@ from starhold.parts.bodies.libration_point import POINTS, PRIMARIES
 from tests.certification.by_hand import by_hand
 from tests.certification.edits import changed, faults, outcomes
 from tests.certification.equilibria import GAINS, OFF, PLANT, STEEP, STEEPNESS, STRONG, WEAK, loop_of
+from tests.making import point_loop
 
 REST, AXIS = (("certificates", 0, "claims", place) for place in (0, 1))
 SUBJECT = ("certificates", 0, "subject")
@@ -179,7 +179,7 @@ def test_other_laws_make_no_equilibrium_attractive(made):
     content = made(GAINS, 4.0)
     for law in catalogue("libration-point").values():
         for gains in law.examples():
-            loop = StationLoop(PLANT, law, gains, loop_of().start, 1e-3, limit=4.0, limit_kind="axis")
+            loop = point_loop(PLANT, law, gains, loop_of().start, 1e-3, limit=4.0, kind="axis")
             other = changed(content, SUBJECT, json.loads(json.dumps(described_station(loop))))
             if law.name != "l2-equilibrium":
                 assert set(faults(other).values()) == {f"the law {law.name} makes no equilibrium attractive"}

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from starhold.parts.environments.gravity import gravity_gradient
 
 from starhold.algebra.quaternion import derivative
 from starhold.analysis.trial import BrokenClaimError, fly_claims
@@ -13,6 +12,7 @@ from starhold.certification.certify import Wanted, certify
 from starhold.laws import lqr, matrix_pd, pd, sliding
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.bodies.rigid_body import angular_acceleration
+from starhold.parts.environments.gravity_gradient import gravity_gradient
 from tests.certification.loops import FULL, LOPSIDED, PRINCIPAL, UNEVEN, loop_of
 
 STILL = (0.0, 0.0, 0.0)

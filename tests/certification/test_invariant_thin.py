@@ -11,7 +11,7 @@ from starhold.algebra.polynomial import exact
 from starhold.certification.invariant import InvariantProblem, System, WantedSet, certify, enclosure, parse, write
 from starhold.certification.invariant.descent import Candidate, jumps, switches
 from starhold.certification.invariant.search import closed_cells
-from starhold.checker import check, cover, passed
+from starhold.checker import check, covering, passed
 from tests.certification.invariants import SQUARE, claim, expression, fractions, outcomes, system
 
 ORIGIN, ROUND = (0, 0), "x**2 + y**2"
@@ -53,7 +53,7 @@ def written(folder, x="-x", y="-y", V=ROUND, theorem="region", equilibrium="equi
 def impatient(monkeypatch):
     """Few boxes, for what is not shown with any number of them."""
     monkeypatch.setattr(enclosure, "MOST", 3_000)
-    monkeypatch.setattr(cover, "MOST", 2_000)
+    monkeypatch.setattr(covering, "MOST", 2_000)
 
 
 @pytest.fixture(scope="module")

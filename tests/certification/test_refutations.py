@@ -15,9 +15,11 @@ from starhold.checker import check, check_file, passed
 from starhold.laws import lqr, matrix_pd, pd, sliding
 from starhold.laws.catalogue import catalogue
 from starhold.laws.sliding import Gains as Sliding
+from tests import making
 from tests.certification.by_hand import by_hand, converging, proved_by_hand
 from tests.certification.edits import alone, claims_of, content_at, edited, reasons, replaced, spots
 from tests.certification.loops import FULL, LOPSIDED, PRINCIPAL, UNEVEN, loop_of, rotors, textbook
+from tests.making import ORBITAL
 
 SKEWED = ((0.01, 0.02, 0.0), (0.02, 0.01, 0.0), (0.0, 0.0, 0.01))
 CASES = {
@@ -212,8 +214,8 @@ def test_no_surface_is_overpowered_by_a_bound_alone(tmp_path):
 
 def test_no_claim_is_about_less_momentum_than_is_had_on_target(tmp_path):
     """A body that follows the orbit at rest on target has momentum; one with none is told of by nobody."""
-    loop = rotors("wheel", catalogue()["wheel"].examples()[0], target="orbital")
-    loop = replace(loop, start=loop.start._replace(momentum=(0.0,) * 4))
+    loop = rotors("wheel", catalogue()["wheel"].examples()[0], target=ORBITAL)
+    loop = loop.with_parts(making.rotors(loop.wheels))
     whole = certify(loop)
     assert whole.claim("wheels").outcome == "proved"
     write([whole], "made", tmp_path / "c.json")

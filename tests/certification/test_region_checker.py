@@ -14,6 +14,7 @@ from tests.certification.by_hand import TEXTBOOK, by_hand, proved_by_hand
 from tests.certification.edits import content_at, replaced, spots
 from tests.certification.loops import rotors
 from tests.certification.regions import BETTER, PLAIN, A, B, by_formula, file, highest_turn, region
+from tests.making import ORBITAL, aimed
 
 ON_WHEELS = ["neither torque nor wheels limited, wheels without friction" if a == TEXTBOOK[4] else a for a in TEXTBOOK]
 
@@ -88,7 +89,7 @@ def test_the_inertia_drops_out(inertia):
     assert faults(file(region(9.0, BETTER), inertia=inertia)) == {}
 
 
-@pytest.mark.parametrize("target", ["orbital", (1.0, 0.0, 0.0, 0.0)])
+@pytest.mark.parametrize("target", [ORBITAL, aimed((1.0, 0.0, 0.0, 0.0))])
 def test_so_do_the_target_torque_that_is_known_and_what_wheels_store(target):
     loop = rotors("modal", modal.Gains((A,) * 3, (A,) * 3, B), target)
     subject = described(make_subject(loop))

@@ -10,7 +10,6 @@ from flint import ctx, fmpq
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, RotationSpline
-from starhold.parts.targets.target import Knots, knots_of, tabulate
 
 from starhold.algebra.polynomial import exact
 from starhold.algebra.quaternion import to_body
@@ -30,6 +29,7 @@ from starhold.errors import InputError
 from starhold.laws import pd, wheel
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.craft import tensor
+from starhold.parts.targets.history import Knots, knots_of, tabulate
 from tests.certification.loops import FULL, free, loop_of
 
 

@@ -7,7 +7,6 @@ import json
 import math
 
 import pytest
-from starhold.loop.station import StationLoop
 
 from starhold.certification.certificate import write
 from starhold.certification.station import certify_station, described_station
@@ -18,6 +17,7 @@ from starhold.parts.bodies.libration_point import POINTS, PRIMARIES
 from tests.certification.by_hand import by_hand
 from tests.certification.circles import BACK, BEST, PLANT, RELAY, SOFT, WIDE, loop_of, peak, station
 from tests.certification.edits import changed, faults, outcomes
+from tests.making import point_loop
 
 CLAIM, NUMBERS = ("certificates", 0, "claims", -1), ("certificates", 0, "claims", -1, "numbers")
 SUBJECT = ("certificates", 0, "subject")
@@ -90,7 +90,7 @@ def test_other_laws_are_read_and_claim_no_circle(made):
     content = made()
     for law in catalogue("libration-point").values():
         for gains in law.examples():
-            loop = StationLoop(PLANT, law, gains, loop_of().start, 1e-3)
+            loop = point_loop(PLANT, law, gains, loop_of().start, 1e-3)
             other = changed(content, SUBJECT, json.loads(json.dumps(described_station(loop))))
             if law.name != "l2-circle":
                 assert "makes no circle attractive" in " ".join(faults(other).values())

@@ -25,7 +25,7 @@ from starhold.scenario.building import build
 from starhold.scenario.reading import load, parse
 from starhold.studies.certificates import certify_law, certify_scenario
 from tests.certification.loops import FULL, free, loop_of, rotors
-from tests.making import on_wheels
+from tests.making import ORBITAL, aimed, on_wheels
 
 EVEN = wheel.Gains(0.3, (0.015, 0.015, 0.015))
 UNEVEN = wheel.Gains(0.3, (0.01, 0.015, 0.025))
@@ -102,7 +102,7 @@ def test_two_equal_weights_leave_one_axis_and_a_circle():
 
 @pytest.mark.parametrize("gains", [EVEN, UNEVEN])
 @pytest.mark.parametrize("sign_policy", ["as_published", "shortest", "hysteresis"])
-@pytest.mark.parametrize("target", ["orbital", (1.0, 0.0, 0.0, 0.0)])
+@pytest.mark.parametrize("target", [ORBITAL, aimed((1.0, 0.0, 0.0, 0.0))])
 def test_the_wheel_law_converges_almost_always_whatever_the_wheels_store(gains, sign_policy, target):
     loop = rotors("wheel", gains, target, sign_policy=sign_policy)
     certificate = certify(loop)
@@ -117,7 +117,7 @@ def test_the_wheel_law_converges_almost_always_whatever_the_wheels_store(gains, 
 def test_without_compensation_it_holds_a_target_at_rest_only():
     gains = EVEN._replace(compensation=0.0)
     assert certify(rotors("wheel", gains)).claim("convergence").outcome == "proved"
-    refused = certify(rotors("wheel", gains, "orbital")).claim("convergence")
+    refused = certify(rotors("wheel", gains, ORBITAL)).claim("convergence")
     assert refused.outcome == "undecided"
     assert "h" in refused.obligations[0].evidence["reason"]
 
@@ -129,7 +129,7 @@ def test_another_law_on_wheels():
     assert still.outcome == "proved"
     assert still.claim("convergence").numbers["everything"]
     assert still.claim("wheels") is not None
-    moving = certify(rotors("pd", gains, "orbital")).claim("convergence")
+    moving = certify(rotors("pd", gains, ORBITAL)).claim("convergence")
     assert moving.outcome == "undecided"
 
 
@@ -137,7 +137,8 @@ def test_momentum_that_piles_up_is_not_passed_over():
     """`lyapunov` cancels the gravity gradient and leaves w x H: as H grows without end the motion may stop short."""
     loop = rotors("lyapunov", catalogue()["lyapunov"].examples()[0])
     assert certify(loop).claim("convergence").outcome == "proved"
-    pulled = replace(rotors("wheel", EVEN, "orbital"), law=loop.law, gains=loop.gains, target=loop.target)
+    pulled = rotors("wheel", EVEN, ORBITAL).without("target").with_parts(loop.target)
+    pulled = replace(pulled, law=loop.law, gains=loop.gains)
     found = certify(pulled).claim("convergence")
     assert found.outcome == "undecided"
     assert "fill the wheels" in found.obligations[3].evidence["reason"]

@@ -38,7 +38,7 @@ class CircleLoop:
 
     @cached_property
     def measurement(self) -> PointMeasurement:
-        """What the law is told; what it says for the period and the limit, it must not read."""
+        """The measurement that the law gets, of which it must not read the period and the limit."""
         return PointMeasurement(variables(named("x")), variables(named("v")), *variables(("period", "limit")))
 
     @cached_property
@@ -76,7 +76,7 @@ class CircleLoop:
 
     @cached_property
     def across(self) -> tuple[Any, Any]:
-        """What pulls x back: its coefficients of the position and the velocity along X, on which alone x'' must depend."""
+        """The coefficients of position and velocity along X that pull x back; x'' must depend on nothing else."""
         swing: Any = self.moving.velocity[0]
         demand(set(swing.slope.terms) <= {("x1",), ("v1",)}, "the motion along X depends on the other axes")
         return -swing.slope.terms.get(("x1",), ZERO), -swing.slope.terms.get(("v1",), ZERO)
@@ -100,7 +100,7 @@ class CircleLoop:
         return "the acceleration flown is the linear one, the neutral control and the damping"
 
     def descent(self) -> str:
-        """What is taken off is a positive multiple of (f2, f3)."""
+        """The damping is a positive multiple of (f2, f3)."""
         demand(self.gains.k > 0, "the damping is not positive")
         return "V' = -(f2, f3).(t2, t3), and t is a positive multiple of f"
 
@@ -165,7 +165,7 @@ def _flies(law: Any, relay: bool, layered: bool, full: bool) -> bool:
 
 
 def _agrees(law: Any, size: Any, layer: Any, full: bool) -> bool:
-    """The same where |(f2, f3)| is `size` and the layer is `layer`, expressions in symbols of known sign; without a size
+    """Whether `_flies` holds where |(f2, f3)| is `size` and the layer is `layer`, in symbols of known sign; without a size
     for smooth feedback, whatever the layer."""
     relay = size is not None
     told = {"feedback": int(relay), "model": int(full), **({"boundary_layer": layer} if relay else {})}

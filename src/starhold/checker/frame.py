@@ -98,7 +98,7 @@ def even_frame(loop: ExactLoop) -> EvenFrame:
 
 
 def _common(loop: ExactLoop, kinds: Mapping[str, Polynomial], *mixing: str) -> tuple[CommonFrame, dict[Monomial, Any]]:
-    """What any V has, of its terms by kind, and the terms of V' around the equilibrium; `mixing`: kinds that
+    """The parts that any V has, from its terms by kind, and the terms of V' around the equilibrium; `mixing`: kinds that
     may be among them."""
     P, tops = _kinetic(loop, kinds.get("ww", Polynomial({})))
     slope = loop.slope(loop.resting()[1]).only(lambda m: not set(letters(m)) & set("ra"))

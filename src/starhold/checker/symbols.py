@@ -31,7 +31,7 @@ class Symbols:
     def flown(self, law: Any, full: bool) -> Any:
         """The acceleration under the law's command."""
         model: Callable[..., Any] = nonlinear if full else linear
-        command = law.command(self.measurement, self.gains, self.plant, NoMemory())[0]
+        command = law.control(self.measurement, self.gains, self.plant, NoMemory())[0]
         return add(model(self.measurement.position, self.measurement.velocity, self.plant), command)
 
 
