@@ -1,4 +1,4 @@
-"""What a certificate holds: the loop it speaks of, claims as numbers, and for each claim what had to be shown and how.
+"""A certificate holds the loop it speaks of, claims as numbers, and for each claim what had to be shown and how.
 
 Sentences are made from the numbers when they are shown (`wording`), so that nothing in the file can say more than what
 the independent checker verifies.
@@ -22,7 +22,7 @@ Outcome = Literal["proved", "refuted", "undecided"]
 EXACT, BALLS, LASALLE = "exact identity", "ball arithmetic", "LaSalle"
 EXACT_SIGN = "exact inequality"
 WHEELS = "neither torque nor wheels limited, wheels without friction"
-"""What claims about loops with wheels assume in place of torque that is not limited."""
+"""Claims about loops with wheels assume this in place of torque that is not limited."""
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from starhold.parts.effectors.wheels import gives_what_is_asked
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is claimed; by default the most that can be proved.
+    """The claims to be made; by default the most that can be proved.
 
     rate: convergence from every attitude and rates up to this (rad/s; inf for any); turn: torque within its limit on every
     turn from rest up to this (rad); inertia_tolerance: the box; disturbance: norm of a torque nobody models (N m);
@@ -99,7 +99,7 @@ def _by_lyapunov(subject: Subject, wanted: Wanted) -> list[Claim]:
 
 
 def _unshown(subject: Subject, wanted: Wanted) -> list[Claim]:
-    """What is asked of a law without a V of its own."""
+    """Claims that are asked of a law without a V of its own."""
     rate, turn, tolerance = wanted.rate, wanted.slew_angle, wanted.inertia_tolerance
     asked: list[tuple[str, dict[str, Any]]] = []
     if rate is not None:

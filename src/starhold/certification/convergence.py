@@ -51,7 +51,7 @@ ALMOST = fmpq(2**20 - 1, 2**20)
 
 
 def assumed(subject: Subject, **instead: tuple[str, ...]) -> tuple[str, ...]:
-    """What claims of convergence about a subject assume, with other texts in place of `limits` and `outside`."""
+    """The assumptions of claims of convergence about a subject, with other texts in place of `limits` and `outside`."""
     limits, outside = ASSUMPTIONS[4:]
     if subject.loop.wheels is not None:
         limits = WHEELS
@@ -323,8 +323,8 @@ def _determinant(K: Rows) -> Any:
 
 
 def _depends_on(motion: Motion, bounded: bool) -> str:
-    """What does not drop out of the error's motion, and would have to: how the target moves, or momentum of the wheels that
-    may grow without end, for then the motion may slow down for good before it is on target."""
+    """The reason why the target's motion, or wheel momentum that may grow without end, does not drop out of the error's
+    motion, as it would have to: with such momentum the motion may slow down for good before it is on target."""
     letters = {name[0] for c in motion.acceleration for case in pieces(c) for name in case.value.variables()}
     if letters & set("ra"):
         return "how the target moves does not drop out"

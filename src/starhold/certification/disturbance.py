@@ -57,7 +57,7 @@ WIDE = 2.0
 
 @dataclass(frozen=True)
 class EndBall:
-    """What the first bound is made of, and what |w| and |q| do not exceed in the end."""
+    """The numbers of the first bound, and bounds of |w| and |q| in the end."""
 
     epsilon: Any
     rho: Any
@@ -191,7 +191,7 @@ def _guesses(frame: Frame, cross: Cross, bound: Any | None) -> Iterator[list[tup
 
 
 def _ball(basin: Basin, cross: Cross, torque: Any, bound: Any | None, epsilon: Any, rho: Any, tau: Any) -> EndBall | None:
-    """What these numbers show, if anything."""
+    """The ball that these numbers show, if they show one."""
     frame, loop = basin.frame, basin.motion.subject.loop
     left = plus(decrease(frame, cross, epsilon, bound), _push(frame, epsilon), -tau)
     if not (definite(left) and definite(margin(frame, cross, epsilon, rho))):

@@ -100,7 +100,7 @@ class Nearby:
         return gyroscopic_torque(turned, identity(3))
 
     def outside(self, rate: Any, turn: Any) -> tuple[Any, Any]:
-        """What |m + g| and 1 - q0 do not exceed."""
+        """Bounds of |m + g| and 1 - q0."""
         return self.torque + self.gyroscopic_torque.most * rate * rate, 1 - root_below(1 - turn * turn)
 
     def holds(self, step: ShrinkingStep, rate: Any, turn: Any) -> bool:

@@ -31,7 +31,7 @@ from starhold.parts.bodies.libration_point import linear
 HELD = "held at rest along Y and Z, where no Coriolis acceleration acts along X"
 CLEAR = "never at the centre of one of the two bodies"
 SHARE = 0.999
-"""Of the bound beyond which no motion returns, the part that is certified."""
+"""The part that is certified of the bound beyond which no motion returns."""
 FAR = 1e3
 """|x| up to which it is, as a multiple of the bound."""
 
@@ -102,7 +102,7 @@ def _axis(loop: ClosedLoop) -> Axis:
 
 
 def _demand(loop: ClosedLoop) -> Any:
-    """What holding Y and Z takes at least."""
+    """The control that holding Y and Z takes at least."""
     square, c = exact(loop.craft.rate) ** 2, exact(loop.craft.stiffness)
     return max(abs((c - square) * exact(loop.gains.y)), abs(c * exact(loop.gains.z)))
 

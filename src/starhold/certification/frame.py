@@ -50,7 +50,7 @@ class Frame:
 
     @property
     def s(self) -> Any:
-        """What the potential is at a half turn (J)."""
+        """The potential at a half turn (J)."""
         return self.potential.s
 
     @property
@@ -212,7 +212,7 @@ def margin(frame: Frame, cross: Cross, epsilon: Any, rho: Any) -> Rows:
 
 
 def contents(start: Any | None, P: Rows, potential: Potential) -> dict[str, Any]:
-    """What {V <= start} holds: the largest turn from rest (rad), the largest rate on target, and the largest rate at
+    """The contents of {V <= start}: the largest turn from rest (rad), the largest rate on target, and the largest rate at
     every attitude (rad/s; None: not every attitude is in it); all from below. For start None everything."""
     if start is None:
         turn = math.pi if potential.even else 2.0 * math.pi

@@ -261,7 +261,7 @@ def _refused(subject: Subject, families: list[Family], tolerance: float) -> Clai
 
 
 def told(subject: Subject, tolerance: float | None) -> tuple[str, ...]:
-    """What the claim assumes; for a tolerance of None any inertia."""
+    """The assumptions of the claim; for a tolerance of None any inertia."""
     body, _, *others = assumed(subject, outside=("no torque from outside", "target at rest"))
     return (body, *(() if tolerance is None else ("inertia within the tolerance",)), *others)
 

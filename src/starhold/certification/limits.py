@@ -174,8 +174,9 @@ def load_of(basin: Basin, parts: list[Polynomial], limit: Any) -> LimitedLoad:
 
 
 def _lines(part: Polynomial, row: list[Any], P: Rows, most: Any) -> tuple[tuple[Any, Any], ...]:
-    """Of b.w + w.Fw, |w.Fw| <= most w.Pw, for some l above most: as l P - F and l P + F are positive definite, its size
-    exceeds l w.Pw by b.(l P -+ F)^-1 b/4 at most. The least over all l is its maximum on w.Pw = z2 (S-procedure)."""
+    """Lines that bound b.w + w.Fw, |w.Fw| <= most w.Pw, for some l above most: as l P - F and l P + F are positive
+    definite, its size exceeds l w.Pw by b.(l P -+ F)^-1 b/4 at most. The least over all l is its maximum on w.Pw = z2
+    (S-procedure)."""
     if most == 0 or not any(row):
         return ()
     F, found = matrix_of(part.only(is_gyroscopic), RATE, RATE), list[tuple[Any, Any]]()

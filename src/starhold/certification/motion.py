@@ -50,7 +50,7 @@ class Motion:
 
     @cached_property
     def factor(self) -> Polynomial:
-        """What derivatives are multiplied by: 1, or the determinant of the unknown inertia."""
+        """The factor of derivatives: 1, or the determinant of the unknown inertia."""
         if not self.unknown_inertia:
             return Polynomial.constant(1)
         j = _entries()
@@ -73,7 +73,7 @@ class Motion:
 
     @cached_property
     def measurement(self) -> Measurement:
-        """What the law is told, in variables."""
+        """The law's measurement in variables."""
         zero: Any = (Polynomial.constant(0),) * 3
         still = not self.subject.moving or self.unknown_inertia
         rate, known = direction("w"), direction("e")

@@ -64,7 +64,7 @@ class Spring:
         return turned, turned
 
     def grid(self, t: Array) -> tuple[Array, Array]:
-        """The same in floats where it has the values t."""
+        """The lengths that `sizes` bounds, in floats, where it has the values t."""
         x = t / number(self.s)
         turned = np.sqrt(np.maximum(x * (2.0 - x), 0.0))
         return turned, turned
@@ -129,7 +129,7 @@ class Cosines:
         return _parabola(start, end, 1), end.sqrt()
 
     def grid(self, t: Array) -> tuple[Array, Array]:
-        """The same in floats where it has the values t."""
+        """The lengths that `sizes` bounds, in floats, where it has the values t."""
         x = t / number(self.s)
         return np.sqrt(np.maximum(x * (1.0 - x), 0.0)), np.sqrt(x)
 

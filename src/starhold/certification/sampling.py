@@ -37,8 +37,8 @@ STILL_WHEELS = "no stored momentum"
 ROOTS = "certified roots"
 APART = "inertia, gains and period are too far apart in size"
 MOST_BITS = 1_000
-"""Of the numbers of a characteristic polynomial whose roots are told apart: everyday ones have 500; of gains of 1e-300
-they have 4000, which takes minutes."""
+"""Most bits in the numbers of a characteristic polynomial whose roots are told apart: everyday ones have 500; gains of
+1e-300 make 4000, which takes minutes."""
 
 
 def sampling(motion: Motion) -> Claim | None:

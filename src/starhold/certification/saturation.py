@@ -81,7 +81,7 @@ def saturation(basin: Basin, turn: float | None = None) -> Claim | None:
 
 
 def _load(basin: Basin, torque: list[Polynomial], wheels: Wheels, i: int) -> LimitedLoad | None:
-    """What bounds a motor's torque; None for a lost wheel."""
+    """The bound of a motor's torque; None for a lost wheel."""
     limit = wheels.torque_limit[i]
     if limit == 0.0:
         return None
@@ -108,7 +108,7 @@ def _needs(basin: Basin, carried: list[LimitedLoad | None], level: Any) -> list[
 
 
 def _stored(basin: Basin, wheels: Wheels, level: Any) -> list[float]:
-    """What each wheel's momentum does not exceed on {V <= level}: the wheels share out momentum as they do torque."""
+    """Bounds of each wheel's momentum on {V <= level}: the wheels share out momentum as they do torque."""
     return [above(offset + gain * _momentum(basin, level)) for offset, gain in _shares(basin, wheels)]
 
 

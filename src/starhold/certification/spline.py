@@ -30,8 +30,8 @@ MOST = 4_000_000
 """Parts of stretches that one proof may take."""
 MARGINS = (1.01, 1.1, 2.0, 10.0)
 BESIDE = 1e-3
-"""What the bound of the acceleration has room for beside a share of the peak, in squares of the rate: an even turn has no
-acceleration at all."""
+"""The bound of the acceleration has this much room beside a share of the peak, in squares of the rate: an even turn has
+no acceleration at all."""
 
 Array = NDArray[np.float64]
 

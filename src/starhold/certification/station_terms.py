@@ -1,4 +1,4 @@
-"""What claims about station-keeping loops have in common."""
+"""Terms that claims about station-keeping loops have in common."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def assumed(loop: ClosedLoop, *more: str) -> tuple[str, ...]:
 
 
 def mismatch(loop: ClosedLoop) -> str:
-    """What is wrong where the law undoes another model than the one that is flown; empty where it undoes that."""
+    """The fault of a law that undoes another model than the one that is flown; empty where it undoes that."""
     if model_of(loop) == ("nonlinear" if loop.gains.model else "linear"):
         return ""
     if loop.gains.model:
@@ -33,7 +33,7 @@ def mismatch(loop: ClosedLoop) -> str:
 
 
 def point_measurement() -> PointMeasurement:
-    """What the law sees, in variables x1..x3 and v1..v3."""
+    """The law's measurement in variables x1..x3 and v1..v3."""
     zero: Any = Polynomial.constant(0)
     return PointMeasurement(direction("x"), direction("v"), zero, zero)
 

@@ -22,7 +22,7 @@ from starhold.parts.environments.gravity_gradient import gravity_gradient
 from starhold.parts.targets.history import Knots
 
 SPLINE = "rotation spline"
-"""What a tabulated target follows between its knots, see `models.target.Knots`."""
+"""The curve that a tabulated target follows between its knots, see `parts.targets.history.Knots`."""
 
 
 @dataclass(frozen=True)

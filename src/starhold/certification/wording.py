@@ -81,14 +81,14 @@ def speed(rate: float, up: bool = False) -> str:
 
 
 def sentence(claim: Claim, subject: Mapping[str, Any]) -> str:
-    """What a claim says, whether or not it is proved, with the assumption about the loop's limits that decides it. What is
-    refuted is rounded to say no less."""
+    """The claim in a sentence, whether or not it is proved, with the assumption about the loop's limits that decides it.
+    Numbers that are refuted are rounded to say no less."""
     told = _SENTENCES[claim.kind]({**claim.numbers, "refuted": claim.outcome == "refuted"}, subject)
     return f"{_unlimited(claim, subject)}{told}"
 
 
 def _unlimited(claim: Claim, subject: Mapping[str, Any]) -> str:
-    """What a claim about where motions end takes away from the loop; empty where that has no limits."""
+    """The limits that a claim about where motions end takes away from the loop; empty where it has none."""
     if claim.kind == "sampling":
         return ""
     if WHEELS in claim.assumptions:
@@ -150,7 +150,7 @@ def _cover(numbers: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 
 
 def _followed(subject: Mapping[str, Any]) -> str:
-    """What a bound that depends on the target's motion assumes of it between the rows of its history."""
+    """The assumption on the target's motion, between the rows of its history, of a bound that depends on it."""
     followed = subject.get("target") == "history" and subject["target_rate"]
     return ", while the target follows the rotation spline through its history" if followed else ""
 
@@ -315,7 +315,7 @@ def _numbers(value: Any) -> str:
 
 
 def brief(certificate: Certificate) -> str:
-    """What is proved in one line."""
+    """All that is proved, in one line."""
     proved = [sentence(c, certificate.subject) for c in certificate.claims if c.outcome == "proved"]
     return "; ".join(proved) or "nothing is proved"
 

@@ -26,7 +26,7 @@ SIZE, SHARE, GREATEST = 40, 12, 20
 MOST = 20_000
 """So many boxes are looked at, at most."""
 CLEAR = 2**14
-"""What rounding up adds in the course of the halvings is less: at most the degree for each."""
+"""Rounding up adds less than this in the course of the halvings: at most the degree for each."""
 
 
 def negative_where(fall: Polynomial, room: Polynomial, box: Box) -> bool:

@@ -46,7 +46,7 @@ BITS = 192
 
 @dataclass(frozen=True)
 class Finding:
-    """What the check says of one obligation of a claim; without an obligation, of the claim, certificate or file."""
+    """A verdict on one obligation of a claim; without an obligation, on the claim, certificate or file."""
 
     certificate: str
     claim: str
@@ -107,7 +107,7 @@ def _certificate(given: Mapping[str, Any]) -> Iterator[Finding]:
 
 
 def _guarded(work: Callable[[], Any]) -> tuple[Any, str]:
-    """What a piece of work gives, or None and why it fails: whatever goes wrong in a check fails it."""
+    """Do a piece of work: its result, or None and why it fails, for whatever goes wrong in a check fails it."""
     try:
         with limited():
             return work(), ""

@@ -1,4 +1,4 @@
-"""What each kind of claim obliges to, and how its checker verifies that. Nothing here is shared with the certifier."""
+"""The obligations of each kind of claim, and how the checker verifies them. Nothing here is shared with the certifier."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Kind:
     wheels: bool | None = None
 
     def assumptions(self, numbers: Numbers, wheels: bool) -> list[str]:
-        """What a claim with these numbers, about a loop with or without wheels, assumes."""
+        """The assumptions of a claim with these numbers, about a loop with or without wheels."""
         unlimited = numbers.get("tolerance", 0) is None
         kept = [told for told in self.assumed if not (unlimited and told == self.untold)]
         return [_FREE if told == _UNLIMITED else told for told in (*kept, *self.beside)] if wheels else kept

@@ -54,7 +54,7 @@ class Disturbed:
 
     @cached_property
     def turn(self) -> Any:
-        """What |q| does not exceed in the ball."""
+        """A bound of |q| in the ball."""
         demand(self.tau > 0, "tau is not positive")
         return root_above(self.torque**2 / (4 * self.tau) * greatest([row[3:] for row in inverse(self.left)[3:]]))
 
@@ -95,7 +95,7 @@ class Disturbed:
         return "V + epsilon C, then forms x.Sx fall outside sets that are within the end"
 
     def _ball(self) -> tuple[Any, Any]:
-        """What |w| and |q| do not exceed where V + epsilon C is no larger than in the ball; there q0 > 0."""
+        """Bounds of |w| and |q| where V + epsilon C is no larger than in the ball; there q0 > 0."""
         region, s, J, epsilon = self.region, self.region.frame.s, self.region.loop.inertia, self.region.epsilon
         P = region.frame.P
         demand(self.turn < 1, "the ball reaches every attitude")

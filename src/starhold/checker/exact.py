@@ -1,5 +1,5 @@
-"""What the checker of certificates decides with: exact matrices and polynomials, derivatives, and bounds that only round
-away from what they bound. Nothing here is shared with the certifier.
+"""Exact matrices and polynomials, derivatives, and bounds that only round away from what they bound, by which the checker
+decides. Nothing here is shared with the certifier.
 
 A matrix is a list of rows of rationals (`fmpq`).
 """

@@ -1,4 +1,4 @@
-"""What a certificate of an invariant set has to hold, shown anew: V' < 0 on {0 < V <= level} and what goes with it, by
+"""Shows anew what a certificate of an invariant set has to hold: V' < 0 on {0 < V <= level} and what goes with it, by
 Bernstein coefficients on charts of the box. Nothing here is shared with the certifier, whose method is intervals.
 """
 
@@ -151,7 +151,7 @@ class Indicator:
 
     @cached_property
     def _looked(self) -> list[tuple[ClosedCell, tuple[Poly, ...]]] | CheckError:
-        """The same, or the error, so that nothing is looked for twice."""
+        """The cells of `_weak`, or the error, so that nothing is looked for twice."""
         try:
             return self._look()
         except CheckError as fault:
@@ -192,7 +192,8 @@ class Indicator:
         return single and all(c > 0 and all(int(e) % 2 == 0 for e in powers) for powers, c in terms.items())
 
     def _not_negative(self, cell: ClosedCell, q: Poly) -> list[tuple[Poly, ...]] | None:
-        """What vanishes where q does, if q is nowhere negative: what it is a sum of squares of, or even factors."""
+        """Polynomials that vanish where q does, if q is nowhere negative: those it is a sum of squares of, or even
+        factors."""
         if self.squares and _sum_of(q, [h * h for h in self.squares]):
             return [self.squares]
         constant, factors = q.factor()

@@ -154,7 +154,7 @@ def _indicator(subject: Mapping[str, Any], place: int, claim: Mapping[str, Any])
 
 
 def _of(subject: Mapping[str, Any], key: str, place: int) -> Any:
-    """What the subject says for one claim, None if nothing."""
+    """The entry of the subject for one claim, None if there is none."""
     return subject[key][place] if key in subject else None
 
 
@@ -207,7 +207,7 @@ def _ordered(what: Indicator, values: Any) -> list[Any]:
 
 
 def _remarks(what: Indicator, claim: Mapping[str, Any]) -> Iterator[tuple[str, Callable[[], str]]]:
-    """What is said beside the obligations: why the level is not larger, and the size of the set."""
+    """Checks of what is said beside the obligations: why the level is not larger, and the size of the set."""
     numbers = claim["numbers"]
     if "limited_by" in numbers or "refuted_level" in numbers:
         yield "limit", lambda: _limit(what, numbers, claim["witness"].get("limit"))

@@ -94,7 +94,7 @@ class ExactLoop:
 
     @cached_property
     def measurement(self) -> Measurement:
-        """What the law is told."""
+        """The measurement that the law gets."""
         still = constants((0, 0, 0))
         turning, spinning = (still, still) if self.still else (variables(named("r")), variables(named("a")))
         rate, relative = add(W, turning), subtract(spinning, cross(W, turning))
@@ -106,8 +106,8 @@ class ExactLoop:
 
     @cached_property
     def moving(self) -> Measurement:
-        """The same with derivatives under a torque t, times the plant's factor; but that of the stored momentum, which V and
-        surfaces have no terms for."""
+        """The measurement with derivatives under a torque t, times the plant's factor; without that of the wheel momentum,
+        which V and surfaces have no terms for."""
         craft, factor = self.plant
         measurement = self.measurement
         torque = add(variables(named("t")), add(measurement.external_torque, variables(named("m"))))
@@ -208,7 +208,7 @@ class ExactLoop:
         return {monomial: share for monomial, share in found.items() if share.terms}
 
     def plain(self, polynomial: Polynomial) -> dict[Monomial, Any]:
-        """The same where no coefficient may depend on the inertia."""
+        """The coefficients of `over` where none may depend on the inertia; else a CheckError."""
         found = self.over(polynomial)
         strange = [" ".join(monomial) for monomial, share in found.items() if share.value is None]
         demand(not strange, f"the terms {', '.join(strange)} depend on the inertia")
@@ -261,7 +261,7 @@ def at_rest(polynomial: Polynomial, sign: int) -> Any:
 
 
 def _factor(polynomial: Polynomial, name: str) -> Polynomial:
-    """What multiplies a variable that occurs once in a term."""
+    """The factor of a variable in the terms where it occurs once."""
     return Polynomial({without(m, name): c for m, c in polynomial.terms.items() if m.count(name) == 1})
 
 

@@ -74,7 +74,7 @@ class ModalRegion:
         self.plain = self.g == 0 and self.m == 0
 
     def proofs(self) -> list[Obligation]:
-        """What has to be shown."""
+        """The obligations of such a claim."""
         found: list[Obligation] = [("form", EXACT, self.form), ("descent", BALLS, self.descent)]
         if self.plain:
             found.append(("only equilibrium", LASALLE, self.only_equilibrium))
@@ -160,7 +160,7 @@ class ModalRegion:
         return negative_where(self.fall(u, y, s, over), self.c - self.height(u, y, s), box)
 
     def _fast(self, ratio: Any) -> bool:
-        """The same where |w| >= ratio alpha l and u <= 1.
+        """Whether V' < 0 where |w| >= ratio alpha l and u <= 1.
 
         u = 2 v2 with v = n |w|/alpha makes l = 2 v sqrt(1 - v2), where the root is at least sqrt(1/2), so that n is at most
         sqrt(1/2)/ratio. The root is taken into x = sqrt(1 - v2) times the cosine, for which -1 to 1 is more than enough.
@@ -209,8 +209,8 @@ class ModalRegion:
 
 
 def _on_unit_quaternions(polynomial: Polynomial) -> Polynomial:
-    """What is left of a polynomial, times a power of 1 + |q|2, where z (1 + |q|2) = 1 and q02 = 1 - |q|2: nothing of one
-    that is zero there."""
+    """The polynomial, times a power of 1 + |q|2, where z (1 + |q|2) = 1 and q02 = 1 - |q|2: without terms if it is zero
+    there."""
     q: Any = variables(named("q"))
     square: Any = dot(q, q)
     depth = max((m.count(QUOTIENT) for m in polynomial.terms), default=0)

@@ -153,7 +153,7 @@ class OddRegion(Region[OddFrame]):
         return "a jump lowers V by 2 s times the width at least"
 
     def repels(self) -> str:
-        """Of the linear motion around the other equilibrium no root is imaginary and some have a positive real part."""
+        """The linear motion around the other equilibrium has no imaginary root and some with a positive real part."""
         rate, attitude = self.loop.linear(-1)
         J_inverse = fmpq_mat(inverse(self.loop.subject.inertia))
         pull = [fmpq_mat(gain) for gain in (rate, attitude)]
@@ -163,9 +163,9 @@ class OddRegion(Region[OddFrame]):
         return "by Routh's array, and no root common to both halves of the polynomial"
 
     def repels_always(self) -> str:
-        """The same for every inertia and stored momentum. Where V + epsilon C falls strictly around the other equilibrium it
-        is indefinite there, so by Lyapunov's equation no root is imaginary and as many are on the right as it has negative
-        eigenvalues. Without a cross term V' = -w.Dw: what an imaginary root moves would stay at w = 0, so q = 0."""
+        """The other equilibrium repels, for every inertia and wheel momentum. Where V + epsilon C falls strictly around it
+        it is indefinite there, so by Lyapunov's equation no root is imaginary and as many are on the right as it has
+        negative eigenvalues. Without a cross term V' = -w.Dw: what an imaginary root moves would stay at w = 0, so q = 0."""
         self.descent()
         if self.epsilon == 0:
             self.only_equilibrium()

@@ -62,7 +62,7 @@ def phases(circle: CircleLoop) -> list[tuple[Polynomial, Polynomial]]:
 
 
 def _on_unit_circle(polynomial: Polynomial) -> Polynomial:
-    """The same with 1 - c^2 for s^2, as often as that occurs."""
+    """The polynomial with 1 - c^2 for s^2, as often as that occurs."""
     kept: Any = polynomial.only(lambda m: m.count("s") < 2)
     rest = polynomial.only(lambda m: m.count("s") >= 2)
     if not rest.terms:

@@ -22,7 +22,7 @@ from starhold.checker.exact import CheckError, demand
 from starhold.errors import InputError
 
 BYTES, DEEPEST, DIGITS, SECONDS = 2**26, 32, 1_000, 60.0
-"""Of a file, how deep its objects and lists may be in one another, of a number, and for the check of one claim."""
+"""The largest file; how deep its objects and lists may be in one another; digits of a number; seconds for one claim."""
 LONGEST, PIECES, TERMS, POWER = 2_000, 64, 600, 24
 """Characters of a text, pieces and terms of what it stands for, and powers: what is larger is not read."""
 _ARGUMENTS = {"min": range(2, 9), "max": range(2, 9), "abs": [1], "clip": [2], "sat": [1, 2], "sign": [1], "where": [3]}
@@ -81,7 +81,7 @@ def _within(part: Any) -> Iterable[Any]:
 
 @contextmanager
 def limited(seconds: float = SECONDS) -> Generator[None]:
-    """What runs within is stopped by `in_time` after so many seconds of processor time, or when what it is part of is."""
+    """Give the work within so many seconds of processor time, no more than what it is part of has; `in_time` stops it."""
     before = _late.set(min(thread_time() + seconds, _late.get()))
     try:
         yield
@@ -107,7 +107,7 @@ def read_names(names: Sequence[str], define: Mapping[str, Any]) -> dict[str, Any
 
 
 def read(text: Any, names: Mapping[str, Any]) -> Any:
-    """What a text stands for; a CheckError where it holds anything else than it may."""
+    """Read an expression; a CheckError where it holds anything else than it may."""
     demand(isinstance(text, (str, int, float)) and not isinstance(text, bool), "an expression is no text")
     line = " ".join(str(text).split())
     demand(len(line) <= LONGEST, "an expression is too long")

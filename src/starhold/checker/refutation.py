@@ -42,7 +42,7 @@ CLOSE = fmpq(1, 10**9)
 
 
 def refutation(subject: LoopSubject, claim: Mapping[str, Any], obligation: Mapping[str, Any]) -> str:
-    """What the evidence of an obligation shows; a CheckError where it does not refute."""
+    """Check the evidence against an obligation and say what it shows; a CheckError where it does not refute."""
     name, evidence = obligation["name"], obligation["evidence"]
     match claim["kind"], name:
         case "convergence", "positive":

@@ -80,7 +80,7 @@ class Region(ABC, Generic[F]):
     @property
     @abstractmethod
     def highest(self) -> Any:
-        """What V at rest does not exceed, whatever the attitude."""
+        """A bound of V at rest, whatever the attitude."""
 
     @abstractmethod
     def holds_turn(self, turn: Any) -> bool:
@@ -93,7 +93,7 @@ class Region(ABC, Generic[F]):
 
     @property
     def bound(self) -> Any | None:
-        """What |w| does not exceed on the level set: as the witness says, else as the least eigenvalue of P tells."""
+        """A bound of |w| on the level set: as the witness says, else as the least eigenvalue of P tells."""
         if self.given is not None or self.level is None or self.loop.shifted:
             return self.given
         return root_above(2 * self.level / least(self.frame.P))
@@ -104,7 +104,7 @@ class Region(ABC, Generic[F]):
         return "V and V' have no other terms"
 
     def damping(self) -> Rows:
-        """What is left of D beside the cubic term, for the rates of the level set."""
+        """D less the cubic term, for the rates of the level set."""
         frame, bound = self.frame, self.bound
         demand(bound is None or bound > 0, "the bound of the rate is not positive")
         demand(frame.kappa == 0 or bound is not None, "V' has a cubic term and the rate no bound")
@@ -134,7 +134,7 @@ class Region(ABC, Generic[F]):
     def contents(
         self, turn: Any, rate: Any | None, everywhere: Any | None, everything: bool, any_inertia: bool = False
     ) -> str:
-        """What is said to be in {V <= start} is."""
+        """Turn and rates that are said to be in {V <= start} are in it."""
         tops, start = self.frame.tops, self.start
         demand(everything == (self.level is None) == (start is None), "the level set is everything only without a level")
         turn, rate, everywhere = rational(turn), optional(rate), optional(everywhere)

@@ -1,4 +1,4 @@
-"""What may stand in a certificate file: the keys of each object, and what each may hold. Nothing here is shared with the
+"""The shape of a certificate file: the keys of each object, and what each may hold. Nothing here is shared with the
 certifier."""
 
 from __future__ import annotations
@@ -168,7 +168,7 @@ STATION: dict[str, Test] = {
     "lag": _number,
     "control_period": _number,
 }
-"""Of a loop that keeps a craft near a libration point."""
+"""The subject where a loop keeps a craft near a libration point."""
 _CIRCLE: dict[str, Test] = dict.fromkeys(("level", "inner", "outer", "velocity"), _number)
 _CONTENTS: dict[str, Test] = {
     "start": _MAYBE,
@@ -210,7 +210,7 @@ NUMBERS: dict[str, dict[str, Test]] = {
     "saturated-axis": dict.fromkeys(("limit", "width", "reach", "boundary"), _number),
 }
 STEP: dict[str, Test] = {"form": _list(_list(_number, 6), 6), "decay": _number, "spread": _number}
-"""Of the proof where a torque from outside lets motions end."""
+"""A step of the proof where a torque from outside lets motions end."""
 _PROOF: dict[str, Test] = {"stiffness": _MAYBE, "epsilon": _number, "rho": _number}
 WITNESS: dict[str, dict[str, Test]] = {
     "convergence": {**_PROOF, "rate_bound": _MAYBE},

@@ -118,7 +118,7 @@ class StationKind:
     anywhere: bool = False
 
     def assumptions(self, subject: StationSubject) -> list[str]:
-        """What a claim about this subject assumes."""
+        """The assumptions of a claim about this subject."""
         motion = "motion exactly as modelled" if subject.full else "linear motion near the point"
         return [
             motion,
@@ -222,7 +222,7 @@ STATION_CLAIMS: dict[str, StationKind] = {
 
 
 def station_refutation(subject: StationSubject, claim: Numbers, obligation: Mapping[str, Any]) -> str:
-    """What the evidence of an obligation shows; a CheckError where it does not refute."""
+    """Check the evidence against an obligation and say what it shows; a CheckError where it does not refute."""
     name, evidence = obligation["name"], obligation["evidence"]
     match claim["kind"], name:
         case "circle", "only the circle":
@@ -261,7 +261,7 @@ def _leaves(circle: CircleLoop, evidence: Numbers) -> str:
 
 
 def _needs_more(subject: StationSubject, numbers: Numbers, evidence: Numbers) -> str:
-    """What the law commands on the circle itself, near an angle from Y at which all is rational."""
+    """The law commands more than the limit on the circle itself, near an angle from Y at which all is rational."""
     demand(set(evidence) == {"control", "angle"}, "the evidence is not that of a control")
     _same_limit(subject, numbers)
     demand(rational(numbers["limit"]) == subject.control_limit, "a limit is refuted that is not the loop's")

@@ -92,7 +92,7 @@ def _lines(F: Rows, b: list[Any], P: Rows, gyro: Any) -> Iterator[tuple[Any, Any
 
 
 def _mixed(parts: Sequence[Polynomial], damping: Rows, P_inverse: Rows) -> Any:
-    """What |Bw.G(w)| does not exceed where w.Pw = 1, its monomials bounded one by one."""
+    """A bound of |Bw.G(w)| where w.Pw = 1, its monomials bounded one by one."""
     product = Polynomial({})
     for part, row in zip(parts, damping, strict=True):
         linear: Any = sum((c * w for c, w in zip(row, W, strict=True)), Polynomial({}))
@@ -120,7 +120,7 @@ def _load(loop: ExactLoop, terms: Mapping[Monomial, Any], P_inverse: Rows, count
 
 
 def _outside(loop: ExactLoop, name: str) -> Any:
-    """What a variable that is neither a rate nor of the vector part does not exceed."""
+    """A bound of a variable that is neither a rate nor of the vector part."""
     subject = loop.subject
     if name[0] == "e":
         return subject.modelled[int(name[1]) - 1]
@@ -134,7 +134,7 @@ def _outside(loop: ExactLoop, name: str) -> Any:
 def _everywhere(
     loop: ExactLoop, found: Sequence[Interval], parts: Sequence[Polynomial], limit: Any, each_axis: bool
 ) -> bool:
-    """The same on a piece where the rates are in intervals, whatever the attitude."""
+    """Whether the torque keeps within the limit on a piece where the rates are in intervals, whatever the attitude."""
     bounds = [_bound(loop, found, part) for part in parts]
     if each_axis:
         return all(bound <= limit for bound in bounds)

@@ -52,7 +52,7 @@ class SubjectWheels:
 
     @property
     def moments(self) -> Rows:
-        """What the moments of the rotors about their axes add to the inertia."""
+        """The inertia that the moments of the rotors about their axes add."""
         return matmul(
             transpose(self.axes), [[moment * x for x in row] for moment, row in zip(self.inertia, self.axes, strict=True)]
         )

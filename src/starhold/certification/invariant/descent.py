@@ -1,4 +1,4 @@
-"""What has to be shown on {0 < V <= level} in a box, by branch and bound over the cells of a piecewise polynomial system.
+"""Shows what has to hold on {0 < V <= level} in a box, by branch and bound over the cells of a piecewise polynomial system.
 
 Motions are those in the sense of Filippov, and more: where the right-hand side jumps, x' is any mean of what it is on the
 sides and on the surface itself. V(x(t)) has a derivative almost always. Inside a cell it is the cell's V'. The times on a
@@ -68,7 +68,7 @@ class Guarded:
 
     @classmethod
     def of(cls, cell: Cell, pieces: Cells, onto: Sequence[Poly] = ()) -> Guarded:
-        """Of a cell; its part where polynomials vanish."""
+        """Make it of a cell, or of its part where polynomials vanish."""
         guards = pieces.guards(cell, onto)
         V = pieces.reduced(cell.V, onto)
         never = V.is_zero() or sign_between(V, guards) < 0
@@ -76,7 +76,7 @@ class Guarded:
 
     @property
     def known(self) -> list[Poly]:
-        """What is not negative in it, as polynomials."""
+        """The polynomials that are not negative in it."""
         return [guard.polynomial for guard in self.guards]
 
     def inside(self, boxes: Boxes) -> Mask:

@@ -34,7 +34,7 @@ class EnclosedPolynomial:
         return [EnclosedPolynomial(self.polynomial.derivative(k)) for k in range(len(self.polynomial.context().gens()))]
 
     def on(self, boxes: Boxes) -> Intervals:
-        """What its values on each box lie in."""
+        """An enclosure of its values on each box."""
         found = self._plain(boxes)
         if boxes.middle is None:
             return found
@@ -191,7 +191,7 @@ def definite(form: Sequence[Sequence[EnclosedPolynomial]], boxes: Boxes) -> Mask
 
 
 def determinant(rows: Sequence[Sequence[Intervals]]) -> Intervals:
-    """Of a matrix of intervals, by its first row."""
+    """The determinant of a matrix of intervals, by its first row."""
     if len(rows) == 1:
         return rows[0][0]
     total = Intervals(np.zeros_like(rows[0][0].low))

@@ -47,7 +47,7 @@ class InvariantProblem:
 
 
 def certify(problem: InvariantProblem) -> Certificate:
-    """What is shown of each claim."""
+    """Prove each claim of a problem as far as possible."""
     system = problem.system
     rates = zip(system.variables, system.rates, strict=True)
     written = problem.written or {"rates": {name: [str(piece.value) for piece in pieces(rate)] for name, rate in rates}}

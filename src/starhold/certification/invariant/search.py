@@ -1,4 +1,4 @@
-"""What floats guess: how large a level may be, and states that refute. The latter are verified in exact rationals."""
+"""Floats guess how large a level may be, and states that refute. The latter are verified in exact rationals."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from starhold.certification.matrices import number
 
 Array = NDArray[np.float64]
 POINTS = {1: 4001, 2: 301, 3: 61, 4: 23}
-"""Of a grid along each side, by the number of sides."""
+"""Points of a grid along each side, by the number of sides."""
 TRIES = 40
 """States that are verified exactly before one gives up."""
 

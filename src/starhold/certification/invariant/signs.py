@@ -126,7 +126,7 @@ def from_equilibrium(q: Poly, equilibrium: Sequence[Any]) -> Poly:
 
 
 def to_equilibrium(context: Any, equilibrium: Sequence[Any]) -> list[Poly]:
-    """What stands for the distance from an equilibrium."""
+    """The polynomials in place of the distance from an equilibrium."""
     return [g if x is None else g - x for g, x in zip(context.gens(), equilibrium, strict=True)]
 
 
@@ -228,7 +228,7 @@ def _definite_with(matrix: list[list[Poly]], guards: Sequence[list[list[Poly]]])
 
 
 def _constants(matrix: list[list[Poly]]) -> NDArray[np.float64]:
-    """What a matrix is at the equilibrium, parameters in the middle of nowhere: zero."""
+    """A matrix at the equilibrium in floats, with parameters at zero."""
     zero = [fmpq(0)] * len(matrix[0][0].context().gens())
     return np.array([[number(entry(*zero)) for entry in row] for row in matrix])
 

@@ -97,7 +97,7 @@ class Cells:
         return self.cells[0].V.context()
 
     def instead(self, zeros: Sequence[Poly]) -> list[Poly]:
-        """What stands for each variable where these polynomials vanish: the linear ones among them eliminate one each."""
+        """Polynomials in place of each variable where these vanish: the linear ones among them eliminate one each."""
         generators = list(self.context.gens())
         for zero in zeros:
             solved = solve(zero.compose(*generators))
@@ -133,7 +133,7 @@ class Cells:
         )
 
     def guards(self, cell: Cell, onto: Sequence[Poly] = ()) -> list[Poly]:
-        """What is not negative in a closed cell, where the polynomials `onto` vanish."""
+        """Polynomials that are not negative in a closed cell, where those of `onto` vanish."""
         sided = list(zip(self.surfaces, cell.signs, strict=True))
         sided += [(self.surfaces[k], way) for k in cell.on for way in (1, -1)]
         return [self.reduced(surface, onto) * side for surface, side in sided if side and surface not in onto]

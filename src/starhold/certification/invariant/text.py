@@ -19,9 +19,9 @@ from starhold.algebra.scalar import absolute, less, maximum, minimum, sign, wher
 LONGEST = 2_000
 """Characters of an expression."""
 DIGITS = 3
-"""Of a power of ten: floats have no more."""
+"""The largest power of ten: floats have no more."""
 MOST_DIGITS = 1_000
-"""Of a number, of what numbers make together too."""
+"""Digits of a number, of what numbers make together too."""
 MOST_TERMS, MOST_CASES, HIGHEST, WORK, COMPARED = 600, 64, 24, 2_000_000, 10
 """Terms of a polynomial, cases of a piecewise one, the degree, and pairs of terms that are multiplied on the way to an
 expression, a pair of cases that are compared counted as so many: beyond these a proof would not end anyway."""
@@ -29,7 +29,7 @@ ALLOWED = "numbers, variables, + - * / **, comparisons, 'a if b else c', and whe
 
 
 class ExpressionError(ValueError):
-    """What is wrong with an expression: what was found, and what is allowed."""
+    """An expression that cannot be read: what was found, and what is allowed."""
 
     def __init__(self, found: str, allowed: str = ALLOWED) -> None:
         self.found, self.allowed = found, allowed
@@ -55,7 +55,7 @@ _FUNCTIONS: dict[str, tuple[Callable[..., Any], int, int]] = {
     "sat": (_sat, 1, 2),
     "sign": (sign, 1, 1),
 }
-"""What a name stands for, and how many arguments it takes at least and at most."""
+"""Functions by their names, with how many arguments they take at least and at most."""
 
 
 def read(text: str, names: Mapping[str, Any]) -> Any:
@@ -142,7 +142,7 @@ class _Reader:
         return found
 
     def _sized(self, found: Any) -> Any:
-        """The same, if it is not too large."""
+        """The value, if it is not too large; else an ExpressionError."""
         parts = pieces(found)
         if len(parts) > MOST_CASES:
             raise ExpressionError(f"{len(parts)} pieces", f"at most {MOST_CASES}")

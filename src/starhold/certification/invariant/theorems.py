@@ -63,7 +63,7 @@ class WantedSet:
 
 @dataclass
 class _Proof:
-    """What is gathered on the way to a claim."""
+    """Obligations and numbers, gathered on the way to a claim."""
 
     wanted: WantedSet
     what: Candidate
@@ -78,7 +78,7 @@ class _Proof:
         return bool(holds)
 
     def perhaps(self, name: str, holds: bool, reason: str) -> bool:
-        """What is proved or else undecided."""
+        """Add an obligation that is proved or else undecided."""
         return self.add(name, INTERVALS, True if holds else None, {} if holds else {"reason": reason})
 
     def claim(self) -> Claim:
@@ -246,7 +246,7 @@ def _falling(proof: _Proof) -> bool:
 
 
 def _at(proof: _Proof, level: float) -> _Shown | None:
-    """What is shown at a level, None where V is not shown to fall."""
+    """Try a level; None where V is not shown to fall."""
     what = proof.what
     weak = falls(what, level) if bounded(what, level) else None
     if weak is None:

@@ -31,7 +31,7 @@ OBLIGATIONS = {
 
 
 def sentence(claim: Claim) -> str:
-    """What a claim says, whether or not it is proved."""
+    """The claim in a sentence, whether or not it is proved."""
     n = claim.numbers
     theorem, level = n["theorem"], n.get("level")
     where = "a level set of V" if level is None else f"{{V <= {down(level)}}}"
@@ -60,7 +60,7 @@ def size(numbers: Mapping[str, Any], orbit: float | None = None) -> str:
 
 
 def limit(numbers: Mapping[str, Any]) -> str:
-    """What the level cannot exceed for this V, and why."""
+    """The bound of the level for this V, and why it is one."""
     if "refuted_level" not in numbers:
         return ""
     why = {"V rises": "where V does not fall", "border": "on the border of the box"}[numbers["limited_by"]]
