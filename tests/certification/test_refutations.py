@@ -3,7 +3,6 @@
 import copy
 import json
 import math
-from dataclasses import replace
 from time import process_time
 
 import numpy as np
@@ -228,7 +227,7 @@ def test_no_claim_is_about_less_momentum_than_is_had_on_target(tmp_path):
     assert "so little momentum" in asked.obligations[0].evidence["reason"]
     # At rest on a target that is at rest a body has none.
     still = rotors("wheel", catalogue()["wheel"].examples()[0])
-    still = replace(still, start=still.start._replace(momentum=(0.0,) * 4))
+    still = still.with_parts(making.rotors(still.wheels))
     write([certify(still, "", Wanted(momentum=0.0))], "made", tmp_path / "s.json")
     assert passed(check_file(tmp_path / "s.json"))
     assert certify(still, "", Wanted(momentum=0.0)).claim("wheels").outcome == "proved"

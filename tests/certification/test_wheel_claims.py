@@ -182,7 +182,7 @@ def test_limits_of_wheels_are_kept_and_nearly_used(law, limits, binding):
     random = np.random.default_rng(4)
     wheels, s = loop.wheels, 4.0 * gains.k_attitude[0] if law == "wheel" else 2.0 * gains.k_attitude
     shares = -np.array(wheels.least)
-    begun = np.array(loop.start.momentum)
+    begun = np.array(loop.rotors)
     kept = begun - shares @ (begun @ np.array(wheels.axes))
     most = {"motors": np.zeros(3), "wheel_momentum": np.zeros(3)}
     for _ in range(20_000):
