@@ -18,6 +18,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from starhold.version import __version__
+
 if TYPE_CHECKING:
     from starhold.api import (
         certify,
@@ -36,7 +38,6 @@ if TYPE_CHECKING:
     from starhold.api import make_scenario as scenario
     from starhold.errors import InputError
 
-__version__ = "0.1.0"
 __all__ = [
     "InputError",
     "__version__",

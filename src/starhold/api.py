@@ -6,10 +6,11 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+from starhold.algebra.quantity import Quantity
 from starhold.scenario import designing, reading
 from starhold.scenario.making import make_scenario as make_scenario
 from starhold.simulation.lane import Recording
-from starhold.studies.kinds import kind_module, kind_of
+from starhold.studies import compare as studies
 from starhold.synthesis.pole_placement import place as place
 
 if TYPE_CHECKING:
@@ -36,8 +37,8 @@ def simulate(
     """Fly one law of a scenario, the first if `law` is None. Returns the Dataset that `starhold run` writes to run.nc, with
     the same attributes; `attrs["diverged_at"]` (s) is there only when the motion was lost."""
     opened = _opened(scenario)
-    kind, entry = kind_of(opened), opened.laws[0] if law is None else opened.pick(law)
-    return kind.record(opened, kind.build(opened, entry), progress).dataset()
+    entry = opened.laws[0] if law is None else opened.pick(law)
+    return studies.record(opened, studies.build(opened, entry), progress).dataset()
 
 
 def metrics(run: xr.Dataset | Flight) -> dict[str, Any]:
@@ -47,11 +48,14 @@ def metrics(run: xr.Dataset | Flight) -> dict[str, Any]:
     if not hasattr(run, "data_vars"):
         return dict(cast("Flight", run).metrics)
     dataset = cast("xr.Dataset", run)
-    if not {"control_period", "record_every"} <= set(dataset.attrs) or "time" not in dataset:
+    if not {"body", "control_period", "record_every"} <= set(dataset.attrs) or "time" not in dataset:
         raise ValueError("not a run: a Dataset of `simulate`, or of a run.nc, is wanted")
     arrays = {str(name): dataset[name].to_numpy() for name in ("time", *dataset.data_vars)}
-    recording = Recording(arrays, dict(dataset.attrs))
-    return kind_module("length_unit_m" not in dataset.attrs).metrics_of(recording)
+    columns = {
+        str(name): Quantity(values.attrs["units"], values.attrs["long_name"], *map(str, values.dims[1:]))
+        for name, values in dataset.data_vars.items()
+    }
+    return studies.metrics_of(Recording(arrays, dict(dataset.attrs), columns))
 
 
 def sweep(
@@ -85,25 +89,25 @@ def to_pandas(results: Any) -> DataFrame:
 def design(scenario: reading.Scenario | str | Path, law: str | None = None) -> list[designing.Design]:
     """The gains that formulas give, with what they can be judged by: every law of a scenario that has a `form`, or the one
     of this name. InputError where there is none."""
-    opened = _opened(scenario)
-    return designing.design(opened, law)
+    return designing.design(_opened(scenario), law)
 
 
 def certify(scenario: reading.Scenario | str | Path, law: str | None = None) -> list[Certificate]:
-    """What is proved of every law of a scenario, or of the one of this name, on its spacecraft. Each certificate has an
+    """Prove what can be of every law of a scenario, or of the one of this name, on its spacecraft. Each certificate has an
     `outcome` and `claims` (numbers in SI, of station keeping scaled), and has been tried by ten thousand flights."""
-    opened = _opened(scenario)
-    return [tried.certificate for tried in kind_of(opened).certify_scenario(opened, law)]
+    from starhold.studies.certificates import certify_scenario
+
+    return [tried.certificate for tried in certify_scenario(_opened(scenario), law)]
 
 
 def compare(scenario: reading.Scenario | str | Path) -> list[Flight]:
     """Fly every law of a scenario; each Flight has the run (`run`, a Dataset) and its `metrics` (SI)."""
-    opened = _opened(scenario)
-    return kind_of(opened).compare(opened)
+    return studies.compare(_opened(scenario))
 
 
 def failures(scenario: reading.Scenario | str | Path, law: str | None = None) -> list[Failure]:
-    """What is left of a scenario on wheels after the loss of any one or two of them, under a law, the first if not given."""
+    """Tell what is left of a scenario on wheels after the loss of any one or two of them, under a law, the first if not
+    given."""
     from starhold.studies.failures import study
 
     opened = _turning(scenario)
@@ -127,8 +131,9 @@ def _turning(scenario: reading.Scenario | str | Path) -> reading.Scenario:
 
 
 def invariant(problem: InvariantProblem | str | Path) -> Certificate:
-    """What is proved of invariant sets: of a problem made in Python (`starhold.certification.invariant`), of a TOML file, or
-    of the built-in problem of that name. Each claim has an `outcome`, numbers (`level`, the set's size) and evidence."""
+    """Prove what can be of invariant sets: of a problem made in Python (`starhold.certification.invariant`), of a TOML
+    file, or of the built-in problem of that name. Each claim has an `outcome`, numbers (`level`, the set's size) and
+    evidence."""
     from starhold.certification import invariant as sets
 
     return sets.certify(problem if isinstance(problem, sets.InvariantProblem) else sets.load(problem))

@@ -24,9 +24,10 @@ from starhold.report.proved import section
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import Recording, fly, label
-from starhold.studies.certificates import certify_scenario, start_inside
+from starhold.studies import compare
+from starhold.studies.bodies.rigid_body import start_inside
+from starhold.studies.certificates import certify_scenario
 from starhold.studies.compare import fly_law, prove
-from starhold.studies.kinds import kind_of
 
 BASE = builtin_text("three-laws").split("[[law]]")[0].replace("duration = 2000.0", "duration = 60.0")
 LAW = '\n[[law]]\ntype = "lyapunov"\nk_rate = 0.09\nk_attitude = 0.009\n'
@@ -206,9 +207,8 @@ def test_the_quaternion_that_is_fed_back_is_that_of_the_loop(cosines, width):
 def deficit():
     scenario = load("l2-deficit")
     entry = scenario.pick("2.786 as printed")
-    kind = kind_of(scenario)
-    loop = kind.build(scenario, entry)
-    return kind.prove(scenario, entry, loop, kind.fly_law(scenario, entry, loop))
+    loop = compare.build(scenario, entry)
+    return prove(scenario, entry, loop, fly_law(scenario, entry, loop))
 
 
 def test_a_lost_flight_first_leaves_the_claim_that_it_ends_on_the_circle(deficit):
@@ -224,7 +224,7 @@ def test_a_lost_flight_first_leaves_the_claim_that_it_ends_on_the_circle(deficit
 def test_no_limit_no_word_of_it():
     scenario = load("l2-circle")
     entry = scenario.pick("smooth")
-    loop = kind_of(scenario).build(scenario, entry)
+    loop = compare.build(scenario, entry)
     claim = Claim("circle", {}, {}, ("control not limited",), ())
     assert sentence(claim, {"limit": "none", "control_limit": None}) == "the motion ends on the circle"
     assert (

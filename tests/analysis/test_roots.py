@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from starhold.analysis.roots import PUBLISHED, Pieces, fit, search, unmet
+from starhold.analysis.roots import PUBLISHED, TwoPieceFit, fit, search, unmet
 from starhold.analysis.transient import Limits
 from tests.analysis.turns import problem
 
@@ -65,7 +65,7 @@ def test_what_no_root_achieves_is_told():
 )
 def test_a_fit_gives_back_what_it_goes_through(below, above, cut, noise):
     angles = np.radians(np.arange(10.0, 181.0, 5.0))
-    true = Pieces(below, above, 0.5 * float(angles[cut - 1] + angles[cut]))
+    true = TwoPieceFit(below, above, 0.5 * float(angles[cut - 1] + angles[cut]))
     roots = true.at(angles) * (1.0 + noise * np.sin(7.0 * np.arange(len(angles))))
     found = fit(angles, roots)
     # No worse than the truth itself, whose errors are the noise.
@@ -80,6 +80,6 @@ def test_a_fit_takes_six_angles():
 
 
 def test_the_published_fit_is_as_published():
-    assert Pieces((-1.018, -2.071, -0.849), (-2.177, -0.726, -0.155), math.radians(85.0)) == PUBLISHED
+    assert TwoPieceFit((-1.018, -2.071, -0.849), (-2.177, -0.726, -0.155), math.radians(85.0)) == PUBLISHED
     at = np.radians([10.0, 85.0, 85.001, 163.74])
     assert PUBLISHED.at(at) == pytest.approx([-1.558, -0.896, -0.897, -0.428], abs=1e-3)

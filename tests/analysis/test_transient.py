@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from starhold.algebra.structure import unflatten
-from starhold.analysis.metrics import acceleration
+from starhold.analysis.rigid_body import acceleration
 from starhold.analysis.transient import Limits, Transient, Watcher, of_run
 from starhold.parts.bodies.rigid_body import State
 from starhold.simulation.lane import Recording, fly, label

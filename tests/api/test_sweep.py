@@ -12,7 +12,7 @@ import starhold as sh
 from starhold.algebra.structure import flatten
 from starhold.simulation.abreast import Flying, fly_abreast
 from starhold.simulation.lane import fly
-from starhold.studies.kinds import kind_of
+from starhold.studies.compare import build, fly_law
 
 SHORT = {"simulation.duration": 20.0, "simulation.record_every": 3}
 THREE = sh.load("three-laws").with_(SHORT)
@@ -88,8 +88,8 @@ def test_metrics_of_a_run_are_those_of_its_flight_and_of_its_file(tmp_path):
             capture_output=True,
         )
         assert done.returncode == 0, done.stderr
-        entry, kind = scenario.laws[0], kind_of(scenario)
-        flight = kind.fly_law(scenario, entry, kind.build(scenario, entry))
+        entry = scenario.laws[0]
+        flight = fly_law(scenario, entry, build(scenario, entry))
         run = sh.simulate(scenario)
         with xr.open_dataset(tmp_path / "out" / "run.nc") as read:
             assert set(read.attrs) == set(run.attrs)
@@ -104,14 +104,13 @@ def test_metrics_of_a_run_are_those_of_its_flight_and_of_its_file(tmp_path):
 
 
 def test_flights_abreast_have_the_samples_of_single_ones_lost_ones_included():
-    kind = kind_of(THREE)
     # Too fast to follow from the start, or soon, for a gain that the held torque cannot bear.
     rates = {0.0: 0.09, 0.04: 60.0, 70.0: 0.09, 0.02: 100.0, 0.01: 200.0}
     changed = [
         THREE.with_({"initial.rate": [rate, 0.1, 0.0], "law.lyapunov.k_rate": k, "spacecraft.torque_limit": None})
         for rate, k in rates.items()
     ]
-    loops = [kind.build(one, one.laws[0]) for one in changed]
+    loops = [build(one, one.laws[0]) for one in changed]
     lost = set()
     for every in (1, 7):
         together = fly_abreast([Flying(loop, 50, every) for loop in loops], lambda _, samples, carry: (samples, carry))

@@ -15,7 +15,7 @@ from starhold.errors import InputError
 from starhold.parts.craft import check_inertia
 from starhold.scenario.building import build
 from starhold.scenario.reading import load
-from starhold.studies.certificates import certify_law, start_inside
+from starhold.studies.bodies.rigid_body import certify_law, start_inside
 
 EARTH, RADIUS = 3.986e14, 6.4e6
 

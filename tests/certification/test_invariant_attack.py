@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
 
-from starhold.report.invariant_picture import sketch
+from starhold.studies.phase_portraits import portraits
 from tests.certification.invariants import claim, outcomes, proved
 
 VDP = (
@@ -150,7 +150,7 @@ def test_share_of_the_region_of_van_der_pol():
     points = np.random.default_rng(1).uniform(box[:, :1], box[:, 1:], size=(2, 400_000))
     area = np.prod(box[:, 1] - box[:, 0]) * np.mean(sextic(points) <= numbers["level"])
     assert low - 0.05 < area < high + 0.05
-    assert sketch(*proved("van-der-pol"))[0].orbit_area == pytest.approx(true, rel=1e-3)
+    assert portraits(*proved("van-der-pol"))[0].orbit_area == pytest.approx(true, rel=1e-3)
 
 
 @pytest.mark.parametrize("name", ["saturated-axis", "saturated-strip"])

@@ -21,7 +21,7 @@ from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.bodies.rigid_body import angular_acceleration
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
-from starhold.studies.certificates import start_inside
+from starhold.studies.bodies.rigid_body import start_inside
 from tests.making import noise
 from tests.small import CRAFT
 

@@ -23,7 +23,8 @@ from starhold.parts.craft import make_craft, tensor
 from starhold.parts.effectors.wheels import lose, three_orthogonal
 from starhold.scenario.building import build
 from starhold.scenario.reading import load, parse
-from starhold.studies.certificates import certify_law, certify_scenario
+from starhold.studies.bodies.rigid_body import certify_law
+from starhold.studies.certificates import certify_scenario
 from tests.certification.loops import FULL, free, loop_of, rotors
 from tests.making import ORBITAL, aimed, on_wheels
 

@@ -169,7 +169,9 @@ def test_check_law_passes_a_good_law_and_fails_a_bad_one(tmp_path):
     good = starhold("check-law", "my_pd.py", cwd=tmp_path)
     assert good.returncode == 0, good.stdout + good.stderr
     assert "failed" not in good.stdout
-    (tmp_path / "bad_pd.py").write_text(text.replace("scale(gains.k_rate, seen.rate)", "scale(-gains.k_rate, seen.rate)"))
+    (tmp_path / "bad_pd.py").write_text(
+        text.replace("scale(gains.k_rate, measurement.rate)", "scale(-gains.k_rate, measurement.rate)")
+    )
     bad = starhold("check-law", "bad_pd.py", cwd=tmp_path)
     assert bad.returncode == 1
     assert "failed" in bad.stdout

@@ -5,8 +5,8 @@ import pytest
 
 from starhold.algebra.structure import flatten
 from starhold.analysis.cost import call_costs
-from starhold.analysis.metrics import measure, stays_within
-from starhold.analysis.ranking import ATTITUDE
+from starhold.analysis.metrics import stays_within
+from starhold.analysis.rigid_body import METRICS, measure
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import Recording, fly, label
@@ -79,9 +79,9 @@ def test_what_is_reached_at_the_very_end_does_not_count(flights):
     assert found["iterations_1e-2"] == 4261
     assert set(found["cut_off"]) >= {"iterations_1e-3", "settling_time", "attitude_settling_time"}
     assert "settling_time" not in measure(run, 2e-3, 1e-3)["cut_off"]
-    assert ATTITUDE.told("settling_time", found) == "— †"
-    assert ATTITUDE.late({"lyapunov": found}) != ""
-    assert ATTITUDE.late({"lyapunov": measure(run, 2e-3, 1e-3)}) == ""
+    assert METRICS.told("settling_time", found) == "— †"
+    assert METRICS.late({"lyapunov": found}) != ""
+    assert METRICS.late({"lyapunov": measure(run, 2e-3, 1e-3)}) == ""
 
 
 def test_sliding_law_stalls_between_1e_2_and_1e_3_by_chatter(flights, metrics):

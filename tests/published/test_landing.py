@@ -8,9 +8,10 @@ import pytest
 
 from starhold.analysis.transient import Limits
 from starhold.report.modal_roots_picture import draw
+from starhold.report.tables import write_modal_roots
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.studies.compare import compare
-from starhold.studies.modal_roots import law_lines, pick_modal, problem_of, study, write_table
+from starhold.studies.modal_roots import law_lines, pick_modal, problem_of, study
 
 LIMITS = Limits(math.radians(30.0), math.radians(50.0))
 CHECKED = {10: -1.564, 45: -1.054, 85: -0.896, 90: -0.858, 135: -0.548, 180: -0.376}
@@ -102,7 +103,7 @@ def test_what_is_printed_is_read_back(found, tmp_path):
     text = builtin_text("landing-limits")
     scenario = parse(text[: text.index("[[law]]")] + "\n".join(law_lines(found.own, found.b)), "pasted")
     assert scenario.laws[0].gains.phi_0[0] == pytest.approx(float(found.own.at(math.radians(90.0))), rel=1e-4)
-    write_table(found, tmp_path / "roots.csv")
+    write_modal_roots(found, tmp_path / "roots.csv")
     with (tmp_path / "roots.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [float(row["root"]) for row in rows] == found.roots.tolist()

@@ -19,8 +19,8 @@ from starhold.laws.point import PointMeasurement
 from starhold.parts.bodies.libration_point import PointState
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lanes import simulate_many
+from starhold.studies.compare import build, compare, fly_law
 from starhold.studies.flight import Flight
-from starhold.studies.station import build, compare, fly_law
 
 
 @cache

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from starhold.analysis.metrics import measure
+from starhold.analysis.rigid_body import METRICS, measure
+from starhold.report.body import report_of
+from starhold.report.figures import paint
 from starhold.scenario.building import build
 from starhold.scenario.reading import Scenario, builtin_text, parse
 from starhold.simulation.lane import Recording, fly, label
 from starhold.studies.flight import Flight
 
+GAINS = {"k_rate": (0.09, "N m s"), "switching_gain": ("<5>", "mN m")}
 HOSTILE = '</script><script>alert("ruse")</script><b>$x_1$ & co'
 
 
@@ -45,8 +49,13 @@ def flights() -> tuple[Flight, ...]:
         loop = build(found, entry)
         run = label(loop, *fly(loop, table.simulation.steps), 1)
         metrics = measure(run, table.settling.attitude_tolerance, table.settling.rate_tolerance)
-        made.append(Flight(entry.name, entry.law.name, run, metrics, {"k_rate": "0.09 N m s", "switching_gain": "<5> mN m"}))
+        made.append(Flight(entry.name, entry.law.name, run, metrics, GAINS, METRICS))
     return tuple(made)
+
+
+def draw(flights: Any, folder: Path, scenario: Any) -> list[Path]:
+    """Draw the pictures of some flights into a folder."""
+    return paint(report_of(scenario.body).picture(flights, scenario), folder)
 
 
 def lost(name: str = "wild") -> Flight:
@@ -55,7 +64,7 @@ def lost(name: str = "wild") -> Flight:
     arrays = {name: values[:67] for name, values in first.recording.arrays.items()}
     arrays["rate_error"] = np.repeat(np.exp(np.linspace(0.0, 20.0, 67))[:, None], 3, axis=1)
     run = Recording(arrays, first.recording.attrs | {"diverged_at": 6.7})
-    return Flight(name, "pd", run, measure(run, 2e-3, 1e-3), {})
+    return Flight(name, "pd", run, measure(run, 2e-3, 1e-3), {}, METRICS)
 
 
 def still() -> Flight:
@@ -66,9 +75,9 @@ def still() -> Flight:
     arrays["rate_error"][:] = 0.0
     arrays["torque"][:] = 0.0
     run = Recording(arrays, first.recording.attrs)
-    return Flight("still", "pd", run, measure(run, 2e-3, 1e-3), {})
+    return Flight("still", "pd", run, measure(run, 2e-3, 1e-3), {}, METRICS)
 
 
 def renamed(flight: Flight, name: str) -> Flight:
-    """The same flight under another name."""
-    return Flight(name, flight.law, flight.recording, flight.metrics, flight.gains)
+    """A flight under another name."""
+    return Flight(name, flight.law, flight.recording, flight.metrics, flight.gains, METRICS)

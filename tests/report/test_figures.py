@@ -11,11 +11,14 @@ import pytest
 from PIL import Image
 
 from starhold.algebra.cosines import to_angles
-from starhold.report.figures import draw
-from starhold.report.plots import collect, early, roll_pitch_yaw, thin, thin_times, until
+from starhold.report.attitude_plots import collect, early, roll_pitch_yaw, until
+from starhold.report.colours import COLOURS, colour
+from starhold.report.plots import thin, thin_times
+from starhold.report.text import number_text
 from starhold.simulation.lane import Recording
-from starhold.studies.flight import COLOURS, Flight, colour, number_text
+from starhold.studies.flight import Flight
 from tests.report import flown
+from tests.report.flown import draw
 
 NAMES = ["scalar", "attitude", "rate", "torque", "angle", "roll-pitch-yaw", "accuracy"]
 
@@ -55,13 +58,13 @@ def test_odd_names_are_shown_as_they_stand(tmp_path: Path) -> None:
 @pytest.mark.parametrize("extra", [flown.lost, flown.still])
 def test_lost_and_resting_runs_are_drawn(tmp_path: Path, extra: object) -> None:
     assert callable(extra)
-    assert len(draw([*flown.flights(), extra()], tmp_path)) == len(NAMES)
-    assert len(draw([extra()], tmp_path)) == len(NAMES)
+    assert len(draw([*flown.flights(), extra()], tmp_path, flown.scenario())) == len(NAMES)
+    assert len(draw([extra()], tmp_path, flown.scenario())) == len(NAMES)
 
 
 def test_a_lost_run_does_not_flatten_the_others() -> None:
-    sound = collect(flown.flights(), 2000)
-    mixed = collect([*flown.flights(), flown.lost()], 2000)
+    sound = collect(flown.flights(), 2000, flown.scenario())
+    mixed = collect([*flown.flights(), flown.lost()], 2000, flown.scenario())
     highest = max(float(np.abs(curve).max()) for curve in sound.rate.panels[0].curves)
     span = mixed.rate.panels[0].span
     assert span is not None
@@ -81,10 +84,12 @@ def test_a_law_keeps_its_colour_and_many_laws_have_one() -> None:
 
 
 def test_a_limit_is_shown_where_it_matters() -> None:
-    assert collect(flown.flights(), 2000).torque.panels[0].levels == (-0.01, 0.01)
+    assert collect(flown.flights(), 2000, flown.scenario()).torque.panels[0].levels == (-0.01, 0.01)
     first = flown.flights()[0]
     far = Recording(first.recording.arrays, first.recording.attrs | {"torque_limit": 5.0})
-    plot = collect([type(first)(first.name, first.law, far, first.metrics, {})], 2000).torque
+    plot = collect(
+        [type(first)(first.name, first.law, far, first.metrics, {}, first.metric_set)], 2000, flown.scenario()
+    ).torque
     assert plot.panels[0].levels == ()
     assert "off the scale" in plot.dashed
 
@@ -97,7 +102,7 @@ def test_roll_pitch_and_yaw_are_those_of_the_algebra() -> None:
     # A small turn about one axis is that angle alone.
     small = np.radians(0.2)
     assert roll_pitch_yaw(np.array([[np.cos(small / 2), 0.0, np.sin(small / 2), 0.0]]))[0] == pytest.approx([0.0, 0.2, 0.0])
-    panels = collect(flown.flights(), 2000).roll_pitch_yaw.panels
+    panels = collect(flown.flights(), 2000, flown.scenario()).roll_pitch_yaw.panels
     assert [panel.label for panel in panels] == ["roll, deg", "pitch, deg", "yaw, deg"]
 
 
@@ -122,7 +127,7 @@ def test_the_transient_of_a_long_run_is_drawn_by_itself(tmp_path: Path) -> None:
     # The slower one is at 2 % after ln 50/0.1 s.
     assert end == pytest.approx(1.2 * np.log(50.0) / 0.1, abs=0.2)
     assert {len(one.recording["time"]) for one in until(flights, end)} == {len(np.flatnonzero(0.1 * np.arange(4001) <= end))}
-    drawn = {path.stem for path in draw(flights, tmp_path)}
+    drawn = {path.stem for path in draw(flights, tmp_path, flown.scenario())}
     assert drawn == {*NAMES, "angle-transient", "torque-transient"}
     # Nothing of it where the transient is most of the run, and none where nothing comes near.
     assert early([stretched(first, 0.01)]) is None

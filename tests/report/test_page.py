@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from starhold.analysis.metrics import MEASURES
-from starhold.analysis.ranking import ATTITUDE
+from starhold.analysis.rigid_body import MEASURES, METRICS
 from starhold.parts.craft import check_inertia
-from starhold.report.page import _box, render, write_page
+from starhold.report.bodies.rigid_body import _box
+from starhold.report.page import render, write_page
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
 from starhold.simulation.lane import Recording, fly, label
@@ -47,12 +47,12 @@ def test_nothing_is_loaded(page: str, reader: Reader) -> None:
 
 def test_every_law_and_every_metric_is_there(reader: Reader) -> None:
     flights = flown.flights()
-    best = ATTITUDE.winners({flight.name: flight.metrics for flight in flights})
+    best = METRICS.winners({flight.name: flight.metrics for flight in flights})
     for flight in flights:
         assert flight.name in reader.words
         for metric in MEASURES:
             if metric in flight.metrics:
-                assert ATTITUDE.shown(metric, flight.metrics[metric]) in reader.words, metric
+                assert METRICS.shown(metric, flight.metrics[metric]) in reader.words, metric
     for metric in flights[0].metrics:
         if metric in MEASURES:
             assert ("th", {"scope": "col", "title": MEASURES[metric].meaning}) in reader.tags

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from starhold.report.stability_map import LINE, draw_map, sketch
+from starhold.report.stability_map import LINE, draw_map, stability_map
 from starhold.synthesis.stability_degree import boundary, optimum
 
 GIVEN = [
@@ -51,7 +51,7 @@ def test_equal_arguments_give_equal_files(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("given", GIVEN)
 def test_the_map_peaks_within_the_budget_at_the_optimum(given: tuple[tuple[float, ...], float, float, float]) -> None:
-    what = sketch(*given)
+    what = stability_map(*given)
     assert what.best == optimum(*given)
     allowed = np.where(what.ask <= 1.0, what.eta, -np.inf)
     assert allowed.max() <= what.best.eta * (1.0 + 1e-12)

@@ -9,17 +9,18 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from starhold.analysis.station import BOARD, Circle, Equilibrium, measure_station
-from starhold.report.station.figures import draw
-from starhold.report.station.page import render, write_page
-from starhold.report.station.phase import phase_portrait
-from starhold.report.station.plots import collect
+from starhold.analysis.libration_point import METRICS, CircleGoal, EquilibriumGoal, measure
+from starhold.report.colours import colour
+from starhold.report.page import render, write_page
+from starhold.report.path_plots import collect
+from starhold.report.phase_portrait import phase_portrait
 from starhold.scenario.reading import Scenario, builtin_text, parse
 from starhold.simulation.lane import Recording
-from starhold.studies.flight import Flight, colour
-from starhold.studies.station import compare
+from starhold.studies.compare import compare
+from starhold.studies.flight import Flight
 from tests.report import flown
 from tests.report.reader import Reader
+from tests.report.flown import draw
 
 
 @cache
@@ -66,9 +67,9 @@ def test_equal_flights_give_equal_bytes(tmp_path: Path, page: str) -> None:
 def test_every_law_every_metric_and_every_picture_is_there(reader: Reader) -> None:
     for flight in flights("l2-deficit"):
         assert flight.name in reader.words
-        for metric in BOARD.measures:
+        for metric in METRICS.measures:
             if metric in flight.metrics:
-                assert BOARD.shown(metric, flight.metrics[metric]) in reader.words, metric
+                assert METRICS.shown(metric, flight.metrics[metric]) in reader.words, metric
     data = reader.data()
     assert [plot["name"] for plot in data["plots"]] == ["projections", "deviation", "control"]
     ids = {attrs.get("id") for _, attrs in reader.tags}
@@ -157,7 +158,7 @@ def test_metrics_of_a_run_made_by_hand() -> None:
     units = told("l2-circle").table.libration.units
     position = np.array([[0.5, 1.5, 0.0], [0.0, 0.0, 1.1], [0.1, 0.9, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     control = np.array([[0.0, 2.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 2.0], [0.0, 0.0, 0.0]])
-    found = measure_station(recording(position, control), units, Circle(1.0, 1.4), 0.15)
+    found = measure(recording(position, control), units, CircleGoal(1.0, 1.4), 0.15)
     assert found["settling_time"] == pytest.approx(units.time)
     assert found["deviation"] == pytest.approx(0.1 * units.length)
     assert found["deviation_overall"] == pytest.approx(0.5 * units.length)
@@ -166,11 +167,11 @@ def test_metrics_of_a_run_made_by_hand() -> None:
     assert found["peak_ratio"] == pytest.approx(1.0)
     assert found["effort"] == pytest.approx(6.0 * units.velocity)
     assert found["effort_per_year"] == pytest.approx(6.0 * units.velocity * 365.25 * 86400 / (4.0 * units.time))
-    rest = measure_station(recording(position, control), units, Equilibrium((0.0, 0.0, 1.0)), 0.01)
+    rest = measure(recording(position, control), units, EquilibriumGoal((0.0, 0.0, 1.0)), 0.01)
     assert rest["final_distance"] == pytest.approx(np.sqrt(2.0) * units.length)
     assert (rest["settling_time"], rest["cut_off"]) == (None, ["settling_time"])
     assert found["cut_off"] == []
-    lost = measure_station(recording(position, control, diverged_at=5.0), units, Circle(1.0, 1.4), 0.15)
+    lost = measure(recording(position, control, diverged_at=5.0), units, CircleGoal(1.0, 1.4), 0.15)
     assert lost["diverged_at"] == pytest.approx(5.0 * units.time)
     assert lost["deviation"] is None
-    assert BOARD.ranked({"a": lost, "b": found}) == ["b", "a"]
+    assert METRICS.ranked({"a": lost, "b": found}) == ["b", "a"]

@@ -7,7 +7,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from starhold.analysis.station import Circle, Equilibrium, goal_of
+from starhold.analysis.libration_point import CircleGoal, EquilibriumGoal, goal_of
 from starhold.errors import InputError
 from starhold.laws.catalogue import catalogue
 from starhold.parts.bodies.libration_point import EARTH_DIAMETER, PRIMARIES
@@ -165,10 +165,10 @@ def test_starts_on_the_circle_of_each_law_and_at_its_place_of_rest():
             loop, goal = build(scenario, entry), goal_of(entry.gains)
             offset = np.array(scenario.table.initial.position)
             assert goal.distance(np.array([loop.start.position]) - offset)[0] == pytest.approx(0.0, abs=1e-15)
-            if isinstance(goal, Circle):
+            if isinstance(goal, CircleGoal):
                 assert loop.start.velocity == (0.0, 0.0, goal.rate)
             else:
-                assert isinstance(goal, Equilibrium)
+                assert isinstance(goal, EquilibriumGoal)
                 assert loop.start.velocity == (0.0, 0.0, 0.0)
 
 
@@ -213,4 +213,4 @@ def test_unstable_gains_are_refused_unless_they_are_allowed(tmp_path):
 def test_every_station_law_has_a_goal():
     for law in catalogue("libration-point").values():
         for gains in law.examples():
-            assert isinstance(goal_of(gains), Circle | Equilibrium)
+            assert isinstance(goal_of(gains), CircleGoal | EquilibriumGoal)

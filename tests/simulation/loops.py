@@ -16,7 +16,6 @@ from starhold.parts.effectors.wheels import ALLOCATIONS
 from starhold.parts.targets.history import tabulate
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_names, builtin_text, load, parse
-from starhold.studies.kinds import kind_of
 from tests.making import ORBITAL, aimed, noise, on_wheels, point_loop
 
 NOISE = noise(1e-4, 1e-3, 1e-4)
@@ -37,7 +36,7 @@ def builtin() -> dict[str, Any]:
     for name in builtin_names():
         scenario = load(name)
         for entry in scenario.laws:
-            loop = kind_of(scenario).build(scenario, entry)
+            loop = build(scenario, entry)
             found.setdefault(kernel_of(loop), (f"{name}: {entry.name}", loop))
     return dict(found.values())
 

@@ -9,26 +9,18 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from starhold.analysis.metrics import measure
-from starhold.cli.failing import print_failures
+from starhold.analysis.rigid_body import measure
+from starhold.cli.failures import print_failures
 from starhold.errors import InputError
 from starhold.parts.effectors.wheels import lose, make_wheels, pyramid
 from starhold.report.failures_picture import draw
 from starhold.report.results import open_folder
+from starhold.report.tables import write_failures
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import fly, label
-from starhold.studies.failures import (
-    FULL,
-    Failure,
-    _flown,
-    _left,
-    directions_lacking,
-    saturation,
-    study,
-    write_table,
-)
+from starhold.studies.failures import FULL, Failure, _flown, _left, directions_lacking, saturation, study
 from tests.running import starhold
 
 BUILTIN = builtin_text("wheels-orbital")
@@ -211,7 +203,7 @@ def test_directions_lacking():
 
 @pytest.mark.xdist_group("failures")
 def test_the_table_reads_back(scenario, found, tmp_path):
-    write_table(found, scenario.laws[0], tmp_path / "failures.csv")
+    write_failures(found, scenario.laws[0], tmp_path / "failures.csv")
     rows = list(csv.DictReader((tmp_path / "failures.csv").read_text(encoding="utf-8").splitlines()))
     assert len(rows) == len(found)
     for row, failure in zip(rows, found, strict=True):
@@ -281,7 +273,7 @@ def test_names_among_the_gains_are_told_as_they_are_written(tmp_path, capsys):
     found = [_flown(short, entry, _left(wheels_of(short), lost, 0.02)) for lost in ((), (1,))]
     print_failures(found)
     assert "The gains are the same in all of them." in capsys.readouterr().out
-    write_table(found, entry, tmp_path / "table.csv")
+    write_failures(found, entry, tmp_path / "table.csv")
     with (tmp_path / "table.csv").open(encoding="utf-8") as file:
         assert [row["limit (1)"] for row in csv.DictReader(file)] == ["norm", "norm"]
 
@@ -301,7 +293,7 @@ def test_a_law_that_what_is_left_does_not_suit_leaves_the_rest_of_the_study(tmp_
     assert (
         'without 1 not flown: limit = "axis" needs k_attitude below the torque limit of 0.011547 N m, not 0.013 N m' in said
     )
-    write_table([intact, struck], entry, tmp_path / "table.csv")
+    write_failures([intact, struck], entry, tmp_path / "table.csv")
     with (tmp_path / "table.csv").open(encoding="utf-8") as file:
         assert [bool(row["not flown because"]) for row in csv.DictReader(file)] == [False, True]
     assert draw([intact, struck], tmp_path / "picture.png", "one").is_file()

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from starhold.algebra.vector import ZERO
-from starhold.analysis.metrics import measure
+from starhold.analysis.rigid_body import METRICS, measure
 from starhold.errors import InputError
 from starhold.loop.kernels import fly_plainly, make_step
 from starhold.parts.effectors.envelope import authority, with_facets
 from starhold.parts.effectors.wheels import MOST, allocate_peak
 from starhold.parts.part import Fitted, Part
-from starhold.report.plots import collect
+from starhold.report.attitude_plots import collect
 from starhold.scenario.bodies.rigid_body.craft import torque_limit
 from starhold.scenario.bodies.rigid_body.faults import fault_times
 from starhold.scenario.building import build
@@ -172,17 +172,17 @@ def test_a_held_torque_shared_out_once_is_that_shared_out_at_every_stage(allocat
 def test_pictures_draw_the_limit_that_binds_first():
     scenario, loop = made(STIFF)
     run = flown(loop)
-    plots = collect([Flight("one", "lyapunov", run, measure(run, 1e-3, 1e-3), {})], 1000, scenario)
+    plots = collect([Flight("one", "lyapunov", run, measure(run, 1e-3, 1e-3), {}, METRICS)], 1000, scenario)
     sure = scenario.craft.torque_limit
     assert plots.torque.dashed == f"what the wheels surely give about each axis at once, {sure:g} N m"
     assert plots.torque.panels[0].levels == (-sure, sure)
     scenario, loop = made(STIFF, limit="torque_limit = 0.01")
     run = flown(loop)
-    plots = collect([Flight("one", "lyapunov", run, measure(run, 1e-3, 1e-3), {})], 1000, scenario)
+    plots = collect([Flight("one", "lyapunov", run, measure(run, 1e-3, 1e-3), {}, METRICS)], 1000, scenario)
     assert plots.torque.dashed == "limit of each axis, 0.01 N m"
     scenario, loop = made(LOST, GENTLE + 'fault_action = "none"\n', limit='limit = "norm"')
     run = flown(loop)
-    words = collect([Flight("one", "lyapunov", run, measure(run, 1e-3, 1e-3), {})], 1000, scenario).torque.dashed
+    words = collect([Flight("one", "lyapunov", run, measure(run, 1e-3, 1e-3), {}, METRICS)], 1000, scenario).torque.dashed
     assert words.startswith("what the wheels surely give in norm before a fault, ")
 
 

@@ -6,15 +6,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from starhold.analysis.metrics import MEASURES, Measure
-
 LATE = " †"
 """Stands by the dash of a time that a run is too short for."""
 
 
 @dataclass(frozen=True)
+class Measure:
+    """How a metric is shown: its heading, unit, what it means, and whether less is better."""
+
+    heading: str
+    unit: str
+    meaning: str
+    scale: float = 1.0
+
+
+@dataclass(frozen=True)
 class MetricSet:
-    """How results of a kind of scenario are told: the metrics that are shown, less being better in each; those that laws are
+    """How results of laws on a body are told: the metrics that are shown, less being better in each; those that laws are
     ranked by in turn; and the unit of time, with its seconds."""
 
     measures: Mapping[str, Measure]
@@ -56,6 +64,10 @@ class MetricSet:
             return f"{int(value)}"
         return f"{scaled:.3g}" if abs(scaled) < 1e3 else f"{scaled:.0f}"
 
+    def moment(self, time: float, digits: int = 6) -> str:
+        """A time (s) with its unit."""
+        return f"{time / self.tick:.{digits}g} {self.clock}"
+
     def told(self, metric: str, row: Mapping[str, Any]) -> str:
         """Show the results of a law as `shown` does, with a mark where a time is reached too late to be counted."""
         return self.shown(metric, row.get(metric)) + (LATE if metric in row.get("cut_off", ()) else "")
@@ -70,10 +82,6 @@ class MetricSet:
         )
 
     def headings(self, results: Mapping[str, Mapping[str, Any]]) -> list[str]:
-        """What laws with these results are ranked by, as headings; the first always is."""
+        """Headings that laws with these results are ranked by; the first always is."""
         there = self.columns(results)
         return [self.measures[metric].heading for metric in self.order if metric in there]
-
-
-ATTITUDE = MetricSet(MEASURES, ("settling_time", "final_attitude_error", "effort"))
-"""Settled before unsettled, then sooner, then more accurate, then more sparing."""

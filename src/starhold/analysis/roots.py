@@ -62,7 +62,7 @@ class Unmet(NamedTuple):
     root: float = math.nan
 
 
-class Pieces(NamedTuple):
+class TwoPieceFit(NamedTuple):
     """The fit is c exp(d angle) + e (1/s; angle in rad), c, d, e up to the split (rad) and beyond it."""
 
     below: tuple[float, float, float]
@@ -78,12 +78,12 @@ class Pieces(NamedTuple):
         return self.at(angles) / np.asarray(roots, dtype=float) - 1.0
 
 
-PUBLISHED = Pieces(*(modal.Fit._field_defaults[name] for name in Pieces._fields))
+PUBLISHED = TwoPieceFit(*(modal.Fit._field_defaults[name] for name in TwoPieceFit._fields))
 """For limits of 30 deg/s and 50 deg/s2, from 20 deg/s along the axis of the turn."""
 
 
 @dataclass(frozen=True)
-class Problem:
+class SlewProblem:
     """The slews start from an angle (rad) about the axis (3,) at a rate (3,) (rad/s) and are flown for `steps` control steps
     of the modal law's loop; the target is at rest; they are over within the ends, in rad and rad/s; b in s."""
 
@@ -121,7 +121,7 @@ class Problem:
 
 
 def search(
-    problem: Problem,
+    problem: SlewProblem,
     angles: Sequence[float],
     roots: ArrayLike,
     limits: Limits,
@@ -147,7 +147,7 @@ def search(
     return found
 
 
-def _best(problem: Problem, watcher: Watcher, roots: Any, limits: Limits, eased: Limits, angle: float) -> Found:
+def _best(problem: SlewProblem, watcher: Watcher, roots: Any, limits: Limits, eased: Limits, angle: float) -> Found:
     """Return the search at one angle: block by block from the fastest roots on."""
     start = np.array(problem.start(angle))[:, None]
     best: dict[Limits, Best] = {}
@@ -171,7 +171,7 @@ def _settled(limits: Limits, least: float, period: float, flown: Flown) -> bool:
     return bool((beyond | late).all())
 
 
-def unmet(problem: Problem, angle: float, roots: ArrayLike, limits: Limits) -> Unmet:
+def unmet(problem: SlewProblem, angle: float, roots: ArrayLike, limits: Limits) -> Unmet:
     """Tell why `search` finds none of these roots (n,) at an angle (rad)."""
     roots = np.asarray(roots, dtype=float)
     flown = problem.fly(angle, roots)
@@ -186,7 +186,7 @@ def unmet(problem: Problem, angle: float, roots: ArrayLike, limits: Limits) -> U
     return Unmet("both")
 
 
-def fit(angles: ArrayLike, roots: ArrayLike) -> Pieces | None:
+def fit(angles: ArrayLike, roots: ArrayLike) -> TwoPieceFit | None:
     """Return the two pieces, and the split half-way between two angles, of the least rms relative error; None for too few
     angles.
 
@@ -199,7 +199,7 @@ def fit(angles: ArrayLike, roots: ArrayLike) -> Pieces | None:
     for cut in range(PIECE, len(x) - PIECE + 1):
         below, above = (_piece(x[part], y[part]) for part in (slice(None, cut), slice(cut, None)))
         if below[1] + above[1] < least:
-            best, least = Pieces(below[0], above[0], 0.5 * float(x[cut - 1] + x[cut])), below[1] + above[1]
+            best, least = TwoPieceFit(below[0], above[0], 0.5 * float(x[cut - 1] + x[cut])), below[1] + above[1]
     return best
 
 

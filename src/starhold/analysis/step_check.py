@@ -2,42 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from starhold.analysis.metrics import error_angle
+from starhold.analysis.rigid_body import error_angle
 
 if TYPE_CHECKING:
-    from starhold.loop.closed_loop import ClosedLoop
     from starhold.simulation.lane import Recording
 
-AnyLoop = TypeVar("AnyLoop", "ClosedLoop", "ClosedLoop")
-
-STATE = ("attitude", "rate", "position", "velocity", "wheel_momentum")
-"""What is compared of a recording, where it is there."""
+Loop = TypeVar("Loop")
 
 
-def halved(loop: AnyLoop) -> AnyLoop:
+def halved(loop: Loop) -> Loop:
     """The loop with twice as many integration steps, each half as long; its control steps and random numbers stay."""
-    return replace(loop, substeps=2 * loop.substeps)
+    known: Any = loop
+    return replace(known, substeps=2 * known.substeps)
 
 
-def step_error(run: Recording, finer: Recording) -> dict[str, float | None]:
-    """Largest differences between a run and the one of the `halved` loop: the angle between the attitudes (rad), norms of
-    the other differences in the units of the recording. All are None where one of the two was lost before the
+def step_error(run: Recording, finer: Recording, names: Iterable[str]) -> dict[str, float | None]:
+    """Largest differences of some quantities between a run and the one of the `halved` loop: of quaternions the angle
+    between them (rad), else norms in the units of the recording. All are None where one of the two was lost before the
     other, for from then on there is nothing to compare."""
-    if len(run["time"]) != len(finer["time"]):
-        return {name: None for name in STATE if name in run.arrays}
-    return {name: _difference(run, finer, name) for name in STATE if name in run.arrays}
+    same = len(run["time"]) == len(finer["time"])
+    return {name: _difference(run, finer, name) if same else None for name in names}
 
 
 def _difference(run: Recording, finer: Recording, name: str) -> float:
     ours, theirs = run[name], finer[name]
-    if name == "attitude":
+    if run.columns[name].dimension == "quaternion":
         # The vector part of conj(p) q, in which small angles keep their digits.
         p0, p, q0, q = ours[:, :1], ours[:, 1:], theirs[:, :1], theirs[:, 1:]
         scalar = np.sum(ours * theirs, axis=1, keepdims=True)
         return float(error_angle(np.hstack([scalar, p0 * q - q0 * p - np.cross(p, q)])).max())
-    return float(np.linalg.norm(ours - theirs, axis=1).max())
+    return float(np.linalg.norm(np.reshape(ours - theirs, (len(ours), -1)), axis=1).max())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, TypeAlias
 
@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from starhold.algebra.quaternion import relative
 from starhold.algebra.structure import unflatten
 from starhold.algebra.vector import ZERO, dot
-from starhold.analysis.metrics import acceleration
+from starhold.analysis.metrics import too_late
+from starhold.analysis.rigid_body import acceleration
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import Observer
 from starhold.loop.watch import Ends, Watched, watch
@@ -29,7 +30,7 @@ LEG = 0.5
 
 
 class Limits(NamedTuple):
-    """Of the body's rate, its norm (rad/s), and of each component of its derivative (rad/s2)."""
+    """Limits of the body's rate, its norm (rad/s), and of each component of its derivative (rad/s2)."""
 
     rate: float
     acceleration: float
@@ -52,7 +53,7 @@ class Transient:
 
 @dataclass(frozen=True)
 class Transients:
-    """The same of many lanes: time (lanes,), NaN for never; peak_rate (lanes,); peak_acceleration (3, lanes)."""
+    """Transients of many lanes: time (lanes,), NaN for never; peak_rate (lanes,); peak_acceleration (3, lanes)."""
 
     time: Array
     peak_rate: Array
@@ -80,6 +81,27 @@ def of_run(run: Recording, angle_end: float, rate_end: float) -> Transient:
     time = None if lost else max(x for x in over if x is not None) * run.attrs["record_every"] * step
     x, y, z = np.abs(acceleration(run)).max(axis=0, initial=0.0).tolist()
     return Transient(time, math.sqrt(_square(run["rate"]).max(initial=0.0)), (x, y, z))
+
+
+def against_limits(
+    run: Recording, limits: Limits, angle_end: float, rate_end: float, cut_off: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Metrics of a run against limits, SI units: its time (None where it comes to no end), its peaks, of the acceleration
+    those of each component too, the limits (None for none), and whether they are kept. A time within the last tenth of the
+    run is None, and joins the names of such times, `cut_off`."""
+    flown = of_run(run, angle_end, rate_end)
+    step = run.attrs["control_period"] * run.attrs["record_every"]
+    late = flown.time is not None and too_late(flown.time / step, len(run["time"]))
+    return {
+        "cut_off": [*cut_off, "transient_time"] if late else list(cut_off),
+        "transient_time": None if late else flown.time,
+        "peak_rate": flown.peak_rate,
+        "peak_acceleration": max(flown.peak_acceleration),
+        "peak_accelerations": list(flown.peak_acceleration),
+        "rate_limit": limits.rate if math.isfinite(limits.rate) else None,
+        "acceleration_limit": limits.acceleration if math.isfinite(limits.acceleration) else None,
+        "limits_kept": flown.keeps(limits),
+    }
 
 
 def _square(vectors: Array) -> Array:
@@ -116,7 +138,7 @@ class Flown(NamedTuple):
         return (self.seen[0] > 1.0) | (self.seen[1] > 1.0) | self.lost
 
     def transients(self, period: float) -> Transients:
-        """What came of the lanes."""
+        """The transients of the lanes so far."""
         time = np.where(self.outside, np.nan, self.seen[2:4].max(axis=0) * period)
         return Transients(time, np.sqrt(self.seen[4]), self.seen[5:8])
 

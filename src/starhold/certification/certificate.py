@@ -14,7 +14,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, Literal
 
-import starhold
+from starhold.version import __version__
 
 FORMAT = "starhold certificate 2"
 FILE = "certificate.json"
@@ -96,7 +96,7 @@ class Certificate:
 
 def write(certificates: Sequence[Certificate], scenario: str, path: Path) -> None:
     """The certificates of a scenario's laws as one JSON file; every number reads back as the same float."""
-    versions = {"starhold": starhold.__version__, "python": platform.python_version()}
+    versions = {"starhold": __version__, "python": platform.python_version()}
     versions |= {name: metadata.version(name) for name in ("python-flint", "numpy", "scipy")}
     content = {
         "format": FORMAT,

@@ -21,23 +21,19 @@ def certify(
 
     Exit code 0: all that is claimed is proved; 3: something is refuted, with the state that does; 4: not decided.
     """
-    from starhold.certification.certificate import FILE, write
     from starhold.cli.show import console
     from starhold.cli.show_certificates import print_certificate
-    from starhold.files import atomic_write
-    from starhold.report.results import open_folder
+    from starhold.report.results import open_folder, write_proofs
     from starhold.scenario.reading import load
-    from starhold.studies.kinds import kind_of
+    from starhold.studies.certificates import certify_scenario
 
     scenario = load(file, allow_unstable)
     folder = open_folder(output or Path("results") / f"{scenario.name}-certificate", force)
-    tried = kind_of(scenario).certify_scenario(scenario, law)
+    tried = certify_scenario(scenario, law)
     for found in tried:
         print_certificate(found)
     certificates = [found.certificate for found in tried]
-    path = folder / FILE
-    with atomic_write(path) as hidden:
-        write(certificates, scenario.name, hidden)
+    path = write_proofs(certificates, scenario.name, folder)
     console.print(f"Certificate: {path}. Re-check it: starhold check {path}", soft_wrap=True)
     outcomes = {certificate.outcome for certificate in certificates}
     if outcomes != {"proved"}:

@@ -11,7 +11,7 @@ from starhold.cli.arguments import REFUTED, UNDECIDED, Force, InvariantOutput
 
 if TYPE_CHECKING:
     from starhold.certification.certificate import Certificate
-    from starhold.report.invariant_picture import Sketch
+    from starhold.studies.phase_portraits import Portrait
 
 SystemFile = Annotated[
     str | None, typer.Argument(metavar="FILE", help="a file with a system, or the name of a built-in one; none: list these")
@@ -27,8 +27,9 @@ def invariant(file: SystemFile = None, output: InvariantOutput = None, force: Fo
     from starhold.certification.certificate import FILE
     from starhold.cli.show import console
     from starhold.files import atomic_write
-    from starhold.report.invariant_picture import PICTURE, draw, sketch
+    from starhold.report.invariant_picture import PICTURE, draw
     from starhold.report.results import open_folder
+    from starhold.studies.phase_portraits import portraits
 
     if file is None:
         for name in sets.builtin_names():
@@ -37,19 +38,19 @@ def invariant(file: SystemFile = None, output: InvariantOutput = None, force: Fo
     problem = sets.load(file)
     folder = open_folder(output or Path("results") / f"{problem.name}-invariant", force)
     certificate = sets.certify(problem)
-    sketches = sketch(problem, certificate)
-    _print(certificate, sketches)
+    drawn = portraits(problem, certificate)
+    _print(certificate, drawn)
     with atomic_write(folder / FILE) as hidden:
         sets.write(certificate, hidden)
     said = f"Certificate: {folder / FILE}."
-    if draw(sketches, folder / PICTURE, problem.name) is not None:
+    if draw(drawn, folder / PICTURE, problem.name) is not None:
         said += f" Picture: {folder / PICTURE}"
     console.print(said, soft_wrap=True)
     if certificate.outcome != "proved":
         raise typer.Exit(REFUTED if certificate.outcome == "refuted" else UNDECIDED)
 
 
-def _print(certificate: Certificate, sketches: list[Sketch]) -> None:
+def _print(certificate: Certificate, portraits: list[Portrait]) -> None:
     """Each claim with its outcome, how it was shown and what it lacks."""
     from rich.markup import escape
     from rich.table import Table
@@ -62,7 +63,7 @@ def _print(certificate: Certificate, sketches: list[Sketch]) -> None:
     table = Table(show_edge=False, pad_edge=False)
     for head in ("claim", "outcome", "what it says"):
         table.add_column(head, overflow="fold")
-    for claim, drawn in zip(certificate.claims, sketches, strict=True):
+    for claim, portrait in zip(certificate.claims, portraits, strict=True):
         heading = HEADINGS[claim.numbers["theorem"]]
         name = escape(claim.witness["name"])
         table.add_row(
@@ -70,7 +71,7 @@ def _print(certificate: Certificate, sketches: list[Sketch]) -> None:
             f"[{COLOURS[claim.outcome]}]{claim.outcome}[/{COLOURS[claim.outcome]}]",
             escape(sentence(claim)),
         )
-        for line in filter(None, (size(claim.numbers, drawn.orbit_area), limit(claim.numbers))):
+        for line in filter(None, (size(claim.numbers, portrait.orbit_area), limit(claim.numbers))):
             table.add_row("", "", f"[dim]{line}[/dim]")
         for o in claim.obligations:
             if o.outcome != "proved":

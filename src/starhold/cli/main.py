@@ -8,15 +8,13 @@ import signal
 import sys
 import traceback
 import warnings
-from dataclasses import replace
 from pathlib import Path
 from threading import Event
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from starhold.cli import certifying, failing, rooting, sailing
-from starhold.cli import invariant as invariant_sets
+from starhold.cli import certifying, failures, invariant, modal_roots, sail
 from starhold.cli.arguments import (
     DIVERGED,
     FAILED_CHECK,
@@ -34,9 +32,6 @@ from starhold.cli.outlet import Outlet, open_outlets
 from starhold.errors import InputError
 
 if TYPE_CHECKING:
-    from types import ModuleType
-
-    from starhold.scenario.reading import Scenario
     from starhold.studies.flight import Flight
 
 app = typer.Typer(
@@ -97,15 +92,15 @@ def _fly(
     # First of all, for it takes as long to get ready as the flight takes.
     with Painter() as painter:
         from starhold.cli.show import console, flying, print_outcome
-        from starhold.report.results import open_folder, write_run
+        from starhold.report.body import report_of
+        from starhold.report.results import open_folder, write_results, write_run
         from starhold.scenario.reading import load
-        from starhold.studies.kinds import kind_of
+        from starhold.studies import compare as studies
 
         scenario = load(file, allow_unstable)
-        kind = kind_of(scenario)
         entries = list(scenario.laws) if nested else [scenario.laws[0] if law is None else scenario.pick(law)]
         # All of them before the first flight, so that what is wrong with the last is said at once.
-        loops = [kind.build(scenario, entry) for entry in entries]
+        loops = [studies.build(scenario, entry) for entry in entries]
         name = scenario.name if nested else f"{scenario.name}-{entries[0].name}"
         folder = open_folder(output or Path("results") / name, force)
         flights: list[Flight] = []
@@ -116,32 +111,27 @@ def _fly(
                 show(name, done, total)
 
             for entry, loop in zip(entries, loops, strict=True):
-                flights.append(kind.fly_law(scenario, entry, loop, notice))
+                flights.append(studies.fly_law(scenario, entry, loop, notice))
                 if entry is entries[-1]:
-                    painter.start(kind.sketch(flights, scenario), folder)
+                    painter.start(report_of(scenario.body).picture(flights, scenario), folder)
                 write_run(flights[-1].recording, (folder / entry.name if nested else folder) / "run.nc")
         # While the pictures are drawn.
         if check_step:
-            flights = [_step_checked(kind, scenario, *pair) for pair in zip(loops, flights, strict=True)]
+            flights = [
+                studies.check_step(scenario, loop, flight, lambda done, total: _heed_interrupt())
+                for loop, flight in zip(loops, flights, strict=True)
+            ]
         if certify:
-            flights = [kind.prove(scenario, *trio) for trio in zip(entries, loops, flights, strict=True)]
+            flights = [studies.prove(scenario, *trio) for trio in zip(entries, loops, flights, strict=True)]
         unpainted = painter.finish()
     # Nothing else runs by now.
-    flights = [kind.timed(loop, flight) for loop, flight in zip(loops, flights, strict=True)]
+    flights = [studies.timed(scenario, loop, flight) for loop, flight in zip(loops, flights, strict=True)]
     print_outcome(flights)
-    page = kind.write(scenario, flights, folder)
+    page = write_results(scenario, flights, folder)
     console.print(f"Report: {page}", soft_wrap=True)
     if unpainted is not None:
         raise unpainted
     return flights
-
-
-def _step_checked(kind: ModuleType, scenario: Scenario, loop: Any, flight: Flight) -> Flight:
-    """The flight with what half the integration step changes among its metrics."""
-    from starhold.analysis.step_check import halved, step_error
-
-    finer = kind.record(scenario, halved(loop), lambda done, total: _heed_interrupt())
-    return replace(flight, metrics=flight.metrics | {"step_error": step_error(flight.recording, finer)})
 
 
 @app.command()
@@ -170,10 +160,10 @@ def design(
 
 app.command()(certifying.certify)
 app.command()(certifying.check)
-app.command()(failing.failures)
-app.command("modal-roots")(rooting.modal_roots)
-app.command("invariant")(invariant_sets.invariant)
-app.command()(sailing.sail)
+app.command()(failures.failures)
+app.command("modal-roots")(modal_roots.modal_roots)
+app.command()(invariant.invariant)
+app.command()(sail.sail)
 
 
 @app.command()
@@ -294,9 +284,9 @@ def check_law(
 @app.callback(invoke_without_command=True)
 def _root(version: Annotated[bool, typer.Option("--version", help="print the version and leave")] = False) -> None:
     if version:
-        import starhold
+        from starhold.version import __version__
 
-        typer.echo(f"starhold {starhold.__version__}")
+        typer.echo(f"starhold {__version__}")
         raise typer.Exit
 
 

@@ -1,4 +1,4 @@
-"""What the commands print: tables and progress bars."""
+"""Tables and progress bars that the commands print."""
 
 from __future__ import annotations
 
@@ -49,10 +49,12 @@ def flying(entries: Sequence[LawEntry], steps: int) -> Iterator[Callable[[str, i
 
 def print_outcome(flights: Sequence[Flight]) -> None:
     """The table, what went wrong and what is proved."""
+    from starhold.report.text import lost_text
+
     print_table(flights)
     for flight in flights:
         if flight.lost is not None:
-            console.print(f"{flight.name} diverged at {flight.lost_text()}; its results end there", style="red")
+            console.print(f"{flight.name} diverged at {lost_text(flight)}; its results end there", style="red")
         if flight.metrics.get("solver_budget_hits"):
             hits, calls = flight.metrics["solver_budget_hits"], flight.metrics["solver_calls"]
             console.print(f"{flight.name}: the solver used up its budget in {hits} of {calls} calls", style="yellow")
@@ -70,13 +72,14 @@ def print_outcome(flights: Sequence[Flight]) -> None:
 
 
 def _step_text(flight: Flight) -> str:
-    """What half the integration step changes."""
+    """Tell what half the integration step changes."""
     errors = flight.metrics["step_error"]
     if None in errors.values():
         return f"{flight.name}: with half the integration step the motion is lost at another time"
     told: list[str] = []
     for name, error in errors.items():
-        unit = "rad" if name == "attitude" else flight.recording.columns[name][1]
+        told_of = flight.recording.columns[name]
+        unit = "rad" if told_of.dimension == "quaternion" else told_of.unit
         told.append(f"{name.replace('_', ' ')} by {error:.1e} {unit}")
     return f"{flight.name}: half the integration step changes at most the {', '.join(told)}"
 
@@ -120,7 +123,7 @@ def print_design(design: Design, law: Law) -> None:
     """The inputs of a design, its gains, and what it can be judged by."""
     import numpy as np
 
-    from starhold.studies.flight import number_text
+    from starhold.report.text import number_text
 
     console.print(f'[bold]{design.name}[/bold]: {law.card.title}, form "{design.form}"', highlight=False)
     for title, items, values in (
@@ -153,7 +156,7 @@ def print_laws(group: str, known: Mapping[str, Law]) -> None:
 
 
 def print_wheels(units: Mapping[str, WheelUnit]) -> None:
-    """What is known of each wheel; a dash where the maker does not say."""
+    """Print what is known of each wheel; a dash where the maker does not say."""
     table = Table(show_edge=False, pad_edge=False)
     for head in ("unit", "maker", "torque, N m", "momentum, N m s", "rotor inertia, kg m²", "mass, kg", "source"):
         table.add_column(head, justify="left" if head in ("unit", "maker", "source") else "right")

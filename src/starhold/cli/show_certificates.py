@@ -1,4 +1,4 @@
-"""What `certify`, `check` and `compare` print of certificates."""
+"""Tables of certificates, as `certify`, `check` and `compare` print them."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from rich.table import Table
 from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.wording import HEADINGS, OBLIGATIONS, eigenvalues, evidence, methods, sentence
 from starhold.cli.show import console
+from starhold.report.text import left_text
 
 if TYPE_CHECKING:
     from starhold.checker import Finding
@@ -74,7 +75,7 @@ def print_proved(flights: Sequence[Flight]) -> None:
             for claim in certificate.claims:
                 table.add_row(f"  {name}", _coloured(claim.outcome), _safe(sentence(claim, certificate.subject)))
                 name = ""
-                texts.setdefault(flight.left_text(place, claim.kind), []).append(HEADINGS[claim.kind])
+                texts.setdefault(left_text(flight, place, claim.kind), []).append(HEADINGS[claim.kind])
             if not certificate.claims:
                 table.add_row(f"  {name}", _coloured("undecided"), "no claim")
             for text, kinds in texts.items():
@@ -107,7 +108,7 @@ def assumptions(certificate: Certificate) -> str:
 
 
 def print_findings(findings: Sequence[Finding]) -> None:
-    """What an independent check found, claim by claim; every obligation that fails."""
+    """Print what an independent check found, claim by claim; every obligation that fails."""
     table = Table(show_edge=False, pad_edge=False)
     for head in ("certificate", "claim", "obligations", "verdict"):
         table.add_column(head, overflow="fold")

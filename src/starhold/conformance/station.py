@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from starhold.algebra.vector import ZERO
-from starhold.analysis.station import goal_of, measure_station
+from starhold.analysis.libration_point import goal_of, measure
 from starhold.certification.station import certify_station
 from starhold.conformance.verdicts import STEPS, agree, declares_itself, require, round_trips
 from starhold.laws.catalogue import Law
@@ -75,7 +75,7 @@ def flies_a_scenario(law: Law) -> None:
         loop = build(scenario, scenario.laws[0])
         table = scenario.table
         run = label(loop, *fly(loop, STEPS), 1)
-        measure_station(run, table.libration.units, goal_of(gains), table.settling.tolerance)
+        measure(run, table.libration.units, goal_of(gains), table.settling.tolerance)
         for claim in certify_station(loop, law.name).claims:
             for obligation in claim.obligations:
                 told = obligation.outcome == "proved" or bool(obligation.evidence)

@@ -14,7 +14,7 @@ from starhold.algebra.quaternion import derivative, multiply, normalise, stretch
 from starhold.algebra.structure import move
 from starhold.algebra.vector import ZERO
 from starhold.analysis.cost import call_costs
-from starhold.analysis.metrics import measure
+from starhold.analysis.rigid_body import measure
 from starhold.analysis.trial import fly_claims
 from starhold.certification.certify import certify
 from starhold.conformance.bench import CRAFT, call, random_measurements, random_quaternions, sample_loop

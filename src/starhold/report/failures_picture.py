@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from starhold.files import atomic_write
+from starhold.report.colours import COLOURS
 from starhold.studies.failures import Failure
-from starhold.studies.flight import COLOURS
 
 DPI = 110
 

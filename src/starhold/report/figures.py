@@ -1,28 +1,25 @@
-"""Figures of a comparison as PNG files, every law in every figure."""
+"""Figures as PNG files, every law in every figure, and what they are drawn with."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
-import numpy as np
-
-from starhold.analysis.metrics import DECADES
 from starhold.files import atomic_write
-from starhold.report.plots import ACCURACIES, Plot, Plots, back_to_front, collect, early, steps_within, until
-from starhold.studies.flight import Flight, colour
+from starhold.report.colours import colour
+from starhold.report.plots import Plot, back_to_front
+from starhold.report.text import lost_text
 
 if TYPE_CHECKING:
-    from starhold.scenario.reading import Scenario
+    from starhold.studies.flight import Flight
 
 DPI = 110
 NOTHING: Any = None
-"""In place of a recording that a sketch does without."""
+"""Stands for a recording where none is needed."""
 POINTS = 2000
 """Samples of a curve, about two for each column of pixels."""
 
@@ -31,49 +28,12 @@ class Picture(Protocol):
     """All that the figures show, without the runs it was taken from: small, and quickly sent to another process."""
 
     def makers(self) -> dict[str, Callable[[], Any]]:
-        """What draws each figure, by the names of their files."""
+        """Tell what draws each figure, by the names of their files."""
         ...
 
 
-class Sketch(NamedTuple):
-    """A picture of attitude laws."""
-
-    plots: Plots
-    flights: list[Flight]
-    name: str
-    transient: Plots | None = None
-
-    def makers(self) -> dict[str, Callable[[], Any]]:
-        """The plots over time, the steps to an accuracy, and angle and torque of the transient alone where it is short."""
-        plots, flights, name, first = self
-        drawn = (plots.scalar, plots.attitude, plots.rate, plots.torque, plots.angle, plots.roll_pitch_yaw, *plots.further)
-        makers: dict[str, Callable[[], Any]] = {
-            plot.name: partial(over_time, plot, plots.times, plots.marks, flights, name) for plot in drawn
-        }
-        if first is not None:
-            for plot in (first.angle, first.torque):
-                cut = replace(plot, title=f"{plot.title}, transient")
-                makers[f"{plot.name}-transient"] = partial(over_time, cut, first.times, first.marks, flights, name)
-        return makers | {"accuracy": partial(_accuracy, flights, name)}
-
-
-def draw(flights: Sequence[Flight], folder: Path, scenario: Scenario | None = None) -> list[Path]:
-    """Write the figures into `folder`, which exists, and return their paths.
-
-    A scenario gives them its name as title and its tolerances as dashed lines.
-    """
-    return paint(sketch(flights, scenario), folder)
-
-
-def sketch(flights: Sequence[Flight], scenario: Scenario | None = None) -> Sketch:
-    """What `paint` needs."""
-    end, name = early(flights), "" if scenario is None else scenario.name
-    transient = None if end is None else collect(until(flights, end), POINTS, scenario, end)
-    return Sketch(collect(flights, POINTS, scenario), without_runs(flights), name, transient)
-
-
 def without_runs(flights: Sequence[Flight]) -> list[Flight]:
-    """The same flights without what was recorded."""
+    """Flights without what was recorded."""
     return [replace(flight, recording=NOTHING) for flight in flights]
 
 
@@ -120,23 +80,6 @@ def over_time(plot: Plot, times: Any, marks: Sequence[float], flights: Sequence[
         axis.set_ylabel(panel.label)
         axis.set_xlim(0.0, max(float(times[-1]), 1e-9))
     axes[-1].set_xlabel(f"time, {plot.clock}")
-    return figure
-
-
-def _accuracy(flights: Sequence[Flight], name: str) -> Any:
-    figure, axes = blank(1, 2, 3.9, "control steps needed to stay within 10⁻ᵏ", flights, name, "")
-    for axis, (kind, label) in zip(axes, ACCURACIES, strict=True):
-        for number, flight in enumerate(flights):
-            steps = np.array([np.nan if s is None else s for s in steps_within(flight, kind)])
-            width = width_of(number, len(flights))
-            axis.plot(
-                list(DECADES), steps, color=colour(number), linewidth=width, marker="os^Dv<>"[number % 7], markersize=5
-            )
-        axis.set_xlim(DECADES[0] - 0.4, DECADES[-1] + 0.4)
-        axis.set_ylim(0.0, max(axis.get_ylim()[1], 1.0))
-        axis.set_xlabel("k")
-        axis.set_title(label, fontsize=9)
-    axes[0].set_ylabel("control steps")
     return figure
 
 
@@ -203,7 +146,7 @@ def headed(
 
 
 def _told(flight: Flight) -> str:
-    fate = "" if flight.lost is None else f" (diverged at {flight.lost_text(4)})"
+    fate = "" if flight.lost is None else f" (diverged at {lost_text(flight, 4)})"
     return shortened(flight.name, (48 if fate else 40) - len(fate)) + fate
 
 

@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from starhold.analysis.roots import Best, Pieces
+from starhold.analysis.roots import Best, TwoPieceFit
 from starhold.files import atomic_write
-from starhold.studies.flight import COLOURS
+from starhold.report.colours import COLOURS
 from starhold.studies.modal_roots import Study
 
 DPI = 110
 LINES = {"fit": ("own fit", "-", COLOURS[2]), "published": ("published fit", (0, (5, 2.5)), COLOURS[1])}
 """How each fit is drawn: its words, dashes and colour."""
 POINTS = 200
-"""Of each piece of a fit."""
+"""Points of each piece of a fit."""
 
 
 def draw(found: Study, path: Path, title: str) -> Path:
@@ -87,7 +87,7 @@ def draw(found: Study, path: Path, title: str) -> Path:
     return path
 
 
-def _line(axis: Any, pieces: Pieces, angles: Any, dashes: Any, colour: str, words: str) -> None:
+def _line(axis: Any, pieces: TwoPieceFit, angles: Any, dashes: Any, colour: str, words: str) -> None:
     """Each piece by itself, for they do not meet."""
     split = np.degrees(pieces.split)
     low, high = (np.linspace(*ends, POINTS) for ends in ((angles[0], split), (np.nextafter(split, np.inf), angles[-1])))

@@ -1,60 +1,29 @@
-"""The page that tells a whole comparison of attitude laws, opens offline and loads nothing."""
+"""The page that tells a comparison, opens offline and loads nothing."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from starhold.algebra.quaternion import conjugate, multiply, to_body
-from starhold.analysis.metrics import DECADES
-from starhold.parts.craft import EARTH, total_inertia
+from starhold.report.body import report_of
 from starhold.report.page_parts import (
-    POINTS,
     columns_list,
     document,
     law_data,
     laws_table,
     lost_alarm,
-    over_time,
     over_time_heading,
-    panel_data,
     plot_box,
     ranking,
-    rounded,
     settings,
     versions,
-    views,
 )
-from starhold.report.plots import ACCURACIES, Panel, Plot, Plots, collect, early, steps_within, until
 from starhold.report.proved import section as proved
-from starhold.report.transients import section as transients
-from starhold.studies.flight import Flight
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
-
-FRAMES = 180
-"""Attitudes of the turning body; the page turns it smoothly from one to the next."""
-EARLY_POINTS = 900
-"""Samples of a curve of the transient alone."""
-EARLY = 1.6
-"""Frame k of n shows the time T (k/n)^EARLY: most of the motion is at the start. Of a run that is long beside its transient
-half of the frames show that."""
-SECONDS = 14.0
-"""How long the animation plays."""
-
-_VIEWS = (
-    "Measurement in the axes of the target (dashed, x* y* z*); solid axes are the body's, and the angle "
-    "is what is left to turn. The outline is that of the uniform box with this inertia."
-)
-_ORBITAL = (
-    " Of the orbital frame x* leads along the motion, y* against the orbit's normal, and z* to the centre of attraction, "
-    "which is down in the picture."
-)
+    from starhold.studies.flight import Flight
 
 
 def write_page(path: Path, scenario: Scenario, flights: Sequence[Flight]) -> None:
@@ -64,118 +33,19 @@ def write_page(path: Path, scenario: Scenario, flights: Sequence[Flight]) -> Non
 
 def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
     """The report as HTML text. Whatever comes from files is escaped."""
-    data = _data(scenario, flights)
+    own = report_of(scenario.body).page(flights, scenario)
     sections = [
         lost_alarm(flights),
         ranking(flights),
-        transients(flights),
+        own.measured,
         proved(flights),
-        "<h2>The turning body</h2>",
-        views(flights, len(data["scene"]["times"]), "Attitude", _told(data["scene"])),
-        over_time_heading(early(flights)),
-        *(plot_box(plot) for plot in data["plots"]),
+        *own.views,
+        over_time_heading(own.transient),
+        *(plot_box(plot) for plot in own.data["plots"] if "planes" not in plot),
         laws_table(flights),
-        settings(scenario, "Spacecraft and settings"),
+        own.units,
+        settings(scenario, own.settings),
         columns_list(flights),
     ]
-    footer = f"{versions()}; seed {scenario.table.simulation.seed}."
-    return document(scenario, sections, data, ("space.js", "body.js"), footer)
-
-
-def _told(scene: Mapping[str, Any]) -> str:
-    arrow = "" if scene["earth"] is None else f" The arrow leads to the {scene['centre']}."
-    return _VIEWS + (_ORBITAL if scene["down"] else "") + arrow
-
-
-def _data(scenario: Scenario, flights: Sequence[Flight]) -> dict[str, Any]:
-    """What the scripts of the page read."""
-    plots = collect(flights, POINTS, scenario)
-    found: dict[str, Any] = {
-        "laws": law_data(flights),
-        "times": rounded(plots.times),
-        "plots": [*_drawn(plots, flights), _accuracy(flights)],
-        "scene": _scene(scenario, flights),
-    }
-    end = early(flights)
-    if end is not None:
-        first = collect(until(flights, end), EARLY_POINTS, scenario, end)
-        found["transient"] = {"times": rounded(first.times), "plots": {one["name"]: one for one in _drawn(first, flights)}}
-    return found
-
-
-def _drawn(plots: Plots, flights: Sequence[Flight]) -> list[dict[str, Any]]:
-    """The plots over time for the script."""
-    quaternion = Plot("quaternion", "error quaternion", [*plots.scalar.panels, *plots.attitude.panels])
-    drawn = (plots.angle, plots.roll_pitch_yaw, quaternion, plots.rate, plots.torque, *plots.further)
-    return [over_time(plot, flights, plots.marks) for plot in drawn]
-
-
-def _accuracy(flights: Sequence[Flight]) -> dict[str, Any]:
-    order = list(range(len(flights)))
-    panels: list[dict[str, Any]] = []
-    for kind, label in ACCURACIES:
-        steps = [steps_within(flight, kind) for flight in flights]
-        panels.append({**panel_data(Panel(f"steps to {label}", []), order), "curves": steps, "widths": [2.0] * len(order)})
-    period = flights[0].recording.attrs["control_period"]
-    return {
-        "name": "accuracy",
-        "title": "control steps needed to stay within 10⁻ᵏ",
-        "dashed": "",
-        "xlabel": f"k; a control step lasts {period:g} s",
-        "panels": panels,
-        "x": list(DECADES),
-        "split": True,
-        "markers": True,
-    }
-
-
-def _scene(scenario: Scenario, flights: Sequence[Flight]) -> dict[str, Any]:
-    longest = max((flight.recording["time"] for flight in flights), key=len)
-    # Some frames of a short run would be equal; each sample shows once.
-    end = early(flights)
-    power = EARLY if end is None else max(EARLY, math.log(end / float(longest[-1])) / math.log(0.5))
-    places = np.unique(np.rint((len(longest) - 1) * np.linspace(0.0, 1.0, FRAMES + 1) ** power).astype(int))
-    attitudes: list[list[list[float | None]]] = []
-    for flight in flights:
-        q = flight.recording["attitude_error"]
-        attitudes.append([rounded(q[place], 4) for place in places if place < len(q)] or [[1.0, 0.0, 0.0, 0.0]])
-    times = longest[places] if len(places) > 1 else np.array([0.0, 1.0])
-    size, axes = _box(total_inertia(scenario.craft))
-    return {
-        "times": rounded(times),
-        "digits": max(0, min(3, 3 - math.floor(math.log10(max(float(times[-1]), 1e-3))))),
-        "attitudes": attitudes,
-        "size": rounded(size, 4),
-        "axes": [rounded(row) for row in axes],
-        "earth": None if scenario.table.orbit is None else _earth(flights, places),
-        "centre": "Earth" if abs(scenario.craft.gravity - EARTH) < 1e-3 * EARTH else "planet",
-        "down": scenario.table.target.mode == "orbital",
-        "seconds": SECONDS,
-    }
-
-
-def _earth(flights: Sequence[Flight], places: Any) -> list[list[float | None]]:
-    """Where the centre of attraction is at these samples of the longest run, in the axes of the target, as unit vectors."""
-    run = max((flight.recording for flight in flights), key=lambda found: len(found["time"]))
-    attitude, error, position = (run[name][places].T for name in ("attitude", "attitude_error", "position"))
-    goal = multiply(tuple(attitude), conjugate(tuple(error)))
-    toward = to_body(goal, tuple(-position / np.linalg.norm(position, axis=0)))
-    return [rounded(row, 4) for row in np.transpose(toward)]
-
-
-def _box(inertia: Any) -> tuple[Any, Any]:
-    """Half edges of the uniform box with this inertia, the longest 0.95, and its axes as columns, in body axes.
-
-    For edges 2a, 2b, 2c a moment is proportional to b^2 + c^2, thus a^2 to the other two moments' sum less its own.
-    Edges that would vanish (a flat body has them) are shown as a tenth of the longest.
-    """
-    full = np.asarray(inertia, dtype=float)
-    if full.ndim == 1:
-        moments, axes = full, np.eye(3)
-    else:
-        moments, axes = np.linalg.eigh(full)
-        # The library is free in the signs; a picture should be the same everywhere.
-        axes = axes * np.where(np.take_along_axis(axes, np.abs(axes).argmax(axis=0)[None], axis=0)[0] < 0.0, -1.0, 1.0)
-        axes[:, 2] *= np.sign(np.linalg.det(axes))
-    edges = np.sqrt(np.maximum(moments.sum() - 2.0 * moments, 0.0))
-    return 0.95 * np.maximum(edges / edges.max(), 0.1), axes
+    data = {"laws": law_data(flights), **own.data}
+    return document(scenario, sections, data, own.scripts, f"{versions()}{own.footer}.")

@@ -1,4 +1,4 @@
-"""What report pages of all kinds of scenario are made of: text, tables, and data for their scripts."""
+"""The parts that pages about any body are made of: text, tables, and data for their scripts."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from starhold.report.colours import colour
 from starhold.report.plots import Panel, Plot, back_to_front
 from starhold.report.proved import swatch
-from starhold.studies.flight import Flight, colour, number_text
+from starhold.report.text import lost_text, number_text, value_text
+from starhold.studies.flight import Flight
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -121,7 +123,7 @@ def over_time(plot: Plot, flights: Sequence[Flight], marks: Sequence[float] = ()
 
 def lost_alarm(flights: Sequence[Flight]) -> str:
     """Which motions were lost; empty where none was."""
-    lost = [f"{flight.name} (at {flight.lost_text()})" for flight in flights if flight.lost is not None]
+    lost = [f"{flight.name} (at {lost_text(flight)})" for flight in flights if flight.lost is not None]
     if not lost:
         return ""
     return f'<p class="alarm">Diverged, and so without final values: {escape(", ".join(lost))}.</p>'
@@ -146,7 +148,7 @@ def ranking(flights: Sequence[Flight]) -> str:
         cells = "".join(
             f"{BEST if name in best[metric] else '<td>'}{metric_set.told(metric, flight.metrics)}</td>" for metric in metrics
         )
-        fate = f"diverged at {flight.lost_text()}" if lost else flight.law if flight.law != name else ""
+        fate = f"diverged at {lost_text(flight)}" if lost else flight.law if flight.law != name else ""
         rows.append(
             f"{LOST if lost else '<tr>'}<td>{place}</td>"
             f'<th scope="row" style="text-align:left">{swatch(numbers[name])}{escape(name)}'
@@ -173,7 +175,7 @@ def laws_table(flights: Sequence[Flight]) -> str:
     """The laws with their gains."""
     rows = "".join(
         f'<tr><th scope="row">{swatch(number)}{escape(flight.name)}</th><td>{escape(flight.law)}</td>'
-        f"<td>{', '.join(f'{escape(key)} = {escape(text)}' for key, text in flight.gains.items()) or '—'}</td></tr>"
+        f"<td>{_gains(flight) or '—'}</td></tr>"
         for number, flight in enumerate(flights)
     )
     head = '<th scope="col">name</th><th scope="col">type</th><th scope="col">gains</th>'
@@ -181,6 +183,10 @@ def laws_table(flights: Sequence[Flight]) -> str:
         f'<h2>Laws</h2>\n<div class="wide"><table class="text"><thead><tr>{head}</tr></thead>'
         f"<tbody>{rows}</tbody></table></div>"
     )
+
+
+def _gains(flight: Flight) -> str:
+    return ", ".join(f"{escape(name)} = {escape(value_text(*gain))}" for name, gain in flight.gains.items())
 
 
 def settings(scenario: Scenario, title: str) -> str:
@@ -219,7 +225,7 @@ def _value(value: Any) -> str:
 
 
 def columns_list(flights: Sequence[Flight]) -> str:
-    """What the columns of the ranking mean."""
+    """The columns of the ranking with their meanings."""
     metric_set = flights[0].metric_set
     measures = [
         metric_set.measures[metric] for metric in metric_set.columns({flight.name: flight.metrics for flight in flights})
@@ -233,8 +239,8 @@ def columns_list(flights: Sequence[Flight]) -> str:
 
 
 def versions() -> str:
-    """What made the page."""
-    from starhold import __version__
+    """The versions that made the page."""
+    from starhold.version import __version__
 
     libraries = ", ".join(f"{name} {metadata.version(name)}" for name in ("llvmlite", "numpy", "plotly"))
     return f"starhold {__version__}, {libraries}"

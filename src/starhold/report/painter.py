@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING
@@ -82,6 +83,8 @@ def main() -> None:
     gc.disable()
     from starhold.report.figures import paint, warm_up
 
+    # The pictures of every body load the parts of pages.
+    import_module("starhold.report.page_parts")
     warm_up()
     what, folder = pickle.load(sys.stdin.buffer)
     # Everything is loaded, so the other half of the figures costs a second process no start-up.

@@ -1,29 +1,18 @@
-"""What the plots of a report show, whoever draws them."""
+"""Plots over time, whoever draws them: panels with a curve for each law."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.analysis.metrics import DECADES, acceleration, error_angle, stays_within
 from starhold.studies.flight import Flight
-
-if TYPE_CHECKING:
-    from starhold.scenario.reading import Scenario
 
 Curve: TypeAlias = NDArray[np.float64]
 
-ACCURACIES = (("", "attitude, |q| ≤ 10⁻ᵏ"), ("rate_", "rate, |ω| ≤ 10⁻ᵏ rad/s"))
-"""What the steps to an accuracy are counted for: the prefix of the metric, and the heading."""
-
-
-NEAR = 0.02
-"""Share of the largest error that counts as near the target."""
 OFF_SCALE = 5.0
 """Limits so many times above all curves are not drawn."""
 
@@ -64,52 +53,6 @@ class Plot:
     """The unit of the times."""
 
 
-@dataclass(frozen=True)
-class Plots:
-    """All plots over time, with the times (s) that all curves share; a run that was lost has shorter curves."""
-
-    times: Curve
-    scalar: Plot
-    attitude: Plot
-    rate: Plot
-    torque: Plot
-    angle: Plot
-    roll_pitch_yaw: Plot
-    further: tuple[Plot, ...] = ()
-    """Rate and acceleration against their limits, momenta and torques of reaction wheels, where there are any."""
-    marks: tuple[float, ...] = ()
-    """When faults happen and are acted on (s)."""
-
-
-def collect(flights: Sequence[Flight], points: int, scenario: Scenario | None = None, end: float = math.inf) -> Plots:
-    """The plots of a comparison, each curve thinned to about `points` samples; marks up to `end` (s)."""
-    longest = max((flight.recording["time"] for flight in flights), key=len)
-    factor = 1 if len(longest) <= points else int(np.ceil(2 * len(longest) / points))
-
-    def curves(name: str, column: int, scale: float = 1.0) -> list[Curve]:
-        return [thin(flight.recording[name][:, column] * scale, factor) for flight in flights]
-
-    from starhold.scenario.bodies.rigid_body.faults import fault_times
-
-    rate_scale, rate_unit = _rate_unit(flights)
-    levels, dashed = _limit(flights, scenario)
-    rates = [Panel(f"{axis}, {rate_unit}", curves("rate_error", i, rate_scale)) for i, axis in enumerate("xyz")]
-    torques = [Panel(f"{axis}, N m", curves("torque", i), False, levels) for i, axis in enumerate("xyz")]
-    scalar = Panel("q₀", curves("attitude_error", 0))
-    vector = [Panel(f"q{'₁₂₃'[i]}", curves("attitude_error", i + 1)) for i in range(3)]
-    return Plots(
-        thin_times(longest, factor),
-        Plot("scalar", "scalar part of the error quaternion", [scalar]),
-        Plot("attitude", "vector part of the error quaternion", vector),
-        Plot("rate", "angular velocity relative to the target", [sound(panel, flights) for panel in rates]),
-        Plot("torque", "torque applied", torques, dashed, True),
-        _angle(flights, factor, scenario),
-        _roll_pitch_yaw(flights, factor),
-        (*_transient(flights, factor, scenario), *_wheels(flights, factor, scenario)),
-        () if scenario is None else tuple(time for time in fault_times(scenario) if time <= end),
-    )
-
-
 def thin(values: Curve, factor: int) -> Curve:
     """Two of every `factor` samples, to be drawn over `thin_times`.
 
@@ -139,14 +82,6 @@ def thin_times(times: Curve, factor: int) -> Curve:
     return times[places]
 
 
-def steps_within(flight: Flight, kind: str) -> list[int | None]:
-    """Control steps after which the error stays within 10^-k, for every k of `DECADES`.
-
-    kind: "" for the attitude, "rate_" for the rate.
-    """
-    return [flight.metrics.get(f"{kind}iterations_1e-{k}") for k in DECADES]
-
-
 def back_to_front(flights: Sequence[Flight], plot: Plot) -> list[int]:
     """Curves that chatter go behind those that do not, which they would hide."""
     numbers = list(range(len(flights)))
@@ -155,114 +90,10 @@ def back_to_front(flights: Sequence[Flight], plot: Plot) -> list[int]:
     return numbers
 
 
-def _angle(flights: Sequence[Flight], factor: int, scenario: Scenario | None) -> Plot:
-    degrees = 180.0 / np.pi
-    angles = [thin(error_angle(flight.recording["attitude_error"]) * degrees, factor) for flight in flights]
-    speeds = [thin(np.linalg.norm(flight.recording["rate_error"], axis=1) * degrees, factor) for flight in flights]
-    settling = None if scenario is None else scenario.table.settling
-    within = () if settling is None else (settling.attitude_tolerance * degrees,)
-    slow = () if settling is None else (settling.rate_tolerance * degrees,)
-    panels = [positive("angle, deg", angles, within), sound(positive("rate, deg/s", speeds, slow), flights)]
-    return Plot("angle", "error angle and relative rate", panels, "tolerance" if settling else "")
-
-
-def _roll_pitch_yaw(flights: Sequence[Flight], factor: int) -> Plot:
-    errors = [roll_pitch_yaw(flight.recording["attitude_error"]) for flight in flights]
-    panels = [
-        Panel(f"{name}, deg", [_unwrapped(thin(own[:, i], factor)) for own in errors])
-        for i, name in enumerate(("roll", "pitch", "yaw"))
-    ]
-    return Plot("roll-pitch-yaw", "roll, pitch and yaw error", panels)
-
-
-def roll_pitch_yaw(q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Turns (deg) about the first, the new second and the new third axis that, taken from the last to the first, make up
-    each quaternion (n, 4); (n, 3). The same as `algebra.cosines.to_angles`, of many."""
-    q0, q1, q2, q3 = q.T
-    roll = np.arctan2(2.0 * (q2 * q3 + q0 * q1), 1.0 - 2.0 * (q1 * q1 + q2 * q2))
-    pitch = np.arcsin(np.clip(2.0 * (q0 * q2 - q1 * q3), -1.0, 1.0))
-    yaw = np.arctan2(2.0 * (q1 * q2 + q0 * q3), 1.0 - 2.0 * (q2 * q2 + q3 * q3))
-    return np.degrees(np.column_stack([roll, pitch, yaw]))
-
-
-def _unwrapped(angles: Curve) -> Curve:
-    """Angles (deg) with gaps where they jump from one end of their range to the other."""
-    broken = angles.copy()
-    broken[1:][np.abs(np.diff(angles)) > 180.0] = np.nan
-    return broken
-
-
-def early(flights: Sequence[Flight]) -> float | None:
-    """The time (s) by which the motions that come near the target are near it, with a little to spare; None where that is
-    most of the run, or none does."""
-    longest, ends = max(float(flight.recording["time"][-1]) for flight in flights), list[float]()
-    for flight in flights:
-        run = flight.recording
-        errors = error_angle(run["attitude_error"]), np.linalg.norm(run["rate_error"], axis=1)
-        within = [stays_within(values, NEAR * float(values.max(initial=0.0))) for values in errors]
-        if flight.lost is None and None not in within:
-            ends.append(float(run["time"][max(place for place in within if place is not None)]))
-    end = 1.2 * max(ends, default=math.inf)
-    return end if 0.0 < end <= 0.5 * longest else None
-
-
-def until(flights: Sequence[Flight], end: float) -> list[Flight]:
-    """The same flights with what was recorded up to a time (s)."""
-    short: list[Flight] = []
-    for flight in flights:
-        count = int(np.searchsorted(flight.recording["time"], end * (1.0 + 1e-9), side="right"))
-        arrays = {name: values[: max(1, count)] for name, values in flight.recording.arrays.items()}
-        short.append(replace(flight, recording=replace(flight.recording, arrays=arrays)))
-    return short
-
-
-def _transient(flights: Sequence[Flight], factor: int, scenario: Scenario | None) -> tuple[Plot, ...]:
-    table = None if scenario is None else scenario.table.transient
-    if table is None:
-        return ()
-    degrees = 180.0 / np.pi
-    rates = [thin(np.linalg.norm(flight.recording["rate"], axis=1) * degrees, factor) for flight in flights]
-    turned = [acceleration(flight.recording) * degrees for flight in flights]
-    fastest = table.rate_limit * degrees
-    panels = [Panel("norm, deg/s", rates, False, near((fastest,), rates))]
-    for i, axis in enumerate("xyz"):
-        curves = [thin(own[:, i], factor) for own in turned]
-        limit = table.acceleration_limit * degrees
-        panels.append(Panel(f"{axis}, deg/s²", curves, False, near((-limit, limit), curves)))
-    return (
-        Plot(
-            "transient",
-            "norm of the body's rate, and the rate's derivative",
-            [sound(panel, flights) for panel in panels],
-            "limit",
-        ),
-    )
-
-
 def near(levels: tuple[float, ...], curves: list[Curve]) -> tuple[float, ...]:
     """Levels but those that would flatten the curves."""
     peak = max((float(np.abs(curve).max(initial=0.0)) for curve in curves), default=0.0)
     return levels if max(levels) <= OFF_SCALE * peak else ()
-
-
-def _wheels(flights: Sequence[Flight], factor: int, scenario: Scenario | None) -> tuple[Plot, ...]:
-    if not all("wheel_momentum" in flight.recording.arrays for flight in flights):
-        return ()
-    from starhold.scenario.bodies.rigid_body.craft import wheels_of
-
-    wheels = None if scenario is None else wheels_of(scenario)
-    plots: list[Plot] = []
-    for name, title, unit, limits in (
-        ("wheel_momentum", "angular momentum of the wheels", "N m s", None if wheels is None else wheels.momentum_limit),
-        ("wheel_torque", "torque on the wheels", "N m", None if wheels is None else wheels.torque_limit),
-    ):
-        panels: list[Panel] = []
-        for wheel in range(flights[0].recording[name].shape[1]):
-            curves = [thin(flight.recording[name][:, wheel], factor) for flight in flights]
-            levels = () if limits is None else (-limits[wheel], limits[wheel])
-            panels.append(Panel(f"wheel {wheel + 1}, {unit}", curves, False, levels))
-        plots.append(Plot(name.replace("_", "-"), title, panels, "limit" if limits else ""))
-    return tuple(plots)
 
 
 def positive(label: str, curves: list[Curve], levels: tuple[float, ...]) -> Panel:
@@ -282,37 +113,3 @@ def sound(panel: Panel, flights: Sequence[Flight]) -> Panel:
     margin = 0.5 * (high - low) + 1e-9
     span = (low / 2.0, high * 10.0) if panel.log else (low - margin, high + margin)
     return Panel(panel.label, panel.curves, panel.log, panel.levels, span)
-
-
-def _peak(flights: Sequence[Flight], name: str) -> float:
-    sound = [flight for flight in flights if flight.lost is None] or flights
-    return max(float(np.abs(flight.recording[name]).max(initial=0.0)) for flight in sound)
-
-
-def _rate_unit(flights: Sequence[Flight]) -> tuple[float, str]:
-    degrees = 180.0 / np.pi
-    return (degrees, "deg/s") if _peak(flights, "rate_error") * degrees >= 0.1 else (degrees * 1e3, "mdeg/s")
-
-
-def _limit(flights: Sequence[Flight], scenario: Scenario | None) -> tuple[tuple[float, ...], str]:
-    """The limit of the torque (N m) that binds first, and what it is."""
-    from starhold.scenario.bodies.rigid_body.craft import torque_limit, wheels_of
-
-    attrs: dict[Any, Any] = flights[0].recording.attrs
-    limit, kind = float(attrs["torque_limit"]), attrs["limit"]
-    limit = math.inf if kind == "none" else limit
-    words = f"limit of {'each axis' if kind == 'axis' else 'the norm'}"
-    wheels = None if scenario is None else wheels_of(scenario)
-    sure = math.inf if scenario is None or wheels is None else torque_limit(scenario.table, wheels)
-    if scenario is not None and sure < limit:
-        norm = scenario.table.spacecraft.limit == "norm"
-        limit, words = sure, f"what the wheels surely give {'in norm' if norm else 'about each axis at once'}"
-        if any(fault.strikes_wheel for fault in scenario.table.fault):
-            words += " before a fault"
-    if not np.isfinite(limit):
-        return (), "no limit"
-    words = f"{words}, {limit:g} N m"
-    # A limit far above all torques would flatten them.
-    if limit > OFF_SCALE * _peak(flights, "torque"):
-        return (), f"{words}, off the scale"
-    return (-limit, limit), words

@@ -8,7 +8,9 @@ from typing import Any
 
 from starhold.certification.certificate import FILE, Claim, Obligation
 from starhold.certification.wording import HEADINGS, OBLIGATIONS, evidence, methods, sentence
-from starhold.studies.flight import Flight, colour, number_text
+from starhold.report.colours import colour
+from starhold.report.text import left_text, number_text
+from starhold.studies.flight import Flight
 
 NOTE = (
     "Proved means shown by a computation without rounding: identities and inequalities in exact rational numbers, the rest "
@@ -65,7 +67,9 @@ def section(flights: Sequence[Flight]) -> str:
 def _law(flight: Flight, number: int, place: int) -> str:
     certificate = flight.certificates[place]
     head = f"<h3>{swatch(number)}{escape(certificate.name)}</h3>"
-    claims = "".join(_claim(claim, certificate.subject, flight.left_text(place, claim.kind)) for claim in certificate.claims)
+    claims = "".join(
+        _claim(claim, certificate.subject, left_text(flight, place, claim.kind)) for claim in certificate.claims
+    )
     if not claims:
         claims = (
             '<p class="note">Nothing is claimed, so nothing is proved: this law comes without a Lyapunov function or a '

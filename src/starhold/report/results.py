@@ -4,25 +4,29 @@ from __future__ import annotations
 
 import json
 import tempfile
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import starhold
 from starhold.certification.certificate import FILE as CERTIFICATES
+from starhold.certification.certificate import write as write_certificates
 from starhold.errors import InputError
 from starhold.files import atomic_write, claim, clear_unfinished
 from starhold.report.netcdf import write_netcdf
 from starhold.scenario.checking import cut
-from starhold.scenario.reading import LONGEST_PATH, Scenario
+from starhold.scenario.reading import LONGEST_PATH
+from starhold.version import __version__
 
 if TYPE_CHECKING:
+    from starhold.certification.certificate import Certificate
+    from starhold.scenario.reading import Scenario
     from starhold.simulation.lane import Recording
+    from starhold.studies.flight import Flight
 
-SUMMARY = "summary.json"
+SUMMARY, PAGE = "summary.json", "report.html"
 FAILURES = ("failures.csv", "failures.png")
 ROOTS = ("modal-roots.csv", "modal-roots.png")
-MARKS = (SUMMARY, "run.nc", "report.html", CERTIFICATES, "invariant.png", *FAILURES, *ROOTS)
+MARKS = (SUMMARY, "run.nc", PAGE, CERTIFICATES, "invariant.png", *FAILURES, *ROOTS)
 """A folder with one of these holds results."""
 
 
@@ -62,14 +66,6 @@ def _clear(folder: Path) -> None:
         (folder / mark).unlink(missing_ok=True)
 
 
-def signed(run: Recording, scenario: Scenario) -> Recording:
-    """The run with the scenario's text, the version and the seed among its attributes."""
-    attrs = {"scenario": scenario.text, "starhold_version": starhold.__version__, **run.attrs}
-    if hasattr(scenario.table.simulation, "seed"):
-        attrs["seed"] = scenario.table.simulation.seed
-    return replace(run, attrs=attrs)
-
-
 def write_run(run: Recording, path: Path) -> None:
     """A run as netCDF-4."""
     path.parent.mkdir(exist_ok=True)
@@ -79,6 +75,28 @@ def write_run(run: Recording, path: Path) -> None:
 
 def write_summary(scenario: Scenario, results: dict[str, dict[str, Any]], path: Path) -> None:
     """The metrics of each law, SI units, as JSON; a value that does not exist is null."""
-    content = {"scenario": scenario.name, "starhold_version": starhold.__version__, "laws": results}
+    content = {"scenario": scenario.name, "starhold_version": __version__, "laws": results}
     with atomic_write(path) as hidden:
         hidden.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def write_proofs(certificates: Sequence[Certificate], name: str, folder: Path) -> Path:
+    """Certificates as one file of a folder; returns its path."""
+    path = folder / CERTIFICATES
+    with atomic_write(path) as hidden:
+        write_certificates(certificates, name, hidden)
+    return path
+
+
+def write_results(scenario: Scenario, flights: Sequence[Flight], folder: Path) -> Path:
+    """Summary, certificates and page into an existing folder; returns the page's path. The runs are written as they are
+    flown, by `write_run`, and the pictures by a `Painter`."""
+    from starhold.report.page import write_page
+
+    write_summary(scenario, {flight.name: flight.results() for flight in flights}, folder / SUMMARY)
+    if certificates := [certificate for flight in flights for certificate in flight.certificates]:
+        write_proofs(certificates, scenario.name, folder)
+    page = folder / PAGE
+    with atomic_write(page) as hidden:
+        write_page(hidden, scenario, flights)
+    return page

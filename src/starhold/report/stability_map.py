@@ -22,7 +22,7 @@ SAME = 1e-9
 """Moments that differ by less than this share count as equal."""
 
 
-class Sketch(NamedTuple):
+class StabilityMap(NamedTuple):
     """All that the map shows.
 
     K_a: (POINTS,); K_w: (POINTS,); eta: (POINTS, POINTS), by K_w, then K_a; ask: torque asked for over the budget, of the
@@ -46,11 +46,11 @@ def draw_map(path: Path, ratios: ArrayLike, alpha: float, omega: float, budget: 
     ratios: (3,), J_axis / J_x in any order; alpha: largest initial error (rad); omega: largest initial rate (1/t0); budget:
     L. ValueError as `optimum` raises it, before anything is written. Equal arguments give equal files.
     """
-    return paint(sketch(ratios, alpha, omega, budget), path)
+    return paint(stability_map(ratios, alpha, omega, budget), path)
 
 
-def sketch(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> Sketch:
-    """What `paint` needs: the map around the optimum. Arguments and errors as of `draw_map`."""
+def stability_map(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> StabilityMap:
+    """The map around the optimum. Arguments and errors as of `draw_map`."""
     best = optimum(ratios, alpha, omega, budget)
     # The optimum at fixed shares of both sides, so that the words around it never meet the lines.
     K_a = np.linspace(0.0, 2.0 * best.K_a, POINTS)
@@ -58,10 +58,10 @@ def sketch(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> Sket
     eta = degree(K_a, K_w[:, None], ratios)
     ask = (2.0 * K_a * alpha + K_w[:, None] * omega) / budget
     three = tuple(np.asarray(ratios, dtype=float).tolist())
-    return Sketch(K_a, K_w, eta, ask, best, three, float(alpha), float(omega), float(budget))
+    return StabilityMap(K_a, K_w, eta, ask, best, three, float(alpha), float(omega), float(budget))
 
 
-def paint(what: Sketch, path: Path) -> Path:
+def paint(what: StabilityMap, path: Path) -> Path:
     """Write the figure to `path`, in a folder that exists, and return the path."""
     from matplotlib.figure import Figure
 
@@ -99,7 +99,7 @@ def paint(what: Sketch, path: Path) -> Path:
     return _save(figure, path)
 
 
-def _budget(axis: Any, what: Sketch) -> None:
+def _budget(axis: Any, what: StabilityMap) -> None:
     """The budget line, and the side beyond it veiled and hatched."""
     beyond = [1.0, max(float(what.ask.max()), 1.0) * 2.0]
     axis.contourf(what.K_a, what.K_w, what.ask, levels=beyond, colors=["white"], alpha=0.42)
@@ -109,7 +109,7 @@ def _budget(axis: Any, what: Sketch) -> None:
     axis.contour(what.K_a, what.K_w, what.ask, levels=[1.0], colors=LINE, linewidths=2.4)
 
 
-def _curves(axis: Any, what: Sketch) -> list[Any]:
+def _curves(axis: Any, what: StabilityMap) -> list[Any]:
     """The border between what decides, and each axis' critical damping; what the legend says of these lines."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -130,8 +130,8 @@ def _curves(axis: Any, what: Sketch) -> list[Any]:
     return handles
 
 
-def _words(axis: Any, what: Sketch) -> None:
-    """What decides on each side of the border, and the optimum with its numbers."""
+def _words(axis: Any, what: StabilityMap) -> None:
+    """Write what decides on each side of the border, and the optimum with its numbers."""
     named, best = sorted(_axes(what.ratios), key=lambda pair: pair[1]), what.best
     numbers = f"optimum\nK_a = {best.K_a:.4g}\nK_w = {best.K_w:.4g}\nη = {best.eta:.4g}"
     texts = (
@@ -157,7 +157,7 @@ def _words(axis: Any, what: Sketch) -> None:
     axis.plot([best.K_a], [best.K_w], "*", markersize=18, color=LINE, markeredgecolor="white", markeredgewidth=1.2, zorder=7)
 
 
-def _places(what: Sketch, texts: Any) -> list[tuple[float, float]]:
+def _places(what: StabilityMap, texts: Any) -> list[tuple[float, float]]:
     """Centres, as shares of the axes, of words that hide as little as can be of the lines and of each other: each as near
     as it can be to where it is wanted, above the border (1), below it (-1) or anywhere (0)."""
     u = np.linspace(0.0, 1.0, 600)

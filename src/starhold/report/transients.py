@@ -1,41 +1,16 @@
-"""The transient of each law against the limits of its scenario: metrics, words, and the section of the page."""
+"""The transient of each law against the limits of its scenario, in words and as a section of the page."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from starhold.analysis.metrics import too_late
-from starhold.analysis.transient import Limits, of_run
 from starhold.report.proved import swatch
-from starhold.studies.flight import Flight
 
 if TYPE_CHECKING:
-    from starhold.scenario.bodies.rigid_body.transient import TransientTable
-    from starhold.simulation.lane import Recording
-
-
-def against_limits(run: Recording, table: TransientTable | None, cut_off: Sequence[str] = ()) -> dict[str, Any]:
-    """Metrics of a run, SI units, empty without a [transient] table: its time (None where it comes to no end), its peaks, of
-    the acceleration those of each component too, the limits (None for none), and whether they are kept. A time within the
-    last tenth of the run is None, and joins the names of such times, `cut_off`."""
-    if table is None:
-        return {}
-    flown, limits = of_run(run, table.angle_end, table.rate_end), Limits(table.rate_limit, table.acceleration_limit)
-    step = run.attrs["control_period"] * run.attrs["record_every"]
-    late = flown.time is not None and too_late(flown.time / step, len(run["time"]))
-    return {
-        "cut_off": [*cut_off, "transient_time"] if late else list(cut_off),
-        "transient_time": None if late else flown.time,
-        "peak_rate": flown.peak_rate,
-        "peak_acceleration": max(flown.peak_acceleration),
-        "peak_accelerations": list(flown.peak_acceleration),
-        "rate_limit": limits.rate if math.isfinite(limits.rate) else None,
-        "acceleration_limit": limits.acceleration if math.isfinite(limits.acceleration) else None,
-        "limits_kept": flown.keeps(limits),
-    }
+    from starhold.studies.flight import Flight
 
 
 def told(flight: Flight) -> str:

@@ -1,21 +1,18 @@
-"""What a spacecraft can still do after the loss of one or two of its wheels: numbers, a CSV file and a picture."""
+"""The failures of wheels: what a spacecraft can still do after the loss of one or two of them."""
 
 from __future__ import annotations
 
-import csv
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import combinations
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.analysis.metrics import measure
+from starhold.analysis.rigid_body import measure
 from starhold.errors import InputError
-from starhold.files import atomic_write
 from starhold.parts.craft import tensor
 from starhold.parts.effectors.envelope import authority
 from starhold.parts.effectors.wheels import Wheels, lose
@@ -23,7 +20,7 @@ from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.bodies.rigid_body.tables import FaultTable
 from starhold.scenario.building import build
 from starhold.simulation.lane import Recording, fly, label
-from starhold.studies.certificates import certify_law
+from starhold.studies.bodies.rigid_body import certify_law
 from starhold.synthesis.stability_degree import degree, scale
 
 if TYPE_CHECKING:
@@ -56,7 +53,7 @@ class Saturation:
 
 @dataclass(frozen=True)
 class Failure:
-    """What is left after a loss. What needs three axes is None where they are not left.
+    """A loss of wheels, and what is left after it. What needs three axes is None where they are not left.
 
     lost: wheels, counted from 1, none for the intact set. lacking: body directions without authority, orthonormal (n, 3).
     condition: condition number of the working axes. authority: N m. share: of the intact authority. gains: what the law is
@@ -130,49 +127,6 @@ def directions_lacking(axes: Array) -> Array:
     lacking = directions[:, sizes <= WEAK * sizes[0]].T
     leading = np.take_along_axis(lacking, np.abs(lacking.round(9)).argmax(axis=1)[:, None], axis=1)
     return np.sign(leading) * lacking
-
-
-def write_table(found: Sequence[Failure], entry: LawEntry, path: Path) -> None:
-    """All numbers as CSV, SI units in the header; what does not exist is an empty cell, vectors are separated by blanks."""
-    gains = {f"{item.name} ({item.gain.unit})": item.name for item in entry.law.fields()}
-    with atomic_write(path) as hidden, hidden.open("w", encoding="utf-8", newline="") as file:
-        rows = csv.writer(file, lineterminator="\n")
-        rows.writerow([*_cells(found[0]), *gains])
-        for failure in found:
-            chosen = failure.gains or {}
-            rows.writerow([*_cells(failure).values(), *(_numbers(chosen.get(name)) for name in gains.values())])
-
-
-def _cells(failure: Failure) -> dict[str, str]:
-    known = failure.saturation or Saturation(None, None, "", None)
-    certified = failure.certified or (None, None)
-    return {
-        "lost wheels": _numbers(failure.lost),
-        "controllable axes": str(3 - len(failure.lacking)),
-        "directions without authority": "; ".join(map(_numbers, failure.lacking)),
-        "condition number": _numbers(failure.condition),
-        "torque authority (N m)": _numbers(failure.authority),
-        "share of intact authority": _numbers(failure.share),
-        "degree of stability intact (1/s)": _numbers(failure.eta_intact),
-        "degree of stability after (1/s)": _numbers(failure.eta),
-        "settling time (s)": _numbers(failure.settling),
-        "diverged at (s)": _numbers(failure.diverged_at),
-        "certified turn (rad)": _numbers(certified[0]),
-        "certified rate (rad/s)": _numbers(certified[1]),
-        "saturation time (s)": _numbers(known.time),
-        "saturating wheel": _numbers(known.wheel),
-        "saturation known from": known.known,
-        "window of momentum growth (s)": _numbers(known.window),
-        "largest share of momentum limit": _numbers(failure.momentum_share),
-        "time flown (s)": _numbers(failure.flown),
-        "not flown because": failure.refused,
-    }
-
-
-def _numbers(value: Any) -> str:
-    if value is None or isinstance(value, str):
-        return value or ""
-    return " ".join(repr(number) for number in np.asarray(value).ravel().tolist())
 
 
 def require_wheels(scenario: Scenario) -> Wheels:
@@ -271,7 +225,7 @@ def _tolerances(scenario: Scenario) -> tuple[float, float]:
 
 
 def _orbit_period(scenario: Scenario) -> float | None:
-    """Of the orbit that the spacecraft starts in (s); None without one, or where it is not closed."""
+    """Period of the orbit that the spacecraft starts in (s); None without one, or where it is not closed."""
     orbit = scenario.table.orbit
     if orbit is None:
         return None

@@ -1,21 +1,18 @@
-"""The roots of the modal law that turn fastest within a scenario's limits: the search, the fit through it, a CSV file."""
+"""The roots of the modal law that turn fastest within a scenario's limits: the search and the fit through it."""
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.analysis.roots import PUBLISHED, Found, Pieces, Problem, fit, search, unmet
+from starhold.analysis.roots import PUBLISHED, Found, SlewProblem, TwoPieceFit, fit, search, unmet
 from starhold.analysis.transient import Limits
 from starhold.errors import InputError
-from starhold.files import atomic_write
 from starhold.scenario.building import build
 
 if TYPE_CHECKING:
@@ -23,7 +20,7 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
 
 DIGITS = 6
-"""Of the fit as it is printed; the roots have three or four."""
+"""Digits of the fit as it is printed; the roots have three or four."""
 PUBLISHED_FOR: dict[str, Any] = {
     "rate_limit": math.radians(30.0),
     "acceleration_limit": math.radians(50.0),
@@ -31,20 +28,20 @@ PUBLISHED_FOR: dict[str, Any] = {
     "rate_end": math.radians(0.1),
     "start_rate": (math.radians(20.0) / math.sqrt(3.0),) * 3,
 }
-"""What the published fit was made for, with the axis along the rate."""
+"""The limits and start that the published fit was made for, with the axis along the rate."""
 
 
 @dataclass(frozen=True)
 class Study:
-    """What a search found, angle by angle; the fit through it, None for too few angles; and the published one, None where
+    """A search's findings, angle by angle; the fit through it, None for too few angles; and the published one, None where
     the limits or the start are not the published ones."""
 
     found: list[Found]
     b: float
     eased: bool
     """Whether the limits were tried with tolerances too."""
-    own: Pieces | None
-    published: Pieces | None
+    own: TwoPieceFit | None
+    published: TwoPieceFit | None
 
     @property
     def angles(self) -> NDArray[np.float64]:
@@ -56,7 +53,7 @@ class Study:
         """The best roots within the limits (1/s), (n,)."""
         return np.array([math.nan if item.hard is None else item.hard.root for item in self.found])
 
-    def fits(self) -> dict[str, Pieces]:
+    def fits(self) -> dict[str, TwoPieceFit]:
         """The fits there are, by how tables call them."""
         both = {"fit": self.own, "published": self.published}
         return {name: pieces for name, pieces in both.items() if pieces is not None}
@@ -90,11 +87,11 @@ def study(scenario: Scenario, entry: LawEntry, notice: Callable[[int, int], None
     return Study(found, b, eased != limits, fit(table.angles, hard), PUBLISHED if _as_published(table, b) else None)
 
 
-def problem_of(scenario: Scenario, entry: LawEntry) -> Problem:
-    """What a scenario's search flies, faults left out."""
+def problem_of(scenario: Scenario, entry: LawEntry) -> SlewProblem:
+    """The slews that a scenario's search flies, faults left out."""
     table: Any = scenario.table.transient
     steps, ends = scenario.table.simulation.steps, (table.angle_end, table.rate_end)
-    return Problem(build(scenario, entry), steps, table.axis, table.start_rate, *ends, entry.gains.b)
+    return SlewProblem(build(scenario, entry), steps, table.axis, table.start_rate, *ends, entry.gains.b)
 
 
 def _limits(table: TransientTable) -> tuple[Limits, Limits]:
@@ -109,7 +106,7 @@ def _as_published(table: TransientTable, b: float) -> bool:
     return bool(along) and b == -0.01 and all(given)
 
 
-def _unreachable(scenario: Scenario, problem: Problem, angle: float, limits: Limits) -> InputError:
+def _unreachable(scenario: Scenario, problem: SlewProblem, angle: float, limits: Limits) -> InputError:
     """Which limit cannot be kept from an angle."""
     table: Any = scenario.table.transient
     why, duration = unmet(problem, angle, table.roots, limits), f"{problem.steps * problem.loop.period:g} s"
@@ -127,26 +124,8 @@ def _unreachable(scenario: Scenario, problem: Problem, angle: float, limits: Lim
     return InputError(scenario.where, f"transient.{why.what}_limit", limit, text)
 
 
-def law_lines(pieces: Pieces, b: float) -> list[str]:
+def law_lines(pieces: TwoPieceFit, b: float) -> list[str]:
     """A [[law]] table in TOML that takes its root from a fit."""
     below, above = ([float(f"{x:.{DIGITS}g}") for x in piece] for piece in (pieces.below, pieces.above))
     split = f'split = "{math.degrees(pieces.split):.{DIGITS}g} deg"'
     return ["[[law]]", 'type = "modal"', 'form = "fit"', f"below = {below}", f"above = {above}", split, f"b = {b!r}"]
-
-
-def write_table(what: Study, path: Path) -> None:
-    """The search as CSV, SI units and radians, one row an angle; with the fits at that angle."""
-    head = ["angle", "root", "time", "peak_rate", *(f"peak_acceleration_{axis}" for axis in "xyz")]
-    eased = ["eased_root", "eased_time"] if what.eased else []
-    fits = {f"{name}_root": pieces.at(what.angles) for name, pieces in what.fits().items()}
-    with atomic_write(path) as hidden, hidden.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*head, *eased, *fits])
-        for place, item in enumerate(what.found):
-            row: list[Any] = [item.angle]
-            if item.hard is not None:
-                flown = item.hard.transient
-                row += [item.hard.root, item.hard.time, flown.peak_rate, *flown.peak_acceleration]
-            if what.eased and item.eased is not None:
-                row += [item.eased.root, item.eased.time]
-            writer.writerow([*row, *(float(values[place]) for values in fits.values())])

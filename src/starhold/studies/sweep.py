@@ -14,8 +14,8 @@ from starhold.scenario.making import variants
 from starhold.scenario.reading import Scenario
 from starhold.simulation.abreast import Flying, fly_abreast
 from starhold.simulation.lane import Progress
+from starhold.studies.compare import build, metrics_of, name_samples
 from starhold.studies.frames import frame_of
-from starhold.studies.kinds import kind_of
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -31,7 +31,6 @@ def sweep(
     """A row for each law and each of the changes, see `starhold.sweep`."""
     points = _points(scenario, changes)
     names = [law] if law is not None else _named(scenario, points)
-    kind = kind_of(scenario)
     rows: list[dict[str, Any]] = []
     flown: list[Scenario] = []
     flights: list[Flying] = []
@@ -39,13 +38,13 @@ def sweep(
     for point, other in zip(points, variants(scenario, points), strict=True):
         simulation = other.table.simulation
         for name in names:
-            loop = kind.build(other, other.pick(name))
+            loop = build(other, other.pick(name))
             rows.append({**point, "law": name})
             flown.append(other)
             flights.append(Flying(loop, simulation.steps, simulation.record_every))
 
     def measured(number: int, samples: Any, carry: Any) -> dict[str, Any]:
-        return kind.metrics_of(kind.name_samples(flown[number], flights[number].loop, samples, carry))
+        return metrics_of(name_samples(flown[number], flights[number].loop, samples, carry))
 
     found = fly_abreast(flights, measured, threads, progress)
     return frame_of([row | metrics for row, metrics in zip(rows, found, strict=True)])

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from starhold.analysis.station import Circle, goal_of
+from starhold.analysis.libration_point import CircleGoal, goal_of
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law, catalogue
 from starhold.laws.l2_circle import peak_demand
@@ -86,7 +86,7 @@ def _limit(scenario: Scenario, own: PointLawTable, gains: Any, key: str) -> floa
         return said["limit"]
     ((word, share),) = said.items()
     goal = goal_of(gains)
-    if not isinstance(goal, Circle):
+    if not isinstance(goal, CircleGoal):
         raise InputError(where, f"{key}.{word}", show(share), "limit, for a law without a circle has no peak demand")
     return peak_demand(scenario.craft, goal.rate) * goal.radius * (1.0 + share if word == "margin" else 1.0 - share)
 

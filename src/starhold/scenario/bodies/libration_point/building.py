@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from starhold.algebra.scalar import is_finite
 from starhold.algebra.vector import ZERO, add, dot, norm
-from starhold.analysis.station import goal_of
+from starhold.analysis.libration_point import goal_of
 from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.libration_point import PointMeasurement, PointState

@@ -1,4 +1,4 @@
-"""Numbers that say how well a station was kept, all in SI units."""
+"""Metrics of a craft that holds a place or a circle near a libration point, all in SI units."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.vector import ZERO, Vector
-from starhold.analysis.metrics import LAST, Measure, limit_share, stays_within, too_late
-from starhold.analysis.ranking import MetricSet
+from starhold.analysis.metrics import LAST, limit_share, stays_within, too_late
+from starhold.analysis.ranking import Measure, MetricSet
 
 if TYPE_CHECKING:
     from starhold.parts.bodies.libration_point import Units
@@ -20,7 +20,7 @@ DAY, YEAR = 86_400.0, 365.25 * 86_400.0
 """Seconds."""
 
 
-class Circle(NamedTuple):
+class CircleGoal(NamedTuple):
     """A circle round the X axis through the libration point, run through at a rate; scaled."""
 
     radius: float
@@ -36,7 +36,7 @@ class Circle(NamedTuple):
         return np.hypot(np.hypot(position[:, 1], position[:, 2]) - self.radius, position[:, 0])
 
 
-class Equilibrium(NamedTuple):
+class EquilibriumGoal(NamedTuple):
     """A place of rest; scaled."""
 
     place: Vector
@@ -50,12 +50,12 @@ class Equilibrium(NamedTuple):
         return np.linalg.norm(position - np.array(self.place), axis=1)
 
 
-def goal_of(gains: Any) -> Circle | Equilibrium:
+def goal_of(gains: Any) -> CircleGoal | EquilibriumGoal:
     """Tell from its gains what a law makes for: a circle of this radius and rate, else rest at this y and z, or at the
     libration point."""
     if hasattr(gains, "radius") and hasattr(gains, "rate"):
-        return Circle(gains.radius, gains.rate)
-    return Equilibrium((0.0, getattr(gains, "y", 0.0), getattr(gains, "z", 0.0)))
+        return CircleGoal(gains.radius, gains.rate)
+    return EquilibriumGoal((0.0, getattr(gains, "y", 0.0), getattr(gains, "z", 0.0)))
 
 
 MEASURES: dict[str, Measure] = {
@@ -75,11 +75,11 @@ MEASURES: dict[str, Measure] = {
 }
 """The metrics a comparison shows; in each, less is better."""
 
-BOARD = MetricSet(MEASURES, ("deviation", "settling_time", "effort_per_year"), "days", DAY)
+METRICS = MetricSet(MEASURES, ("deviation", "settling_time", "effort_per_year"), "days", DAY)
 
 
-def measure_station(run: Recording, units: Units, goal: Circle | Equilibrium, tolerance: float) -> dict[str, Any]:
-    """Metrics of a run as `simulate_station` gives it; `tolerance` (scaled) is the distance that counts as near. Times that
+def measure(run: Recording, units: Units, goal: CircleGoal | EquilibriumGoal, tolerance: float) -> dict[str, Any]:
+    """Metrics of a run as `simulate` gives it; `tolerance` (scaled) is the distance that counts as near. Times that
     are never reached are None, as are all final values of a motion that was lost; `diverged_at` (s) is None for one that
     was not; `cut_off` names a time that is None because it lies within the last quarter of the run."""
     position, control = run["position"], run["control"]
@@ -99,7 +99,7 @@ def measure_station(run: Recording, units: Units, goal: Circle | Equilibrium, to
         "cut_off": ["settling_time"] if cut_off else [],
         "settling_time": None if settled is None else float(run["time"][settled]) * units.time,
     }
-    if isinstance(goal, Circle):
+    if isinstance(goal, CircleGoal):
         radius = np.hypot(position[:, 1], position[:, 2])
         off = np.abs(radius - goal.radius)
         found |= {

@@ -1,21 +1,25 @@
-"""What the pictures of station keeping show, whoever draws them."""
+"""The plots of a craft near a libration point: its path and its control in planes and over time."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.analysis.station import DAY, YEAR, Circle, Equilibrium, goal_of
+from starhold.analysis.libration_point import DAY, YEAR, CircleGoal, EquilibriumGoal, goal_of
 from starhold.parts.bodies.libration_point import EARTH_DIAMETER
+from starhold.report.colours import colour
+from starhold.report.phase_portrait import phase_portrait
+from starhold.report.plane_plots import Guide, Line, Plane, PlanePlot, ring
 from starhold.report.plots import Curve, Panel, Plot, near, positive, sound, thin, thin_times
-from starhold.report.station.phase import phase_portrait
-from starhold.report.station.planes import Guide, Line, Plane, PlanePlot, ring
-from starhold.scenario.reading import LawEntry, Scenario
-from starhold.studies.flight import Flight, colour
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import LawEntry, Scenario
+    from starhold.studies.flight import Flight
 
 LONG = 400.0 * DAY
 """Runs of more seconds are drawn over years."""
@@ -28,7 +32,7 @@ LEAST = 0.02
 
 
 @dataclass(frozen=True)
-class StationPlots:
+class PathPlots:
     """All pictures: the projections that the publication draws, the phase portrait of X where a law holds a place of rest,
     paths (n, 3) in length units, and the plots over time with their times."""
 
@@ -40,16 +44,16 @@ class StationPlots:
     unit: str
 
 
-def collect(flights: Sequence[Flight], points: int, scenario: Scenario) -> StationPlots:
+def collect(flights: Sequence[Flight], points: int, scenario: Scenario) -> PathPlots:
     """The pictures of a comparison, curves over time thinned to about `points` samples."""
     entries = [scenario.pick(flight.name) for flight in flights]
     units = scenario.table.libration.units
     longest = max((flight.recording["time"] for flight in flights), key=len)
     factor = 1 if len(longest) <= points else int(np.ceil(2 * len(longest) / points))
     clock, tick = ("years", YEAR) if longest[-1] * units.time > LONG else ("days", DAY)
-    rings = sorted({goal.radius for goal in map(_goal, entries) if isinstance(goal, Circle)})
+    rings = sorted({goal.radius for goal in map(_goal, entries) if isinstance(goal, CircleGoal)})
     portrait = phase_portrait(flights, entries, scenario)
-    return StationPlots(
+    return PathPlots(
         thin_times(longest, factor) * (units.time / tick),
         [_away(flights, entries, factor, scenario, clock), _control(flights, entries, factor, scenario, clock)],
         [_projections(flights, entries, scenario), *([] if portrait is None else [portrait])],
@@ -60,7 +64,7 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario) -> Stati
 
 
 def unit_text(scenario: Scenario) -> str:
-    """What lengths are counted in."""
+    """The unit of lengths, in words."""
     length = scenario.table.libration.units.length
     return "Earth diameters" if length == EARTH_DIAMETER else f"units of {length / 1e3:g} km"
 
@@ -79,10 +83,10 @@ def _away(flights: Sequence[Flight], entries: Sequence[LawEntry], factor: int, s
     x = [thin(flight.recording["position"][:, 0] * length, factor) for flight in flights]
     goals = [goal_of(entry.gains) for entry in entries]
     off: list[Curve] = []
-    circles = all(isinstance(goal, Circle) for goal in goals)
+    circles = all(isinstance(goal, CircleGoal) for goal in goals)
     for flight, goal in zip(flights, goals, strict=True):
         position = flight.recording["position"]
-        if circles and isinstance(goal, Circle):
+        if circles and isinstance(goal, CircleGoal):
             off.append(thin((np.hypot(position[:, 1], position[:, 2]) - goal.radius) * length, factor))
         else:
             off.append(thin(goal.distance(position) * length, factor))
@@ -114,7 +118,7 @@ def _control(flights: Sequence[Flight], entries: Sequence[LawEntry], factor: int
 def _projections(flights: Sequence[Flight], entries: Sequence[LawEntry], scenario: Scenario) -> PlanePlot:
     """(x, y), (y, z) and (u_y, u_z), as published, and (u_x, u_z), in which the control comes nearest to the limit; with the
     circle and the limit."""
-    radii = sorted({goal.radius for goal in map(_goal, entries) if isinstance(goal, Circle)})
+    radii = sorted({goal.radius for goal in map(_goal, entries) if isinstance(goal, CircleGoal)})
     size = max([*radii, *(max(map(abs, goal_of(entry.gains).at(0.0)[0])) for entry in entries)]) or 1.0
     kept = [flight for flight in flights if flight.lost is None]
     places = [_path(flight.recording["position"]) for flight in flights]
@@ -139,7 +143,7 @@ def _projections(flights: Sequence[Flight], entries: Sequence[LawEntry], scenari
         bounds = [_square(guide) for guide in bounds]
     strong = (1.0 + ROOM) * max([most, *(float(np.abs(guide.x).max()) for guide in bounds)])
     x = reach(0)
-    places_of = [goal.place for goal in map(_goal, entries) if isinstance(goal, Equilibrium)]
+    places_of = [goal.place for goal in map(_goal, entries) if isinstance(goal, EquilibriumGoal)]
     rests = [Guide(np.array([y]), np.array([z]), "rest", kind="points") for _, y, z in places_of]
     planes = [
         Plane("x", "y", [Line(p[:, 0], p[:, 1]) for p in places], [], (-x, x, -across, across), False),

@@ -1,13 +1,10 @@
-"""How much sail a circle about a libration point takes, over the circle's rate and the reflectivity: rows and a file."""
+"""The sail that a circle about a libration point takes, over the circle's rate and the reflectivity."""
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
-from starhold.files import atomic_write
 from starhold.parts.bodies.libration_point import nonlinear
 from starhold.synthesis.circle import Station, demand
 
@@ -45,18 +42,3 @@ def reflectivities(station: Station) -> tuple[float, ...]:
 def dearer(station: Station) -> float:
     """By which part the full three-body problem asks for more than the formula."""
     return station.peak_full(nonlinear) / station.peak() - 1.0
-
-
-def write_table(station: Station, path: Path) -> None:
-    """The table as CSV, SI units, one row a rate and reflectivity."""
-    columns = reflectivities(station)
-    with atomic_write(path) as hidden, hidden.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(
-            ["rate", "period", "peak_scaled", "peak", "pressure", "radius", "specular", "diffuse", "area_per_mass"]
-        )
-        for row in rows(station, columns):
-            for mirror, area in zip(columns, row.areas, strict=True):
-                scattered = min(station.diffuse, 1.0 - mirror)
-                fixed = (station.pressure, station.radius)
-                writer.writerow([*row[:4], *fixed, mirror, scattered, area])

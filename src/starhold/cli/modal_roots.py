@@ -27,8 +27,9 @@ def modal_roots(
     from starhold.cli.show import console
     from starhold.report.modal_roots_picture import draw
     from starhold.report.results import ROOTS, open_folder
+    from starhold.report.tables import write_modal_roots
     from starhold.scenario.reading import load
-    from starhold.studies.modal_roots import law_lines, pick_modal, study, write_table
+    from starhold.studies.modal_roots import law_lines, pick_modal, study
 
     scenario = load(file, allow_unstable).about("rigid-body")
     entry = pick_modal(scenario, law)
@@ -39,7 +40,7 @@ def modal_roots(
         found = study(
             scenario, entry, lambda done, total: bars.update(task, completed=done, total=total, description="angles")
         )
-    write_table(found, table)
+    write_modal_roots(found, table)
     draw(found, picture, f"{scenario.name}: fastest root within the limits")
     print_roots(found)
     if found.own is not None:

@@ -21,14 +21,15 @@ def failures(
     output: FailuresOutput = None,
     force: Force = False,
 ) -> None:
-    """What is left after the loss of any one or two wheels: a table, failures.csv and failures.png."""
+    """Tell what is left after the loss of any one or two wheels: a table, failures.csv and failures.png."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
     from starhold.cli.show import console
     from starhold.report.failures_picture import draw
     from starhold.report.results import FAILURES, open_folder
+    from starhold.report.tables import write_failures
     from starhold.scenario.reading import load
-    from starhold.studies.failures import require_wheels, study, write_table
+    from starhold.studies.failures import require_wheels, study
 
     scenario = load(file).about("rigid-body")
     entry = scenario.laws[0] if law is None else scenario.pick(law)
@@ -42,7 +43,7 @@ def failures(
             bars.update(task, completed=done, total=total, description=f"lost: {name}" if name else "flown")
 
         found = study(scenario, entry, notice)
-    write_table(found, entry, table)
+    write_failures(found, entry, table)
     draw(found, picture, f"{scenario.name}, {entry.name}: loss of wheels")
     print_failures(found)
     console.print(f"Table: {table}. Picture: {picture}", soft_wrap=True)
@@ -53,7 +54,7 @@ def print_failures(found: Sequence[Failure]) -> None:
     from rich.table import Table
 
     from starhold.cli.show import console
-    from starhold.studies.flight import number_text
+    from starhold.report.text import number_text
 
     flown = [failure.gains for failure in found if failure.gains is not None]
     retuned = [name for name in flown[0] if any(number_text(g[name]) != number_text(flown[0][name]) for g in flown)]
@@ -84,7 +85,7 @@ def print_failures(found: Sequence[Failure]) -> None:
 def _row(failure: Failure, retuned: Sequence[str], designed: bool) -> list[str]:
     from starhold.certification.wording import shown
     from starhold.report.failures_picture import direction_text
-    from starhold.studies.flight import number_text
+    from starhold.report.text import number_text
 
     axes = "three" if failure.controllable else f"[red]not {direction_text(failure)}[/red]"
     begun = [axes, f"{failure.condition:.3g}", f"{failure.authority:.4g}", f"{100.0 * failure.share:.1f}"]

@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.analysis.station import Equilibrium, goal_of
+from starhold.analysis.libration_point import EquilibriumGoal, goal_of
+from starhold.report.colours import colour
+from starhold.report.plane_plots import Guide, Line, Plane, PlanePlot
 from starhold.report.plots import Curve
-from starhold.report.station.planes import Guide, Line, Plane, PlanePlot
-from starhold.scenario.reading import LawEntry, Scenario
-from starhold.studies.flight import Flight, colour
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import LawEntry, Scenario
+    from starhold.studies.flight import Flight
 
 WINDOW = 1.7
 """Half the width of the picture, in distances of the saddles."""
 FAMILY = 26
 """Paths on each edge of the picture."""
 STEPS, STEP = 900, 0.01
-"""Of the paths, in units of the natural time."""
+"""Steps of the paths: how many, and how long in units of the natural time."""
 PATH = 4000
 """Samples of a flight at most."""
 
@@ -53,7 +56,7 @@ class _Axis:
         return np.stack(found, axis=-1)
 
     def separatrix(self, side: float) -> tuple[Curve, Curve]:
-        """What ends in a saddle: where the region of attraction ends."""
+        """The path that ends in a saddle: where the region of attraction ends."""
         small = 1e-6 * self.saddle
         starts = np.array([[side * self.saddle + small, side * self.saddle - small], [-small, small]])
         halves = self.path(starts, -2.0 * STEP)
@@ -64,8 +67,11 @@ class _Axis:
 def phase_portrait(flights: Sequence[Flight], entries: Sequence[LawEntry], scenario: Scenario) -> PlanePlot | None:
     """x and x' of laws that hold a place of rest, among the paths of the X axis alone; None where no law does so or no law's
     X axis has a limit of its own."""
-    limited = [entry for entry in entries if math.isfinite(entry.options.limit)]
-    resting = [entry for entry in limited if isinstance(goal_of(entry.gains), Equilibrium)]
+    resting = [
+        entry
+        for entry in entries
+        if isinstance(goal_of(entry.gains), EquilibriumGoal) and math.isfinite(entry.options.limit)
+    ]
     if not resting or scenario.table.control.limit_kind != "axis":
         return None
     first = _Axis(resting[0], scenario)

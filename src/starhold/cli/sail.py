@@ -101,16 +101,16 @@ def _read(option: str, text: str, gain: Any) -> float:
 
 def _write(station: Station, path: Path) -> None:
     from starhold.cli.show import console
-    from starhold.report.sail_table import write_table
+    from starhold.report.tables import write_sail
 
-    write_table(station, path)
+    write_sail(station, path)
     console.print(f"Table: {path}", soft_wrap=True)
 
 
 def print_sail(station: Station, point: str, mass: float, area: float | None) -> None:
     """The design in words, then the tables."""
     from starhold.cli.show import console
-    from starhold.report.sail_table import dearer
+    from starhold.studies.sail import dearer
     from starhold.synthesis.circle import demand
 
     plant, units = station.plant, station.units
@@ -153,7 +153,7 @@ def _print_rates(station: Station) -> None:
     from rich.table import Table
 
     from starhold.cli.show import console
-    from starhold.report.sail_table import reflectivities, rows
+    from starhold.studies.sail import reflectivities, rows
 
     columns = reflectivities(station)
     table = Table(show_edge=False, pad_edge=False, title="Sail over the rate and the reflectivity", title_justify="left")
@@ -169,11 +169,11 @@ def _print_rates(station: Station) -> None:
 
 
 def _print_deficits(station: Station, own: float | None) -> None:
-    """What deficits leave, of what the circle asks; `own` is that of the sail there is, negative for a margin."""
+    """Tell what deficits leave of what the circle asks; `own` is that of the sail there is, negative for a margin."""
     from rich.table import Table
 
     from starhold.cli.show import console
-    from starhold.report.sail_table import DEFICITS
+    from starhold.studies.sail import DEFICITS
 
     table = Table(show_edge=False, pad_edge=False, title="What a deficit of control leaves", title_justify="left")
     heads = ["deficit\n[dim]%[/dim]", "largest radius\n[dim]km[/dim]", "Sun seen there\n[dim]%[/dim]"]

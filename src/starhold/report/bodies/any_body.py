@@ -1,0 +1,69 @@
+"""The report of a body that has none of its own: every recorded quantity over time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple, final
+
+import numpy as np
+
+from starhold.report.body import BodyReport, PageParts
+from starhold.report.figures import POINTS, over_time, without_runs
+from starhold.report.page_parts import POINTS as PAGE_POINTS
+from starhold.report.page_parts import over_time as over_time_data
+from starhold.report.page_parts import rounded
+from starhold.report.plots import Curve, Panel, Plot, sound, thin, thin_times
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import Scenario
+    from starhold.studies.flight import Flight
+
+
+class RecordedPicture(NamedTuple):
+    """A figure for each recorded quantity."""
+
+    times: Curve
+    plots: list[Plot]
+    flights: list[Flight]
+    name: str
+
+    def makers(self) -> dict[str, Callable[[], Any]]:
+        return {plot.name: partial(over_time, plot, self.times, (), self.flights, self.name) for plot in self.plots}
+
+
+@final
+class AnyBodyReport:
+    """Plots over time, with the names, units and meanings that the body's part declares."""
+
+    def picture(self, flights: Sequence[Flight], scenario: Scenario) -> RecordedPicture:
+        return RecordedPicture(*collect(flights, POINTS), without_runs(flights), scenario.name)
+
+    def page(self, flights: Sequence[Flight], scenario: Scenario) -> PageParts:
+        times, plots = collect(flights, PAGE_POINTS)
+        return PageParts({"times": rounded(times), "plots": [over_time_data(plot, flights) for plot in plots]})
+
+
+REPORT: BodyReport = AnyBodyReport()
+
+
+def collect(flights: Sequence[Flight], points: int) -> tuple[Curve, list[Plot]]:
+    """Times, and a plot of each quantity that all flights record, a panel for each component; thinned to about `points`."""
+    longest = max((flight.recording for flight in flights), key=lambda run: len(run["time"]))
+    count = len(longest["time"])
+    factor = 1 if count <= points else int(np.ceil(2 * count / points))
+    _, coordinates = longest.variables()
+    plots: list[Plot] = []
+    for name, (unit, meaning, dimension) in longest.columns.items():
+        if not all(name in flight.recording.arrays for flight in flights):
+            continue
+        runs = [np.reshape(flight.recording[name], (len(flight.recording["time"]), -1)) for flight in flights]
+        labels = coordinates[dimension].data if dimension in coordinates else range(1, runs[0].shape[1] + 1)
+        panels = [
+            Panel(f"{label}, {unit}" if dimension else unit, [thin(run[:, column], factor) for run in runs])
+            for column, label in enumerate(labels)
+        ]
+        shown = [sound(panel, flights) for panel in panels]
+        title = f"{name.replace('_', ' ')}: {meaning}"
+        plots.append(Plot(name.replace("_", "-"), title, shown, chatters=name == "command", clock=longest.time_unit))
+    return thin_times(longest["time"], factor), plots

@@ -1,0 +1,49 @@
+"""The hooks by which reports know a body, and how they are found by the body's name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+from starhold.studies.body import body_module
+
+if TYPE_CHECKING:
+    from starhold.report.figures import Picture
+    from starhold.scenario.reading import Scenario
+    from starhold.studies.flight import Flight
+
+
+class PageParts(NamedTuple):
+    """The parts of a page that are the body's own: the data of its scripts, of which "plots" has a box each, HTML, and the
+    names of scripts among the assets."""
+
+    data: dict[str, Any]
+    views: Sequence[str] = ()
+    """Sections above the plots over time."""
+    measured: str = ""
+    """A section below the ranking."""
+    transient: float | None = None
+    """How long the transient is (s) that the page shows alone if asked, None for none."""
+    settings: str = "Settings"
+    """The heading of the settings."""
+    units: str = ""
+    """A section above the settings."""
+    scripts: Sequence[str] = ()
+    footer: str = ""
+
+
+class BodyReport(Protocol):
+    """All that pictures and pages ask of a body; `starhold.report.bodies` holds one `REPORT` a module."""
+
+    def picture(self, flights: Sequence[Flight], scenario: Scenario) -> Picture:
+        """Gather what the figures show."""
+        ...
+
+    def page(self, flights: Sequence[Flight], scenario: Scenario) -> PageParts:
+        """Make the body's parts of the page."""
+        ...
+
+
+def report_of(body: str) -> BodyReport:
+    """The report of a body of this name, or that of any body where there is none of its own."""
+    return body_module("starhold.report.bodies", body).REPORT

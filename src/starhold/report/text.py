@@ -1,0 +1,59 @@
+"""Numbers, times and gains for reading."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from starhold.studies.flight import Flight
+
+ROUNDING = 1e-13
+"""Share of a matrix's largest entry below which another is taken for what rounding left."""
+
+
+def listed(parts: Sequence[str]) -> str:
+    """Some things in a row, as a sentence has them."""
+    return " and ".join(filter(None, (", ".join(parts[:-1]), parts[-1])))
+
+
+def number_text(value: Any, digits: int = 6) -> str:
+    """A number, vector or matrix for reading; of a diagonal matrix the diagonal, of equal numbers one; a name as it is. An
+    entry that is nothing beside the largest but the rounding of a computation reads as 0."""
+    if isinstance(value, str):
+        return value
+    array = np.asarray(value, dtype=float)
+    if array.ndim:
+        array = np.where(np.abs(array) < ROUNDING * np.abs(array).max(initial=0.0), 0.0, array)
+    if array.ndim == 0:
+        return f"{array:.{digits}g}"
+    if array.ndim == 1 and len(array) == 3 and array[0] and (array == array[0]).all():
+        return f"{array[0]:.{digits}g} each"
+    if array.ndim == 2 and array.shape[0] == array.shape[1]:
+        diagonal = np.diagonal(array)
+        if np.count_nonzero(array - np.diag(diagonal)) == 0:
+            return f"diag({', '.join(f'{v:.{digits}g}' for v in diagonal)})"
+    return f"[{', '.join(_row_text(row, digits) for row in array)}]"
+
+
+def _row_text(row: Any, digits: int) -> str:
+    return f"[{', '.join(f'{v:.{digits}g}' for v in row)}]" if np.ndim(row) else f"{row:.{digits}g}"
+
+
+def value_text(value: Any, unit: str) -> str:
+    """A value with its unit."""
+    return number_text(value) if unit == "1" else f"{number_text(value)} {unit}"
+
+
+def left_text(flight: Flight, certificate: int, kind: str) -> str:
+    """How a flight leaves a claim of one of its certificates, for reading; empty where it does not."""
+    left, moment = flight.left(certificate, kind), flight.metric_set.moment
+    groups = {time: listed([one.how for one in left if one.time == time]) for time in (one.time for one in left)}
+    return "; ".join(f"{'from the start' if time == 0.0 else f'at {moment(time, 4)}'} {how}" for time, how in groups.items())
+
+
+def lost_text(flight: Flight, digits: int = 6) -> str:
+    """When the motion of a flight was lost, for reading; empty where it was not."""
+    return "" if flight.lost is None else flight.metric_set.moment(flight.lost, digits)

@@ -1,0 +1,76 @@
+"""The study of a craft near a libration point."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, final
+
+from starhold.analysis.libration_point import METRICS, CircleGoal, EquilibriumGoal, goal_of, measure
+from starhold.parts.bodies.libration_point import Units
+from starhold.parts.craft import vector
+from starhold.simulation.lane import label
+from starhold.studies.body import BodyStudy, Issued, Values
+
+if TYPE_CHECKING:
+    from starhold.analysis.departure import Departure
+    from starhold.analysis.ranking import MetricSet
+    from starhold.analysis.trial import Trial
+    from starhold.loop.closed_loop import ClosedLoop
+    from starhold.scenario.reading import LawEntry, Scenario
+    from starhold.simulation.lane import Recording
+
+
+@final
+class LibrationPointStudy:
+    """Runs are scaled, with what their units are worth among the attributes; metrics are in SI."""
+
+    def name_samples(self, scenario: Scenario, loop: ClosedLoop, samples: Any, carry: Any) -> Recording:
+        units, goal = scenario.table.libration.units, goal_of(loop.gains)
+        run = label(loop, samples, carry, scenario.table.simulation.record_every)
+        worth = {"length_unit_m": units.length, "time_unit_s": units.time, "rate_unit_rad_per_s": units.rate}
+        worth |= {"velocity_unit_m_per_s": units.velocity, "acceleration_unit_m_per_s2": units.acceleration}
+        worth |= {"settling_tolerance": scenario.table.settling.tolerance}
+        worth |= {"circle": [*goal]} if isinstance(goal, CircleGoal) else {"rest": [*goal.place]}
+        return replace(run, attrs=run.attrs | worth)
+
+    def metrics_of(self, run: Recording) -> dict[str, Any]:
+        told = run.attrs
+        units = Units(float(told["length_unit_m"]), float(told["rate_unit_rad_per_s"]))
+        goal = CircleGoal(*map(float, told["circle"])) if "circle" in told else EquilibriumGoal(vector(told["rest"]))
+        return measure(run, units, goal, float(told["settling_tolerance"]))
+
+    def metric_set(self, run: Recording) -> MetricSet:
+        return METRICS
+
+    def state_names(self, run: Recording) -> tuple[str, ...]:
+        return ("position", "velocity")
+
+    def resources(self, entry: LawEntry) -> Values:
+        return {"limit": (entry.options.limit, "1")} | ({"lag": (entry.options.lag, "1")} if entry.options.lag else {})
+
+    def call_costs(self, loop: ClosedLoop, run: Recording) -> dict[str, float]:
+        # Calls are not timed where control surfaces move within hours.
+        return {}
+
+    def certify(self, scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[Issued]:
+        from starhold.certification.station import certify_station
+
+        return [Issued(certify_station(loop, entry.name), loop)]
+
+    def departures(self, issued: Issued, loop: ClosedLoop, run: Recording) -> dict[str, tuple[Departure, ...]]:
+        from starhold.analysis.libration_point_claims import departures
+
+        return departures(issued.certificate, loop, run, float(run.attrs["time_unit_s"]))
+
+    def fly_claims(self, issued: Issued) -> Trial | None:
+        from starhold.analysis.libration_point_claims import fly_claims
+
+        return fly_claims(issued.loop, issued.certificate)
+
+    def start_inside(self, issued: Issued) -> dict[str, bool]:
+        from starhold.analysis.libration_point_claims import start_inside
+
+        return start_inside(issued.certificate, issued.loop)
+
+
+STUDY: BodyStudy = LibrationPointStudy()

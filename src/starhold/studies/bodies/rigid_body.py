@@ -1,0 +1,156 @@
+"""The study of a body that turns, with or without wheels."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, cast, final
+
+import numpy as np
+
+from starhold.analysis.rigid_body import METRICS, measure
+from starhold.analysis.transient import Limits, against_limits
+from starhold.loop.kernels import make_step
+from starhold.parts.bodies.rigid_body import kinetic_energy
+from starhold.parts.craft import tensor
+from starhold.parts.effectors.wheels import gives_what_is_asked
+from starhold.parts.quaternion_sign import SIGN_POLICIES
+from starhold.simulation.lane import fly, label
+from starhold.studies.body import BodyStudy, Issued, Values
+
+if TYPE_CHECKING:
+    from starhold.analysis.departure import Departure
+    from starhold.analysis.ranking import MetricSet
+    from starhold.analysis.trial import Trial
+    from starhold.certification.certificate import Certificate
+    from starhold.loop.closed_loop import ClosedLoop
+    from starhold.scenario.reading import LawEntry, Scenario
+    from starhold.simulation.lane import Recording
+
+TRANSIENT = ("rate_limit", "acceleration_limit", "angle_end", "rate_end")
+
+
+@final
+class RigidBodyStudy:
+    """Everything is in SI. Laws with wheels are certified anew after faults that they know of."""
+
+    def name_samples(self, scenario: Scenario, loop: ClosedLoop, samples: Any, carry: Any) -> Recording:
+        settling, transient = scenario.table.settling, scenario.table.transient
+        told = {f"settling_{name}": getattr(settling, name) for name in ("attitude_tolerance", "rate_tolerance")}
+        if transient is not None:
+            told |= {f"transient_{name}": getattr(transient, name) for name in TRANSIENT}
+        run = label(loop, samples, carry, scenario.table.simulation.record_every)
+        return replace(run, attrs=run.attrs | told | {"seed": scenario.table.simulation.seed})
+
+    def metrics_of(self, run: Recording) -> dict[str, Any]:
+        told = run.attrs
+        found = measure(run, told["settling_attitude_tolerance"], told["settling_rate_tolerance"])
+        if "transient_angle_end" not in told:
+            return found
+        rate, acceleration, angle_end, rate_end = (told[f"transient_{name}"] for name in TRANSIENT)
+        return found | against_limits(run, Limits(rate, acceleration), angle_end, rate_end, found["cut_off"])
+
+    def metric_set(self, run: Recording) -> MetricSet:
+        return METRICS
+
+    def state_names(self, run: Recording) -> tuple[str, ...]:
+        wheels = ("wheel_momentum",) if "wheel_momentum" in run.arrays else ()
+        return ("attitude", "rate", "position", "velocity", *wheels)
+
+    def resources(self, entry: LawEntry) -> Values:
+        return {}
+
+    def call_costs(self, loop: ClosedLoop, run: Recording) -> dict[str, float]:
+        from starhold.analysis.cost import call_costs, recorded_states
+
+        return call_costs(loop, recorded_states(loop, run))
+
+    def certify(self, scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[Issued]:
+        return certify_law(scenario, entry, loop)
+
+    def departures(self, issued: Issued, loop: ClosedLoop, run: Recording) -> dict[str, tuple[Departure, ...]]:
+        from starhold.analysis.departure import departures
+
+        # A certificate ends where the loop changes next.
+        last = min((event.step for event in loop.events if event.step > issued.step), default=None)
+        within = last is not None and last * loop.period <= float(run["time"][-1])
+        return departures(issued.certificate, issued.loop, run, issued.step, last if within else None)
+
+    def fly_claims(self, issued: Issued) -> Trial | None:
+        from starhold.analysis.trial import fly_claims
+
+        return fly_claims(issued.loop, issued.certificate)
+
+    def start_inside(self, issued: Issued) -> dict[str, bool]:
+        return start_inside(issued.certificate, issued.loop)
+
+
+STUDY: BodyStudy = RigidBodyStudy()
+
+
+def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[Issued]:
+    """The certificates of one law of the scenario, with the claims that its [certify] table asks for: as it starts, and from
+    each time on at which wheels, gains or craft are others and the law knows of it."""
+    from starhold.certification.certify import Wanted, certify
+
+    table = scenario.table.certify
+    wanted = Wanted(table.rate, table.slew_angle, table.inertia_tolerance, table.disturbance, table.momentum)
+    found: list[Issued] = []
+    for step, now in _known(loop, scenario.table.simulation.steps):
+        name = f"{entry.name} from {step * loop.period:g} s" if step else entry.name
+        found.append(Issued(certify(now, name, wanted), now, step))
+    return found
+
+
+def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:
+    """The loop as it starts, and at each control step of a run from which on it is another that the law knows."""
+    found = [(0, replace(loop, events=()))]
+    if loop.remembers:
+        return found
+    latest = {event.step: event for event in loop.events if event.step < steps}
+    for step, event in latest.items():
+        sound = all(gives_what_is_asked(f.params) for f in event.parts if f.part.name == "wheels")
+        if not sound or event.nominal.inertia != event.craft.inertia:
+            continue
+        now = replace(loop, events=(), craft=event.craft, gains=event.gains, parts=event.parts)
+        if step:
+            # A step more, for what the event changes at once.
+            carry = fly(loop, step)[1]
+            phase = next(phase for phase in loop.phases(steps) if phase.first == step)
+            carry = phase.entered(carry)
+            moving = zip(now.used("effector"), carry.effectors, strict=True)
+            now = replace(now, start=carry.state).with_parts(*(replace(f, start=own) for f, own in moving))
+            if loop.target.part.name == "history":
+                table = loop.target.params.table[step:]
+                now = now.with_parts(replace(loop.target, params=loop.target.params._replace(table=table)))
+        found = [(step, now)] if step == 0 else [*found, (step, now)]
+    return found
+
+
+def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
+    """Whether the loop's start lies in the sets of the proved claims that are about a level of V."""
+    if loop.remembers:
+        return {}
+    from starhold.certification.region import Shape
+
+    # The true start, whatever the sensors make of it.
+    loop = loop.without("sensor", "estimator")
+    measurement = make_step(loop.composition()).measure(loop.carry(), 0, 0, loop.craft, loop.setup())
+    shown = measurement._replace(
+        attitude=SIGN_POLICIES[loop.sign_policy](measurement.attitude, loop.carry().h, loop.hysteresis_width)[0]
+    )
+    total = tensor(loop.craft.inertia) @ measurement.body_rate + np.array(measurement.wheel_momentum)
+    function, found = loop.law.lyapunov, dict[str, bool]()
+    for claim in certificate.claims:
+        if claim.outcome != "proved":
+            continue
+        if claim.kind == "region":
+            a = cast(float, loop.law.module.single_root(loop.gains)[0])
+            found[claim.kind] = bool(Shape(**claim.witness).value(a, shown.attitude, shown.rate) <= claim.numbers["level"])
+        elif function is not None and "start" in claim.numbers:
+            level, stiffness = claim.numbers["start"], claim.witness.get("stiffness")
+            value = function(shown, loop.gains, loop.craft)
+            if stiffness is not None:
+                value = kinetic_energy(shown.rate, loop.craft) + 2.0 * stiffness * (1.0 - shown.attitude[0])
+            held = float(np.linalg.norm(total)) <= claim.numbers.get("momentum", np.inf)
+            found[claim.kind] = held and (level is None or value <= level)
+    return found

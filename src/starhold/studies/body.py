@@ -1,0 +1,83 @@
+"""The hooks by which studies know a body, and how they are found by the body's name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
+
+if TYPE_CHECKING:
+    from starhold.analysis.departure import Departure
+    from starhold.analysis.ranking import MetricSet
+    from starhold.analysis.trial import Trial
+    from starhold.certification.certificate import Certificate
+    from starhold.scenario.reading import LawEntry, Scenario
+    from starhold.simulation.lane import Recording
+
+Values: TypeAlias = dict[str, tuple[Any, str]]
+"""Values with their units ("1" for none), by name."""
+
+
+class Issued(NamedTuple):
+    """A certificate, the loop, without faults to come, that it speaks of, and the control step from which on that flies."""
+
+    certificate: Certificate
+    loop: Any
+    step: int = 0
+
+
+class BodyStudy(Protocol):
+    """All that flying, measuring and certifying ask of a body; `starhold.studies.bodies` holds one `STUDY` a module."""
+
+    def name_samples(self, scenario: Scenario, loop: Any, samples: Any, carry: Any) -> Recording:
+        """Name the samples of `fly`, with what they are measured by among the attributes."""
+        ...
+
+    def metrics_of(self, run: Recording) -> dict[str, Any]:
+        """Measure a recorded run; `diverged_at` (s) is None for a motion that was not lost."""
+        ...
+
+    def metric_set(self, run: Recording) -> MetricSet:
+        """Say how metrics of such runs are told and ranked."""
+        ...
+
+    def state_names(self, run: Recording) -> Sequence[str]:
+        """Name the recorded quantities that the integration gives."""
+        ...
+
+    def resources(self, entry: LawEntry) -> Values:
+        """List what a law has beside its gains."""
+        ...
+
+    def call_costs(self, loop: Any, run: Recording) -> dict[str, float]:
+        """Time the law's calls; empty where that is not worth telling."""
+        ...
+
+    def certify(self, scenario: Scenario, entry: LawEntry, loop: Any) -> list[Issued]:
+        """Certify one law, as it starts and after each change that it knows of."""
+        ...
+
+    def departures(self, issued: Issued, loop: Any, run: Recording) -> Mapping[str, tuple[Departure, ...]]:
+        """Tell how a run leaves the proved claims of a certificate, by their kinds."""
+        ...
+
+    def fly_claims(self, issued: Issued) -> Trial | None:
+        """Try a certificate by flights, None where it claims nothing that can be flown. Raises `BrokenClaimError`."""
+        ...
+
+    def start_inside(self, issued: Issued) -> dict[str, bool]:
+        """Tell, for each kind of proved claim about a set, whether the loop's start lies in it."""
+        ...
+
+
+def study_of(body: str) -> BodyStudy:
+    """The study of a body of this name, or that of any body where there is none of its own."""
+    return body_module("starhold.studies.bodies", body).STUDY
+
+
+def body_module(package: str, body: str) -> Any:
+    """The module of a package that is named for a body, else its `any_body`."""
+    own = f"{package}.{body.replace('-', '_')}"
+    there = body.replace("-", "").isalnum() and find_spec(own) is not None
+    return import_module(own if there else f"{package}.any_body")
