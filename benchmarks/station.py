@@ -27,7 +27,9 @@ GAINS = l2_circle.design(PLANT, l2_circle.Best(1.0, model=1))
 START = PointState((0.02, 1.05, 0.0), (0.0, 0.0, GAINS.rate), ZERO)
 STEPS, LANES = 6283, 2048
 PERIOD = 2.0 * math.pi / STEPS
-LOOP = StationLoop(PLANT, catalogue("libration-point")["l2-circle"], GAINS, START, PERIOD, model="nonlinear", limit_kind="none")
+LOOP = StationLoop(
+    PLANT, catalogue("libration-point")["l2-circle"], GAINS, START, PERIOD, model="nonlinear", limit_kind="none"
+)
 STARTS = np.repeat(np.array(flatten(START))[:, None], LANES, axis=1)
 STARTS[1] += np.linspace(-0.1, 0.1, LANES)
 

@@ -19,8 +19,8 @@ from starhold.simulation.lane import Recording
 from starhold.studies.compare import compare
 from starhold.studies.flight import Flight
 from tests.report import flown
-from tests.report.reader import Reader
 from tests.report.flown import draw
+from tests.report.reader import Reader
 
 
 @cache

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from starhold.certification.certificate import Certificate, Claim
-from starhold.certification.invariant import Problem, Wanted
+from starhold.certification.invariant import InvariantProblem, WantedSet
 from starhold.certification.invariant.descent import Candidate
-from starhold.certification.invariant.enclosure import Form
+from starhold.certification.invariant.enclosure import EnclosedPolynomial
 from starhold.certification.invariant.search import Values
 from starhold.certification.invariant.theorems import indicator
 
@@ -40,16 +40,16 @@ class Portrait:
     orbit: Any = None
     orbit_area: float | None = None
     marks: tuple[tuple[float, float], ...] = ()
-    rest: tuple[float, float] | None = None
+    equilibrium: tuple[float, float] | None = None
 
 
-def portraits(problem: Problem, certificate: Certificate) -> list[Portrait]:
+def portraits(problem: InvariantProblem, certificate: Certificate) -> list[Portrait]:
     """A portrait of each claim, in floats."""
     pairs = zip(problem.claims, certificate.claims, strict=True)
     return [_portrait(problem, wanted, claim, problem.orbit(k)) for k, (wanted, claim) in enumerate(pairs)]
 
 
-def _portrait(problem: Problem, wanted: Wanted, claim: Claim, start: tuple[float, ...] | None) -> Portrait:
+def _portrait(problem: InvariantProblem, wanted: WantedSet, claim: Claim, start: tuple[float, ...] | None) -> Portrait:
     names = problem.system.names
     if len(problem.system.variables) < 2:
         return Portrait(claim, names)
@@ -73,9 +73,9 @@ def _portrait(problem: Problem, wanted: Wanted, claim: Claim, start: tuple[float
     ]
     orbit = None if start is None or len(problem.system.variables) != 2 else _orbit(what, np.array(start))
     marked = tuple((mark[names[0]], mark[names[1]]) for mark in marks)
-    rest = None if wanted.rest is None else (float(wanted.rest[0]), float(wanted.rest[1]))
+    equilibrium = None if wanted.equilibrium is None else (float(wanted.equilibrium[0]), float(wanted.equilibrium[1]))
     area = None if orbit is None else _area(orbit)
-    return Portrait(claim, names, x, y, V, u, v, orbit, area, marked, rest)
+    return Portrait(claim, names, x, y, V, u, v, orbit, area, marked, equilibrium)
 
 
 def _least(what: Candidate, points: Any, moving: int, sign: float) -> Any:
@@ -100,7 +100,7 @@ def _rates(what: Candidate, values: Values) -> Any:
     for place, cell in enumerate(what.pieces.cells):
         here = values.cell == place
         for k, rate in enumerate(cell.rates):
-            found[k, here] = Form(rate).at(values.points[:, here])
+            found[k, here] = EnclosedPolynomial(rate).at(values.points[:, here])
     return found
 
 
@@ -108,8 +108,8 @@ def _orbit(what: Candidate, start: Any) -> Any:
     """One turn of the closed motion that the motion from a state comes to backwards in time; None if it comes to none."""
     from scipy.integrate import solve_ivp
 
-    cells = [(cell.signs, [Form(rate) for rate in cell.rates[:2]]) for cell in what.pieces.cells]
-    surfaces = [Form(s) for s in what.pieces.surfaces]
+    cells = [(cell.signs, [EnclosedPolynomial(rate) for rate in cell.rates[:2]]) for cell in what.pieces.cells]
+    surfaces = [EnclosedPolynomial(s) for s in what.pieces.surfaces]
     others = [0.5 * (low + high) for low, high in what.box[2:]]
 
     def back(time: float, state: Any) -> Any:
