@@ -13,6 +13,7 @@ from starhold.algebra.scalar import side
 from starhold.algebra.vector import ZERO
 from starhold.analysis.metrics import ALMOST, on_limit
 from starhold.certification.certificate import WHEELS
+from starhold.certification.openness import WITHOUT
 from starhold.certification.region import Shape
 from starhold.laws.interface import Measurement
 from starhold.loop.kernels import make_step
@@ -85,7 +86,7 @@ def departures(
     found: dict[str, tuple[Departure, ...]] = {}
     for claim in certificate.claims:
         if claim.outcome == "proved" and claim.kind != "sampling":
-            own = [one for assumed in claim.assumptions for one in MET[assumed](span)]
+            own = [one for assumed in claim.assumptions for one in _met(assumed, span)]
             found[claim.kind] = tuple(sorted({*common, *own, *_set(claim, span)}))
     return found
 
@@ -105,13 +106,10 @@ def _exact(span: Span) -> list[Departure]:
     loop = span.loop
     noisy, lag, slow = loop.find("gaussian"), loop.find("lag"), loop.has("rate-limit")
     slow = slow or (lag is not None and math.isfinite(lag.params.rate_limit))
-    told = ("gaussian", "lag", "rate-limit")
-    others = [f for role in ("sensor", "estimator", "actuator") for f in loop.used(role) if f.part.name not in told]
     return [
         *span.always("the sensors are noisy", noisy is not None and any(noisy.params)),
         *span.always("the actuators lag", lag is not None),
         *span.always("the torque's rate is limited", slow),
-        *(one for f in others for one in span.always(f"the {f.part.role} {f.called} is there", True)),
     ]
 
 
@@ -137,25 +135,34 @@ def _friction(span: Span) -> list[Departure]:
 
 def _random(span: Span) -> list[Departure]:
     found = span.loop.find("random-torque")
-    known = ("random-torque", "gravity-gradient")
-    others = [f for f in span.loop.used("environment") if f.part.hook("torque") and f.part.name not in known]
-    return [
-        *span.always("a random torque acts", found is not None and found.params.deviation > 0.0),
-        *(one for f in others for one in span.always(f"the torque {f.called} acts", True)),
-    ]
+    return span.always("a random torque acts", found is not None and found.params.deviation > 0.0)
+
+
+def _bounded(span: Span) -> list[Departure]:
+    """Torques that claims against disturbances take in by their bounds, and others assume not to act."""
+    entering = [f for f in span.loop.used("environment") if f.part.hook("bound") is not None]
+    return [one for f in entering for one in span.always(f"the torque {f.called} acts")]
+
+
+def _absent(assumption: str, span: Span) -> list[Departure]:
+    return span.always(f"the {assumption.removeprefix(WITHOUT)} is there")
 
 
 def _cancelled(span: Span) -> list[Departure]:
     gravity = span.loop.has("gravity-gradient") and not cancels(span.loop)
-    return [*_random(span), *span.always("the law does not cancel the gravity gradient", gravity)]
+    return [*_random(span), *_bounded(span), *span.always("the law does not cancel the gravity gradient", gravity)]
 
 
 def _alone(span: Span) -> list[Departure]:
-    return [*_random(span), *span.always("the gravity gradient acts", span.loop.has("gravity-gradient"))]
+    return [*_random(span), *_bounded(span), *span.always("the gravity gradient acts", span.loop.has("gravity-gradient"))]
 
 
 def _still(span: Span) -> list[Departure]:
     return span.always("the target turns", span.loop.target.part.name != "inertial")
+
+
+def _met(assumption: str, span: Span) -> list[Departure]:
+    return _absent(assumption, span) if assumption.startswith(WITHOUT) else MET[assumption](span)
 
 
 MET: Mapping[str, Callable[[Span], list[Departure]]] = {

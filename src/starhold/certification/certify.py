@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite, isinf
 from typing import Any
 
@@ -15,6 +15,7 @@ from starhold.certification.disturbance import disturbance
 from starhold.certification.inertia import inertia_box, told
 from starhold.certification.limits import torque_limit
 from starhold.certification.motion import Motion
+from starhold.certification.openness import bounded_torque, named
 from starhold.certification.region import region
 from starhold.certification.sampling import APART, sampling
 from starhold.certification.saturation import FREE, saturation
@@ -48,6 +49,8 @@ def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certific
     neither V nor a surface nor a single root gets one without claims, which is undecided; so does a surface with wheels, and
     a loop that counts on a lost wheel. Of a law that polynomials cannot follow the one claim is undecided, and names the
     operation and its line; so it is where numbers are too far apart in size for floats to guess with."""
+    # Torques that the loop's own parts add with a bound are disturbances that nobody models.
+    wanted = replace(wanted, disturbance=wanted.disturbance + bounded_torque(loop))
     subject = make_subject(loop, wanted.disturbance, wanted.momentum)
     everywhere = {"rate_everywhere": None, "everything": True}
     try:
@@ -59,7 +62,7 @@ def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certific
         claims = [_undecided("convergence", everywhere, subject, str(reason))]
     except (OverflowError, ZeroDivisionError, np.linalg.LinAlgError) as reason:
         claims = [_undecided("convergence", everywhere, subject, f"{APART}: {reason}")]
-    return Certificate(name or loop.law.name, described(subject), tuple(claims))
+    return Certificate(name or loop.law.name, described(subject), named(claims, loop))
 
 
 def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:

@@ -10,6 +10,7 @@ import numpy as np
 from starhold.certification.certificate import EXACT, Certificate, Claim, Obligation
 from starhold.certification.circle import attracts, control_limit
 from starhold.certification.equilibrium import returns, saturated_axis
+from starhold.certification.openness import assumed_away, named
 from starhold.certification.station_terms import UNLIMITED, assumed, lag_of, model_of
 from starhold.certification.subject import described_gains
 from starhold.loop.closed_loop import ClosedLoop
@@ -27,7 +28,7 @@ def certify_station(loop: ClosedLoop, name: str = "") -> Certificate:
             )
             kind = "circle" if loop.law.name == "l2-circle" else "equilibrium"
             claims = [Claim(kind, {}, {}, assumed(loop, UNLIMITED), (refused,))]
-    return Certificate(name or loop.law.name, described_station(loop), tuple(claims))
+    return Certificate(name or loop.law.name, described_station(loop), named(claims, loop))
 
 
 def _claims(loop: ClosedLoop) -> list[Claim]:
@@ -55,4 +56,5 @@ def described_station(loop: ClosedLoop) -> dict[str, Any]:
         "control_limit": loop.cutoff() if math.isfinite(loop.cutoff()) else None,
         "lag": lag_of(loop),
         "control_period": loop.period,
+        "assumed_away": assumed_away(loop),
     }

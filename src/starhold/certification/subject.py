@@ -12,6 +12,7 @@ from starhold.algebra.intervals import Intervals
 from starhold.algebra.polynomial import Polynomial, constants, exact
 from starhold.algebra.vector import Matrix, Vector
 from starhold.certification.matrices import Rows, greatest, inverse, least, matrix_of, number, plus, rows, times
+from starhold.certification.openness import assumed_away
 from starhold.certification.spline import spline_bounds
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law
@@ -103,6 +104,7 @@ def described(subject: Subject) -> dict[str, Any]:
         "modelled_torque_norm": above(subject.modelled_norm),
         "disturbance": number(subject.disturbance),
         "control_period": loop.period,
+        "assumed_away": assumed_away(loop),
         "wheels": None if loop.wheels is None else _described_wheels(subject, loop.wheels),
     }
 

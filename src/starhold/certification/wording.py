@@ -8,6 +8,7 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from typing import Any, cast
 
 from starhold.certification.certificate import WHEELS, Certificate, Claim, Obligation
+from starhold.certification.openness import WITHOUT
 from starhold.laws.catalogue import known_law
 
 HEADINGS = {
@@ -88,7 +89,15 @@ def sentence(claim: Claim, subject: Mapping[str, Any]) -> str:
 
 
 def _unlimited(claim: Claim, subject: Mapping[str, Any]) -> str:
-    """The limits that a claim about where motions end takes away from the loop; empty where it has none."""
+    """The parts and limits that a claim takes away from the loop; empty where it has none."""
+    absent = [text.removeprefix(WITHOUT) for text in claim.assumptions if text.startswith(WITHOUT)]
+    # What a loop has and a claim leaves out decides what the claim is worth.
+    *most, last = [f"the {name}" for name in absent] or [""]
+    away = f"without {', '.join(most)} and {last}, " if most else f"without {last}, " if last else ""
+    return away + _unbounded(claim, subject)
+
+
+def _unbounded(claim: Claim, subject: Mapping[str, Any]) -> str:
     if claim.kind == "sampling":
         return ""
     if WHEELS in claim.assumptions:

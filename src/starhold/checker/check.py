@@ -96,7 +96,7 @@ def _certificate(given: Mapping[str, Any]) -> Iterator[Finding]:
         return
     for claim in given["claims"]:
         kind = str(claim.get("kind", ""))
-        proofs, fault = _guarded(partial(_claim, subject, claim))
+        proofs, fault = _guarded(partial(_claim, subject, given["subject"]["assumed_away"], claim))
         if proofs is None:
             yield Finding(name, kind, "", "fails", fault)
             continue
@@ -131,7 +131,7 @@ def _subject(given: Any) -> LoopSubject | StationSubject:
     return (read_station if station else read_subject)(given["subject"])
 
 
-def _claim(subject: LoopSubject | StationSubject, claim: Any) -> list[tuple[str, Verdict, str]]:
+def _claim(subject: LoopSubject | StationSubject, absent: Sequence[str], claim: Any) -> list[tuple[str, Verdict, str]]:
     """Verdict and reason for each obligation of a claim."""
     shaped(claim, CLAIM, "the claim")
     kinds = STATION_CLAIMS if isinstance(subject, StationSubject) else CLAIMS
@@ -141,6 +141,8 @@ def _claim(subject: LoopSubject | StationSubject, claim: Any) -> list[tuple[str,
     outcomes = [obligation["outcome"] for obligation in claim["obligations"]]
     demand(claim["outcome"] == outcome_of(outcomes), "the outcome does not follow from the obligations")
     told, proofs = _obliges(subject, claim)
+    # What the loop has beside what claims are about is left out by name, in all of them.
+    told = [*told, *(f"without the {name}" for name in absent)]
     demand(claim["assumptions"] == told, "the assumptions are not those of such a claim")
     if claim["outcome"] != "proved":
         return _unproved(subject, claim)

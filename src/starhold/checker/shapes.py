@@ -156,6 +156,7 @@ SUBJECT: dict[str, Test] = {
     "modelled_torque_norm": _number,
     "disturbance": _number,
     "control_period": _number,
+    "assumed_away": _list(_text),
     "wheels": _or_none(_within(_WHEELS)),
 }
 STATION: dict[str, Test] = {
@@ -167,6 +168,7 @@ STATION: dict[str, Test] = {
     "control_limit": _MAYBE,
     "lag": _number,
     "control_period": _number,
+    "assumed_away": _list(_text),
 }
 """The subject where a loop keeps a craft near a libration point."""
 _CIRCLE: dict[str, Test] = dict.fromkeys(("level", "inner", "outer", "velocity"), _number)
