@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from starhold.cli import certifying, failures, invariant, modal_roots, sail
+from starhold.cli import certifying, failures, invariant, modal_roots, parts, sail
 from starhold.cli.arguments import (
     DIVERGED,
-    FAILED_CHECK,
     INTERNAL_ERROR,
     USER_ERROR,
     Certified,
@@ -164,6 +163,9 @@ app.command()(failures.failures)
 app.command("modal-roots")(modal_roots.modal_roots)
 app.command()(invariant.invariant)
 app.command()(sail.sail)
+app.command()(parts.parts)
+app.command("check-part")(parts.check_part)
+app.command("check-law", help="The old name of check-part.")(parts.check_part)
 
 
 @app.command()
@@ -172,12 +174,14 @@ def laws(name: Annotated[str | None, typer.Argument(help="show this law's card a
     from starhold.cli.show import print_law, print_laws
     from starhold.conformance.suite import find_law
     from starhold.laws.catalogue import catalogue
+    from starhold.parts.catalogue import parts as installed
     from starhold.scenario.checking import nearest
 
-    known = catalogue() | catalogue("libration-point")
+    groups = {body: catalogue(body) for body in installed("body")}
+    known = {law: found for group in groups.values() for law, found in group.items()}
     if name is None:
-        print_laws("attitude", catalogue())
-        print_laws("station keeping", catalogue("libration-point"))
+        for body, group in groups.items():
+            print_laws(body, group)
     elif name.endswith(".py"):
         print_law(find_law(name))
     elif name not in known:
@@ -260,25 +264,6 @@ def _schema_text() -> str:
     from starhold.scenario.schema import json_schema
 
     return json.dumps(json_schema(), indent=1) + "\n"
-
-
-@app.command("check-law")
-def check_law(
-    law: Annotated[str, typer.Argument(metavar="FILE", help="a Python file that holds a law, or the name of one")],
-) -> None:
-    """Run the conformance suite over a law of your own."""
-    from starhold.cli.show import console
-    from starhold.conformance.suite import examine, find_law
-
-    failed = 0
-    for verdict in examine(find_law(law)):
-        failed += verdict.outcome == "failed"
-        colour = {"passed": "green", "failed": "red", "does not apply": "dim"}[verdict.outcome]
-        console.print(f"[{colour}]{verdict.outcome:>14}[/{colour}]  {verdict.name}", highlight=False)
-        if verdict.reason:
-            console.print(f"{'':16}{verdict.reason}", highlight=False, markup=False)
-    if failed:
-        raise typer.Exit(FAILED_CHECK)
 
 
 @app.callback(invoke_without_command=True)

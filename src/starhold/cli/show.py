@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ from rich.table import Table
 
 if TYPE_CHECKING:
     from starhold.laws.catalogue import Law
+    from starhold.parts.contract import Field
     from starhold.parts.effectors.wheel_units import WheelUnit
     from starhold.scenario.designing import Design
     from starhold.scenario.reading import LawEntry
@@ -174,18 +175,24 @@ def print_law(law: Law) -> None:
     console.print(f"Claims: {card.claims} asymptotic stability, if: {'; '.join(card.assumptions)}", highlight=False)
     for source in card.sources:
         console.print(f"Source: {source}", highlight=False)
-    for form in (None, *law.forms):
-        console.print("\n[bold]Gains[/bold]" if form is None else f'\n[bold]form = "{form}"[/bold]', highlight=False)
-        table = Table(show_edge=False, pad_edge=False)
-        for head in ("key", "unit", "allowed", "default", "meaning"):
-            table.add_column(head)
-        for item in law.fields(form):
-            allowed = ", ".join(item.gain.choices) or _bounds(item.gain)
-            default = (
-                "required" if item.required else str(item.gain.choices[item.default] if item.gain.choices else item.default)
-            )
-            table.add_row(item.name, item.gain.unit, allowed, default, item.gain.text)
-        console.print(table)
+    print_fields("Gains", law.fields())
+    for form in law.forms:
+        print_fields(f'form = "{form}"', law.fields(form))
+
+
+def print_fields(title: str, fields: Iterable[Field]) -> None:
+    """Parameters with their units, bounds and defaults under a title."""
+    console.print(f"\n[bold]{title}[/bold]", highlight=False)
+    table = Table(show_edge=False, pad_edge=False)
+    for head in ("key", "unit", "allowed", "default", "meaning"):
+        table.add_column(head)
+    for item in fields:
+        allowed = ", ".join(item.gain.choices) or _bounds(item.gain)
+        default = (
+            "required" if item.required else str(item.gain.choices[item.default] if item.gain.choices else item.default)
+        )
+        table.add_row(item.name, item.gain.unit, allowed, default, item.gain.text)
+    console.print(table)
 
 
 def _bounds(gain: Any) -> str:
