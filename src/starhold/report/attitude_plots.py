@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from starhold.analysis.metrics import stays_within
 from starhold.analysis.rigid_body import DECADES, acceleration, error_angle
-from starhold.report.plots import OFF_SCALE, Curve, Panel, Plot, near, positive, sound, thin, thin_times
+from starhold.parts.bodies import rigid_body
+from starhold.parts.effectors import wheels
+from starhold.report.plots import OFF_SCALE, Curve, Panel, Plot, near, positive, recorded_plots, sound, thin, thin_times
 from starhold.scenario.bodies.rigid_body.craft import torque_limit, wheels_of
 from starhold.scenario.bodies.rigid_body.faults import fault_times
 
@@ -24,6 +26,8 @@ ACCURACIES = (("", "attitude, |q| ≤ 10⁻ᵏ"), ("rate_", "rate, |ω| ≤ 10�
 """Errors whose steps to an accuracy are counted: the prefix of the metric, and the heading."""
 NEAR = 0.02
 """Share of the largest error that counts as near the target."""
+KNOWN = (*rigid_body.Sample._fields, *wheels.Sample._fields)
+"""Recorded quantities that have plots of their own."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +42,8 @@ class AttitudePlots:
     angle: Plot
     roll_pitch_yaw: Plot
     further: tuple[Plot, ...] = ()
-    """Rate and acceleration against their limits, momenta and torques of reaction wheels, where there are any."""
+    """Rate and acceleration against their limits, momenta and torques of reaction wheels, where there are any, and what
+    other parts record."""
     marks: tuple[float, ...] = ()
     """When faults happen and are acted on (s)."""
 
@@ -65,7 +70,11 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario, end: flo
         Plot("torque", "torque applied", torques, dashed, True),
         _angle(flights, factor, scenario),
         _roll_pitch_yaw(flights, factor),
-        (*_transient(flights, factor, scenario), *_wheels(flights, factor, scenario)),
+        (
+            *_transient(flights, factor, scenario),
+            *_wheels(flights, factor, scenario),
+            *recorded_plots(flights, factor, KNOWN),
+        ),
         tuple(time for time in fault_times(scenario) if time <= end),
     )
 

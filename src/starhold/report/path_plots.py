@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from starhold.analysis.libration_point import DAY, YEAR, CircleGoal, EquilibriumGoal, goal_of
-from starhold.parts.bodies.libration_point import EARTH_DIAMETER
+from starhold.parts.bodies.libration_point import EARTH_DIAMETER, Sample
 from starhold.report.colours import colour
 from starhold.report.phase_portrait import phase_portrait
 from starhold.report.plane_plots import Guide, Line, Plane, PlanePlot, ring
-from starhold.report.plots import Curve, Panel, Plot, near, positive, sound, thin, thin_times
+from starhold.report.plots import Curve, Panel, Plot, near, positive, recorded_plots, sound, thin, thin_times
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
@@ -55,7 +55,11 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario) -> PathP
     portrait = phase_portrait(flights, entries, scenario)
     return PathPlots(
         thin_times(longest, factor) * (units.time / tick),
-        [_away(flights, entries, factor, scenario, clock), _control(flights, entries, factor, scenario, clock)],
+        [
+            _away(flights, entries, factor, scenario, clock),
+            _control(flights, entries, factor, scenario, clock),
+            *(replace(plot, clock=clock) for plot in recorded_plots(flights, factor, Sample._fields)),
+        ],
         [_projections(flights, entries, scenario), *([] if portrait is None else [portrait])],
         [_path(flight.recording["position"]) for flight in flights],
         rings,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -113,3 +113,24 @@ def sound(panel: Panel, flights: Sequence[Flight]) -> Panel:
     margin = 0.5 * (high - low) + 1e-9
     span = (low / 2.0, high * 10.0) if panel.log else (low - margin, high + margin)
     return Panel(panel.label, panel.curves, panel.log, panel.levels, span)
+
+
+def recorded_plots(flights: Sequence[Flight], factor: int, known: Container[str] = ()) -> list[Plot]:
+    """A plot of each quantity that all flights record and that is not known otherwise, with the name, unit and meaning that
+    its part declares; a panel for each component."""
+    longest = max((flight.recording for flight in flights), key=lambda run: len(run["time"]))
+    _, coordinates = longest.variables()
+    plots: list[Plot] = []
+    for name, (unit, meaning, dimension) in longest.columns.items():
+        if name in known or not all(name in flight.recording.arrays for flight in flights):
+            continue
+        runs = [np.reshape(flight.recording[name], (len(flight.recording["time"]), -1)) for flight in flights]
+        labels = coordinates[dimension].data if dimension in coordinates else range(1, runs[0].shape[1] + 1)
+        panels = [
+            Panel(f"{label}, {unit}" if dimension else unit, [thin(run[:, column], factor) for run in runs])
+            for column, label in enumerate(labels)
+        ]
+        shown = [sound(panel, flights) for panel in panels]
+        title = f"{name.replace('_', ' ')}: {meaning}"
+        plots.append(Plot(name.replace("_", "-"), title, shown, chatters=name == "command", clock=longest.time_unit))
+    return plots

@@ -13,7 +13,7 @@ from starhold.report.figures import POINTS, over_time, without_runs
 from starhold.report.page_parts import POINTS as PAGE_POINTS
 from starhold.report.page_parts import over_time as over_time_data
 from starhold.report.page_parts import rounded
-from starhold.report.plots import Curve, Panel, Plot, sound, thin, thin_times
+from starhold.report.plots import Curve, Plot, recorded_plots, thin_times
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -52,18 +52,4 @@ def collect(flights: Sequence[Flight], points: int) -> tuple[Curve, list[Plot]]:
     longest = max((flight.recording for flight in flights), key=lambda run: len(run["time"]))
     count = len(longest["time"])
     factor = 1 if count <= points else int(np.ceil(2 * count / points))
-    _, coordinates = longest.variables()
-    plots: list[Plot] = []
-    for name, (unit, meaning, dimension) in longest.columns.items():
-        if not all(name in flight.recording.arrays for flight in flights):
-            continue
-        runs = [np.reshape(flight.recording[name], (len(flight.recording["time"]), -1)) for flight in flights]
-        labels = coordinates[dimension].data if dimension in coordinates else range(1, runs[0].shape[1] + 1)
-        panels = [
-            Panel(f"{label}, {unit}" if dimension else unit, [thin(run[:, column], factor) for run in runs])
-            for column, label in enumerate(labels)
-        ]
-        shown = [sound(panel, flights) for panel in panels]
-        title = f"{name.replace('_', ' ')}: {meaning}"
-        plots.append(Plot(name.replace("_", "-"), title, shown, chatters=name == "command", clock=longest.time_unit))
-    return thin_times(longest["time"], factor), plots
+    return thin_times(longest["time"], factor), recorded_plots(flights, factor)
