@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from types import SimpleNamespace
+from types import ModuleType
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -25,9 +25,12 @@ from starhold.laws.interface import Card, Measurement, NoMemory
 from starhold.laws.pd import Gains
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.rigid_body import State
+from starhold.parts.catalogue import fit
 from starhold.parts.craft import EARTH, Craft, make_craft
 
 PERIOD = 0.1
+ORBIT = (fit("environment", "two-body"), fit("environment", "gravity-gradient"))
+NOISE = (fit("environment", "random-torque", 1e-3), fit("sensor", "gaussian", 1e-3, 1e-3))
 INERTIA = (2.0, 3.0, 4.0)
 PUBLISHED = State((0.0, *(3.0**-0.5,) * 3), (0.04, 0.03, 0.02), (7e6, 0.0, 0.0), (0.0, 7550.0, 0.0), ZERO)
 """The published start. It is half a turn from the target, where the two sets of Rodrigues parameters meet."""
@@ -105,7 +108,9 @@ def steady(seen: Measurement, gains: Vector, craft: Craft, memory: NoMemory) -> 
 
 def _as_law(name: str, torque: Callable[..., Any]) -> Law:
     card = Card(title=name, summary="", sources=(), assumptions=(), claims="none")
-    return Law(name, cast(Any, SimpleNamespace(CARD=card, torque=torque)))
+    module = ModuleType(name)
+    vars(module).update(CARD=card, torque=torque)
+    return Law(name, module)
 
 
 FEEDBACK = _as_law("feedback", feedback)
@@ -117,7 +122,7 @@ STEADY_TORQUE: Vector = (1e-4, -2e-4, 1.5e-4)
 def problem(law: Law, gains: Any, start: State = START, **options: Any) -> ClosedLoop:
     """The closed loop of a law on the problem; without further options the torque is not limited."""
     craft = make_craft(INERTIA, options.pop("torque_limit", np.inf))
-    around = {"orbit": True, "gravity_gradient": True, "limit": "none"}
+    around = {"parts": ORBIT, "limit": "none"}
     return ClosedLoop(craft, law, gains, start, PERIOD, **(around | options))
 
 

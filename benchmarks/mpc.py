@@ -35,7 +35,7 @@ import scipy.sparse as sp
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from common import INERTIA, PERIOD, PUBLISHED, header, show
+from common import INERTIA, ORBIT, PERIOD, PUBLISHED, header, show
 from starhold.algebra.structure import leaves
 from starhold.algebra.structured import Buffer, repeat
 from starhold.algebra.vector import ZERO
@@ -74,7 +74,7 @@ class Program(NamedTuple):
 
 def fly(gains: Any, craft: Craft, steps: int, start: Any = PUBLISHED) -> Any:
     """Rows of what the law sees, see ROW."""
-    loop = ClosedLoop(craft, catalogue()["mpc"], gains, start, PERIOD, orbit=True, gravity_gradient=True)
+    loop = ClosedLoop(craft, catalogue()["mpc"], gains, start, PERIOD, parts=ORBIT)
     record, _ = lane.fly(loop, steps - 1)
     q, inertial = record[:4], record[7:10]
     # Body axes from inertial ones: r - 2 q0 (q x r) + 2 q x (q x r).

@@ -95,8 +95,8 @@ def chain(body: str, chains: int) -> Callable[[], None]:
 
 def operations(loop: ClosedLoop) -> Work:
     """Operations of one control step of one lane."""
-    numbers = Numbers(loop.gains, loop.craft, loop.craft, loop.setup())
-    program = many(make_step(loop.parts()), loop.carry(), numbers, loop.substeps, None)
+    numbers = Numbers.of(loop.phases(1)[0])
+    program = many(make_step(loop.composition()), loop.carry(), numbers, loop.substeps, None)
     counts = {"first": 0, "blocks": 1, "width": 1}
     one, two = (work(program, counts | {"count": count}).work for count in (1, 2))
     return Work(*(b - a for a, b in zip(one, two, strict=True)))

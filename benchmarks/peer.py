@@ -27,18 +27,17 @@ def worker() -> None:
     """Answer the name of a task with what it took, in seconds, and where it ended."""
     import numpy as np
 
-    from common import PUBLISHED, problem
+    from common import NOISE, PUBLISHED, problem
     from starhold.algebra.structure import flatten
     from starhold.laws.catalogue import catalogue
-    from starhold.parts.sensors.gaussian import Noise
     from starhold.simulation.lane import fly
     from starhold.simulation.lanes import simulate_many
 
     def loop_of(name: str) -> Any:
         law, _, extra = name.partition("+")
         gains = catalogue()[law].examples()[0]
-        noise = Noise(1e-3, 1e-3, 1e-3) if extra == "noise" else Noise(0.0, 0.0, 0.0)
-        return problem(catalogue()[law], gains, PUBLISHED, torque_limit=0.01, limit="axis", noise=noise)
+        loop = problem(catalogue()[law], gains, PUBLISHED, torque_limit=0.01, limit="axis")
+        return loop.with_parts(*NOISE) if extra == "noise" else loop
 
     for line in sys.stdin:
         kind, law = line.split()

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from starhold.loop.station import StationLoop
 
 from common import header, interleaved, show
 from starhold.algebra.structure import flatten
@@ -17,7 +16,9 @@ from starhold.laws import l2_circle
 from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import NoMemory
 from starhold.laws.point import PointMeasurement
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.libration_point import PRIMARIES, PointState, make_libration, nonlinear
+from starhold.parts.catalogue import fit
 from starhold.simulation.lane import fly
 from starhold.simulation.lanes import simulate_many
 
@@ -27,9 +28,8 @@ GAINS = l2_circle.design(PLANT, l2_circle.Best(1.0, model=1))
 START = PointState((0.02, 1.05, 0.0), (0.0, 0.0, GAINS.rate), ZERO)
 STEPS, LANES = 6283, 2048
 PERIOD = 2.0 * math.pi / STEPS
-LOOP = StationLoop(
-    PLANT, catalogue("libration-point")["l2-circle"], GAINS, START, PERIOD, model="nonlinear", limit_kind="none"
-)
+LAW = catalogue("libration-point")["l2-circle"]
+LOOP = ClosedLoop(PLANT, LAW, GAINS, START, PERIOD, parts=(fit("environment", "three-body-gravity"),), limit="none")
 STARTS = np.repeat(np.array(flatten(START))[:, None], LANES, axis=1)
 STARTS[1] += np.linspace(-0.1, 0.1, LANES)
 

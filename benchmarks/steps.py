@@ -34,7 +34,6 @@ from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.rigid_body import State
 from starhold.parts.craft import make_craft
-from starhold.parts.sensors.gaussian import Noise
 from starhold.simulation.lane import fly
 from starhold.simulation.lanes import simulate_many
 
@@ -178,13 +177,12 @@ def _verdict(ratio: float, goal: int) -> str:
 
 def variants(loop: ClosedLoop) -> dict[str, ClosedLoop]:
     """A loop plain and with what costs more."""
-    noise = Noise(1e-3, 1e-3, 1e-3)
     return {
         "plain": loop,
         "hysteresis": replace(loop, sign_policy="hysteresis"),
         "full inertia": replace(loop, craft=FULL),
-        "noise": replace(loop, noise=noise),
-        "all three": replace(loop, craft=FULL, sign_policy="hysteresis", noise=noise),
+        "noise": loop.with_parts(*common.NOISE),
+        "all three": replace(loop, craft=FULL, sign_policy="hysteresis").with_parts(*common.NOISE),
     }
 
 

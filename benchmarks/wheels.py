@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,8 +11,9 @@ import common
 import steps
 from common import header, interleaved, show
 from starhold.laws.catalogue import catalogue
-from starhold.parts.effectors.wheeled_body import WheeledState
-from starhold.parts.effectors.wheels import make_wheels, pyramid, three_orthogonal
+from starhold.parts.catalogue import find
+from starhold.parts.effectors.wheels import ALLOCATIONS, make_wheels, pyramid, three_orthogonal
+from starhold.parts.part import Fitted
 
 GOAL = 2.5
 """A loop with four wheels costs at most this many times the loop without."""
@@ -24,7 +24,7 @@ class WheelBatch(steps.Batch):
 
     def __init__(self, loop: Any, threads: int) -> None:
         self.loop, self.threads = loop, threads
-        plain = steps.starts(replace(loop, start=common.PUBLISHED, wheels=None))
+        plain = steps.starts(loop)
         self.states = np.vstack([plain, np.zeros((len(loop.wheels.axes), plain.shape[1]))])
 
 
@@ -40,8 +40,8 @@ def main() -> None:
         ("4 wheels, least peak", pyramid(), "least-peak"),
     ):
         wheels = make_wheels(axes, 1e-4, 0.02, 0.4, 1e-7, 1e-5)
-        start = WheeledState(*common.PUBLISHED, (0.0,) * len(axes))
-        batches[name] = WheelBatch(replace(plain, wheels=wheels, start=start, allocation=allocation), 1)
+        wheels = wheels._replace(allocation=ALLOCATIONS.index(allocation))
+        batches[name] = WheelBatch(plain.with_parts(Fitted(find("effector", "wheels"), wheels)), 1)
     tasks: dict[str, Callable[[], Any]] = {}
     for name, batch in batches.items():
         tasks |= batch.tasks(name)
