@@ -145,7 +145,7 @@ def _bounded(span: Span) -> list[Departure]:
 
 
 def _absent(assumption: str, span: Span) -> list[Departure]:
-    return span.always(f"the {assumption.removeprefix(WITHOUT)} is there")
+    return span.always(f"the loop has the {assumption.removeprefix(WITHOUT)}")
 
 
 def _cancelled(span: Span) -> list[Departure]:

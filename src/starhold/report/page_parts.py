@@ -18,6 +18,7 @@ from starhold.report.text import lost_text, number_text, value_text
 from starhold.studies.flight import Flight
 
 if TYPE_CHECKING:
+    from starhold.parts.part import Fitted
     from starhold.scenario.reading import Scenario
 
 POINTS = 1500
@@ -190,7 +191,7 @@ def _gains(flight: Flight) -> str:
 
 
 def settings(scenario: Scenario, title: str) -> str:
-    """All tables of a scenario."""
+    """All tables of a scenario, those of its parts included."""
     from pydantic import BaseModel
 
     parts: list[str] = []
@@ -198,6 +199,7 @@ def settings(scenario: Scenario, title: str) -> str:
         table = getattr(scenario.table, name)
         if isinstance(table, BaseModel):
             parts.append(_table(name, table))
+    parts += [_part(fitted) for fitted in scenario.parts]
     return f'<h2>{title}</h2>\n<div class="columns">{"".join(parts)}</div>'
 
 
@@ -211,6 +213,17 @@ def _table(name: str, table: Any) -> str:
             meaning = str(properties.get(key, {}).get("description", "")).replace("^2", "²").replace("^3", "³")
             rows.append(f"<tr><td>{escape(key)}</td><td>{escape(_value(value))}</td><td>{escape(meaning)}</td></tr>")
     title = name.replace("_", " ")
+    return f'<section><h3>{escape(title)}</h3><table class="text"><tbody>{"".join(rows)}</tbody></table></section>'
+
+
+def _part(fitted: Fitted) -> str:
+    """The parameters of a part, with their units and meanings."""
+    rows: list[str] = []
+    for item, value in zip(fitted.part.fields(), fitted.params, strict=True):
+        told = item.gain.choices[value] if item.gain.choices else _value(value)
+        unit = "" if item.gain.unit == "1" or item.gain.choices else f" {item.gain.unit}"
+        rows.append(f"<tr><td>{escape(item.name)}</td><td>{escape(told + unit)}</td><td>{escape(item.gain.text)}</td></tr>")
+    title = f"{fitted.part.role} {fitted.called}"
     return f'<section><h3>{escape(title)}</h3><table class="text"><tbody>{"".join(rows)}</tbody></table></section>'
 
 
