@@ -83,9 +83,9 @@ def make_equations(parts: Composition) -> Step:
             one.part.module.torque(found, setup.environments[one.place], craft, memories.environments[one.place])
             for one in telling
         )
-        momentum = total(
-            e.module.momentum(s, p) for e, s, p in zip(parts.effectors, carry.effectors, setup.effectors, strict=True)
-        )
+        # Those that take the command know their speeds; others have no sensor.
+        turning = zip(parts.effectors, carry.effectors, setup.effectors, strict=True)
+        momentum = total(e.module.momentum(own, params) for e, own, params in turning if e.flag("ACTS"))
         scene = Scene(
             goal,
             still,

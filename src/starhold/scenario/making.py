@@ -31,13 +31,13 @@ def make_scenario(tables: Mapping[str, Any], folder: str | Path = ".", allow_uns
 
 def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
     """The scenario with other values at these keys, which are told as errors tell them, "spacecraft.inertia" or
-    "law[2].k_rate", and of laws by their names too, "law.pd.k_rate"; None takes a key, a table or a law away."""
+    "law[2].k_rate", and of laws and parts by their names too, "law.pd.k_rate"; None takes a key, a table or a law away."""
     return next(variants(scenario, [changes]))
 
 
 def variants(scenario: Scenario, changes: Iterable[Mapping[str, Any]]) -> Iterator[Scenario]:
     """The scenario changed in one way after the other; errors tell which."""
-    names = [entry.name for entry in scenario.laws]
+    names = {"law": [entry.name for entry in scenario.laws], "part": [fitted.called for fitted in scenario.parts]}
     tables = read_toml(scenario.text, scenario.where)
     for change in changes:
         # As short as one line allows: of many changes the first.
@@ -54,19 +54,19 @@ def variants(scenario: Scenario, changes: Iterable[Mapping[str, Any]]) -> Iterat
             raise InputError(where, error.key, error.found, error.allowed) from None
 
 
-def _path(key: Any, names: Sequence[str], where: str) -> list[str | int]:
+def _path(key: Any, names: Mapping[str, Sequence[str]], where: str) -> list[str | int]:
     """Names of tables and keys, and places in lists from 0."""
     if not isinstance(key, str):
         raise InputError(where, show(key), "a key that is no string", 'keys such as "spacecraft.inertia"')
-    if key.startswith("law."):
-        rest = key.removeprefix("law.")
+    array, dot, rest = key.partition(".")
+    if dot and array in names:
         # The longest first: names may hold dots.
-        for name in sorted(names, key=len, reverse=True):
+        for name in sorted(names[array], key=len, reverse=True):
             if rest == name or rest.startswith(f"{name}."):
                 after = rest[len(name) + 1 :]
-                return ["law", names.index(name), *(_path(after, (), where) if after else [])]
+                return [array, names[array].index(name), *(_path(after, {}, where) if after else [])]
         given = rest.partition(".")[0]
-        raise InputError(where, key, show(given), nearest(given, list(names)))
+        raise InputError(where, key, show(given), nearest(given, list(names[array])))
     path: list[str | int] = []
     for part in key.split("."):
         match = _PART.fullmatch(part)

@@ -93,8 +93,8 @@ class Scenario:
 
     def with_(self, changes: Mapping[str, Any]) -> Scenario:
         """The scenario with other values at some keys: {"spacecraft.inertia": [2, 3, 4], "law.pd.k_rate": "0.1 N m s"}; the
-        key of a law's table is its name, or "law[1]" by its place; None takes away what is there. InputError as of a
-        file."""
+        key of a law's or a part's table is its name, or "law[1]" by its place; None takes away what is there. InputError as
+        of a file."""
         # Loaded here, for it reads scenarios.
         from starhold.scenario.making import changed
 
