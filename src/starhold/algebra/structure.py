@@ -56,6 +56,13 @@ def places(state: Any) -> Any:
     return mapped(state, lambda leaf: leaf if isinstance(leaf, Buffer) else next(count))
 
 
+def rows(state: Any) -> Any:
+    """Return the state with a slice in the place of each of its fields: where that field stands in a table of `flatten`ed
+    states, which has a row for each number."""
+    ends = [len(flatten(tuple(state[: k + 1]))) for k in range(len(state))]
+    return rebuild(state, [slice(first, last) for first, last in zip([0, *ends], ends, strict=False)])
+
+
 def buffers(state: Any) -> list[Buffer]:
     """Return the buffers of a state in order."""
     return [leaf for leaf in leaves(state) if isinstance(leaf, Buffer)]

@@ -17,6 +17,7 @@ from starhold.analysis.trial import SLACK as RISE
 from starhold.certification.station_terms import lag_of
 from starhold.laws import l2_circle
 from starhold.laws.point import PointMeasurement
+from starhold.parts.bodies.libration_point import ROWS
 from starhold.simulation.lanes import simulate_many
 
 if TYPE_CHECKING:
@@ -107,10 +108,10 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
         states, after = batch.states, _value(loop.gains, batch.states)
         wrong = (after > before * (1.0 + RISE) + floor) | (batch.lost_at >= 0.0)
         if wrong.any():
-            shown = ", ".join(f"{x:.9g}" for x in states[:6, int(np.argmax(wrong))])
+            shown = ", ".join(f"{x:.9g}" for x in states[: ROWS.velocity.stop, int(np.argmax(wrong))])
             raise BrokenClaimError(f"{certificate.name}, {claim.kind}: V rises on a flight, which is then at ({shown})")
         highest, before = max(highest, float((after / np.maximum(before, floor)).max())), after
-        need = max(need, float(_size(states[6:9], loop.limit).max()))
+        need = max(need, float(_size(states[ROWS.control], loop.limit).max()))
     if claim.kind == "circle":
         return Trial(flights, level, highest, None)
     if need > loop.cutoff() * (1.0 + 1e-12):
@@ -124,10 +125,11 @@ def draw(gains: Any, level: float, count: int, random: np.random.Generator) -> N
     s, turn, angle = random.uniform(-1.0, 1.0, count), *random.uniform(0.0, 2.0 * np.pi, (2, count))
     r = np.sqrt(np.maximum(gains.radius**2 + s * np.sqrt(2.0 * v / gains.alpha), 0.0))
     error = np.sqrt(2.0 * v * (1.0 - s * s))
-    states = np.zeros((9, count))
-    states[1], states[2] = r * np.cos(turn), r * np.sin(turn)
-    states[4] = error * np.cos(angle) - gains.rate * states[2]
-    states[5] = error * np.sin(angle) + gains.rate * states[1]
+    states = np.zeros((ROWS.control.stop, count))
+    position, velocity = states[ROWS.position], states[ROWS.velocity]
+    position[1], position[2] = r * np.cos(turn), r * np.sin(turn)
+    velocity[1] = error * np.cos(angle) - gains.rate * position[2]
+    velocity[2] = error * np.sin(angle) + gains.rate * position[1]
     return states
 
 
@@ -142,7 +144,7 @@ def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
 
 
 def _value(gains: Any, states: NDArray[np.float64]) -> NDArray[np.float64]:
-    return circle_value(gains, states[:3], states[3:6])
+    return circle_value(gains, states[ROWS.position], states[ROWS.velocity])
 
 
 def _size(control: NDArray[np.float64], kind: str) -> NDArray[np.float64]:

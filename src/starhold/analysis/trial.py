@@ -23,6 +23,7 @@ from starhold.certification.sliding import take_surface
 from starhold.certification.subject import make_subject
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.bodies.rigid_body import ROWS
 from starhold.parts.craft import tensor
 from starhold.parts.effectors.wheels import Wheels
 from starhold.simulation.lanes import Batch, simulate_many
@@ -96,7 +97,7 @@ def _fly_region(loop: ClosedLoop, certificate: Certificate, claim: Claim, flight
     sign: Callable[[Array], Any] = lambda q0: np.where(q0 < 0.0, -1.0, 1.0) if free.sign_policy == "shortest" else 1.0  # noqa: E731
 
     def value(states: Array) -> Array:
-        return shape.value(a, states[:4] * sign(states[0]), states[4:7])
+        return shape.value(a, states[ROWS.attitude] * sign(states[0]), states[ROWS.rate])
 
     states = shape.draw(a, level, flights, np.random.default_rng(seed))
     free, states = _paced(free, certificate, states, np.random.default_rng(seed + 1))
@@ -144,17 +145,19 @@ def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, fl
     level = min(level, math.inf if claim.numbers["start"] is None else claim.numbers["start"])
     states = draw(flights, J, Spring(1), 2.0 + level, np.random.default_rng(seed))
     if not claim.numbers["everything"]:
-        states[:4] *= np.where(states[0] < 0.0, -1.0, 1.0)
+        states[ROWS.attitude] *= np.where(states[0] < 0.0, -1.0, 1.0)
     surface = loop.law.module.surface
 
     def s_of(states: Array) -> Array:
-        w: Any = tuple(states[4:7])
-        return np.array(surface(Measurement(tuple(states[:4]), w, w, ZERO, ZERO, ZERO, ZERO, free.period), loop.gains))  # type: ignore
+        w: Any = tuple(states[ROWS.rate])
+        return np.array(
+            surface(Measurement(tuple(states[ROWS.attitude]), w, w, ZERO, ZERO, ZERO, ZERO, free.period), loop.gains)
+        )  # type: ignore
 
     # Drawn as rates, s is taken as what was drawn: w = s - Kq.
-    wanted = np.sqrt(level / (2.0 + level)) * states[4:7]
-    states[4:7] = 0.0
-    states[4:7] = wanted - s_of(states)
+    wanted = np.sqrt(level / (2.0 + level)) * states[ROWS.rate]
+    states[ROWS.rate] = 0.0
+    states[ROWS.rate] = wanted - s_of(states)
     s, highest, before = wanted, 0.0, np.einsum("ik,ij,jk->k", wanted, J, wanted) / 2.0
     # Held torque lets s.Js/2 rise where reach.|s| is at most half a period times reach.J^-1 reach, and by a step from there.
     size = float(np.linalg.norm(reach))
@@ -197,10 +200,10 @@ def draw(count: int, P: Array, potential: Potential, level: float, random: np.ra
     directions = random.normal(size=(count, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     rates = np.sqrt(2.0 * left)[:, None] * (directions @ turned.T)
-    states = np.zeros((16, count))
+    states = np.zeros((ROWS.torque.stop, count))
     states[0], states[1:4] = q0, (potential.length(t, axes)[:, None] * axes).T
-    states[:4] /= np.linalg.norm(states[:4], axis=0)
-    states[4:7] = rates.T
+    states[ROWS.attitude] /= np.linalg.norm(states[ROWS.attitude], axis=0)
+    states[ROWS.rate] = rates.T
     return states
 
 
@@ -236,7 +239,7 @@ def _paced(
     loop: ClosedLoop, certificate: Certificate, states: Array, random: np.random.Generator
 ) -> tuple[ClosedLoop, Array]:
     """Return the loop with a period in which no flight turns far, and the states with the momenta of their rotors."""
-    fastest = float(np.linalg.norm(states[4:7], axis=0).max())
+    fastest = float(np.linalg.norm(states[ROWS.rate], axis=0).max())
     if loop.wheels is not None:
         states = np.vstack([states, _rotors(loop, certificate, states, random)])
         # The body's momentum is in both.
@@ -268,7 +271,7 @@ def _rotors(loop: ClosedLoop, certificate: Certificate, states: Array, random: n
     total = random.normal(size=(3, states.shape[1]))
     total *= told["total_momentum"] * random.uniform(size=states.shape[1]) ** (1.0 / 3.0) / np.linalg.norm(total, axis=0)
     kept = begun + shares @ (begun @ axes)
-    return kept[:, None] - shares @ (total - tensor(loop.craft.inertia) @ states[4:7])
+    return kept[:, None] - shares @ (total - tensor(loop.craft.inertia) @ states[ROWS.rate])
 
 
 def _value(loop: ClosedLoop, frame: Frame, epsilon: float) -> Callable[[Array], Array]:
@@ -276,7 +279,10 @@ def _value(loop: ClosedLoop, frame: Frame, epsilon: float) -> Callable[[Array], 
     P, J, potential = floats(frame.P), tensor(loop.craft.inertia), frame.potential
 
     def value(states: Array) -> Array:
-        q, w = states[:4] * (np.where(states[0] < 0.0, -1.0, 1.0) if loop.sign_policy == "shortest" else 1.0), states[4:7]
+        q, w = (
+            states[ROWS.attitude] * (np.where(states[0] < 0.0, -1.0, 1.0) if loop.sign_policy == "shortest" else 1.0),
+            states[ROWS.rate],
+        )
         return np.einsum("ik,ij,jk->k", w, P, w) / 2.0 + potential.of(q) + epsilon * np.einsum("ik,ij,jk->k", q[1:], J, w)
 
     return value
@@ -284,10 +290,13 @@ def _value(loop: ClosedLoop, frame: Frame, epsilon: float) -> Callable[[Array], 
 
 def _need(states: Array, loop: ClosedLoop, claim: Claim) -> float:
     """Return the largest torque, or of wheels torque and momentum, as a share of what is claimed."""
-    torque = states[13:16]
+    torque = states[ROWS.torque]
     if claim.kind == "wheels":
         wheels = cast(Wheels, loop.wheels)
-        needs = (np.array(wheels.least) @ torque, claim.numbers["motors"]), (states[16:], claim.numbers["wheel_momentum"])
+        needs = (
+            (np.array(wheels.least) @ torque, claim.numbers["motors"]),
+            (states[ROWS.torque.stop :], claim.numbers["wheel_momentum"]),
+        )
         # What a lost wheel is claimed to need is zero, and it needs that.
         return max(float((np.abs(found).max(axis=1) / np.maximum(limits, 1e-300)).max()) for found, limits in needs)
     size = np.linalg.norm(torque, axis=0) if loop.limit == "norm" else np.abs(torque)
@@ -295,5 +304,5 @@ def _need(states: Array, loop: ClosedLoop, claim: Claim) -> float:
 
 
 def _where(certificate: Certificate, claim: Claim, states: Array, lane: int, what: str) -> str:
-    shown = ", ".join(f"{x:.9g}" for x in states[:7, lane])
+    shown = ", ".join(f"{x:.9g}" for x in states[: ROWS.rate.stop, lane])
     return f"{certificate.name}, {claim.kind}: the flight at (q, w) = ({shown}) {what}"

@@ -34,6 +34,7 @@ from starhold.certification.convergence import Obligations, assumed
 from starhold.certification.matrices import number, root_float
 from starhold.certification.motion import Motion
 from starhold.certification.subject import Subject, above, below, direction, enclosed
+from starhold.parts.bodies.rigid_body import ROWS
 
 MOST = 300_000
 """Boxes that one proof may take: a fraction of a second."""
@@ -75,9 +76,9 @@ class Shape(NamedTuple):
         while ((room := self.room(level / (a * a), u)) < 0.0).any():
             u = np.where(room < 0.0, 0.9 * u, u)
         inside = np.where(np.arange(count) % 2 == 0, 1.0 - 1e-9, random.uniform(size=count) ** (1.0 / 3.0))
-        states = np.zeros((16, count))
+        states = np.zeros((ROWS.torque.stop, count))
         states[0], states[1:4] = 1.0 - u, np.sqrt(u * (2.0 - u)) * axes
-        states[4:7] = a * ((self.g + self.m * u) * states[1:4] + inside * np.sqrt(room) * directions)
+        states[ROWS.rate] = a * ((self.g + self.m * u) * states[1:4] + inside * np.sqrt(room) * directions)
         return states
 
 

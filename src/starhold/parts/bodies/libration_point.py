@@ -15,6 +15,7 @@ from typing import Annotated, Any, NamedTuple
 from starhold.algebra.halving import rising
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.scalar import Scalar, Truth, both, is_finite, less, sqrt
+from starhold.algebra.structure import rows
 from starhold.algebra.vector import ZERO, Vector, add, dot
 from starhold.parts.contract import Card
 from starhold.parts.roles import Loads, Scene
@@ -76,6 +77,8 @@ class Sample(NamedTuple):
 
 
 State, Measurement = PointState, PointMeasurement
+ROWS: Any = rows(PointState(ZERO, ZERO, ZERO))
+"""Where each field stands in a table of states."""
 
 
 def linear(position: Vector, velocity: Vector, plant: Libration) -> Vector:

@@ -7,6 +7,7 @@ from typing import Annotated, Any, NamedTuple
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import Quaternion, derivative, relative, renormalise, to_body, to_reference
 from starhold.algebra.scalar import Scalar, Truth, both, is_finite, less, side
+from starhold.algebra.structure import rows
 from starhold.algebra.vector import ZERO, Vector, add, apply, cross, dot, gyroscopic_torque, scale, subtract
 from starhold.parts.contract import Card
 from starhold.parts.craft import Craft
@@ -33,6 +34,10 @@ class State(NamedTuple):
     position: Vector
     velocity: Vector
     torque: Vector
+
+
+ROWS: Any = rows(State((1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO, ZERO))
+"""Where each field stands in a table of states."""
 
 
 class Measurement(NamedTuple):
