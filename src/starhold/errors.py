@@ -17,5 +17,5 @@ class InputError(Exception):
 
 
 def _one_line(text: str) -> str:
-    """What does not print, such as a line break in a key, as its escape."""
+    """A character that does not print, such as a line break in a key, as its escape."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

@@ -28,7 +28,7 @@ def random_quaternions(count: int, seed: int = 7) -> list[Quaternion]:
 
 
 def random_measurements(count: int, external: bool = True, seed: int = 11) -> Iterator[Measurement]:
-    """What a law sees at random states of a body at a target at rest, with or without a modelled torque."""
+    """Measurements that a law is shown at random states of a body at a target at rest, with or without a modelled torque."""
     random = np.random.default_rng(seed)
     for attitude in random_quaternions(count, seed + 1):
         rate: Vector = unflatten(random.normal(scale=0.05, size=3), ZERO)

@@ -1,4 +1,4 @@
-"""What a check of a law finds, and what the checks of laws of all kinds share."""
+"""A check's verdict, and the helpers that the checks of parts of all roles share."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class NotApplicableError(Exception):
 
 
 class Verdict(NamedTuple):
-    """What a check found."""
+    """A check's name, its outcome and its reason."""
 
     name: str
     outcome: Literal["passed", "failed", "does not apply"]

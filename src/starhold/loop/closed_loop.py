@@ -58,8 +58,8 @@ class Composition(NamedTuple):
 
 
 class Memories(NamedTuple):
-    """What parts keep from control step to control step, in the order in which a loop has them; `followed` is the target's
-    attitude at the last one, where it is continued from that."""
+    """The memories of parts from control step to control step, in the order in which a loop has them; `followed` is the
+    target's attitude at the last one, where it is continued from that."""
 
     followed: Any
     environments: tuple[Any, ...]
@@ -70,7 +70,7 @@ class Memories(NamedTuple):
 
 
 class Carry(NamedTuple):
-    """What a trajectory carries from step to step: the states of the body, of the effectors, and of actuators that another
+    """A trajectory carries this from step to step: the states of the body, of the effectors, and of actuators that another
     one follows; the law's memory, those of other parts, the sign h = +-1 of the quaternion policy, the command, and the
     control step at which the motion was lost (-1: not lost)."""
 
@@ -121,7 +121,7 @@ class Phase(NamedTuple):
         return apply(self.craft.inverse_inertia, apply(self.before.inertia, rate))
 
     def entered(self, carry: Carry) -> Carry:
-        """What is carried into the phase."""
+        """A carry as the phase begins with it."""
         return carry._replace(state=carry.state._replace(rate=self.rate_from(carry.state.rate))) if self.jumps else carry
 
 
@@ -196,7 +196,7 @@ class ClosedLoop:
 
     @property
     def target(self) -> Fitted:
-        """What the body is to reach; the inertial axes where nothing else is said."""
+        """The attitude that the body is to reach; the inertial axes where nothing else is said."""
         return next(iter(self.used("target")), ON_TARGET)
 
     def cutoff(self) -> float:
@@ -272,7 +272,7 @@ class ClosedLoop:
         return found
 
     def carry(self, start: Any = None, gains: Any = None, nominal: Any = None) -> Carry:
-        """What a trajectory starts with; from another state of the body, with other gains or another nominal model."""
+        """The carry at the start of a trajectory: of the loop, or with another state of the body, gains or nominal model."""
         start, setup = self.start if start is None else start, self.setup()
         memory = self.law.remember(gains or self.gains, nominal or self.craft, self.period)
         goal = self._goal(start, setup) if self.aims else None

@@ -42,8 +42,8 @@ class Numbers(NamedTuple):
 
 
 class Observer(NamedTuple):
-    """What is noted of a flight along the way: note(noted, before, carry, step, numbers) -> noted, after each control step,
-    `before` and `carry` at its start and its end; `first` gives its shape, `numbers` are arguments of the kernel."""
+    """Notes are taken of a flight along the way: note(noted, before, carry, step, numbers) -> noted, after each control
+    step, `before` and `carry` at its start and its end; `first` gives its shape, `numbers` are arguments of the kernel."""
 
     note: Callable[..., Any]
     first: Any
@@ -68,7 +68,7 @@ def form(value: Any) -> Any:
 
 
 def fly_plainly(loop: ClosedLoop, steps: int, run: int = 0) -> Any:
-    """What a loop without events carries after so many control steps in plain Python."""
+    """The carry of a loop without events after so many control steps in plain Python."""
     step, carry, setup, key = make_step(loop.composition()), loop.carry(), loop.setup(), (loop.seed, run)
     for k in range(steps):
         carry = step.update(step.check(carry, k, setup), k, key, loop.gains, loop.craft, setup)
@@ -88,7 +88,7 @@ class Arguments:
         self.tables = np.array([x for table in buffers(values) for x in table.cells])
 
     def bound(self, recorder: Recorder, base: Any) -> Any:
-        """The same values while recording; `base` is where a lane's own numbers begin."""
+        """The values while recording; `base` is where a lane's own numbers begin."""
         shared, own, tables = (recorder.memory(name, lanes=name == "own") for name in ("shared", "own", "tables"))
         places = {name: iter(range(1 << 40)) for name in ("shared", "own")}
         offset = 0

@@ -62,7 +62,7 @@ def make_equations(parts: Composition) -> Step:
         return None if target is None else target.module.goal(setup.target, state, step, carry.memories.followed)
 
     def observed(carry, step, key, craft, setup):
-        """What the law is told, and what sensors and estimator keep of it."""
+        """The measurement that the law is told, and what sensors and estimator keep of it."""
         state, memories = carry.state, carry.memories
         goal = goal_of(carry, state, step, setup)
         readings, kept = SimpleNamespace(), []
@@ -210,7 +210,7 @@ def make_equations(parts: Composition) -> Step:
 
 
 class _Begun(NamedTuple):
-    """What a substep begins with: the effectors' commands where they are held, and what actuators put out."""
+    """A substep begins with: the effectors' commands where they are held, and what actuators put out."""
 
     commands: Any
     applied: Any
@@ -225,7 +225,7 @@ class _Placed(NamedTuple):
 
 
 class _Named:
-    """What is told of a composition before any equation runs."""
+    """Facts that are told of a composition before any equation runs."""
 
     def __init__(self, parts: Composition) -> None:
         environments = [_Placed(part, place) for place, part in enumerate(parts.environments)]

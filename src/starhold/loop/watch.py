@@ -20,7 +20,7 @@ class Ends(NamedTuple):
 
 
 class Watched(NamedTuple):
-    """What is noted of a transient: squares of the error angle's half sine and of the relative rate, both over their ends,
+    """A transient is noted by these: squares of the error angle's half sine and of the relative rate, both over their ends,
     at the last instant; the control step, with its fraction, at which each was last above 1; the largest square of the
     body's rate (rad2/s2), and of each of its components the largest mean rate of change over a control step (rad/s2)."""
 

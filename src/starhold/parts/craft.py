@@ -1,4 +1,4 @@
-"""What a law and the equations of motion know of the spacecraft."""
+"""A spacecraft as a law and the equations of motion know it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ EARTH = 3.986e14
 
 class Craft(NamedTuple):
     """A rigid spacecraft. The inertia, about the centre of mass in body axes, is three moments where these are principal,
-    else a matrix: `apply` and `swing` take both."""
+    else a matrix: `apply` and `gyroscopic_torque` take both."""
 
     inertia: Annotated[Matrix | Vector, Quantity("kg m^2", "of a craft with wheels without their rotors' about their axes")]
     inverse_inertia: Annotated[Matrix | Vector, Quantity("1/(kg m^2)", "its inverse")]

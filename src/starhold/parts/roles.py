@@ -55,8 +55,8 @@ class Scene(NamedTuple):
 
 
 class Body(Protocol):
-    """What moves. `State` has a field named `COMMAND` for the command that acts; `Measurement` is what laws are told,
-    `Sample` what is recorded, its fields annotated with `Quantity`. `SIGN_POLICIES`: by name, which of equivalent
+    """The part that moves. `State` has a field named `COMMAND` for the command that acts; `Measurement` is what laws are
+    told, `Sample` what is recorded, its fields annotated with `Quantity`. `SIGN_POLICIES`: by name, which of equivalent
     measurements a law is shown; empty where there is no choice."""
 
     COMMAND: str
@@ -143,8 +143,8 @@ class Effector(Protocol):
 
 
 class Sensor(Protocol):
-    """What is known of the body's state. `Reading` is a NamedTuple whose fields are called as those of the body's state that
-    it tells of; further fields are for estimators."""
+    """A sensor tells of the body's state. `Reading` is a NamedTuple whose fields are called as those of the body's state
+    that it tells of; further fields are for estimators."""
 
     Reading: type
 

@@ -37,8 +37,9 @@ def fly_abreast(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> list[Any]:
-    """What `use(number, samples, carry)` makes of each flight, in order: samples (number, sample) and carry as `fly` gives
-    them, the same bits. Loops of one form fly together, whatever numbers they differ in; the others one by one."""
+    """A list of what `use(number, samples, carry)` makes of each flight, in order: samples (number, sample) and carry as
+    `fly` gives them, the same bits. Loops of one form fly together, whatever numbers they differ in; the others one by
+    one."""
     groups: dict[Any, list[int]] = {}
     for number, flight in enumerate(flights):
         groups.setdefault(_key(flight), []).append(number)

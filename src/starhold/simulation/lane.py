@@ -56,7 +56,7 @@ class Recording:
         return self.arrays[name]
 
     def dataset(self) -> xr.Dataset:
-        """The same as a Dataset with units."""
+        """The recording as a Dataset with units."""
         # Loaded here, for it takes longer than most flights, and measuring and drawing do without.
         import xarray as xr
 
@@ -64,7 +64,7 @@ class Recording:
         return xr.Dataset(data, coords, self.attrs)
 
     def variables(self) -> tuple[dict[str, Variable], dict[str, Variable]]:
-        """What is recorded, and its coordinates, by name."""
+        """The recorded variables, and their coordinates, by name."""
         data: dict[str, Variable] = {}
         columns = {name: told for name, told in self.columns.items() if name in self.arrays}
         for name, (unit, meaning, dimension) in columns.items():

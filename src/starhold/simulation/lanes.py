@@ -109,11 +109,11 @@ class Fleet:
         return np.ascontiguousarray(blocks.swapaxes(0, 1).reshape(blocks.shape[1], -1)[:, : self.lanes])
 
     def carries(self) -> NDArray[np.float64]:
-        """What each lane carries now, (numbers, lanes)."""
+        """The numbers that each lane carries now, (numbers, lanes)."""
         return self._unpacked(self.x)
 
     def notes(self) -> NDArray[np.float64]:
-        """What has been noted of each lane, (numbers, lanes)."""
+        """The numbers that have been noted of each lane, (numbers, lanes)."""
         return self._unpacked(self.noted)
 
     def fly(self, phase: Phase, piece: range, first: int | None = None, count: int | None = None) -> None:
@@ -154,7 +154,7 @@ class Fleet:
         return self._ready[id(phase)]
 
     def _turned(self, phase: Phase) -> Any:
-        """Of the rates of the lanes of a piece, what the phase makes of them as it begins."""
+        """The body's rates in the lanes of a piece, as the phase makes them when it begins."""
         size = self.count * self.width
 
         def whole(leaf: Any) -> Any:
@@ -193,8 +193,8 @@ class Fleet:
 
 
 def carry_columns(loop: ClosedLoop, start: NDArray[np.float64], phase: Any = None) -> NDArray[np.float64]:
-    """What each lane starts with, one column a lane, from its state (numbers of a state, lanes). phase: the first, where
-    numbers of it differ between lanes."""
+    """The carry at the start of each lane, one column a lane, from its state (numbers of a state, lanes). phase: the first,
+    where numbers of it differ between lanes."""
     lanes = start.shape[1]
     own = phase is not None and any(isinstance(leaf, np.ndarray) for leaf in leaves((phase.gains, phase.nominal)))
     first = loop.carry()

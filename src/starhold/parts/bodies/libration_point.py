@@ -177,7 +177,7 @@ def sample(state: PointState, goal: None, applied: Vector, command: Vector) -> S
 
 
 class Units(NamedTuple):
-    """What one scaled unit is worth: length (m) and rate (1/s)."""
+    """The worth of one scaled unit: length (m) and rate (1/s)."""
 
     length: float
     rate: float

@@ -86,7 +86,7 @@ class State(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """What is recorded of the wheels."""
+    """The quantities that are recorded of the wheels."""
 
     wheel_momentum: Annotated[Numbers, Quantity("N m s", "angular momentum of each rotor about its spin axis", "wheel")]
     wheel_torque: Annotated[Numbers, Quantity("N m", "rate of that momentum: the motor's torque and friction", "wheel")]
@@ -167,7 +167,7 @@ def allocate_peak(torque: Vector, wheels: Wheels) -> Numbers:
     """
     facets, width = wheels.facets, 6 + 3 * len(wheels.axes)
     if not isinstance(facets, Buffer):
-        raise TypeError("these wheels have no facets: see models.envelope.with_facets")
+        raise TypeError("these wheels have no facets: see parts.effectors.envelope.with_facets")
 
     def piece(k: Any) -> tuple[Any, ...]:
         n0, n1, n2, e0, e1, e2, *rows = facets.row(k, width)

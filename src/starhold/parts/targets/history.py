@@ -27,8 +27,8 @@ swing between them."""
 
 
 class Knots(NamedTuple):
-    """What makes a rotation spline: times (n,) in s, attitudes (n, 4) and rates (n, 3; rad/s, target axes) at them. From a
-    knot to the next the rotation vector is the cubic in time that has the attitudes and rates of both."""
+    """The numbers of a rotation spline: times (n,) in s, attitudes (n, 4) and rates (n, 3; rad/s, target axes) at them. From
+    a knot to the next the rotation vector is the cubic in time that has the attitudes and rates of both."""
 
     times: NDArray[np.float64]
     attitudes: NDArray[np.float64]
