@@ -119,7 +119,7 @@ def multiply(a: Matrix, b: Matrix) -> Matrix:
 
 
 def combine(c: Scalar, a: Matrix, d: Scalar, b: Matrix) -> Matrix:
-    """Return c a + d b."""
+    """Return the matrix c a + d b."""
     return (
         add(scale(c, a[0]), scale(d, b[0])),
         add(scale(c, a[1]), scale(d, b[1])),
