@@ -46,14 +46,17 @@ def to_pandas(results: Any) -> DataFrame:
 
 
 def run_frame(run: xr.Dataset) -> DataFrame:
-    """A run with a row a sample: time, then every component in a column of its own, such as rate_x."""
+    """A run with a row a sample: time, then every number, and every component in a column of its own, such as rate_x."""
     import pandas as pd
 
     columns: dict[str, Any] = {"time": run["time"].to_numpy()}
     for name, values in run.data_vars.items():
+        data = cast(Any, values.to_numpy())
+        if data.ndim == 1:
+            columns[str(name)] = data
+            continue
         dimension = str(values.dims[1])
         known = dimension in run.coords
         labels = run[dimension].to_numpy() if known else np.arange(1, values.shape[1] + 1)
-        data = cast(Any, values.to_numpy())
         columns |= {f"{name}_{label}": data[:, place] for place, label in enumerate(labels)}
     return pd.DataFrame(columns)
