@@ -1,5 +1,5 @@
-"""Writes docs/laws.md from the laws' own files: cards, gains, and the torque as SymPy reads it; and the tables of
-docs/law-authors.md from the code that they describe."""
+"""Writes docs/laws.md and docs/parts.md from the files of laws and of other parts: cards, gains, parameters, and the torque
+as SymPy reads it; and the tables of docs/law-authors.md and docs/part-authors.md from the code that they describe."""
 
 from __future__ import annotations
 
@@ -21,8 +21,14 @@ from starhold.algebra.quantity import quantities
 from starhold.laws.catalogue import Law, catalogue
 from starhold.laws.interface import Card, Gain, Measurement, NoMemory, Start
 from starhold.laws.point import PointMeasurement
+from starhold.parts import roles
 from starhold.parts.bodies.libration_point import Libration
+from starhold.parts.catalogue import DEMANDED, EITHER, PACKAGES, parts
+from starhold.parts.contract import Card as PartCard
+from starhold.parts.contract import Field, Parameter
 from starhold.parts.craft import Craft, make_craft
+from starhold.parts.part import Part
+from starhold.parts.random import Dice
 
 CRAFT = make_craft([2.0, 3.0, 4.0])
 
@@ -56,22 +62,22 @@ def described(law: Law) -> list[str]:
     lines = [f"## {law.name}: {card.title}", "", card.summary, "", f"* claims: {card.claims}"]
     lines += [f"* assumes: {'; '.join(card.assumptions)}", f"* sources: {'; '.join(card.sources)}", ""]
     for form in (None, *law.forms):
-        lines += [
-            "Gains:" if form is None else f'Form `"{form}"`:',
-            "",
-            "| key | unit | meaning | default |",
-            "|---|---|---|---|",
-        ]
-        for item in law.fields(form):
-            default = item.gain.choices[item.default] if item.gain.choices and not item.required else item.default
-            shown = "required" if item.required else f"`{default}`"
-            lines.append(f"| `{item.name}` | {item.gain.unit} | {item.gain.text} | {shown} |")
-        lines.append("")
+        lines += ["Gains:" if form is None else f'Form `"{form}"`:', "", *keys(law.fields(form)), ""]
+    return lines
+
+
+def keys(fields: list[Field]) -> list[str]:
+    """A table of gains or parameters."""
+    lines = ["| key | unit | meaning | default |", "|---|---|---|---|"]
+    for item in fields:
+        default = item.gain.choices[item.default] if item.gain.choices and not item.required else item.default
+        shown = "required" if item.required else f"`{default}`"
+        lines.append(f"| `{item.name}` | {item.gain.unit} | {item.gain.text} | {shown} |")
     return lines
 
 
 def page() -> str:
-    """The page."""
+    """The page of laws."""
     lines = ["# Laws", "", "Written from the laws' own files by `make docs`.", ""]
     for law in catalogue().values():
         lines += described(law)
@@ -82,6 +88,68 @@ def page() -> str:
     for law in catalogue("libration-point").values():
         lines += described(law)
     return "\n".join(lines)
+
+
+def described_part(part: Part) -> list[str]:
+    """A part's card, parameters, and what is recorded of it."""
+    card = part.card
+    lines = [f"### {part.name}: {card.title}", "", card.summary.replace("*", "\\*"), ""]
+    if part.role != "body":
+        lines.append(f"* body: {part.body or 'any'}")
+    lines += [
+        f"* {head}: {'; '.join(told)}" for head, told in (("needs", part.needs), ("assumes", card.assumptions)) if told
+    ]
+    lines += [f"* sources: {'; '.join(card.sources)}", ""]
+    if part.table:
+        lines += [f"Given by the `[{part.table}]` table.", ""]
+    elif part.role != "body" and part.fields():
+        lines += [*keys(part.fields()), ""]
+    kind = next((getattr(part.module, n) for n in ("Sample", "Reading", "Estimate") if hasattr(part.module, n)), None)
+    if kind is not None and getattr(part.module, "RECORDED", True):
+        rows = [f"| `{name}` | {q.unit} | {q.text} |" for name, q in quantities(kind).items()]
+        lines += ["| recorded | unit | meaning |", "|---|---|---|", *rows, ""]
+    return lines
+
+
+def page_of_parts() -> str:
+    """The page of all other parts."""
+    lines = [
+        "# Parts",
+        "",
+        "Written from the parts' own files by `make docs`. A part that names no table here is given by a `[[part]]`",
+        "table with its `type` and its keys, see [scenario files](scenarios.md#further-parts). Laws have",
+        "[a page of their own](laws.md), and so have [parts of your own](part-authors.md).",
+        "",
+    ]
+    for role, package in PACKAGES.items():
+        lines += [f"## {package.rpartition('.')[2].capitalize()}", ""]
+        for part in parts(role).values():
+            lines += described_part(part)
+    return "\n".join(lines)
+
+
+def roles_text() -> str:
+    """The roles of parts but bodies and laws: for each the attributes and the equations of its protocol."""
+    found: list[str] = []
+    for role in PACKAGES:
+        if role == "body":
+            continue
+        protocol = getattr(roles, role.capitalize())
+        either = EITHER.get(role, ())
+        rows: list[list[str]] = []
+        for name, kind in protocol.__annotations__.items():
+            needed = "required" if name in DEMANDED[role] else ""
+            rows.append([f"`{name}`", needed, {"type": "a NamedTuple", "bool": "True or False"}.get(kind, "names")])
+        for name, item in vars(protocol).items():
+            if inspect.isfunction(item) and not name.startswith("_"):
+                needed = (
+                    "required" if name in DEMANDED[role] else f"or `{'`, `'.join({*either} - {name})}`" * (name in either)
+                )
+                shown = f"`{name}({_parameters(item).removesuffix(', /')})`"
+                rows.append([shown, needed, " ".join((item.__doc__ or "").split())])
+        text = " ".join((protocol.__doc__ or "").split())
+        found += [f"### {role.capitalize()}", "", text, "", table(["equation or attribute", "", "meaning"], rows), ""]
+    return "\n".join(found).rstrip()
 
 
 OPERATORS = ("plus", "minus", "product", "negative", "select")
@@ -129,6 +197,12 @@ def functions_table(module: ModuleType) -> str:
     return table(["function", "meaning"], rows)
 
 
+def methods_table(cls: Any) -> str:
+    """The methods of a class."""
+    own = [f for name, f in vars(cls).items() if inspect.isfunction(f) and not name.startswith("_")]
+    return table(["method", "meaning"], [[f"`.{f.__name__}({_parameters(f)})`", _first(f)] for f in own])
+
+
 def _parameters(function: Any) -> str:
     shown = [str(p).partition(":")[0] for p in inspect.signature(function).parameters.values()]
     return ", ".join(name for name in shown if name != "self")
@@ -161,6 +235,10 @@ TABLES = {
     "start": _start_table,
     "measurement point": lambda: fields_table(PointMeasurement),
     "plant": lambda: fields_table(Libration),
+    "part card": lambda: attributes_table(PartCard),
+    "parameter": lambda: attributes_table(Parameter),
+    "roles": roles_text,
+    "dice": lambda: methods_table(Dice),
 }
 MARK = re.compile(r"(<!-- written by docs/generate.py: (.*?) -->\n).*?(<!-- end -->)", re.DOTALL)
 
@@ -171,6 +249,9 @@ def filled(text: str) -> str:
 
 
 if __name__ == "__main__":
-    Path(__file__).with_name("laws.md").write_text(page(), encoding="utf-8")
-    authors = Path(__file__).with_name("law-authors.md")
-    authors.write_text(filled(authors.read_text(encoding="utf-8")), encoding="utf-8")
+    here = Path(__file__).parent
+    (here / "laws.md").write_text(page(), encoding="utf-8")
+    (here / "parts.md").write_text(page_of_parts(), encoding="utf-8")
+    for name in ("law-authors.md", "part-authors.md"):
+        authors = here / name
+        authors.write_text(filled(authors.read_text(encoding="utf-8")), encoding="utf-8")

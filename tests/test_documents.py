@@ -2,21 +2,26 @@
 
 import os
 import re
+import runpy
 import shlex
 import subprocess
 import sys
+import tomllib
 from functools import cache
 from pathlib import Path
 
 import pytest
 import typer
 
+import starhold as sh
 from starhold.certification.certify import certify
 from starhold.certification.wording import HEADINGS, sentence
 from starhold.cli.main import app
 from starhold.conformance.suite import examine
 from starhold.laws.catalogue import catalogue, from_file
+from starhold.parts.catalogue import PACKAGES, parts
 from starhold.scenario.building import build
+from starhold.scenario.checking import RENAMED
 from starhold.scenario.reading import load
 
 ROOT = Path(__file__).parents[1]
@@ -82,8 +87,8 @@ def test_commands_of_the_readme_are_commands():
     for start, name, *words in lines:
         assert start == "starhold"
         known[name].make_context(name, words)
-    # All but those that lists or schemas come from.
-    assert set(known) - {name for _, name, *_ in lines} <= {"schema", "wheels"}
+    # All but those that lists or schemas come from, and an old name.
+    assert set(known) - {name for _, name, *_ in lines} <= {"schema", "wheels", "check-law"}
 
 
 @pytest.mark.slow
@@ -138,14 +143,70 @@ def test_help_says_where_results_go(name):
 
 
 def test_generated_page_of_laws():
-    import runpy
-
     page = runpy.run_path(str(ROOT / "docs" / "generate.py"))["page"]()
     kept = (ROOT / "docs" / "laws.md").read_text(encoding="utf-8")
     assert page == kept, "docs/laws.md is not what the laws say; write it anew: python docs/generate.py"
     for law in catalogue() | catalogue("libration-point"):
         assert f"## {law}: " in page
     assert "-k_attitude*q_1 - k_rate*w_1" in page
+
+
+def test_generated_page_of_parts():
+    page = runpy.run_path(str(ROOT / "docs" / "generate.py"))["page_of_parts"]()
+    kept = (ROOT / "docs" / "parts.md").read_text(encoding="utf-8")
+    assert page == kept, "docs/parts.md is not what the parts say; write it anew: python docs/generate.py"
+    for role in PACKAGES:
+        for name in parts(role):
+            assert f"### {name}: " in page
+    assert "| `bias_walk` | rad/s |" in page
+
+
+def test_example_of_parts_flies(tmp_path):
+    """The scenario of the page about scenario files, with what it says is recorded."""
+    (example,) = (text for text in blocks("docs/scenarios.md", "toml") if "[[part]]" in text)
+    path = tmp_path / "my.toml"
+    path.write_text(example, encoding="utf-8")
+    scenario = load(str(path))
+    run = sh.simulate(scenario)
+    assert {"gyro_rate", "complementary_filter_gyro_bias"} < set(run)
+    # The filter finds the gyro's bias.
+    assert abs(float(run["complementary_filter_gyro_bias"][-1, 0]) - 1.75e-4) < 5e-5
+
+
+@pytest.mark.parametrize("body", ["rigid_body", "libration_point"])
+def test_commented_part_of_a_template_is_one(body):
+    text = (ROOT / "src" / "starhold" / "scenario" / "bodies" / body / "template.toml").read_text(encoding="utf-8")
+    table = re.search(r"^# \[\[part\]\].*?\n\n", text, flags=re.DOTALL | re.MULTILINE)
+    assert table is not None
+    there = re.sub("^# ", "", table[0], flags=re.MULTILINE)
+    own = tomllib.loads(there)["part"][0]["name"]
+    made = sh.scenario(tomllib.loads(text.replace(table[0], there)))
+    assert own in sh.simulate(made.with_({"simulation.duration": 1.0}), law=made.laws[0].name).attrs["parts"]
+
+
+def test_architecture_draws_the_layers_as_they_are():
+    """In the picture each layer has a line, which begins with its packages."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    layers = settings["tool"]["importlinter"]["contracts"][0]["layers"]
+    picture, *_ = re.findall(r"```\n(.*?)```", (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8"), flags=re.DOTALL)
+    assert [re.split(" {2,}", line)[0] for line in picture.splitlines()] == layers
+    source = ROOT / "src" / "starhold"
+    there = {path.stem for path in source.iterdir() if path.suffix == ".py" or (path / "__init__.py").is_file()}
+    assert {name for layer in layers for name in re.findall(r"\w+", layer)} == there - {"__init__", "__main__"}
+
+
+def test_files_that_architecture_names_are_there():
+    text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    named = {name for name in re.findall(r"`([\w/]+\.py)`", text) if "/" in name}
+    assert len(named) > 10
+    for name in named:
+        assert (ROOT / name).is_file() or (ROOT / "src" / "starhold" / name).is_file(), name
+    assert len(text.splitlines()) <= 95
+
+
+def test_changelog_names_all_that_was_renamed():
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert dict(re.findall(r"^ *\| `([\w-]+)` \| `([\w-]+)` \|$", text, flags=re.MULTILINE)) == RENAMED
 
 
 def glossary():

@@ -1,0 +1,119 @@
+"""The page for authors of parts is true: its tables are those of the code, and its parts conform and fly together."""
+
+import inspect
+import re
+import runpy
+import tomllib
+from dataclasses import fields as dataclass_fields
+from pathlib import Path
+
+import pytest
+
+import starhold as sh
+from starhold.conformance.parts import examine_part, find_part
+from starhold.parts import roles
+from starhold.parts.catalogue import DEMANDED, EITHER, PACKAGES
+from starhold.parts.contract import Card, Parameter
+from starhold.parts.random import RANGE, Dice
+
+ROOT = Path(__file__).parents[1]
+PAGE = (ROOT / "docs" / "part-authors.md").read_text(encoding="utf-8")
+FILES = dict(re.findall(r"`(\w+\.(?:py|toml))`:\n\n```\w+\n(.*?)```", PAGE, flags=re.DOTALL))
+PARTS = {"sunlight": "environment", "drifting_tracker": "sensor", "rate_from_attitude": "estimator"}
+PARTS |= {"dead_zone": "actuator", "flexible_panel": "effector"}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    for name, text in FILES.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_its_tables_are_written_from_the_code():
+    filled = runpy.run_path(str(ROOT / "docs" / "generate.py"))["filled"]
+    assert filled(PAGE) == PAGE, "docs/part-authors.md is not what the code says; write it anew: python docs/generate.py"
+    for cls in (Card, Parameter):
+        assert all(f"| `{field.name}` | " in PAGE for field in dataclass_fields(cls))
+    for name in ("vector", "normals"):
+        assert hasattr(Dice, name)
+        assert f"| `.{name}(" in PAGE
+    assert f"A part has {RANGE} places at each control step" in PAGE
+
+
+def test_it_shows_every_role_with_all_that_is_demanded_of_it():
+    for role in set(PACKAGES) - {"body"}:
+        section = PAGE.partition(f"### {role.capitalize()}\n")[2].partition("### ")[0]
+        for name in (*DEMANDED[role], *EITHER.get(role, ())):
+            if name not in ("Params", "examples"):
+                assert re.search(rf"\| `{name}\b[^|]*\| (required|or `)", section), (role, name)
+        equations = {n for n, item in vars(getattr(roles, role.capitalize())).items() if inspect.isfunction(item)}
+        assert {name for name in equations if not name.startswith("_")} <= set(re.findall(r"\| `(\w+)\(", section))
+
+
+def test_it_tells_all_that_a_part_may_add():
+    """What the code asks a part for by name."""
+    asked: set[str] = set()
+    for path in (ROOT / "src").rglob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        asked |= set(re.findall(r"\.(?:hook|flag)\(\"(\w+)\"\)", text))
+        if path.parent.name in ("parts", "loop"):
+            asked |= set(re.findall(r"getattr\([\w.]*module, \"(\w+)\"", text))
+    assert {"prepare", "bound", "FIRST", "ACTS"} < asked
+    assert {name for name in asked if f"`{name}" not in PAGE} == set()
+
+
+def test_it_has_an_example_for_each_role():
+    assert set(FILES) == {f"{name}.py" for name in PARTS} | {"own.toml", "pyproject.toml"}
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_its_parts_conform(name, folder):
+    part = find_part(f"{name}.py")
+    assert part.role == PARTS[name]
+    verdicts = list(examine_part(part))
+    assert [verdict for verdict in verdicts if verdict.outcome == "failed"] == []
+
+
+def test_its_parts_fly_together(folder):
+    scenario = sh.load("own.toml")
+    run = sh.simulate(scenario)
+    assert float(abs(run.deflection).max()) > 1e-4
+    error = run["rate_from_attitude_rate"] - run["rate"]
+    assert 1e-5 < float(abs(error[100:]).max()) < 5e-3
+    # A command is none, or at least as wide as the dead zone is, which the torque shows.
+    torque = abs(run.torque.values[1:-1])
+    assert (torque[torque > 0.0] >= 1e-5).all()
+    assert (torque == 0.0).any()
+    # A stronger light turns it further off its target.
+    (folder / "bright.toml").write_text(FILES["own.toml"].replace("20 uN", "2 mN"), encoding="utf-8")
+    ends = [sh.metrics(one)["final_attitude_error"] for one in (run, sh.simulate("bright.toml"))]
+    assert ends[1] > 2.0 * ends[0]
+
+
+def test_its_lines_of_python_run(folder, monkeypatch, capsys):
+    drawn = []
+    monkeypatch.setattr("pandas.DataFrame.plot", lambda table, **how: drawn.append((table.columns, how["y"])))
+    (example,) = (text for text in re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL) if "sh.simulate" in text)
+    exec(compile(example, "part-authors.md", "exec"), {})
+    assert capsys.readouterr().out.endswith(" rad/s\n")
+    assert drawn[0][1] in drawn[0][0]
+
+
+def test_claims_say_of_its_parts_what_it_tells(folder):
+    (certificate,) = sh.certify("own.toml")
+    for claim in certificate.claims:
+        away = {name for name in claim.assumptions if name.startswith("without the ")}
+        assert "without the sensor drifting-tracker" in away
+        assert "without the effector panel" in away
+        assert not any("sunlight" in name for name in away)
+    pushed = certificate.claim("disturbance")
+    assert pushed.outcome == "proved"
+    assert certificate.subject["disturbance"] == pytest.approx(20e-6 * 0.05)
+
+
+def test_its_package_names_the_modules_of_its_parts():
+    (text,) = re.findall(r"`pyproject.toml`:\n\n```toml\n(.*?)```", PAGE, flags=re.DOTALL)
+    points = tomllib.loads(text)["project"]["entry-points"]["starhold.parts"]
+    assert {module.rpartition(".")[2] for module in points.values()} < set(PARTS)
