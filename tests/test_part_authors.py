@@ -86,10 +86,6 @@ def test_its_parts_fly_together(folder):
     torque = abs(run.torque.values[1:-1])
     assert (torque[torque > 0.0] >= 1e-5).all()
     assert (torque == 0.0).any()
-    # A stronger light turns it further off its target.
-    (folder / "bright.toml").write_text(FILES["own.toml"].replace("20 uN", "2 mN"), encoding="utf-8")
-    ends = [sh.metrics(one)["final_attitude_error"] for one in (run, sh.simulate("bright.toml"))]
-    assert ends[1] > 2.0 * ends[0]
 
 
 def test_its_lines_of_python_run(folder, monkeypatch, capsys):
@@ -97,7 +93,11 @@ def test_its_lines_of_python_run(folder, monkeypatch, capsys):
     monkeypatch.setattr("pandas.DataFrame.plot", lambda table, **how: drawn.append((table.columns, how["y"])))
     (example,) = (text for text in re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL) if "sh.simulate" in text)
     exec(compile(example, "part-authors.md", "exec"), {})
-    assert capsys.readouterr().out.endswith(" rad/s\n")
+    error, *rows = capsys.readouterr().out.splitlines()
+    assert error.endswith(" rad/s")
+    # A stronger light turns it further off its target.
+    weak, strong = (float(row.split()[1]) for row in rows[:2])
+    assert strong > 2.0 * weak
     assert drawn[0][1] in drawn[0][0]
 
 
