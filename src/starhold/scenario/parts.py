@@ -4,20 +4,23 @@ package."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
 
-import numpy as np
 from pydantic import Field, create_model
 from pydantic_core import PydanticCustomError
 
+from starhold.algebra.quantity import quantities
+from starhold.algebra.structured import Buffer
+from starhold.algebra.vector import ZERO
 from starhold.errors import InputError
-from starhold.loop.closed_loop import ClosedLoop
-from starhold.loop.kernels import make_step
+from starhold.loop.closed_loop import ClosedLoop, is_recorded
+from starhold.loop.step import make_equations
 from starhold.parts.catalogue import PACKAGES, as_part, from_file, parts, read_module, role_of, told
 from starhold.parts.part import Fitted, Part
+from starhold.parts.roles import Goal
 from starhold.scenario.checking import free_name, nearest, show, validate
 from starhold.scenario.quantity import any_quantity
 from starhold.scenario.tables import Name, Table, check_name
@@ -124,6 +127,8 @@ def _with_rows(part: Part, table: dict[str, Any], folder: Path, where: str, key:
                 lines = [line.split(",") for line in text.splitlines() if line.strip() and not line.startswith("#")]
                 if lines and not _is_number(lines[0][0]):
                     lines = lines[1:]
+                if any(len(line) != len(item.gain.columns) for line in lines):
+                    raise ValueError(f"a line that has not {len(item.gain.columns)} columns")
                 found[item.name] = [[float(cell) for cell in line] for line in lines]
             except OSError as error:
                 raise InputError(where, f"{key}.{item.name}", f"{given}: {error.strerror}", allowed) from None
@@ -177,56 +182,114 @@ def try_parts(loop: ClosedLoop, where: str) -> None:
     """InputError where a part cannot work with its numbers, or a part's file fails: a control step is flown in plain Python,
     which goes through all of it."""
     for fitted in loop.parts:
-        try:
-            fitted.prepared(loop.period)
-        except Exception as error:
-            raise InputError(where, _key(fitted), "", _why(error, fitted.part)) from None
-    files = [f.part for f in loop.parts if f.part.file is not None]
-    if not files:
+        if fitted.part.file is None:
+            try:
+                fitted.prepared(loop.period)
+            except ValueError as error:
+                raise InputError(where, _key(fitted), "", str(error)) from None
+    if all(fitted.part.file is None for fitted in loop.parts):
         return
+    tried = replace(loop, parts=tuple(f if f.part.file is None else _watched(f, loop, where) for f in loop.parts))
     try:
-        step, carry, setup = make_step(loop.composition()), loop.carry(), loop.setup()
-        carry = step.update(carry, 0, (loop.seed, 0), loop.gains, loop.craft, setup)
-        after = step.propagate(carry, loop.craft, setup)
-        step.sample(after, 1, setup)
-        again = step.update(after, 1, (loop.seed, 0), loop.gains, loop.craft, setup)
-    except Exception as error:
-        guilty = next((part for part in files if _line_of(error, part)), None)
-        if guilty is None:
-            raise
-        raise InputError(where, f"part {guilty.name}", "", _why(error, guilty)) from None
-    if not _alike(carry, again):
-        raise InputError(
-            where, f"part {files[0].name}", "", "its equations must return states formed as those they are given"
-        )
+        # Not of the cache of such steps, for it is flown once.
+        step, carry, setup = make_equations(tried.composition()), tried.carry(), tried.setup()
+        for number in range(2):
+            carry = step.update(carry, number, (loop.seed, 0), loop.gains, loop.craft, setup)
+            carry = step.propagate(carry, loop.craft, setup)
+            step.sample(carry, number + 1, setup)
+    except InputError:
+        raise
+    except Exception:
+        # A fault of the law's, which is tried next, and told then.
+        return
+
+
+def _watched(fitted: Fitted, loop: ClosedLoop, where: str) -> Fitted:
+    """A part from a file whose every equation is looked at when it is called."""
+    module: Any = _Watched(fitted, loop.start, where)
+    return replace(fitted, part=replace(fitted.part, module=module))
+
+
+class _Watched:
+    """The module of a part from a file, whose equations raise InputError where they fail or give what its role does not."""
+
+    def __init__(self, fitted: Fitted, state: Any, where: str) -> None:
+        self._fitted, self._state, self._where = fitted, state, where
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(self._fitted.part.module, name)
+        return found if isinstance(found, type) or not callable(found) else self._called(name, found)
+
+    def _called(self, name: str, equation: Any) -> Any:
+        def called(*given: Any) -> Any:
+            part = self._fitted.part
+            try:
+                found = equation(*given)
+            except Exception as error:
+                raise InputError(self._where, _key(self._fitted), "", told(error, part.file)) from None
+            what = self._wrong(part, name, found, given)
+            if what:
+                raise InputError(self._where, _key(self._fitted), f"{name} returns {show(found)}", what)
+            return found
+
+        return called
+
+    def _wrong(self, part: Part, name: str, found: Any, given: Any) -> str:
+        """Words for what the equation should give, where it does not."""
+        if name in VECTORS.get(part.role, ()):
+            return "" if _alike(found, ZERO) else "three numbers"
+        if (part.role, name) == ("effector", "inertia"):
+            return "" if _alike(found, (ZERO, ZERO, ZERO)) else "three rows of three numbers"
+        if (part.role, name) == ("target", "goal"):
+            like = Goal((1.0, 0.0, 0.0, 0.0), ZERO, ZERO)
+            return "" if isinstance(found, Goal) and _alike(found, like) else "a Goal of four, three and three numbers"
+        if (part.role, name) in (("effector", "rates"), ("environment", "update")):
+            return "" if _alike(found, given[0]) else "numbers formed as those of the first argument"
+        if name == "record":
+            return _undeclared(type(found))
+        if name not in ("measure", "estimate"):
+            return ""
+        kind = part.module.Reading if name == "measure" else part.module.Estimate
+        if not (isinstance(found, tuple) and len(cast(Any, found)) == 2 and isinstance(found[0], kind)):
+            return f"a pair of a {kind.__name__} and the memory"
+        if not _alike(found[1], given[1]):
+            return "a memory formed as the one that it is given"
+        for item, value in cast(Any, found[0])._asdict().items():
+            if item in self._state._fields and not _alike(value, getattr(self._state, item)):
+                return f"{item} formed as that of the body's state"
+        return _undeclared(kind) if name == "estimate" or is_recorded(part) else ""
+
+
+VECTORS = {
+    "environment": ("torque", "acceleration"),
+    "effector": ("reaction", "momentum", "applied"),
+    "actuator": ("command", "rates"),
+}
+"""Equations that give three numbers."""
+
+
+def _undeclared(kind: Any) -> str:
+    """Words for what recordings need of a kind of tuple, where it lacks it."""
+    try:
+        quantities(kind)
+    except Exception:
+        return "a NamedTuple whose fields are annotated with a Quantity"
+    return ""
 
 
 def _alike(one: Any, other: Any) -> bool:
     if isinstance(one, tuple):
         same = isinstance(other, tuple) and len(cast(Any, one)) == len(cast(Any, other))
         return same and all(_alike(a, b) for a, b in zip(cast(Any, one), cast(Any, other), strict=True))
-    return not isinstance(other, tuple) and np.ndim(one) == np.ndim(other)
+    return not isinstance(other, tuple) and isinstance(one, (int, float, Buffer)) and not isinstance(one, bool)
 
 
-def _line_of(error: BaseException, part: Part) -> bool:
-    return part.file is not None and part.file.name in told(error, part.file).partition(": ")[0]
-
-
-def _why(error: Exception, part: Part) -> str:
-    return str(error) if type(error) is ValueError and part.file is None else told(error, part.file)
-
-
-def part_schemas() -> list[dict[str, Any]]:
-    """JSON Schemas of [[part]] tables: one for each installed part, and one for a part from a file."""
-    found = [part_model(part).model_json_schema() for part in installed().values()]
+def part_schemas(body: str) -> list[dict[str, Any]]:
+    """JSON Schemas of the [[part]] tables of a body: one for each installed part, and one for a part from a file."""
+    found = [part_model(part).model_json_schema() for part in installed().values() if part.body in ("", body)]
     for table in found:
         table["required"] = sorted({"type", *table.get("required", [])})
     file = {"type": "string", "description": "a Python file that holds a part, relative to this one; it is run"}
     name = PartTable.model_json_schema()["properties"]["name"]
     own = {"title": "PartFromFile", "type": "object", "properties": {"file": file, "name": name}, "required": ["file"]}
     return [*found, own | {"not": {"required": ["type"]}}]
-
-
-def names_of(fitted: Iterable[Fitted]) -> Sequence[str]:
-    """How the parts of a loop are called."""
-    return [one.called for one in fitted]

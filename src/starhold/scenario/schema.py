@@ -12,7 +12,9 @@ from starhold.laws.catalogue import Law
 from starhold.laws.interface import Field as Parameter
 from starhold.laws.interface import Gain
 from starhold.scenario.bodies import bodies
+from starhold.scenario.bodies.interface import Body
 from starhold.scenario.checking import MOST_SUBSTEPS
+from starhold.scenario.parts import part_schemas
 from starhold.scenario.quantity import any_quantity, quantity
 from starhold.scenario.tables import Name, Table, at_key
 
@@ -87,7 +89,7 @@ def law_model(law: Law, form: str | None, base: type[LawTable]) -> Any:
 
 def json_schema() -> dict[str, Any]:
     """A JSON Schema of scenario files of every body, for completion and checks in editors."""
-    known = [_file_schema(body.tables, body.laws().values(), body.law_table) for body in bodies().values()]
+    known = [_file_schema(body) for body in bodies().values()]
     shared: dict[str, Any] = {}
     for schema in known:
         shared |= schema.pop("$defs", {})
@@ -95,10 +97,11 @@ def json_schema() -> dict[str, Any]:
     return {**title, "anyOf": known, "$defs": shared}
 
 
-def _file_schema(whole: type[ScenarioTable], laws: Iterable[Law], base: type[LawTable]) -> dict[str, Any]:
-    """A JSON Schema of the files of one body: its tables, and those of its laws, gains and design forms."""
-    models = [law_model(law, form, base) for law in laws for form in (None, *law.forms)]
-    schema = whole.model_json_schema()
+def _file_schema(body: Body) -> dict[str, Any]:
+    """A JSON Schema of the files of one body: its tables, those of its laws, gains and design forms, and of its parts."""
+    base = body.law_table
+    models = [law_model(law, form, base) for law in body.laws().values() for form in (None, *law.forms)]
+    schema = body.tables.model_json_schema()
     tables: list[dict[str, Any]] = []
     for model in models:
         table = model.model_json_schema()
@@ -113,5 +116,6 @@ def _file_schema(whole: type[ScenarioTable], laws: Iterable[Law], base: type[Law
     tables[-1] |= {"required": ["file"], "not": {"required": ["type"]}}
     schema.setdefault("$defs", {}).update(shared.get("$defs", {}))
     schema["properties"]["law"] = {"type": "array", "minItems": 1, "items": {"anyOf": tables}}
+    schema["properties"]["part"] = {"type": "array", "items": {"anyOf": part_schemas(body.name)}}
     schema["required"].append("law")
     return schema

@@ -1,0 +1,221 @@
+"""Parts of every role as the text of one file each, and a scenario that takes them."""
+
+HEAD = '''"""A part."""
+
+from typing import Annotated, NamedTuple
+
+from starhold.algebra.quantity import Quantity
+from starhold.algebra.vector import ZERO, add, cross, dot, scale
+from starhold.parts.contract import Card, Parameter
+
+CARD = Card(title="Mine", summary="a part", sources=("mine",), assumptions=())
+'''
+EFFECTOR = f'''{HEAD}ROLE = "effector"
+
+
+class Params(NamedTuple):
+    """A mode of an appendage."""
+
+    coupling: Annotated[tuple, Parameter("sqrt(kg) m", shape=(3,), spread=False, text="of the mode with the rotation")]
+    frequency: Annotated[float, Parameter("rad/s", above=0.0, text="with the body held")]
+    damping: Annotated[float, Parameter("1", at_least=0.0, text="as a share of the critical")] = 0.0
+    deflection: Annotated[float, Parameter("sqrt(kg) m", text="at the start")] = 0.0
+
+
+class State(NamedTuple):
+    """Modal deflection and its rate."""
+
+    deflection: float
+    speed: float
+
+
+class Sample(NamedTuple):
+    """All of the state."""
+
+    deflection: Annotated[float, Quantity("sqrt(kg) m", "modal deflection")]
+    speed: Annotated[float, Quantity("sqrt(kg) m/s", "rate of the modal deflection")]
+
+
+def remember(params):
+    return State(params.deflection, 0.0)
+
+
+def spring(own, params):
+    return params.frequency * (2.0 * params.damping * own.speed + params.frequency * own.deflection)
+
+
+def inertia(own, params):
+    return tuple(scale(-x, params.coupling) for x in params.coupling)
+
+
+def reaction(own, command, body, params):
+    return add(scale(spring(own, params), params.coupling), cross(scale(-own.speed, body.rate), params.coupling))
+
+
+def rates(own, command, body, acceleration, params):
+    return State(own.speed, -dot(params.coupling, acceleration) - spring(own, params))
+
+
+def momentum(own, params):
+    return scale(own.speed, params.coupling)
+
+
+def record(own, command, body, params):
+    return Sample(own.deflection, own.speed)
+
+
+def examples():
+    return [Params((0.5, 0.2, 0.9), 2.0, 0.0, 0.03)]
+'''
+ENVIRONMENT = f'''{HEAD}ROLE = "environment"
+
+
+class Params(NamedTuple):
+    """How strongly a medium slows the rotation."""
+
+    drag: Annotated[float, Parameter("N m s", at_least=0.0, text="torque for a radian a second")]
+
+
+def torque(state, params, craft, memory):
+    return scale(-params.drag, state.rate)
+
+
+def examples():
+    return [Params(1e-3)]
+'''
+SENSOR = f'''{HEAD}ROLE = "sensor"
+
+
+class Params(NamedTuple):
+    """How the rate is told."""
+
+    noise: Annotated[float, Parameter("rad/s", at_least=0.0, text="standard deviation")]
+    bias: Annotated[tuple, Parameter("rad/s", shape=(3,), text="added to the rate")] = ZERO
+
+
+class Reading(NamedTuple):
+    """The rate."""
+
+    rate: Annotated[tuple, Quantity("rad/s", "measured rate, body axes", "axis")]
+
+
+def measure(state, memory, params, dice, step):
+    return Reading(add(add(state.rate, params.bias), dice.vector(0, params.noise))), memory
+
+
+def examples():
+    return [Params(1e-4)]
+'''
+ESTIMATOR = f'''{HEAD}ROLE = "estimator"
+NEEDS = ("rate",)
+
+
+class Params(NamedTuple):
+    """How far the estimate goes to a reading."""
+
+    share: Annotated[float, Parameter("1", above=0.0, at_most=1.0, text="of the difference, at each control step")]
+
+
+class Estimate(NamedTuple):
+    """The smoothed rate."""
+
+    rate: Annotated[tuple, Quantity("rad/s", "smoothed rate, body axes", "axis")]
+
+
+def remember(params, state):
+    return state.rate
+
+
+def estimate(readings, memory, params, craft, period):
+    rate = add(scale(1.0 - params.share, memory), scale(params.share, readings.rate))
+    return Estimate(rate), rate
+
+
+def examples():
+    return [Params(0.5)]
+'''
+TARGET = f'''{HEAD}from starhold.parts.roles import Goal
+
+ROLE = "target"
+
+
+class Params(NamedTuple):
+    """Which attitude."""
+
+    attitude: Annotated[tuple, Parameter("1", shape=(4,), spread=False, text="unit quaternion")] = (0.6, 0.8, 0.0, 0.0)
+
+
+def goal(params, state, step, before):
+    return Goal(params.attitude, ZERO, ZERO)
+
+
+def examples():
+    return [Params()]
+'''
+ACTUATOR = f'''{HEAD}from starhold.algebra.scalar import absolute, less, where
+
+ROLE = "actuator"
+
+
+class Params(NamedTuple):
+    """Where nothing happens."""
+
+    dead: Annotated[float, Parameter("N m", at_least=0.0, text="commands below it are left out, on each axis")]
+
+
+def command(command, params):
+    return tuple(where(less(absolute(x), params.dead), 0.0, x) for x in command)
+
+
+def examples():
+    return [Params(1e-3)]
+'''
+LAW = '''"""A law that does nothing or little."""
+
+from typing import Annotated, NamedTuple
+
+from starhold.algebra.vector import add, scale
+from starhold.laws.interface import Card, Gain
+
+CARD = Card(title="Slow", summary="u = -k w - p q", sources=("mine",), assumptions=(), claims="none")
+
+
+class Gains(NamedTuple):
+    k: Annotated[float, Gain("N m s", at_least=0.0, text="damping")] = 0.0
+    p: Annotated[float, Gain("N m", at_least=0.0, text="stiffness")] = 0.0
+
+
+def torque(measurement, gains, craft, memory):
+    return scale(-1.0, add(scale(gains.k, measurement.rate), scale(gains.p, measurement.attitude[1:]))), memory
+
+
+def examples():
+    return [Gains(0.09, 0.009)]
+'''
+PARTS = {
+    "effector": (EFFECTOR, "coupling = [0.5, 0.2, 0.9]\nfrequency = 2.0\ndeflection = 0.03\n"),
+    "environment": (ENVIRONMENT, 'drag = "1 mN m s"\n'),
+    "sensor": (SENSOR, 'noise = "1e-4 rad/s"\nbias = 1e-4\n'),
+    "estimator": (ESTIMATOR, "share = 0.5\n"),
+    "target": (TARGET, ""),
+    "actuator": (ACTUATOR, 'dead = "30 mN m"\n'),
+}
+"""For each role but the law's a part's text and its keys in a scenario."""
+BODY = """
+name = "own"
+[spacecraft]
+inertia = [[8.0, 0.2, 0.1], [0.2, 9.0, 0.3], [0.1, 0.3, 7.0]]
+torque_limit = 0.05
+[initial]
+angles = ["40 deg", 0, 0]
+rate = [0.02, -0.03, 0.01]
+[simulation]
+duration = 10.0
+control_period = 0.1
+"""
+PD = '[[law]]\ntype = "pd"\nk_rate = 0.9\nk_attitude = 0.09\n'
+
+
+def part(text):
+    """A [[part]] table with these lines."""
+    return f"[[part]]\n{text}"

@@ -1,0 +1,192 @@
+"""What is wrong with the parts of a scenario is told in one line, with exit code 2."""
+
+import pytest
+
+from starhold.laws.catalogue import catalogue
+from starhold.scenario.writing import law_table
+from tests.parts.files import ACTUATOR, BODY, EFFECTOR, ENVIRONMENT, LAW, PARTS, PD, SENSOR, TARGET, part
+from tests.running import starhold
+
+POINT = 'name = "own"\n[libration]\n[initial]\nposition = [0.0, 0.5, 0.1]\n[simulation]\nduration = 1.0\n'
+CIRCLE = law_table(catalogue("libration-point")["l2-circle"], catalogue("libration-point")["l2-circle"].examples()[0])
+GYRO, FILTER = part('type = "gyro"\n'), part('type = "complementary-filter"\nattitude_gain = 0.1\nbias_gain = 0.01\n')
+TRACKER = part('type = "star-tracker"\ncross = 1e-5\nroll = 1e-4\n')
+MINE = 'file = "mine.py"\n'
+TABLE = part('type = "torque-table"\ntable = "rows.csv"\n')
+
+
+def told(folder, text):
+    """What the command says of a scenario: one line, and exit code 2."""
+    (folder / "own.toml").write_text(text)
+    done = starhold("run", "own.toml", "-o", "out", cwd=folder)
+    assert done.returncode == 2, done.stderr or done.stdout
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert not (folder / "out").exists()
+    return done.stderr
+
+
+COMPOSED = {
+    "a law for another body": (POINT + '[[law]]\ntype = "pd"\nk_rate = 0.1\nk_attitude = 0.1\n', "law[1].type", '"pd"'),
+    "a law for this body is not there": (BODY + CIRCLE, "law[1].type", '"l2-circle"'),
+    "an estimator without its sensors": (BODY + FILTER + PD, "no attitude", "a sensor that measures attitude"),
+    "an estimator without one of its sensors": (BODY + TRACKER + FILTER + PD, "no rate", "a sensor that measures rate"),
+    "two estimators": (BODY + GYRO + TRACKER + FILTER * 2 + PD, "a second estimator", "one estimator"),
+    "two sensors of the rate": (BODY + GYRO * 2 + PD, "a second sensor of rate, beside gyro", "one of each"),
+    "a sensor beside [sensor]": (
+        BODY + "[sensor]\nrate_noise = 1e-4\n" + GYRO + PD,
+        "a second sensor of rate",
+        "one of each",
+    ),
+    "a part of another body": (
+        POINT + part('type = "constant-torque"\ntorque = [0, 0, 1e-5]\n') + CIRCLE,
+        "part[1]: found constant-torque, for the body rigid-body",
+        "a part for libration-point",
+    ),
+    "an unknown type": (BODY + part('type = "gyroo"\n') + PD, 'part[1].type: found "gyroo"', "did you mean gyro?"),
+    "no type": (BODY + part("noise = 1\n") + PD, "part[1].type: found nothing", "or a file"),
+    "what another table gives": (BODY + part('type = "wheels"\n') + PD, '"wheels"', "the [wheels] table, which gives it"),
+    "single brackets": (BODY + '[part]\ntype = "gyro"\n' + PD, "part: found", "[[part]] tables, with double brackets"),
+    "no table": ("part = [3]\n" + BODY + PD, "part[1]: found 3", "a [[part]] table"),
+    "an unknown key": (BODY + part('type = "gyro"\nnoice = 1\n') + PD, "part[1].noice: found an unknown key", "noise"),
+    "a missing key": (BODY + part('type = "lag"\n') + PD, "part[1].lag: found nothing", "this key is required"),
+    "another unit": (BODY + part('type = "gyro"\nnoise = "1 N m"\n') + PD, 'part[1].noise: found "1 N m"', "rad"),
+    "below the bound": (BODY + part('type = "gyro"\nnoise = -1\n') + PD, "part[1].noise: found -1", "at least 0"),
+    "two numbers of three": (BODY + part('type = "gyro"\nbias = [0, 1]\n') + PD, "part[1].bias", "3 numbers"),
+    "a name twice": (BODY + GYRO + part('type = "lag"\nlag = 1\nname = "gyro"\n') + PD, "part[2].name", "a name that"),
+    "too late a tracker": (
+        BODY + part('type = "star-tracker"\ncross = 0\nroll = 0\ndelay = 100\n') + PD,
+        "part star-tracker",
+        "the delay must be at most 64 control periods",
+    ),
+    "a blind tracker": (
+        BODY + part('type = "star-tracker"\ncross = 0\nroll = 0\nboresight = [0, 0, 0]\n') + PD,
+        "part star-tracker",
+        "the boresight needs a direction",
+    ),
+    "too fast a lag": (BODY + part('type = "lag"\nlag = 0.001\n') + PD, "simulation.substeps", "at least 200 substeps"),
+    "file and type": (BODY + part(MINE + 'type = "gyro"\n') + PD, "part[1].file", "either a type or a file, not both"),
+    "a file's name that is a number": (BODY + part("file = 3\n") + PD, "part[1].file: found 3", "the name of a Python file"),
+    "no such file": (BODY + part('file = "nope.py"\n') + PD, '"nope.py": No such file', "a Python file that holds a part"),
+}
+
+
+@pytest.mark.parametrize("kind", COMPOSED)
+def test_parts_that_do_not_go_together(kind, tmp_path):
+    text, *said = COMPOSED[kind]
+    line = told(tmp_path, text)
+    assert all(words in line for words in said), line
+
+
+def test_two_targets_and_two_effectors_that_take_the_command(tmp_path):
+    (tmp_path / "mine.py").write_text(TARGET)
+    (tmp_path / "other.py").write_text(TARGET)
+    both = part(MINE) + part('file = "other.py"\n')
+    assert "one target" in told(tmp_path, BODY + both + PD)
+    line = told(tmp_path, BODY + '[target]\nangles = ["10 deg", 0, 0]\n' + part(MINE) + PD)
+    assert "part mine: found a second target, beside [target]; allowed: one target" in line
+    acting = EFFECTOR.replace('ROLE = "effector"\n', 'ROLE = "effector"\nACTS = True\n')
+    (tmp_path / "mine.py").write_text(acting + "\n\ndef command(applied, params):\n    return applied\n")
+    wheels = '[wheels]\nlayout = "orthogonal"\ninertia = 1e-3\ntorque_limit = 0.05\nmomentum_limit = 0.4\n'
+    assert "a second effector for the command" in told(tmp_path, BODY + wheels + part(MINE + PARTS["effector"][1]) + PD)
+
+
+def test_an_effector_on_a_body_that_does_not_turn(tmp_path):
+    (tmp_path / "mine.py").write_text(EFFECTOR.replace("ROLE = ", 'BODY = ""\nROLE = '))
+    line = told(tmp_path, POINT + part(MINE + PARTS["effector"][1]) + CIRCLE)
+    assert "an effector on the body libration-point; allowed: a body that turns" in line
+
+
+DRAG = "return scale(-params.drag, state.rate)"
+BROKEN = {
+    "syntax": ("environment", "def torque(state,", "def torque(state", "mine.py, line"),
+    "no card": ("environment", "CARD = Card(", "KARD = Card(", "this environment needs CARD"),
+    "not a card": ("environment", "CARD = Card(", "CARD = dict(", "CARD is not a Card"),
+    "import": ("environment", "import Quantity", "import Quantities", "mine.py, line 5: ImportError"),
+    "an unknown role": ("environment", 'ROLE = "environment"', 'ROLE = "thruster"', "its role must be one of effector"),
+    "no role": ("environment", 'ROLE = "environment"', "", "it declares no ROLE"),
+    "a role of its own tables": ("environment", 'ROLE = "environment"', 'ROLE = "law"', "its role must be one of"),
+    "no equation": ("environment", "def torque", "def torques", "this environment needs torque or acceleration"),
+    "no measure": ("sensor", "def measure", "def measures", "this sensor needs measure"),
+    "no needs": ("estimator", "NEEDS = ", "NEED = ", "this estimator needs NEEDS"),
+    "no momentum": ("effector", "def momentum", "def momenta", "this effector needs momentum"),
+    "no unit": (
+        "environment", 'Annotated[float, Parameter("N m s", at_least=0.0, text="torque for a radian a second")]', "float",
+        "Params.drag declares no unit",
+    ),
+    "an equation fails": ("environment", "state.rate)", "state.rates)", "part mine: mine.py, line 20: AttributeError"),
+    "it divides by nothing": ("environment", "-params.drag,", "1.0 / 0.0,", "mine.py, line 20: ZeroDivisionError"),
+    "two numbers of three": ("environment", DRAG, "return (0.0, 0.0)", "torque returns (0.0, 0.0)"),
+    "a torque of nothing": ("environment", DRAG, "return None", "torque returns None; allowed: three"),
+    "another memory": ("sensor", "params.noise))), memory", "params.noise))), (1.0,)", "a memory formed as the one"),
+    "a reading of two numbers": ("sensor", "Reading(add(add(state.rate, params.bias), dice.vector(0, params.noise)))",
+                                 "Reading((0.0, 0.0))", "rate formed as that of the body's state"),
+    "no pair": ("sensor", ", memory\n", "\n", "a pair of a Reading and the memory"),
+    "another effector's rates": ("effector", "return State(own.speed, ", "return (", "numbers formed as"),
+    "a goal of three": ("target", "Goal(params.attitude, ZERO, ZERO)", "(params.attitude, ZERO, ZERO)", "a Goal of four"),
+    "an undeclared record": ("effector", 'Annotated[float, Quantity("sqrt(kg) m", "modal deflection")]', "float",
+                             "annotated with a Quantity"),
+    "its start fails": ("effector", "State(params.deflection,", "State(params.deflexion,", "mine.py, line 37: Attr"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", BROKEN)
+def test_a_file_that_is_no_part_or_fails(kind, tmp_path):
+    role, old, new, said = BROKEN[kind]
+    text, keys = PARTS[role]
+    assert old in text
+    (tmp_path / "mine.py").write_text(text.replace(old, new))
+    before = GYRO if role == "estimator" else ""
+    assert said in told(tmp_path, BODY + before + part(MINE + keys) + PD)
+
+
+def test_a_branch_that_kernels_cannot_take(tmp_path):
+    line = "return tuple(where(less(absolute(x), params.dead), 0.0, x) for x in command)"
+    assert line in ACTUATOR
+    (tmp_path / "mine.py").write_text(ACTUATOR.replace(line, "return command if command[0] > 0.1 else (0.0, 0.0, 0.0)"))
+    (tmp_path / "own.toml").write_text(BODY + part(MINE + "dead = 1e-3\n") + PD)
+    done = starhold("run", "own.toml", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "mine.py" in done.stderr
+
+
+def test_a_part_and_a_law_from_files_are_told_apart(tmp_path):
+    (tmp_path / "mine.py").write_text(ENVIRONMENT)
+    (tmp_path / "own_law.py").write_text(LAW.replace("measurement.rate)", "measurement.rates)"))
+    law = '[[law]]\nfile = "own_law.py"\nk = 0.1\n'
+    assert "own_law.py, line 17: AttributeError" in told(tmp_path, BODY + part(MINE + "drag = 0.1\n") + law)
+    (tmp_path / "own_law.py").write_text(LAW)
+    (tmp_path / "mine.py").write_text(SENSOR.replace("state.rate,", "state.rates,"))
+    assert "part mine: mine.py, line 27: AttributeError" in told(tmp_path, BODY + part(MINE + "noise = 0.1\n") + law)
+
+
+def test_a_file_named_as_an_installed_part(tmp_path):
+    (tmp_path / "gyro.py").write_text(SENSOR)
+    line = told(tmp_path, BODY + part('file = "gyro.py"\nnoise = 1e-4\n') + PD)
+    assert "a part named gyro is installed already; rename the file" in line
+
+
+ROWS = {
+    "missing": (None, "rows.csv: No such file"),
+    "words": ("time,x,y,z\n0,0,0,much\n1,0,0,0\n", "rows.csv: could not convert string to float"),
+    "a column too few": ("0,0,0\n1,0,0\n", "has not 4 columns; allowed: a CSV file of time, x, y, z"),
+    "lines of other lengths": ("0,0,0,1\n1,0,0\n", "a CSV file of time, x, y, z"),
+    "nothing": ("time,x,y,z\n", "rows of time, x, y, z"),
+    "no number": ("0,0,0,nan\n1,0,0,0\n", "finite"),
+    "one row": ("0,0,0,1e-4\n", "at least two rows"),
+    "back in time": ("1,0,0,0\n0,0,0,1e-4\n", "times that increase"),
+    "bytes": (b"\xff\xfe0,0,0,0\n", "rows.csv: "),
+}
+
+
+@pytest.mark.parametrize("kind", ROWS)
+def test_a_table_that_is_none(kind, tmp_path):
+    text, said = ROWS[kind]
+    if text is not None:
+        (tmp_path / "rows.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
+    assert said in told(tmp_path, BODY + TABLE + PD)
+
+
+def test_rows_of_other_lengths_in_the_scenario_itself(tmp_path):
+    rows = part('type = "torque-table"\ntable = [[0, 0, 0, 1e-4], [1, 0, 0]]\n')
+    assert "part[1].table" in told(tmp_path, BODY + rows + PD)

@@ -1,0 +1,144 @@
+"""The conformance suite of parts: those of starhold pass all of it, and each check finds the fault that it is for."""
+
+import pytest
+
+from starhold.conformance.parts import CHECKS, examine_part, find_part
+from starhold.errors import InputError
+from starhold.parts.catalogue import PACKAGES, parts
+from tests.parts.files import ACTUATOR, ENVIRONMENT, PARTS
+
+ALL = [(role, name) for role in PACKAGES for name in parts(role)]
+NAMES = {check.__name__: (check.__doc__ or "").splitlines()[0].rstrip(".") for check in CHECKS}
+EVERY = {"declares_itself", "is_pure", "reads_alike", "stays_finite"}
+"""Checks that say something of every part but a body."""
+
+
+def outcomes(part):
+    """The outcome and reason of each check by name."""
+    verdicts = {verdict.name: verdict for verdict in examine_part(part)}
+    assert set(verdicts) == set(NAMES.values())
+    return {name: verdicts[text] for name, text in NAMES.items()}
+
+
+@pytest.mark.parametrize(("role", "name"), ALL)
+def test_parts_of_starhold_conform(role, name):
+    part = parts(role)[name]
+    found = outcomes(part)
+    assert [v for v in found.values() if v.outcome == "failed"] == []
+    if role != "body":
+        passed = {name for name, v in found.items() if v.outcome == "passed"}
+        assert passed >= EVERY
+        assert ("survives_toml" in passed) == (not part.table)
+        assert ("keeps_momentum" in passed) == (role == "effector")
+        assert ("measures_what_it_says" in passed) == (role in ("sensor", "estimator"))
+
+
+def test_the_parts_are_all_there():
+    assert set(PACKAGES) == {role for role, _ in ALL}
+    assert {"gyro", "star-tracker", "constant-torque", "torque-table", "lag", "rate-limit", "wheels"} <= {n for _, n in ALL}
+
+
+COUNTED = """
+CALLS = []
+
+
+def counted():
+    CALLS.append(1)
+    return 1e-6 * len(CALLS)
+
+
+def examples():"""
+PREPARED = "def prepare(params, period):\n    return Params(params.drag * period)\n\n\ndef torque"
+BROKEN = {
+    "a counter of its own": (
+        "environment",
+        {"scale(-params.drag,": "scale(counted() - params.drag,", "\ndef examples():": COUNTED},
+        {"is_pure", "reads_alike"},
+    ),
+    "a counter in a sensor": (
+        "sensor",
+        {"add(state.rate, params.bias)": "add(state.rate, (counted(), 0.0, 0.0))", "\ndef examples():": COUNTED},
+        {"is_pure", "reads_alike"},
+    ),
+    "a wrong unit": ("environment", {'"N m s"': '"N m"'}, {"keeps_units"}),
+    "a number without its unit": ("environment", {"scale(-params.drag,": "scale(-1e-3 - params.drag,"}, {"keeps_units"}),
+    "a wrong unit of a command's limit": ("actuator", {'Parameter("N m"': 'Parameter("N m s"'}, {"keeps_units"}),
+    "not a number": (
+        "environment",
+        {"scale(-params.drag,": "scale(params.drag / (dot(state.rate, state.rate) - dot(state.rate, state.rate)),"},
+        {"stays_finite"},
+    ),
+    "infinite at rest": (
+        "environment",
+        {"scale(-params.drag,": "scale(-1e-6 * params.drag / dot(state.rate, state.rate),"},
+        {"stays_finite", "keeps_units"},
+    ),
+    "a reading of two numbers": (
+        "sensor",
+        {"Reading(add(add(state.rate, params.bias), dice.vector(0, params.noise)))": "Reading(state.rate[:2])"},
+        {"measures_what_it_says"},
+    ),
+    "a reading without a unit": (
+        "sensor",
+        {'Annotated[tuple, Quantity("rad/s", "measured rate, body axes", "axis")]': "tuple"},
+        {"declares_itself"},
+    ),
+    "an example out of its bounds": ("sensor", {"[Params(1e-4)]": "[Params(-1e-4)]"}, {"declares_itself", "survives_toml"}),
+    "no example": ("sensor", {"[Params(1e-4)]": "[]"}, {"declares_itself"}),
+    "no title": ("target", {'title="Mine"': 'title=""'}, {"declares_itself"}),
+    "an example of another shape": ("effector", {"(0.5, 0.2, 0.9), 2.0": "[0.5, 0.2, 0.9], 2.0"}, {"declares_itself"}),
+    "a reaction of the wrong sign": (
+        "effector",
+        {"add(scale(spring(own, params)": "add(scale(-spring(own, params)"},
+        {"keeps_momentum"},
+    ),
+    "no gyroscopic torque of its momentum": (
+        "effector",
+        {"cross(scale(-own.speed, body.rate), params.coupling)": "ZERO"},
+        {"keeps_momentum"},
+    ),
+    "no inertia": ("effector", {"def inertia": "def inertia_of"}, {"keeps_momentum"}),
+    "the same numbers in every run": (
+        "sensor",
+        {"dice.vector(0, params.noise)": "type(dice)((1, 1), 1, 0).vector(0, params.noise + 0.0 * dice.vector(0, 1.0)[0])"},
+        {"draws_in_its_range"},
+    ),
+    "an estimate of two numbers": ("estimator", {"Estimate(rate),": "Estimate(rate[:2]),"}, {"measures_what_it_says"}),
+    "a unit without the period": (
+        "environment",
+        {"def torque": PREPARED},
+        {"keeps_units"},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", BROKEN)
+def test_each_fault_is_found(kind, tmp_path):
+    role, changes, found_by = BROKEN[kind]
+    text = PARTS[role][0]
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / "mine.py").write_text(text)
+    failed = {name for name, v in outcomes(find_part(str(tmp_path / "mine.py"))).items() if v.outcome == "failed"}
+    assert failed >= found_by, failed
+
+
+def test_every_check_has_found_something():
+    assert {name for _, _, found_by in BROKEN.values() for name in found_by} == set(NAMES)
+
+
+def test_a_part_that_prepares_its_numbers_for_the_control_period_keeps_its_units(tmp_path):
+    (tmp_path / "mine.py").write_text(ENVIRONMENT.replace("def torque", PREPARED).replace('"N m s"', '"N m"'))
+    assert outcomes(find_part(str(tmp_path / "mine.py")))["keeps_units"].outcome == "passed"
+
+
+def test_a_part_is_found_by_its_name_and_by_its_file(tmp_path):
+    assert find_part("gyro") is parts("sensor")["gyro"]
+    (tmp_path / "mine.py").write_text(ACTUATOR)
+    assert find_part(str(tmp_path / "mine.py")).role == "actuator"
+    assert find_part(parts("sensor")["gyro"].module.__file__) is parts("sensor")["gyro"]
+    for given, said in (("gyroo", "did you mean gyro?"), (str(tmp_path), "a Python file that holds a part")):
+        with pytest.raises(InputError, match=said.replace("?", r"\?")) as caught:
+            find_part(given)
+        assert "\n" not in str(caught.value)

@@ -1,0 +1,292 @@
+"""Parts against oracles: SciPy's integrator, interpolation, and statistics with bounds of their own standard errors."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from starhold.algebra.vector import ZERO
+from starhold.laws.catalogue import catalogue
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.bodies.rigid_body import State
+from starhold.parts.catalogue import fit
+from starhold.parts.craft import make_craft
+from starhold.parts.random import Dice
+from starhold.simulation.lane import fly, label
+
+INERTIA = np.array([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]])
+LAW = catalogue()["pd"]
+HOUR = 3600.0
+
+
+def free(*parts, rate=(0.02, -0.03, 0.05), period=0.1, substeps=4, limit=0.0, **gains):
+    """A body under these parts; with a limit of zero no command acts."""
+    start = State((0.6, 0.0, 0.8, 0.0), rate, ZERO, ZERO, ZERO)
+    own = LAW.gains(**({"k_rate": 0.9, "k_attitude": 0.09} | gains))
+    craft = make_craft(INERTIA.tolist(), torque_limit=0.05)
+    return ClosedLoop(craft, LAW, own, start, period, substeps, parts=parts, command_limit=limit)
+
+
+def flown(loop, steps, run=0):
+    """The recording of a flight."""
+    return label(loop, *fly(loop, steps, run=run), 1)
+
+
+def product(p, q):
+    """Quaternions (..., 4) multiplied."""
+    a, b, v, w = p[..., :1], q[..., :1], p[..., 1:], q[..., 1:]
+    return np.concatenate([a * b - np.sum(v * w, -1, keepdims=True), a * w + b * v + np.cross(v, w)], -1)
+
+
+def angles(true, measured):
+    """Small rotation vectors (n, 3) from true attitudes (n, 4) to measured ones, body axes."""
+    error = product(true * [1.0, -1.0, -1.0, -1.0], measured)
+    return 2.0 * error[:, 1:] * np.sign(error[:, :1])
+
+
+def to_body(q, v):
+    """A vector in inertial axes turned to those of a body with attitude q (inertial to body)."""
+    full = product(product(q * [1.0, -1.0, -1.0, -1.0], np.array([0.0, *v])), q)
+    return full[1:]
+
+
+def integrated(run, torque):
+    """Attitudes and rates of the free body under torque(t, q) (N m, body axes), by SciPy."""
+
+    def slope(t, y):
+        q, w = y[:4], y[4:]
+        spin = np.linalg.solve(INERTIA, torque(t, q) - np.cross(w, INERTIA @ w))
+        return [*(0.5 * product(q, np.array([0.0, *w]))), *spin]
+
+    times = run["time"]
+    start = [*run["attitude"][0], *run["rate"][0]]
+    steps = solve_ivp(slope, (0.0, times[-1]), start, "DOP853", times, rtol=1e-12, atol=1e-13, max_step=0.1).y
+    return steps[:4].T, steps[4:].T
+
+
+@pytest.mark.parametrize("axes", ["body", "inertial"])
+def test_a_constant_torque_turns_the_body_as_euler_s_equations_say(axes):
+    torque = (2e-3, -1e-3, 3e-3)
+    run = flown(free(fit("environment", "constant-torque", torque, ("body", "inertial").index(axes))), 300)
+    given = (lambda t, q: np.array(torque)) if axes == "body" else (lambda t, q: to_body(q, torque))
+    attitude, rate = integrated(run, given)
+    assert np.abs(run["attitude"] - attitude).max() < 1e-8
+    assert np.abs(run["rate"] - rate).max() < 1e-9
+    if axes == "inertial":
+        # The angular momentum in inertial axes grows by the torque's impulse.
+        momentum = [to_body(q * [1, -1, -1, -1], INERTIA @ w) for q, w in zip(run["attitude"], run["rate"], strict=True)]
+        assert np.abs(momentum[-1] - momentum[0] - 30.0 * np.array(torque)).max() < 1e-9
+
+
+@pytest.mark.parametrize("axes", ["body", "inertial"])
+def test_a_table_is_interpolated_at_control_steps_and_held_between(axes):
+    rows = ((0.55, 1e-3, 0.0, 0.0), (1.0, 2e-3, -3e-3, 1e-3), (2.5, 0.0, 4e-3, -1e-3), (4.25, 3e-3, 1e-3, 2e-3))
+    columns = np.array(rows).T
+    run = flown(free(fit("environment", "torque-table", rows, ("body", "inertial").index(axes))), 60)
+
+    def held(t):
+        # Held from the control step on; a step that ends there belongs to the one before.
+        begun = 0.1 * math.floor(t / 0.1 + 1e-9)
+        return np.array([np.interp(begun, columns[0], column, left=0.0, right=0.0) for column in columns[1:]])
+
+    rate, attitude = run["rate"], run["attitude"]
+    for k in range(60):
+        # A step at a time, for the torque jumps between them.
+        value = held(0.1 * k)
+
+        def slope(t, y, value=value):
+            own = value if axes == "body" else to_body(y[:4], value)
+            spin = np.linalg.solve(INERTIA, own - np.cross(y[4:], INERTIA @ y[4:]))
+            return [*(0.5 * product(y[:4], np.array([0.0, *y[4:]]))), *spin]
+
+        end = solve_ivp(slope, (0.0, 0.1), [*attitude[k], *rate[k]], "DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
+        assert np.abs(end[4:] - rate[k + 1]).max() < 1e-11, k
+    for outside in (0.1, 0.5, 4.3, 9.0):
+        assert not held(outside).any()
+    assert all(np.abs(held(t)).max() > 1e-4 for t in (0.6, 1.0, 2.5, 4.2))
+
+
+def readings(fitted, steps, run=0, rate=ZERO, period=0.1, name=None):
+    """What a sensor tells of a body that turns at a steady rate, as its equation says: readings (steps,)."""
+    numbers, found = fitted.prepared(period), []
+    state = State((1.0, 0.0, 0.0, 0.0), rate, ZERO, ZERO, ZERO)
+    memory = fitted.remembered(numbers, state)
+    for k in range(steps):
+        reading, memory = fitted.part.module.measure(state, memory, numbers, Dice((3, run), k, 0), k)
+        found.append(reading)
+    return found
+
+
+def test_the_noise_of_a_gyro_is_white_and_as_strong_as_it_says():
+    noise, period, steps = 1e-4, 0.1, 4000
+    run = flown(free(fit("sensor", "gyro", noise), period=period), steps)
+    error = (run["gyro_rate"] - run["rate"])[:steps]
+    deviation = noise / math.sqrt(period)
+    count = error.size
+    assert abs(error.mean()) < 4.0 * deviation / math.sqrt(count)
+    assert abs(error.std() / deviation - 1.0) < 4.0 / math.sqrt(2.0 * count)
+    for lag in (1, 2, 7):
+        # Correlations between steps and between axes.
+        assert abs(np.mean(error[lag:] * error[:-lag])) < 4.0 * deviation**2 / math.sqrt(count)
+    assert np.abs(np.corrcoef(error.T) - np.eye(3)).max() < 4.5 / math.sqrt(steps)
+    # The mean over a second has the deviation that is asked for; over m seconds it falls with the square root of m.
+    for seconds in (1, 4, 16):
+        means = error[: steps // (10 * seconds) * 10 * seconds].reshape(-1, 10 * seconds, 3).mean(1)
+        allan = math.sqrt(0.5 * np.mean(np.diff(means, axis=0) ** 2))
+        spread = math.sqrt(1.5 / (3 * len(means)))
+        assert abs(allan / (noise / math.sqrt(seconds)) - 1.0) < 4.0 * spread, seconds
+
+
+def test_the_bias_of_a_gyro_walks_with_the_square_root_of_time():
+    hour, start, steps, runs = 1e-3, (1e-4, -2e-4, 3e-4), 100, 150
+    loop = free(fit("sensor", "gyro", 0.0, start, hour), period=1.0, substeps=8)
+    biases = []
+    for run in range(runs):
+        recording = flown(loop, steps, run)
+        biases.append(recording["gyro_rate"] - recording["rate"])
+    biases = np.array(biases)
+    np.testing.assert_allclose(biases[:, 0], np.broadcast_to(start, (runs, 3)), atol=1e-17)
+    for step in (1, 10, 100):
+        change = biases[:, step] - start
+        wanted = hour * math.sqrt(step / HOUR)
+        assert abs(change.std() / wanted - 1.0) < 4.0 / math.sqrt(2.0 * change.size), step
+        assert abs(change.mean()) < 4.0 * wanted / math.sqrt(change.size)
+    # Increments are independent: of the later half nothing is told by the earlier one.
+    early, late = biases[:, 50] - biases[:, 0], biases[:, 100] - biases[:, 50]
+    assert abs(np.corrcoef(early.ravel(), late.ravel())[0, 1]) < 4.0 / math.sqrt(early.size)
+
+
+def test_a_gyro_s_scale_and_limit():
+    gyro = fit("sensor", "gyro", 0.0, (0.01, 0.0, 0.0), 0.0, 0.05, 0.2)
+    (reading,) = readings(gyro, 1, rate=(0.1, -0.3, 0.02))
+    assert reading.rate == pytest.approx((0.115, -0.2, 0.021))
+
+
+def test_the_noise_of_a_star_tracker_is_a_rotation_less_sure_about_the_boresight():
+    cross, roll, steps = 2e-5, 3e-4, 3000
+    boresight = np.array([0.0, 0.6, 0.8])
+    run = flown(free(fit("sensor", "star-tracker", cross, roll, (0.0, 1.2, 1.6))), steps)
+    error = angles(run["attitude"], run["star_tracker_attitude"])[:steps]
+    assert np.abs(np.linalg.norm(run["star_tracker_attitude"], axis=1) - 1.0).max() < 1e-14
+    about = error @ boresight
+    across = error @ np.array([[1.0, 0.0, 0.0], [0.0, 0.8, -0.6]]).T
+    bound = 4.0 / math.sqrt(2.0 * steps)
+    assert abs(about.std() / roll - 1.0) < bound
+    assert np.abs(across.std(0) / cross - 1.0).max() < bound
+    assert abs(about.mean()) < 4.0 * roll / math.sqrt(steps)
+    assert abs(np.mean(about[1:] * about[:-1])) < 4.0 * roll**2 / math.sqrt(steps)
+    assert np.abs(np.corrcoef(np.column_stack([about, across]).T) - np.eye(3)).max() < 4.5 / math.sqrt(steps)
+
+
+@pytest.mark.parametrize(("interval", "delay", "every", "late"), [(0.0, 0.3, 1, 3), (0.5, 0.0, 5, 0), (0.4, 0.7, 4, 7)])
+def test_a_star_tracker_tells_of_the_true_attitude_some_steps_ago_at_its_own_rate(interval, delay, every, late):
+    tracker = fit("sensor", "star-tracker", 0.0, 0.0, (0.0, 0.0, 1.0), interval, delay)
+    run = flown(free(tracker, rate=(0.2, -0.1, 0.3)), 40)
+    told, new = run["star_tracker_attitude"], run["star_tracker_attitude_is_new"]
+    # A sample shows the state at its time and what was measured of it.
+    steps = np.arange(40)
+    assert np.abs(told[:-1] - run["attitude"][np.maximum(steps // every * every - late, 0)]).max() < 1e-15
+    np.testing.assert_array_equal(new[:-1], (steps % every == 0) * 1.0)
+
+
+def test_a_law_is_told_what_the_star_tracker_says():
+    tracker = fit("sensor", "star-tracker", 0.0, 0.0, (0.0, 0.0, 1.0), 0.0, 0.5)
+    run = flown(replace(free(tracker, rate=(0.02, 0.0, 0.0)), limit="none"), 30)
+    # The rate is the true one: what is left of u = -k_rate w - k_attitude q is the attitude of five steps before.
+    felt = -(run["command"] + 0.9 * run["rate"]) / 0.09
+    told = run["attitude"][np.maximum(np.arange(31) - 5, 0), 1:]
+    assert np.abs(felt - told).max() < 1e-14
+    assert np.abs(felt - run["attitude"][:, 1:]).max() > 1e-3
+
+
+def test_a_filter_finds_the_bias_of_the_gyro():
+    bias = np.array([2e-3, -1e-3, 3e-3])
+    parts = (fit("sensor", "gyro", 0.0, tuple(bias.tolist())), fit("sensor", "star-tracker", 0.0, 0.0))
+    filtering = fit("estimator", "complementary-filter", 0.1, 0.05)
+    run = flown(free(*parts, filtering, rate=ZERO), 3000)
+    found = run["complementary_filter_gyro_bias"]
+    assert np.abs(found[-1] - bias).max() < 1e-9
+    assert np.abs(run["complementary_filter_rate"][-1]).max() < 1e-9
+    assert np.abs(angles(run["attitude"], run["complementary_filter_attitude"])[-1]).max() < 1e-9
+    # It settles as the linear recursion of its errors does: foretold with the bias of the step before, then put right.
+    error, left = np.zeros(3), -bias
+    for k in range(1, 300):
+        error = error - 0.1 * left
+        left = left + 0.05 * 0.1 * error
+        error = 0.9 * error
+        assert np.abs(found[k] - bias - left).max() < 1e-6, k
+
+
+def test_a_filter_of_a_body_that_turns_is_off_by_half_a_step_s_change_of_rate():
+    parts = (fit("sensor", "gyro", 0.0, (2e-3, -1e-3, 3e-3)), fit("sensor", "star-tracker", 0.0, 0.0))
+    filtering = fit("estimator", "complementary-filter", 0.1, 0.05)
+    run = flown(free(*parts, filtering, rate=(0.01, 0.02, -0.01)), 3000)
+    error = run["complementary_filter_rate"][2000:] - run["rate"][2000:]
+    change = np.abs(np.diff(run["rate"][2000:], axis=0)).max()
+    assert 0.1 * change < np.abs(error).max() < change
+    assert np.abs(angles(run["attitude"], run["complementary_filter_attitude"])[2000:]).max() < 1e-5
+
+
+def test_a_filter_halves_the_noise_as_its_gain_says():
+    gain, noise, steps = 0.05, 1e-3, 6000
+    parts = (fit("sensor", "gyro"), fit("sensor", "star-tracker", noise, noise))
+    run = flown(free(*parts, fit("estimator", "complementary-filter", gain, 0.0), rate=ZERO), steps)
+    error = angles(run["attitude"], run["complementary_filter_attitude"])[200:-1]
+    # A first-order filter passes gain / (2 - gain) of white noise's variance, with a memory of about 1 / gain steps.
+    wanted = noise * math.sqrt(gain / (2.0 - gain))
+    independent = error.size * gain / 2.0
+    assert abs(error.std() / wanted - 1.0) < 4.0 / math.sqrt(2.0 * independent)
+
+
+def test_a_lag_and_then_a_rate_limit_act_in_their_order():
+    lag, rate_limit, period = 0.5, 0.02, 0.1
+    chain = (fit("actuator", "lag", lag), fit("actuator", "rate-limit", rate_limit))
+    loop = free(*chain, rate=ZERO, limit=None, substeps=10)
+    run = flown(loop, 60)
+    command, torque = run["command"], run["torque"]
+    assert np.abs(np.diff(torque, axis=0)).max() <= rate_limit * period * (1.0 + 1e-9)
+    assert np.abs(np.diff(torque, axis=0)).max() > 0.99 * rate_limit * period
+    # The lag's output is exact between control steps; the limited one follows it on straight lines over substeps.
+    between, acts, h = np.zeros(3), np.zeros(3), period / 10
+    for k in range(60):
+        assert np.abs(acts - torque[k]).max() < 1e-8, k
+        for _ in range(10):
+            # As the method of fourth order sees it: at the start, the middle and the end of a substep.
+            begun, gap = acts, between - command[k]
+            for share, weight in ((0.0, 1.0), (0.5, 4.0), (1.0, 1.0)):
+                between = command[k] + gap * math.exp(-share * h / lag)
+                acts = acts + weight / 6.0 * np.clip(between - begun, -h * rate_limit, h * rate_limit)
+    lone = flown(free(chain[0], rate=ZERO, limit=None, substeps=10), 60)
+    exact = np.zeros(3)
+    for k in range(60):
+        assert np.abs(exact - lone["torque"][k]).max() < 1e-9, k
+        exact = lone["command"][k] + (exact - lone["command"][k]) * math.exp(-period / lag)
+
+
+def test_two_random_torques_draw_different_numbers():
+    loop = free(
+        fit("environment", "random-torque", 1e-3, called="one"), fit("environment", "random-torque", 1e-3, called="two")
+    )
+    memories = [fly(loop, steps)[1].memories.environments for steps in range(1, 300)]
+    first, second = (np.array([memory[place] for memory in memories]) for place in (0, 1))
+    assert not (first == second).any()
+    assert abs(np.corrcoef(first.ravel(), second.ravel())[0, 1]) < 4.0 / math.sqrt(first.size)
+    # The first draws what it draws alone.
+    alone = fly(replace(loop, parts=loop.parts[:1]), 299)[1].memories.environments
+    assert alone[0] == memories[-1][0]
+
+
+def test_two_sensors_and_a_torque_draw_different_numbers():
+    parts = [
+        fit("sensor", "gyro", 1e-3),
+        fit("sensor", "star-tracker", 1e-3, 1e-3),
+        fit("environment", "random-torque", 1e-3),
+    ]
+    loop = free(*parts)
+    run = flown(loop, 2000)
+    gyro = (run["gyro_rate"] - run["rate"])[:2000] / 1e-3 * math.sqrt(0.1)
+    tracker = angles(run["attitude"], run["star_tracker_attitude"])[:2000] / 1e-3
+    together = np.corrcoef(np.column_stack([gyro, tracker]).T)
+    assert np.abs(together - np.eye(6)).max() < 4.5 / math.sqrt(2000)
