@@ -189,4 +189,4 @@ def test_a_table_that_is_none(kind, tmp_path):
 
 def test_rows_of_other_lengths_in_the_scenario_itself(tmp_path):
     rows = part('type = "torque-table"\ntable = [[0, 0, 0, 1e-4], [1, 0, 0]]\n')
-    assert "part[1].table" in told(tmp_path, BODY + rows + PD)
+    assert "allowed: rows of time, x, y, z, or the name of a CSV file" in told(tmp_path, BODY + rows + PD)

@@ -62,7 +62,7 @@ def integrated(run, torque):
 
     times = run["time"]
     start = [*run["attitude"][0], *run["rate"][0]]
-    steps = solve_ivp(slope, (0.0, times[-1]), start, "DOP853", times, rtol=1e-12, atol=1e-13, max_step=0.1).y
+    steps = solve_ivp(slope, (0.0, times[-1]), start, "DOP853", times, rtol=1e-12, atol=1e-13).y
     return steps[:4].T, steps[4:].T
 
 
@@ -269,12 +269,12 @@ def test_two_random_torques_draw_different_numbers():
     loop = free(
         fit("environment", "random-torque", 1e-3, called="one"), fit("environment", "random-torque", 1e-3, called="two")
     )
-    memories = [fly(loop, steps)[1].memories.environments for steps in range(1, 300)]
+    memories = [fly(loop, steps)[1].memories.environments for steps in range(1, 120)]
     first, second = (np.array([memory[place] for memory in memories]) for place in (0, 1))
     assert not (first == second).any()
     assert abs(np.corrcoef(first.ravel(), second.ravel())[0, 1]) < 4.0 / math.sqrt(first.size)
     # The first draws what it draws alone.
-    alone = fly(replace(loop, parts=loop.parts[:1]), 299)[1].memories.environments
+    alone = fly(replace(loop, parts=loop.parts[:1]), 119)[1].memories.environments
     assert alone[0] == memories[-1][0]
 
 

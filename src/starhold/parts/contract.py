@@ -73,7 +73,11 @@ class Parameter:
             if value not in self.choices:
                 raise ValueError(f"must be one of {', '.join(self.choices)}")
             return self.choices.index(value)
-        array = np.asarray(value, dtype=float)
+        try:
+            array = np.asarray(value, dtype=float)
+        except ValueError:
+            # Rows of different lengths.
+            raise ValueError(f"must be {self.describe()}") from None
         if self.columns and (array.ndim != 2 or array.shape[1] != len(self.columns)):
             raise ValueError(f"must be {self.describe()}")
         if not np.isfinite(array).all():
