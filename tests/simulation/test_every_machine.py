@@ -89,7 +89,7 @@ def test_every_lane_of_many(name, width):
     differs = slice(0, 3) if loop.body.name == "libration-point" else slice(4, 7)
     starts[differs] = starts[differs] * np.linspace(0.3, 1.0, width) + np.linspace(1e-3, 0.0, width)
     batch = simulate_many(loop, starts, steps_of(name), first_run=RUN - width + 1, width=width)
-    same(batch.states[:, -1], numbers_of(legs(name)[-1].end)[: len(start)])
+    same(batch.states[:, -1], numbers_of(legs(name)[-1].end)[: len(batch.states)])
     assert len(np.unique(batch.states[differs.start])) == width
 
 

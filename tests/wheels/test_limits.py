@@ -109,7 +109,7 @@ def test_laws_see_the_lesser_of_their_limit_and_what_the_wheels_surely_give(kind
         _, loop = made(STIFF, limit=limit, allocation=allocation)
         assert loop.craft.torque_limit == (sure if given is None or kind == "none" else min(sure, given))
         # What is cut off before it is shared out is what the file says, and nothing else.
-        assert loop.setup().command_limit == (math.inf if given is None else given)
+        assert loop.setup().limit == (math.inf if given is None else given)
 
 
 def test_the_command_is_cut_off_where_the_file_says():
