@@ -14,7 +14,7 @@ from starhold.conformance.suite import examine, find_law
 from starhold.laws import catalogue as laws
 from starhold.laws.catalogue import Law, adopted, catalogue, from_file
 from starhold.parts import catalogue as parts
-from starhold.scenario.schema import json_schema
+from starhold.scenario.json_schema import json_schema
 from tests.running import starhold
 
 LAW = '''"""Feedback."""

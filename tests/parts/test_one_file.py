@@ -15,9 +15,9 @@ from starhold.conformance.parts import examine_part, find_part
 from starhold.conformance.suite import examine, find_law
 from starhold.laws import catalogue as laws
 from starhold.parts import catalogue as parts
+from starhold.scenario.json_schema import json_schema
 from starhold.scenario.parts import installed
 from starhold.scenario.reading import parse
-from starhold.scenario.schema import json_schema
 from tests.parts.files import BODY, LAW, PARTS, PD, part
 from tests.running import starhold
 

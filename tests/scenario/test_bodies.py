@@ -9,9 +9,10 @@ from starhold.laws.catalogue import catalogue
 from starhold.scenario import bodies as package
 from starhold.scenario.bodies import bodies, body_for
 from starhold.scenario.building import build
+from starhold.scenario.json_schema import json_schema
 from starhold.scenario.making import make_scenario
 from starhold.scenario.reading import builtin_text, load, open_scenario, parse
-from starhold.scenario.schema import LawTable, ScenarioTable, Timing, json_schema
+from starhold.scenario.schema import LawTable, ScenarioTable, Timing
 from starhold.scenario.writing import scenario_with
 
 BODY = "inertia = [2.0, 3.0, 4.0]\ntorque_limit = 0.01\n"
@@ -64,8 +65,8 @@ def test_a_scenario_is_opened_as_it_is_or_by_name():
 def test_a_file_has_one_body():
     law = "[[law]]\ntype = 'pd'\nk_rate = 0.1\nk_attitude = 0.1\n"
     nobody = SLEW.replace(f"[spacecraft]\n{BODY}", "") + law
-    assert message(nobody) == "my.toml: found no body; allowed: one of the tables [libration], [spacecraft]"
-    assert message("") == "my.toml: found no body; allowed: one of the tables [libration], [spacecraft]"
+    assert message(nobody) == "my.toml: found no body; allowed: one of the tables [body], [libration], [spacecraft]"
+    assert message("") == "my.toml: found no body; allowed: one of the tables [body], [libration], [spacecraft]"
     near = SLEW.replace("[spacecraft]", "[spacecrfat]") + law
     assert message(near) == "my.toml: spacecrfat: found an unknown key; did you mean spacecraft?"
     both = SLEW + "[libration]\n" + law

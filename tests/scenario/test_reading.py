@@ -19,9 +19,9 @@ from starhold.scenario.bodies import bodies
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.bodies.rigid_body.tables import RigidBodyTable
 from starhold.scenario.building import build
+from starhold.scenario.json_schema import json_schema
 from starhold.scenario.quantity import reader
 from starhold.scenario.reading import builtin_names, builtin_text, load, parse
-from starhold.scenario.schema import json_schema
 from starhold.scenario.template import template_text
 from starhold.scenario.writing import law_table
 
@@ -68,7 +68,7 @@ FAULTS = {
     "unknown table": ("[orbit]", "[orbits]", ["orbits", "unknown key", "orbit?"]),
     "unknown gain": ("k_rate = 0.09", "k_ratee = 0.09", ["law[1].k_ratee", "unknown key", "k_rate?"]),
     "missing gain": ("k_rate = 0.09", "", ["law[1].k_rate", "required"]),
-    "missing table": ("[spacecraft]", "[other]", ["no body", "[libration], [spacecraft]"]),
+    "missing table": ("[spacecraft]", "[other]", ["no body", "[body], [libration], [spacecraft]"]),
     "wrong type": ("duration = 2000.0", "duration = true", ["simulation.duration", "True", "a number in s"]),
     "wrong type of a table": ("[orbit]", "orbit = 3\n[x]", ["orbit"]),
     "text for a number": ("duration = 2000.0", 'duration = "long"', ["simulation.duration", '"long"', "1 s"]),

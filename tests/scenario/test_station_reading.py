@@ -13,8 +13,8 @@ from starhold.laws.catalogue import catalogue
 from starhold.parts.bodies.libration_point import EARTH_DIAMETER, PRIMARIES
 from starhold.scenario.bodies.libration_point.tables import LibrationPointTable, PointLawTable
 from starhold.scenario.building import build
+from starhold.scenario.json_schema import json_schema
 from starhold.scenario.reading import builtin_text, load, parse
-from starhold.scenario.schema import json_schema
 from starhold.scenario.template import template_text
 
 BASE = builtin_text("l2-circle")

@@ -138,6 +138,13 @@ def _rests(turn: float, subject: Mapping[str, Any], more: bool) -> str:
     )
 
 
+def unclaimed(subject: Mapping[str, Any]) -> str:
+    """Why a certificate claims nothing."""
+    if "body" in subject:
+        return f"nothing is known of the body {subject['body']} that a proof could be built on"
+    return "proofs are for laws with a Lyapunov function, one root, or a surface and no wheels"
+
+
 def _even(subject: Mapping[str, Any]) -> bool:
     """Whether the law takes both quaternions of an attitude for the same."""
     law = known_law(subject.get("law", ""))

@@ -28,6 +28,7 @@ from starhold.checker.shapes import (
     OBLIGATION,
     STATION,
     SUBJECT,
+    UNKNOWN_BODY,
     WITNESS,
     outcome_of,
     shaped,
@@ -90,6 +91,10 @@ def check(content: Any) -> list[Finding]:
 
 def _certificate(given: Mapping[str, Any]) -> Iterator[Finding]:
     name = str(given.get("name", ""))
+    if "body" in given.get("subject", ()):
+        _, fault = _guarded(partial(_of_unknown_body, given))
+        yield Finding(name, "", "", "fails" if fault else "not claimed", fault or "nothing is known of this body")
+        return
     subject, fault = _guarded(partial(_subject, given))
     if subject is None:
         yield Finding(name, "", "", "fails", fault)
@@ -115,6 +120,12 @@ def _guarded(work: Callable[[], Any]) -> tuple[Any, str]:
         return None, str(fault)
     except (ArithmeticError, AttributeError, LookupError, MemoryError, RecursionError, TypeError, ValueError) as error:
         return None, f"cannot be verified: {error}"
+
+
+def _of_unknown_body(given: Any) -> None:
+    shaped(given, CERTIFICATE, "the certificate")
+    shaped(given["subject"], UNKNOWN_BODY, "the subject")
+    demand(not given["claims"] and given["outcome"] == "undecided", "it claims what is not known of this body")
 
 
 def _subject(given: Any) -> LoopSubject | StationSubject:

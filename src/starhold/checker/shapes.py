@@ -159,6 +159,8 @@ SUBJECT: dict[str, Test] = {
     "assumed_away": _list(_text),
     "wheels": _or_none(_within(_WHEELS)),
 }
+UNKNOWN_BODY: dict[str, Test] = {"body": _text, "law": _text}
+"""The subject where nothing is known of the body."""
 STATION: dict[str, Test] = {
     "law": _text,
     "gains": lambda x: _object(x) and all(map(_gain, x.values())),

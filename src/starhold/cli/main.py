@@ -261,7 +261,7 @@ def schema() -> None:
 def _schema_text() -> str:
     import json
 
-    from starhold.scenario.schema import json_schema
+    from starhold.scenario.json_schema import json_schema
 
     return json.dumps(json_schema(), indent=1) + "\n"
 

@@ -9,7 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from starhold.certification.certificate import Certificate, Claim
-from starhold.certification.wording import HEADINGS, OBLIGATIONS, eigenvalues, evidence, methods, sentence
+from starhold.certification.wording import HEADINGS, OBLIGATIONS, eigenvalues, evidence, methods, sentence, unclaimed
 from starhold.cli.show import console
 from starhold.report.text import left_text
 
@@ -36,10 +36,7 @@ def print_certificate(tried: Tried) -> None:
     certificate, trial, inside = tried
     console.print(f"[bold]{_safe(certificate.name)}[/bold]: {_coloured(certificate.outcome)}", highlight=False)
     if not certificate.claims:
-        console.print(
-            "  no claim: proofs are for laws with a Lyapunov function, one root, or a surface and no wheels",
-            highlight=False,
-        )
+        console.print(f"  no claim: {_safe(unclaimed(certificate.subject))}", highlight=False)
     table = Table(show_edge=False, pad_edge=False, box=None, show_header=False)
     for _ in range(3):
         table.add_column(overflow="fold")

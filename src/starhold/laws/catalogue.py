@@ -47,7 +47,7 @@ class Law(Part):
     @property
     def equation(self) -> str:
         """The module calls the equation of the command by this name."""
-        return _commands()[self.body]
+        return parts.find("body", self.body).module.COMMAND
 
     @property
     def gains(self) -> Any:
@@ -106,7 +106,7 @@ class Law(Part):
 
 @cache
 def _commands() -> dict[str, str]:
-    """Return for each body the name by which its laws call the equation of the command."""
+    """Return for each installed body the name by which its laws call the equation of the command."""
     return {name: part.module.COMMAND for name, part in parts.parts("body").items()}
 
 
@@ -157,11 +157,9 @@ def from_file(path: Path, known: Mapping[str, Law] | None = None) -> Law:
 def as_law(module: ModuleType, path: Path | None = None) -> Law:
     """The law in a module. ValueError, one line, where it lacks a part of the contract."""
     body = getattr(module, "BODY", None)
-    commands = _commands() if body is None else {name: word for name, word in _commands().items() if name == body}
-    if not commands:
-        raise ValueError(f"{module.__file__}: there is no body {body}; one of {', '.join(_commands())}")
-    if not any(hasattr(module, command) for command in commands.values()):
-        raise ValueError(f"{module.__file__}: a law needs {' or '.join(commands.values())}")
+    commands = _commands().values() if body is None else [_command_of(body, module, path)]
+    if not any(hasattr(module, command) for command in commands):
+        raise ValueError(f"{module.__file__}: a law needs {' or '.join(commands)}")
     law = parts.make(Law, module, path, ("Gains", "examples"))
     try:
         for form in (None, *law.forms):
@@ -171,3 +169,18 @@ def as_law(module: ModuleType, path: Path | None = None) -> Law:
     if not isinstance(module.CARD, Card):
         raise ValueError(f"{module.__file__}: CARD is not a Card of starhold.laws.interface")
     return law
+
+
+def _command_of(body: Any, module: ModuleType, path: Path | None) -> str:
+    """The name of the command of the body that a law's module names. A body that is not known yet may stand in a file of its
+    name beside that of the law."""
+    try:
+        return parts.find("body", body).module.COMMAND
+    except (KeyError, TypeError):
+        beside = None if path is None else path.with_name(f"{body}.py".replace("-", "_"))
+        if beside is None or not beside.is_file():
+            known = ", ".join(_commands())
+            raise ValueError(
+                f"{module.__file__}: there is no body {body}; one of {known}, or a file beside the law's"
+            ) from None
+    return parts.body_from_file(beside).module.COMMAND

@@ -153,8 +153,9 @@ class ClosedLoop:
 
     @property
     def body(self) -> Part:
-        """The part that moves."""
-        return find("body", self.law.body)
+        """The part that moves: one among the parts, else that of the name that the law says."""
+        own = self.used("body")
+        return own[0].part if own else find("body", self.law.body)
 
     def used(self, role: str) -> tuple[Fitted, ...]:
         """The parts of a role."""
@@ -217,7 +218,7 @@ class ClosedLoop:
             None if estimator is None else estimator.part,
             used["actuator"],
             self.limit,
-            self.sign_policy if self.body.module.SIGN_POLICIES else "",
+            self.sign_policy if self.body.flag("SIGN_POLICIES") else "",
         )
 
     @property

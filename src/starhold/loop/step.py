@@ -53,7 +53,7 @@ def make_equations(parts: Composition) -> Step:
     """The equations of a control step made of these parts."""
     body, target = parts.body.module, parts.target
     command_of, limit = parts.law.command, LIMITS[parts.limit]
-    policy = body.SIGN_POLICIES.get(parts.sign_policy)
+    policy = getattr(body, "SIGN_POLICIES", {}).get(parts.sign_policy)
     named = _Named(parts)
     still = target is None or target.flag("STILL")
     follows = target is not None and target.flag("FOLLOWS")

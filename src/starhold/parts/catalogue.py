@@ -33,7 +33,7 @@ PACKAGES = {
 }
 """Where starhold's own parts of a role stand."""
 DEMANDED: dict[str, tuple[str, ...]] = {
-    "body": ("COMMAND", "State", "Measurement", "Sample", "rates", "observe", "sample"),
+    "body": ("COMMAND", "State", "Measurement", "Sample", "rates", "renormalised", "is_sound", "observe", "sample"),
     "effector": ("Params", "examples", "reaction", "rates", "momentum"),
     "environment": ("Params", "examples"),
     "sensor": ("Params", "examples", "Reading", "measure"),
@@ -55,9 +55,24 @@ def parts(role: str) -> dict[str, Part]:
     return installed(PACKAGES[role], role, as_part)
 
 
+_BODIES: dict[str, Part] = {}
+"""Bodies from files, by name: the one read last of those so called."""
+
+
 def find(role: str, name: str) -> Part:
-    """The installed part of this role and name. KeyError where there is none."""
-    return parts(role)[name]
+    """The part of this role and name that is installed, or the body read from a file so called. KeyError where there is
+    none."""
+    return _BODIES[name] if role == "body" and name in _BODIES else parts(role)[name]
+
+
+def body_from_file(path: Path) -> Part:
+    """The body in a file, which is run for it and from then on found by its name. Errors as of `from_file`."""
+    body = from_file(path, parts("body"), as_part)
+    if body.role != "body":
+        raise ValueError(f"its ROLE must be body, not {body.role}")
+    if body.file is not None:
+        _BODIES[body.name] = body
+    return body
 
 
 def fit(role: str, name: str, *numbers: Any, called: str = "", start: Any = None) -> Fitted:

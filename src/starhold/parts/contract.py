@@ -132,11 +132,14 @@ class Field:
 
 
 @cache
-def fields(cls: Any) -> list[Field]:
-    """Read the declared parameters of a NamedTuple class (`Params`, `Gains`, a design form), in order."""
+def fields(cls: Any, but: str = "") -> list[Field]:
+    """Read the declared parameters of a NamedTuple class (`Params`, `Gains`, a design form), in order; `but`: the name of a
+    field that is left out."""
     found: list[Field] = []
     hints = get_type_hints(cls, include_extras=True)
     for name in cls._fields:
+        if name == but:
+            continue
         hint = hints[name]
         gain = next((a for a in get_args(hint)[1:] if isinstance(a, Parameter)), None)
         if get_origin(hint) is not Annotated or gain is None:

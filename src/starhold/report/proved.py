@@ -7,7 +7,7 @@ from html import escape
 from typing import Any
 
 from starhold.certification.certificate import FILE, Claim, Obligation
-from starhold.certification.wording import HEADINGS, OBLIGATIONS, evidence, methods, sentence
+from starhold.certification.wording import HEADINGS, OBLIGATIONS, evidence, methods, sentence, unclaimed
 from starhold.report.colours import colour
 from starhold.report.text import left_text, number_text
 from starhold.studies.flight import Flight
@@ -71,10 +71,8 @@ def _law(flight: Flight, number: int, place: int) -> str:
         _claim(claim, certificate.subject, left_text(flight, place, claim.kind)) for claim in certificate.claims
     )
     if not claims:
-        claims = (
-            '<p class="note">Nothing is claimed, so nothing is proved: this law comes without a Lyapunov function or a '
-            "sliding surface to build a proof on.</p>"
-        )
+        why = escape(unclaimed(certificate.subject))
+        claims = f'<p class="note">Nothing is claimed, so nothing is proved: {why}.</p>'
     return f'<section class="law">{head}{claims}</section>\n'
 
 

@@ -13,7 +13,7 @@ def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
     cannot follow what is in the loop."""
     loop = scenario.hooks.build(scenario, entry)
     check_fit(loop, scenario.where)
-    try_parts(loop, scenario.where)
+    try_parts(loop, scenario.where, f"law {entry.name}")
     check_substeps(loop, scenario.where)
     try_law(loop, scenario.where, f"law {entry.name}")
     scenario.hooks.examine(scenario, entry, loop)

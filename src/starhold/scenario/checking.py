@@ -85,14 +85,14 @@ def numbered(laws: Any, where: str) -> list[tuple[str, Any]]:
 
 
 def pick_law(
-    data: Any, known: Mapping[str, Law], folder: Path, where: str, key: str
+    data: Any, known: Mapping[str, Law], body: str, folder: Path, where: str, key: str
 ) -> tuple[dict[str, Any], Law, str | None]:
     """A law table with its type, the law of that type or in the `file` of the table, which is relative to a folder, and its
-    form."""
+    form; known: the installed laws for the body of this name."""
     if not isinstance(data, dict):
         raise InputError(where, key, show(data), "a [[law]] table")
     table = cast(dict[str, Any], data)
-    law = _law_of(table, known, where, key) if "file" not in table else _law_in(table, known, folder, where, key)
+    law = _law_of(table, known, where, key) if "file" not in table else _law_in(table, known, body, folder, where, key)
     table = {name: value for name, value in table.items() if name != "file"} | {"type": law.name}
     form = table.get("form")
     if form is not None and (not isinstance(form, str) or form not in law.forms):
@@ -105,11 +105,12 @@ def _law_of(table: dict[str, Any], known: Mapping[str, Law], where: str, key: st
     name = table.get("type")
     if not isinstance(name, str) or name not in known:
         allowed = nearest(name, list(known)) if isinstance(name, str) else f"{nearest('', list(known))}; or a file"
+        allowed = allowed if known else "a file, for no law for this body is installed"
         raise InputError(where, f"{key}.type", show(name) if name is not None else "nothing", allowed)
     return known[name]
 
 
-def _law_in(table: dict[str, Any], known: Mapping[str, Law], folder: Path, where: str, key: str) -> Law:
+def _law_in(table: dict[str, Any], known: Mapping[str, Law], body: str, folder: Path, where: str, key: str) -> Law:
     given, key = table["file"], f"{key}.file"
     if not isinstance(given, str):
         raise InputError(where, key, show(given), 'the name of a Python file, such as "mine.py"')
@@ -117,9 +118,8 @@ def _law_in(table: dict[str, Any], known: Mapping[str, Law], folder: Path, where
         raise InputError(where, key, show(given), "either a type or a file, not both")
     try:
         law = from_file(folder / given, known)
-        bodies = {one.body for one in known.values()}
-        if law.body not in bodies:
-            raise ValueError(f"a law for the body {law.body}, not for {', '.join(bodies)}")
+        if law.body != body:
+            raise ValueError(f"a law for the body {law.body}, not for {body}")
     except OSError as error:
         raise InputError(where, key, f"{show(given)}: {error.strerror}", "a Python file that holds a law") from None
     except ValueError as error:

@@ -3,7 +3,6 @@ package."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -21,8 +20,8 @@ from starhold.loop.step import make_equations
 from starhold.parts.catalogue import PACKAGES, as_part, from_file, parts, read_module, role_of, told
 from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import Goal
-from starhold.scenario.checking import free_name, nearest, show, validate
-from starhold.scenario.quantity import any_quantity
+from starhold.scenario.checking import free_name, nearest, show, try_law, validate
+from starhold.scenario.schema import columns
 from starhold.scenario.tables import Name, Table, check_name
 
 ROLES = tuple(role for role in PACKAGES if role != "body")
@@ -46,13 +45,7 @@ def installed() -> dict[str, Part]:
 @cache
 def part_model(part: Part) -> type[Any]:
     """The table of a part."""
-    entries: dict[str, Any] = {"type": (Literal[part.name], part.name)}
-    for item in part.fields():
-        written = item.gain.choices[item.default] if item.gain.choices and not item.required else item.default
-        # What is unlimited by default may be left out.
-        written = None if isinstance(written, float) and not math.isfinite(written) else written
-        kind = Annotated[Any, *any_quantity(item.gain), Field(validate_default=written is not None)]
-        entries[item.name] = (kind, ... if item.required else written)
+    entries: dict[str, Any] = {"type": (Literal[part.name], part.name), **columns(part.fields())}
     title = part.name.replace("-", " ").title().replace(" ", "")
     return create_model(title, __base__=PartTable, __doc__=part.card.summary, **entries)
 
@@ -74,13 +67,17 @@ def read_parts(tables: Any, body: str, folder: Path, where: str, units: Any = No
         if part.body not in ("", body):
             raise InputError(where, key, f"{part.name}, for the body {part.body}", f"a part for {body}")
         table = {name: value for name, value in table.items() if name != "file"} | {"type": part.name}
-        table = _with_rows(part, table, folder, where, key)
+        table = with_rows(part, table, folder, where, key)
         read = validate(part_model(part), table, where, key, ["file"], units)
         taken = {fitted.name for fitted in found}
-        values = {item.name: getattr(read, item.name) for item in part.fields()}
-        params = part.params(**{name: value for name, value in values.items() if value is not None})
-        found.append(Fitted(part, params, free_name(read.name, part.name, taken, where, key)))
+        found.append(Fitted(part, params_of(part, read), free_name(read.name, part.name, taken, where, key)))
     return tuple(found)
+
+
+def params_of(part: Part, read: Any) -> Any:
+    """The parameters of a part from its validated table."""
+    values = {item.name: getattr(read, item.name) for item in part.fields()}
+    return part.params(**{name: value for name, value in values.items() if value is not None})
 
 
 def _of_type(table: dict[str, Any], where: str, key: str) -> Part:
@@ -115,7 +112,7 @@ def _in_file(table: dict[str, Any], folder: Path, where: str, key: str) -> Part:
     return part
 
 
-def _with_rows(part: Part, table: dict[str, Any], folder: Path, where: str, key: str) -> dict[str, Any]:
+def with_rows(part: Part, table: dict[str, Any], folder: Path, where: str, key: str) -> dict[str, Any]:
     """The table with the rows of CSV files in place of their names."""
     found = dict(table)
     for item in part.fields():
@@ -178,9 +175,9 @@ def _key(fitted: Fitted) -> str:
     return f"part {fitted.called}"
 
 
-def try_parts(loop: ClosedLoop, where: str) -> None:
+def try_parts(loop: ClosedLoop, where: str, key: str) -> None:
     """InputError where a part cannot work with its numbers, or a part's file fails: a control step is flown in plain Python,
-    which goes through all of it."""
+    which goes through all of it. `key`: what errors call the law."""
     for fitted in loop.parts:
         if fitted.part.file is None:
             try:
@@ -200,8 +197,11 @@ def try_parts(loop: ClosedLoop, where: str) -> None:
     except InputError:
         raise
     except Exception:
-        # A fault of the law's, which is tried next, and told then.
-        return
+        # The law's own file may be at fault; else what a part gives does not fit where it is taken.
+        try_law(loop, where, key)
+        guilty = next(f for f in loop.parts if f.part.file is not None)
+        allowed = "its equations must return states formed as those they are given"
+        raise InputError(where, _key(guilty), "", allowed) from None
 
 
 def _watched(fitted: Fitted, loop: ClosedLoop, where: str) -> Fitted:

@@ -177,7 +177,7 @@ def read_tables(data: Mapping[str, Any], text: str, where: str, folder: Path, al
 def _read_law(data: Any, scenario: Scenario, context: Any, key: str, taken: set[str]) -> LawEntry:
     """The law of a raw table, for a scenario that as yet has none."""
     body, where, craft = scenario.hooks, scenario.where, scenario.craft
-    found, law, form = pick_law(data, body.laws(), scenario.folder, where, key)
+    found, law, form = pick_law(data, body.laws(), body.name, scenario.folder, where, key)
     extra = ["file", *(["form"] if law.forms else [])]
     own = validate(law_model(law, form, body.law_table), found, where, key, extra, context)
     values = [getattr(own, item.name) for item in law.fields(form)]

@@ -1,7 +1,8 @@
-"""The tables that scenarios of every body share, those of laws, and the JSON Schema of all."""
+"""The tables that scenarios of every body share, and those of laws."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from functools import cache
 from typing import Annotated, Any, ClassVar, Literal
@@ -11,10 +12,7 @@ from pydantic import Field, create_model, model_validator
 from starhold.laws.catalogue import Law
 from starhold.laws.interface import Field as Parameter
 from starhold.laws.interface import Gain
-from starhold.scenario.bodies import bodies
-from starhold.scenario.bodies.interface import Body
 from starhold.scenario.checking import MOST_SUBSTEPS
-from starhold.scenario.parts import part_schemas
 from starhold.scenario.quantity import any_quantity, quantity
 from starhold.scenario.tables import Name, Table, at_key
 
@@ -71,7 +69,8 @@ def columns(declared: Iterable[Parameter]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for item in declared:
         written = item.gain.choices[item.default] if item.gain.choices and not item.required else item.default
-        # What has None for its default may be left out.
+        # What has None for its default, or is unlimited by default, may be left out.
+        written = None if isinstance(written, float) and not math.isfinite(written) else written
         kind = Annotated[Any, *any_quantity(item.gain), Field(validate_default=written is not None)]
         found[item.name] = (kind, ... if item.required else written)
     return found
@@ -85,37 +84,3 @@ def law_model(law: Law, form: str | None, base: type[LawTable]) -> Any:
         entries["form"] = (Literal[form], form)
     title = law.name.replace("-", " ").title().replace(" ", "") + (form or "").title()
     return create_model(title, __base__=base, __doc__=law.card.summary, **entries, **columns(law.fields(form)))
-
-
-def json_schema() -> dict[str, Any]:
-    """A JSON Schema of scenario files of every body, for completion and checks in editors."""
-    known = [_file_schema(body) for body in bodies().values()]
-    shared: dict[str, Any] = {}
-    for schema in known:
-        shared |= schema.pop("$defs", {})
-    title = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "starhold scenario", "type": "object"}
-    return {**title, "anyOf": known, "$defs": shared}
-
-
-def _file_schema(body: Body) -> dict[str, Any]:
-    """A JSON Schema of the files of one body: its tables, those of its laws, gains and design forms, and of its parts."""
-    base = body.law_table
-    models = [law_model(law, form, base) for law in body.laws().values() for form in (None, *law.forms)]
-    schema = body.tables.model_json_schema()
-    tables: list[dict[str, Any]] = []
-    for model in models:
-        table = model.model_json_schema()
-        schema.setdefault("$defs", {}).update(table.pop("$defs", {}))
-        # TOML tables name their type, though pydantic has a default for it.
-        table["required"] = sorted({"type", *table.get("required", [])} | ({"form"} & set(table["properties"])))
-        tables.append(table)
-    shared = base.model_json_schema()
-    shared["properties"].pop("type")
-    file = {"type": "string", "description": "a Python file that holds a law, relative to this one; it is run"}
-    tables.append({"title": "LawFromFile", "type": "object", "properties": {"file": file, **shared["properties"]}})
-    tables[-1] |= {"required": ["file"], "not": {"required": ["type"]}}
-    schema.setdefault("$defs", {}).update(shared.get("$defs", {}))
-    schema["properties"]["law"] = {"type": "array", "minItems": 1, "items": {"anyOf": tables}}
-    schema["properties"]["part"] = {"type": "array", "items": {"anyOf": part_schemas(body.name)}}
-    schema["required"].append("law")
-    return schema

@@ -171,11 +171,11 @@ def label(loop: ClosedLoop, samples: NDArray[np.float64], carry: Carry, record_e
         "record_every": record_every,
         f"{loop.body.module.COMMAND}_limit": loop.cutoff(),
         "limit": loop.limit,
-        "parts": ", ".join(fitted.called for fitted in loop.parts),
+        "parts": ", ".join(fitted.called for fitted in loop.parts if fitted.part.role != "body"),
     }
     if carry.lost_at >= 0.0:
         attrs["diverged_at"] = carry.lost_at * loop.period
-    return Recording(arrays, attrs, columns, loop.body.module.TIME_UNIT)
+    return Recording(arrays, attrs, columns, getattr(loop.body.module, "TIME_UNIT", "s"))
 
 
 def recorded(loop: ClosedLoop) -> list[tuple[str, Quantity, int]]:

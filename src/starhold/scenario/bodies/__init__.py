@@ -1,4 +1,5 @@
-"""The bodies that scenarios can be about: each module or folder here is one, and is named nowhere else."""
+"""The bodies that scenarios can be about: each module or folder here tells the tables of one, and is named nowhere else;
+`any_body` tells those of all others."""
 
 from __future__ import annotations
 
@@ -12,6 +13,7 @@ from typing import Any
 
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law
+from starhold.parts.catalogue import find, parts
 from starhold.scenario.bodies.interface import Body
 
 
@@ -25,7 +27,7 @@ def bodies() -> dict[str, Body]:
 
 def body_of(tables: Mapping[str, Any], where: str, folder: Path) -> Body:
     """The body that the tables of a file are about, by its marker; InputError for none and for several."""
-    markers = {body.marker: body for body in bodies().values()}
+    markers = {body.marker: body for body in (_any_body().NAMED_BY_TABLE, *bodies().values())}
     there = [marker for marker in markers if marker in tables]
     if len(there) > 1:
         raise InputError(where, there[1], f"a second body beside [{there[0]}]", "one of the two")
@@ -40,4 +42,17 @@ def body_of(tables: Mapping[str, Any], where: str, folder: Path) -> Body:
 
 def body_for(law: Law) -> Body:
     """The body that a law is for."""
-    return next(body for body in bodies().values() if body.name == law.body)
+    return bodies().get(law.body) or _any_body().AnyBody(find("body", law.body))
+
+
+def others() -> list[Body]:
+    """The bodies without tables of their own: each that is installed, and one that stands for those in files."""
+    return [
+        _any_body().NAMED_BY_TABLE,
+        *(_any_body().AnyBody(part) for name, part in parts("body").items() if name not in bodies()),
+    ]
+
+
+def _any_body() -> Any:
+    # Its tables are made of `schema`, which asks here for all bodies.
+    return import_module(f"{__name__}.any_body")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, final
 
 from starhold.analysis.any_body import measure, metric_set
+from starhold.certification.certificate import Certificate
 from starhold.simulation.lane import label
 from starhold.studies.body import BodyStudy, Issued, Values
 
@@ -39,7 +40,8 @@ class AnyBodyStudy:
         return {}
 
     def certify(self, scenario: Scenario, entry: LawEntry, loop: Any) -> list[Issued]:
-        return []
+        # A certificate without claims is undecided.
+        return [Issued(Certificate(entry.name, {"body": scenario.body, "law": entry.law.name}, ()), loop)]
 
     def departures(self, issued: Issued, loop: Any, run: Recording) -> dict[str, tuple[Departure, ...]]:
         return {}

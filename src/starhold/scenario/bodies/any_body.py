@@ -1,0 +1,292 @@
+"""Scenarios of any body that has no tables of its own, known by their [body] table: a part that is installed, or one in a
+file. The part's parameters are the keys of [body], its state's fields those of [initial]."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, cast
+
+from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo, create_model, model_validator
+from pydantic_core import PydanticCustomError
+
+from starhold.algebra.quantity import quantities
+from starhold.algebra.vector import ZERO
+from starhold.errors import InputError
+from starhold.laws.catalogue import Law, catalogue
+from starhold.laws.interface import Gain
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.loop.kernels import make_step
+from starhold.parts import contract
+from starhold.parts.catalogue import body_from_file, parts, told
+from starhold.parts.part import Fitted, Part
+from starhold.scenario import bodies
+from starhold.scenario.bodies.interface import Body
+from starhold.scenario.checking import nearest, show
+from starhold.scenario.parts import params_of, with_rows
+from starhold.scenario.quantity import quantity
+from starhold.scenario.schema import LawTable, ScenarioTable, Timing, columns
+from starhold.scenario.tables import Table, at_key, check_name
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import LawEntry, Scenario
+
+MARKER = "body"
+
+
+class AnyTiming(Timing):
+    """How long and how finely."""
+
+    lost_beyond: Annotated[
+        float | None, *quantity(Gain(above=0.0, text="distance at which the body counts its motion as lost; none if absent"))
+    ] = None
+    seed: Annotated[int, *quantity(Gain("1", at_least=0, at_most=2**53, whole=True, text="of all random numbers"))] = 1
+
+    @model_validator(mode="after")
+    def _whole_steps(self) -> AnyTiming:
+        count = self.duration / self.control_period
+        if abs(count - round(count)) > 1e-6:
+            raise at_key("duration", f"a whole number of control periods of {self.control_period:g}", self.duration)
+        return self
+
+
+class BodyFromFile(Table):
+    """Any body, in a file."""
+
+    model_config = ConfigDict(extra="allow")
+    file: Annotated[str, Field(description="a Python file that holds a body, relative to this one; it is run")]
+
+
+class AnyCommand(Table):
+    """The limit of every law's command."""
+
+    limit: Annotated[float | None, *quantity(Gain(above=0.0, text="largest command; none if absent"))] = None
+    limit_kind: Annotated[
+        Literal["axis", "norm"], Field(description="whether the limit holds for each axis or for the norm")
+    ] = "axis"
+
+
+class BodyFromFileTables(ScenarioTable):
+    """A whole file about a body in a file, but for its law tables and for what that body declares."""
+
+    body: BodyFromFile
+    control: AnyCommand = AnyCommand()
+    initial: dict[str, Any] = Field(default={}, description="the fields of the body's state")
+    simulation: AnyTiming
+
+
+class Context(NamedTuple):
+    """The name that errors call a scenario by, and the folder that file names in it are relative to. All numbers are in the
+    units that the body declares."""
+
+    where: str
+    folder: Path
+    length: float = 1.0
+    velocity: float = 1.0
+    acceleration: float = 1.0
+    time: float = 1.0
+    rate: float = 1.0
+
+
+class Made(NamedTuple):
+    """The parameters of a body, and the numbers that laws and equations of motion take."""
+
+    params: Any
+    craft: Any
+
+
+class AnyBody(Body):
+    """One body, as its part declares it."""
+
+    marker = MARKER
+    law_table = LawTable
+
+    def __init__(self, part: Part, folder: Path = Path()) -> None:
+        self.part, self.folder = part, folder
+        self.name, self.tables, self.example = part.name, tables_of(part), _example(part)
+
+    def laws(self) -> Mapping[str, Law]:
+        return catalogue(self.name)
+
+    def context(self, tables: Mapping[str, Any], where: str) -> Context:
+        return Context(where, self.folder)
+
+    def make(self, table: Any, where: str) -> Made:
+        params = params_of(self.part, table.body) if _params(self.part) else contract.NoParams()
+        make = self.part.hook("make")
+        try:
+            return Made(params, params if make is None else make(params))
+        except Exception as error:
+            why = str(error) if type(error) is ValueError else told(error, self.part.file)
+            raise InputError(where, MARKER, "", why) from None
+
+    def options(self, scenario: Scenario, own: Any, gains: Any, key: str) -> None:
+        return None
+
+    def build(self, scenario: Scenario, entry: LawEntry) -> ClosedLoop:
+        table, module = scenario.table, self.part.module
+        values = {item.name: getattr(table.initial, item.name) for item in _state(self.part)}
+        timing, limit = table.simulation, table.control.limit
+        return ClosedLoop(
+            craft=scenario.craft,
+            law=entry.law,
+            gains=entry.gains,
+            start=module.State(**values, **{module.COMMAND: ZERO}),
+            period=timing.control_period,
+            substeps=timing.substeps,
+            parts=(Fitted(self.part, cast(Made, scenario.made).params), *scenario.parts),
+            limit="none" if limit is None else table.control.limit_kind,
+            command_limit=math.inf if limit is None else limit,
+            far=timing.lost_beyond or math.inf,
+            seed=timing.seed,
+        )
+
+    def examine(self, scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> None:
+        lost = make_step(loop.composition()).check(loop.carry(), 0, loop.setup()).lost_at
+        if lost >= 0.0:
+            raise InputError(scenario.where, "initial", "a start that the body counts as lost", "a sound one")
+
+
+class NamedByTable:
+    """It stands for all these bodies until a file's [body] table tells which."""
+
+    name = ""
+    marker = MARKER
+    tables = BodyFromFileTables
+    law_table = LawTable
+    example = ""
+
+    def laws(self) -> Mapping[str, Law]:
+        return {}
+
+    def chosen(self, tables: Mapping[str, Any], where: str, folder: Path) -> AnyBody:
+        table = tables[MARKER]
+        if not isinstance(table, dict):
+            raise InputError(where, MARKER, show(table), "a table")
+        given = cast(dict[str, Any], table)
+        if "file" in given:
+            return _from_file(given, where, folder)
+        name, own = given.get("type"), bodies.bodies()
+        if isinstance(name, str) and name in own:
+            raise InputError(where, f"{MARKER}.type", show(name), f"the [{own[name].marker}] table, which gives it")
+        known = {part.name: part for part in parts("body").values() if part.name not in own}
+        if not isinstance(name, str) or name not in known:
+            found = "nothing" if name is None else show(name)
+            allowed = f"{nearest(str(name), list(known))}; or a file" if known else "a file, for no other body is installed"
+            raise InputError(where, f"{MARKER}.type", found, allowed)
+        try:
+            return AnyBody(known[name], folder)
+        except ValueError as error:
+            raise InputError(where, f"{MARKER}.type", "", str(error)) from None
+
+
+NAMED_BY_TABLE = NamedByTable()
+
+
+def _from_file(table: dict[str, Any], where: str, folder: Path) -> AnyBody:
+    given, key = table["file"], f"{MARKER}.file"
+    if not isinstance(given, str):
+        raise InputError(where, key, show(given), 'the name of a Python file, such as "mine.py"')
+    if "type" in table:
+        raise InputError(where, key, show(given), "either a type or a file, not both")
+    try:
+        part = body_from_file(folder / given)
+        check_name(part.name)
+        if part.file is None and part.name in bodies.bodies():
+            raise ValueError(f"the body {part.name}, which the [{bodies.bodies()[part.name].marker}] table gives")
+        return AnyBody(part, folder)
+    except OSError as error:
+        raise InputError(where, key, f"{show(given)}: {error.strerror}", "a Python file that holds a body") from None
+    except PydanticCustomError as error:
+        raise InputError(where, key, show(given), f"a file named with {error.message()}") from None
+    except ValueError as error:
+        raise InputError(where, key, "", f"{show(given)}: {error}") from None
+
+
+@cache
+def tables_of(part: Part) -> type[ScenarioTable]:
+    """The tables of a file about a body but those of its laws. ValueError, one line, where the part does not declare itself
+    so that a file can give its numbers."""
+    try:
+        state, params = _state(part), _params(part)
+        recorded = quantities(part.module.Sample)
+    except StopIteration:
+        raise ValueError(f"{part.module.__file__}: each field of Sample is annotated with Quantity") from None
+    except (AttributeError, NameError, TypeError) as error:
+        raise ValueError(f"{part.module.__file__}: {error}") from None
+    if part.module.COMMAND not in part.module.State._fields:
+        raise ValueError(f"{part.module.__file__}: State has no field {part.module.COMMAND}, the COMMAND")
+    for item in state:
+        if len(item.gain.shape) > 1 or item.gain.whole or item.gain.choices or item.gain.columns:
+            raise ValueError(f"{part.module.__file__}: State.{item.name} must be a number or a vector")
+    if taken := {"type", "file"} & {item.name for item in params}:
+        raise ValueError(f"{part.module.__file__}: Params has a field {taken.pop()}, which says which body it is")
+    title = part.name.replace("-", " ").title().replace(" ", "")
+    named: Any = {"type": (Literal[part.name], ...)} if part.file is None else {"file": (str, ...)}
+    body: Any = create_model(f"{title}Body", __base__=Table, __doc__=part.card.summary, **named, **columns(params))
+    initial: Any = create_model(f"{title}Initial", __base__=Table, __doc__="Where it starts.", **columns(state))
+    unit = getattr(part.module, "TIME_UNIT", "s")
+    command = recorded["command"].unit if "command" in recorded else "1"
+    limit = quantity(Gain(command, above=0.0, text="largest command; none if absent"))
+    control: Any = create_model(
+        f"{title}Control", __base__=AnyCommand, __doc__=AnyCommand.__doc__, limit=(Annotated[float | None, *limit], None)
+    )
+    time, said = ("s", "") if unit == "s" else ("1", f", in {unit}")
+    duration = quantity(Gain(time, above=0.0, text=f"length of the run, in whole control periods{said}"))
+    held = quantity(Gain(time, above=0.0, text=f"for which a command is held{said}"))
+    timing: Any = create_model(
+        f"{title}Timing",
+        __base__=AnyTiming,
+        __doc__=AnyTiming.__doc__,
+        duration=(Annotated[float, *duration], ...),
+        control_period=(Annotated[float, *held], ...),
+    )
+
+    def rows(table: Any, info: ValidationInfo) -> Any:
+        context = cast(Context, info.context)
+        return with_rows(part, table, context.folder, context.where, MARKER) if isinstance(table, dict) and params else table
+
+    whole: Any = {
+        "body": (Annotated[body, BeforeValidator(rows)], ...),
+        "control": (control, control()),
+        "initial": (initial, ...) if any(item.required for item in state) else (initial, initial()),
+        "simulation": (timing, ...),
+    }
+    return create_model(
+        f"{title}Tables",
+        __base__=ScenarioTable,
+        __doc__=f"A whole file about the body {part.name}, but for its law tables.",
+        **whole,
+    )
+
+
+def _example(part: Part) -> str:
+    """Written from the example of the part's parameters, where it has one; what the state leaves open is 0.1."""
+    which = f'type = "{part.name}"' if part.file is None else f"file = {json.dumps(str(part.file))}"
+    lines = ['name = "written"', f"[{MARKER}]", which]
+    examples = part.examples() if part.hook("examples") else []
+    for item, value in zip(_params(part), examples[0] if examples else (), strict=False):
+        if not (isinstance(value, float) and math.isinf(value)):
+            lines.append(f"{item.name} = {json.dumps(item.gain.choices[value] if item.gain.choices else value)}")
+    lines.append("[initial]")
+    lines += [f"{item.name} = {json.dumps(_within(item.gain))}" for item in _state(part) if item.required]
+    return "\n".join([*lines, "[simulation]", "duration = 1.0", "control_period = 0.01\n"])
+
+
+def _params(part: Part) -> list[contract.Field]:
+    return part.fields() if part.hook("Params") else []
+
+
+def _state(part: Part) -> list[contract.Field]:
+    """The fields of the state that a file gives: all but the command, which is zero at the start."""
+    return contract.fields(part.module.State, part.module.COMMAND)
+
+
+def _within(gain: contract.Parameter) -> Any:
+    """A value that a parameter may have: 0.1 for each number, or what lies near that."""
+    least = [0.1, *(x for x in (gain.at_least, None if gain.above is None else gain.above + 0.1) if x is not None)]
+    value = min(max(least), math.inf if gain.at_most is None else gain.at_most)
+    return [value] * gain.shape[0] if gain.shape else value

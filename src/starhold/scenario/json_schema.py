@@ -1,0 +1,44 @@
+"""The JSON Schema of scenario files, with laws and parts as they are installed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from starhold.scenario.bodies import bodies, others
+from starhold.scenario.bodies.interface import Body
+from starhold.scenario.parts import part_schemas
+from starhold.scenario.schema import law_model
+
+
+def json_schema() -> dict[str, Any]:
+    """A JSON Schema of scenario files of every body, for completion and checks in editors."""
+    known = [_file_schema(body) for body in (*bodies().values(), *others())]
+    shared: dict[str, Any] = {}
+    for schema in known:
+        shared |= schema.pop("$defs", {})
+    title = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "starhold scenario", "type": "object"}
+    return {**title, "anyOf": known, "$defs": shared}
+
+
+def _file_schema(body: Body) -> dict[str, Any]:
+    """A JSON Schema of the files of one body: its tables, those of its laws, gains and design forms, and of its parts."""
+    base = body.law_table
+    models = [law_model(law, form, base) for law in body.laws().values() for form in (None, *law.forms)]
+    schema = body.tables.model_json_schema()
+    tables: list[dict[str, Any]] = []
+    for model in models:
+        table = model.model_json_schema()
+        schema.setdefault("$defs", {}).update(table.pop("$defs", {}))
+        # TOML tables name their type, though pydantic has a default for it.
+        table["required"] = sorted({"type", *table.get("required", [])} | ({"form"} & set(table["properties"])))
+        tables.append(table)
+    shared = base.model_json_schema()
+    shared["properties"].pop("type")
+    file = {"type": "string", "description": "a Python file that holds a law, relative to this one; it is run"}
+    tables.append({"title": "LawFromFile", "type": "object", "properties": {"file": file, **shared["properties"]}})
+    tables[-1] |= {"required": ["file"], "not": {"required": ["type"]}}
+    schema.setdefault("$defs", {}).update(shared.get("$defs", {}))
+    schema["properties"]["law"] = {"type": "array", "minItems": 1, "items": {"anyOf": tables}}
+    schema["properties"]["part"] = {"type": "array", "items": {"anyOf": part_schemas(body.name)}}
+    schema["required"].append("law")
+    return schema
