@@ -6,7 +6,9 @@ from pathlib import Path
 import pytest
 
 from starhold.conformance.bench import sample_loop
-from starhold.conformance.suite import CHECKS, NotApplicableError, examine
+from starhold.conformance.bodies.rigid_body import CHECKS
+from starhold.conformance.suite import examine
+from starhold.conformance.verdicts import NotApplicableError
 from starhold.errors import InputError
 from starhold.laws.catalogue import catalogue, from_file
 from starhold.simulation.lane import fly

@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 import starhold as sh
 from starhold.algebra.structure import flatten
+from starhold.conformance.suite import examine, find_law
 from starhold.errors import InputError
 from starhold.loop.kernels import fly_plainly
 from starhold.scenario.building import build
@@ -316,6 +317,39 @@ def test_each_loop_keeps_the_body_that_it_was_read_with(folder: Path) -> None:
     other = sh.load(folder / "pull.toml")
     assert flatten(fly(build(other, other.laws[0]), 40)[1].state) != before
     assert flatten(fly(loop, 40)[1].state) == flatten(fly_plainly(loop, 40).state) == before
+
+
+def test_its_laws_go_through_the_checks_for_any_body(folder: Path) -> None:
+    # The body is found beside the law.
+    (folder / "sledge.py").rename(folder / "cart.py")
+    (folder / "rein.py").write_text(LAW.replace('BODY = "sledge"', 'BODY = "cart"'))
+    law = find_law(str(folder / "rein.py"))
+    assert law.body == "cart"
+    verdicts = list(examine(law))
+    assert [verdict.outcome for verdict in verdicts] == ["passed"] * 6, verdicts
+    told = starhold("check-law", "rein.py", cwd=folder)
+    assert told.returncode == 0, told.stdout
+    assert told.stdout.count("passed") == 6
+
+
+BROKEN = {
+    "Finite command": ("-gains.k, measurement", "-gains.k / dot(measurement.position, measurement.position), measurement"),
+    "Gains written": ("[Gains(1.0, 0.5), ", "[Gains(-1.0, 0.5), "),
+    "The command depends": ("def force(", "COUNT = [0.0]\n\n\ndef force("),
+}
+
+
+@pytest.mark.parametrize("check", sorted(BROKEN))
+def test_a_broken_law_is_caught(folder: Path, check: str) -> None:
+    old, new = BROKEN[check]
+    assert old in LAW
+    text = LAW.replace(old, new).replace("import add, scale", "import add, dot, scale")
+    if "COUNT" in new:
+        counted = "    COUNT[0] += 1.0\n    return add(scale(COUNT[0], measurement.position), "
+        text = text.replace("    return add(scale(-gains.k, measurement.position), ", counted)
+    (folder / "rein.py").write_text(text)
+    failed = [verdict.name for verdict in examine(find_law(str(folder / "rein.py"))) if verdict.outcome == "failed"]
+    assert any(name.startswith(check) for name in failed), failed
 
 
 def test_editors_are_told_of_bodies_in_files() -> None:

@@ -82,4 +82,4 @@ def flies_a_scenario(law: Law) -> None:
                 require(told, f"{claim.kind}: {obligation.name} is {obligation.outcome} without a reason")
 
 
-STATION_CHECKS = (declares_itself, is_pure, stays_finite, reads_alike, survives_toml, flies_a_scenario)
+CHECKS = (declares_itself, is_pure, stays_finite, reads_alike, survives_toml, flies_a_scenario)

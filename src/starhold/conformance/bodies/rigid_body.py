@@ -1,0 +1,203 @@
+"""The checks for laws that turn a rigid body."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from starhold.algebra.quaternion import derivative, multiply, normalise, stretch, to_reference
+from starhold.algebra.structure import move
+from starhold.algebra.vector import ZERO
+from starhold.analysis.cost import call_costs
+from starhold.analysis.rigid_body import measure
+from starhold.analysis.trial import fly_claims
+from starhold.certification.certify import certify
+from starhold.conformance.bench import CRAFT, call, random_measurements, random_quaternions, sample_loop
+from starhold.conformance.units import rescaled
+from starhold.conformance.verdicts import (
+    STEPS,
+    NotApplicableError,
+    agree,
+    declares_itself,
+    require,
+    round_trips,
+)
+from starhold.laws.catalogue import Law
+from starhold.laws.interface import Measurement
+from starhold.parts.bodies.rigid_body import angular_acceleration
+from starhold.parts.catalogue import fit
+from starhold.scenario.building import build
+from starhold.scenario.reading import parse
+from starhold.scenario.writing import scenario_with
+from starhold.simulation.lane import fly, label
+
+FEW = 16
+"""Flights that try a certificate."""
+ON_TARGET = Measurement((1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.1)
+
+
+def is_pure(law: Law) -> None:
+    """The torque depends on nothing but its arguments."""
+    for gains in law.examples():
+        for measurement in random_measurements(10):
+            require(call(law, measurement, gains) == call(law, measurement, gains), f"two calls differ at {measurement}")
+
+
+def reads_alike(law: Law) -> None:
+    """Plain Python, one lane and every lane of a batch agree bit for bit."""
+    for gains in law.examples():
+        loop = sample_loop(law, gains)
+        agree(loop, [replace_rate(loop.start, factor) for factor in (1.0, 0.5, 1.0, 2.0)], (0, 2))
+
+
+def replace_rate(state: Any, factor: float) -> Any:
+    """The state with its rate multiplied."""
+    return state._replace(rate=tuple(factor * w for w in state.rate))
+
+
+def rests_on_target(law: Law) -> None:
+    """No torque at rest on target."""
+    for gains in law.examples():
+        torque = call(law, ON_TARGET, gains)
+        size = float(np.abs(torque).max())
+        require(size <= law.card.rest_tolerance, f"torque {size:g} N m at rest on target")
+
+
+def treats_quaternion_sign_as_stated(law: Law) -> None:
+    """q and -q give what the card says of the double cover."""
+    for gains in law.examples():
+        differences: list[float] = []
+        for measurement in random_measurements(20):
+            other = measurement._replace(attitude=stretch(-1.0, measurement.attitude))
+            differences.append(float(np.abs(np.subtract(call(law, measurement, gains), call(law, other, gains))).max()))
+        if law.card.quaternion_sign == "even":
+            require(max(differences) < 1e-12, f"q and -q differ by {max(differences):g} N m, the card says they do not")
+        else:
+            require(max(differences) > 1e-12, "q and -q never differ, the card says they do")
+
+
+def ignores_inertial_frame(law: Law) -> None:
+    """Turning the inertial frame changes nothing."""
+    for gains, turn in zip(law.examples(), random_quaternions(len(law.examples())), strict=True):
+        loop = sample_loop(law, gains)
+        s = loop.start
+        turned = s._replace(
+            attitude=normalise(multiply(turn, s.attitude)),
+            position=to_reference(turn, s.position),
+            velocity=to_reference(turn, s.velocity),
+        )
+        goal = fit("target", "inertial", normalise(multiply(turn, loop.target.params.attitude)))
+        other = replace(loop.with_parts(goal), start=turned)
+        rows = slice(13, 16)
+        difference = np.abs(fly(loop, STEPS)[0][rows] - fly(other, STEPS)[0][rows]).max()
+        require(difference <= 1e-9, f"the torque changes by {difference:g} N m")
+
+
+def stays_finite(law: Law) -> None:
+    """Finite torque at half turns, at zero error and at rest."""
+    halves = [(0.0, *axis) for axis in ((1.0, 0.0, 0.0), (0.0, 0.6, -0.8), (1 / math.sqrt(3.0),) * 3)]
+    for gains in law.examples():
+        for attitude in [(1.0, 0.0, 0.0, 0.0), (-1.0, 0.0, 0.0, 0.0), *halves]:
+            for rate in (ZERO, (0.1, -0.2, 0.05)):
+                measurement = ON_TARGET._replace(attitude=attitude, rate=rate, body_rate=rate)
+                require(bool(np.isfinite(call(law, measurement, gains)).all()), f"not finite at {attitude}, rate {rate}")
+
+
+def survives_toml(law: Law) -> None:
+    """Gains written to a scenario file and read back are the same; unknown keys are refused."""
+    round_trips(law, scenario_with, parse)
+
+
+def keeps_units(law: Law) -> None:
+    """The declared units are right: the torque is the same in any system of units."""
+    for gains in law.examples():
+        for measurement in random_measurements(5):
+            plain = np.array(call(law, measurement, gains))
+            size = max(float(np.abs(plain).max()), 1e-9)
+            for factors in ((7.0, 1.0, 1.0), (1.0, 3.0, 1.0), (1.0, 1.0, 0.2), (2.0, 0.3, 5.0)):
+                seen2, gains2, craft2, back = rescaled(law, measurement, gains, CRAFT, factors)
+                other = np.array(call(law, seen2, gains2, craft2)) * back
+                error = float(np.abs(other - plain).max()) / size
+                require(error < 1e-6, f"with kg, m, s scaled by {factors} the torque changes by {error:.1e} of itself")
+
+
+def decreases_lyapunov(law: Law) -> None:
+    """V is positive and does not rise, at random states, for a body free of other torques."""
+    if law.lyapunov is None:
+        raise NotApplicableError("the law has no `lyapunov`")
+    if law.card.claims == "none":
+        raise NotApplicableError("the card claims nothing")
+    for gains in law.examples():
+        require(abs(law.lyapunov(ON_TARGET, gains, CRAFT)) < 1e-15, "V is not zero at rest on target")
+        for measurement in random_measurements(300, external=False):
+            value = law.lyapunov(measurement, gains, CRAFT)
+            require(value > 0.0, f"V = {value:g} at {measurement}")
+            slope = _slope(law, measurement, gains)
+            require(slope <= 1e-7 * value, f"dV/dt = {slope:g} at {measurement}")
+
+
+def can_be_certified(law: Law) -> None:
+    """The certifier reads the law, or says what of it cannot be read."""
+    for gains in law.examples():
+        plain = sample_loop(law, gains)
+        for loop in (
+            plain,
+            plain.without("target").with_parts(fit("target", "orbital")),
+            replace(plain, limit="norm", sign_policy="as_published"),
+        ):
+            certificate = certify(loop)
+            require(certificate.outcome in ("proved", "refuted", "undecided"), f"outcome {certificate.outcome}")
+            for claim in certificate.claims:
+                for obligation in claim.obligations:
+                    told = obligation.outcome == "proved" or bool(obligation.evidence)
+                    require(told, f"{claim.kind}: {obligation.name} is {obligation.outcome} without a reason")
+
+
+def flies_a_scenario(law: Law) -> None:
+    """It flies from a scenario file, is measured, timed and certified, and flights do not contradict what is proved."""
+    for gains in law.examples():
+        scenario = parse(scenario_with(law, gains), law.name)
+        loop = build(scenario, scenario.laws[0])
+        samples, carry = fly(loop, STEPS)
+        recording = label(loop, samples, carry, 1)
+        measured = measure(recording, 1e-3, 1e-3)
+        require(measured["diverged_at"] is None, f"the motion is lost after {measured['diverged_at']} s")
+        # What is timed has a kernel of its own.
+        if gains == law.examples()[0]:
+            require(call_costs(loop, samples, calls=100)["cost_median"] >= 0.0, "a call cannot be timed")
+        fly_claims(loop, certify(loop, law.name), flights=FEW)
+
+
+def _slope(law: Law, measurement: Measurement, gains: Any) -> float:
+    """dV/dt along the closed loop, by a central difference."""
+    rates = angular_acceleration(measurement.body_rate, call(law, measurement, gains), CRAFT)
+    turning = derivative(measurement.attitude, measurement.rate)
+    function = law.lyapunov
+    assert function is not None
+
+    def value(h: float) -> float:
+        rate = move(measurement.rate, h, rates)
+        moved = measurement._replace(attitude=move(measurement.attitude, h, turning), rate=rate, body_rate=rate)
+        return function(moved, gains, CRAFT)
+
+    return (value(1e-4) - value(-1e-4)) / 2e-4
+
+
+CHECKS: tuple[Callable[[Law], None], ...] = (
+    declares_itself,
+    is_pure,
+    reads_alike,
+    rests_on_target,
+    treats_quaternion_sign_as_stated,
+    ignores_inertial_frame,
+    stays_finite,
+    survives_toml,
+    keeps_units,
+    decreases_lyapunov,
+    can_be_certified,
+    flies_a_scenario,
+)
