@@ -2,7 +2,9 @@
 
 import hashlib
 import json
+import sys
 import tomllib
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +13,12 @@ from scipy.integrate import solve_ivp
 
 import starhold as sh
 from starhold.algebra.structure import flatten
+from starhold.conformance.parts import examine_part, find_part
 from starhold.conformance.suite import examine, find_law
 from starhold.errors import InputError
+from starhold.laws import catalogue as laws
 from starhold.loop.kernels import fly_plainly
+from starhold.parts import catalogue as parts
 from starhold.scenario.building import build
 from starhold.scenario.json_schema import json_schema
 from starhold.simulation.lane import fly
@@ -350,6 +355,46 @@ def test_a_broken_law_is_caught(folder: Path, check: str) -> None:
     (folder / "rein.py").write_text(text)
     failed = [verdict.name for verdict in examine(find_law(str(folder / "rein.py"))) if verdict.outcome == "failed"]
     assert any(name.startswith(check) for name in failed), failed
+
+
+def test_a_body_s_file_is_checked(folder: Path) -> None:
+    outcomes = {verdict.outcome for verdict in examine_part(find_part(str(folder / "sledge.py")))}
+    assert outcomes == {"passed", "does not apply"}
+    (folder / "sledge.py").write_text(BODY.replace('shape=(3,), spread=False, text="from the mark"', "shape=(3, 3)"))
+    failed = [verdict for verdict in examine_part(find_part(str(folder / "sledge.py"))) if verdict.outcome == "failed"]
+    assert "a number or a vector" in failed[0].reason
+
+
+def test_body_and_law_of_another_package_are_known_by_type(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    wagon, tow = BODY, LAW.replace('BODY = "sledge"', 'BODY = "wagon"')
+    (folder / "wagon.py").write_text(wagon)
+    (folder / "tow.py").write_text(tow)
+    monkeypatch.syspath_prepend(str(folder))
+    for name in ("wagon", "tow"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    points = [EntryPoint(name, name, "starhold.parts") for name in ("wagon", "tow")]
+    monkeypatch.setattr(parts, "entry_points", lambda group: points if group == "starhold.parts" else [])
+    known = (parts.parts, laws._commands, laws._installed, laws.catalogue)
+    try:
+        for found in known:
+            found.cache_clear()
+        text = TEXT.replace('file = "sledge.py"', 'type = "wagon"').replace('file = "rein.py"', 'type = "tow"')
+        part = "[[part]]\ntype = 'lag'\nlag = 0.1\n[[law]]"
+        (folder / "my.toml").write_text(text)
+        own, other = sh.simulate(folder / "my.toml", "tow"), sh.simulate(folder / "pull.toml", "rein")
+        assert own.attrs["body"] == "wagon"
+        assert (own["position"].to_numpy() == other["position"].to_numpy()).all()
+        (folder / "my.toml").write_text(text.replace("[[law]]", part, 1))
+        lagged = sh.simulate(folder / "my.toml", "tow")
+        assert np.abs(lagged["force"].to_numpy()[1] - own["force"].to_numpy()[1]).max() > 0.01
+        assert "did you mean wagon?" in _said(folder, text.replace("wagon", "wagen"))
+        assert {"WagonBody", "WagonInitial"} <= set(json_schema()["$defs"])
+        assert find_law("tow").body == "wagon"
+        assert {verdict.outcome for verdict in examine(find_law("tow"))} == {"passed"}
+    finally:
+        monkeypatch.undo()
+        for found in known:
+            found.cache_clear()
 
 
 def test_editors_are_told_of_bodies_in_files() -> None:

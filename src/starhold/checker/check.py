@@ -91,7 +91,8 @@ def check(content: Any) -> list[Finding]:
 
 def _certificate(given: Mapping[str, Any]) -> Iterator[Finding]:
     name = str(given.get("name", ""))
-    if "body" in given.get("subject", ()):
+    about = given.get("subject")
+    if isinstance(about, Mapping) and "body" in about:
         _, fault = _guarded(partial(_of_unknown_body, given))
         yield Finding(name, "", "", "fails" if fault else "not claimed", fault or "nothing is known of this body")
         return

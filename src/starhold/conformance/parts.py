@@ -19,16 +19,18 @@ from starhold.errors import InputError
 from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import fly_plainly, numbers_of
-from starhold.parts.bodies.libration_point import PRIMARIES, PointState
-from starhold.parts.catalogue import as_part, fit, from_file, parts, read_module, role_of
+from starhold.parts.catalogue import as_part, from_file, parts, read_module, role_of
 from starhold.parts.contract import Card
 from starhold.parts.craft import make_craft
-from starhold.parts.part import Fitted, Part
+from starhold.parts.part import Part
 from starhold.parts.random import Dice
+from starhold.scenario.bodies import bodies
+from starhold.scenario.bodies.any_body import tables_of
 from starhold.scenario.checking import nearest
 from starhold.scenario.parts import ROLES, part_model, read_parts
 from starhold.scenario.writing import part_table
 from starhold.simulation.lane import fly, label, recorded
+from starhold.studies.body import body_module
 
 SYSTEMS = ((7.0, 1.0, 1.0), (1.0, 3.0, 1.0), (1.0, 1.0, 0.2), (2.0, 0.3, 5.0))
 """Units of mass, length and time, in kg, m and s, in which physics must be the same."""
@@ -58,34 +60,7 @@ def find_part(given: str) -> Part:
 
 def loop_with(part: Part, params: Any) -> ClosedLoop:
     """A loop that holds a part, and what it needs."""
-    if part.body == "libration-point":
-        law = catalogue("libration-point")["l2-circle"]
-        start = PointState((0.01, 0.9, 0.1), (0.1, 0.0, 1.3), ZERO)
-        plant, gains = PRIMARIES["sun-earth"].point("L2"), law.examples()[0]
-        loop = ClosedLoop(plant, law, gains, start, 1e-3, limit="norm", command_limit=4.0)
-        field = () if part.hook("acceleration") else (fit("environment", "three-body-gravity"),)
-        return loop.with_parts(*field, Fitted(part, params))
-    law = catalogue()["lyapunov"]
-    loop = sample_loop(law, law.examples()[0])
-    if part.role == "target":
-        loop = loop.without("target")
-    if part.role == "estimator":
-        loop = loop.with_parts(*(fit("sensor", name, *numbers) for name, numbers in _sensors(part)))
-    return loop.with_parts(Fitted(part, params))
-
-
-def _sensors(part: Part) -> list[tuple[str, tuple[float, ...]]]:
-    """Sensors for all that an estimator needs, with some noise."""
-    found: list[tuple[str, tuple[float, ...]]] = []
-    for need in part.needs:
-        sensor = next(
-            (one for one in parts("sensor").values() if not one.table and need in one.module.Reading._fields), None
-        )
-        if sensor is None:
-            raise NotApplicableError(f"no sensor of starhold measures {need}")
-        if sensor.name not in dict(found):
-            found.append((sensor.name, tuple(sensor.examples()[0])))
-    return found
+    return body_module("starhold.conformance.bodies", part.body or "rigid-body").loop_with(part, params)
 
 
 def declares_itself(part: Part) -> None:
@@ -93,7 +68,10 @@ def declares_itself(part: Part) -> None:
     card = part.card
     require(isinstance(card, Card) and bool(card.title and card.summary), "CARD is not a Card with a title and a summary")
     if part.role == "body":
-        raise NotApplicableError("a body's numbers come from tables of its own")
+        if part.name in bodies():
+            raise NotApplicableError("a body's numbers come from tables of its own")
+        tables_of(part)
+        return
     require(bool(part.examples()), "examples() is empty")
     for params in part.examples():
         require(isinstance(params, part.params), f"the example {params} is not a Params")
@@ -140,7 +118,7 @@ def stays_finite(part: Part) -> None:
 def survives_toml(part: Part) -> None:
     """Parameters written to a [[part]] table and read back are the same; unknown keys are refused."""
     if part.table or part.role == "body":
-        raise NotApplicableError(f"it has no [[part]] table; [{part.table or part.name}] gives it")
+        raise NotApplicableError("it has no [[part]] table: one of its own gives it")
     for params in part.examples():
         table = part_table(part, params)
         body = part.body or "rigid-body"

@@ -62,7 +62,8 @@ _BODIES: dict[str, Part] = {}
 def find(role: str, name: str) -> Part:
     """The part of this role and name that is installed, or the body read from a file so called. KeyError where there is
     none."""
-    return _BODIES[name] if role == "body" and name in _BODIES else parts(role)[name]
+    installed = parts(role)
+    return _BODIES[name] if role == "body" and name not in installed else installed[name]
 
 
 def body_from_file(path: Path) -> Part:

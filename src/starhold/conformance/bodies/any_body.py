@@ -10,10 +10,11 @@ import numpy as np
 from starhold.algebra.structure import flatten, unflatten
 from starhold.algebra.vector import ZERO
 from starhold.analysis.any_body import measure
-from starhold.conformance.verdicts import STEPS, agree, declares_itself, require, round_trips
-from starhold.laws.catalogue import Law
+from starhold.conformance.verdicts import STEPS, NotApplicableError, agree, declares_itself, require, round_trips
+from starhold.laws.catalogue import Law, catalogue
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import make_step
+from starhold.parts.part import Fitted, Part
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
 from starhold.scenario.writing import scenario_with
@@ -23,6 +24,14 @@ from starhold.simulation.lane import fly, label
 def _loop(law: Law, gains: Any) -> ClosedLoop:
     scenario = parse(scenario_with(law, gains), law.name)
     return build(scenario, scenario.laws[0])
+
+
+def loop_with(part: Part, params: Any) -> ClosedLoop:
+    """A loop that holds a part, steered by whatever law for its body is installed."""
+    law = next(iter(catalogue(part.body).values()), None)
+    if law is None:
+        raise NotApplicableError(f"no law for the body {part.body} is installed")
+    return _loop(law, law.examples()[0]).with_parts(Fitted(part, params))
 
 
 def _measurements(loop: ClosedLoop, count: int) -> Iterator[Any]:

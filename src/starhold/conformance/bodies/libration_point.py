@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,12 @@ from starhold.algebra.vector import ZERO
 from starhold.analysis.libration_point import goal_of, measure
 from starhold.certification.station import certify_station
 from starhold.conformance.verdicts import STEPS, agree, declares_itself, require, round_trips
-from starhold.laws.catalogue import Law
+from starhold.laws.catalogue import Law, catalogue
 from starhold.laws.point import PointMeasurement
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.libration_point import PRIMARIES, PointState
 from starhold.parts.catalogue import fit
+from starhold.parts.part import Fitted, Part
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
 from starhold.scenario.writing import scenario_with
@@ -28,6 +30,13 @@ PLANT = PRIMARIES["sun-earth"].point("L2")
 def _loop(law: Law, gains: Any) -> ClosedLoop:
     start = PointState((0.01, 0.9, 0.1), (0.1, 0.0, 1.3), ZERO)
     return ClosedLoop(PLANT, law, gains, start, 1e-3, parts=PARTS, limit="norm", command_limit=LIMIT)
+
+
+def loop_with(part: Part, params: Any) -> ClosedLoop:
+    """A loop that holds a part, and a field where it gives none."""
+    law = catalogue("libration-point")["l2-circle"]
+    field = () if part.hook("acceleration") else PARTS[:1]
+    return replace(_loop(law, law.examples()[0]), parts=(*field, Fitted(part, params)))
 
 
 def _states(count: int) -> Any:

@@ -26,10 +26,12 @@ from starhold.conformance.verdicts import (
     require,
     round_trips,
 )
-from starhold.laws.catalogue import Law
+from starhold.laws.catalogue import Law, catalogue
 from starhold.laws.interface import Measurement
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.rigid_body import angular_acceleration
-from starhold.parts.catalogue import fit
+from starhold.parts.catalogue import fit, parts
+from starhold.parts.part import Fitted, Part
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
 from starhold.scenario.writing import scenario_with
@@ -38,6 +40,31 @@ from starhold.simulation.lane import fly, label
 FEW = 16
 """Flights that try a certificate."""
 ON_TARGET = Measurement((1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.1)
+
+
+def loop_with(part: Part, params: Any) -> ClosedLoop:
+    """A loop that holds a part, and what it needs."""
+    law = catalogue()["lyapunov"]
+    loop = sample_loop(law, law.examples()[0])
+    if part.role == "target":
+        loop = loop.without("target")
+    if part.role == "estimator":
+        loop = loop.with_parts(*(fit("sensor", name, *numbers) for name, numbers in _sensors(part)))
+    return loop.with_parts(Fitted(part, params))
+
+
+def _sensors(part: Part) -> list[tuple[str, tuple[float, ...]]]:
+    """Sensors for all that an estimator needs, with some noise."""
+    found: list[tuple[str, tuple[float, ...]]] = []
+    for need in part.needs:
+        sensor = next(
+            (one for one in parts("sensor").values() if not one.table and need in one.module.Reading._fields), None
+        )
+        if sensor is None:
+            raise NotApplicableError(f"no sensor of starhold measures {need}")
+        if sensor.name not in dict(found):
+            found.append((sensor.name, tuple(sensor.examples()[0])))
+    return found
 
 
 def is_pure(law: Law) -> None:
