@@ -14,7 +14,7 @@ test: check
 
 # A part of the tests for the time between two changes: under a minute.
 test-fast: $(VENV)/.test
-	$(BIN)/python -m pytest -n 2 --dist loadgroup -q tests/algebra tests/analysis tests/loop tests/models tests/scenario --ignore tests/models/test_wheels.py
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -q tests/algebra tests/analysis tests/loop tests/parts tests/synthesis tests/scenario --ignore tests/parts/test_wheels.py --ignore tests/parts/test_one_file.py --ignore tests/parts/test_parts_against_oracles.py
 
 test-all: check
 	$(BIN)/python -m pytest -n 2 --dist loadgroup -m ""

@@ -12,7 +12,8 @@ import steps
 from common import header, interleaved, show
 from starhold.laws.catalogue import catalogue
 from starhold.parts.catalogue import find
-from starhold.parts.effectors.wheels import ALLOCATIONS, make_wheels, pyramid, three_orthogonal
+from starhold.parts.effectors.layouts import pyramid, three_orthogonal
+from starhold.parts.effectors.wheels import ALLOCATIONS, make_wheels
 from starhold.parts.part import Fitted
 
 GOAL = 2.5

@@ -12,7 +12,8 @@ from starhold.laws import lqr, matrix_pd
 from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import fields
 from starhold.parts.craft import make_craft, tensor
-from starhold.parts.effectors.wheels import body_inertia, make_wheels, pyramid
+from starhold.parts.effectors.layouts import pyramid
+from starhold.parts.effectors.wheels import body_inertia, make_wheels
 from tests import making
 from tests.making import ORBITAL, aimed
 

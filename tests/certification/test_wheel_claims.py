@@ -20,7 +20,8 @@ from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.bodies.rigid_body import angular_acceleration
 from starhold.parts.craft import make_craft, tensor
-from starhold.parts.effectors.wheels import lose, three_orthogonal
+from starhold.parts.effectors.layouts import three_orthogonal
+from starhold.parts.effectors.wheels import lose
 from starhold.scenario.building import build
 from starhold.scenario.reading import load, parse
 from starhold.studies.bodies.rigid_body import certify_law

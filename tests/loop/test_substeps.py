@@ -11,7 +11,8 @@ from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.rigid_body import State
 from starhold.parts.catalogue import fit
 from starhold.parts.craft import make_craft
-from starhold.parts.effectors.wheels import fastest, make_wheels, pyramid
+from starhold.parts.effectors.layouts import pyramid
+from starhold.parts.effectors.wheels import fastest, make_wheels
 from starhold.scenario.building import build
 from starhold.scenario.checking import RESOLVED, check_substeps
 from starhold.scenario.reading import builtin_text, parse

@@ -374,7 +374,7 @@ def test_body_and_law_of_another_package_are_known_by_type(folder: Path, monkeyp
         monkeypatch.delitem(sys.modules, name, raising=False)
     points = [EntryPoint(name, name, "starhold.parts") for name in ("wagon", "tow")]
     monkeypatch.setattr(parts, "entry_points", lambda group: points if group == "starhold.parts" else [])
-    known = (parts.parts, laws._commands, laws._installed, laws.catalogue)
+    known = (parts.parts, laws._commands, laws._installed, laws._of_body)
     try:
         for found in known:
             found.cache_clear()

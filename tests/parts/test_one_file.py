@@ -99,7 +99,7 @@ def offer(monkeypatch):
     """Give entry points of other packages, and forget what they gave afterwards."""
 
     def forget():
-        for found in (laws._installed, laws.catalogue, parts.parts):
+        for found in (laws._installed, laws._of_body, parts.parts):
             found.cache_clear()
 
     def give(*points):

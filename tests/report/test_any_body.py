@@ -17,7 +17,7 @@ from starhold.studies import compare
 from starhold.studies.body import study_of
 from starhold.studies.certificates import certify_scenario
 from tests.report import flown
-from tests.report.test_page import Reader
+from tests.report.reader import Reader
 
 
 @dataclass(frozen=True, repr=False)

@@ -12,7 +12,8 @@ from scipy.optimize import linprog
 from starhold.analysis.rigid_body import measure
 from starhold.cli.failures import print_failures
 from starhold.errors import InputError
-from starhold.parts.effectors.wheels import lose, make_wheels, pyramid
+from starhold.parts.effectors.layouts import pyramid
+from starhold.parts.effectors.wheels import lose, make_wheels
 from starhold.report.failures_picture import draw
 from starhold.report.results import open_folder
 from starhold.report.tables import write_failures

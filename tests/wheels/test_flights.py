@@ -9,7 +9,8 @@ from starhold.algebra.quaternion import to_reference
 from starhold.errors import InputError
 from starhold.parts.craft import make_craft, tensor
 from starhold.parts.effectors.envelope import authority
-from starhold.parts.effectors.wheels import make_wheels, pyramid, wheel_momentum
+from starhold.parts.effectors.layouts import pyramid
+from starhold.parts.effectors.wheels import make_wheels, wheel_momentum
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse

@@ -22,7 +22,7 @@ from starhold.loop.kernels import fly_plainly, numbers_of
 from starhold.parts.catalogue import as_part, from_file, parts, read_module, role_of
 from starhold.parts.contract import Card
 from starhold.parts.craft import make_craft
-from starhold.parts.part import Part
+from starhold.parts.part import Fitted, Part
 from starhold.parts.random import Dice
 from starhold.scenario.bodies import bodies
 from starhold.scenario.bodies.any_body import tables_of

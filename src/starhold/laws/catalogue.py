@@ -115,10 +115,14 @@ def _installed() -> dict[str, Law]:
     return parts.installed(starhold.laws.__name__, "law", as_law)
 
 
-@cache
 def catalogue(body: str = "rigid-body") -> dict[str, Law]:
     """All laws for a body that are installed, by name. One of another package that does not load is left out, with a warning
     that names it."""
+    return _of_body(body)
+
+
+@cache
+def _of_body(body: str) -> dict[str, Law]:
     return {name: law for name, law in _installed().items() if law.body == body}
 
 

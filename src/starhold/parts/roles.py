@@ -55,9 +55,9 @@ class Scene(NamedTuple):
 
 
 class Body(Protocol):
-    """The part that moves. `State` has a field named `COMMAND` for the command that acts, three numbers; `Measurement` is what laws
-    are told, `Sample` what is recorded, its fields annotated with `Quantity`. `SIGN_POLICIES`: by name, which of equivalent
-    measurements a law is shown; none where there is no choice. `TIME_UNIT`: "s" unless it is said.
+    """The part that moves. `State` has a field named `COMMAND` for the command that acts, three numbers; `Measurement` is
+    what laws are told, `Sample` what is recorded, its fields annotated with `Quantity`. `SIGN_POLICIES`: by name, which of
+    equivalent measurements a law is shown; none where there is no choice. `TIME_UNIT`: "s" unless it is said.
 
     A body that scenarios have no tables for is given by a [body] table: the fields of its `Params`, if it has any, are the
     keys of that, and those of its `State` but the command, annotated with `Parameter`, the keys of [initial]. Its craft is

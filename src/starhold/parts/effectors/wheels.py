@@ -5,8 +5,7 @@ body axes, W its speed relative to the body. With the wheels' axial inertia take
 
     J' w' = on_body + external - w x J' w,        h_i' = motor_i
 
-hold exactly, and the momentum of the whole is J' w + sum a_i h_i: motors and friction are internal.
-"""
+hold exactly; the momentum of the whole is J' w + sum a_i h_i."""
 
 from __future__ import annotations
 
@@ -24,6 +23,7 @@ from starhold.algebra.structured import Buffer, repeat
 from starhold.algebra.vector import Vector, add, cross, dot, scale
 from starhold.parts.contract import Card
 from starhold.parts.craft import check_inertia, vector
+from starhold.parts.effectors.layouts import pyramid, three_orthogonal
 
 CARD = Card(
     title="Reaction wheels",
@@ -47,9 +47,8 @@ CREEP = 1.0
 """Below this relative speed (rad/s) Coulomb friction grows in proportion to the speed: a friction that jumps with the sign
 would make any integrator of fixed step chatter about standstill."""
 
-ALLOCATIONS = ("least-squares", "least-peak")
-MOST = 24
-"""Wheels of a craft: with least-peak allocation the work grows with the cube of their number."""
+ALLOCATIONS, MOST = ("least-squares", "least-peak"), 24
+"""Ways to share out a torque, and how many wheels a craft has at most: the work of the second grows with their cube."""
 COPLANAR = 1e-9
 """Sine of the angle below which axes count as parallel, or as lying in a plane."""
 _WORST_CONDITION = 1e3
@@ -109,7 +108,7 @@ def remember(params: Wheels) -> State:
 
 
 def command(applied: Vector, params: Wheels) -> Numbers:
-    """The motor torques (N m) that a wanted torque on the body (N m) is shared out to."""
+    """Motor torques (N m) for a wanted torque on the body (N m)."""
     return allocate_peak(applied, params) if params.allocation else allocate(applied, params)
 
 
@@ -130,12 +129,12 @@ def momentum(own: State, params: Wheels) -> Vector:
 
 def record(own: State, command: Numbers, body: Any, params: Wheels) -> Sample:
     """The recorded quantities."""
-    rotors = motor(command, own.momentum, body.rate, params)
-    return Sample(own.momentum, rotors, command, available(command, own.momentum, params))
+    h = own.momentum
+    return Sample(h, motor(command, h, body.rate, params), command, available(command, h, params))
 
 
 def applied(own: State, command: Numbers, body: Any, params: Wheels) -> Vector:
-    """The torque that motors and friction give the body (N m), less than what is asked where wheels are at their limits."""
+    """The torque that motors and friction give the body (N m)."""
     return scale(-1.0, weighted(motor(command, own.momentum, body.rate, params), params.axes))
 
 
@@ -336,26 +335,6 @@ def body_inertia(inertia_total: Any, wheels: Wheels) -> NDArray[np.float64]:
     # What symmetric layouts leave of the products is rounding, and would cost the loop its diagonal inertia.
     rest[np.abs(rest) < 1e-15 * moments[-1]] = 0.0
     return rest
-
-
-def three_orthogonal() -> tuple[Vector, ...]:
-    """Three wheels along the body axes."""
-    return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-
-
-def pyramid(elevation: float = math.atan(math.sqrt(0.5))) -> tuple[Vector, ...]:
-    """Four wheels about the z axis, this far above the xy plane (rad) and halfway between the x and y axes; the default
-    serves all three body axes alike. ValueError where the elevation is not between 0 and pi/2."""
-    if not 0.0 < elevation < 0.5 * math.pi:
-        raise ValueError(f"the elevation of a pyramid must be between 0 and pi/2 rad, not {elevation:g}")
-    flat, up = math.cos(elevation) * math.sqrt(0.5), math.sin(elevation)
-    return ((flat, flat, up), (-flat, flat, up), (-flat, -flat, up), (flat, -flat, up))
-
-
-def nasa_standard() -> tuple[Vector, ...]:
-    """Four wheels: three along the body axes and a spare at equal angles to them."""
-    skewed = math.sqrt(1.0 / 3.0)
-    return (*three_orthogonal(), (skewed, skewed, skewed))
 
 
 def _unit_axes(axes: Sequence[Sequence[float]]) -> NDArray[np.float64]:

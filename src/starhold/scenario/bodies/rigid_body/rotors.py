@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from starhold.parts.effectors.layouts import nasa_standard, pyramid, three_orthogonal
 from starhold.parts.effectors.wheel_units import WHEEL_UNITS
-from starhold.parts.effectors.wheels import ALLOCATIONS, Wheels, make_wheels, nasa_standard, pyramid, three_orthogonal
+from starhold.parts.effectors.wheels import ALLOCATIONS, Wheels, make_wheels
 from starhold.scenario.bodies.rigid_body.tables import Rotor, WheelsTable, WheelTable
 
 LAYOUTS = {"orthogonal": three_orthogonal, "pyramid": pyramid, "nasa-standard": nasa_standard}

@@ -19,6 +19,7 @@ from starhold.algebra.structured import Buffer, repeat
 from starhold.algebra.vector import add, apply, dot, gyroscopic_torque, inverse, scale, subtract
 from starhold.parts.craft import matrix
 from starhold.parts.effectors.envelope import with_facets
+from starhold.parts.effectors.layouts import nasa_standard, pyramid, three_orthogonal
 from starhold.parts.effectors.wheel_units import WHEEL_UNITS
 from starhold.parts.effectors.wheels import (
     BAND,
@@ -30,10 +31,7 @@ from starhold.parts.effectors.wheels import (
     lose,
     make_wheels,
     motor,
-    nasa_standard,
     on_body,
-    pyramid,
-    three_orthogonal,
     wheel_momentum,
 )
 from starhold.trace.calling import Compiled
