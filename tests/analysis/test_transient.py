@@ -14,7 +14,7 @@ from starhold.analysis.transient import Limits, Transient, Watcher, of_run
 from starhold.parts.bodies.rigid_body import State
 from starhold.simulation.lane import Recording, fly, label
 from tests.analysis.turns import END, LAW, ZERO, problem
-from tests.making import ORBIT, ORBITAL
+from tests.making import ORBIT, ORBITAL, aimed
 
 
 def flown(made, angle, root):
@@ -25,7 +25,7 @@ def flown(made, angle, root):
 
 @pytest.mark.parametrize("target", [(1.0, 0.0, 0.0, 0.0), (0.6, 0.0, 0.8, 0.0)])
 def test_a_lane_and_a_recorded_run_give_the_same_bits(target):
-    made = problem(target=target)
+    made = problem(parts=(aimed(target),))
     roots = np.linspace(-2.5, -0.05, 150)
     for angle in (0.3, 3.0):
         lanes = made.fly(angle, roots)

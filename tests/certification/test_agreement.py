@@ -25,7 +25,6 @@ from starhold.laws.catalogue import catalogue
 from starhold.parts.craft import make_craft
 from tests.certification.hunt import fault_in, random_scenario
 from tests.certification.loops import free, loop_of, rotors
-from tests.making import ORBITAL
 
 
 def checked(certificate, tmp_path):
@@ -69,7 +68,7 @@ def test_what_cannot_be_shown_is_undecided_for_the_checker_too(law, wheels, tmp_
 def test_a_law_may_cancel_a_part_of_the_modelled_torque(compensation, wheels, tmp_path):
     gains = wheel.Gains(0.09, (0.0045, 0.0045, 0.0045), compensation)
     if wheels:
-        certificate = certify(rotors("wheel", gains, target=ORBITAL), "wheel")
+        certificate = certify(rotors("wheel", gains), "wheel")
     else:
         certificate = certify(loop_of("wheel", gains), "wheel")
     assert certificate.claim("convergence").outcome == "proved"
