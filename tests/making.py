@@ -16,9 +16,9 @@ ORBIT = (fit("environment", "two-body"), fit("environment", "gravity-gradient"))
 ORBITAL = fit("target", "orbital")
 
 
-def aimed(target: Any) -> Fitted:
-    """A quaternion or a table of `tabulate` as a target."""
-    return fit("target", "history" if isinstance(target, np.ndarray) else "inertial", target)
+def aimed(target: Any, knots: Any = ()) -> Fitted:
+    """A quaternion, or a table of `tabulate` with the knots of its spline, as a target."""
+    return fit("target", "history", target, knots) if isinstance(target, np.ndarray) else fit("target", "inertial", target)
 
 
 def noise(torque: float = 0.0, attitude: float = 0.0, rate: float = 0.0) -> tuple[Fitted, Fitted]:

@@ -44,6 +44,7 @@ def by_hand(law, gains, claims, **changes):
         "modelled_torque_norm": 0.0,
         "disturbance": 0.0,
         "control_period": 0.25,
+        "assumed_away": [],
         "wheels": None,
         **changes,
     }

@@ -27,6 +27,7 @@ LOPSIDED = lqr.FormII((1e-4, 1e-4, 1e-4, 1.0, 4e4, 1.0), (1e3, 1e3, 1e3))
 def loop_of(law, gains, craft=FULL, **changes):
     """A law in orbit under the gravity gradient, at an inertial target, feeding back q as it is."""
     target = changes.pop("target", aimed(NO_TURN))
+    target = aimed(target, changes.pop("knots", ())) if isinstance(target, np.ndarray) else target
     given = {"sign_policy": "as_published", **changes}
     loop = sample_loop(catalogue()[law], gains).without("target")
     return replace(loop.with_parts(target), craft=craft, **given)

@@ -67,10 +67,7 @@ def test_what_cannot_be_shown_is_undecided_for_the_checker_too(law, wheels, tmp_
 @pytest.mark.parametrize("wheels", [False, True])
 def test_a_law_may_cancel_a_part_of_the_modelled_torque(compensation, wheels, tmp_path):
     gains = wheel.Gains(0.09, (0.0045, 0.0045, 0.0045), compensation)
-    if wheels:
-        certificate = certify(rotors("wheel", gains), "wheel")
-    else:
-        certificate = certify(loop_of("wheel", gains), "wheel")
+    certificate = certify(rotors("wheel", gains), "wheel") if wheels else certify(loop_of("wheel", gains), "wheel")
     assert certificate.claim("convergence").outcome == "proved"
     assert passed(checked(certificate, tmp_path))
 

@@ -10,7 +10,7 @@ from starhold.conformance.bodies.rigid_body import CHECKS
 from starhold.conformance.suite import examine
 from starhold.conformance.verdicts import NotApplicableError
 from starhold.errors import InputError
-from starhold.laws.catalogue import catalogue, from_file
+from starhold.laws.catalogue import _installed, catalogue, from_file
 from starhold.simulation.lane import fly
 
 
@@ -111,12 +111,15 @@ def test_what_cannot_be_recorded_is_told_in_one_line(kind, tmp_path):
 
 
 def test_a_law_of_another_package_that_does_not_load_is_left_out_with_a_warning(monkeypatch):
-    broken = EntryPoint("broken", "no_such_package.law", "starhold.laws")
-    incomplete = EntryPoint("incomplete", "json", "starhold.laws")
-    monkeypatch.setattr("starhold.laws.catalogue.entry_points", lambda group: [broken, incomplete])
+    broken = EntryPoint("broken", "no_such_package.law", "starhold.parts")
+    incomplete = EntryPoint("incomplete", "json", "starhold.parts")
+    old = EntryPoint("old", "my_law", "starhold.laws")
+    offered = {"starhold.parts": [broken, incomplete], "starhold.laws": [old]}
+    monkeypatch.setattr("starhold.parts.catalogue.entry_points", lambda group: offered[group])
     with pytest.warns(UserWarning, match="is left out") as told:
-        found = catalogue.__wrapped__()
-    assert set(found) == set(catalogue())
+        found = _installed.__wrapped__()
+    assert set(found) == set(_installed())
     texts = [str(warning.message) for warning in told]
-    assert texts[0].startswith("the law no_such_package.law is left out: ModuleNotFoundError")
-    assert "a law needs CARD" in texts[1]
+    assert texts[0].startswith("the part no_such_package.law is left out: ModuleNotFoundError")
+    assert "its ROLE must be one of" in texts[1]
+    assert "starhold.laws, now starhold.parts" in texts[2]

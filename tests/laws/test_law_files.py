@@ -207,7 +207,7 @@ def test_what_is_wrong_with_a_law_table_is_one_line(kind, folder):
 BROKEN = {
     "syntax": ("def torque(measurement,", "def torque(measurement", "my_law.py, line"),
     "name": ("CARD = Card(", "CARD = Cards(", "my_law.py, line 10: NameError"),
-    "part missing": ("def torque", "def torques", "a law needs torque"),
+    "part missing": ("def torque", "def torques", "a law needs control or torque"),
     "no unit": ('Annotated[float, Gain("N m s", above=0.0, text="damping")]', "float", "k declares no unit"),
     "attribute": (
         "gains.k, measurement.rate",
@@ -235,7 +235,7 @@ def test_what_is_wrong_in_a_law_file_is_one_line(kind, folder):
 def test_a_file_with_the_name_of_another_law_is_refused_and_the_law_s_own_is_it(folder):
     own = catalogue()["pd"].module.__file__
     (folder / "laws" / "pd.py").write_text(LAW)
-    with pytest.raises(sh.InputError, match="a law named pd is installed already; rename the file"):
+    with pytest.raises(sh.InputError, match="a part named pd is installed already; rename the file"):
         find_law(str(folder / "laws" / "pd.py"))
     assert find_law(own) is find_law("pd") is catalogue()["pd"]
     (folder / "own.toml").write_text(BODY + f"[[law]]\nfile = {json.dumps(own)}\nk_rate = 0.09\nk_attitude = 0.009\n")

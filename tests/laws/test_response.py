@@ -158,7 +158,7 @@ def test_wheels_bound_torque_and_momentum():
 @pytest.mark.parametrize(
     ("law", "changes", "said"),
     [
-        ("sliding", {"spacecraft.torque_limit": None}, "reach must be given where the torque is not limited"),
+        ("sliding", {"spacecraft.torque_limit": None}, "switching_gain must be given where the torque is not limited"),
         ("pd", {"law[1].time": 0.0}, "law[1].time: found 0.0; allowed: above 0"),
         ("pd", {"law[1].attitude": [0, 0, 0, 0]}, "a quaternion that is not zero"),
         ("pd", {"law[1].time": 1e-30}, "too short"),

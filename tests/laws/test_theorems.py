@@ -46,7 +46,7 @@ def slope(value, measurement, torque, craft):
 def test_lyapunov_function_falls_as_damping_says(law):
     measurement, craft = symbolic_body()
     gains = law.Gains(*sympy.symbols("k_w k_q", positive=True))
-    torque, _ = law.command(measurement, gains, craft, NoMemory())
+    torque, _ = law.torque(measurement, gains, craft, NoMemory())
     # The law `lyapunov` knows the external torque and cancels it; `pd` is for a body free of any.
     external = measurement.external_torque if law is lyapunov else (0, 0, 0)
     found = slope(law.lyapunov(measurement, gains, craft), measurement, add(torque, external), craft)

@@ -10,17 +10,23 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from starhold.simulation.station import simulate_station
 
 from starhold.algebra.vector import ZERO
 from starhold.laws.interface import NoMemory
 from starhold.laws.l2_circle import peak_demand
 from starhold.laws.point import PointMeasurement
 from starhold.parts.bodies.libration_point import PointState
+from starhold.parts.catalogue import fit
 from starhold.scenario.reading import builtin_text, load, parse
+from starhold.simulation.lane import fly, label
 from starhold.simulation.lanes import simulate_many
 from starhold.studies.compare import build, compare, fly_law
 from starhold.studies.flight import Flight
+
+
+def recorded(loop, steps, every):
+    """The run of a loop."""
+    return label(loop, *fly(loop, steps, every), every)
 
 
 @cache
@@ -161,7 +167,7 @@ def test_scipy_flies_the_same_in_the_limit_of_small_periods(scenario_name, law, 
     smooth = solve_ivp(slope, (0.0, length), start, method="DOP853", rtol=1e-10, atol=1e-12, max_step=0.02).y[:, -1]
     errors = []
     for steps in (2000, 4000, 8000):
-        run = simulate_station(replace(loop, period=length / steps), steps, steps)
+        run = recorded(replace(loop, period=length / steps), steps, steps)
         errors.append(float(np.abs(np.concatenate([run["position"][-1], run["velocity"][-1]]) - smooth).max()))
     # A control that is held is late by half a period: the error is of first order in it.
     assert errors[2] < 3e-3
@@ -172,14 +178,15 @@ def test_scipy_flies_the_same_in_the_limit_of_small_periods(scenario_name, law, 
 @pytest.mark.parametrize("lag", [0.0, 0.0086])
 def test_many_lanes_are_one_lane_bit_for_bit(lag):
     scenario = load("l2-deficit")
-    loop = replace(build(scenario, scenario.pick("deficit 10")), lag=lag)
+    loop = build(scenario, scenario.pick("deficit 10")).without("lag")
+    loop = loop.with_parts(fit("actuator", "lag", lag)) if lag else loop
     random = np.random.default_rng(4)
     starts = [
         PointState(tuple(random.normal((0.0, 1.0, 0.0), 0.1)), tuple(random.normal(0.0, 0.1, 3)), ZERO) for _ in range(21)
     ]
     ends = simulate_many(loop, starts, 3000)
     for lane in (0, 7, 20):
-        run = simulate_station(replace(loop, start=starts[lane]), 3000, 3000)
+        run = recorded(replace(loop, start=starts[lane]), 3000, 3000)
         if ends.lost_at[lane] < 0.0:
             assert run["position"][-1].tolist() == list(ends.state(lane).position)
             assert run["velocity"][-1].tolist() == list(ends.state(lane).velocity)
