@@ -15,7 +15,8 @@ from starhold.algebra.vector import ZERO
 from starhold.laws.interface import NoMemory
 from starhold.laws.l2_circle import peak_demand
 from starhold.laws.point import PointMeasurement
-from starhold.parts.bodies.libration_point import PointState
+from starhold.parts.actuators.limits import LIMITS
+from starhold.parts.bodies.libration_point import PointState, linear, nonlinear
 from starhold.parts.catalogue import fit
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import fly, label
@@ -155,8 +156,9 @@ def test_the_steepest_descent_of_the_published_v_stops_on_a_wrong_circle():
 def test_scipy_flies_the_same_in_the_limit_of_small_periods(scenario_name, law, years):
     scenario = load(scenario_name)
     loop = build(scenario, scenario.pick(law))
-    plant, length = loop.plant, years * 2.0 * math.pi
-    motion, limit, size = loop.composition().motion, loop.composition().limit, loop.limit
+    plant, length = loop.craft, years * 2.0 * math.pi
+    motion = linear if loop.has("linear-gravity") else nonlinear
+    limit, size = LIMITS[loop.limit], loop.cutoff()
 
     def slope(_, state):
         position, velocity = tuple(state[:3]), tuple(state[3:])
