@@ -272,9 +272,10 @@ class ClosedLoop:
                 before = craft
         return found
 
-    def carry(self, start: Any = None, gains: Any = None, nominal: Any = None) -> Carry:
-        """The carry at the start of a trajectory: of the loop, or with another state of the body, gains or nominal model."""
-        start, setup = self.start if start is None else start, self.setup()
+    def carry(self, start: Any = None, gains: Any = None, nominal: Any = None, setup: Setup | None = None) -> Carry:
+        """The carry at the start of a trajectory: of the loop, or with another state of the body, gains, nominal model or
+        setup."""
+        start, setup = self.start if start is None else start, setup or self.setup()
         memory = self.law.remember(gains or self.gains, nominal or self.craft, self.period)
         goal = self._goal(start, setup) if self.aims else None
         h = () if goal is None else self.body.module.side_of(start, goal)

@@ -202,8 +202,9 @@ def carry_columns(loop: ClosedLoop, start: NDArray[np.float64], phase: Any = Non
     moving = len(flatten((first.state, first.effectors)))
     if _differ(loop) or (own and loop.remembers):
         gains, nominal = (None, None) if phase is None else (phase.gains, phase.nominal)
+        setup = loop.setup()
         carries = (
-            loop.carry(unflatten(start[:, lane], loop.start), _of_lane(gains, lane), _of_lane(nominal, lane))
+            loop.carry(unflatten(start[:, lane], loop.start), _of_lane(gains, lane), _of_lane(nominal, lane), setup)
             for lane in range(lanes)
         )
         columns = np.array([numbers_of(carry) for carry in carries]).T
