@@ -58,7 +58,9 @@ def test_output_that_cannot_be_written_is_told(folder):
 
 
 def test_poor_encoding_and_home_that_cannot_be_written(folder):
-    poor = os.environ | {"PYTHONIOENCODING": "ascii", "HOME": "/nonexistent", "XDG_CACHE_HOME": "/nonexistent"}
+    (folder / "file").touch()  # a folder below a file cannot be made, even by root
+    home = str(folder / "file" / "home")
+    poor = os.environ | {"PYTHONIOENCODING": "ascii", "HOME": home, "XDG_CACHE_HOME": home, "XDG_CONFIG_HOME": home}
     (folder / "units.toml").write_text(SHORT.replace("duration = 20.0", 'duration = "0.4 min"'))
     done = run("run", "units.toml", "--no-certify", "-o", "out", cwd=folder, stdout=subprocess.PIPE, env=poor)
     assert (done.returncode, done.stderr) == (0, "")

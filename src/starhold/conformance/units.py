@@ -10,6 +10,7 @@ from starhold.laws.catalogue import Law
 from starhold.laws.interface import Measurement
 from starhold.parts.craft import Craft
 from starhold.parts.part import Part
+from starhold.scenario.units import unit_registry
 
 
 def rescaled(
@@ -50,10 +51,7 @@ def _factor(unit: str, factors: tuple[float, float, float]) -> float:
 @cache
 def _powers(unit: str) -> tuple[float, float, float]:
     """Exponents of mass, length and time in a unit."""
-    import pint
-
-    registry = pint.UnitRegistry(cache_folder=":auto:")
-    dimensions: Any = registry.parse_units("dimensionless" if unit == "1" else unit).dimensionality
+    dimensions: Any = unit_registry().parse_units("dimensionless" if unit == "1" else unit).dimensionality
     return (dimensions.get("[mass]", 0.0), dimensions.get("[length]", 0.0), dimensions.get("[time]", 0.0))
 
 

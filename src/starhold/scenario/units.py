@@ -3,6 +3,7 @@ only tells what units of these names are worth."""
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections import Counter
 from functools import cache
@@ -95,7 +96,7 @@ def _convert(value: float, powers: dict[str, int], unit: str) -> float:
         powers = {_SHARES[name]: power for name, power in powers.items()}
     import pint
 
-    registry = _registry()
+    registry = unit_registry()
     try:
         given, wanted = _container({"deg" if name == "°" else name: power for name, power in powers.items()}), _wanted(unit)
         if not _angle_fits(given, wanted):
@@ -109,7 +110,7 @@ def _convert(value: float, powers: dict[str, int], unit: str) -> float:
 
 def _angle_fits(given: Any, wanted: Any) -> bool:
     """Whether radians stand where they are wanted; 1/s will do for rad/s, but Hz, which may count turns, will not."""
-    roots = [_registry().get_root_units(units)[1] for units in (given, wanted)]
+    roots = [unit_registry().get_root_units(units)[1] for units in (given, wanted)]
     angle, asked = (root._units.get("radian", 0) for root in roots)
     if asked == 0 or angle == asked:
         return True
@@ -124,14 +125,24 @@ def _wanted(unit: str) -> Any:
 def _container(powers: dict[str, int]) -> Any:
     from pint.util import UnitsContainer
 
-    registry, named = _registry(), Counter[str]()
+    registry, named = unit_registry(), Counter[str]()
     for name, power in powers.items():
         named[registry.get_name(name)] += power
     return UnitsContainer({name: power for name, power in named.items() if power})
 
 
 @cache
-def _registry() -> Any:
-    import pint
+def unit_registry() -> Any:
+    """The registry of units (pint), read from a cache on the disk where there can be one.
 
-    return pint.UnitRegistry(cache_folder=":auto:")
+    Pint's own cache folder is shared by every environment of the user, and its entries name files of the environment that
+    wrote them: when that one is deleted, all others fail. So this environment has a folder of its own.
+    """
+    import pint
+    import platformdirs
+
+    here = hashlib.sha256(f"{pint.__version__} {pint.__file__}".encode()).hexdigest()[:16]
+    try:
+        return pint.UnitRegistry(cache_folder=platformdirs.user_cache_path("starhold", appauthor=False) / f"units-{here}")
+    except OSError:
+        return pint.UnitRegistry()
