@@ -133,6 +133,11 @@ def small_number(word: Any) -> Scalar:
     return with_bits(word_or(word, 0x4330000000000000)) - 4503599627370496.0
 
 
+def whole_word(number: Any) -> Any:
+    """Return a whole number from 0 to 2^52 as a word, the other way round."""
+    return word_and(bits_of(number + 4503599627370496.0), 0x000FFFFFFFFFFFFF)
+
+
 @operation("", "word", llvm="add {word} {lanes}, {zero}", c="UINT64_C(0)", javascript=("0", "0"))
 def lane() -> int:
     """Return the number of the lane, from 0; recorded by `Recorder.lane`."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from starhold.algebra.scalar import less
 from starhold.algebra.structure import buffers, flatten, leaves, mapped, move, unflatten
 from starhold.algebra.structured import Buffer, at, repeat
-from starhold.algebra.words import word_add, word_of
+from starhold.algebra.words import whole_word, word_add, word_of
 from starhold.loop.closed_loop import ClosedLoop, Composition, Phase
 from starhold.loop.step import Step, make_equations
 from starhold.trace.machine import load, word
@@ -42,8 +42,9 @@ class Numbers(NamedTuple):
 
 
 class Observer(NamedTuple):
-    """Notes are taken of a flight along the way: note(noted, before, carry, step, numbers) -> noted, after each control
-    step, `before` and `carry` at its start and its end; `first` gives its shape, `numbers` are arguments of the kernel."""
+    """Notes are taken of a flight along the way, each control step: note(noted, decided, carry, step, setup, numbers) ->
+    noted. `decided` is the carry at the control instant `step`, with the command decided there, and `carry` that at its
+    end; `first` gives the shape of what is noted, `numbers` are arguments of the kernel."""
 
     note: Callable[..., Any]
     first: Any
@@ -204,9 +205,10 @@ def one(step: Step, carry: Any, numbers: Numbers, substeps: int) -> Program:
     return recorder.program("fly", "Flies a closed loop.")
 
 
-def many(step: Step, carry: Any, numbers: Numbers, substeps: int, observer: Observer | None) -> Program:
+def many(step: Step, carry: Any, numbers: Numbers, substeps: int, observer: Observer | None, runs: Any = ()) -> Program:
     """The flight of many lanes, recorded: control steps first .. first+count-1 of every lane of `blocks` blocks of lanes, in
-    place; lane 0 is run number `run`. What an observer notes lies in `noted`."""
+    place. Lane 0 is run number `run` and the others follow, or each lane has its own of `runs`. What an observer notes lies
+    in `noted`."""
     recorder = Recorder()
     with recorder.recording():
         cells = recorder.memory("carry", lanes=True, writable=True)
@@ -214,11 +216,12 @@ def many(step: Step, carry: Any, numbers: Numbers, substeps: int, observer: Obse
         first, count, blocks, width = (recorder.input(name, "index") for name in ("first", "count", "blocks", "width"))
         seed, run = recorder.input("seed", "word"), recorder.input("run", "word")
         first_noted, more = ((), ()) if observer is None else (observer.first, observer.numbers)
-        arguments = Arguments(*numbers, more)
+        arguments = Arguments(*numbers, more, runs)
 
         def block(b: Any) -> None:
-            gains, nominal, craft, setup, noting = arguments.bound(recorder, b * len(arguments.own))
-            key = (seed, word_add(word_add(run, word_of(b * width)), recorder.lane()))
+            gains, nominal, craft, setup, noting, own_run = arguments.bound(recorder, b * len(arguments.own))
+            along = word_add(word_add(run, word_of(b * width)), recorder.lane())
+            key = (seed, along if isinstance(runs, tuple) else whole_word(own_run))
             base, place = b * len(numbers_of(carry)), b * len(flatten(first_noted))
             state, noted = _state(carry, cells, base), _state(first_noted, seen, place)
 
@@ -227,7 +230,7 @@ def many(step: Step, carry: Any, numbers: Numbers, substeps: int, observer: Obse
                 updated = step.update(carry, now, key, gains, nominal, setup)
                 after = step.check(_propagated(step, updated, craft, setup, substeps), now + 1, setup)
                 if observer is not None:
-                    noted = observer.note(noted, carry, after, now + 1, setup, noting)
+                    noted = observer.note(noted, updated, after, now, setup, noting)
                 return after, noted
 
             end, noted = repeat(count, turn, step.check(state, first, setup), noted)

@@ -40,17 +40,17 @@ def watch(parts: Composition) -> Any:
 
     def last_above(then: Any, now: Any, before: Any, step: Any) -> Any:
         # A fraction of the step before, by a line through the two squares.
-        crossing = number_of(step) - 1.0 + (before - 1.0) / (before - now)
-        return where(less(1.0, now), number_of(step), where(less(1.0, before), crossing, then))
+        crossing = number_of(step) + (before - 1.0) / (before - now)
+        return where(less(1.0, now), number_of(step + 1), where(less(1.0, before), crossing, then))
 
-    def note(seen: Watched, before: Any, carry: Any, step: Any, setup: Any, ends: Ends) -> Watched:
+    def note(seen: Watched, decided: Any, carry: Any, step: Any, setup: Any, ends: Ends) -> Watched:
         s = carry.state
-        goal = target.module.goal(setup.target, s, step, carry.memories.followed)
+        goal = target.module.goal(setup.target, s, step + 1, carry.memories.followed)
         error = relative(goal.attitude, s.attitude)
         left = subtract(s.rate, to_body(error, goal.rate))
         angle = ends.angle * (error[1] * error[1] + error[2] * error[2] + error[3] * error[3])
         rate = ends.rate * dot(left, left)
-        moved, most = subtract(s.rate, before.state.rate), seen.peak_acceleration
+        moved, most = subtract(s.rate, decided.state.rate), seen.peak_acceleration
         return Watched(
             angle,
             rate,

@@ -42,7 +42,7 @@ def fly_abreast(
     one."""
     groups: dict[Any, list[int]] = {}
     for number, flight in enumerate(flights):
-        groups.setdefault(_key(flight), []).append(number)
+        groups.setdefault(kernel_key(flight), []).append(number)
     jobs: list[Callable[[], list[tuple[int, Any]]]] = []
     for numbers in groups.values():
         group = [flights[number] for number in numbers]
@@ -63,7 +63,7 @@ def fly_abreast(
     return found
 
 
-def _key(flight: Flying) -> Any:
+def kernel_key(flight: Flying) -> Any:
     """Equal for flights that one kernel serves, with the same tables."""
     loop = flight.loop
     phases = [(p.first, p.last, form(Numbers.of(p))) for p in loop.phases(flight.steps)]

@@ -77,26 +77,29 @@ def simulate_many(
 class Fleet:
     """Many lanes on their way: what each carries, in blocks of `width`, and what an observer has noted of it.
 
-    carries: (numbers, lanes), see `carry_columns`; noted: (numbers, lanes).
+    carries: (numbers, lanes), see `carry_columns`; first_run: the run number of lane 0, or those of all lanes (lanes,);
+    noted: (numbers, lanes).
     """
 
     def __init__(
         self,
         loop: ClosedLoop,
         carries: NDArray[np.float64],
-        first_run: int,
+        first_run: int | NDArray[np.int64],
         width: int,
         observer: Observer | None = None,
         noted: NDArray[np.float64] | None = None,
     ) -> None:
-        self.loop, self.first_run, self.width, self.observer = loop, first_run, width, observer
+        self.loop, self.width, self.observer = loop, width, observer
+        along = isinstance(first_run, int)
+        self.first_run, self.runs = (first_run, ()) if along else (0, np.asarray(first_run, dtype=float))
         self.lanes = carries.shape[1]
         self.count = -(-self.lanes // width)
         self.like = loop.carry()
         self.rows = places(self.like)
         self.x = self._packed(carries)
         self.noted = self._packed(np.empty((0, self.lanes)) if noted is None else noted)
-        self._ready: dict[int, Any] = {}
+        self._ready: dict[tuple[int, int], Any] = {}
 
     def _packed(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Blocks (blocks, numbers, width) of rows (numbers, lanes); the last lane fills up the last block."""
@@ -105,22 +108,31 @@ class Fleet:
         blocks[:] = padded.reshape(len(rows), self.count, self.width).swapaxes(0, 1)
         return blocks
 
-    def _unpacked(self, blocks: NDArray[np.float64]) -> NDArray[np.float64]:
+    def unpacked(self, blocks: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rows (numbers, lanes) of blocks (blocks, numbers, width)."""
         return np.ascontiguousarray(blocks.swapaxes(0, 1).reshape(blocks.shape[1], -1)[:, : self.lanes])
 
     def carries(self) -> NDArray[np.float64]:
         """The numbers that each lane carries now, (numbers, lanes)."""
-        return self._unpacked(self.x)
+        return self.unpacked(self.x)
 
     def notes(self) -> NDArray[np.float64]:
         """The numbers that have been noted of each lane, (numbers, lanes)."""
-        return self._unpacked(self.noted)
+        return self.unpacked(self.noted)
 
-    def fly(self, phase: Phase, piece: range, first: int | None = None, count: int | None = None) -> None:
-        """Fly the blocks of a piece through a phase, or through `count` control steps of it from `first` on."""
-        _, kernel, arguments, own, turn = self.prepare(phase)
+    def fly(
+        self,
+        phase: Phase,
+        piece: range,
+        first: int | None = None,
+        count: int | None = None,
+        observer: Observer | None = None,
+    ) -> None:
+        """Fly the blocks of a piece through a phase, or through `count` control steps of it from `first` on. observer: in
+        place of the fleet's, with notes of the same shape."""
+        _, kernel, arguments, own, turn = self.prepare(phase, observer)
         part = self.x[piece.start : piece.stop]
-        if turn is not None and first is None:
+        if turn is not None and first in (None, phase.first):
             rows = list(self.rows.state.rate)
             rates = self._unblocked(part[:, rows])
             part[:, rows] = self._blocked(np.array(turn(tuple(rates), piece)), len(piece))
@@ -142,16 +154,20 @@ class Fleet:
     def _blocked(self, rows: NDArray[np.float64], count: int) -> NDArray[np.float64]:
         return rows.reshape(len(rows), count, self.width).swapaxes(0, 1)
 
-    def prepare(self, phase: Phase) -> Any:
+    def prepare(self, phase: Phase, observer: Observer | None = None) -> Any:
         """Compile what flies a phase, once, before threads share it out."""
-        if id(phase) not in self._ready:
-            observer = self.observer
+        observer = observer or self.observer
+        key = (id(phase), id(observer))
+        if key not in self._ready:
             numbers = Numbers.of(phase)
-            arguments = Arguments(*numbers, () if observer is None else observer.numbers)
-            kernel = make_kernel(many, self.loop.composition(), self.width, self.like, numbers, self.loop.substeps, observer)
+            arguments = Arguments(*numbers, () if observer is None else observer.numbers, self.runs)
+            more = (numbers, self.loop.substeps, observer, self.runs)
+            kernel = make_kernel(many, self.loop.composition(), self.width, self.like, *more)
             turn = self._turned(phase) if phase.jumps else None
-            self._ready[id(phase)] = (phase, kernel, arguments, self._packed(arguments.rows(self.lanes)), turn)
-        return self._ready[id(phase)]
+            # With what its key tells apart, lest that go and leave its number to another.
+            kept = (phase, observer)
+            self._ready[key] = (kept, kernel, arguments, self._packed(arguments.rows(self.lanes)), turn)
+        return self._ready[key]
 
     def _turned(self, phase: Phase) -> Any:
         """The body's rates in the lanes of a piece, as the phase makes them when it begins."""

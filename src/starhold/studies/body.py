@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
 
 if TYPE_CHECKING:
     from starhold.analysis.departure import Departure
+    from starhold.analysis.meter import Meter
     from starhold.analysis.ranking import MetricSet
     from starhold.analysis.trial import Trial
     from starhold.certification.certificate import Certificate
@@ -36,6 +37,15 @@ class BodyStudy(Protocol):
 
     def metrics_of(self, run: Recording) -> dict[str, Any]:
         """Measure a recorded run; `diverged_at` (s) is None for a motion that was not lost."""
+        ...
+
+    def meter(
+        self, scenario: Scenario, loop: Any, gains: Any, extras: Sequence[str] = (), cones: Sequence[Any] = ()
+    ) -> Meter:
+        """Make what measures many flights along their way, as `metrics_of` does recordings of every control step. gains:
+        those of all lanes, with an array (lanes,) in place of a number that differs; extras: metrics that are measured where
+        they are asked for; cones: axes with the directions that they are to stay away from. ValueError where the body has no
+        such thing."""
         ...
 
     def metric_set(self, run: Recording) -> MetricSet:
@@ -74,6 +84,14 @@ class BodyStudy(Protocol):
 def study_of(body: str) -> BodyStudy:
     """The study of a body of this name, or that of any body where there is none of its own."""
     return body_module("starhold.studies.bodies", body).STUDY
+
+
+def nothing_more(extras: Sequence[str], cones: Sequence[Any]) -> None:
+    """ValueError for a body that has neither further metrics nor axes that could stay away from anything."""
+    if cones:
+        raise ValueError("a body with an attitude, for an axis that is to stay out of a cone")
+    if extras:
+        raise ValueError(f"no further metrics; {extras[0]} is none of this body")
 
 
 def body_module(package: str, body: str) -> Any:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, final
 
 from starhold.analysis.any_body import measure, metric_set
 from starhold.certification.certificate import Certificate
 from starhold.simulation.lane import label
-from starhold.studies.body import BodyStudy, Issued, Values
+from starhold.studies.body import BodyStudy, Issued, Values, nothing_more
 
 if TYPE_CHECKING:
     from starhold.analysis.departure import Departure
+    from starhold.analysis.meter import Meter
     from starhold.analysis.ranking import MetricSet
     from starhold.analysis.trial import Trial
     from starhold.scenario.reading import LawEntry, Scenario
@@ -26,6 +28,14 @@ class AnyBodyStudy:
 
     def metrics_of(self, run: Recording) -> dict[str, Any]:
         return measure(run)
+
+    def meter(
+        self, scenario: Scenario, loop: Any, gains: Any, extras: Sequence[str] = (), cones: Sequence[Any] = ()
+    ) -> Meter:
+        from starhold.analysis.any_body_meter import make_meter
+
+        nothing_more(extras, cones)
+        return make_meter(loop, scenario.table.simulation.steps)
 
     def metric_set(self, run: Recording) -> MetricSet:
         return metric_set(run)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, final
 
@@ -9,10 +10,11 @@ from starhold.analysis.libration_point import METRICS, CircleGoal, EquilibriumGo
 from starhold.parts.bodies.libration_point import Units
 from starhold.parts.craft import vector
 from starhold.simulation.lane import label
-from starhold.studies.body import BodyStudy, Issued, Values
+from starhold.studies.body import BodyStudy, Issued, Values, nothing_more
 
 if TYPE_CHECKING:
     from starhold.analysis.departure import Departure
+    from starhold.analysis.meter import Meter
     from starhold.analysis.ranking import MetricSet
     from starhold.analysis.trial import Trial
     from starhold.loop.closed_loop import ClosedLoop
@@ -38,6 +40,15 @@ class LibrationPointStudy:
         units = Units(float(told["length_unit_m"]), float(told["rate_unit_rad_per_s"]))
         goal = CircleGoal(*map(float, told["circle"])) if "circle" in told else EquilibriumGoal(vector(told["rest"]))
         return measure(run, units, goal, float(told["settling_tolerance"]))
+
+    def meter(
+        self, scenario: Scenario, loop: ClosedLoop, gains: Any, extras: Sequence[str] = (), cones: Sequence[Any] = ()
+    ) -> Meter:
+        from starhold.analysis.libration_point_meter import make_meter
+
+        nothing_more(extras, cones)
+        units, tolerance = scenario.table.libration.units, scenario.table.settling.tolerance
+        return make_meter(loop, scenario.table.simulation.steps, units, goal_of(gains), tolerance)
 
     def metric_set(self, run: Recording) -> MetricSet:
         return METRICS

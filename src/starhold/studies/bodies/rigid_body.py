@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast, final
 
@@ -19,6 +20,7 @@ from starhold.studies.body import BodyStudy, Issued, Values
 
 if TYPE_CHECKING:
     from starhold.analysis.departure import Departure
+    from starhold.analysis.meter import Meter
     from starhold.analysis.ranking import MetricSet
     from starhold.analysis.trial import Trial
     from starhold.certification.certificate import Certificate
@@ -48,6 +50,15 @@ class RigidBodyStudy:
             return found
         rate, acceleration, angle_end, rate_end = (told[f"transient_{name}"] for name in TRANSIENT)
         return found | against_limits(run, Limits(rate, acceleration), angle_end, rate_end, found["cut_off"])
+
+    def meter(
+        self, scenario: Scenario, loop: ClosedLoop, gains: Any, extras: Sequence[str] = (), cones: Sequence[Any] = ()
+    ) -> Meter:
+        from starhold.analysis.rigid_body_meter import make_meter
+
+        settling = scenario.table.settling
+        tolerances = settling.attitude_tolerance, settling.rate_tolerance
+        return make_meter(loop, scenario.table.simulation.steps, *tolerances, cones, extras)
 
     def metric_set(self, run: Recording) -> MetricSet:
         return METRICS

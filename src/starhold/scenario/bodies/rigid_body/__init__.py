@@ -10,6 +10,7 @@ from starhold.loop.closed_loop import ClosedLoop
 from starhold.scenario.bodies.interface import Body
 from starhold.scenario.bodies.rigid_body.building import build, check_events
 from starhold.scenario.bodies.rigid_body.craft import Made, make
+from starhold.scenario.bodies.rigid_body.lanes import derive, refused
 from starhold.scenario.bodies.rigid_body.start import told_to_design
 from starhold.scenario.bodies.rigid_body.tables import AttitudeLawTable, RigidBodyTable
 
@@ -59,6 +60,12 @@ class RigidBody(Body):
 
     def build(self, scenario: Scenario, entry: LawEntry) -> ClosedLoop:
         return build(scenario, entry)
+
+    def derive(self, scenario: Scenario, columns: Mapping[str, Any]) -> dict[str, Any]:
+        return derive(scenario, columns)
+
+    def refused(self, columns: Mapping[str, Any]) -> Any:
+        return refused(columns)
 
     def examine(self, scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> None:
         check_events(scenario, entry, loop)

@@ -75,13 +75,13 @@ def start_of(scenario: Scenario, goal: Fitted) -> State:
     position, velocity = (ZERO, ZERO) if orbit is None else orbit.start
     begun = State(_attitude(table.initial), table.initial.rate, position, velocity, ZERO)
     if table.initial.relative_to == "target":
-        held = _goal_at_start(goal, begun)
+        held = goal_at_start(goal, begun)
         rate = add(begun.rate, to_body(begun.attitude, held.rate))
         return begun._replace(attitude=multiply(held.attitude, begun.attitude), rate=rate)
     return begun
 
 
-def _goal_at_start(goal: Fitted, begun: State) -> Goal:
+def goal_at_start(goal: Fitted, begun: State) -> Goal:
     return goal.part.module.goal(goal.prepared(1.0), begun, 0, NO_TURN)
 
 
@@ -89,7 +89,7 @@ def told_to_design(scenario: Scenario, sign: str) -> Start:
     """The start that the design of a law may reckon with; `sign`: its quaternion sign policy."""
     table, goal, wheels = scenario.table, target_of(scenario), wheels_of(scenario)
     begun = start_of(scenario, goal)
-    held = _goal_at_start(goal, begun)
+    held = goal_at_start(goal, begun)
     error = relative(held.attitude, begun.attitude)
     error = error if sign == "as_published" else stretch(side(error[0]), error)
     rate = subtract(begun.rate, to_body(error, held.rate))

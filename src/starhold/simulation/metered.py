@@ -1,0 +1,78 @@
+"""Flies many lanes with notes taken at every control instant, the last one included, and of each window of time apart."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.loop.closed_loop import ClosedLoop, Phase
+from starhold.loop.kernels import Observer
+from starhold.simulation.lane import Progress
+from starhold.simulation.lanes import Fleet
+from starhold.trace.machine import widest
+
+Array = NDArray[np.float64]
+
+
+class Metered(NamedTuple):
+    """What is left of flights: where each lane ended (numbers, lanes), its notes when the second observer took over and at
+    the end (numbers, lanes), and the noted numbers of windows (windows, quantities, lanes)."""
+
+    ends: Array
+    before: Array
+    notes: Array
+    windows: Array
+
+
+def fly_metered(
+    loop: ClosedLoop,
+    carries: Array,
+    phases: Sequence[Phase],
+    first_run: int | NDArray[np.int64],
+    observers: tuple[Observer, Observer],
+    noted: Array,
+    cuts: Sequence[int],
+    late: int,
+    rows: Sequence[int],
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Metered:
+    """Fly lanes through phases, and note the instant after the last step too, at which a command is decided and not flown.
+
+    carries: (numbers, lanes), see `carry_columns`; observers: one before the control step `late` and one from it on; noted:
+    notes before the flight (numbers, lanes); cuts: control steps at which windows end, `late` among them unless it is 0, the
+    last at the end of the flight; rows: noted numbers that begin anew in each window, at 0.
+    """
+    fleet = Fleet(loop, carries, first_run, widest(len(carries)), observers[0], noted)
+    for phase in phases:
+        for observer in observers:
+            fleet.prepare(phase, observer)
+    found = np.empty((len(cuts), len(rows), fleet.count, fleet.width))
+    before, end, kept = fleet.noted.copy(), phases[-1].last, list(rows)
+
+    def work(piece: range) -> None:
+        span, done = slice(piece.start, piece.stop), 0
+        for window, cut in enumerate(cuts):
+            if done == late:
+                before[span] = fleet.noted[span]
+            observer = observers[done >= late]
+            for phase in phases:
+                first, last = max(done, phase.first), min(cut, phase.last)
+                if first < last:
+                    fleet.fly(phase, piece, first, last - first, observer)
+            done = cut
+            if done == end:
+                carried = fleet.x[span].copy()
+                fleet.fly(phases[-1], piece, end, 1, observers[1])
+                fleet.x[span] = carried
+            seen = fleet.noted[span]
+            found[window, :, span] = seen[:, kept].swapaxes(0, 1)
+            seen[:, kept] = 0.0
+
+    fleet.share_out(work, threads or os.cpu_count() or 1, progress)
+    windows = found.reshape(len(cuts), len(rows), -1)[:, :, : carries.shape[1]]
+    return Metered(fleet.carries(), fleet.unpacked(before), fleet.notes(), windows)
