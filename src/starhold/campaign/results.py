@@ -1,0 +1,122 @@
+"""What a campaign comes to, law by law: distributions, envelopes, verdicts, drivers, and the runs worth flying again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from starhold.campaign.drivers import Drivers
+    from starhold.campaign.sensitivity import Morris, Refused, Sobol
+    from starhold.campaign.verdicts import Verdict
+
+Array: TypeAlias = NDArray[np.float64]
+
+QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+"""Of a metric's distribution: least, 5 %, quarter, median, three quarters, 95 %, largest."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """The distribution of a metric over the runs that have it. quantiles: those of QUANTILES, by linear interpolation, as
+    `numpy.quantile` gives them; edges (bins + 1,) and counts (bins,) of a histogram; missing: runs without the metric."""
+
+    metric: str
+    unit: str
+    runs: int
+    missing: int
+    mean: float
+    quantiles: tuple[float, ...]
+    edges: Array
+    counts: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """How a quantity goes over time: in each window that ends at `times` (s), of the largest value in it of each run that
+    was not lost: the least, the 5 % quantile, the median, the 95 % quantile, the largest; all (windows,). The quantiles are
+    read off a histogram and right to within 3 %; the extremes are exact."""
+
+    name: str
+    unit: str
+    meaning: str
+    times: Array
+    least: Array
+    low: Array
+    median: Array
+    high: Array
+    most: Array
+
+
+@dataclass(frozen=True)
+class Again:
+    """A run that is worth flying again: its number, why, and the command."""
+
+    run: int
+    why: str
+    command: str
+
+
+@dataclass(frozen=True)
+class Bracket:
+    """How bad a metric gets: *flown <= true <= proved*. flown: the worst that the runs and a search over the dispersions'
+    box have flown, with the scenario file of that run; proved: the bound of a certificate, with its assumption; None where
+    nothing is proved of the metric."""
+
+    metric: str
+    unit: str
+    flown: float
+    file: str
+    evaluations: int
+    proved: float | None
+    assumption: str
+
+
+@dataclass(frozen=True)
+class LawResult:
+    """What a campaign says of one law."""
+
+    law: str
+    runs: int
+    lost: int
+    failed: int
+    spreads: tuple[Spread, ...]
+    envelopes: tuple[Envelope, ...]
+    verdicts: tuple[Verdict, ...]
+    drivers: Drivers | None
+    indices: Mapping[str, Morris | Sobol | Refused] = field(default_factory=dict[str, Any])
+    """Sensitivity of metrics, by their names, where the sampling is for that."""
+    again: tuple[Again, ...] = ()
+    brackets: tuple[Bracket, ...] = ()
+
+
+@dataclass(frozen=True)
+class CampaignResult:
+    """A whole campaign, in its folder: the number of runs of each law, how they were sampled, the digest of its results
+    (SHA-256), the seconds that flying took this time, and how many runs were flown in them."""
+
+    name: str
+    folder: Path
+    runs: int
+    sampling: str
+    over: Mapping[str, str]
+    """Each dispersed key, with its distribution in words."""
+    laws: tuple[LawResult, ...]
+    digest: str
+    seconds: float
+    flown: int
+
+    @property
+    def met(self) -> bool | None:
+        """Whether every requirement is met by every law; None where some are not decided and none is missed."""
+        outcomes = {verdict.outcome for law in self.laws for verdict in law.verdicts}
+        return False if "missed" in outcomes else None if "not decided" in outcomes else True
+
+    def __repr__(self) -> str:
+        told = ", ".join(f"{law.law}: {law.failed} of {law.runs} failed" for law in self.laws)
+        return f"<campaign {self.name}: {told}>"
