@@ -58,8 +58,8 @@ def test_metrics_are_those_of_recordings(name):
         loop, carries, phases, 5, meter.observers, meter.begun(20), meter.cuts(), meter.marks[-1], rows, threads=2
     )
     assert (flown.ends[-1] < 0.0).all()
-    found = meter.metrics(flown.before, flown.notes, flown.windows, np.full(20, math.nan))
-    assert set(found) == {*meter.units, "lost_at"}
+    found = meter.metrics(flown.before, flown.notes, flown.windows, flown.ends[-1])
+    assert set(found) == {*meter.units, "diverged_at"}
     size = len(flatten(loop.start))
     for lane in (0, 7, 19):
         own = replace(loop, start=unflatten(begun[:size, lane], loop.start))

@@ -50,7 +50,7 @@ def make_meter(loop: ClosedLoop, steps: int) -> Meter:
         return found
 
     observer = Observer(note, first, float(steps))
-    meter = Meter(first, (observer, observer), finish, units, windows, steps, (tail,))
+    meter = Meter(first, (observer, observer), finish, units, windows, steps, loop.period, (tail,))
     return meter
 
 

@@ -106,7 +106,7 @@ def make_meter(loop: ClosedLoop, steps: int, units: Units, goal: CircleGoal | Eq
     early, late = (Observer(_note(loop.composition(), circle, since), first, told) for since in (False, True))
     # What is noted late, the radius, is asked of circles alone, which have no later mark.
     marks = (half,) if circle else (half, tail)
-    meter = Meter(first, (early, late), finish, units_of, windows, steps, marks)
+    meter = Meter(first, (early, late), finish, units_of, windows, steps, loop.period * units.time, marks)
     return meter
 
 

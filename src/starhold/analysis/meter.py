@@ -52,7 +52,8 @@ class Flown(NamedTuple):
 class Meter:
     """What is noted of lanes, and what it comes to. first: notes before a flight; observers: before the last of `marks` and
     from it on; finish(flown): metrics; units: those of the metrics; windows: quantities of envelopes by name; steps: control
-    steps of a flight; marks: instants at which windows end, in order."""
+    steps of a flight, of `instant` seconds each (or of the body's own unit of time, where that is unknown); marks: instants
+    at which windows end, in order."""
 
     first: Any
     observers: tuple[Observer, Observer]
@@ -60,6 +61,7 @@ class Meter:
     units: Mapping[str, str]
     windows: Mapping[str, Window]
     steps: int
+    instant: float
     marks: tuple[int, ...]
 
     def begun(self, lanes: int) -> Array:
@@ -70,16 +72,16 @@ class Meter:
         """The control steps at which windows end, every mark among them."""
         return window_ends(self.steps, self.marks)
 
-    def metrics(self, before: Array, end: Array, windows: Array, lost_at: Array) -> Metrics:
-        """Metrics of lanes from what is noted of them before the last quarter and at the end, (numbers, lanes), of windows
-        (windows, quantities, lanes), and the time at which each was lost (lanes,), NaN for those that were not. Those of a
-        lost motion are NaN."""
+    def metrics(self, before: Array, end: Array, windows: Array, lost: Array) -> Metrics:
+        """Metrics of lanes from what is noted of them before the last mark and at the end, (numbers, lanes), of windows
+        (windows, quantities, lanes), and the control step at which each was lost (lanes,), -1 for those that were not, whose
+        `diverged_at` is NaN. All others of a lost motion are."""
         named = {name: windows[:, place] for place, name in enumerate(self.windows)}
         with np.errstate(invalid="ignore", over="ignore"):
             first, last = (unflatten(list(rows), self.first) for rows in (before, end))
             found = self.finish(Flown(first, last, named))
-        kept = np.isnan(lost_at)
-        return {"lost_at": lost_at} | {name: np.where(kept, values, np.nan) for name, values in found.items()}
+        kept = lost < 0.0
+        return {"diverged_at": np.where(kept, np.nan, lost * self.instant)} | {name: np.where(kept, values, np.nan) for name, values in found.items()}
 
 
 def sampled(parts: Composition) -> Callable[..., dict[str, Any]]:

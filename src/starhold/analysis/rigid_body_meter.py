@@ -145,7 +145,7 @@ def make_meter(
     if loop.rotors:
         units["peak_wheel_momentum"] = "N m s"
     units |= {f"cone[{number}]": "rad" for number in range(1, len(cones) + 1)}
-    meter = Meter(first, (before, last), finish, units, windows, steps, (tail,))
+    meter = Meter(first, (before, last), finish, units, windows, steps, loop.period, (tail,))
     return meter
 
 

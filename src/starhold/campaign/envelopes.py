@@ -1,0 +1,68 @@
+"""Envelopes over time: histograms of what was noted in each window, which add up over any blocks of runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.analysis.meter import Array, Window
+from starhold.campaign.results import Envelope
+
+FINE = 4
+"""Binary digits by which a bin of an octave is told: sixteen bins."""
+LEAST, OCTAVES = -100, 150
+"""The noted numbers are told apart from 2^LEAST on, over so many octaves; what is less or more falls in the end bins."""
+BINS = OCTAVES << FINE
+_SHIFT = 52 - FINE
+_FIRST = (1023 + LEAST) << FINE
+NAME = "envelope"
+
+
+def count(windows: Array) -> tuple[NDArray[np.int64], Array, Array]:
+    """The histogram (windows, quantities, BINS) and the extremes (windows, quantities) of noted numbers, none below zero,
+    (windows, quantities, lanes)."""
+    shape = windows.shape[:2]
+    found = np.zeros((*shape, BINS), dtype=np.int64)
+    if not windows.shape[2]:
+        return found, np.full(shape, np.nan), np.full(shape, np.nan)
+    # The leading bits of a double, exponent and all, number the bins.
+    bins = (np.ascontiguousarray(windows).view(np.int64) >> _SHIFT) - _FIRST
+    np.clip(bins, 0, BINS - 1, out=bins)
+    for row in np.ndindex(shape):
+        found[row] = np.bincount(bins[row], minlength=BINS)
+    return found, windows.min(axis=2), windows.max(axis=2)
+
+
+def edges() -> Array:
+    """The edges (BINS + 1,) of the bins: those of equal parts of octaves."""
+    at = np.arange(BINS + 1)
+    return np.ldexp(1.0 + (at % (1 << FINE)) / (1 << FINE), LEAST + (at >> FINE))
+
+
+def quantile(counts: NDArray[np.int64], share: float, least: Array, most: Array) -> Array:
+    """A quantile of histograms (..., BINS), by a line through its bin and within the extremes (...); NaN of empty ones."""
+    total = counts.sum(axis=-1)
+    upto = np.cumsum(counts, axis=-1)
+    wanted = share * np.maximum(total - 1, 0)
+    place = (upto <= wanted[..., None]).sum(axis=-1).clip(max=BINS - 1)
+    inside = np.take_along_axis(counts, place[..., None], -1)[..., 0]
+    before = np.take_along_axis(upto, place[..., None], -1)[..., 0] - inside
+    sides = edges()
+    low, high = np.maximum(sides[place], least), np.minimum(sides[place + 1], most)
+    part = (wanted - before + 0.5) / np.maximum(inside, 1)
+    return np.where(total > 0, np.clip(low + (high - low) * part.clip(0.0, 1.0), least, most), np.nan)
+
+
+def read(
+    counts: NDArray[np.int64], least: Array, most: Array, windows: Mapping[str, Window], times: Array
+) -> tuple[Envelope, ...]:
+    """The envelopes of quantities by name: histograms (windows, quantities, BINS) and extremes (windows, quantities) of
+    what was noted, and the times (s) at which windows end."""
+    low, median, high = (quantile(counts, share, least, most) for share in (0.05, 0.5, 0.95))
+    found: list[Envelope] = []
+    for place, (name, window) in enumerate(windows.items()):
+        noted = (values[:, place] for values in (least, low, median, high, most))
+        found.append(Envelope(name, window.unit, window.meaning, times, *map(window.value, noted)))
+    return tuple(found)

@@ -1,0 +1,72 @@
+"""All numbers that a loop flies with, in one row, each with its name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.loop.closed_loop import ClosedLoop, Phase
+from starhold.loop.kernels import Numbers, numbers_of
+from starhold.simulation.abreast import Flying, kernel_key
+
+Array: TypeAlias = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Flat:
+    """A loop as the numbers that fly. form: equal for loops that one kernel flies; names and numbers, in order: of the carry
+    at the start, of each phase, and the times at which later phases begin."""
+
+    loop: ClosedLoop
+    form: Any
+    names: tuple[str, ...]
+    numbers: Array
+
+    @classmethod
+    def of(cls, loop: ClosedLoop, steps: int) -> Flat:
+        """The numbers of a loop that flies so many control steps."""
+        rest = named_phases(loop, loop.phases(steps))
+        names = (*named_carry(loop), *(name for name, _ in rest))
+        numbers = np.array([*numbers_of(loop.carry()), *(value for _, value in rest)], dtype=float)
+        return cls(loop, kernel_key(Flying(loop, steps, 1)), names, numbers)
+
+    def places(self, name: str) -> list[int]:
+        """The places of a number of this name, in every phase that has it."""
+        return [place for place, own in enumerate(self.names) if own == name or own.endswith(f"].{name}")]
+
+
+def named_carry(loop: ClosedLoop) -> list[str]:
+    """The names of the numbers of a loop's carry, what its buffers hold at the end."""
+    carry = loop.carry()
+    found = [name for name, _ in named(carry, "")]
+    return [*found, *(f"buffer[{k}]" for k in range(1, len(numbers_of(carry)) - len(found) + 1))]
+
+
+def named_phases(loop: ClosedLoop, phases: Sequence[Phase]) -> list[tuple[str, Any]]:
+    """The numbers of phases with their names, those of events by their number; then the times of events, in the body's unit
+    of time."""
+    found: list[tuple[str, Any]] = []
+    for number, phase in enumerate(phases):
+        prefix = f"event[{number}]." if number else ""
+        found += [(f"{prefix}{name}", value) for name, value in named(Numbers.of(phase), "")]
+    return [*found, *((f"event[{number}].time", phase.first * loop.period) for number, phase in enumerate(phases) if number)]
+
+
+def named(value: Any, name: str) -> Iterator[tuple[str, Any]]:
+    """The numbers of a structure with their names, in the order of its leaves."""
+    if isinstance(value, tuple):
+        fields = getattr(value, "_fields", None)
+        for place, part in enumerate(value):
+            own = f"{name}.{fields[place]}".lstrip(".") if fields else f"{name}[{place + 1}]"
+            yield from named(part, own)
+    elif isinstance(value, float | np.ndarray):
+        yield name, value
+
+
+def same(a: Array, b: Array) -> bool:
+    """Whether rows of numbers have the same bits."""
+    return a.shape == b.shape and np.ascontiguousarray(a).tobytes() == np.ascontiguousarray(b).tobytes()

@@ -1,0 +1,172 @@
+"""Flies blocks of runs: draws them, makes their lanes, measures them in the kernel's own pass, and tells their margins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.structure import places
+from starhold.analysis.meter import Meter
+from starhold.campaign.chunk import LEAST, MOST, Chunk
+from starhold.campaign.dispersions import Dispersion, read_dispersions
+from starhold.campaign.envelopes import NAME, count
+from starhold.campaign.lanes import Lanes, Lot
+from starhold.campaign.requirements import Requirement, cones_of, extras_of, read_requirements
+from starhold.campaign.sampling import Plan
+from starhold.errors import InputError
+from starhold.scenario.building import build
+from starhold.scenario.campaign import CampaignTable
+from starhold.scenario.reading import Scenario, parse
+from starhold.simulation.metered import fly_metered
+from starhold.studies.body import study_of
+
+if TYPE_CHECKING:
+    from starhold.simulation.lane import Progress
+
+
+@dataclass(frozen=True)
+class Source:
+    """A scenario as any process can read it again."""
+
+    text: str
+    where: str
+    folder: Path
+    allow_unstable: bool
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Source:
+        """Where a scenario came from."""
+        return cls(scenario.text, scenario.where, scenario.folder, scenario.allow_unstable)
+
+    def read(self) -> Scenario:
+        """The scenario, read."""
+        return parse(self.text, self.where, self.folder, self.allow_unstable)
+
+
+@dataclass
+class Job:
+    """Flies the runs of a campaign; small when pickled, whoever flies reads the scenario once."""
+
+    source: Source
+    table: CampaignTable
+    progress: Callable[[str, int], None] | None = None
+    """Called with a law and how many more of its runs were flown, as a block goes on; not from other processes."""
+    _lanes: dict[str, Lanes] = field(default_factory=dict[str, Lanes])
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"source": self.source, "table": self.table, "progress": None, "_lanes": {}}
+
+    @cached_property
+    def scenario(self) -> Scenario:
+        """The scenario that runs differ from."""
+        return self.source.read()
+
+    @cached_property
+    def plan(self) -> Plan:
+        """The draws of all runs."""
+        table, dispersions = self.table, self.dispersions
+        return Plan(dispersions, table.sampling, table.seed, table.runs, self.source.where)
+
+    @cached_property
+    def dispersions(self) -> tuple[Dispersion, ...]:
+        """The keys that runs differ in."""
+        return read_dispersions(self.scenario, self.table.over)
+
+    def lanes(self, law: str) -> Lanes:
+        """The lanes of a law, made when they are first asked for."""
+        if law not in self._lanes:
+            self._lanes[law] = Lanes(self.scenario, law, self.plan)
+        return self._lanes[law]
+
+    def meter(self, law: str, lot: Lot | None = None) -> Meter:
+        """What measures the runs of a law, or of one lot of them. InputError where it cannot be measured what is asked."""
+        if lot is None:
+            loop = build(self.scenario, self.scenario.pick(law))
+            gains = loop.gains
+        else:
+            loop, gains = lot.loop, lot.phases[0].gains
+        required = self.table.requirement
+        extras, cones = extras_of(required, self.table.metrics), cones_of(required)
+        try:
+            return study_of(self.scenario.body).meter(self.scenario, loop, gains, extras, cones)
+        except ValueError as error:
+            key = "campaign.requirement" if cones else "campaign.metrics"
+            raise InputError(self.source.where, key, "", str(error)) from None
+
+    def requirements(self, law: str) -> tuple[Requirement, ...]:
+        """What runs of a law must keep."""
+        return read_requirements(self.table.requirement, self.meter(law).units, self.source.where)
+
+    def __call__(self, law: str, first: int, count: int, threads: int) -> Chunk:
+        """The results of runs first .. first+count-1 of a law."""
+        rows: dict[str, NDArray[Any]] = {"run": np.arange(first, first + count)}
+        rows |= self.plan.columns(first, count)
+        measured: dict[str, NDArray[Any]] = {}
+        histogram: Any = 0
+        extremes: list[Any] = []
+        for lot, told in self.lanes(law).lots(first, count):
+            metrics, windows = self._fly(law, lot, threads)
+            kept = np.isnan(metrics["diverged_at"])
+            bins, least, most = counted(windows if kept.all() else windows[:, :, kept], threads)
+            histogram = histogram + bins
+            extremes.append((least, most))
+            for name, values in (told | metrics).items():
+                whole = measured.setdefault(name, np.full(count, np.nan))
+                whole[lot.runs - first] = values
+        rows |= measured
+        failed = ~np.isnan(rows["diverged_at"])
+        for requirement in self.requirements(law):
+            margins = requirement.margins(rows)
+            rows[f"margin.{requirement.name}"] = margins
+            failed = failed | (margins < 0.0)
+        rows["failed"] = failed
+        merged = (np.fmin.reduce([a for a, _ in extremes]), np.fmax.reduce([b for _, b in extremes]))
+        return Chunk(law, first, rows, {NAME: histogram}, {f"{NAME}{LEAST}": merged[0], f"{NAME}{MOST}": merged[1]})
+
+    def _fly(self, law: str, lot: Lot, threads: int) -> tuple[dict[str, Any], Any]:
+        """The metrics of a lot, (lanes,), and what was noted in windows (windows, quantities, lanes)."""
+        meter = self.meter(law, lot)
+        lanes, runs = len(lot.runs), lot.runs
+        along = bool((np.diff(runs) == 1).all())
+        told: Progress | None = None
+        if self.progress is not None:
+            tell, begun = self.progress, [0]
+
+            def told(done: int, total: int) -> None:
+                now = lanes * done // total
+                tell(law, now - begun[0])
+                begun[0] = now
+
+        flown = fly_metered(
+            lot.loop,
+            lot.carries,
+            lot.phases,
+            int(runs[0]) if along else runs,
+            meter.observers,
+            meter.begun(lanes),
+            meter.cuts(),
+            meter.marks[-1],
+            [window.row for window in meter.windows.values()],
+            threads,
+            told,
+        )
+        lost = flown.ends[places(lot.loop.carry()).lost_at]
+        return meter.metrics(flown.before, flown.notes, flown.windows, lost), flown.windows
+
+
+def counted(windows: Any, threads: int) -> Any:
+    """The histogram and the extremes of noted numbers, by so many threads."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    parts = [part for part in np.array_split(windows, max(1, threads), axis=0) if len(part)]
+    if len(parts) < 2:
+        return count(windows)
+    with ThreadPoolExecutor(len(parts)) as pool:
+        found = list(pool.map(count, parts))
+    return tuple(np.concatenate(pieces) for pieces in zip(*found, strict=True))

@@ -1,0 +1,105 @@
+"""Requirements: bounds that runs must keep, each with its margin."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.analysis.rigid_body_meter import EXTRAS, Cone
+from starhold.errors import InputError
+from starhold.scenario.campaign import RequirementTable
+from starhold.scenario.checking import nearest, show
+from starhold.scenario.units import shown, to_number
+
+LOST, CONE = "lost", "exclusion-cone"
+"""What may be required beside metrics: that the motion is not lost, and that a body axis stays away from a direction."""
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A bound of a metric, in its unit (SI), that a `share` of the flights is to keep, shown with a `confidence`. column:
+    the metric among those that are measured; at_most: whether the bound is the largest or the least value allowed."""
+
+    name: str
+    metric: str
+    column: str
+    unit: str
+    bound: float
+    at_most: bool
+    share: float
+    confidence: float
+
+    def margins(self, metrics: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+        """How far each run is on the good side of the bound, in the metric's unit: kept from 0 on, minus infinity where the
+        run has no such value. Of a motion that was not lost it is 1."""
+        if self.metric == LOST:
+            return np.where(np.isnan(metrics["diverged_at"]), 1.0, -np.inf)
+        values = metrics[self.column]
+        margins = self.bound - values if self.at_most else values - self.bound
+        return np.where(np.isnan(margins), -np.inf, margins)
+
+    def __str__(self) -> str:
+        if self.metric == LOST:
+            return "not lost"
+        return f"{self.metric} {'at most' if self.at_most else 'at least'} {self.bound:.6g} {shown(self.unit)}"
+
+
+def cones_of(tables: Sequence[RequirementTable]) -> list[Cone]:
+    """The cones that requirements ask for, in order; axes and directions of unit length."""
+    return [Cone(_unit(table.axis), _unit(table.direction)) for table in tables if table.metric == CONE]
+
+
+def extras_of(tables: Sequence[RequirementTable], more: Sequence[str]) -> tuple[str, ...]:
+    """The metrics, or kinds of them, beyond the usual that are to be measured: those asked for, and those required."""
+    asked = {*more, *(extra for table in tables for extra in EXTRAS if extra in table.metric)}
+    return tuple(extra for extra in (*EXTRAS, *sorted(asked - {*EXTRAS})) if extra in asked)
+
+
+def read_requirements(tables: Sequence[RequirementTable], units: Mapping[str, str], where: str) -> tuple[Requirement, ...]:
+    """The requirements of tables; units: those of the metrics that are measured. InputError where one asks for what is not
+    measured, or for no bound."""
+    found: list[Requirement] = []
+    cones = 0
+    for number, table in enumerate(tables, 1):
+        key = f"campaign.requirement[{number}]"
+        column = table.metric
+        if table.metric == CONE:
+            cones += 1
+            column = f"cone[{cones}]"
+        elif table.metric != LOST and table.metric not in units:
+            raise InputError(where, f"{key}.metric", show(table.metric), nearest(table.metric, [*units, LOST, CONE]))
+        bound = _bound(table, units.get(column, "1"), where, key)
+        at_most = table.at_least is None
+        found.append(
+            Requirement(table.called, table.metric, column, units.get(column, "1"), bound, at_most, table.share, table.confidence)
+        )
+    return tuple(found)
+
+
+def _bound(table: RequirementTable, unit: str, where: str, key: str) -> float:
+    told = "at_least" if table.at_most is None else "at_most"
+    value = getattr(table, told)
+    if table.metric == LOST:
+        if value is not None:
+            raise InputError(where, f"{key}.{told}", show(value), "no bound, for a motion is lost or not")
+        return math.nan
+    if table.metric == CONE and (told == "at_most" or value is None):
+        raise InputError(where, f"{key}.at_least", show(table.at_least), "the least angle between axis and direction")
+    if value is None:
+        raise InputError(where, key, "no bound", "at_most or at_least")
+    try:
+        number = to_number(value, unit) if isinstance(value, str) else float(value)
+    except (ValueError, TypeError) as error:
+        allowed = str(error) if isinstance(value, str) else f"one number, in {shown(unit)} or with its unit"
+        raise InputError(where, f"{key}.{told}", show(value), allowed) from None
+    return number
+
+
+def _unit(vector: Any) -> Any:
+    length = math.hypot(*vector)
+    return tuple(component / length for component in vector)
