@@ -1,0 +1,383 @@
+"""Which inputs, alone or two together, make runs fail and move their metrics; lost runs are welcome.
+
+Every test asks only for ranks or counts, so nothing is assumed about distributions, and a run without a metric merely has
+no say about that metric:
+
+* an input and a metric: Spearman's rank correlation; of a choice between words the correlation ratio of the ranks
+  (Kruskal and Wallis, 1952), which for two words is the same up to its sign;
+* an input and failure: how failed and passed runs differ in it, by Kolmogorov and Smirnov's distance and by Mann and
+  Whitney's statistic as the probability that a failed run has the greater value (the area under the ROC curve); of a choice
+  between words the total variation distance, with the likelihood ratio (G) test;
+* two inputs and failure: whether they fail a run *together*, beyond what each does by itself. Two causes that act
+  independently are survived independently, so the probability to pass is a product, 1 - p(x, y) = A(x) B(y) (the noisy-or
+  of J. Pearl, "Probabilistic reasoning in intelligent systems", 1988; for rare failures the additive risks of K. J.
+  Rothman, Am. J. Epidemiol. 99, 1974). The product is fitted to the failures on a grid of quantile bins by maximum
+  likelihood, and the likelihood ratio against a probability for each cell says how badly it fits. A cause by itself, or two
+  that do not know of each other, fit exactly, whatever their shape; failure where both are high does not, nor where just
+  one of them is.
+
+All p-values are corrected together (S. Holm, Scand. J. Statist. 6, 1979): among all that was looked at, something is wrongly
+called significant with probability `RISK` at most, for inputs that are drawn independently. Where two inputs were drawn
+together, each shows what the other does; such pairs are marked.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from starhold.campaign.ranks import Column
+
+Array: TypeAlias = NDArray[np.float64]
+RISK = 0.05
+LEAST = 5
+"""Failed runs, and passed runs, without which nothing is said about failure; and expected failures in a cell of a pair's
+grid."""
+BINS = 4
+"""At most as many bins of a number in a pair's grid."""
+RAREST = 0.1
+"""Values of a choice that are rarer than this are counted together with others in a pair's grid."""
+TOGETHER = 1e-3
+"""Two inputs whose cells' counts are less likely than this, corrected, count as drawn together."""
+FEWEST_RUNS = 10
+"""Runs that have a metric, without which nothing is said about it."""
+ROUNDS = 300
+"""Of the fit of independent causes, whose likelihood grows in each; what is missing makes a pair look the better by
+little."""
+BLOCK = 65536
+"""Runs that are counted at once."""
+
+
+@dataclass(frozen=True)
+class MetricDriver:
+    """How an input moves a metric over the `runs` that have it: rank correlation, or correlation ratio for a choice of
+    words.
+
+    `p` is the p-value by itself, `corrected` the one among all that was looked at.
+    """
+
+    input: str
+    metric: str
+    correlation: float
+    runs: int
+    words: bool
+    p: float
+    corrected: float
+
+    @property
+    def significant(self) -> bool:
+        return self.corrected <= RISK
+
+    def sentence(self) -> str:
+        """Tell what was found."""
+        how = "changes" if self.words else "grows" if self.correlation > 0.0 else "falls"
+        kind = "correlation ratio" if self.words else "rank correlation"
+        return f"{self.metric} {how} with {self.input}: {kind} {self.correlation:.2f}, {_chance(self.corrected)}"
+
+
+@dataclass(frozen=True)
+class FailureDriver:
+    """How failed runs differ from passed ones in an input: `distance` between the distributions, from 0 to 1, and `above`,
+    the probability that a failed run has the greater value, ties split evenly (None for words). `range` (low, high) has
+    nine in ten failed runs; for words it says with which of them runs fail most often. `p` is the lesser of the two tests'
+    p-values.
+    """
+
+    input: str
+    distance: float
+    above: float | None
+    range: tuple[float, float] | str
+    p: float
+    corrected: float
+
+    @property
+    def significant(self) -> bool:
+        return self.corrected <= RISK
+
+    def sentence(self) -> str:
+        """Tell what was found."""
+        if self.above is None or isinstance(self.range, str):
+            return f"runs fail most often where {self.range}: distance {self.distance:.2f}, {_chance(self.corrected)}"
+        low, high = self.range
+        how = f"nine in ten failed runs have {self.input} from {low:.4g} to {high:.4g}"
+        return f"{how}: distance {self.distance:.2f}, greater in a failed run {self.above:.2f}, {_chance(self.corrected)}"
+
+
+@dataclass(frozen=True)
+class PairDriver:
+    """How two inputs make runs fail together: twice the logarithm of the likelihood ratio against independent causes, which
+    by chance is chi-square with `degrees` of freedom; in the cell `where` of their grid the share `failed` of the runs
+    fails. `drawn_together`: the draws of the two depend on each other, so that one may stand for the other.
+    """
+
+    inputs: tuple[str, str]
+    statistic: float
+    degrees: int
+    where: str
+    failed: float
+    drawn_together: bool
+    p: float
+    corrected: float
+
+    @property
+    def significant(self) -> bool:
+        return self.corrected <= RISK
+
+    def sentence(self) -> str:
+        """Tell what was found."""
+        share = f"{100.0 * self.failed:.3g} % of the runs fail where {self.where}"
+        warning = "; they are drawn together, so one may stand for the other" if self.drawn_together else ""
+        first, second = self.inputs
+        return f"{first} and {second} together: {share} (G = {self.statistic:.4g}, {_chance(self.corrected)}){warning}"
+
+
+@dataclass(frozen=True)
+class Drivers:
+    """What drives failures and metrics, the strongest first in each list, everything that was looked at included.
+
+    `skipped` names inputs that are constant or lack values, `remark` says what was left out for too few runs.
+    """
+
+    runs: int
+    failures: int
+    inputs: tuple[FailureDriver, ...]
+    pairs: tuple[PairDriver, ...]
+    metrics: tuple[MetricDriver, ...]
+    skipped: tuple[str, ...]
+    remark: str
+
+    def sentences(self) -> list[str]:
+        """Tell all that is significant, and what cannot be told."""
+        found = [
+            driver.sentence()
+            for drivers in (self.inputs, self.pairs, self.metrics)
+            for driver in drivers
+            if driver.significant
+        ]
+        flown = f"{self.failures} of {self.runs} runs failed"
+        nothing = [] if found else ["nothing that was looked at stands out from chance"]
+        return [flown, *found, *nothing, *([self.remark] if self.remark else [])]
+
+
+def find_drivers(inputs: Mapping[str, NDArray], failed: NDArray[np.bool_], metrics: Mapping[str, NDArray]) -> Drivers:
+    """Find what drives failures and metrics in columns (n,) with a number, or a word, for each run.
+
+    A column a component, for a vector; `failed` (n,) says which runs failed. NaN in a metric: the run does not have it.
+    """
+    failed = np.asarray(failed, dtype=bool)
+    failures, passed = int(failed.sum()), int((~failed).sum())
+    columns = {name: Column(name, np.asarray(values)) for name, values in inputs.items()}
+    skipped = tuple(name for name, column in columns.items() if column.empty)
+    used = [column for column in columns.values() if not column.empty]
+    fewer = min(failures, passed)
+    singles = [_between(column, failed) for column in used] if fewer >= LEAST else []
+    bins = min(BINS, math.isqrt(fewer // LEAST))
+    pairs = _pairs(used, failed, bins) if bins > 1 else []
+    moved = _moved(used, metrics)
+    chances = [*(p for _, tests in singles for p in tests), *(pair.p for pair in pairs), *(found.p for found in moved)]
+    corrected = iter(_holm(np.array(chances)).tolist())
+    singles = [replace(driver, corrected=min(next(corrected) for _ in tests)) for driver, tests in singles]
+    pairs = [replace(driver, corrected=next(corrected)) for driver in pairs]
+    moved = [replace(driver, corrected=next(corrected)) for driver in moved]
+    return Drivers(
+        runs=len(failed),
+        failures=failures,
+        inputs=tuple(sorted(singles, key=lambda driver: (not driver.significant, -driver.distance))),
+        pairs=tuple(sorted(pairs, key=lambda driver: (not driver.significant, driver.drawn_together, -driver.statistic))),
+        metrics=tuple(sorted(moved, key=lambda driver: (not driver.significant, -abs(driver.correlation)))),
+        skipped=skipped,
+        remark=_remark(failures, passed, bins),
+    )
+
+
+def _between(column: Column, failed: NDArray[np.bool_]) -> tuple[FailureDriver, list[float]]:
+    """Compare failed with passed runs in a column, by one or two tests; return their p-values as well."""
+    total, bad = len(failed), int(failed.sum())
+    good = total - bad
+    if column.words:
+        codes, labels = column.words_grid(LEAST / min(bad, good))
+        table = np.stack([np.bincount(codes[rows], minlength=len(labels)) for rows in (failed, ~failed)])
+        expected = table.sum(1, keepdims=True) * table.sum(0) / total
+        p = float(special.chdtrc(max(1, len(labels) - 1), _misfit(table, expected, (0, 1))))
+        gap = 0.5 * float(np.abs(table[0] / bad - table[1] / good).sum())
+        return FailureDriver(column.name, gap, None, labels[np.argmax(table[0] / table.sum(0))], p, p), [p]
+    last = np.append(np.flatnonzero(np.diff(column.steps)), total - 1)
+    low = failed[column.order].cumsum()[last]
+    distance = float(np.abs(low / bad - (last + 1 - low) / good).max())
+    ranks = column.ranks(np.ones(total, bool))
+    above = 0.5 + float(ranks[failed].sum()) / (bad * good)
+    # The variance of the mean of `bad` ranks drawn out of all: equal values lessen that of the ranks themselves.
+    spread = math.sqrt(float(ranks @ ranks) / (total - 1) / (bad * good * total))
+    tests = [
+        float(special.kolmogorov(distance * math.sqrt(bad * good / total))),
+        float(2.0 * special.ndtr(-abs(above - 0.5) / spread)),
+    ]
+    low_end, high_end = np.quantile(column.values[failed], (0.05, 0.95))
+    return FailureDriver(column.name, distance, above, (float(low_end), float(high_end)), min(tests), min(tests)), tests
+
+
+def _pairs(used: list[Column], failed: NDArray[np.bool_], bins: int) -> list[PairDriver]:
+    """Test each two inputs for failing runs together; p-values are not yet corrected."""
+    least = max(RAREST, 2 * LEAST / min(failed.sum(), (~failed).sum()))
+    grids = [(column.name, *(column.words_grid(least) if column.words else column.grid(bins, least))) for column in used]
+    grids = [grid for grid in grids if len(grid[2]) > 1]
+    pairs = list(combinations(range(len(grids)), 2))
+    if not pairs:
+        return []
+    runs, failures = _tables([(codes, len(labels)) for _, codes, labels in grids], failed, pairs)
+    fitted = independent_causes(failures, runs)
+    statistics = _misfit(np.stack([failures, runs - failures]), np.stack([runs * fitted, runs * (1.0 - fitted)]), (0, 2, 3))
+    expected = runs.sum(2, keepdims=True) * runs.sum(1, keepdims=True) / len(failed)
+    entangled = _misfit(runs, expected, (1, 2))
+    with np.errstate(invalid="ignore"):
+        shares = failures / runs
+    excess = np.where(runs >= LEAST, shares - fitted, -1.0).reshape(len(pairs), -1).argmax(1)
+    drivers = []
+    for at, (i, j) in enumerate(pairs):
+        (first, _, rows), (second, _, columns) = grids[i], grids[j]
+        free = (len(rows) - 1) * (len(columns) - 1)
+        empty = int((runs[at, : len(rows), : len(columns)] == 0).sum())
+        row, column = divmod(int(excess[at]), runs.shape[2])
+        degrees = max(1, free - empty)
+        p = float(special.chdtrc(degrees, statistics[at]))
+        drivers.append(
+            PairDriver(
+                inputs=(first, second),
+                statistic=float(statistics[at]),
+                degrees=degrees,
+                where=f"{rows[row]} and {columns[column]}",
+                failed=float(shares[at, row, column]),
+                drawn_together=bool(special.chdtrc(free, entangled[at]) < TOGETHER / len(pairs)),
+                p=p,
+                corrected=p,
+            )
+        )
+    return drivers
+
+
+def _misfit(counts: NDArray, expected: Array, axes: tuple[int, ...]) -> Array:
+    """Return how far counts are from what is expected, chi-square by chance: the lesser of the likelihood ratio and
+    Pearson's statistic. They agree for many runs; for few the one or the other exaggerates."""
+    ratio = 2.0 * special.rel_entr(counts, expected).sum(axes)
+    deviation = np.divide((counts - expected) ** 2, expected, out=np.zeros_like(expected), where=expected > 0.0)
+    return np.minimum(ratio, deviation.sum(axes))
+
+
+def _tables(
+    grids: list[tuple[NDArray[np.int64], int]], failed: NDArray[np.bool_], pairs: list[tuple[int, int]]
+) -> tuple[Array, Array]:
+    """Count runs, and failed runs, in the cells of each pair's grid (pairs, bins, bins), with zeros beyond its own bins."""
+    offsets = np.cumsum([0, *(size for _, size in grids)])
+    codes = np.stack([numbers + offset for (numbers, _), offset in zip(grids, offsets, strict=False)], axis=1)
+    both = np.zeros((2, offsets[-1], offsets[-1]))
+    for start in range(0, len(failed), BLOCK):
+        block, lost = codes[start : start + BLOCK], failed[start : start + BLOCK]
+        # Single precision is exact for the counts of a block.
+        hot = np.zeros((len(block), offsets[-1]), np.float32)
+        np.put_along_axis(hot, block, np.float32(1.0), axis=1)
+        both += hot.T @ hot, hot[lost].T @ hot[lost]
+    widest = max(size for _, size in grids)
+    tables = np.zeros((2, len(pairs), widest, widest))
+    for at, (i, j) in enumerate(pairs):
+        cells = both[:, offsets[i] : offsets[i + 1], offsets[j] : offsets[j + 1]]
+        tables[:, at, : cells.shape[1], : cells.shape[2]] = cells
+    return tables[0], tables[1]
+
+
+def independent_causes(failures: Array, runs: Array) -> Array:
+    """Fit the probability to fail 1 - (1 - a_i)(1 - b_j), by maximum likelihood, to counts on grids (grids, rows, columns).
+
+    Returns the probabilities in the same form. By expectation-maximization: a failure is attributed to each cause as its
+    probability has it, and each probability becomes the share of runs so attributed. The likelihood grows in each round.
+    """
+    rows, columns = (runs.sum(axis, keepdims=True).clip(1.0) for axis in (2, 1))
+    a = 0.5 * failures.sum(2, keepdims=True) / rows
+    b = 0.5 * failures.sum(1, keepdims=True) / columns
+    fail = a + b - a * b
+    for _ in range(ROUNDS):
+        weight = np.divide(failures, fail, out=np.zeros_like(failures), where=fail > 0.0)
+        a, b = a * weight.sum(2, keepdims=True) / rows, b * weight.sum(1, keepdims=True) / columns
+        fail = a + b - a * b
+    return fail
+
+
+def _moved(used: list[Column], metrics: Mapping[str, NDArray]) -> list[MetricDriver]:
+    """Correlate each input with each metric; p-values are not yet corrected."""
+    groups: dict[bytes, list[tuple[str, Array]]] = {}
+    for name, values in metrics.items():
+        values = np.asarray(values, dtype=np.float64)
+        there = ~np.isnan(values)
+        metric = Column(name, values[there])
+        if there.sum() >= FEWEST_RUNS and not metric.empty:
+            # Runs that lack one metric mostly lack others too: inputs are ranked once for all of them.
+            groups.setdefault(there.tobytes(), []).append((name, metric.ranks(np.ones(len(metric.values), bool))))
+    drivers = []
+    for mask, ranked in groups.items():
+        there = np.frombuffer(mask, dtype=bool)
+        for column in used:
+            correlate = _word_correlation(column.group[there]) if column.words else _rank_correlation(column.ranks(there))
+            if correlate is None:
+                continue
+            for name, ranks in ranked:
+                strength, p = correlate(ranks)
+                drivers.append(MetricDriver(column.name, name, strength, len(ranks), column.words, p, p))
+    return drivers
+
+
+Correlate: TypeAlias = Callable[[Array], tuple[float, float]]
+"""From a metric's ranks (n,), less their mean, to the strength of a dependence and its p-value."""
+
+
+def _rank_correlation(own: Array) -> Correlate | None:
+    """Return Spearman's correlation with an input's ranks (n,); None where they are all equal."""
+    n, norm = len(own), float(own @ own)
+
+    def correlate(ranks: Array) -> tuple[float, float]:
+        strength = max(-1.0, min(1.0, float(own @ ranks) / math.sqrt(norm * float(ranks @ ranks))))
+        return strength, float(special.betainc(0.5 * n - 1.0, 0.5, 1.0 - strength**2))
+
+    return correlate if norm > 0.0 else None
+
+
+def _word_correlation(group: NDArray[np.int64]) -> Correlate | None:
+    """Return the correlation ratio with an input's words (n,), numbered; None where they are all the same."""
+    n, sizes = len(group), np.bincount(group)
+    kinds = int((sizes > 0).sum())
+
+    def correlate(ranks: Array) -> tuple[float, float]:
+        between = float((np.bincount(group, ranks) ** 2 / sizes.clip(1)).sum()) / float(ranks @ ranks)
+        return math.sqrt(between), float(special.chdtrc(kinds - 1, (n - 1) * between))
+
+    return correlate if kinds > 1 else None
+
+
+def _holm(chances: Array) -> Array:
+    """Correct p-values for their number: each is at most the risk that one as small comes up somewhere by chance."""
+    order = np.argsort(chances, kind="stable")
+    corrected = np.empty(len(chances))
+    corrected[order] = np.maximum.accumulate(np.minimum(1.0, chances[order] * np.arange(len(chances), 0, -1)))
+    return corrected
+
+
+def _remark(failures: int, passed: int, bins: int) -> str:
+    """Tell what is not looked at, for too few runs."""
+    if failures < LEAST:
+        return f"too few failures to say what drives them: {failures}, where {LEAST} are the least"
+    if passed < LEAST:
+        return f"too few passed runs to tell failed ones from: {passed}, where {LEAST} are the least"
+    if bins < 2:
+        fewer = "failures" if failures < passed else "passed runs"
+        return f"too few {fewer} to say what pairs of inputs do: {min(failures, passed)}, where {4 * LEAST} are the least"
+    return ""
+
+
+def _chance(p: float) -> str:
+    """Show a corrected p-value; below the least float there is nothing to show."""
+    return f"p = {p:.2g}" if p > 1e-300 else "p < 1e-300"

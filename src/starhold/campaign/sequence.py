@@ -1,0 +1,148 @@
+"""Bounds of a failure probability hold at every number of runs at once, so that a campaign may stop as soon as it knows.
+
+Let k of n independent runs fail, each with probability p. For a rate q below p the likelihood ratio
+
+    (q / p)^k ((1 - q) / (1 - p))^(n - k)
+
+is a nonnegative martingale in n with mean one, and a supermartingale where the true probability is above p. So is its mean
+over any weight of q on (0, p), fixed before the first run. We weigh by the arcsine law, Beta(1/2, 1/2), cut at p, for which
+the mean is closed in the incomplete beta function. By Ville's inequality it reaches 1/risk at *any* number of runs with a
+probability of at most `risk`: once it does, "the failure probability is below p" is right with confidence 1 - risk, however
+often one looked and for whatever reason one stopped. The mirrored mean over (p, 1) speaks for "above p". Each is thus a
+one-sided test of power one (H. Robbins, "Statistical methods related to the law of the iterated logarithm", Ann. Math.
+Statist. 41, 1970; J. Ville, "Étude critique de la notion de collectif", 1939).
+
+The mean grows with p from p = k/n up: with p = sin²θ its derivative vanishes only where the second one is positive, because
+(n p - k) 2θ / sin 2θ grows. So the rates that it does not rule out are an interval that holds k/n. It also falls with k, so
+that the bound is never inside the Clopper-Pearson bound of the same risk: that is the price of looking.
+
+A share of 99.73 % with 90 % confidence is decided by 1104 runs without a failure, where a number of runs fixed beforehand
+needs 852; by 2128, 2916, 4907 and 7793 runs with 1, 2, 5 and 10 failures, where it needs 1440, 1970, 3433 and 5704.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import special
+
+from starhold.errors import InputError
+
+Outcome: TypeAlias = Literal["met", "missed", "not decided"]
+
+
+class Bounds(NamedTuple):
+    """Lower and upper bound of a probability."""
+
+    lower: float
+    upper: float
+
+
+def require_share(name: str, value: float) -> None:
+    """Refuse a share, a risk or a confidence that is not between 0 and 1, both left out: no finite campaign shows those."""
+    if not 0.0 < value < 1.0:
+        raise InputError("verdict", name, f"{value:g}", "above 0 and below 1")
+
+
+def require_counts(failures: int, runs: int) -> None:
+    """Refuse counts that are no counts of failed runs among runs."""
+    if not 0 <= failures <= runs:
+        raise InputError("verdict", "failures", f"{failures} of {runs} runs", "from 0 to the number of runs")
+
+
+def log_evidence_below(failures: ArrayLike, runs: ArrayLike, rate: float) -> NDArray[np.float64]:
+    """The logarithm of the evidence that the failure probability is below `rate`; see the module. Arrays of counts may be
+    given."""
+    k, n = np.asarray(failures, float), np.asarray(runs, float)
+    a, b = k + 0.5, n - k + 0.5
+    with np.errstate(divide="ignore"):
+        # Where the weight of all rates below is less than the least float, there is no evidence.
+        weighed = special.betaln(a, b) + np.log(special.betainc(a, b, rate))
+    return weighed - math.log(2.0 * math.asin(math.sqrt(rate))) - special.xlogy(k, rate) - special.xlog1py(n - k, -rate)
+
+
+def log_evidence_above(failures: ArrayLike, runs: ArrayLike, rate: float) -> NDArray[np.float64]:
+    """The logarithm of the evidence that the failure probability is above `rate`; passing runs are failures mirrored."""
+    k, n = np.asarray(failures, float), np.asarray(runs, float)
+    a, b = k + 0.5, n - k + 0.5
+    with np.errstate(divide="ignore"):
+        weighed = special.betaln(a, b) + np.log(special.betaincc(a, b, rate))
+    return weighed - math.log(2.0 * math.acos(math.sqrt(rate))) - special.xlogy(k, rate) - special.xlog1py(n - k, -rate)
+
+
+def bounds(failures: int, runs: int, confidence: float) -> Bounds:
+    """Bound the failure probability at all numbers of runs at once: each bound by itself holds with the confidence.
+
+    Both together hold with confidence 2 `confidence` - 1. The interval holds failures/runs; without runs it is (0, 1).
+    """
+    require_share("confidence", confidence)
+    require_counts(failures, runs)
+    enough = -math.log1p(-confidence)
+    share = failures / runs if runs else 0.0
+    lower, upper = 0.0, 1.0
+    if failures < runs:
+        upper = _edge(lambda rate: float(log_evidence_below(failures, runs, rate)) >= enough, share, 1.0)
+    if failures > 0:
+        lower = _edge(lambda rate: float(log_evidence_above(failures, runs, rate)) >= enough, share, 0.0)
+    return Bounds(lower, upper)
+
+
+def decided(failures: int, runs: int, share: float, confidence: float) -> Literal["met", "missed"] | None:
+    """Tell whether so many failures decide that at least `share` of all flights keep a requirement ("met") or fewer
+    ("missed").
+
+    None: fly on. Asked after every run, and stopped at the first answer, each answer is wrong with probability 1 -
+    `confidence` at most.
+    """
+    require_share("share", share)
+    require_share("confidence", confidence)
+    require_counts(failures, runs)
+    enough = -math.log1p(-confidence)
+    if log_evidence_below(failures, runs, 1.0 - share) >= enough:
+        return "met"
+    if log_evidence_above(failures, runs, 1.0 - share) >= enough:
+        return "missed"
+    return None
+
+
+def runs_to_meet(share: float, confidence: float, failures: int) -> int:
+    """Return the least number of runs at which `decided` says "met" if no more than so many failures are seen by then."""
+    return least(lambda runs: decided(failures, runs, share, confidence) == "met", failures)
+
+
+def failures_to_meet(share: float, confidence: float, runs: int) -> int | None:
+    """Return the greatest number of failures among so many runs at which `decided` says "met"; None where there is none."""
+    return greatest(lambda failures: decided(failures, runs, share, confidence) == "met", runs)
+
+
+def least(holds: Callable[[int], bool], start: int) -> int:
+    """Return the least whole number from `start` on for which something holds that holds for all greater ones as well."""
+    low, step = start - 1, 1
+    while not holds(low + step):
+        low, step = low + step, 2 * step
+    high = low + step
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if holds(middle) else (middle, high)
+    return high
+
+
+def greatest(holds: Callable[[int], bool], end: int) -> int | None:
+    """Return the greatest whole number from 0 to `end` for which something holds that holds for all smaller ones as well."""
+    low, high = -1, end + 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return None if low < 0 else low
+
+
+def _edge(ruled_out: Callable[[float], bool], inside: float, outside: float) -> float:
+    """Return the rate nearest to `inside` that is ruled out, to the last digits; halving keeps it on the safe side."""
+    while abs(outside - inside) > 1e-14 * max(outside, inside):
+        middle = 0.5 * (inside + outside)
+        inside, outside = (inside, middle) if ruled_out(middle) else (middle, outside)
+    return outside

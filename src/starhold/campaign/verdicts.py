@@ -1,0 +1,312 @@
+"""Whether a campaign shows that a requirement is kept by the share of flights that it asks for.
+
+A number of runs that is fixed beforehand is judged by the binomial law: exact bounds of the failure probability (C. J.
+Clopper, E. S. Pearson, Biometrika 26, 1934) and, which is the same test told otherwise, the greatest number of failures
+with which the requirement is accepted at a consumer's risk of at most 1 - confidence (J. M. Hanson, B. B. Beard, "Applying
+Monte Carlo Simulation to Launch Vehicle Design and Requirements Verification", NASA/TP-2010-216447). A campaign that stops
+when it knows enough is judged by `sequence` instead.
+
+A margin is kept where it is 0 or more. A margin that is NaN or minus infinity, as of a lost run, is missed and worse than
+any other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import special
+
+from starhold.campaign import sequence
+from starhold.campaign.sequence import Bounds, Outcome, require_counts, require_share
+from starhold.errors import InputError
+
+SEVERITY: tuple[Outcome, ...] = ("met", "not decided", "missed")
+PARTS = 4
+"""Known inputs with more values than this are cut into this many parts, each with about as many runs."""
+
+
+def failure_bounds(failures: int, runs: int, confidence: float, sides: int = 2) -> Bounds:
+    """Bound a failure probability from the failures among a fixed number of independent runs (Clopper-Pearson, exact).
+
+    With two `sides` both bounds together hold with the confidence; with one each bound holds with it by itself.
+    """
+    require_share("confidence", confidence)
+    require_counts(failures, runs)
+    tail = (1.0 - confidence) / sides
+    lower = float(special.betaincinv(failures, runs - failures + 1, tail)) if failures else 0.0
+    upper = float(special.betainccinv(failures + 1, runs - failures, tail)) if failures < runs else 1.0
+    return Bounds(lower, upper)
+
+
+def acceptance(share: float, runs: int, failures: int) -> float:
+    """Return the probability that at most so many of the runs fail, if flights keep the requirement with probability
+    `share`."""
+    require_share("share", share)
+    require_counts(failures, runs)
+    return 1.0 if failures == runs else float(special.betainc(runs - failures, failures + 1, share))
+
+
+def consumer_risk(share: float, runs: int, failures: int) -> float:
+    """Return the risk to accept, with at most so many failures allowed, a design that only just does not keep the share
+    asked."""
+    return acceptance(share, runs, failures)
+
+
+def producer_risk(share: float, runs: int, failures: int) -> float:
+    """Return the risk to refuse, with at most so many failures allowed, a design whose flights keep the requirement with the
+    probability `share`, which is better than the share that is asked."""
+    return 1.0 - acceptance(share, runs, failures)
+
+
+def runs_needed(share: float, risk: float, failures: int) -> int:
+    """Return the least number of runs with which at most so many failures are accepted at a consumer's risk of at most
+    `risk`.
+
+    A share of 99.73 % and a risk of 10 % need 852, 1440, 1970, 3433 and 5704 runs for 0, 1, 2, 5 and 10 failures (Hanson
+    and Beard).
+    """
+    require_share("share", share)
+    require_share("risk", risk)
+    return sequence.least(lambda runs: acceptance(share, runs, failures) <= risk, failures)
+
+
+def allowed_failures(share: float, risk: float, runs: int) -> int | None:
+    """Return the greatest number of failures that is accepted at a consumer's risk of at most `risk`; None: too few runs
+    for any."""
+    require_share("share", share)
+    require_share("risk", risk)
+    return sequence.greatest(lambda failures: acceptance(share, runs, failures) <= risk, runs)
+
+
+def quantile_bound(values: ArrayLike, share: float, confidence: float) -> float | None:
+    """Return a value that at least `share` of all flights reach or exceed, with the confidence; None where runs are too few.
+
+    It is an order statistic of the values (n,), whatever their distribution: the one above as many as may fail by
+    `allowed_failures`. Less is worse; NaN is worst and counts as minus infinity. Give the negative of a metric of which
+    more is worse. A requirement is met by a fixed number of runs just where this bound of its margin is 0 or more.
+    """
+    values = _worst_first(values)
+    allowed = allowed_failures(share, 1.0 - confidence, len(values))
+    return None if allowed is None else float(np.partition(values, allowed)[allowed])
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of the runs, of one condition that is known before flight, judged by itself; `more` as in Verdict."""
+
+    name: str
+    runs: int
+    failures: int
+    lower: float | None
+    upper: float | None
+    outcome: Outcome
+    more: int | None
+
+    @property
+    def observed(self) -> float:
+        """Return the share of the runs that kept the requirement."""
+        return 1.0 - self.failures / self.runs
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a campaign shows about a requirement that `share` of all flights must keep, with `confidence`.
+
+    `lower` and `upper` bound the failure probability, each by itself with the confidence: Clopper-Pearson's bounds, or
+    those of `sequence` where the campaign stopped when it knew enough (`until_decided`); None where the draws are not
+    `independent`. `allowed` failures are accepted with these runs (None: none are, there are too few runs); `more` runs
+    without another failure would make the outcome "met", about, as the runs that fall in a part are not chosen (None:
+    nothing would, or it cannot be told). `worst_margin` is flown by the run numbered `worst_run`; `margin_bound` is a
+    margin that at least `share` of all flights keep, with the confidence, by order statistics (None: too few runs, or no
+    fixed number of them). `parts` are the conditions known before flight, `worst_part` the one that speaks most against the
+    requirement.
+    """
+
+    name: str
+    runs: int
+    failures: int
+    share: float
+    confidence: float
+    outcome: Outcome
+    lower: float | None
+    upper: float | None
+    allowed: int | None
+    more: int | None
+    worst_margin: float
+    worst_run: int
+    margin_bound: float | None
+    parts: tuple[Part, ...]
+    worst_part: Part | None
+    independent: bool
+    until_decided: bool
+
+    @property
+    def observed(self) -> float:
+        """Return the share of the runs that kept the requirement."""
+        return 1.0 - self.failures / self.runs
+
+    def sentence(self) -> str:
+        """Tell the verdict and what it rests on."""
+        flown = (
+            f"{self.failures} of {self.runs} runs miss it ({_percent(self.observed)} keep it, {_percent(self.share)} must)"
+        )
+        if self.lower is None or self.upper is None:
+            told = f"{self.name}: {flown}. The draws are not independent of each other, so no confidence can be given"
+            return told + "; random sampling gives one."
+        least, most = f"at least {_percent(self.lower)}", f"at most {_percent(self.upper)}"
+        both = self.lower <= 1.0 - self.share < self.upper
+        bound = f"{least} and {most}" if both else least if self.lower > 1.0 - self.share else most
+        told = (
+            f"{self.name}: {self.outcome}. {flown}; {bound} of all flights do, with {_percent(self.confidence)} confidence"
+        )
+        told += " each" if both else ""
+        if self.worst_part is not None:
+            part = self.worst_part
+            told += (
+                f". Worst is {part.name}, known before flight: {part.outcome}, {part.failures} of {part.runs} runs miss it"
+            )
+        if self.outcome == "not decided" and self.more:
+            about = "about " if self.parts else ""
+            told += f". It would be met after {about}{self.more} more runs without a failure"
+        stopped = ", whenever the campaign was stopped" if self.until_decided else ""
+        return f"{told}. This holds for independent draws from the stated dispersions{stopped}."
+
+
+def judge(
+    name: str,
+    margins: ArrayLike,
+    share: float,
+    confidence: float,
+    known: Mapping[str, NDArray] | None = None,
+    *,
+    independent: bool = True,
+    until_decided: bool = False,
+    run: NDArray[np.int64] | None = None,
+) -> Verdict:
+    """Judge a requirement by its margins (n,), n > 0, of the runs numbered `run` (n,), or else 0 to n - 1.
+
+    What is known before flight must not be averaged over: a launch on a bad day has a bad day's failure probability. So
+    each column (n,) of `known` is cut into its quarters, or its values if they are words or no more than four numbers, and
+    each such part is judged by itself with the same share and confidence. The outcome is "met" only if the runs together
+    and each of the parts are. That needs no correction for the number of parts: if any condition misses its share, its own
+    test has to fail for that (the risk of an intersection-union test is that of its tests; R. L. Berger, Technometrics 24,
+    1982). The reverse does: for "missed" the parts share one risk 1 - `confidence` evenly (Bonferroni), beside that of the
+    runs together. Conditions are known one at a time: what two of them do together is not judged.
+
+    `independent` says whether runs are drawn independently; with Sobol' points or a Latin hypercube the binomial law does
+    not hold, and only the observed share is told. `until_decided` says that the number of runs was not fixed beforehand; the
+    verdict then rests on `sequence` and may be taken any number of times.
+    """
+    require_share("share", share)
+    require_share("confidence", confidence)
+    margins = _worst_first(margins)
+    if not len(margins):
+        raise InputError("verdict", name, "no runs", "one or more")
+    missed = margins < 0.0
+    pieces = list(_parts(known or {}))
+    judged = [
+        _judge(part, missed[rows], share, confidence, independent, until_decided, 1.0 - (1.0 - confidence) / len(pieces))
+        for part, rows in pieces
+    ]
+    whole = _judge(name, missed, share, confidence, independent, until_decided, confidence)
+    worst = max(judged, key=_badness, default=None)
+    outcome = SEVERITY[max(SEVERITY.index(part.outcome) for part in (whole, *judged))]
+    row, risk = int(np.argmin(margins)), 1.0 - confidence
+    if until_decided:
+        allowed = sequence.failures_to_meet(share, confidence, len(margins))
+    else:
+        allowed = allowed_failures(share, risk, len(margins))
+    more = [None if part.more is None else math.ceil(part.more * len(margins) / part.runs) for part in (whole, *judged)]
+    return Verdict(
+        name=name,
+        runs=whole.runs,
+        failures=whole.failures,
+        share=share,
+        confidence=confidence,
+        outcome=outcome,
+        lower=whole.lower,
+        upper=whole.upper,
+        allowed=allowed if independent else None,
+        more=None if outcome == "missed" else max((n for n in more if n is not None), default=None),
+        worst_margin=float(margins[row]),
+        worst_run=row if run is None else int(run[row]),
+        margin_bound=quantile_bound(margins, share, confidence) if independent and not until_decided else None,
+        parts=tuple(judged),
+        worst_part=worst,
+        independent=independent,
+        until_decided=until_decided,
+    )
+
+
+def _judge(
+    name: str,
+    missed: NDArray[np.bool_],
+    share: float,
+    confidence: float,
+    independent: bool,
+    until_decided: bool,
+    missed_confidence: float,
+) -> Part:
+    """Judge runs of one condition; "missed" is said with a confidence of its own."""
+    runs, failures = len(missed), int(missed.sum())
+    if not independent:
+        return Part(name, runs, failures, None, None, "not decided", None)
+    if until_decided:
+        lower, upper = sequence.bounds(failures, runs, confidence)
+        met = sequence.decided(failures, runs, share, confidence) == "met"
+        short = sequence.decided(failures, runs, share, missed_confidence) == "missed"
+        needed = sequence.runs_to_meet(share, confidence, failures)
+    else:
+        lower, upper = failure_bounds(failures, runs, confidence, sides=1)
+        met = acceptance(share, runs, failures) <= 1.0 - confidence
+        short = failure_bounds(failures, runs, missed_confidence, sides=1).lower > 1.0 - share
+        needed = runs_needed(share, 1.0 - confidence, failures)
+    outcome: Outcome = "met" if met else "missed" if short else "not decided"
+    return Part(name, runs, failures, lower, upper, outcome, None if short else max(0, needed - runs))
+
+
+def _parts(known: Mapping[str, NDArray]) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+    """Name the conditions that are known before flight, and tell which runs (n,) belong to each; a constant is no
+    condition."""
+    for name, column in known.items():
+        column = np.asarray(column)
+        values = np.unique(column)
+        if len(values) == 1:
+            continue
+        if column.dtype.kind not in "fiu" or len(values) <= PARTS:
+            for value in values:
+                # Not a number is equal to nothing, itself included.
+                yield f"{name} = {_shown(value)}", np.isnan(column) if value != value else column == value
+            continue
+        there = ~np.isnan(column)
+        if not there.all():
+            yield f"{name} without a value", ~there
+        quarter = np.searchsorted(np.quantile(column[there], np.arange(1, PARTS) / PARTS), column)
+        for number in range(PARTS):
+            rows = there & (quarter == number)
+            if rows.any():
+                yield f"{name} from {_shown(column[rows].min())} to {_shown(column[rows].max())}", rows
+
+
+def _badness(part: Part) -> tuple[int, float, float]:
+    return SEVERITY.index(part.outcome), part.failures / part.runs, part.upper or 0.0
+
+
+def _worst_first(values: ArrayLike) -> NDArray[np.float64]:
+    """Return values (n,) with minus infinity for NaN, so that nothing is worse."""
+    values = np.asarray(values, dtype=np.float64)
+    return np.where(np.isnan(values), -np.inf, values)
+
+
+def _shown(value: object) -> str:
+    return f"{value:.4g}" if isinstance(value, (int, float, np.number)) else str(value)
+
+
+def _percent(share: float) -> str:
+    """Show a share with enough digits to tell it from 0 and 100 %."""
+    digits = 3 if not 0.0 < share < 1.0 else max(3, 1 - math.floor(math.log10(min(share, 1.0 - share) * 100.0)))
+    return f"{100.0 * share:.{digits}f}".rstrip("0").rstrip(".") + " %"

@@ -1,0 +1,246 @@
+"""Drivers against SciPy's statistics, planted causes, and chance."""
+
+import math
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import optimize, special, stats
+
+from starhold.campaign.drivers import find_drivers, independent_causes
+
+N = 2000
+
+
+def draws(rng, runs=N, count=6):
+    inputs = {f"x{number}": rng.uniform(size=runs) for number in range(count)}
+    return inputs | {"mode": rng.choice(["axis", "norm", "off"], runs, p=[0.5, 0.3, 0.2])}
+
+
+def told(drivers):
+    return [driver.input for driver in drivers.inputs if driver.significant]
+
+
+def told_pairs(drivers):
+    return [set(pair.inputs) for pair in drivers.pairs if pair.significant]
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(8)
+
+
+@pytest.mark.parametrize("round_to", [None, 1])
+def test_statistics_of_failure_are_those_of_scipy(rng, round_to):
+    """With and without equal values."""
+    x = rng.normal(size=300) if round_to is None else rng.normal(size=300).round(round_to)
+    failed = rng.uniform(size=300) < special.expit(x - 1.0)
+    driver = find_drivers({"x": x}, failed, {}).inputs[0]
+    assert driver.distance == pytest.approx(stats.ks_2samp(x[failed], x[~failed]).statistic)
+    theirs = stats.mannwhitneyu(x[failed], x[~failed], use_continuity=False, method="asymptotic")
+    assert driver.above == pytest.approx(theirs.statistic / (failed.sum() * (~failed).sum()))
+    distance_chance = special.kolmogorov(driver.distance * math.sqrt(failed.sum() * (~failed).sum() / 300))
+    assert driver.p == pytest.approx(min(theirs.pvalue, distance_chance))
+    assert distance_chance == pytest.approx(stats.ks_2samp(x[failed], x[~failed], method="asymp").pvalue, rel=0.5)
+
+
+def test_correlations_are_those_of_scipy(rng):
+    x, y = rng.normal(size=(2, 400)).round(1)
+    words = rng.choice(["a", "b", "c"], 400)
+    metric = x + rng.normal(size=400) + (words == "b")
+    metric[rng.choice(400, 90, replace=False)] = np.nan
+    there = ~np.isnan(metric)
+    drivers = find_drivers({"x": x, "y": y, "words": words}, np.zeros(400, bool), {"m": metric, "all": y**2})
+    found = {(driver.input, driver.metric): driver for driver in drivers.metrics}
+    for (name, metric_name), column, values in ((("x", "m"), x, metric), (("y", "m"), y, metric), (("x", "all"), x, y**2)):
+        rows = ~np.isnan(values)
+        theirs = stats.spearmanr(column[rows], values[rows])
+        driver = found[name, metric_name]
+        assert (driver.correlation, driver.p) == pytest.approx((theirs.statistic, theirs.pvalue))
+        assert driver.runs == rows.sum()
+    kruskal = stats.kruskal(*(metric[there & (words == word)] for word in "abc"))
+    driver = found["words", "m"]
+    assert driver.correlation**2 * (there.sum() - 1) == pytest.approx(kruskal.statistic)
+    assert driver.p == pytest.approx(kruskal.pvalue)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10_000))
+def test_independent_causes_are_fitted_to_the_most_likely(seed):
+    rng = np.random.default_rng(seed)
+    runs = rng.integers(0, 200, (3, 4))
+    truth = 1.0 - np.outer(1.0 - rng.uniform(0.0, 0.6, 3), 1.0 - rng.uniform(0.0, 0.3, 4))
+    failures = rng.binomial(runs, truth if seed % 2 else 0.2)
+
+    def loss(chances):
+        fail = np.clip(1.0 - np.outer(1.0 - chances[:3], 1.0 - chances[3:]), 1e-12, 1.0 - 1e-12)
+        return -(special.xlogy(failures, fail) + special.xlog1py(runs - failures, -fail)).sum()
+
+    fitted = independent_causes(failures[None].astype(float), runs[None].astype(float))[0]
+    found = -(special.xlogy(failures, fitted) + special.xlog1py(runs - failures, -fitted)).sum()
+    best = min(optimize.minimize(loss, np.full(7, start), bounds=[(0.0, 1.0)] * 7).fun for start in (0.1, 0.3))
+    assert found - best < 0.02
+
+
+def test_a_single_driver_is_found_and_no_pair(rng):
+    inputs = draws(rng)
+    drivers = find_drivers(inputs, inputs["x2"] > 0.93, {})
+    assert told(drivers) == ["x2"]
+    assert told_pairs(drivers) == []
+    assert drivers.inputs[0].above == 1.0
+    assert drivers.inputs[0].distance == 1.0
+    assert drivers.inputs[0].range[0] > 0.93
+    assert "nine in ten failed runs have x2 from 0.93" in drivers.sentences()[1]
+
+
+def test_a_driver_with_two_bad_ends_is_found_and_no_pair(rng):
+    inputs = draws(rng)
+    drivers = find_drivers(inputs, np.abs(inputs["x2"] - 0.5) > 0.45, {})
+    assert told(drivers) == ["x2"]
+    assert told_pairs(drivers) == []
+
+
+@pytest.mark.parametrize("chance", [1.0, 0.1])
+def test_failure_by_two_inputs_together_is_found(rng, chance):
+    inputs = draws(rng)
+    failed = (inputs["x1"] > 2 / 3) & (inputs["x2"] > 2 / 3) & (rng.uniform(size=N) < chance)
+    drivers = find_drivers(inputs, failed, {})
+    assert set(told(drivers)) == {"x1", "x2"}
+    assert told_pairs(drivers) == [{"x1", "x2"}]
+    pair = drivers.pairs[0]
+    assert pair.where.startswith("x1 is at least 0.")
+    assert "x2 is at least 0." in pair.where
+    assert not pair.drawn_together
+    assert pair.failed > 0.5 * failed.mean() / 0.25
+    assert any(sentence.startswith("x1 and x2 together: ") for sentence in drivers.sentences())
+
+
+def test_two_causes_that_do_not_know_of_each_other_are_no_pair(rng):
+    inputs = draws(rng)
+    drivers = find_drivers(inputs, (inputs["x1"] > 0.9) | (inputs["x2"] > 0.9), {})
+    assert set(told(drivers)) == {"x1", "x2"}
+    assert told_pairs(drivers) == []
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.3])
+def test_failure_by_just_one_of_two_is_found_though_neither_shows_alone(rng, noise):
+    inputs = draws(rng)
+    failed = (inputs["x1"] > 0.5) ^ (inputs["x4"] > 0.5) ^ (rng.uniform(size=N) < noise)
+    drivers = find_drivers(inputs, failed, {})
+    assert told(drivers) == []
+    assert told_pairs(drivers) == [{"x1", "x4"}]
+
+
+def test_words_and_numbers_fail_together(rng):
+    inputs = draws(rng)
+    failed = (inputs["mode"] == "norm") & (inputs["x0"] < 0.3)
+    drivers = find_drivers(inputs, failed, {})
+    assert set(told(drivers)) == {"mode", "x0"}
+    assert told_pairs(drivers) == [{"mode", "x0"}]
+    assert "mode is norm" in drivers.pairs[0].where
+    assert "x0 is at most 0." in drivers.pairs[0].where
+    assert next(driver for driver in drivers.inputs if driver.input == "mode").range == "mode is norm"
+
+
+def test_a_choice_between_numbers_that_is_uneven_is_a_driver_like_others(rng):
+    inputs = draws(rng) | {"wheel": rng.choice([1.0, 2.0, 3.0], N, p=[0.9, 0.07, 0.03]), "flag": rng.uniform(size=N) < 0.5}
+    drivers = find_drivers(inputs, (inputs["wheel"] > 1.0) & inputs["flag"], {})
+    assert set(told(drivers)) == {"wheel", "flag"}
+    assert told_pairs(drivers) == [{"wheel", "flag"}]
+
+
+def test_lost_runs_have_no_say_about_a_metric_they_lack(rng):
+    inputs = draws(rng)
+    lost = inputs["x0"] > 0.9
+    metrics = {
+        "settling": np.where(lost, np.nan, 100.0 - 20.0 * inputs["x1"] + rng.normal(size=N)),
+        "none": np.full(N, np.nan),
+    }
+    drivers = find_drivers(inputs, lost, metrics | {"constant": np.ones(N)})
+    assert [(driver.input, driver.metric) for driver in drivers.metrics if driver.significant] == [("x1", "settling")]
+    assert drivers.metrics[0].runs == (~lost).sum()
+    assert drivers.metrics[0].correlation < -0.9
+    assert "settling falls with x1: rank correlation -0.9" in "\n".join(drivers.sentences())
+    assert {driver.metric for driver in drivers.metrics} == {"settling"}
+    assert told(drivers) == ["x0"]
+
+
+def test_inputs_drawn_together_are_marked(rng):
+    inputs = draws(rng)
+    inputs["y"] = inputs["x1"] + 0.2 * rng.normal(size=N)
+    drivers = find_drivers(inputs, inputs["x1"] > 0.9, {})
+    marked = {frozenset(pair.inputs) for pair in drivers.pairs if pair.drawn_together}
+    assert marked == {frozenset({"x1", "y"})}
+    assert all("one may stand for the other" in pair.sentence() for pair in drivers.pairs if pair.drawn_together)
+
+
+def test_constant_inputs_are_skipped(rng):
+    inputs = draws(rng) | {
+        "same": np.ones(N),
+        "word": np.full(N, "axis"),
+        "hole": np.where(rng.uniform(size=N) < 0.1, np.nan, 1.0),
+    }
+    drivers = find_drivers(inputs, inputs["x0"] > 0.9, {})
+    assert drivers.skipped == ("same", "word", "hole")
+    assert told(drivers) == ["x0"]
+
+
+@pytest.mark.parametrize(
+    ("failures", "remark"), [(0, "too few failures"), (4, "too few failures"), (N - 2, "too few passed runs")]
+)
+def test_too_few_runs_to_say(rng, failures, remark):
+    failed = np.arange(N) < failures
+    drivers = find_drivers(draws(rng), failed, {})
+    assert (drivers.inputs, drivers.pairs) == ((), ())
+    assert remark in drivers.sentences()[-1]
+
+
+def test_too_few_failures_for_pairs(rng):
+    inputs = draws(rng)
+    failed = inputs["x0"] > np.sort(inputs["x0"])[-13]
+    drivers = find_drivers(inputs, failed, {})
+    assert told(drivers) == ["x0"]
+    assert drivers.pairs == ()
+    assert drivers.remark == "too few failures to say what pairs of inputs do: 12, where 20 are the least"
+
+
+@pytest.mark.parametrize("failures", [6, 24, 50, 300])
+def test_chance_is_called_a_driver_as_rarely_as_said(failures):
+    """Of all that was looked at, something is called significant in one campaign of twenty at most."""
+    campaigns, wrong = 150, 0
+    for seed in range(campaigns):
+        rng = np.random.default_rng(1000 * failures + seed)
+        inputs = draws(rng, runs=800, count=5) | {"number": rng.choice([1.0, 2.0, 5.0], 800, p=[0.7, 0.2, 0.1])}
+        failed = np.zeros(800, bool)
+        failed[rng.choice(800, failures, replace=False)] = True
+        metrics = {"a": np.where(failed, np.nan, rng.normal(size=800)), "b": rng.normal(size=800)}
+        drivers = find_drivers(inputs, failed, metrics)
+        wrong += any(driver.significant for driver in (*drivers.inputs, *drivers.pairs, *drivers.metrics))
+    assert wrong <= stats.binom.ppf(0.999, campaigns, 0.05)
+
+
+def test_corrected_chances_are_those_of_holm(rng):
+    inputs = draws(rng, count=3)
+    drivers = find_drivers(inputs, inputs["x0"] + 0.3 * rng.normal(size=N) > 0.9, {"m": inputs["x1"] + rng.normal(size=N)})
+    # Two tests of each of three numbers, one of the words; six pairs; four correlations.
+    looked = 2 * 3 + 1 + 6 + 4
+    every = [*drivers.inputs, *drivers.pairs, *drivers.metrics]
+    least = min(every, key=lambda driver: driver.p)
+    assert least.corrected == pytest.approx(min(1.0, looked * least.p))
+    assert all(driver.p <= driver.corrected <= 1.0 for driver in every)
+    ordered = sorted(every, key=lambda driver: driver.p)
+    assert [driver.corrected for driver in ordered] == sorted(driver.corrected for driver in ordered)
+
+
+@pytest.mark.slow
+def test_many_runs_take_little_time(rng):
+    inputs = draws(rng, runs=100_000, count=19)
+    failed = (inputs["x1"] > 0.7) & (inputs["x2"] > 0.7) & (rng.uniform(size=100_000) < 0.2)
+    metrics = {f"m{number}": rng.normal(size=100_000) for number in range(6)}
+    started = time.perf_counter()
+    drivers = find_drivers(inputs, failed, metrics)
+    assert time.perf_counter() - started < 4.0
+    assert told_pairs(drivers) == [{"x1", "x2"}]
+    assert len(drivers.pairs) == 190
