@@ -81,7 +81,9 @@ class Meter:
             first, last = (unflatten(list(rows), self.first) for rows in (before, end))
             found = self.finish(Flown(first, last, named))
         kept = lost < 0.0
-        return {"diverged_at": np.where(kept, np.nan, lost * self.instant)} | {name: np.where(kept, values, np.nan) for name, values in found.items()}
+        return {"diverged_at": np.where(kept, np.nan, lost * self.instant)} | {
+            name: np.where(kept, values, np.nan) for name, values in found.items()
+        }
 
 
 def sampled(parts: Composition) -> Callable[..., dict[str, Any]]:

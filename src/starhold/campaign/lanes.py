@@ -206,7 +206,8 @@ class Lanes:
         lanes = len(lot.runs)
         found = dict(zip(named_carry(lot.loop), lot.carries, strict=True)) | dict(named_phases(lot.loop, lot.phases))
         return {
-            f"flown.{name}": np.broadcast_to(np.asarray(found.get(name, np.nan), dtype=float), (lanes,)) for name in self.flown
+            f"flown.{name}": np.broadcast_to(np.asarray(found.get(name, np.nan), dtype=float), (lanes,))
+            for name in self.flown
         }
 
 

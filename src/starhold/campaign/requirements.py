@@ -76,7 +76,9 @@ def read_requirements(tables: Sequence[RequirementTable], units: Mapping[str, st
         bound = _bound(table, units.get(column, "1"), where, key)
         at_most = table.at_least is None
         found.append(
-            Requirement(table.called, table.metric, column, units.get(column, "1"), bound, at_most, table.share, table.confidence)
+            Requirement(
+                table.called, table.metric, column, units.get(column, "1"), bound, at_most, table.share, table.confidence
+            )
         )
     return tuple(found)
 

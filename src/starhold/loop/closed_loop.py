@@ -148,6 +148,8 @@ class ClosedLoop:
     hysteresis_width: float = 0.5
     far: float = 1e3
     seed: int = 1
+    run: int = 0
+    """Which of many runs it flies where nothing else is said: with the seed it fixes the random numbers."""
     events: tuple[Event, ...] = ()
     """What changes during a run, in order of time."""
 

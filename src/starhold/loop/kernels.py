@@ -68,9 +68,10 @@ def form(value: Any) -> Any:
     return "number" if isinstance(value, float) else (type(value), value)
 
 
-def fly_plainly(loop: ClosedLoop, steps: int, run: int = 0) -> Any:
+def fly_plainly(loop: ClosedLoop, steps: int, run: int | None = None) -> Any:
     """The carry of a loop without events after so many control steps in plain Python."""
-    step, carry, setup, key = make_step(loop.composition()), loop.carry(), loop.setup(), (loop.seed, run)
+    step, carry, setup = make_step(loop.composition()), loop.carry(), loop.setup()
+    key = (loop.seed, loop.run if run is None else run)
     for k in range(steps):
         carry = step.update(step.check(carry, k, setup), k, key, loop.gains, loop.craft, setup)
         for _ in range(loop.substeps):

@@ -68,7 +68,16 @@ def kernel_key(flight: Flying) -> Any:
     loop = flight.loop
     phases = [(p.first, p.last, form(Numbers.of(p))) for p in loop.phases(flight.steps)]
     tables = [np.array(table.cells).tobytes() for phase in loop.phases(flight.steps) for table in buffers(phase.setup)]
-    return (loop.composition(), loop.substeps, loop.seed, form(loop.carry()), tuple(phases), tuple(tables), *flight[1:])
+    return (
+        loop.composition(),
+        loop.substeps,
+        loop.seed,
+        loop.run,
+        form(loop.carry()),
+        tuple(phases),
+        tuple(tables),
+        *flight[1:],
+    )
 
 
 def _one_by_one(group: Sequence[Flying], numbers: Sequence[int], use: Callable[..., Any]) -> list[Callable[[], Any]]:
@@ -118,7 +127,7 @@ class _Vector:
     def __init__(self, flights: Sequence[Flying], phases: Sequence[Any], kernels: Sequence[Kernel], size: int) -> None:
         self.phases, self.kernels, self.size, self.width = phases, kernels, size, len(flights)
         loop, self.steps, self.every = flights[0]
-        self.seed, self.like, self.step = loop.seed, loop.carry(), make_step(loop.composition())
+        self.seed, self.run, self.like, self.step = loop.seed, loop.run, loop.carry(), make_step(loop.composition())
         self.begun: list[Any] = [flight.loop.carry() for flight in flights]
         self.setups = [flight.loop.setup() for flight in flights]
         self.carry = aligned(len(numbers_of(self.like)), self.width)
@@ -170,5 +179,5 @@ class _Vector:
             groups, each, place = 1, min(count, self.every - into), 0 if into == 0 else -1
         else:
             groups, each, place = count // self.every, self.every, 0
-        kernel(memories, first, groups, each, place, -(-first // self.every), self.seed, 0)
+        kernel(memories, first, groups, each, place, -(-first // self.every), self.seed, self.run)
         return groups * each

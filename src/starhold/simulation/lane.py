@@ -80,12 +80,12 @@ class Recording:
 
 
 def simulate(
-    loop: ClosedLoop, steps: int, record_every: int = 1, run: int = 0, progress: Progress | None = None
+    loop: ClosedLoop, steps: int, record_every: int = 1, run: int | None = None, progress: Progress | None = None
 ) -> xr.Dataset:
     """Fly a closed loop for `steps` control periods.
 
     Returns an xarray Dataset over `time` (s), a sample every `record_every` control steps, the state before and the torque
-    after each. `run` numbers the random numbers. A motion that was lost (not finite, or faster than the integration can
+    after each. `run` numbers the random numbers, in place of the loop's. A motion that was lost (not finite, or faster than the integration can
     follow) ends the samples, and its time stands in `attrs["diverged_at"]` (s); else that attribute is absent.
     """
     samples, carry = fly(loop, steps, record_every, run, progress)
@@ -93,14 +93,14 @@ def simulate(
 
 
 def fly(
-    loop: ClosedLoop, steps: int, record_every: int = 1, run: int = 0, progress: Progress | None = None
+    loop: ClosedLoop, steps: int, record_every: int = 1, run: int | None = None, progress: Progress | None = None
 ) -> tuple[NDArray[np.float64], Carry]:
     """The samples (number, sample) of a trajectory, one row for each number of a sample, and what it carries at its end."""
     like, phases = loop.carry(), loop.phases(steps)
     width = len(flatten(make_step(loop.composition()).sample(like, 0, loop.setup())))
     samples = _room(steps, record_every, width)
     carry, done, chunk = np.array(numbers_of(like)), 0, steps if progress is None else 1
-    flight = _Flight(loop, like, record_every, run, samples)
+    flight = _Flight(loop, like, record_every, loop.run if run is None else run, samples)
     while done < steps:
         begun = time.perf_counter()
         now = next(phase for phase in phases if done < phase.last)

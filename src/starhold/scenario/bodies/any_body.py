@@ -44,6 +44,12 @@ class AnyTiming(Timing):
         float | None, *quantity(Gain(above=0.0, text="distance at which the body counts its motion as lost; none if absent"))
     ] = None
     seed: Annotated[int, *quantity(Gain("1", at_least=0, at_most=2**53, whole=True, text="of all random numbers"))] = 1
+    run: Annotated[
+        int,
+        *quantity(
+            Gain("1", at_least=0, at_most=2**53, whole=True, text="of a campaign: each has random numbers of its own")
+        ),
+    ] = 0
 
     @model_validator(mode="after")
     def _whole_steps(self) -> AnyTiming:
@@ -142,6 +148,7 @@ class AnyBody(Body):
             command_limit=math.inf if limit is None else limit,
             far=timing.lost_beyond or math.inf,
             seed=timing.seed,
+            run=timing.run,
         )
 
     def examine(self, scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> None:

@@ -37,6 +37,7 @@ def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
         sign_policy=entry.options.quaternion_sign,
         hysteresis_width=entry.options.hysteresis_width,
         seed=table.simulation.seed,
+        run=table.simulation.run,
         events=make_events(scenario, entry, parts) if table.fault else (),
     )
 

@@ -119,6 +119,12 @@ class Simulation(Timing):
     duration: Annotated[float, *quantity(Gain("s", above=0.0, text="length of the run"))]
     control_period: Annotated[float, *quantity(Gain("s", above=0.0, text="for which a torque is held"))] = 0.1
     seed: Annotated[int, *quantity(Gain("1", at_least=0, at_most=2**53, whole=True, text="of all random numbers"))] = 1
+    run: Annotated[
+        int,
+        *quantity(
+            Gain("1", at_least=0, at_most=2**53, whole=True, text="of a campaign: each has random numbers of its own")
+        ),
+    ] = 0
 
     @model_validator(mode="after")
     def _whole_steps(self) -> Simulation:

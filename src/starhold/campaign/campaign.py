@@ -1,0 +1,179 @@
+"""Flies a campaign into a folder, goes on with one, and flies single runs of it again."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from starhold.campaign.chunk import Chunk
+from starhold.campaign.digest import digest
+from starhold.campaign.engines import Engine, Threads, Workers, fly_all
+from starhold.campaign.job import Job, Source
+from starhold.campaign.manifest import Manifest
+from starhold.campaign.results import CampaignResult
+from starhold.campaign.store import Store
+from starhold.campaign.summary import summarise
+from starhold.errors import InputError
+from starhold.scenario.building import build
+from starhold.scenario.campaign import CampaignTable
+from starhold.scenario.checking import read_toml, show
+from starhold.scenario.reading import Scenario
+from starhold.studies.compare import Flight, fly_law
+
+if TYPE_CHECKING:
+    from starhold.campaign.dispersions import Dispersion
+
+CHUNK, SMALL = 16384, 512
+"""Runs of a block: where many runs' numbers are made at once, and where each is made by itself."""
+LOOK = 1024
+"""Runs after which a campaign that ends when all is decided is looked at."""
+
+Notice = Callable[[str, int], None]
+"""Called with a law and how many more of its runs were flown."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a campaign is flown; nothing of it changes results. engine: None for all cores of this process; chunk: runs of a
+    block, None for what suits."""
+
+    engine: Engine | None = None
+    chunk: int | None = None
+    resume: bool = False
+    force: bool = False
+    until_decided: bool = False
+
+
+def with_campaign(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
+    """The scenario with other entries of its [campaign] table, or with one; None leaves an entry as it is."""
+    given = {key: value for key, value in changes.items() if value is not None}
+    if scenario.table.campaign is None and not given:
+        given = {"runs": CampaignTable().runs}
+    return scenario.with_({f"campaign.{key}": value for key, value in given.items()}) if given else scenario
+
+
+def begin(scenario: Scenario, laws: Sequence[str]) -> Job:
+    """The job of a campaign. InputError for whatever is wrong with it, before anything is flown."""
+    table = scenario.table.campaign
+    job = Job(Source.of(scenario), table)
+    reached: set[str] = set()
+    for law in laws:
+        job.requirements(law)
+        reached |= {key for key, places in job.lanes(law).moved.items() if places}
+    for dispersion in job.dispersions:
+        told = ", ".join(dispersion.keys)
+        if told not in reached:
+            flown = f"law {laws[0]}" if len(laws) == 1 else "any law"
+            raise InputError(
+                scenario.where, f'campaign.over."{told}"', f"changes nothing of what {flown} flies", "a key that reaches it"
+            )
+    return job
+
+
+def fly_campaign(
+    scenario: Scenario, folder: Path, law: str | None = None, options: Options = Options(), notice: Notice | None = None
+) -> CampaignResult:
+    """Fly the campaign of a scenario's [campaign] table into a folder, for one law or all, and say what it comes to.
+
+    InputError for whatever is wrong with it, and where something stands in its way: what was flown until then is kept, and
+    `resume` goes on from there. The results are the same for any engine and any chunk.
+    """
+    laws = tuple(entry.name for entry in scenario.laws) if law is None else (scenario.pick(law).name,)
+    job = begin(scenario, laws)
+    table, engine = job.table, options.engine or Threads(os.cpu_count() or 1)
+    if options.until_decided:
+        _check_decidable(job)
+    at_once = all(job.lanes(name).at_once for name in laws)
+    manifest = Manifest(
+        scenario.name,
+        scenario.text,
+        {"files": _hashes(scenario)},
+        laws,
+        table.runs,
+        options.chunk or _chunk(table.runs, engine, at_once),
+        table.seed,
+        table.sampling in ("random", "sobol"),
+    )
+    exists = (folder / "manifest.json").exists()
+    store = (
+        Store.open(folder).resume(manifest) if options.resume and exists else Store.create(folder, manifest, options.force)
+    )
+    job.progress = notice if isinstance(engine, Threads) else None
+    begun, flown = time.perf_counter(), 0
+
+    def arrived(chunk: Chunk) -> None:
+        nonlocal flown
+        flown += chunk.count
+        if notice is not None and job.progress is None:
+            notice(chunk.law, chunk.count)
+
+    if options.until_decided:
+        runs = _fly_until_decided(store, job, engine, arrived)
+    else:
+        fly_all(job, _blocks(store, notice), store.put, engine, arrived)
+        runs = table.runs
+    seconds = time.perf_counter() - begun
+    results = tuple(summarise(store, job, name, options.until_decided) for name in laws)
+    told = digest(store, runs)
+    totals = {
+        "verdicts": {
+            result.law: {verdict.name: verdict.outcome for verdict in result.verdicts}
+            for result in results
+            if result.verdicts
+        },
+        "failed": {result.law: result.failed for result in results},
+        "lost": {result.law: result.lost for result in results},
+    }
+    store.finish(told, totals)
+    over = {", ".join(one.keys): in_words(one, table) for one in job.dispersions}
+    return CampaignResult(scenario.name, folder, runs, table.sampling, over, results, told, seconds, flown)
+
+
+def fly_again(folder: Path, run: int, law: str | None = None) -> tuple[Scenario, Flight]:
+    """The scenario of one run of a campaign, and its flight with every control step recorded, the same bits as then.
+    InputError where there is no such run."""
+    store = Store.open(folder)
+    name = store.manifest.laws[0] if law is None else law
+    if name not in store.manifest.laws:
+        raise InputError(str(folder), "law", name, ", ".join(store.manifest.laws))
+    raise NotImplementedError
+
+
+def _blocks(store: Store, notice: Notice | None) -> Iterator[tuple[str, int, int]]:
+    for name in store.manifest.laws:
+        missing = store.missing(name)
+        held = store.manifest.runs - sum(count for _, count in missing)
+        if notice is not None and held:
+            notice(name, held)
+        yield from ((name, first, count) for first, count in missing)
+
+
+def _chunk(runs: int, engine: Engine, at_once: bool) -> int:
+    """Runs of a block: enough for each worker to have a few, and no more than memory has room for."""
+    most = CHUNK if at_once else SMALL
+    if isinstance(engine, Workers):
+        most = min(most, -(-runs // (4 * engine.count)))
+    return max(1, min(most, runs))
+
+
+def _hashes(scenario: Scenario) -> dict[str, str]:
+    """SHA-256 of the files that a scenario names."""
+    found: dict[str, str] = {}
+
+    def look(value: Any) -> None:
+        if isinstance(value, dict):
+            name = value.get("file")
+            if isinstance(name, str) and (scenario.folder / name).is_file():
+                found[name] = hashlib.sha256((scenario.folder / name).read_bytes()).hexdigest()
+        for item in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+            look(item)
+
+    look(read_toml(scenario.text, scenario.where))
+    return found
