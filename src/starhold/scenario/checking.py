@@ -223,9 +223,11 @@ def _translate(
     fault = min(error.errors(include_url=False), key=lambda e: e["type"] != "extra_forbidden")
     place = [f"[{part + 1}]" if isinstance(part, int) else part for part in fault["loc"]]
     context: dict[str, Any] = fault.get("ctx", {})
-    if fault["type"] == "quantity_at":
+    if fault["type"] in ("quantity_at", "told_at"):
         place.append(context["key"])
-    key = cut(".".join(part for part in [prefix, *place] if part).replace(".[", "["), 200)
+    key = cut(".".join(part for part in [prefix, *map(_quoted, place[:-1]), *place[-1:]] if part).replace(".[", "["), 200)
+    if fault["type"] == "told_at":
+        return InputError(where, key, context["found"], context["reason"])
     found = show(context.get("found", fault.get("input")))
     if fault["type"] == "extra_forbidden":
         known = list(_model_at(model, place[:-1]).model_fields) + (extra if len(place) == 1 else [])
@@ -236,6 +238,11 @@ def _translate(
     if fault["type"] in ("quantity", "quantity_at"):
         return InputError(where, key, found, str(context["reason"]).removeprefix("must be "))
     return InputError(where, key, found, _plain(fault["msg"]))
+
+
+def _quoted(part: str) -> str:
+    """A key as TOML writes it where it holds dots or a comma, as the keys of [campaign.over] do."""
+    return f'"{part}"' if {".", ","} & set(part) else part
 
 
 def _model_at(model: Any, place: list[str]) -> Any:
@@ -250,7 +257,7 @@ def _model_at(model: Any, place: list[str]) -> Any:
 
 def _plain(message: str) -> str:
     text = message.removeprefix("Input should be ").removeprefix("a valid ")
-    if text.startswith("dictionary or instance of"):
+    if text == "dictionary" or text.startswith("dictionary or instance of"):
         return "a table"
     return text.replace("boolean", "true or false")
 

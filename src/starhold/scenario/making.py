@@ -25,8 +25,8 @@ def make_scenario(tables: Mapping[str, Any], folder: str | Path = ".", allow_uns
     [{"type": "pd", ...}]}: strings, numbers, truths, lists and tables; tuples and NumPy arrays count as lists, and what is
     None as left out. `folder`: what file names in it are relative to. InputError says what is wrong, as of a file. A
     scenario's `with_` gives others like it, and its `text` is the file."""
-    plain = _plain(tables, WHERE, "")
-    return read_tables(plain, toml_text(plain), WHERE, Path(folder), allow_unstable)
+    written = plain(tables, WHERE, "")
+    return read_tables(written, toml_text(written), WHERE, Path(folder), allow_unstable)
 
 
 def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
@@ -47,15 +47,16 @@ def variants(scenario: Scenario, changes: Iterable[Mapping[str, Any]]) -> Iterat
         try:
             other = deepcopy(tables)
             for key, value in change.items():
-                _put(other, _path(key, names, where), value, where)
-            plain = _plain(other, where, "")
-            yield read_tables(plain, toml_text(plain), scenario.where, scenario.folder, scenario.allow_unstable)
+                _put(other, path_of(key, names, where), value, where)
+            written = plain(other, where, "")
+            yield read_tables(written, toml_text(written), scenario.where, scenario.folder, scenario.allow_unstable)
         except InputError as error:
             raise InputError(where, error.key, error.found, error.allowed) from None
 
 
-def _path(key: Any, names: Mapping[str, Sequence[str]], where: str) -> list[str | int]:
-    """Names of tables and keys, and places in lists from 0."""
+def path_of(key: Any, names: Mapping[str, Sequence[str]], where: str) -> list[str | int]:
+    """The path of a key as `with_` takes it: names of tables and keys, and places in lists from 0; `names`: those of laws
+    and parts, by the arrays of their tables. InputError where it is no key."""
     if not isinstance(key, str):
         raise InputError(where, show(key), "a key that is no string", 'keys such as "spacecraft.inertia"')
     array, dot, rest = key.partition(".")
@@ -64,7 +65,7 @@ def _path(key: Any, names: Mapping[str, Sequence[str]], where: str) -> list[str 
         for name in sorted(names[array], key=len, reverse=True):
             if rest == name or rest.startswith(f"{name}."):
                 after = rest[len(name) + 1 :]
-                return [array, names[array].index(name), *(_path(after, {}, where) if after else [])]
+                return [array, names[array].index(name), *(path_of(after, {}, where) if after else [])]
         given = rest.partition(".")[0]
         raise InputError(where, key, show(given), nearest(given, list(names[array])))
     path: list[str | int] = []
@@ -100,7 +101,7 @@ def _put(tables: Any, path: Sequence[str | int], value: Any, where: str) -> None
             here = cast(Any, here)[part]
 
 
-def _plain(value: Any, where: str, key: str) -> Any:
+def plain(value: Any, where: str, key: str) -> Any:
     """The value in what TOML has; InputError where it is nothing of that."""
     if isinstance(value, np.generic | np.ndarray):
         value = cast(Any, value).tolist()
@@ -114,9 +115,9 @@ def _plain(value: Any, where: str, key: str) -> Any:
             if not isinstance(name, str):
                 raise InputError(where, key, f"the key {show(name)}", "keys that are strings")
             if item is not None:
-                found[name] = _plain(item, where, f"{key}.{name}".lstrip("."))
+                found[name] = plain(item, where, f"{key}.{name}".lstrip("."))
         return found
     if isinstance(value, list | tuple):
         items = list(cast(Sequence[Any], value))
-        return [_plain(item, where, f"{key}[{n}]") for n, item in enumerate(items, 1) if item is not None]
+        return [plain(item, where, f"{key}[{n}]") for n, item in enumerate(items, 1) if item is not None]
     raise InputError(where, key, show(value), "numbers, strings, truths, and lists and tables of them")

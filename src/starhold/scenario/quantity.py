@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Literal, cast
+from typing import Any, Literal, TypeAlias, cast
 
 import numpy as np
 from pydantic import BeforeValidator, ValidationInfo, WithJsonSchema
+from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 from starhold.laws.interface import Gain
@@ -20,30 +21,37 @@ MOST_WHOLE = 2**53
 """Up to here floats hold every whole number."""
 
 
-def quantity(gain: Gain) -> tuple[BeforeValidator, WithJsonSchema]:
+Annotations: TypeAlias = tuple[BeforeValidator, WithJsonSchema, Gain]
+"""What reads a quantity, what describes it in the JSON schema, and its declaration, which pydantic leaves with the field."""
+
+
+def quantity(gain: Gain) -> Annotations:
     """The annotations by which pydantic reads a quantity: `Annotated[Any, *quantity(Gain("N m", above=0.0))]`."""
-    return BeforeValidator(reader(gain)), WithJsonSchema(_schema(gain))
+    return BeforeValidator(reader(gain)), WithJsonSchema(_schema(gain)), gain
 
 
-def quantity_or(word: str, meaning: float, gain: Gain) -> tuple[BeforeValidator, WithJsonSchema]:
+def declared(field: FieldInfo) -> Gain | None:
+    """The declaration of a table's key that is a quantity, None for any other."""
+    return next((item for item in field.metadata if isinstance(item, Gain)), None)
+
+
+def quantity_or(word: str, meaning: float, gain: Gain) -> Annotations:
     """The annotations for a quantity in whose place a word may stand."""
     read, schema = reader(gain), _schema(gain)
     described = {"anyOf": [{"const": word}, *schema["anyOf"]], "description": schema["description"]}
-    return BeforeValidator(lambda value: meaning if value == word else read(value)), WithJsonSchema(described)
+    return BeforeValidator(lambda value: meaning if value == word else read(value)), WithJsonSchema(described), gain
 
 
 SCALED = {"length": "m", "velocity": "m/s", "acceleration": "m/s^2", "time": "s", "rate": "rad/s"}
 """Kinds of scaled numbers with their SI units."""
 
 
-def any_quantity(gain: Gain) -> tuple[BeforeValidator, WithJsonSchema]:
+def any_quantity(gain: Gain) -> Annotations:
     """The annotations for a quantity, scaled where the declaration says of what."""
     return scaled(gain.dimension, replace(gain, unit=SCALED[gain.dimension])) if gain.dimension else quantity(gain)
 
 
-def scaled(
-    kind: Literal["length", "velocity", "acceleration", "time", "rate"], gain: Gain
-) -> tuple[BeforeValidator, WithJsonSchema]:
+def scaled(kind: Literal["length", "velocity", "acceleration", "time", "rate"], gain: Gain) -> Annotations:
     """The annotations for scaled numbers: plain ones are, strings with the gain's unit become so. Their worth in SI is told
     by the validation's context, under the name of its kind; the bounds are of scaled numbers."""
     read, schema = reader(gain), _schema(gain)
@@ -52,7 +60,7 @@ def scaled(
     def to_scaled(value: Any, info: ValidationInfo) -> Any:
         return read(value, getattr(info.context, kind))
 
-    return BeforeValidator(to_scaled), WithJsonSchema(schema)
+    return BeforeValidator(to_scaled), WithJsonSchema(schema), replace(gain, dimension=kind)
 
 
 def reader(gain: Gain) -> Callable[..., Any]:

@@ -12,6 +12,7 @@ from pydantic import Field, create_model, model_validator
 from starhold.laws.catalogue import Law
 from starhold.laws.interface import Field as Parameter
 from starhold.laws.interface import Gain
+from starhold.scenario.campaign import CampaignTable
 from starhold.scenario.checking import MOST_SUBSTEPS
 from starhold.scenario.quantity import any_quantity, quantity
 from starhold.scenario.tables import Name, Table, at_key
@@ -27,6 +28,7 @@ class ScenarioTable(Table):
 
     name: Name
     description: str = ""
+    campaign: CampaignTable | None = None
 
 
 class LawTable(Table):

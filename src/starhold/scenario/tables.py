@@ -28,6 +28,11 @@ def at_key(key: str, reason: str, found: Any) -> PydanticCustomError:
     return PydanticCustomError("quantity_at", "{reason}", {"reason": reason, "key": key, "found": found})
 
 
+def told_at(key: str, found: str, allowed: str) -> PydanticCustomError:
+    """An error about one key of a table that is read, in words that have been found already."""
+    return PydanticCustomError("told_at", "{reason}", {"reason": allowed, "key": key, "found": found})
+
+
 LONGEST_NAME = 100
 _RESULTS = (".json", ".html", ".nc", ".png", ".csv")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -21,12 +22,15 @@ SHORTEST, LONGEST = 0.5, 2.0
 """Lengths between which four numbers are taken for a direction among quaternions; [0, 1, 1, 1] is one."""
 
 
+MOMENTS = Gain("kg m^2", shape=(3, 3))
+
+
 def _read_inertia(given: Any) -> Any:
     if not isinstance(given, list) or len(given) != 3:
         raise refuse("three principal moments or a 3x3 matrix, in kg m^2")
     shape = (3, 3) if any(isinstance(row, list) for row in given) else (3,)
     try:
-        return check_inertia(reader(Gain("kg m^2", shape=shape))(given))
+        return check_inertia(reader(replace(MOMENTS, shape=shape))(given))
     except ValueError as error:
         raise refuse(str(error)) from None
 
@@ -34,6 +38,7 @@ def _read_inertia(given: Any) -> Any:
 INERTIA = (
     BeforeValidator(_read_inertia),
     Field(description="three principal moments or a 3x3 matrix, with the wheels (kg m^2)"),
+    MOMENTS,
 )
 
 

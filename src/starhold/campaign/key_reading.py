@@ -1,0 +1,121 @@
+"""The table of one key's dispersion, and the numbers that it means for the key."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from starhold.campaign.distributions import Numbers
+from starhold.campaign.values import Place, accepted, width_at
+from starhold.scenario.checking import show
+from starhold.scenario.reading import Scenario
+
+SYMMETRIC = 1e-9
+"""Difference of a matrix from its transpose, as a share of its largest entry, that counts as none."""
+
+
+def components(shape: tuple[int, ...], symmetric: bool = False) -> list[tuple[int, ...]]:
+    """The indices of the numbers of an array, row by row; of a symmetric one those on and above the diagonal."""
+    every = [tuple(map(int, index)) for index in np.ndindex(shape)]
+    return [index for index in every if index[0] <= index[1]] if symmetric else every
+
+
+@dataclass(frozen=True)
+class KeyReading:
+    """One key and its table, while its dispersion is read."""
+
+    scenario: Scenario
+    place: Place
+    table: Any
+    index: tuple[tuple[int, ...], ...]
+    """Of the components that are drawn."""
+    relative: bool
+
+    @staticmethod
+    def of(scenario: Scenario, place: Place, table: Any) -> KeyReading:
+        """InputError where values of the distribution cannot be such a key's."""
+        kind, relative, value = table.distribution, getattr(table, "relative", False), place.value
+        if place.wordy and kind != "choice":
+            raise place.refuse("distribution", show(kind), "choice, for the key holds a word")
+        if place.whole and kind not in ("uniform", "choice"):
+            raise place.refuse("distribution", show(kind), "uniform or choice, for the key holds a whole number")
+        if relative and (place.wordy or place.whole):
+            raise place.refuse("relative", "true", "false, for the key holds a word or a whole number")
+        if relative and (value is None or not np.isfinite(value).all() or not np.any(value)):
+            raise place.refuse("relative", "true", f"false, for there are no shares of {_shown(value)}")
+        index = components(place.shape, symmetric=_is_symmetric(place))
+        return KeyReading(scenario, place, table, tuple(index), relative)
+
+    @property
+    def dims(self) -> int:
+        """Uniforms for components that are drawn one by one, or together."""
+        return 1 if self.table.together else len(self.index)
+
+    @property
+    def unit(self) -> str | None:
+        """The unit of shares; None for that of the key."""
+        return "1" if self.relative else None
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The names of the components."""
+        return tuple(self.place.key + "".join(f"[{n + 1}]" for n in item) for item in self.index)
+
+    @property
+    def nominal(self) -> tuple[Any, ...]:
+        """The numbers or the word that the file has, by component; NaN where it has none."""
+        value = self.place.value
+        if self.place.wordy:
+            return (word(value),)
+        return self.picked(np.full(self.place.shape, np.nan) if value is None else value)
+
+    def picked(self, array: Any) -> Numbers:
+        """The components that are drawn, of an array of the key's shape."""
+        full = np.asarray(array, dtype=float)
+        return tuple(float(full[item]) for item in self.index)
+
+    def centre(self, name: str, held: bool = True) -> Numbers:
+        """A mean or a median, by default what the file has."""
+        value = self.place.value
+        if getattr(self.table, name) is not None:
+            return self.numbers(name, held)
+        if not self.relative and (value is None or not np.isfinite(value).all()):
+            raise self.place.refuse(name, "nothing", f"a value, for the file has {_shown(value)}")
+        return (1.0,) * len(self.index) if self.relative else self.nominal
+
+    def numbers(self, name: str, held: bool = True) -> Numbers:
+        """The numbers of a parameter in the key's unit, or as shares; `held`: whether the key must take them. InputError
+        where it does not."""
+        return self.read(getattr(self.table, name), name, held)
+
+    def read(self, raw: Any, name: str, held: bool = True) -> Numbers:
+        """The numbers that a raw value means, which errors call by a name; `held` as of `numbers`."""
+        read = width_at(self.place, raw, name, self.unit)
+        if held:
+            accepted(self.scenario, self.place, (read * self.place.value if self.relative else read).tolist(), name)
+        return self.picked(read)
+
+    def sigma(self, unit: str | None) -> Numbers:
+        """Standard deviations in a unit, None for the key's. InputError where one is negative, or nothing is dispersed."""
+        raw, scale = self.table.sigma, self.nominal if self.relative else (1.0,) * len(self.index)
+        found = self.picked(width_at(self.place, raw, "sigma", unit))
+        if min(found) < 0.0 or not any(share * size for share, size in zip(found, scale, strict=True)):
+            raise self.place.refuse("sigma", show(raw), "above 0")
+        return found
+
+
+def _shown(value: Any) -> str:
+    return "no value" if value is None else show(value)
+
+
+def word(value: Any) -> Any:
+    return str(value).lower() if isinstance(value, bool) else value
+
+
+def _is_symmetric(place: Place) -> bool:
+    if len(place.shape) != 2 or place.value is None:
+        return False
+    array = np.array(place.value)
+    return bool(np.abs(array - array.T).max() <= SYMMETRIC * np.abs(array).max())

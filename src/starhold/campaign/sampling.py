@@ -1,0 +1,192 @@
+"""Plans of a campaign: which numbers each run draws. They are the same however the runs are cut into chunks, and whoever
+draws them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.campaign.dispersions import Dispersion
+from starhold.campaign.distributions import Array
+from starhold.errors import InputError
+from starhold.scenario.checking import nearest, show
+
+SAMPLINGS = ("random", "sobol", "latin-hypercube", "morris", "saltelli")
+LEVELS = 4
+"""Values that each uniform takes in Morris's design, the middles of as many equal parts."""
+INNERMOST = 2.0**-53
+"""The least uniform, and the distance of the greatest from 1."""
+BITS = 52
+"""Of a random uniform: with half a unit added, as many as floats hold exactly."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The draws of all runs of a campaign: the dispersions, how their uniforms are placed, the seed, and the number of runs.
+
+    random: independent, by a counter-based generator of its own for each dispersion, keyed by the seed and its keys, so that
+    what is drawn for one key depends on no other. sobol: a scrambled Sobol sequence over all dispersions, best with a power
+    of 2 of runs. latin-hypercube: each uniform falls once into each of as many equal parts as there are runs. morris,
+    saltelli: SALib's designs for elementary effects (Morris 1991), of uniforms from 0 to 1 though `LEVELS` are within,
+    and for Sobol indices with those of pairs (Saltelli 2002).
+
+    InputError where there is no such sampling, or where the number of runs does not fit its design; `where` names the
+    scenario in it.
+    """
+
+    dispersions: tuple[Dispersion, ...]
+    sampling: str
+    seed: int
+    runs: int
+    where: str = ""
+
+    def __post_init__(self) -> None:
+        if self.sampling not in SAMPLINGS:
+            raise self._refuse("sampling", show(self.sampling), nearest(str(self.sampling), list(SAMPLINGS)))
+        if self.runs < 1:
+            raise self._refuse("runs", str(self.runs), "at least 1")
+        if self.sampling not in ("morris", "saltelli"):
+            return
+        if not self.dims:
+            raise self._refuse("sampling", show(self.sampling), "random, for nothing is dispersed")
+        self._check_design()
+
+    def _refuse(self, key: str, found: str, allowed: str) -> InputError:
+        return InputError(self.where, f"campaign.{key}", found, allowed)
+
+    def _check_design(self) -> None:
+        block, count = self.block, self.runs // self.block
+        if self.sampling == "morris":
+            sizes, rule = [max(2, count), max(2, count) + 1], "from 2 on"
+        else:
+            power = max(0, count.bit_length() - 1)
+            sizes, rule = [2**power, 2 ** (power + 1)], "a power of 2"
+        if self.runs not in [block * size for size in sizes]:
+            near = " or ".join(str(block * size) for size in sizes)
+            allowed = f"{near}: {block} times a number, {rule}, for {self.dims} drawn numbers by {self.sampling}"
+            raise self._refuse("runs", str(self.runs), allowed)
+
+    @property
+    def block(self) -> int:
+        """Runs that belong together in a design: D + 1 of Morris's, 2 D + 2 of Saltelli's, for D uniforms; else 1."""
+        return {"morris": self.dims + 1, "saltelli": 2 * self.dims + 2}.get(self.sampling, 1)
+
+    @cached_property
+    def dims(self) -> int:
+        """Uniforms that a run takes."""
+        return sum(dispersion.dims for dispersion in self.dispersions)
+
+    @property
+    def factors(self) -> tuple[str, ...]:
+        """The names of the uniforms: of the column that one alone moves, or else of the key and its place from 1."""
+        found: list[str] = []
+        for dispersion in self.dispersions:
+            names, told = dispersion.columns, ", ".join(dispersion.keys)
+            if dispersion.dims == 1:
+                found.append(told)
+            elif dispersion.independent:
+                found += names
+            else:
+                found += [f"{told} ({number} of {dispersion.dims})" for number in range(1, dispersion.dims + 1)]
+        return tuple(found)
+
+    def unit(self, first: int, count: int) -> Array:
+        """Uniforms (dims, count), strictly between 0 and 1, of the runs from `first` on."""
+        if not 0 <= first <= first + count <= self.runs:
+            raise ValueError(f"runs {first} to {first + count - 1} of {self.runs}")
+        if not self.dims or not count:
+            return np.empty((self.dims, count))
+        if self.sampling == "random":
+            return np.vstack([_random(self._key(one), one.dims, first, count) for one in self.dispersions])
+        if self.sampling == "sobol":
+            found = _sobol(self.dims, self.seed, first, count)
+        elif self.sampling == "latin-hypercube":
+            keys = tuple((self._key(one), one.dims) for one in self.dispersions)
+            found = _latin_hypercube(keys, self.runs)[first : first + count]
+        else:
+            found = _design(self.sampling, self.dims, self.seed, self.runs // self.block)[first : first + count]
+        return np.clip(np.ascontiguousarray(found.T), INNERMOST, 1.0 - INNERMOST)
+
+    def _key(self, dispersion: Dispersion) -> int:
+        """128 bits that no other seed or dispersion has."""
+        told = f"starhold campaign {self.seed} {', '.join(dispersion.keys)}"
+        return int.from_bytes(hashlib.sha256(told.encode()).digest()[:16], "little")
+
+    def columns(self, first: int, count: int) -> dict[str, NDArray[Any]]:
+        """The drawn values, by column, each (count,), of the runs from `first` on. InputError where a key refuses one."""
+        return self.values(self.unit(first, count))
+
+    def values(self, unit: Array) -> dict[str, NDArray[Any]]:
+        """The values by column, each (n,), for uniforms (dims, n). InputError where a key refuses one."""
+        found: dict[str, NDArray[Any]] = {}
+        begun = 0
+        for dispersion in self.dispersions:
+            drawn = dispersion.draw(unit[begun : begun + dispersion.dims])
+            found |= dict(zip(dispersion.columns, drawn, strict=True))
+            begun += dispersion.dims
+        return found
+
+    def change(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """The change by which `Scenario.with_` gives the scenario of one run, from its values by column."""
+        found: dict[str, Any] = {}
+        for dispersion in self.dispersions:
+            found |= dispersion.change(values)
+        return found
+
+
+def _random(key: int, dims: int, first: int, count: int) -> Array:
+    """Uniforms (dims, count) of a generator that is a function of its key and of a counter; each run has its own counts."""
+    # Philox gives four numbers for each value of its counter.
+    each = -(-dims // 4)
+    raw = np.random.Philox(key=key, counter=first * each).random_raw(count * each * 4).reshape(count, each * 4)
+    whole = np.ascontiguousarray(raw[:, :dims].T) >> np.uint64(64 - BITS)
+    return whole.astype(np.float64) * 2.0**-BITS + 2.0 ** -(BITS + 1)
+
+
+def _generator(seed: int) -> np.random.Generator:
+    return np.random.Generator(np.random.Philox(seed))
+
+
+def _sobol(dims: int, seed: int, first: int, count: int) -> Array:
+    from scipy.stats import qmc
+
+    # Untyped, for newer versions know `seed` only at run time, and older ones nothing else.
+    make: Any = qmc.Sobol
+    sequence = make(dims, scramble=True, seed=_generator(seed))
+    # The first point is drawn alone: the library warns where a first draw is of no power of 2, but cuts are the caller's.
+    head = sequence.random(1)
+    if first > 1:
+        sequence.fast_forward(first - 1)
+    rest = sequence.random(count - 1 if first == 0 else count)
+    # To the middle of what a point of its 30 bits stands for.
+    return (np.vstack([head, rest]) if first == 0 else rest) + 2.0**-31
+
+
+@lru_cache(maxsize=1)
+def _latin_hypercube(keys: tuple[tuple[int, int], ...], runs: int) -> Array:
+    """The whole sample (runs, dims): for each dispersion a key and its uniforms."""
+    from scipy.stats import qmc
+
+    make: Any = qmc.LatinHypercube
+    return np.hstack([make(dims, seed=_generator(key)).random(runs) for key, dims in keys])
+
+
+@lru_cache(maxsize=1)
+def _design(sampling: str, dims: int, seed: int, size: int) -> Array:
+    """The whole design (runs, dims) of a number of trajectories, or of base points."""
+    problem = {"num_vars": dims, "names": [str(n) for n in range(dims)], "bounds": [[0.0, 1.0]] * dims}
+    if sampling == "morris":
+        from SALib.sample import morris
+
+        levels = morris.sample(problem, size, num_levels=LEVELS, seed=_generator(seed))
+        # At 0 and 1 many distributions are infinite.
+        return (levels * (LEVELS - 1) + 0.5) / LEVELS
+    from SALib.sample import sobol
+
+    return sobol.sample(problem, size, calc_second_order=True, seed=_generator(seed))

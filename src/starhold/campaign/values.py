@@ -1,0 +1,293 @@
+"""The values that keys of a scenario hold, and those that numbers with units mean there.
+
+Keys are told as `Scenario.with_` takes them. Values are validated ones: SI or scaled, as plain numbers in the file would be.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, TypeAlias, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic_core import PydanticCustomError
+
+from starhold.errors import InputError
+from starhold.laws.interface import Gain
+from starhold.parts.part import Fitted
+from starhold.scenario.checking import nearest, read_toml, show
+from starhold.scenario.making import path_of
+from starhold.scenario.parts import part_model
+from starhold.scenario.quantity import declared, reader
+from starhold.scenario.reading import LawEntry, Scenario
+from starhold.scenario.schema import law_model
+from starhold.scenario.tables import Table
+
+SHARED = ("name", "description", "campaign", "simulation", "certify")
+"""Tables and keys that all runs of a campaign share."""
+STRUCTURE = ("type", "name", "form", "file")
+"""Keys that say what a table is."""
+PAIRS = {"attitude": "angles", "angles": "attitude"}
+"""Keys of which a table has one: giving this takes that away."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """A key of a scenario in which runs may differ, with all that is known of it; it can be sent to other processes."""
+
+    where: str
+    """How errors call the scenario."""
+    key: str
+    path: tuple[str | int, ...]
+    gain: Gain | None
+    """Its declaration; None for a word or a truth."""
+    value: Any
+    """A number, tuples of numbers, a word or a truth; None where the file has none."""
+    shape: tuple[int, ...]
+    """() a number, (n,) a vector or a diagonal, (n, n) a matrix."""
+    worth: float
+    """The unit of a scaled number in SI; else 1."""
+    displaced: str | None
+    """A key that is taken away where this one is given."""
+    table: str
+    """How [campaign.over] calls its dispersion: by this key, or by several."""
+
+    @property
+    def wordy(self) -> bool:
+        """Whether it holds a word or a truth."""
+        return self.gain is None or bool(self.gain.choices)
+
+    @property
+    def whole(self) -> bool:
+        """Whether it holds a whole number."""
+        return self.gain is not None and self.gain.whole
+
+    @property
+    def bounds(self) -> Gain:
+        """The bounds of each of its numbers; none of a matrix's entries."""
+        gain = self.gain
+        if gain is None or gain.shape == (3, 3):
+            return Gain()
+        return Gain(above=gain.above, at_least=gain.at_least, at_most=gain.at_most)
+
+    def change(self, value: Any) -> dict[str, Any]:
+        """The change that gives the key this plain value, for `Scenario.with_`."""
+        return {self.key: self._written(value)} | ({} if self.displaced is None else {self.displaced: None})
+
+    def _written(self, value: Any) -> Any:
+        """The value as a file may hold it: plain angles only within a turn."""
+        if isinstance(value, list):
+            return [self._written(item) for item in cast(list[Any], value)]
+        turns = self.gain is not None and self.gain.unit == "rad" and isinstance(value, float) and abs(value) > math.tau
+        return f"{value!r} rad" if turns else value
+
+    def refuse(self, name: str, found: str, allowed: str) -> InputError:
+        """An error about the dispersion of the key, or about a parameter of it."""
+        told = f'campaign.over."{self.table}"'
+        return InputError(self.where, f"{told}.{name}" if name else told, found, allowed)
+
+
+def value_at(scenario: Scenario, key: str) -> Any:
+    """The validated value of a key: a number, a tuple of numbers, rows of them, a word or a truth; None where neither the
+    file nor a default gives one. Of a matrix that the file gives by a number or a diagonal, the diagonal. InputError where
+    there is no such key, where it is that of a whole table, or where all runs of a campaign share it."""
+    return locate(scenario, key).value
+
+
+def number_at(scenario: Scenario, key: str, raw: Any, name: str = "") -> Any:
+    """The value that a raw one, a number or a string with a unit or a list of them, has at a key; a single one is that of
+    every component of a vector. InputError, which calls it `name`, where the key's own rules refuse it."""
+    place = locate(scenario, key)
+    return accepted(scenario, place, _filled(place, raw, place.shape, name), name)
+
+
+def accepted(scenario: Scenario, place: Place, value: Any, name: str = "") -> Any:
+    """The validated form of a value that fits the key's shape. InputError where the scenario refuses it there."""
+    try:
+        return locate(scenario.with_(place.change(value)), place.key).value
+    except InputError as error:
+        if error.key.rpartition(".")[2] == place.key.rpartition(".")[2]:
+            raise place.refuse(name, error.found or show(value), error.allowed) from None
+        found = f"found {error.found}; " if error.found else ""
+        raise place.refuse(name, show(value), f"what {error.key or 'the scenario'} takes: {found}{error.allowed}") from None
+
+
+def width_at(place: Place, raw: Any, name: str = "", unit: str | None = None) -> NDArray[np.float64]:
+    """Numbers (of the key's shape) of a raw value that need not be within the key's bounds, such as a standard deviation; in
+    the key's unit, or in the one given. InputError calls it by `name`."""
+    gain = place.gain or Gain()
+    read: Callable[..., Any] = reader(Gain(gain.unit if unit is None else unit))
+    worth = place.worth if unit is None else 1.0
+
+    def number(item: Any) -> float:
+        try:
+            return read(item, worth)
+        except PydanticCustomError as error:
+            raise place.refuse(name, show(item), error.message().removeprefix("must be ")) from None
+
+    return np.array(_each(_filled(place, raw, place.shape, name), number), dtype=float)
+
+
+def _each(raw: Any, number: Callable[[Any], float]) -> Any:
+    return [_each(item, number) for item in cast(list[Any], raw)] if isinstance(raw, list) else number(raw)
+
+
+def _filled(place: Place, raw: Any, shape: Sequence[int], name: str) -> Any:
+    """The raw value as lists of this shape; a single one stands for all."""
+    if not isinstance(raw, list | tuple):
+        return raw if not shape else [_filled(place, raw, shape[1:], name) for _ in range(shape[0])]
+    items = cast(Sequence[Any], raw)
+    if not shape or len(items) != shape[0]:
+        whole = place.shape
+        allowed = "one value" if not whole else f"a number or {' x '.join(map(str, whole))} numbers"
+        raise place.refuse(name, show(raw), allowed)
+    return [_filled(place, item, shape[1:], name) for item in items]
+
+
+def locate(scenario: Scenario, key: str) -> Place:
+    """The place of a key. InputError where there is no such key, or none in which runs of a campaign may differ."""
+    names = {"law": [entry.name for entry in scenario.laws], "part": [fitted.called for fitted in scenario.parts]}
+    told = f'campaign.over."{key}"'
+    try:
+        path = path_of(key, names, scenario.where)
+        if path[0] in SHARED:
+            raise _no("a key that all runs share", "a key of the craft, its surroundings, laws or parts")
+        return _locate(scenario, key, tuple(path))
+    except InputError as error:
+        raise InputError(scenario.where, told, error.found, error.allowed) from None
+
+
+def _no(found: str, allowed: str) -> InputError:
+    """An error about a key that leads nowhere; `locate` says which."""
+    return InputError("", "", found, allowed)
+
+
+def _locate(scenario: Scenario, key: str, path: tuple[str | int, ...]) -> Place:
+    model, held, (name, *rest) = _table_of(scenario, path)
+    known = [item for item in model.model_fields if item not in STRUCTURE]
+    if name in STRUCTURE:
+        raise _no("a key that says what a table is", "a key of a number or a word")
+    if name not in model.model_fields:
+        raise _no("an unknown key", nearest(str(name), known))
+    gain, value = declared(model.model_fields[str(name)]), held(str(name))
+    if isinstance(value, Table | dict) or (gain is None and isinstance(value, list)) or _is_table(model, name):
+        raise _no("a whole table", f"keys of it, such as {key}.KEY")
+    if gain is not None and gain.columns:
+        raise _no("rows of a table", "a key of a number, a vector or a word")
+    tables = read_toml(scenario.text, scenario.where)
+    value, shape = _formed(gain, _plainly(gain, value), _raw_at(tables, path))
+    if rest:
+        value, shape = _component(value, shape, rest), ()
+    kind = "" if gain is None else gain.dimension
+    worth = getattr(scenario.hooks.context(tables, scenario.where), kind) if kind else 1.0
+    other = PAIRS.get(str(name), "")
+    displaced = other in model.model_fields and _raw_at(tables, (*path[:-1], other)) is not None
+    taken = f"{key.rpartition('.')[0]}.{other}" if displaced else None
+    return Place(scenario.where, key, path, gain, value, shape, worth, taken, key)
+
+
+_Held: TypeAlias = tuple[type[Table], Callable[[str], Any], tuple[str | int, ...]]
+"""The model of a table, the values of its keys, and what is left of a path."""
+
+
+def _table_of(scenario: Scenario, path: tuple[str | int, ...]) -> _Held:
+    """The table that a path leads to. InputError where it leads to none, or ends there."""
+    if path[0] in ("law", "part"):
+        return _of_array(scenario, path)
+    table: Any = scenario.table
+    while len(path) > 0 and isinstance(path[0], str):
+        model, name, after = type(table), str(path[0]), path[1:]
+        if name not in model.model_fields:
+            known = [*model.model_fields, *(("law", "part") if table is scenario.table else ())]
+            raise _no("an unknown key", nearest(name, known))
+        inner = getattr(table, name)
+        if not after or not _is_table(model, name):
+            return model, partial(getattr, table), path
+        if inner is None:
+            raise _no(f"no [{name}] table", f"a scenario with [{name}]")
+        if isinstance(inner, list):
+            inner, after = _numbered(cast(list[Any], inner), name, after), after[1:]
+        table, path = inner, after
+    raise _no("a whole table", "one of its keys")
+
+
+def _numbered(there: Sequence[Any], name: str, after: Sequence[str | int]) -> Any:
+    if not isinstance(after[0], int):
+        raise _no("an array of tables", f"a key of one of them, such as {name}[1].KEY")
+    if not 0 <= after[0] < len(there):
+        raise _no("no such table", f"1 to {len(there)}" if there else f"a scenario with [[{name}]]")
+    return there[after[0]]
+
+
+def _is_table(model: type[Any], name: str | int) -> bool:
+    """Whether a key is that of a table, or of an array of tables, whether or not there is one."""
+    left: list[Any] = [model.model_fields[str(name)].annotation]
+    while left:
+        kind = left.pop()
+        if isinstance(kind, type) and issubclass(kind, Table):
+            return True
+        left += getattr(kind, "__args__", ())
+    return False
+
+
+def _of_array(scenario: Scenario, path: tuple[str | int, ...]) -> _Held:
+    """The table of a law or a part that a path leads to."""
+    array, after = str(path[0]), path[1:]
+    if len(after) < 2:
+        raise _no("a whole table", f"a key of one, such as {array}.NAME.KEY")
+    if array == "part":
+        fitted: Fitted = _numbered(scenario.parts, array, after)
+        return part_model(fitted.part), lambda name: getattr(fitted.params, name, None), after[1:]
+    entry: LawEntry = _numbered(scenario.laws, array, after)
+    names = [item.name for item in entry.law.fields(entry.form)]
+    numbers = dict(zip(names, entry.gains if entry.form is None else entry.spec, strict=True))
+    model = law_model(entry.law, entry.form, scenario.hooks.law_table)
+    return model, lambda name: numbers[name] if name in numbers else getattr(entry.options, name, None), after[1:]
+
+
+def _plainly(gain: Gain | None, value: Any) -> Any:
+    """Numbers in tuples, and the word itself in place of its number."""
+    if gain is not None and gain.choices and isinstance(value, int):
+        return gain.choices[value]
+    return _tuples(value.tolist()) if isinstance(value, np.ndarray) else value
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(_tuples(item) for item in cast(list[Any], value)) if isinstance(value, list) else value
+
+
+def _formed(gain: Gain | None, value: Any, raw: Any) -> tuple[Any, tuple[int, ...]]:
+    """The value and its shape; of a matrix what the file gives: all of it, or its diagonal."""
+    if gain is None or len(gain.shape) < 2:
+        return value, () if gain is None else gain.shape
+    rows = isinstance(raw, list) and any(isinstance(row, list) for row in cast(list[Any], raw))
+    if value is None:
+        return None, gain.shape if rows else gain.shape[:1]
+    array = np.array(value, dtype=float)
+    full = np.diag(array) if array.ndim == 1 else array
+    if rows or (raw is None and np.count_nonzero(full - np.diag(np.diagonal(full)))):
+        return _tuples(full.tolist()), full.shape
+    return tuple(np.diagonal(full).tolist()), full.shape[:1]
+
+
+def _component(value: Any, shape: tuple[int, ...], rest: Sequence[str | int]) -> Any:
+    """One component of a vector."""
+    if len(shape) != 1 or len(rest) != 1 or not isinstance(rest[0], int):
+        raise _no("a value that is no vector" if len(shape) != 1 else "no component of a vector", "the whole key")
+    if not 0 <= rest[0] < shape[0]:
+        raise _no("no such component", f"1 to {shape[0]}")
+    return None if value is None else value[rest[0]]
+
+
+def _raw_at(tables: Any, path: Sequence[str | int]) -> Any:
+    """The value that raw tables have at a path, None where they have none."""
+    here: Any = tables
+    for part in path:
+        try:
+            here = here[part]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return here
