@@ -58,7 +58,7 @@ def test_metrics_are_those_of_recordings(name):
         loop, carries, phases, 5, meter.observers, meter.begun(20), meter.cuts(), meter.marks[-1], rows, threads=2
     )
     assert (flown.ends[-1] < 0.0).all()
-    found = meter.metrics(flown.before, flown.notes, flown.windows, flown.ends[-1])
+    found = meter.metrics(flown.notes, flown.windows, flown.ends[-1])
     assert set(found) == {*meter.units, "diverged_at"}
     size = len(flatten(loop.start))
     for lane in (0, 7, 19):

@@ -40,10 +40,9 @@ class Window(NamedTuple):
 
 
 class Flown(NamedTuple):
-    """What was noted of lanes: notes as they were before the last quarter and at the end, with an array (lanes,) in place
-    of each number, and by its name each window's quantity (windows, lanes), as it was noted."""
+    """What was noted of lanes: notes at the end, with an array (lanes,) in place of each number, and by its name each
+    window's quantity (windows, lanes), as it was noted."""
 
-    before: Any
     end: Any
     windows: Mapping[str, Array]
 
@@ -72,14 +71,13 @@ class Meter:
         """The control steps at which windows end, every mark among them."""
         return window_ends(self.steps, self.marks)
 
-    def metrics(self, before: Array, end: Array, windows: Array, lost: Array) -> Metrics:
-        """Metrics of lanes from what is noted of them before the last mark and at the end, (numbers, lanes), of windows
-        (windows, quantities, lanes), and the control step at which each was lost (lanes,), -1 for those that were not, whose
-        `diverged_at` is NaN. All others of a lost motion are."""
+    def metrics(self, noted: Array, windows: Array, lost: Array) -> Metrics:
+        """Metrics of lanes from what is noted of them, (numbers, lanes), of windows (windows, quantities, lanes), and the
+        control step at which each was lost (lanes,), -1 for those that were not, whose `diverged_at` is NaN. All others of a
+        lost motion are."""
         named = {name: windows[:, place] for place, name in enumerate(self.windows)}
         with np.errstate(invalid="ignore", over="ignore"):
-            first, last = (unflatten(list(rows), self.first) for rows in (before, end))
-            found = self.finish(Flown(first, last, named))
+            found = self.finish(Flown(unflatten(list(noted), self.first), named))
         kept = lost < 0.0
         return {"diverged_at": np.where(kept, np.nan, lost * self.instant)} | {
             name: np.where(kept, values, np.nan) for name, values in found.items()

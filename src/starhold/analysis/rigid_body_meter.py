@@ -84,8 +84,8 @@ class Turning(NamedTuple):
 
 class Noted(NamedTuple):
     """Notes on a lane: the last instants outside the tolerances; peaks of torque (component), of rate (square) and of wheel
-    momentum; sums of the torque's norm, of instants on the limit and, in the last quarter, of changes of torque; the last
-    error and torque; squares of the least distances of axes from the middles of cones; what extras need; and of a window
+    momentum; sums of the torque's norm, of instants on the limit and, in the last quarter, of changes of torque; there the
+    first and the last error, and the last torque; squares of the least distances of axes from the middles of cones; what extras need; and of a window
     the largest squares of half the angle's sine, of the rate error and of the torque."""
 
     attitude_outside: float
@@ -96,6 +96,7 @@ class Noted(NamedTuple):
     torque_sum: float
     limited: float
     chatter_sum: float
+    first_error: Vector
     error: Vector
     torque: Vector
     cones: tuple[float, ...]
@@ -119,7 +120,7 @@ def make_meter(
     are to be noted."""
     levels = (-1.0,) * len(DECADES) if "iterations" in extras else ()
     turning = Turning(ZERO, 0.0, 0.0) if "overshoot" in extras else ()
-    begun: Any = (-1.0, -1.0, *(0.0,) * 6, ZERO, ZERO, (4.0,) * len(cones), turning, levels, levels, 0.0, 0.0, 0.0)
+    begun: Any = (-1.0, -1.0, *(0.0,) * 6, ZERO, ZERO, ZERO, (4.0,) * len(cones), turning, levels, levels, 0.0, 0.0, 0.0)
     first = Noted(*begun)
     tail = tail_start(steps)
     angle = math.sin(0.5 * min(attitude_tolerance, math.pi)) ** 2
@@ -159,11 +160,13 @@ def _note(parts: Composition, late: bool, overshoot: bool, iterations: bool) -> 
         q, rate, torque, command = (own[name] for name in ("attitude_error", "rate_error", "torque", "command"))
         angle_square = q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
         rate_square, torque_square = dot(rate, rate), dot(torque, torque)
-        size, chatter = sqrt(torque_square), seen.chatter_sum
+        size, chatter, tail = sqrt(torque_square), seen.chatter_sum, (seen.first_error, seen.error, seen.torque)
         if late:
+            chatters, error = less(told.tail, now), scale(q[0], vector_part(q))
+            tail = (chosen(chatters, seen.first_error, error), error, torque)
             change = subtract(torque, seen.torque)
             size = where(less(now, told.last), size, 0.0)
-            chatter = chatter + where(less(told.tail, now), sqrt(dot(change, change)), 0.0)
+            chatter = chatter + where(chatters, sqrt(dot(change, change)), 0.0)
         bound, peak_wheel = _on_limit(command, setup.limit, limit), seen.peak_wheel_momentum
         for momentum, asked, there in zip(*(own.get(name, ()) for name in WHEEL), strict=True):
             peak_wheel, asked = maximum(peak_wheel, absolute(momentum)), absolute(asked)
@@ -177,8 +180,7 @@ def _note(parts: Composition, late: bool, overshoot: bool, iterations: bool) -> 
             seen.torque_sum + size,
             seen.limited + where(bound, 1.0, 0.0),
             chatter,
-            scale(q[0], vector_part(q)),
-            torque,
+            *tail,
             tuple(_nearest(least, cone, own["attitude"]) for least, cone in zip(seen.cones, told.cones, strict=True)),
             _turned(seen.turning, q, now) if overshoot else (),
             _levels(seen.attitude_levels, angle_square, now) if iterations else (),
@@ -237,7 +239,7 @@ def _metrics(flown: Flown, meter: Meter, period: float, wheels: bool) -> Metrics
         "final_attitude_error": _angle(largest_since(tail, flown.windows["attitude_error"], cuts)),
         "final_rate_error": np.sqrt(largest_since(tail, flown.windows["rate_error"], cuts)),
         # Twice the difference of q0 times the vector part is that of the sines of the angles.
-        "drift": 2.0 * _distance(noted.error, flown.before.error) / ((steps - tail + 1) * period),
+        "drift": 2.0 * _distance(noted.error, noted.first_error) / (max(steps - tail, 1) * period),
     }
     if wheels:
         found["peak_wheel_momentum"] = noted.peak_wheel_momentum

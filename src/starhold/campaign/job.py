@@ -157,7 +157,7 @@ class Job:
             told,
         )
         lost = flown.ends[places(lot.loop.carry()).lost_at]
-        return meter.metrics(flown.before, flown.notes, flown.windows, lost), flown.windows
+        return meter.metrics(flown.notes, flown.windows, lost), flown.windows
 
 
 def counted(windows: Any, threads: int) -> Any:

@@ -187,14 +187,15 @@ class Lanes:
         return Lot(runs, loop, np.ascontiguousarray(table[:carried]), _phases(loop.phases(self.steps), carried, row))
 
     def _read_back(self) -> tuple[str, ...]:
-        """The names of numbers that show each dispersion: those that are its values, else all that it moves, and of those
-        that are always equal the first."""
+        """The names of numbers that show each dispersion: those that are its values, else all that it moves; of those that
+        are always equal, one, and rather what flies than what the law takes it for."""
         kept: list[int] = []
         alike = [flat for flat in self._varied if flat.names == self.base.names]
-        for places in self.moved.values():
-            moved = sorted(places - {_FORM})
+        for dispersion, places in zip(self.plan.dispersions, self.moved.values(), strict=True):
+            moved = sorted(places - {_FORM}, key=lambda place: (self.base.names[place].startswith("nominal."), place))
+            follow = {place: self._follows[place] for place in moved if place in self._follows}
             told: set[bytes] = set()
-            for place in [place for place in moved if place in self._follows] or moved:
+            for place in follow if {*dispersion.columns} <= {*follow.values()} else moved:
                 values = np.array([self.base.numbers[place], *(flat.numbers[place] for flat in alike)]).tobytes()
                 if values not in told:
                     told.add(values)

@@ -185,15 +185,28 @@ class RequirementTable(Table):
     """A bound of a metric, and the share of the runs that must keep it."""
 
     name: Annotated[Name | None, Field(description="how tables and columns call it; the metric if absent")] = None
-    metric: Annotated[str, Field(description="what is required: a metric as summaries name them, or lost")]
+    metric: Annotated[str, Field(description="what is required: a metric as summaries name them, lost, or exclusion-cone")]
     at_most: Annotated[Any, *raw("the greatest value that will do, in the metric's unit")] = None
     at_least: Annotated[Any, *raw("the least value that will do, in the metric's unit")] = None
+    axis: Annotated[Any, *quantity(Gain("1", shape=(3,), spread=False, text="body axis that keeps out of a cone"))] = None
+    direction: Annotated[Any, *quantity(Gain("1", shape=(3,), spread=False, text="inertial axis of that cone"))] = None
     share: Annotated[
         float, *quantity(Gain("1", above=0.0, at_most=1.0, text="of the runs that must keep it, such as 99.73 %"))
     ] = 0.9973
     confidence: Annotated[
         float, *quantity(Gain("1", above=0.0, at_most=1.0, text="of the verdict: one less the consumer's risk"))
     ] = 0.9
+
+    @model_validator(mode="after")
+    def _has_a_cone(self) -> RequirementTable:
+        for key in ("axis", "direction"):
+            value = getattr(self, key)
+            if (self.metric == "exclusion-cone") != (value is not None):
+                allowed = "a vector, for the exclusion-cone" if value is None else 'only with metric = "exclusion-cone"'
+                raise at_key(key, allowed, value)
+            if value is not None and not any(value):
+                raise at_key(key, "a vector that is not zero", list(value))
+        return self
 
     @model_validator(mode="after")
     def _can_be_decided(self) -> RequirementTable:
@@ -219,6 +232,7 @@ class CampaignTable(Table):
         Literal["random", "sobol", "latin-hypercube", "morris", "saltelli"],
         Field(description="how the draws are placed; the last two for the shares that inputs have in the result"),
     ] = "random"
+    metrics: list[str] = Field(default=[], description="to be measured beside the usual ones: overshoot, iterations")
     over: dict[str, Dispersed] = Field(default={}, description="distributions by the keys that they are of")
     requirement: list[RequirementTable] = Field(default=[], description="what runs must keep")
 

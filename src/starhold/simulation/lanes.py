@@ -108,17 +108,17 @@ class Fleet:
         blocks[:] = padded.reshape(len(rows), self.count, self.width).swapaxes(0, 1)
         return blocks
 
-    def unpacked(self, blocks: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _unpacked(self, blocks: NDArray[np.float64]) -> NDArray[np.float64]:
         """Rows (numbers, lanes) of blocks (blocks, numbers, width)."""
         return np.ascontiguousarray(blocks.swapaxes(0, 1).reshape(blocks.shape[1], -1)[:, : self.lanes])
 
     def carries(self) -> NDArray[np.float64]:
         """The numbers that each lane carries now, (numbers, lanes)."""
-        return self.unpacked(self.x)
+        return self._unpacked(self.x)
 
     def notes(self) -> NDArray[np.float64]:
         """The numbers that have been noted of each lane, (numbers, lanes)."""
-        return self.unpacked(self.noted)
+        return self._unpacked(self.noted)
 
     def fly(
         self,

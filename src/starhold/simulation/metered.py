@@ -19,11 +19,10 @@ Array = NDArray[np.float64]
 
 
 class Metered(NamedTuple):
-    """What is left of flights: where each lane ended (numbers, lanes), its notes when the second observer took over and at
-    the end (numbers, lanes), and the noted numbers of windows (windows, quantities, lanes)."""
+    """What is left of flights: where each lane ended (numbers, lanes), its notes (numbers, lanes), and the noted
+    numbers of windows (windows, quantities, lanes)."""
 
     ends: Array
-    before: Array
     notes: Array
     windows: Array
 
@@ -52,13 +51,11 @@ def fly_metered(
         for observer in observers:
             fleet.prepare(phase, observer)
     found = np.empty((len(cuts), len(rows), fleet.count, fleet.width))
-    before, end, kept = fleet.noted.copy(), phases[-1].last, list(rows)
+    end, kept = phases[-1].last, list(rows)
 
     def work(piece: range) -> None:
         span, done = slice(piece.start, piece.stop), 0
         for window, cut in enumerate(cuts):
-            if done == late:
-                before[span] = fleet.noted[span]
             observer = observers[done >= late]
             for phase in phases:
                 first, last = max(done, phase.first), min(cut, phase.last)
@@ -75,4 +72,4 @@ def fly_metered(
 
     fleet.share_out(work, threads or os.cpu_count() or 1, progress)
     windows = found.reshape(len(cuts), len(rows), -1)[:, :, : carries.shape[1]]
-    return Metered(fleet.carries(), fleet.unpacked(before), fleet.notes(), windows)
+    return Metered(fleet.carries(), fleet.notes(), windows)
