@@ -1,16 +1,22 @@
 """What keys hold, and what numbers with units mean there."""
 
 import pickle
+import re
+import tomllib
 
+import jsonschema
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from starhold.campaign.dispersions import read_dispersions
 from starhold.campaign.values import locate, number_at, value_at, width_at
 from starhold.errors import InputError
 from starhold.scenario.building import build
+from starhold.scenario.json_schema import json_schema
 from starhold.scenario.reading import builtin_text, load, parse
+from starhold.scenario.template import template_text
 
 NOISE = load("three-laws-noise")
 WHEELS = load("wheels-orbital")
@@ -175,6 +181,20 @@ def test_every_body_takes_a_campaign():
         campaign = parse(f"{builtin_text(name)}{TABLE}", "my.toml").table.campaign
         assert (campaign.runs, campaign.seed, campaign.requirement[0].share) == (852, 1, pytest.approx(0.9973, rel=1e-15))
         assert campaign.over["initial.rate"].high == "4 deg/s"
+
+
+@pytest.mark.parametrize("body", ["rigid-body", "libration-point"])
+def test_the_commented_campaign_of_a_template_is_one(body):
+    text = template_text(body)
+    table = re.search(r"^# \[campaign\].*?\n\n", text, flags=re.DOTALL | re.MULTILINE)
+    assert table is not None
+    there = re.sub("^# ", "", table[0], flags=re.MULTILINE)
+    scenario = parse(text.replace(table[0], there), "new.toml")
+    (found,) = read_dispersions(scenario, scenario.table.campaign.over)
+    assert found.dims == 3
+    check = jsonschema.Draft202012Validator(json_schema())
+    assert not list(check.iter_errors(tomllib.loads(scenario.text)))
+    assert list(check.iter_errors(tomllib.loads(scenario.text.replace("sampling =", "sampler ="))))
 
 
 @pytest.mark.parametrize("name", FAULTS)
