@@ -19,7 +19,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from starhold.algebra.quaternion import Quaternion, vector_part
-from starhold.algebra.vector import ZERO, Vector, add, scale
+from starhold.algebra.vector import ZERO, Vector, add, gyroscopic_torque, scale
 from starhold.laws.catalogue import Law
 from starhold.laws.interface import Card, Measurement, NoMemory
 from starhold.laws.pd import Gains
@@ -36,6 +36,9 @@ PUBLISHED = State((0.0, *(3.0**-0.5,) * 3), (0.04, 0.03, 0.02), (7e6, 0.0, 0.0),
 """The published start. It is half a turn from the target, where the two sets of Rodrigues parameters meet."""
 START = PUBLISHED._replace(attitude=(0.01, 0.4, 0.7, 0.3499**0.5))
 """A start just short of half a turn, which the rate carries past it."""
+
+DURATION, SLOW, FAST = 600.0, 0.02, 0.07
+"""A campaign's runs: their length (s), and the least and largest magnitude of the rate at the start (rad/s)."""
 
 
 def header(*packages: str) -> str:
@@ -101,21 +104,29 @@ def feedback(seen: Measurement, gains: Gains, craft: Craft, memory: NoMemory) ->
     return add(scale(-gains.k_attitude / (1.0 + q[0]), vector_part(q)), scale(-gains.k_rate, seen.rate)), memory
 
 
+def cancelling(seen: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
+    """The feedback, and w x Jw cancelled."""
+    torque, memory = feedback(seen, gains, craft, memory)
+    return add(torque, gyroscopic_torque(craft.inertia, seen.body_rate)), memory
+
+
 def steady(seen: Measurement, gains: Vector, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """A constant torque, no control at all."""
     return gains, memory
 
 
-def _as_law(name: str, torque: Callable[..., Any]) -> Law:
+def as_law(name: str, torque: Callable[..., Any]) -> Law:
+    """A law of a function alone, of which nothing is claimed."""
     card = Card(title=name, summary="", sources=(), assumptions=(), claims="none")
     module = ModuleType(name)
     vars(module).update(CARD=card, torque=torque)
     return Law(name, module)
 
 
-FEEDBACK = _as_law("feedback", feedback)
+FEEDBACK = as_law("feedback", feedback)
 FEEDBACK_GAINS = Gains(k_rate=0.09, k_attitude=0.036)
-STEADY = _as_law("steady", steady)
+CANCELLING = as_law("cancelling", cancelling)
+STEADY = as_law("steady", steady)
 STEADY_TORQUE: Vector = (1e-4, -2e-4, 1.5e-4)
 
 
@@ -152,12 +163,44 @@ def in_basilisk(control: Control | str, start: State = START) -> Callable[[int],
     function, called from a Basilisk module in Python. The models run in such an order that the torque of a state is
     held from that instant on.
     """
+    simulation, body, actuator, kept = body_in_basilisk(start)
+    tick = round(PERIOD * 1e9)
+    if control == "feedback":
+        kept += flight_software(simulation, body, actuator, FEEDBACK_GAINS)
+    elif control == "steady":
+        actuator.extTorquePntB_B = [[x] for x in STEADY_TORQUE]
+    else:
+        kept += _python_control(simulation, body, actuator, cast(Control, control))
+    simulation.AddModelToTask("task", actuator)
+    simulation.InitializeSimulation()
+    done = 0
+
+    def fly(steps: int) -> State:
+        nonlocal done
+        done += steps
+        simulation.ConfigureStopTime(done * tick)
+        simulation.ExecuteSimulation()
+        return state_in_basilisk(body)
+
+    return fly
+
+
+def state_in_basilisk(body: Any) -> State:
+    """Where a body of Basilisk's is now."""
+    now = body.scStateOutMsg.read()
+    rate, position, velocity = (tuple(x) for x in (now.omega_BN_B, now.r_CN_N, now.v_CN_N))
+    return State(as_quaternion(now.sigma_BN), rate, position, velocity, ZERO)
+
+
+def body_in_basilisk(start: State) -> tuple[Any, Any, Any, list[Any]]:
+    """The body on its orbit under the gravity gradient: simulation, body, its actuator, which is in no task yet, and what
+    has to be kept as long as they fly, for Basilisk's models hold each other by bare pointers."""
     from Basilisk.simulation import GravityGradientEffector, extForceTorque, spacecraft
     from Basilisk.utilities import SimulationBaseClass, macros, simIncludeGravBody
 
     simulation = SimulationBaseClass.SimBaseClass()
-    process, tick = simulation.CreateNewProcess("process"), macros.sec2nano(PERIOD)
-    process.addTask(simulation.CreateNewTask("task", tick))
+    process = simulation.CreateNewProcess("process")
+    process.addTask(simulation.CreateNewTask("task", macros.sec2nano(PERIOD)))
 
     body = spacecraft.Spacecraft()
     body.ModelTag = "body"
@@ -180,38 +223,19 @@ def in_basilisk(control: Control | str, start: State = START) -> Callable[[int],
     actuator = extForceTorque.ExtForceTorque()
     body.addDynamicEffector(actuator)
 
-    # Basilisk's models hold each other by bare pointers.
-    kept: list[Any] = [body, factory, earth, gradient, actuator]
-    if control == "feedback":
-        kept += _flight_software(simulation, body, actuator)
-    elif control == "steady":
-        actuator.extTorquePntB_B = [[x] for x in STEADY_TORQUE]
-    else:
-        kept += _python_control(simulation, body, actuator, cast(Control, control))
-    simulation.AddModelToTask("task", actuator)
-    simulation.InitializeSimulation()
-    done = 0
-
-    def fly(steps: int) -> State:
-        nonlocal done
-        done += steps
-        simulation.ConfigureStopTime(done * tick)
-        simulation.ExecuteSimulation()
-        reached = kept[0].scStateOutMsg.read()
-        attitude = _quaternion(reached.sigma_BN)
-        return State(attitude, *(tuple(x) for x in (reached.omega_BN_B, reached.r_CN_N, reached.v_CN_N)), ZERO)
-
-    return fly
+    return simulation, body, actuator, [body, factory, earth, gradient, actuator]
 
 
-def _quaternion(sigma: Sequence[float]) -> Quaternion:
+def as_quaternion(sigma: Sequence[float]) -> Quaternion:
+    """The quaternion of modified Rodrigues parameters."""
     s = np.array(sigma)
     square = float(s @ s)
     v = (2.0 * s / (1.0 + square)).tolist()
     return ((1.0 - square) / (1.0 + square), v[0], v[1], v[2])
 
 
-def _flight_software(simulation: Any, body: Any, actuator: Any) -> list[Any]:
+def flight_software(simulation: Any, body: Any, actuator: Any, gains: Gains, gyroscopic: bool = False) -> list[Any]:
+    """Basilisk's own modules of the feedback on modified Rodrigues parameters; gyroscopic: w x Jw is cancelled too."""
     from Basilisk.architecture import messaging
     from Basilisk.fswAlgorithms import attTrackingError, inertial3D, mrpFeedback
     from Basilisk.simulation import simpleNav
@@ -225,7 +249,8 @@ def _flight_software(simulation: Any, body: Any, actuator: Any) -> list[Any]:
     error.attRefInMsg.subscribeTo(goal.attRefOutMsg)
     law = mrpFeedback.mrpFeedback()
     law.guidInMsg.subscribeTo(error.attGuidOutMsg)
-    law.K, law.P, law.Ki = FEEDBACK_GAINS.k_attitude, FEEDBACK_GAINS.k_rate, -1.0
+    law.K, law.P, law.Ki = gains.k_attitude, gains.k_rate, -1.0
+    law.controlLawType = int(gyroscopic)
     known = messaging.VehicleConfigMsgPayload()
     known.ISCPntB_B = np.diag(INERTIA).ravel().tolist()
     told = messaging.VehicleConfigMsg().write(known)
@@ -252,7 +277,7 @@ def _python_control(simulation: Any, body: Any, actuator: Any, control: Control)
 
         def UpdateState(self, CurrentSimNanos: int) -> None:  # noqa: N802
             reached = body.scStateOutMsg.read()
-            torque = control(_quaternion(reached.sigma_BN), np.array(reached.omega_BN_B), np.array(reached.r_CN_N))
+            torque = control(as_quaternion(reached.sigma_BN), np.array(reached.omega_BN_B), np.array(reached.r_CN_N))
             payload = messaging.CmdTorqueBodyMsgPayload()
             payload.torqueRequestBody = np.asarray(torque).tolist()
             self.command.write(payload, CurrentSimNanos, self.moduleID)
