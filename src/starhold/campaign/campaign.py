@@ -6,26 +6,26 @@ import hashlib
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from starhold.campaign.chunk import Chunk
 from starhold.campaign.digest import digest
 from starhold.campaign.engines import Engine, Threads, Workers, fly_all
-from starhold.campaign.job import Job, Source
+from starhold.campaign.job import Job, Source, scenario_of
 from starhold.campaign.manifest import Manifest
 from starhold.campaign.results import CampaignResult
 from starhold.campaign.store import Store
-from starhold.campaign.summary import summarise
+from starhold.campaign.summary import summarise, verdicts_of
+from starhold.campaign.worst import brackets
 from starhold.errors import InputError
 from starhold.scenario.building import build
 from starhold.scenario.campaign import CampaignTable
-from starhold.scenario.checking import read_toml, show
-from starhold.scenario.reading import Scenario
-from starhold.studies.compare import Flight, fly_law
+from starhold.scenario.checking import nearest, read_toml, show
+from starhold.scenario.reading import Scenario, parse
+from starhold.studies.compare import fly_law
+from starhold.studies.flight import Flight
 
 if TYPE_CHECKING:
     from starhold.campaign.dispersions import Dispersion
@@ -49,6 +49,8 @@ class Options:
     resume: bool = False
     force: bool = False
     until_decided: bool = False
+    search: bool = True
+    """Whether the worst of what is required is looked for over the box of the dispersions."""
 
 
 def with_campaign(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
@@ -92,14 +94,16 @@ def fly_campaign(
         _check_decidable(job)
     at_once = all(job.lanes(name).at_once for name in laws)
     manifest = Manifest(
-        scenario.name,
-        scenario.text,
-        {"files": _hashes(scenario)},
-        laws,
-        table.runs,
-        options.chunk or _chunk(table.runs, engine, at_once),
-        table.seed,
-        table.sampling in ("random", "sobol"),
+        scenario=scenario.name,
+        text=scenario.text,
+        settings={"files": _hashes(scenario)} | ({"until_decided": True} if options.until_decided else {}),
+        laws=laws,
+        runs=table.runs,
+        chunk=LOOK if options.until_decided else options.chunk or _chunk(table.runs, engine, at_once),
+        seed=table.seed,
+        extensible=table.sampling in ("random", "sobol"),
+        folder=str(scenario.folder.resolve()),
+        allow_unstable=scenario.allow_unstable,
     )
     exists = (folder / "manifest.json").exists()
     store = (
@@ -120,7 +124,10 @@ def fly_campaign(
         fly_all(job, _blocks(store, notice), store.put, engine, arrived)
         runs = table.runs
     seconds = time.perf_counter() - begun
-    results = tuple(summarise(store, job, name, options.until_decided) for name in laws)
+    results = [summarise(store, job, name, options.until_decided) for name in laws]
+    if options.search and job.dispersions and table.requirement:
+        threads = engine.count if isinstance(engine, Threads) else os.cpu_count() or 1
+        results = [replace(result, brackets=brackets(job, store, result, threads)) for result in results]
     told = digest(store, runs)
     totals = {
         "verdicts": {
@@ -133,17 +140,60 @@ def fly_campaign(
     }
     store.finish(told, totals)
     over = {", ".join(one.keys): in_words(one, table) for one in job.dispersions}
-    return CampaignResult(scenario.name, folder, runs, table.sampling, over, results, told, seconds, flown)
+    return CampaignResult(scenario.name, folder, runs, table.sampling, over, tuple(results), told, seconds, flown)
 
 
-def fly_again(folder: Path, run: int, law: str | None = None) -> tuple[Scenario, Flight]:
-    """The scenario of one run of a campaign, and its flight with every control step recorded, the same bits as then.
-    InputError where there is no such run."""
+class FlownAgain(NamedTuple):
+    """A run of a campaign, flown again: its scenario, its flight, and the columns in which the campaign holds other bits than
+    come out now, which are none unless the machine computes otherwise."""
+
+    scenario: Scenario
+    flight: Flight
+    differs: tuple[str, ...]
+
+
+def fly_again(folder: Path, run: int, law: str | None = None) -> FlownAgain:
+    """Fly one run of a campaign again, by its own scenario, and record it. InputError where there is no such run."""
     store = Store.open(folder)
-    name = store.manifest.laws[0] if law is None else law
-    if name not in store.manifest.laws:
-        raise InputError(str(folder), "law", name, ", ".join(store.manifest.laws))
-    raise NotImplementedError
+    manifest = store.manifest
+    name = manifest.laws[0] if law is None else law
+    if name not in manifest.laws:
+        raise InputError(str(folder), "law", show(name), nearest(name, list(manifest.laws)))
+    stored = store.row(name, run)
+    scenario = parse(manifest.text, str(folder), Path(manifest.folder), manifest.allow_unstable)
+    job = Job(Source.of(scenario), scenario.table.campaign)
+    now = job(name, run, 1, 1).rows
+    differs = tuple(column for column, value in stored.items() if not _equal(value, now[column][0]))
+    own = scenario_of(job, job.plan.columns(run, 1), run)
+    entry = own.pick(name)
+    return FlownAgain(own, fly_law(own, entry, build(own, entry)), differs)
+
+
+def _equal(a: Any, b: Any) -> bool:
+    return bool(a == b or (a != a and b != b))
+
+
+def _fly_until_decided(store: Store, job: Job, engine: Engine, arrived: Callable[[Chunk], None]) -> int:
+    """Fly on until every requirement of every law is decided, and return the number of runs. Looks are taken at numbers of
+    runs that depend on nothing, so that every engine ends at the same one."""
+    most, flown = job.table.runs, 0
+    while flown < most:
+        flown = min(most, max(flown + LOOK, -(-flown * 5 // (4 * LOOK)) * LOOK))
+        missing = [(name, first, count) for name in store.manifest.laws for first, count in store.missing(name)]
+        fly_all(job, [block for block in missing if block[1] < flown], store.put, engine, arrived)
+        verdicts = [verdict for name in store.manifest.laws for verdict in verdicts_of(store, job, name, True, flown)]
+        if all(verdict.outcome != "not decided" for verdict in verdicts):
+            break
+    return flown
+
+
+def _check_decidable(job: Job) -> None:
+    where = job.source.where
+    if not job.table.requirement:
+        raise InputError(where, "campaign.requirement", "none", "at least one, to fly until it is decided")
+    if job.table.sampling != "random":
+        found = show(job.table.sampling)
+        raise InputError(where, "campaign.sampling", found, '"random", for only independent runs can be stopped by what they show')
 
 
 def _blocks(store: Store, notice: Notice | None) -> Iterator[tuple[str, int, int]]:
@@ -177,3 +227,15 @@ def _hashes(scenario: Scenario) -> dict[str, str]:
 
     look(read_toml(scenario.text, scenario.where))
     return found
+
+
+def in_words(dispersion: Dispersion, table: CampaignTable) -> str:
+    """A dispersion as the file has it, in one line."""
+    given = table.over[dispersion.places[0].table].model_dump(exclude_defaults=True, exclude={"distribution", "known"})
+    told = [f"{name} {_brief(value)}" if value is not True else name for name, value in given.items()]
+    known = ["known before flight"] if dispersion.known else []
+    return ", ".join([table.over[dispersion.places[0].table].distribution, *told, *known])
+
+
+def _brief(value: Any) -> str:
+    return value if isinstance(value, str) else show(value)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.structure import places
-from starhold.analysis.meter import Meter
+from starhold.analysis.meter import Meter, Metrics
 from starhold.campaign.chunk import LEAST, MOST, Chunk
 from starhold.campaign.dispersions import Dispersion, read_dispersions
 from starhold.campaign.envelopes import NAME, count
@@ -105,21 +105,19 @@ class Job:
 
     def __call__(self, law: str, first: int, count: int, threads: int) -> Chunk:
         """The results of runs first .. first+count-1 of a law."""
-        rows: dict[str, NDArray[Any]] = {"run": np.arange(first, first + count)}
-        rows |= self.plan.columns(first, count)
-        measured: dict[str, NDArray[Any]] = {}
+        runs = np.arange(first, first + count)
+        columns = self.plan.columns(first, count)
         histogram: Any = 0
         extremes: list[Any] = []
-        for lot, told in self.lanes(law).lots(first, count):
-            metrics, windows = self._fly(law, lot, threads)
+
+        def take(metrics: Metrics, windows: Any) -> None:
+            nonlocal histogram
             kept = np.isnan(metrics["diverged_at"])
             bins, least, most = counted(windows if kept.all() else windows[:, :, kept], threads)
             histogram = histogram + bins
             extremes.append((least, most))
-            for name, values in (told | metrics).items():
-                whole = measured.setdefault(name, np.full(count, np.nan))
-                whole[lot.runs - first] = values
-        rows |= measured
+
+        rows: dict[str, NDArray[Any]] = {"run": runs, **columns, **self.measure(law, columns, runs, threads, take)}
         failed = ~np.isnan(rows["diverged_at"])
         for requirement in self.requirements(law):
             margins = requirement.margins(rows)
@@ -128,6 +126,24 @@ class Job:
         rows["failed"] = failed
         merged = (np.fmin.reduce([a for a, _ in extremes]), np.fmax.reduce([b for _, b in extremes]))
         return Chunk(law, first, rows, {NAME: histogram}, {f"{NAME}{LEAST}": merged[0], f"{NAME}{MOST}": merged[1]})
+
+    def measure(
+        self,
+        law: str,
+        columns: Mapping[str, NDArray[Any]],
+        runs: NDArray[np.int64],
+        threads: int,
+        take: Callable[[Metrics, Any], None] = lambda metrics, windows: None,
+    ) -> Metrics:
+        """The metrics of runs of a law, and the numbers read back, (lanes,), by name. columns: what was drawn; runs: their
+        numbers, which number their random ones; take: called with metrics and windows of each lot."""
+        found: Metrics = {}
+        for lot, places, told in self.lanes(law).lots(columns, runs):
+            metrics, windows = self._fly(law, lot, threads)
+            take(metrics, windows)
+            for name, values in (told | metrics).items():
+                found.setdefault(name, np.full(len(runs), np.nan))[places] = values
+        return found
 
     def _fly(self, law: str, lot: Lot, threads: int) -> tuple[dict[str, Any], Any]:
         """The metrics of a lot, (lanes,), and what was noted in windows (windows, quantities, lanes)."""
@@ -158,6 +174,15 @@ class Job:
         )
         lost = flown.ends[places(lot.loop.carry()).lost_at]
         return meter.metrics(flown.notes, flown.windows, lost), flown.windows
+
+
+def scenario_of(job: Job, columns: Mapping[str, NDArray[Any]], run: int) -> Scenario:
+    """The scenario of one run as a file of its own: what was drawn, in columns (1,), in the places of what was to be, the
+    number of the run, and no campaign."""
+    change = {**job.plan.change({name: values[0] for name, values in columns.items()}), "campaign": None}
+    if hasattr(job.scenario.table.simulation, "run"):
+        change["simulation.run"] = run
+    return job.scenario.with_(change)
 
 
 def counted(windows: Any, threads: int) -> Any:

@@ -68,7 +68,8 @@ class Lanes:
         for dispersion in plan.dispersions:
             self.moved[", ".join(dispersion.keys)] = self._moved_by(dispersion)
         fixed = not any(_FORM in places for places in self.moved.values())
-        self.at_once = fixed and self._agrees(plan.columns(0, min(plan.runs, PROBES)))
+        probes = np.arange(min(plan.runs, PROBES))
+        self.at_once = fixed and self._agrees(plan.columns(0, len(probes)), probes)
         self.flown = self._read_back()
 
     def scenario_of(self, columns: Columns) -> Scenario:
@@ -80,26 +81,26 @@ class Lanes:
         other = self.scenario_of(columns)
         return Flat.of(build(other, other.pick(self.law)), self.steps)
 
-    def lots(self, first: int, count: int) -> Iterator[tuple[Lot, dict[str, Array]]]:
-        """The lanes of runs first .. first+count-1, and the numbers read back of them. InputError where a run's scenario is
-        refused."""
-        columns, runs = self.plan.columns(first, count), np.arange(first, first + count)
+    def lots(self, columns: Columns, runs: NDArray[np.int64]) -> Iterator[tuple[Lot, NDArray[np.int64], dict[str, Array]]]:
+        """The lanes of runs of these numbers (lanes,), drawn as the columns say, in lots: with the place of each of their
+        lanes among all, and the numbers read back. InputError where a run's scenario is refused."""
         refused = self.scenario.hooks.refused(self._by_key(columns))
         if refused is not None and refused.any():
             place = int(np.flatnonzero(refused)[0])
-            self._told_exact(_one(columns, place), first + place)
+            self._told_exact(_one(columns, place), runs[place])
         # A look at two of them, for what no probe showed.
-        if self.at_once and self._agrees(_some(columns, [0, count // 2]), first):
+        looked = [0, len(runs) // 2]
+        if self.at_once and self._agrees(_some(columns, looked), runs[looked]):
             lot = self._together(columns, runs)
-            yield lot, self._told(lot)
+            yield lot, np.arange(len(runs)), self._told(lot)
             return
-        flats = [self._told_exact(_one(columns, place), first + place) for place in range(count)]
+        flats = [self._told_exact(_one(columns, place), run) for place, run in enumerate(runs.tolist())]
         groups: dict[Any, list[int]] = {}
         for place, flat in enumerate(flats):
             groups.setdefault(flat.form, []).append(place)
         for places in groups.values():
             lot = self._apart([flats[place] for place in places], runs[places])
-            yield lot, self._told(lot)
+            yield lot, np.array(places), self._told(lot)
 
     def _told_exact(self, columns: Columns, run: int) -> Flat:
         try:
@@ -125,15 +126,14 @@ class Lanes:
         # What differs in none of them may differ in another.
         return found if others else {_FORM}
 
-    def _agrees(self, columns: Columns, first: int = 0) -> bool:
+    def _agrees(self, columns: Columns, runs: NDArray[np.int64]) -> bool:
         """Whether the numbers of these runs, made at once, are those of each one's own scenario."""
-        runs = np.arange(len(next(iter(columns.values()), [0])))
         try:
             found = _table(self._together(columns, runs))
         except (ValueError, TypeError):
             return False
-        for lane in runs.tolist():
-            flat = self._told_exact(_one(columns, lane), first + lane)
+        for lane, run in enumerate(runs.tolist()):
+            flat = self._told_exact(_one(columns, lane), run)
             if flat.form != self.base.form or not same(flat.numbers, found[:, lane]):
                 return False
         return True

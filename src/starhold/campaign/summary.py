@@ -33,7 +33,7 @@ def summarise(store: Store, job: Job, law: str, until_decided: bool = False) -> 
     meter, requirements = job.meter(law), job.requirements(law)
     own = store.columns(["failed", "diverged_at"], law)
     failed, lost = own["failed"].astype(bool), ~np.isnan(own["diverged_at"])
-    verdicts = tuple(_verdict(store, job, law, requirement, until_decided) for requirement in requirements)
+    verdicts = verdicts_of(store, job, law, until_decided)
     return LawResult(
         law,
         len(failed),
@@ -69,10 +69,17 @@ def _envelopes(store: Store, meter: Meter, law: str) -> Any:
     return envelopes.read(counts[name], extremes[f"{name}{LEAST}"], extremes[f"{name}{MOST}"], meter.windows, times)
 
 
-def _verdict(store: Store, job: Job, law: str, requirement: Requirement, until_decided: bool) -> Verdict:
+def verdicts_of(store: Store, job: Job, law: str, until_decided: bool, runs: int | None = None) -> tuple[Verdict, ...]:
+    """The verdicts on a law's requirements by its stored runs, or by the first ones."""
+    return tuple(_verdict(store, job, law, requirement, until_decided, runs) for requirement in job.requirements(law))
+
+
+def _verdict(
+    store: Store, job: Job, law: str, requirement: Requirement, until_decided: bool, runs: int | None
+) -> Verdict:
     known = [name for dispersion in job.dispersions if dispersion.known for name in dispersion.columns]
     margin = f"margin.{requirement.name}"
-    columns = store.columns([margin, *known], law)
+    columns = {name: values[:runs] for name, values in store.columns([margin, *known], law).items()}
     return judge(
         requirement.name,
         columns.pop(margin),
