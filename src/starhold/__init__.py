@@ -6,6 +6,7 @@ scenario = sh.load("three-laws")                 # or sh.scenario({...}), and sc
 run = sh.simulate(scenario, law="lyapunov")      # an xarray Dataset
 flights = sh.compare(scenario)                   # runs and metrics of every law
 numbers = sh.metrics(run)                        # settling time, overshoot, effort and all the others, in SI
+result = sh.campaign(scenario, runs=10_000, over={"initial.attitude": {"distribution": "rotations"}})    # and verdicts
 table = sh.sweep(scenario, {"law.lyapunov.k_rate": gains})    # a DataFrame, a row for each flight
 frame = sh.to_pandas(flights)                    # runs, flights, certificates and designs as tidy tables
 certificates = sh.certify(scenario)              # what is proved of every law
@@ -22,6 +23,7 @@ from starhold.version import __version__
 
 if TYPE_CHECKING:
     from starhold.api import (
+        campaign,
         certify,
         compare,
         design,
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
 __all__ = [
     "InputError",
     "__version__",
+    "campaign",
     "certify",
     "compare",
     "design",
@@ -63,9 +66,9 @@ def __getattr__(name: str) -> Any:
 
     if name == "InputError":
         return import_module("starhold.errors").InputError
-    if name == "scenario":
+    if name in ("scenario", "campaign"):
         # The package of that name, which can be called.
-        return import_module("starhold.scenario")
+        return import_module(f"starhold.{name}")
     if name in __all__:
         return getattr(import_module("starhold.api"), name)
     raise AttributeError(f"module 'starhold' has no attribute {name!r}")

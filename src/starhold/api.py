@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from pandas import DataFrame
 
+    from starhold.campaign.results import CampaignResult
     from starhold.certification.certificate import Certificate
     from starhold.certification.invariant import InvariantProblem
     from starhold.studies.failures import Failure
@@ -76,6 +77,59 @@ def sweep(
     from starhold.studies.sweep import sweep as fly_sweep
 
     return fly_sweep(_opened(scenario), changes, law, threads, progress)
+
+
+def campaign(
+    scenario: reading.Scenario | str | Path,
+    folder: str | Path | None = None,
+    *,
+    runs: int | None = None,
+    over: Mapping[str, Any] | None = None,
+    requirement: Iterable[Mapping[str, Any]] | None = None,
+    metrics: Iterable[str] | None = None,
+    sampling: str | None = None,
+    seed: int | None = None,
+    law: str | None = None,
+    threads: int | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    resume: bool = False,
+    force: bool = False,
+    until_decided: bool = False,
+    search: bool = True,
+    progress: Callable[[str, int], None] | None = None,
+) -> CampaignResult:
+    """Fly many runs of a scenario with numbers drawn from distributions, and judge what is required of them.
+
+    over: a distribution for each key that is drawn, {"initial.rate": {"distribution": "shell", "high": "4 deg/s"}};
+    requirement: bounds of metrics, [{"metric": "settling_time", "at_most": 120, "share": 0.99, "confidence": 0.9}]; metrics:
+    costlier ones to be measured too, "overshoot" or "iterations". These, with `runs`, `sampling` and `seed`, stand in place of
+    what the scenario's [campaign] table has. law: one law, else all. Results are kept in `folder`, or in one that goes with
+    this process; `resume` flies there what is missing. threads, workers (processes), scheduler (the address of a Dask
+    cluster): who flies; results are the same bits. until_decided: end as soon as every requirement is met or missed, `runs` at
+    the most. search: look for the worst, too. progress: called with a law and how many more of its runs were flown.
+
+    InputError for whatever is wrong, what was flown until then being kept.
+    """
+    from starhold.campaign.campaign import Options, fly_campaign, with_campaign
+    from starhold.campaign.engines import engine_of
+
+    changes = {"runs": runs, "over": over, "metrics": metrics, "sampling": sampling, "seed": seed, "requirement": requirement}
+    plain = {key: list(value) if key in ("metrics", "requirement") and value else value for key, value in changes.items()}
+    options = Options(engine_of(threads, workers, scheduler), None, resume, force, until_decided, search)
+    place = Path(_temporary() if folder is None else folder)
+    return fly_campaign(with_campaign(_opened(scenario), plain), place, law, options, progress)
+
+
+def _temporary() -> str:
+    """A new folder that goes with this process."""
+    import atexit
+    import shutil
+    import tempfile
+
+    folder = tempfile.mkdtemp(prefix="starhold-campaign-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
 
 
 def to_pandas(results: Any) -> DataFrame:

@@ -1,1 +1,18 @@
-"""Campaigns: many flights of one scenario, each with its own numbers drawn from distributions, and what they show."""
+"""Campaigns: many runs with dispersions, their verdicts and what drives them. Called, this package is `starhold.campaign`, a
+function of the Python interface."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+
+class _Flying(ModuleType):
+    def __call__(self, *args: Any, **keywords: Any) -> Any:
+        # The interface is above all layers; it alone is asked for by this name.
+        return import_module("starhold.api").campaign(*args, **keywords)
+
+
+sys.modules[__name__].__class__ = _Flying

@@ -11,6 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
+    from starhold.campaign.campaign import FlownAgain
     from starhold.campaign.drivers import Drivers
     from starhold.campaign.sensitivity import Morris, Refused, Sobol
     from starhold.campaign.verdicts import Verdict
@@ -116,6 +119,22 @@ class CampaignResult:
         """Whether every requirement is met by every law; None where some are not decided and none is missed."""
         outcomes = {verdict.outcome for law in self.laws for verdict in law.verdicts}
         return False if "missed" in outcomes else None if "not decided" in outcomes else True
+
+    def frame(self) -> DataFrame:
+        """A row for each run of each law: `law`, `run`, what was drawn and what flew, metrics, margins."""
+        return self.query("SELECT * FROM runs ORDER BY law, run")
+
+    def query(self, sql: str) -> DataFrame:
+        """The answer to a SELECT about `runs`. InputError where it cannot be answered."""
+        from starhold.campaign.query import query
+
+        return query(self.folder, sql)
+
+    def again(self, run: int, law: str | None = None) -> FlownAgain:
+        """One run, flown again and recorded. InputError where there is no such run."""
+        from starhold.campaign.campaign import fly_again
+
+        return fly_again(self.folder, run, law)
 
     def __repr__(self) -> str:
         told = ", ".join(f"{law.law}: {law.failed} of {law.runs} failed" for law in self.laws)

@@ -44,7 +44,7 @@ def summarise(store: Store, job: Job, law: str, until_decided: bool = False) -> 
         verdicts,
         _drivers(store, job, law, failed, requirements),
         _indices(store, job, law, requirements),
-        _again(store.folder, law, verdicts, failed),
+        _again(store.folder, law, verdicts, failed, job.table.seed),
     )
 
 
@@ -126,13 +126,17 @@ def _indices(store: Store, job: Job, law: str, requirements: tuple[Requirement, 
     return {name: kind(job.plan.factors, unit, columns[name]) for name in names}
 
 
-def _again(folder: Path, law: str, verdicts: tuple[Verdict, ...], failed: NDArray[np.bool_]) -> tuple[Again, ...]:
-    """The worst run of each requirement, and the first ones that failed."""
+def _again(
+    folder: Path, law: str, verdicts: tuple[Verdict, ...], failed: NDArray[np.bool_], seed: int
+) -> tuple[Again, ...]:
+    """The worst run of each requirement, the first ones that failed, and one for comparison."""
     why: dict[int, list[str]] = {}
     for verdict in verdicts:
         why.setdefault(verdict.worst_run, []).append(f"worst {verdict.name}")
     for run in np.flatnonzero(failed)[:FAILURES].tolist():
         why.setdefault(run, []).append("failed")
+    other = int(np.random.default_rng(seed).integers(len(failed)))
+    why.setdefault(other, []).append("picked at random")
     told = shlex.quote(str(folder))
     return tuple(
         Again(run, ", ".join(reasons), f"starhold rerun {told} {run} --law {shlex.quote(law)}")
