@@ -1,0 +1,78 @@
+"""A chunk is a block of consecutive runs of one law: a row of numbers a run, and what adds up over runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Counts: TypeAlias = dict[str, NDArray[np.int64]]
+Extremes: TypeAlias = dict[str, NDArray[np.float64]]
+LEAST, MOST = ".least", ".most"
+"""How names of extremes end: of those merged by the minimum, and of those merged by the maximum."""
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """The results of one law's runs `first` to `first + count - 1`.
+
+    rows: columns by name, each an array of one element a run: float64 (NaN: the run has no such value), int64, bool or
+        text. The column `run` holds the runs' numbers in order.
+    counts: histograms of any shapes by name; those of several chunks add up.
+    extremes: arrays of any shapes in any unit by name, which ends in `.least` or `.most`; NaN where nothing was measured.
+    """
+
+    law: str
+    first: int
+    rows: dict[str, NDArray[Any]]
+    counts: Counts = field(default_factory=dict)
+    extremes: Extremes = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        numbers = self.rows.get("run")
+        if numbers is None or not np.array_equal(numbers, np.arange(self.first, self.first + len(numbers))):
+            raise ValueError(f"a chunk's column 'run' must hold its runs in order, from {self.first}")
+        if wrong := [name for name, values in self.rows.items() if values.shape != numbers.shape]:
+            raise ValueError(f"columns of other lengths than 'run': {', '.join(wrong)}")
+        if wrong := [name for name in self.extremes if not name.endswith((LEAST, MOST))]:
+            raise ValueError(f"extremes that end neither in {LEAST} nor in {MOST}: {', '.join(wrong)}")
+
+    @property
+    def count(self) -> int:
+        """The number of runs."""
+        return len(self.rows["run"])
+
+
+def merge(parts: Iterable[tuple[Counts, Extremes]]) -> tuple[Counts, Extremes]:
+    """The counts and extremes of several chunks as one: the same bits for any order and grouping of the parts.
+
+    Raises ValueError where two parts have different names or shapes.
+    """
+    counts: Counts = {}
+    extremes: Extremes = {}
+    for number, (more, others) in enumerate(parts):
+        if number == 0:
+            counts = {name: values.copy() for name, values in more.items()}
+            extremes = {name: _plain(values) for name, values in others.items()}
+            continue
+        _check_shapes(counts, more)
+        _check_shapes(extremes, others)
+        for name, values in more.items():
+            counts[name] += values
+        for name, values in others.items():
+            pick = np.fmin if name.endswith(LEAST) else np.fmax
+            extremes[name] = _plain(pick(extremes[name], values))
+    return counts, extremes
+
+
+def _plain(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values with one NaN and one zero: which of several NaNs, or of 0 and -0, a minimum returns depends on the order."""
+    return np.where(np.isnan(values), np.nan, values + 0.0)
+
+
+def _check_shapes(held: dict[str, NDArray[Any]], more: dict[str, NDArray[Any]]) -> None:
+    if {name: values.shape for name, values in held.items()} != {name: values.shape for name, values in more.items()}:
+        raise ValueError(f"chunks of other names or shapes: {sorted(held)} and {sorted(more)}")

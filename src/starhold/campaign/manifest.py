@@ -1,0 +1,168 @@
+"""A campaign's folder states what the campaign is; two such statements are compared here."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, cast
+
+import numpy as np
+
+from starhold.errors import InputError
+from starhold.scenario.checking import cut
+from starhold.version import __version__
+
+FILE = "manifest.json"
+_LONGEST_VALUE = 60
+_MISSING = object()
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """The statement of what a campaign flies.
+
+    scenario, text: name and whole text of the scenario file.
+    settings: all else that determines results, as a file would hold it: dispersions, requirements, sampling, and the hashes
+        of other files that the scenario reads. Not the number of runs.
+    laws: names of the laws in order; each flies all runs.
+    runs, chunk: numbers of runs, of a law and of a full chunk. Results do not depend on `chunk`.
+    seed: that of the draws.
+    extensible: whether the draws of a run are the same for any number of runs, which Latin hypercubes are not.
+    columns: names of the columns of each law, known once its first chunk is stored.
+    """
+
+    scenario: str
+    text: str
+    settings: Mapping[str, Any]
+    laws: tuple[str, ...]
+    runs: int
+    chunk: int
+    seed: int
+    extensible: bool = True
+    columns: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    version: str = __version__
+
+    def determining(self) -> dict[str, Any]:
+        """Everything that results depend on, by the keys that differences are told with."""
+        settings = cast(dict[str, Any], plain(self.settings))
+        settings.pop("runs", None)
+        tables = _tables(self.text)
+        others: dict[str, Any] = {"laws": list(self.laws), "seed": self.seed, "starhold_version": self.version}
+        if not self.extensible:
+            others["runs"] = self.runs
+        return {"campaign": settings, "": tables, **others}
+
+    def fingerprint(self) -> str:
+        """SHA-256, in hexadecimal, of everything that results depend on."""
+        return hashlib.sha256(json.dumps(self.determining(), sort_keys=True).encode()).hexdigest()
+
+    def to_json(self) -> str:
+        """The manifest as the text of a JSON file."""
+        content = {
+            "starhold_version": self.version,
+            "scenario": self.scenario,
+            "fingerprint": self.fingerprint(),
+            "laws": self.laws,
+            "runs": self.runs,
+            "chunk": self.chunk,
+            "seed": self.seed,
+            "extensible": self.extensible,
+            "campaign": plain(self.settings),
+            "columns": {law: list(names) for law, names in self.columns.items()},
+            "text": self.text,
+        }
+        return json.dumps(content, indent=2, allow_nan=False) + "\n"
+
+    @classmethod
+    def from_json(cls, text: str, where: str) -> Manifest:
+        """The manifest in a text; InputError where it is none, or was changed since it was written."""
+        try:
+            data = json.loads(text)
+            manifest = cls(
+                scenario=data["scenario"],
+                text=data["text"],
+                settings=data["campaign"],
+                laws=tuple(data["laws"]),
+                runs=data["runs"],
+                chunk=data["chunk"],
+                seed=data["seed"],
+                extensible=data["extensible"],
+                columns={law: tuple(names) for law, names in data["columns"].items()},
+                version=data["starhold_version"],
+            )
+            whole = data["fingerprint"] == manifest.fingerprint()
+        except (ValueError, KeyError, TypeError, AttributeError):
+            raise InputError(where, "", "no manifest of a campaign", "the file as starhold wrote it") from None
+        if not whole:
+            raise InputError(where, "", "a file that was changed by hand", "the file as starhold wrote it")
+        return manifest
+
+    def difference(self, old: Manifest) -> str | None:
+        """The first difference from an older manifest that changes results, such as `campaign.seed: 2, was 1`; else None."""
+        new, held = self.determining(), old.determining()
+        for key in dict.fromkeys((*new, *held)):
+            if found := difference(new.get(key, _MISSING), held.get(key, _MISSING), key):
+                return found
+        return None
+
+
+def plain(value: Any) -> Any:
+    """A value in the types that JSON has; numbers that are not finite become text, and so does anything unknown."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in cast(Mapping[Any, Any], value).items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(cast(Any, value).tolist())
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in cast(list[Any], value)]
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value if value is None or isinstance(value, str | bool | int | float) else str(value)
+
+
+def difference(new: Any, old: Any, key: str) -> str | None:
+    """The first difference of two values of JSON, with the dotted key that leads to it; entries of lists count from 1."""
+    if isinstance(new, dict) and isinstance(old, dict):
+        mine, theirs = cast(dict[str, Any], new), cast(dict[str, Any], old)
+        for name in dict.fromkeys((*mine, *theirs)):
+            below = f"{key}.{_quoted(name)}" if key else _quoted(name)
+            if found := difference(mine.get(name, _MISSING), theirs.get(name, _MISSING), below):
+                return found
+        return None
+    if isinstance(new, list) and isinstance(old, list) and len(cast(list[Any], new)) == len(cast(list[Any], old)):
+        pairs = zip(cast(list[Any], new), cast(list[Any], old), strict=True)
+        told = (difference(mine, theirs, f"{key}[{number}]") for number, (mine, theirs) in enumerate(pairs, 1))
+        return next((found for found in told if found), None)
+    mine, theirs = _written(new), _written(old)
+    if mine == theirs:
+        return None
+    # Of two long values, the parts that differ.
+    pairs = zip(mine, theirs, strict=False)
+    same = next((place for place, (a, b) in enumerate(pairs) if a != b), min(len(mine), len(theirs)))
+    if same > _LONGEST_VALUE // 2:
+        mine, theirs = (f"...{text[same - 10 :]}" for text in (mine, theirs))
+    return f"{key}: {cut(mine, _LONGEST_VALUE)}, was {cut(theirs, _LONGEST_VALUE)}"
+
+
+def _tables(text: str) -> dict[str, Any]:
+    """The tables of a scenario's text: what it says without its comments. Lines, where it is not TOML."""
+    try:
+        tables = cast(dict[str, Any], plain(tomllib.loads(text)))
+    except (ValueError, RecursionError):
+        return {"line": text.splitlines()}
+    campaign = tables.get("campaign")
+    if isinstance(campaign, dict):
+        cast(dict[str, Any], campaign).pop("runs", None)
+    return tables
+
+
+def _quoted(name: str) -> str:
+    return name if re.fullmatch(r"[\w-]+", name) else json.dumps(name, ensure_ascii=False)
+
+
+def _written(value: Any) -> str:
+    return "nothing" if value is _MISSING else json.dumps(value, ensure_ascii=False)

@@ -1,0 +1,71 @@
+"""Questions in SQL to the rows of a campaign, answered by DuckDB."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from starhold.campaign.extras import extra
+from starhold.campaign.store import Store
+from starhold.errors import InputError
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+_CLOSED = {
+    "enable_external_access": False,
+    "autoinstall_known_extensions": False,
+    "autoload_known_extensions": False,
+    "temp_directory": "",
+}
+"""A question reads the view and nothing else: no file, no network, no disk for what does not fit into memory."""
+
+
+def query(folder: Path, sql: str, tell: Callable[[str], None] | None = None) -> DataFrame:
+    """The answer to one SELECT about `runs`: a row for each stored run of each law, with the campaign's columns and `law`.
+
+    Columns that a law does not have are null in its rows, as are numbers that a run does not have. Chunks that are unusable
+    are left out, with a line to `tell`; without it they are an InputError. InputError too for whatever DuckDB refuses.
+    """
+    store = Store.open(folder)
+    duckdb, dataset = extra("duckdb"), extra("pyarrow.dataset")
+    files = {law: [str(file.path) for file in store.files(law)] for law in store.manifest.laws}
+    for line in store.notices:
+        if tell is None:
+            raise InputError("query", "", "", line)
+        tell(line)
+    held = [law for law in files if files[law]]
+    if not held:
+        raise InputError(str(folder), "", "no runs", "a folder with flown runs")
+    with duckdb.connect(":memory:", config=_CLOSED) as connection:
+        # Through Arrow, so that DuckDB itself needs no access to files, not even to these, which it could write as well.
+        for number, law in enumerate(held):
+            connection.register(f"chunks {number}", dataset.dataset(files[law], format="parquet"))
+        parts = [f'SELECT {_quoted(law)} AS law, * FROM "chunks {number}"' for number, law in enumerate(held)]
+        connection.execute(f"CREATE VIEW runs AS {' UNION ALL BY NAME '.join(parts)}")
+        connection.execute("SET lock_configuration = true")
+        try:
+            _check(connection, sql, duckdb)
+            return connection.execute(sql).df()
+        except duckdb.Error as error:
+            raise InputError("query", "", "", _short(str(error))) from None
+
+
+def _quoted(law: str) -> str:
+    return "'" + law.replace("'", "''") + "'"
+
+
+def _check(connection: Any, sql: str, duckdb: Any) -> None:
+    """InputError where a text is not one question."""
+    kinds = [statement.type for statement in connection.extract_statements(sql)]
+    if len(kinds) != 1:
+        raise InputError("query", "", f"{len(kinds)} statements", "one SELECT")
+    if kinds[0] not in (duckdb.StatementType.SELECT, duckdb.StatementType.EXPLAIN):
+        raise InputError("query", "", f"a statement of type {kinds[0].name}", "one SELECT")
+
+
+def _short(message: str) -> str:
+    """DuckDB's message without the repetition of the question, as one line."""
+    told = message.partition("\n\nLINE ")[0]
+    return "; ".join(line.strip() for line in told.splitlines() if line.strip())

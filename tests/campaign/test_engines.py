@@ -1,0 +1,132 @@
+"""Engines fly the same results, pass errors on, and keep few blocks under way."""
+
+import os
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from starhold.campaign import engines
+from starhold.campaign.engines import Scheduler, Threads, Workers, fly_all
+from starhold.campaign.store import Store
+from starhold.errors import InputError
+from tests.campaign.cluster import cluster
+from tests.campaign.toy import LAWS, Toy, fly, manifest, missing
+
+pytestmark = pytest.mark.xdist_group("campaign engines")
+
+
+@pytest.fixture
+def store(tmp_path):
+    return Store.create(tmp_path / "campaign", manifest())
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory):
+    with cluster(tmp_path_factory.mktemp("cluster")) as (address, *_):
+        yield address
+
+
+def reference(tmp_path):
+    return fly(Store.create(tmp_path / "reference", manifest()))
+
+
+def test_workers_find_the_same_results_and_say_nothing(tmp_path, store, capfd):
+    assert fly(store, Workers(2)) == reference(tmp_path)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_an_existing_cluster_finds_the_same_results(tmp_path, store, running):
+    assert fly(store, Scheduler(running)) == reference(tmp_path)
+
+
+@pytest.mark.parametrize("processes", [False, True])
+def test_what_a_job_refuses_is_told_as_it_is(store, running, processes):
+    with pytest.raises(InputError) as caught:
+        fly(store, Scheduler(running) if processes else Threads(1), Toy(refused=40))
+    assert (caught.value.where, caught.value.key) == ("toy.toml", "law.pd")
+    assert str(caught.value) == "toy.toml: law.pd: found a gain; allowed: another"
+
+
+def test_a_fault_in_a_job_is_no_user_error(store, running):
+    with pytest.raises(TypeError, match="cannot be interpreted"):
+        fly(store, Scheduler(running), Toy(pause="long"))
+
+
+def test_few_blocks_are_under_way_however_many_there_are(tmp_path, running):
+    trail = tmp_path / "trail"
+    trail.mkdir()
+    store = Store.create(tmp_path / "campaign", manifest(runs=32, chunk=2))
+    ahead = []
+
+    def progress(chunk):
+        # A writer that is slow: workers would be far ahead of it if they had all blocks.
+        time.sleep(0.03)
+        ahead.append(len(list(trail.glob("[lp]*"))) - len(ahead))
+
+    fly(store, Scheduler(running), Toy(trail=trail), progress)
+    assert len(ahead) == 32
+    assert 1 <= max(ahead) <= engines._AHEAD + 1
+
+
+def test_an_interrupt_keeps_what_is_there_and_does_not_wait_for_blocks_under_way(tmp_path, store):
+    def interrupt():
+        while not list((tmp_path / "campaign").rglob("*.parquet")):
+            time.sleep(0.02)
+        time.sleep(0.3)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    class Slow(Toy):
+        def __call__(self, law, first, count, threads):
+            time.sleep(60.0 if first else 0.0)
+            return super().__call__(law, first, count, threads)
+
+    threading.Thread(target=interrupt, daemon=True).start()
+    started = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        fly(store, Workers(1), Slow())
+    assert time.monotonic() - started < 20.0
+    assert 0 < len(missing(store)) < 14
+    assert fly(Store.open(store.folder).resume(manifest())) == reference(tmp_path)
+
+
+def test_a_cluster_out_of_reach_is_told(store):
+    with pytest.raises(InputError, match=r"^tcp://127.0.0.1:9: no Dask scheduler answers: "):
+        fly(store, Scheduler("tcp://127.0.0.1:9", patience=0.5))
+    with pytest.raises(InputError, match="no Dask scheduler answers"):
+        fly(store, Scheduler("carrier pigeon", patience=0.5))
+
+
+def test_other_versions_are_told(store, running, monkeypatch):
+    monkeypatch.setattr(engines, "__version__", "9.9")
+    with pytest.raises(InputError, match=r"tcp://.*: tcp://.*: found starhold \d.*; allowed: 9.9, as here"):
+        fly(store, Scheduler(running))
+    monkeypatch.undo()
+    as_is = engines._compared
+    monkeypatch.setattr(engines, "_compared", lambda versions: as_is(versions) | {"dask": str(id(versions))})
+    with pytest.raises(InputError, match=r"the scheduler: found dask \d+; allowed: \d+, as here"):
+        fly(store, Scheduler(running))
+
+
+def test_a_worker_that_came_later_with_another_version_is_told():
+    refusal = engines._fly(b"", "9.9", "pd", 0, 1)
+    assert isinstance(refusal, engines._Refusal)
+    assert (refusal.where, refusal.allowed) == ("a worker", "9.9, as here")
+
+
+def test_a_job_that_a_worker_cannot_read_is_told():
+    refusal = engines._fly(b"cnowhere\nnothing\n.", engines.__version__, "pd", 0, 1)
+    assert isinstance(refusal, engines._Refusal)
+    assert "No module named 'nowhere'" in refusal.allowed
+
+
+def test_nothing_to_fly_starts_nothing(store):
+    fly_all(Toy(), [], store.put, Scheduler("tcp://127.0.0.1:9"))
+
+
+def test_all_laws_have_the_same_runs(store):
+    fly(store)
+    for law in LAWS:
+        assert np.array_equal(store.columns(["run"], law)["run"], np.arange(100))
