@@ -309,3 +309,19 @@ def _quiet() -> Generator[None]:
     finally:
         for handler, level in levels:
             handler.setLevel(level)
+
+
+def engine_of(threads: int | None, workers: int | None, scheduler: str | None) -> Engine | None:
+    """The engine that is asked for; None where none is. InputError for more than one, and for less than one thread or
+    process."""
+    asked = {"threads": threads, "workers": workers, "scheduler": scheduler}
+    given = [name for name, value in asked.items() if value is not None]
+    if len(given) > 1:
+        raise InputError("campaign", given[1], f"beside {given[0]}", "one of threads, workers and scheduler")
+    for name in ("threads", "workers"):
+        count = asked[name]
+        if count is not None and int(count) < 1:
+            raise InputError("campaign", name, str(count), "at least 1")
+    if scheduler is not None:
+        return Scheduler(scheduler)
+    return Workers(workers) if workers is not None else None if threads is None else Threads(threads)

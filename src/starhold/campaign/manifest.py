@@ -34,6 +34,8 @@ class Manifest:
     seed: that of the draws.
     extensible: whether the draws of a run are the same for any number of runs, which Latin hypercubes are not.
     columns: names of the columns of each law, known once its first chunk is stored.
+    folder, allow_unstable: what file names in the text are relative to, and whether gains known to be unstable are taken;
+        results depend on neither.
     """
 
     scenario: str
@@ -46,6 +48,8 @@ class Manifest:
     extensible: bool = True
     columns: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     version: str = __version__
+    folder: str = ""
+    allow_unstable: bool = False
 
     def determining(self) -> dict[str, Any]:
         """Everything that results depend on, by the keys that differences are told with."""
@@ -74,6 +78,8 @@ class Manifest:
             "extensible": self.extensible,
             "campaign": plain(self.settings),
             "columns": {law: list(names) for law, names in self.columns.items()},
+            "folder": self.folder,
+            "allow_unstable": self.allow_unstable,
             "text": self.text,
         }
         return json.dumps(content, indent=2, allow_nan=False) + "\n"
@@ -94,6 +100,8 @@ class Manifest:
                 extensible=data["extensible"],
                 columns={law: tuple(names) for law, names in data["columns"].items()},
                 version=data["starhold_version"],
+                folder=data["folder"],
+                allow_unstable=data["allow_unstable"],
             )
             whole = data["fingerprint"] == manifest.fingerprint()
         except (ValueError, KeyError, TypeError, AttributeError):
