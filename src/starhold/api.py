@@ -114,7 +114,14 @@ def campaign(
     from starhold.campaign.campaign import Options, fly_campaign, with_campaign
     from starhold.campaign.engines import engine_of
 
-    changes = {"runs": runs, "over": over, "metrics": metrics, "sampling": sampling, "seed": seed, "requirement": requirement}
+    changes = {
+        "runs": runs,
+        "over": over,
+        "metrics": metrics,
+        "sampling": sampling,
+        "seed": seed,
+        "requirement": requirement,
+    }
     plain = {key: list(value) if key in ("metrics", "requirement") and value else value for key, value in changes.items()}
     options = Options(engine_of(threads, workers, scheduler), None, resume, force, until_decided, search)
     place = Path(_temporary() if folder is None else folder)

@@ -193,7 +193,9 @@ def _check_decidable(job: Job) -> None:
         raise InputError(where, "campaign.requirement", "none", "at least one, to fly until it is decided")
     if job.table.sampling != "random":
         found = show(job.table.sampling)
-        raise InputError(where, "campaign.sampling", found, '"random", for only independent runs can be stopped by what they show')
+        raise InputError(
+            where, "campaign.sampling", found, '"random", for only independent runs can be stopped by what they show'
+        )
 
 
 def _blocks(store: Store, notice: Notice | None) -> Iterator[tuple[str, int, int]]:

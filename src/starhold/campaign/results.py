@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from starhold.campaign.campaign import FlownAgain
     from starhold.campaign.drivers import Drivers
+    from starhold.campaign.requirements import Requirement
     from starhold.campaign.sensitivity import Morris, Refused, Sobol
     from starhold.campaign.verdicts import Verdict
 
@@ -90,6 +91,7 @@ class LawResult:
     failed: int
     spreads: tuple[Spread, ...]
     envelopes: tuple[Envelope, ...]
+    requirements: tuple[Requirement, ...]
     verdicts: tuple[Verdict, ...]
     drivers: Drivers | None
     indices: Mapping[str, Morris | Sobol | Refused] = field(default_factory=dict[str, Any])

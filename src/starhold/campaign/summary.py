@@ -41,6 +41,7 @@ def summarise(store: Store, job: Job, law: str, until_decided: bool = False) -> 
         int(failed.sum()),
         tuple(_spread(name, unit, store.columns([name], law)[name]) for name, unit in meter.units.items()),
         _envelopes(store, meter, law),
+        requirements,
         verdicts,
         _drivers(store, job, law, failed, requirements),
         _indices(store, job, law, requirements),
@@ -74,9 +75,7 @@ def verdicts_of(store: Store, job: Job, law: str, until_decided: bool, runs: int
     return tuple(_verdict(store, job, law, requirement, until_decided, runs) for requirement in job.requirements(law))
 
 
-def _verdict(
-    store: Store, job: Job, law: str, requirement: Requirement, until_decided: bool, runs: int | None
-) -> Verdict:
+def _verdict(store: Store, job: Job, law: str, requirement: Requirement, until_decided: bool, runs: int | None) -> Verdict:
     known = [name for dispersion in job.dispersions if dispersion.known for name in dispersion.columns]
     margin = f"margin.{requirement.name}"
     columns = {name: values[:runs] for name, values in store.columns([margin, *known], law).items()}
@@ -126,9 +125,7 @@ def _indices(store: Store, job: Job, law: str, requirements: tuple[Requirement, 
     return {name: kind(job.plan.factors, unit, columns[name]) for name in names}
 
 
-def _again(
-    folder: Path, law: str, verdicts: tuple[Verdict, ...], failed: NDArray[np.bool_], seed: int
-) -> tuple[Again, ...]:
+def _again(folder: Path, law: str, verdicts: tuple[Verdict, ...], failed: NDArray[np.bool_], seed: int) -> tuple[Again, ...]:
     """The worst run of each requirement, the first ones that failed, and one for comparison."""
     why: dict[int, list[str]] = {}
     for verdict in verdicts:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from starhold.cli import certifying, failures, invariant, modal_roots, parts, sail
+from starhold.cli import campaign, certifying, failures, invariant, modal_roots, parts, sail
 from starhold.cli.arguments import (
     DIVERGED,
     INTERNAL_ERROR,
@@ -157,6 +157,9 @@ def design(
         console.print(f"Map: {map_to}", soft_wrap=True)
 
 
+app.command()(campaign.campaign)
+app.command()(campaign.query)
+app.command()(campaign.rerun)
 app.command()(certifying.certify)
 app.command()(certifying.check)
 app.command()(failures.failures)

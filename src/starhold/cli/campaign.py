@@ -1,0 +1,136 @@
+"""The commands `campaign`, `query` and `rerun`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from starhold.cli.arguments import (
+    DIVERGED,
+    REFUTED,
+    UNDECIDED,
+    CampaignOutput,
+    Force,
+    OneLaw,
+    RunOutput,
+    ScenarioFile,
+    Unstable,
+)
+
+CampaignFolder = Annotated[Path, typer.Argument(metavar="DIR", help="the folder of a campaign")]
+
+
+def campaign(
+    file: ScenarioFile,
+    runs: Annotated[int | None, typer.Option(help="of each law; else what the file says")] = None,
+    law: OneLaw = None,
+    seed: Annotated[int | None, typer.Option(help="of the draws; else what the file says")] = None,
+    sampling: Annotated[
+        str | None, typer.Option(help="random, sobol, latin-hypercube, morris or saltelli; else what the file says")
+    ] = None,
+    until_decided: Annotated[
+        bool, typer.Option("--until-decided", help="end once every requirement is met or missed; runs are the most")
+    ] = False,
+    search: Annotated[bool, typer.Option("--search/--no-search", help="look for the worst of what is required")] = True,
+    threads: Annotated[int | None, typer.Option(help="of this process; all cores if nothing is said")] = None,
+    workers: Annotated[int | None, typer.Option(help="processes of this machine in place of threads")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="tcp://HOST:PORT", help="an existing Dask cluster in place of threads")
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="fly what is missing in a folder that holds a part")] = False,
+    output: CampaignOutput = None,
+    force: Force = False,
+    allow_unstable: Unstable = False,
+) -> None:
+    """Fly many runs with numbers drawn from distributions: verdicts, what drives failures, the worst runs, report.html."""
+    from starhold.campaign.campaign import Options, fly_campaign, with_campaign
+    from starhold.campaign.engines import engine_of
+    from starhold.cli.show import console
+    from starhold.cli.show_campaign import flying_campaign, print_campaign
+    from starhold.report.campaign_files import write_campaign
+    from starhold.scenario.reading import load
+
+    engine = engine_of(threads, workers, scheduler)
+    scenario = with_campaign(load(file, allow_unstable), {"runs": runs, "seed": seed, "sampling": sampling})
+    laws = [entry.name for entry in scenario.laws] if law is None else [scenario.pick(law).name]
+    folder = output or Path("results") / f"{scenario.name}-campaign"
+    with flying_campaign(laws, scenario.table.campaign.runs) as notice:
+        options = Options(engine, None, resume, force, until_decided, search)
+        result = fly_campaign(scenario, folder, law, options, notice)
+    print_campaign(result, scenario.body)
+    page = write_campaign(scenario, result)
+    console.print(f"Report: {page}", soft_wrap=True)
+    if result.met is not True:
+        raise typer.Exit(UNDECIDED if result.met is None else REFUTED)
+
+
+def query(
+    folder: CampaignFolder,
+    sql: Annotated[str, typer.Argument(metavar="SELECT", help='such as "select avg(effort) from runs where failed"')],
+    csv: Annotated[bool, typer.Option("--csv", help="comma-separated values in place of a table")] = False,
+) -> None:
+    """Ask the runs of a campaign a question in SQL; the table is called runs."""
+    from rich.table import Table
+
+    from starhold.campaign.query import query as ask
+    from starhold.cli.show import console
+
+    frame = ask(folder, sql, lambda line: print(f"starhold: {line}", file=sys.stderr))
+    if csv:
+        typer.echo(frame.to_csv(index=False), nl=False)
+        return
+    table = Table(show_edge=False, pad_edge=False)
+    for name in frame.columns:
+        table.add_column(str(name), justify="right", overflow="fold")
+    for row in frame.head(MOST_ROWS).itertuples(index=False):
+        table.add_row(*(_shown(value) for value in row))
+    console.print(table, markup=False)
+    if len(frame) > MOST_ROWS:
+        console.print(f"the first {MOST_ROWS} of {len(frame)} rows; --csv gives all", highlight=False)
+
+
+MOST_ROWS = 60
+"""That are printed as a table."""
+
+
+def _shown(value: Any) -> str:
+    if value is None or value != value:
+        return "—"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def rerun(
+    folder: CampaignFolder,
+    run: Annotated[int, typer.Argument(metavar="RUN", help="the number of the run")],
+    law: Annotated[str | None, typer.Option(help="which law of the campaign; its first if not given")] = None,
+    output: RunOutput = None,
+    force: Force = False,
+) -> None:
+    """Fly one run of a campaign again, bit for bit: run.nc, its scenario file, pictures and report.html."""
+    from starhold.campaign.campaign import fly_again
+    from starhold.cli.show import console, print_outcome
+    from starhold.files import atomic_write
+    from starhold.report.body import report_of
+    from starhold.report.figures import paint
+    from starhold.report.results import open_folder, write_results, write_run
+
+    found = fly_again(folder, run, law)
+    flight, scenario = found.flight, found.scenario
+    place = open_folder(output or Path("results") / f"{scenario.name}-{flight.name}-{run}", force)
+    write_run(flight.recording, place / "run.nc")
+    with atomic_write(place / "scenario.toml") as hidden:
+        hidden.write_text(scenario.text, encoding="utf-8")
+    paint(report_of(scenario.body).picture([flight], scenario), place)
+    print_outcome([flight])
+    page = write_results(scenario, [flight], place)
+    if found.differs:
+        told = ", ".join(found.differs[:4])
+        console.print(f"[red]Other bits than in the campaign, as another machine may compute: {told}[/red]", soft_wrap=True)
+    else:
+        console.print("The same bits as in the campaign.")
+    console.print(f"Report: {page}", soft_wrap=True)
+    if flight.lost is not None:
+        raise typer.Exit(DIVERGED)
