@@ -107,9 +107,9 @@ def test_a_run_without_a_value_is_missed_and_worst():
 
 def test_known_conditions_are_not_averaged_over():
     """Runs together keep the share easily; the quarter in which all failures are does not."""
-    rng = np.random.default_rng(0)
-    load, other = rng.uniform(size=(2, 10_000))
-    values = np.where(load > 0.9985, -1.0, 1.0)
+    load = np.arange(40_000) / 40_000
+    other = np.random.default_rng(0).permutation(40_000) % 5000
+    values = np.where(load > 0.9987, -1.0, 1.0)
     assert judge("pointing", values, 0.9973, 0.9).outcome == "met"
     assert judge("pointing", values, 0.9973, 0.9, {"other": other}).outcome == "met"
     verdict = judge("pointing", values, 0.9973, 0.9, {"other": other, "load": load})
@@ -119,7 +119,7 @@ def test_known_conditions_are_not_averaged_over():
     assert verdict.worst_part.name.startswith("load from 0.7")
     assert verdict.worst_part.failures == verdict.failures == (values < 0).sum()
     assert len(verdict.parts) == 8
-    assert [part.runs for part in verdict.parts] == [2500] * 8
+    assert [part.runs for part in verdict.parts] == [10_000] * 8
     assert "Worst is load from 0.7" in verdict.sentence()
 
 

@@ -38,11 +38,11 @@ from starhold.campaign.ranks import Column
 Array: TypeAlias = NDArray[np.float64]
 RISK = 0.05
 LEAST = 5
-"""Failed runs, and passed runs, without which nothing is said about failure; and expected failures in a cell of a pair's
-grid."""
+"""Failed runs, and passed runs, without which nothing is said about failure; and expected failures in a cell
+of a grid of two numbers."""
 BINS = 4
 """At most as many bins of a number in a pair's grid."""
-RAREST = 0.1
+RAREST = 0.05
 """Values of a choice that are rarer than this are counted together with others in a pair's grid."""
 TOGETHER = 1e-3
 """Two inputs whose cells' counts are less likely than this, corrected, count as drawn together."""
@@ -73,6 +73,7 @@ class MetricDriver:
 
     @property
     def significant(self) -> bool:
+        """Tell whether chance is ruled out as an explanation, all that was looked at considered."""
         return self.corrected <= RISK
 
     def sentence(self) -> str:
@@ -99,6 +100,7 @@ class FailureDriver:
 
     @property
     def significant(self) -> bool:
+        """Tell whether chance is ruled out as an explanation, all that was looked at considered."""
         return self.corrected <= RISK
 
     def sentence(self) -> str:
@@ -128,6 +130,7 @@ class PairDriver:
 
     @property
     def significant(self) -> bool:
+        """Tell whether chance is ruled out as an explanation, all that was looked at considered."""
         return self.corrected <= RISK
 
     def sentence(self) -> str:
@@ -140,7 +143,7 @@ class PairDriver:
 
 @dataclass(frozen=True)
 class Drivers:
-    """What drives failures and metrics, the strongest first in each list, everything that was looked at included.
+    """Drivers of failures and metrics, the strongest first in each list, everything that was looked at included.
 
     `skipped` names inputs that are constant or lack values, `remark` says what was left out for too few runs.
     """
@@ -225,7 +228,7 @@ def _between(column: Column, failed: NDArray[np.bool_]) -> tuple[FailureDriver, 
 
 def _pairs(used: list[Column], failed: NDArray[np.bool_], bins: int) -> list[PairDriver]:
     """Test each two inputs for failing runs together; p-values are not yet corrected."""
-    least = max(RAREST, 2 * LEAST / min(failed.sum(), (~failed).sum()))
+    least = max(RAREST, LEAST / min(failed.sum(), (~failed).sum()))
     grids = [(column.name, *(column.words_grid(least) if column.words else column.grid(bins, least))) for column in used]
     grids = [grid for grid in grids if len(grid[2]) > 1]
     pairs = list(combinations(range(len(grids)), 2))
@@ -271,14 +274,14 @@ def _misfit(counts: NDArray, expected: Array, axes: tuple[int, ...]) -> Array:
 
 
 def _tables(
-    grids: list[tuple[NDArray[np.int64], int]], failed: NDArray[np.bool_], pairs: list[tuple[int, int]]
+    grids: list[tuple[NDArray[np.int32], int]], failed: NDArray[np.bool_], pairs: list[tuple[int, int]]
 ) -> tuple[Array, Array]:
     """Count runs, and failed runs, in the cells of each pair's grid (pairs, bins, bins), with zeros beyond its own bins."""
     offsets = np.cumsum([0, *(size for _, size in grids)])
-    codes = np.stack([numbers + offset for (numbers, _), offset in zip(grids, offsets, strict=False)], axis=1)
     both = np.zeros((2, offsets[-1], offsets[-1]))
     for start in range(0, len(failed), BLOCK):
-        block, lost = codes[start : start + BLOCK], failed[start : start + BLOCK]
+        lost = failed[start : start + BLOCK]
+        block = np.stack([codes[start : start + BLOCK] for codes, _ in grids], axis=1) + offsets[:-1]
         # Single precision is exact for the counts of a block.
         hot = np.zeros((len(block), offsets[-1]), np.float32)
         np.put_along_axis(hot, block, np.float32(1.0), axis=1)
@@ -346,7 +349,7 @@ def _rank_correlation(own: Array) -> Correlate | None:
     return correlate if norm > 0.0 else None
 
 
-def _word_correlation(group: NDArray[np.int64]) -> Correlate | None:
+def _word_correlation(group: NDArray[np.intp]) -> Correlate | None:
     """Return the correlation ratio with an input's words (n,), numbered; None where they are all the same."""
     n, sizes = len(group), np.bincount(group)
     kinds = int((sizes > 0).sum())

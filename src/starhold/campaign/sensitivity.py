@@ -22,6 +22,7 @@ from starhold.errors import InputError
 Array: TypeAlias = NDArray[np.float64]
 RESAMPLES = 200
 """Of the bootstrap for the half-widths."""
+NO_SALTELLI = "the runs are no Saltelli design of two samples and their crossings"
 STEP_ERROR = 0.05
 """By which a step of a Morris design, as a share of it, may differ from the grid's: ends of the unit interval may be drawn
 in."""
@@ -95,7 +96,7 @@ def morris(names: Sequence[str], unit: Array, values: Array, confidence: float =
     """Compute elementary effects from points of the unit cube (runs, inputs) and the metric's values (runs,), NaN where a
     run has none; runs in the order of the design. `seed` is that of the bootstrap for the half-widths."""
     unit, values, size = np.asarray(unit, float), np.asarray(values, float), len(names) + 1
-    if not names or len(values) != len(unit) or len(values) == 0 or len(values) % size:
+    if not names or unit.shape != (len(values), len(names)) or not len(values) or len(values) % size:
         return Refused(f"{len(values)} runs are no whole number of trajectories of {size} runs")
     steps = np.diff(unit.reshape(-1, size, len(names)), axis=1)
     step = float(np.abs(steps).max())
@@ -125,9 +126,11 @@ def sobol(names: Sequence[str], unit: Array, values: Array, confidence: float = 
     """Compute Sobol's indices from points of the unit cube (runs, inputs) and the metric's values (runs,), NaN where a run
     has none; runs in the order of the design, with or without what second-order indices need. `seed` as for `morris`."""
     unit, values, count = np.asarray(unit, float), np.asarray(values, float), len(names)
+    if not count or unit.shape != (len(values), count):
+        return Refused(NO_SALTELLI)
     second_order = next((second for second in (False, True) if _crossed(unit, second)), None)
-    if not count or len(values) != len(unit) or second_order is None:
-        return Refused("the runs are no Saltelli design of two samples and their crossings")
+    if second_order is None:
+        return Refused(NO_SALTELLI)
     missing = int((~np.isfinite(values)).sum())
     if missing:
         have = "1 run has" if missing == 1 else f"{missing} runs have"

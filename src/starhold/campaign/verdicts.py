@@ -114,7 +114,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a campaign shows about a requirement that `share` of all flights must keep, with `confidence`.
+    """A campaign's answer whether a requirement is kept by at least `share` of all flights, with `confidence`.
 
     `lower` and `upper` bound the failure probability, each by itself with the confidence: Clopper-Pearson's bounds, or
     those of `sequence` where the campaign stopped when it knew enough (`until_decided`); None where the draws are not
