@@ -51,8 +51,6 @@ FEWEST_RUNS = 10
 ROUNDS = 300
 """Of the fit of independent causes, whose likelihood grows in each; what is missing makes a pair look the better by
 little."""
-BLOCK = 65536
-"""Runs that are counted at once."""
 
 
 @dataclass(frozen=True)
@@ -217,7 +215,7 @@ def _between(column: Column, failed: NDArray[np.bool_]) -> tuple[FailureDriver, 
     ranks = column.ranks(np.ones(total, bool))
     above = 0.5 + float(ranks[failed].sum()) / (bad * good)
     # The variance of the mean of `bad` ranks drawn out of all: equal values lessen that of the ranks themselves.
-    spread = math.sqrt(float(ranks @ ranks) / (total - 1) / (bad * good * total))
+    spread = math.sqrt(_product(ranks, ranks) / (total - 1) / (bad * good * total))
     tests = [
         float(special.kolmogorov(distance * math.sqrt(bad * good / total))),
         float(2.0 * special.ndtr(-abs(above - 0.5) / spread)),
@@ -277,21 +275,12 @@ def _tables(
     grids: list[tuple[NDArray[np.int32], int]], failed: NDArray[np.bool_], pairs: list[tuple[int, int]]
 ) -> tuple[Array, Array]:
     """Count runs, and failed runs, in the cells of each pair's grid (pairs, bins, bins), with zeros beyond its own bins."""
-    offsets = np.cumsum([0, *(size for _, size in grids)])
-    both = np.zeros((2, offsets[-1], offsets[-1]))
-    for start in range(0, len(failed), BLOCK):
-        lost = failed[start : start + BLOCK]
-        block = np.stack([codes[start : start + BLOCK] for codes, _ in grids], axis=1) + offsets[:-1]
-        # Single precision is exact for the counts of a block.
-        hot = np.zeros((len(block), offsets[-1]), np.float32)
-        np.put_along_axis(hot, block, np.float32(1.0), axis=1)
-        both += hot.T @ hot, hot[lost].T @ hot[lost]
     widest = max(size for _, size in grids)
-    tables = np.zeros((2, len(pairs), widest, widest))
-    for at, (i, j) in enumerate(pairs):
-        cells = both[:, offsets[i] : offsets[i + 1], offsets[j] : offsets[j + 1]]
-        tables[:, at, : cells.shape[1], : cells.shape[2]] = cells
-    return tables[0], tables[1]
+    rows = [codes * np.int32(2 * widest) for codes, _ in grids]
+    columns = [codes * np.int32(2) + failed for codes, _ in grids]
+    counts = [np.bincount(rows[i] + columns[j], minlength=2 * widest**2) for i, j in pairs]
+    tables = np.array(counts, dtype=np.float64).reshape(len(pairs), widest, widest, 2)
+    return tables.sum(3), tables[..., 1]
 
 
 def independent_causes(failures: Array, runs: Array) -> Array:
@@ -340,10 +329,10 @@ Correlate: TypeAlias = Callable[[Array], tuple[float, float]]
 
 def _rank_correlation(own: Array) -> Correlate | None:
     """Return Spearman's correlation with an input's ranks (n,); None where they are all equal."""
-    n, norm = len(own), float(own @ own)
+    n, norm = len(own), _product(own, own)
 
     def correlate(ranks: Array) -> tuple[float, float]:
-        strength = max(-1.0, min(1.0, float(own @ ranks) / math.sqrt(norm * float(ranks @ ranks))))
+        strength = max(-1.0, min(1.0, _product(own, ranks) / math.sqrt(norm * _product(ranks, ranks))))
         return strength, float(special.betainc(0.5 * n - 1.0, 0.5, 1.0 - strength**2))
 
     return correlate if norm > 0.0 else None
@@ -355,10 +344,15 @@ def _word_correlation(group: NDArray[np.intp]) -> Correlate | None:
     kinds = int((sizes > 0).sum())
 
     def correlate(ranks: Array) -> tuple[float, float]:
-        between = float((np.bincount(group, ranks) ** 2 / sizes.clip(1)).sum()) / float(ranks @ ranks)
+        between = float((np.bincount(group, ranks) ** 2 / sizes.clip(1)).sum()) / _product(ranks, ranks)
         return math.sqrt(between), float(special.chdtrc(kinds - 1, (n - 1) * between))
 
     return correlate if kinds > 1 else None
+
+
+def _product(one: Array, other: Array) -> float:
+    """Return the inner product; BLAS would wake its threads for it, and add up in an order that depends on their number."""
+    return float(np.einsum("i,i", one, other))
 
 
 def _holm(chances: Array) -> Array:
