@@ -1,0 +1,94 @@
+"""What is printed of a campaign."""
+
+from __future__ import annotations
+
+import io
+import threading
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from starhold.cli import show_campaign
+from starhold.cli.show_campaign import flying_campaign, print_campaign
+from starhold.report.campaign_units import figure, percent
+from tests.report.campaign_made import ASKED, result
+
+
+@pytest.fixture
+def printed(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Print to a console of some width; returns the text."""
+
+    def to_text(work: Any, width: int = 160, terminal: bool = False) -> str:
+        console = Console(file=io.StringIO(), width=width, record=True, force_terminal=terminal, legacy_windows=False)
+        monkeypatch.setattr(show_campaign, "console", console)
+        work()
+        return console.export_text()
+
+    return to_text
+
+
+def test_everything_that_decides_is_printed(printed: Any) -> None:
+    made = result()
+    text = printed(lambda: print_campaign(made, "rigid-body", ASKED))
+    for one in made.laws:
+        for verdict in one.verdicts:
+            assert f"{percent(verdict.observed)} / {percent(verdict.share)}" in text
+            assert verdict.outcome in text
+        for item in one.again[:3]:
+            assert item.command in text
+        error = next(item for item in one.spreads if item.metric == "settling_time")
+        assert figure(error.quantiles[3]) in text
+        assert one.drivers is not None
+        assert f"{one.law}: {one.failed} of {one.runs} runs failed" in text
+    assert "provided that flights are independent draws" in text.replace("\n", " ")
+    assert f"digest {made.digest}" in text
+    assert "6000 runs flown in 12.5 s, 480 runs/s" in text
+    assert "120.3 mdeg ≤ true; nothing is proved" in text
+    assert "5.225 deg/s ≤ true ≤ 6.303 deg/s (no disturbance, exact sensors)" in text
+
+
+def test_few_drivers_are_printed_and_the_rest_is_counted(printed: Any) -> None:
+    made = result(20000)
+    sentences = made.laws[1].drivers.sentences()  # type: ignore[union-attr]
+    assert len(sentences) > 5
+    text = printed(lambda: print_campaign(made, "rigid-body", ASKED), width=400)
+    assert sentences[4] in text
+    assert sentences[5] not in text
+    assert f"{len(sentences) - 5} more in the report" in text
+
+
+def test_names_steer_neither_the_terminal_nor_the_markup(printed: Any) -> None:
+    made = result(names=("lyapunov",))
+    bad = "[red]x[/red]\x1b[31m"
+    one = replace(made.laws[0], law=bad, again=(replace(made.laws[0].again[0], why=bad, command=bad),))
+    text = printed(lambda: print_campaign(replace(made, laws=(one,)), "rigid-body", ASKED), terminal=True)
+    assert "[red]x[/red]\\x1b[31m" in text
+
+
+def test_a_campaign_without_requirements_or_of_another_body(printed: Any) -> None:
+    made = result(names=("lyapunov",))
+    bare = replace(made, laws=(replace(made.laws[0], verdicts=(), drivers=None, again=(), brackets=()),), flown=0)
+    text = printed(lambda: print_campaign(bare, "no-such-body"))
+    assert "nothing is required of it" in text
+    assert "settling time" in text
+    assert "flown" not in text
+
+
+def test_bars_count_runs_and_tell_rate_and_time_left(printed: Any) -> None:
+    def fly() -> None:
+        with flying_campaign(["lyapunov", "[b]pd"], 1000, 10, {"[b]pd": 600}) as notice:
+            workers = [threading.Thread(target=notice, args=("lyapunov", 100)) for _ in range(10)]
+            for worker in workers:
+                worker.start()
+            for worker in workers:
+                worker.join()
+            notice("[b]pd", 150)
+
+    text = printed(fly, terminal=True)
+    assert "1000 runs of 2 laws, 10 blocks each" in text
+    assert "1000/1000 runs" in text
+    assert "750/1000 runs" in text
+    assert "runs/s" in text
+    assert "[b]pd" in text
