@@ -103,11 +103,11 @@ def campaign(
 
     over: a distribution for each key that is drawn, {"initial.rate": {"distribution": "shell", "high": "4 deg/s"}};
     requirement: bounds of metrics, [{"metric": "settling_time", "at_most": 120, "share": 0.99, "confidence": 0.9}]; metrics:
-    costlier ones to be measured too, "overshoot" or "iterations". These, with `runs`, `sampling` and `seed`, stand in place of
-    what the scenario's [campaign] table has. law: one law, else all. Results are kept in `folder`, or in one that goes with
-    this process; `resume` flies there what is missing. threads, workers (processes), scheduler (the address of a Dask
-    cluster): who flies; results are the same bits. until_decided: end as soon as every requirement is met or missed, `runs` at
-    the most. search: look for the worst, too. progress: called with a law and how many more of its runs were flown.
+    costlier ones to be measured too, "overshoot" or "iterations". These, with `runs`, `sampling` and `seed`, stand in place
+    of what the scenario's [campaign] table has. law: one law, else all. Results are kept in `folder`, or in one that goes
+    with this process; `resume` flies there what is missing. threads, workers (processes), scheduler (the address of a Dask
+    cluster): who flies; results are the same bits. until_decided: end as soon as every requirement is met or missed, `runs`
+    at the most. search: look for the worst, too. progress: called with a law and how many more of its runs were flown.
 
     InputError for whatever is wrong, what was flown until then being kept.
     """

@@ -49,7 +49,7 @@ def test_what_was_flown_is_read_back(result):
     assert (pd_runs["flown.gains.k_rate"] == pd_runs["law.pd.k_rate"]).all()
     assert pd_runs["law.pd.k_rate"].between(1.5, 2.5).all()
     assert (frame["flown.craft.inertia[2]"] == frame["spacecraft.inertia[2]"]).all()
-    assert (frame["flown.setup.sensors[1].rate_noise"] == frame["sensor.rate_noise"]).all()
+    assert (frame["flown.setup.sensors[1].rate"] == frame["sensor.rate_noise"]).all()
     attitudes = frame[[f"flown.state.attitude[{k}]" for k in range(1, 5)]].to_numpy()
     assert np.abs(np.linalg.norm(attitudes, axis=1) - 1.0).max() < 1e-15
     both = [group.drop(columns="law").reset_index(drop=True) for _, group in frame.groupby("law")]
@@ -95,12 +95,12 @@ def test_envelopes_are_those_of_recordings(result):
     )
     assert envelope.least == pytest.approx(tops.min(axis=0), rel=1e-9)
     assert envelope.most == pytest.approx(tops.max(axis=0), rel=1e-9)
+    # By the bins, which are of the square of half the angle's sine.
+    ranked = np.sort(np.sin(0.5 * tops) ** 2, axis=0)
     for values, share in ((envelope.low, 0.05), (envelope.median, 0.5), (envelope.high, 0.95)):
-        # By neighbours, for between them a quantile is a matter of taste.
-        near = np.sort(tops, axis=0)
-        place = share * 89
-        assert (values >= 0.96 * near[math.floor(place) - 1]).all()
-        assert (values <= 1.04 * near[math.ceil(place) + 1]).all()
+        place, noted = share * 89, np.sin(0.5 * values) ** 2
+        assert (noted >= ranked[math.floor(place)] / 1.07).all()
+        assert (noted <= ranked[math.ceil(place)] * 1.07).all()
 
 
 @pytest.mark.parametrize("options", [{"threads": 2}, {"law": "pd"}])
@@ -122,7 +122,7 @@ def test_who_flies_and_how_runs_are_cut_change_nothing(result, tmp_path, options
 def test_faults_words_and_kernels_of_their_own(tmp_path):
     scenario = small(
         wheels={"layout": "pyramid", "inertia": 1e-3, "torque_limit": 0.2, "momentum_limit": 4.0},
-        fault=[{"time": 4.0, "wheel": 1, "lost": True}],
+        fault=[{"time": 4.0, "wheel": 1, "lost": True, "action": "reallocate"}],
         simulation__duration=12.0,
     )
     over = {
@@ -183,11 +183,11 @@ def test_planted_drivers_are_found(tmp_path):
 
 
 def test_ends_once_all_is_decided(tmp_path):
-    asked = [{"name": "easy", "metric": "final_rate_error", "at_most": "20 deg/s", "share": 0.99}]
+    asked = [{"name": "easy", "metric": "final_rate_error", "at_most": "60 deg/s", "share": 0.99}]
     options = {"requirement": asked, "runs": 20_000, "law": "pd", "until_decided": True}
     scenario = small(simulation__duration=2.0)
     found = fly(tmp_path / "a", scenario=scenario, **options)
-    assert found.runs < 2_000
+    assert found.runs == 2048
     assert found.met
     assert fly(tmp_path / "b", scenario=scenario, **options | {"threads": 2}).digest == found.digest
     again = fly(tmp_path / "a", scenario=scenario, resume=True, **options)
@@ -206,14 +206,16 @@ def test_goes_on_after_a_crash_with_more_runs_and_not_after_a_change(result, tmp
     again = fly(folder, metrics=["overshoot", "iterations"], resume=True)
     assert again.digest == result.digest
     assert again.flown == 32 + 20 + 20
+    changed = OVER | {"law.pd.k_rate": {"distribution": "uniform", "low": 1.4, "high": 2.5}}
     with pytest.raises(InputError, match=r'over."law.pd.k_rate".low: 1.4, was 1.5'):
-        changed = OVER | {"law.pd.k_rate": {"distribution": "uniform", "low": 1.4, "high": 2.5}}
         fly(folder, metrics=["overshoot", "iterations"], over=changed, resume=True)
     assert Store.open(folder).missing("pd") == []
 
 
 def test_the_worst_is_flown_again_by_its_file(tmp_path):
-    scenario = sh.load("cubesat-slew").with_({"simulation.record_every": 1})
+    # Long enough for the end that is proved.
+    clean = {"sensor": None, "spacecraft.actuator_lag": None}
+    scenario = sh.load("cubesat-slew").with_({"simulation.record_every": 1, "simulation.duration": 600, **clean})
     over = {"initial.rate": {"distribution": "shell", "high": "2 deg/s"}}
     asked = [
         {"metric": "final_attitude_error", "at_most": "1 deg", "share": 0.5},
@@ -232,7 +234,7 @@ def test_the_worst_is_flown_again_by_its_file(tmp_path):
             if math.isnan(bracket.flown)
             else metrics[metric] == pytest.approx(bracket.flown, rel=1e-12)
         )
-        assert bracket.proved is None or bracket.flown <= bracket.proved
+        assert bracket.proved is None or (bracket.flown <= bracket.proved and "not come" not in bracket.assumption)
     assert brackets["peak_torque"].proved == 0.002
     assert brackets["final_attitude_error"].proved > 0.0
     assert brackets["settling_time"].proved is None

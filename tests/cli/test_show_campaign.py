@@ -13,7 +13,7 @@ from rich.console import Console
 from starhold.cli import show_campaign
 from starhold.cli.show_campaign import flying_campaign, print_campaign
 from starhold.report.campaign_units import figure, percent
-from tests.report.campaign_made import ASKED, result
+from tests.report.campaign_made import result
 
 
 @pytest.fixture
@@ -31,7 +31,7 @@ def printed(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 def test_everything_that_decides_is_printed(printed: Any) -> None:
     made = result()
-    text = printed(lambda: print_campaign(made, "rigid-body", ASKED))
+    text = printed(lambda: print_campaign(made, "rigid-body"))
     for one in made.laws:
         for verdict in one.verdicts:
             assert f"{percent(verdict.observed)} / {percent(verdict.share)}" in text
@@ -53,7 +53,7 @@ def test_few_drivers_are_printed_and_the_rest_is_counted(printed: Any) -> None:
     made = result(20000)
     sentences = made.laws[1].drivers.sentences()  # type: ignore[union-attr]
     assert len(sentences) > 5
-    text = printed(lambda: print_campaign(made, "rigid-body", ASKED), width=400)
+    text = printed(lambda: print_campaign(made, "rigid-body"), width=400)
     assert sentences[4] in text
     assert sentences[5] not in text
     assert f"{len(sentences) - 5} more in the report" in text
@@ -63,7 +63,7 @@ def test_names_steer_neither_the_terminal_nor_the_markup(printed: Any) -> None:
     made = result(names=("lyapunov",))
     bad = "[red]x[/red]\x1b[31m"
     one = replace(made.laws[0], law=bad, again=(replace(made.laws[0].again[0], why=bad, command=bad),))
-    text = printed(lambda: print_campaign(replace(made, laws=(one,)), "rigid-body", ASKED), terminal=True)
+    text = printed(lambda: print_campaign(replace(made, laws=(one,)), "rigid-body"), terminal=True)
     assert "[red]x[/red]\\x1b[31m" in text
 
 
@@ -78,16 +78,17 @@ def test_a_campaign_without_requirements_or_of_another_body(printed: Any) -> Non
 
 def test_bars_count_runs_and_tell_rate_and_time_left(printed: Any) -> None:
     def fly() -> None:
-        with flying_campaign(["lyapunov", "[b]pd"], 1000, 10, {"[b]pd": 600}) as notice:
+        with flying_campaign(["lyapunov", "[b]pd"], 1000) as notice:
             workers = [threading.Thread(target=notice, args=("lyapunov", 100)) for _ in range(10)]
             for worker in workers:
                 worker.start()
             for worker in workers:
                 worker.join()
+            notice("[b]pd", 600)
             notice("[b]pd", 150)
 
     text = printed(fly, terminal=True)
-    assert "1000 runs of 2 laws, 10 blocks each" in text
+    assert "1000 runs of 2 laws" in text
     assert "1000/1000 runs" in text
     assert "750/1000 runs" in text
     assert "runs/s" in text

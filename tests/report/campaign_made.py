@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from starhold.campaign.drivers import find_drivers
+from starhold.campaign.requirements import Requirement
 from starhold.campaign.results import QUANTILES, Again, Bracket, CampaignResult, Envelope, LawResult, Spread
 from starhold.campaign.sensitivity import Morris, Refused, Sobol
 from starhold.campaign.verdicts import judge
@@ -32,21 +32,12 @@ OVER = {
 }
 
 
-@dataclass(frozen=True)
-class Asked:
-    """A requirement as reports need it."""
-
-    name: str
-    column: str
-    bound: float
-    at_most: bool = True
-    share: float = 0.9973
-
-
 ASKED = (
-    Asked("pointing", "final_attitude_error", np.radians(0.1)),
-    Asked("settling", "settling_time", 420.0, share=0.95),
-    Asked("not lost", "lost", np.nan),
+    Requirement(
+        "pointing", "final_attitude_error", "final_attitude_error", "rad", float(np.radians(0.1)), True, 0.9973, 0.9
+    ),
+    Requirement("settling", "settling_time", "settling_time", "s", 420.0, True, 0.95, 0.9),
+    Requirement("not lost", "lost", "lost", "1", np.nan, True, 0.9973, 0.9),
 )
 
 
@@ -170,7 +161,9 @@ def law(name: str, number: int, runs: int, sampling: str = "random") -> LawResul
 def result(runs: int = 3000, sampling: str = "random", names: tuple[str, ...] = ("lyapunov", "pd")) -> CampaignResult:
     """A campaign of some laws."""
     laws = tuple(law(name, number, runs, sampling) for number, name in enumerate(names))
-    return CampaignResult("detumbling", Path("results/detumbling"), runs, sampling, OVER, laws, "5f" * 32, 12.5, 2 * runs)
+    return CampaignResult(
+        "detumbling", Path("results/detumbling"), runs, sampling, OVER, laws, "5f" * 32, 12.5, 2 * runs, ASKED
+    )
 
 
 def indices() -> dict[str, Any]:

@@ -31,12 +31,12 @@ def whole() -> CampaignResult:
     return replace(made, laws=(replace(made.laws[0], indices=indices()), *made.laws[1:]))
 
 
-def page(campaign: CampaignResult, asked: Any = ASKED) -> Reader:
-    return Reader(render(flown.scenario("detumbling"), campaign, asked))
+def page(campaign: CampaignResult) -> Reader:
+    return Reader(render(flown.scenario("detumbling"), campaign))
 
 
 def words(campaign: CampaignResult) -> Wording:
-    return Wording.of("rigid-body", campaign, ASKED)
+    return Wording.of("rigid-body", campaign)
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def reader() -> Reader:
 
 
 def test_nothing_is_loaded() -> None:
-    text = render(flown.scenario(), whole(), ASKED)
+    text = render(flown.scenario(), whole())
     for tag, attrs in Reader(text).tags:
         assert tag not in {"link", "iframe", "img", "object", "embed", "base"}, tag
         assert not {"src", "href", "srcset", "action", "data", "poster"} & set(attrs), (tag, attrs)
@@ -59,7 +59,7 @@ def test_the_same_results_give_the_same_bytes_whatever_the_time_took(tmp_path: A
     paths = [tmp_path / name for name in ("one.html", "two.html")]
     slow = replace(whole(), seconds=4711.5, flown=17)
     for path, campaign in zip(paths, (whole(), slow), strict=True):
-        write_page(path, flown.scenario("detumbling"), campaign, ASKED)
+        write_page(path, flown.scenario("detumbling"), campaign)
     assert paths[0].read_bytes() == paths[1].read_bytes()
 
 
@@ -76,7 +76,7 @@ def test_every_section_is_there(reader: Reader) -> None:
 
 def test_an_empty_campaign_is_told(tmp_path: Any) -> None:
     bare = LawResult("pd", 10, 0, 0, (), (), (), None)
-    found = page(replace(result(), laws=(bare,), over={}), ())
+    found = page(replace(result(), laws=(bare,), over={}, requirements=()))
     assert "nothing is required of it, so nothing is judged; no run was lost." in found.text
     assert found.data()["histograms"] == found.data()["envelopes"] == []
     for heading in ("Metrics", "Distributions", "Runs worth flying again", "Sensitivity indices", "Dispersions flown"):
@@ -164,9 +164,11 @@ def test_names_from_files_are_no_markup() -> None:
             remark=bad,
         ),
     )
-    made = CampaignResult(bad, result().folder / bad, 300, bad, {bad: bad}, (hostile,), bad, 1.0, 300)
-    text = render(flown.scenario("plain"), made, [replace(ASKED[0], name=bad)])
-    plain = render(flown.scenario("plain"), result(), ASKED)
+    made = CampaignResult(
+        bad, result().folder / bad, 300, bad, {bad: bad}, (hostile,), bad, 1.0, 300, (replace(ASKED[0], name=bad),)
+    )
+    text = render(flown.scenario("plain"), made)
+    plain = render(flown.scenario("plain"), result())
     assert "<b>$x_1$" not in text
     assert text.count("<script") == plain.count("<script")
     assert text.count("</script") == plain.count("</script")

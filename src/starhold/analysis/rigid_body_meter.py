@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -85,8 +86,8 @@ class Turning(NamedTuple):
 class Noted(NamedTuple):
     """Notes on a lane: the last instants outside the tolerances; peaks of torque (component), of rate (square) and of wheel
     momentum; sums of the torque's norm, of instants on the limit and, in the last quarter, of changes of torque; there the
-    first and the last error, and the last torque; squares of the least distances of axes from the middles of cones; what extras need; and of a window
-    the largest squares of half the angle's sine, of the rate error and of the torque."""
+    first and the last error, and the last torque; squares of the least distances of axes from the middles of cones; what
+    extras need; and of a window the largest squares of half the angle's sine, of the rate error and of the torque."""
 
     attitude_outside: float
     rate_outside: float
@@ -113,10 +114,11 @@ def make_meter(
     steps: int,
     attitude_tolerance: float,
     rate_tolerance: float,
-    cones: Sequence[Cone] = (),
+    cones: Mapping[str, Cone] = MappingProxyType({}),
     extras: Sequence[str] = (),
 ) -> Meter:
-    """The meter of a loop for flights of so many control steps. Tolerances in rad and rad/s; extras: those of EXTRAS that
+    """The meter of a loop for flights of so many control steps. Tolerances in rad and rad/s; cones: by the
+    names of their metrics; extras: those of EXTRAS that
     are to be noted."""
     levels = (-1.0,) * len(DECADES) if "iterations" in extras else ()
     turning = Turning(ZERO, 0.0, 0.0) if "overshoot" in extras else ()
@@ -124,7 +126,7 @@ def make_meter(
     first = Noted(*begun)
     tail = tail_start(steps)
     angle = math.sin(0.5 * min(attitude_tolerance, math.pi)) ** 2
-    told = Told(angle, rate_tolerance**2, float(tail), float(steps), tuple(cones))
+    told = Told(angle, rate_tolerance**2, float(tail), float(steps), tuple(cones.values()))
     rows = rows_of(first)
     windows = {
         "attitude_error": Window(rows.window_angle, _angle, "angle to the target", "rad"),
@@ -136,7 +138,9 @@ def make_meter(
     meter: Meter
 
     def finish(flown: Flown) -> Metrics:
-        return _metrics(flown, meter, loop.period, bool(loop.rotors))
+        found = _metrics(flown, meter, loop.period, bool(loop.rotors))
+        apart = zip(cones, flown.end.cones, strict=True)
+        return found | {name: 2.0 * np.arcsin(0.5 * np.sqrt(square)) for name, square in apart}
 
     units = dict(UNITS)
     if "iterations" in extras:
@@ -145,7 +149,7 @@ def make_meter(
         units["overshoot"] = "1"
     if loop.rotors:
         units["peak_wheel_momentum"] = "N m s"
-    units |= {f"cone[{number}]": "rad" for number in range(1, len(cones) + 1)}
+    units |= dict.fromkeys(cones, "rad")
     meter = Meter(first, (before, last), finish, units, windows, steps, loop.period, (tail,))
     return meter
 
@@ -243,8 +247,6 @@ def _metrics(flown: Flown, meter: Meter, period: float, wheels: bool) -> Metrics
     }
     if wheels:
         found["peak_wheel_momentum"] = noted.peak_wheel_momentum
-    for number, square in enumerate(noted.cones, 1):
-        found[f"cone[{number}]"] = 2.0 * np.arcsin(0.5 * np.sqrt(square))
     if noted.turning:
         first: Any = noted.turning.first
         small = sum(np.asarray(component) ** 2 for component in first) < 1e-18

@@ -124,10 +124,10 @@ def fly_campaign(
         fly_all(job, _blocks(store, notice), store.put, engine, arrived)
         runs = table.runs
     seconds = time.perf_counter() - begun
-    results = [summarise(store, job, name, options.until_decided) for name in laws]
+    results = summarise(store, job, laws, options.until_decided)
     if options.search and job.dispersions and table.requirement:
         threads = engine.count if isinstance(engine, Threads) else os.cpu_count() or 1
-        results = [replace(result, brackets=brackets(job, store, result, threads)) for result in results]
+        results = tuple(replace(result, brackets=brackets(job, store, result, threads)) for result in results)
     told = digest(store, runs)
     totals = {
         "verdicts": {
@@ -140,12 +140,13 @@ def fly_campaign(
     }
     store.finish(told, totals)
     over = {", ".join(one.keys): in_words(one, table) for one in job.dispersions}
-    return CampaignResult(scenario.name, folder, runs, table.sampling, over, tuple(results), told, seconds, flown)
+    asked = job.requirements(laws[0])
+    return CampaignResult(scenario.name, folder, runs, table.sampling, over, results, told, seconds, flown, asked)
 
 
 class FlownAgain(NamedTuple):
-    """A run of a campaign, flown again: its scenario, its flight, and the columns in which the campaign holds other bits than
-    come out now, which are none unless the machine computes otherwise."""
+    """A run of a campaign, flown again: its scenario, its flight, and the columns in which the campaign holds other bits
+    than come out now, which are none unless the machine computes otherwise."""
 
     scenario: Scenario
     flight: Flight

@@ -12,7 +12,7 @@ from starhold.campaign.results import Envelope
 
 FINE = 4
 """Binary digits by which a bin of an octave is told: sixteen bins."""
-LEAST, OCTAVES = -100, 150
+LEAST, OCTAVES = -90, 110
 """The noted numbers are told apart from 2^LEAST on, over so many octaves; what is less or more falls in the end bins."""
 BINS = OCTAVES << FINE
 _SHIFT = 52 - FINE
@@ -51,8 +51,10 @@ def quantile(counts: NDArray[np.int64], share: float, least: Array, most: Array)
     before = np.take_along_axis(upto, place[..., None], -1)[..., 0] - inside
     sides = edges()
     low, high = np.maximum(sides[place], least), np.minimum(sides[place + 1], most)
-    part = (wanted - before + 0.5) / np.maximum(inside, 1)
-    return np.where(total > 0, np.clip(low + (high - low) * part.clip(0.0, 1.0), least, most), np.nan)
+    part = ((wanted - before + 0.5) / np.maximum(inside, 1)).clip(0.0, 1.0)
+    # Not from the low end alone, for a bin that holds the infinite has no width.
+    found = np.where(low == high, low, low * (1.0 - part) + high * part)
+    return np.where(total > 0, np.clip(found, least, most), np.nan)
 
 
 def read(

@@ -117,7 +117,8 @@ class Job:
             histogram = histogram + bins
             extremes.append((least, most))
 
-        rows: dict[str, NDArray[Any]] = {"run": runs, **columns, **self.measure(law, columns, runs, threads, take)}
+        measured = self.measure(law, columns, runs, threads, take, self._telling(law))
+        rows: dict[str, NDArray[Any]] = {"run": runs, **columns, **measured}
         failed = ~np.isnan(rows["diverged_at"])
         for requirement in self.requirements(law):
             margins = requirement.margins(rows)
@@ -127,6 +128,21 @@ class Job:
         merged = (np.fmin.reduce([a for a, _ in extremes]), np.fmax.reduce([b for _, b in extremes]))
         return Chunk(law, first, rows, {NAME: histogram}, {f"{NAME}{LEAST}": merged[0], f"{NAME}{MOST}": merged[1]})
 
+    def _telling(self, law: str) -> Progress | None:
+        """What tells of the runs of a block as they are flown, lot after lot."""
+        if self.progress is None:
+            return None
+        tell, told, whole = self.progress, [0], [0]
+
+        def progress(done: int, lanes: int) -> None:
+            now = whole[0] + done
+            tell(law, now - told[0])
+            told[0] = now
+            if done == lanes:
+                whole[0] += lanes
+
+        return progress
+
     def measure(
         self,
         law: str,
@@ -134,31 +150,23 @@ class Job:
         runs: NDArray[np.int64],
         threads: int,
         take: Callable[[Metrics, Any], None] = lambda metrics, windows: None,
+        progress: Progress | None = None,
     ) -> Metrics:
         """The metrics of runs of a law, and the numbers read back, (lanes,), by name. columns: what was drawn; runs: their
         numbers, which number their random ones; take: called with metrics and windows of each lot."""
         found: Metrics = {}
-        for lot, places, told in self.lanes(law).lots(columns, runs):
-            metrics, windows = self._fly(law, lot, threads)
+        for lot, at, told in self.lanes(law).lots(columns, runs):
+            metrics, windows = self._fly(law, lot, threads, progress)
             take(metrics, windows)
             for name, values in (told | metrics).items():
-                found.setdefault(name, np.full(len(runs), np.nan))[places] = values
+                found.setdefault(name, np.full(len(runs), np.nan))[at] = values
         return found
 
-    def _fly(self, law: str, lot: Lot, threads: int) -> tuple[dict[str, Any], Any]:
+    def _fly(self, law: str, lot: Lot, threads: int, progress: Progress | None) -> tuple[dict[str, Any], Any]:
         """The metrics of a lot, (lanes,), and what was noted in windows (windows, quantities, lanes)."""
         meter = self.meter(law, lot)
         lanes, runs = len(lot.runs), lot.runs
         along = bool((np.diff(runs) == 1).all())
-        told: Progress | None = None
-        if self.progress is not None:
-            tell, begun = self.progress, [0]
-
-            def told(done: int, total: int) -> None:
-                now = lanes * done // total
-                tell(law, now - begun[0])
-                begun[0] = now
-
         flown = fly_metered(
             lot.loop,
             lot.carries,
@@ -170,7 +178,7 @@ class Job:
             meter.marks[-1],
             [window.row for window in meter.windows.values()],
             threads,
-            told,
+            None if progress is None else lambda done, total: progress(lanes * done // total, lanes),
         )
         lost = flown.ends[places(lot.loop.carry()).lost_at]
         return meter.metrics(flown.notes, flown.windows, lost), flown.windows

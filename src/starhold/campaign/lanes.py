@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.structure import flatten, leaves, mapped
+from starhold.algebra.structure import flatten, mapped
 from starhold.campaign.flat import Flat, named, named_carry, named_phases, same
 from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop, Phase
 from starhold.loop.kernels import Numbers, numbers_of
 from starhold.scenario.building import build
+from starhold.scenario.making import variants
 from starhold.simulation.lanes import carry_columns
 
 if TYPE_CHECKING:
@@ -60,6 +61,8 @@ class Lanes:
 
     def __init__(self, scenario: Scenario, law: str, plan: Plan) -> None:
         self.scenario, self.law, self.plan = scenario, law, plan
+        # Of one run nothing else is read.
+        self._bare = scenario.with_({"campaign": None})
         self.steps = scenario.table.simulation.steps
         self.first = plan.columns(0, 1)
         self.base = self.exact(self.first)
@@ -72,42 +75,42 @@ class Lanes:
         self.at_once = fixed and self._agrees(plan.columns(0, len(probes)), probes)
         self.flown = self._read_back()
 
-    def scenario_of(self, columns: Columns) -> Scenario:
-        """The scenario of one run, from its columns (1,)."""
-        return self.scenario.with_(self.plan.change({name: values[0] for name, values in columns.items()}))
-
     def exact(self, columns: Columns) -> Flat:
-        """The numbers of one run, from its own scenario."""
-        other = self.scenario_of(columns)
-        return Flat.of(build(other, other.pick(self.law)), self.steps)
+        """The numbers of one run, from its own scenario; columns: (1,)."""
+        return next(self._each(columns, [0]))
+
+    def _each(self, columns: Columns, runs: Sequence[int]) -> Iterator[Flat]:
+        """The numbers of each run, one after the other, from its own scenario. InputError tells the run."""
+        drawn = ({name: values[place] for name, values in columns.items()} for place in range(len(runs)))
+        others = variants(self._bare, (self.plan.change(one) for one in drawn))
+        for run in runs:
+            try:
+                other = next(others)
+                yield Flat.of(build(other, other.pick(self.law)), self.steps)
+            except InputError as error:
+                where = f"{self.scenario.where}, run {run}"
+                raise InputError(where, error.key, error.found, error.allowed) from None
 
     def lots(self, columns: Columns, runs: NDArray[np.int64]) -> Iterator[tuple[Lot, NDArray[np.int64], dict[str, Array]]]:
         """The lanes of runs of these numbers (lanes,), drawn as the columns say, in lots: with the place of each of their
         lanes among all, and the numbers read back. InputError where a run's scenario is refused."""
-        refused = self.scenario.hooks.refused(self._by_key(columns))
+        refused = self.scenario.hooks.refused(self.scenario, self._by_key(columns))
         if refused is not None and refused.any():
             place = int(np.flatnonzero(refused)[0])
-            self._told_exact(_one(columns, place), runs[place])
+            next(self._each(_one(columns, place), [runs[place]]))
         # A look at two of them, for what no probe showed.
         looked = [0, len(runs) // 2]
         if self.at_once and self._agrees(_some(columns, looked), runs[looked]):
             lot = self._together(columns, runs)
             yield lot, np.arange(len(runs)), self._told(lot)
             return
-        flats = [self._told_exact(_one(columns, place), run) for place, run in enumerate(runs.tolist())]
+        flats = list(self._each(columns, runs.tolist()))
         groups: dict[Any, list[int]] = {}
         for place, flat in enumerate(flats):
             groups.setdefault(flat.form, []).append(place)
         for places in groups.values():
             lot = self._apart([flats[place] for place in places], runs[places])
             yield lot, np.array(places), self._told(lot)
-
-    def _told_exact(self, columns: Columns, run: int) -> Flat:
-        try:
-            return self.exact(columns)
-        except InputError as error:
-            where = f"{self.scenario.where}, run {run}"
-            raise InputError(where, error.key, error.found, error.allowed) from None
 
     def _moved_by(self, dispersion: Dispersion) -> set[int]:
         """The places of numbers that differ where the values of one dispersion alone do."""
@@ -132,8 +135,7 @@ class Lanes:
             found = _table(self._together(columns, runs))
         except (ValueError, TypeError):
             return False
-        for lane, run in enumerate(runs.tolist()):
-            flat = self._told_exact(_one(columns, lane), run)
+        for lane, flat in enumerate(self._each(columns, runs.tolist())):
             if flat.form != self.base.form or not same(flat.numbers, found[:, lane]):
                 return False
         return True

@@ -49,9 +49,15 @@ class Requirement:
         return f"{self.metric} {'at most' if self.at_most else 'at least'} {self.bound:.6g} {shown(self.unit)}"
 
 
-def cones_of(tables: Sequence[RequirementTable]) -> list[Cone]:
-    """The cones that requirements ask for, in order; axes and directions of unit length."""
-    return [Cone(_unit(table.axis), _unit(table.direction)) for table in tables if table.metric == CONE]
+def cones_of(tables: Sequence[RequirementTable]) -> dict[str, Cone]:
+    """The cones that requirements ask for, by the names of their metrics; axes and directions of unit length."""
+    asked = [table for table in tables if table.metric == CONE]
+    return {_cone_column(table): Cone(_unit(table.axis), _unit(table.direction)) for table in asked}
+
+
+def _cone_column(table: RequirementTable) -> str:
+    """The angle between the axis of a requirement and its direction."""
+    return f"angle of {table.called}" if table.name else "cone_angle"
 
 
 def extras_of(tables: Sequence[RequirementTable], more: Sequence[str]) -> tuple[str, ...]:
@@ -64,13 +70,11 @@ def read_requirements(tables: Sequence[RequirementTable], units: Mapping[str, st
     """The requirements of tables; units: those of the metrics that are measured. InputError where one asks for what is not
     measured, or for no bound."""
     found: list[Requirement] = []
-    cones = 0
     for number, table in enumerate(tables, 1):
         key = f"campaign.requirement[{number}]"
         column = table.metric
         if table.metric == CONE:
-            cones += 1
-            column = f"cone[{cones}]"
+            column = _cone_column(table)
         elif table.metric != LOST and table.metric not in units:
             raise InputError(where, f"{key}.metric", show(table.metric), nearest(table.metric, [*units, LOST, CONE]))
         bound = _bound(table, units.get(column, "1"), where, key)

@@ -276,6 +276,9 @@ def _claim(folder: Path) -> None:
 def _clear(folder: Path) -> None:
     """Remove a campaign and nothing else, the manifest last: until then, what is left of it is known for what it is."""
     (folder / TOTALS).unlink(missing_ok=True)
+    for pattern in BESIDE:
+        for path in folder.glob(pattern):
+            path.unlink()
     for path in (folder / RUNS).glob("*/*"):
         if _NAME.fullmatch(path.name):
             path.unlink()

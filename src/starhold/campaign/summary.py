@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,16 +20,27 @@ from starhold.campaign.results import QUANTILES, Again, LawResult, Spread
 from starhold.campaign.store import Store
 from starhold.campaign.verdicts import Verdict, judge
 
-BARS = 60
-"""Of a histogram."""
+BARS, WIDE = 60, 100.0
+"""Of a histogram; and how many times the least the largest of a metric is that is shown on a logarithmic scale."""
 MOST_DRIVEN = 200_000
 """Runs, the first ones, that drivers are looked for among."""
 FAILURES = 3
 """Failed runs that are worth flying again, beside the worst of each requirement."""
 
 
-def summarise(store: Store, job: Job, law: str, until_decided: bool = False) -> LawResult:
-    """What the stored runs of a law say."""
+def summarise(store: Store, job: Job, laws: Sequence[str], until_decided: bool = False) -> tuple[LawResult, ...]:
+    """What the stored runs of each law say."""
+    spreads: dict[str, dict[str, Spread]] = {law: {} for law in laws}
+    units = {name: unit for law in laws for name, unit in job.meter(law).units.items()}
+    for name, unit in units.items():
+        # All laws at once, for histograms that stand side by side.
+        found = {law: store.columns([name], law)[name] for law in laws if name in job.meter(law).units}
+        for law, spread in zip(found, _spreads(name, unit, list(found.values())), strict=True):
+            spreads[law][name] = spread
+    return tuple(_summary(store, job, law, spreads[law], until_decided) for law in laws)
+
+
+def _summary(store: Store, job: Job, law: str, spreads: Mapping[str, Spread], until_decided: bool) -> LawResult:
     meter, requirements = job.meter(law), job.requirements(law)
     own = store.columns(["failed", "diverged_at"], law)
     failed, lost = own["failed"].astype(bool), ~np.isnan(own["diverged_at"])
@@ -39,9 +50,8 @@ def summarise(store: Store, job: Job, law: str, until_decided: bool = False) -> 
         len(failed),
         int(lost.sum()),
         int(failed.sum()),
-        tuple(_spread(name, unit, store.columns([name], law)[name]) for name, unit in meter.units.items()),
+        tuple(spreads[name] for name in meter.units),
         _envelopes(store, meter, law),
-        requirements,
         verdicts,
         _drivers(store, job, law, failed, requirements),
         _indices(store, job, law, requirements),
@@ -49,19 +59,30 @@ def summarise(store: Store, job: Job, law: str, until_decided: bool = False) -> 
     )
 
 
-def _spread(name: str, unit: str, values: NDArray[np.float64]) -> Spread:
-    there = values[~np.isnan(values)]
-    if not len(there):
-        nothing = np.zeros(0)
-        return Spread(name, unit, 0, len(values), np.nan, (np.nan,) * len(QUANTILES), nothing, nothing.astype(np.int64))
-    # Without the last hundredth of each side where that is far away, so that one run does not squeeze all others.
-    quantiles = tuple(np.quantile(there, QUANTILES).tolist())
-    low, high = np.quantile(there, [0.005, 0.995]).tolist()
-    least, most = quantiles[0], quantiles[-1]
-    wide = max(high - low, 1e-12 * max(abs(high), 1e-300))
-    span = (max(least, low - 0.5 * wide), min(most, high + 0.5 * wide))
-    counts, edges = np.histogram(there, BARS, span if span[0] < span[1] else None)
-    return Spread(name, unit, len(there), len(values) - len(there), float(there.mean()), quantiles, edges, counts)
+def _spreads(name: str, unit: str, values: Sequence[NDArray[np.float64]]) -> list[Spread]:
+    """The distributions of a metric of some laws, with the same bins."""
+    there = [column[~np.isnan(column)] for column in values]
+    edges = _edges(np.concatenate(there))
+    return [_spread(name, unit, own, len(column), edges) for own, column in zip(there, values, strict=True)]
+
+
+def _spread(name: str, unit: str, there: NDArray[np.float64], runs: int, edges: NDArray[np.float64]) -> Spread:
+    quantiles = tuple(np.quantile(there, QUANTILES).tolist()) if len(there) else (np.nan,) * len(QUANTILES)
+    mean = float(there.mean()) if len(there) else np.nan
+    counts = np.histogram(there.clip(edges[0], edges[-1]), edges)[0] if len(edges) else np.zeros(0, dtype=np.int64)
+    return Spread(name, unit, runs, runs - len(there), mean, quantiles, edges, counts)
+
+
+def _edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The edges of the bins, equal on a logarithmic scale where the values span decades. What is far away from nearly all
+    others is counted in the end bins, so that it does not squeeze them."""
+    if not len(values):
+        return np.zeros(0)
+    least, low, high, most = np.quantile(values, [0.0, 0.005, 0.995, 1.0]).tolist()
+    if least > 0.0 and high > WIDE * low:
+        return np.geomspace(max(least, low / 3.0), min(most, 3.0 * high), BARS + 1)
+    reach = 0.5 * (high - low)
+    return np.linspace(max(least, low - reach), min(most, high + reach), BARS + 1)
 
 
 def _envelopes(store: Store, meter: Meter, law: str) -> Any:

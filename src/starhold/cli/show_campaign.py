@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,6 @@ from rich.text import Text
 from starhold.cli.show import console
 from starhold.report.campaign_units import (
     DASH,
-    Asked,
     Wording,
     bounds_text,
     count_text,
@@ -46,16 +45,9 @@ class Rate(ProgressColumn):
 
 
 @contextmanager
-def flying_campaign(
-    laws: Sequence[str], runs: int, blocks: int, stored: Mapping[str, int] | None = None
-) -> Iterator[Callable[[str, int], None]]:
-    """Show a bar for each law with the rate and the time left; yields what is to be called with a law and how many more of
-    its runs are done, from any thread.
-
-    runs: those of each law, in so many blocks; stored: how many of them are there already, by law, of a campaign that is
-    resumed.
-    """
-    done = stored or {}
+def flying_campaign(laws: Sequence[str], runs: int) -> Iterator[Callable[[str, int], None]]:
+    """Show a bar for each law, of so many runs, with the rate and the time left; yields what is to be called with a law and
+    how many more of its runs are done, from any thread."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -64,11 +56,11 @@ def flying_campaign(
         Rate(),
         TimeLeft(),
     )
-    console.print(f"{counted(runs, 'run')} of {counted(len(laws), 'law')}, {counted(blocks, 'block')} each", highlight=False)
+    console.print(f"{counted(runs, 'run')} of {counted(len(laws), 'law')}", highlight=False)
     with Progress(*columns, console=console) as bars:
         tasks: dict[str, TaskID] = {}
         for law in laws:
-            tasks[law] = bars.add_task(f"{escape(_plain(law))} (compiling)", total=runs, completed=done.get(law, 0))
+            tasks[law] = bars.add_task(f"{escape(_plain(law))} (compiling)", total=runs)
 
         def notice(law: str, more: int) -> None:
             bars.update(tasks[law], advance=more, description=escape(_plain(law)))
@@ -76,10 +68,10 @@ def flying_campaign(
         yield notice
 
 
-def print_campaign(result: CampaignResult, body: str, requirements: Iterable[Asked] = ()) -> None:
-    """Print what a campaign on a body of this name comes to: what its laws do, verdicts, metrics, drivers, the worst runs.
-    requirements: those that the verdicts are about."""
-    words = Wording.of(body, result, requirements)
+def print_campaign(result: CampaignResult, body: str) -> None:
+    """Print what a campaign on a body of this name comes to: what its laws do, verdicts, metrics, drivers, the worst
+    runs."""
+    words = Wording.of(body, result)
     console.print()
     for law in result.laws:
         outcome = outcome_of(law)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from starhold.report.campaign_drivers import drivers, indices
 from starhold.report.campaign_plots import box, envelopes, histograms
 from starhold.report.campaign_tables import again, brackets, code, dispersions, headlines, laws, metrics, named, verdicts
-from starhold.report.campaign_units import Asked, Wording, headings_of
+from starhold.report.campaign_units import Wording, headings_of
 from starhold.report.campaign_words import flown_text
 from starhold.report.colours import colour
 from starhold.report.page_parts import document, versions
@@ -38,15 +37,14 @@ READING = {
 }
 
 
-def write_page(path: Path, scenario: Scenario, result: CampaignResult, requirements: Iterable[Asked] = ()) -> None:
-    """Write the report of a campaign as one HTML file; the same results give the same bytes. requirements: those that the
-    verdicts are about, which tell what is asked, and in what units margins are."""
-    path.write_text(render(scenario, result, requirements), encoding="utf-8", newline="\n")
+def write_page(path: Path, scenario: Scenario, result: CampaignResult) -> None:
+    """Write the report of a campaign as one HTML file; the same results give the same bytes."""
+    path.write_text(render(scenario, result), encoding="utf-8", newline="\n")
 
 
-def render(scenario: Scenario, result: CampaignResult, requirements: Iterable[Asked] = ()) -> str:
+def render(scenario: Scenario, result: CampaignResult) -> str:
     """Make the report as HTML text; whatever comes from files is escaped."""
-    words = Wording.of(scenario.body, result, requirements)
+    words = Wording.of(scenario.body, result)
     spreads, over_time = histograms(result, words), envelopes(result, words)
     sections = [
         f'<p class="note">{escape(flown_text(result))}</p>',

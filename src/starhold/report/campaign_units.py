@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from starhold.analysis.ranking import Measure, MetricSet
 from starhold.studies.body import body_module
 
 if TYPE_CHECKING:
+    from starhold.campaign.requirements import Requirement
     from starhold.campaign.results import CampaignResult
     from starhold.campaign.verdicts import Verdict
 
@@ -21,33 +22,20 @@ INDEPENDENT = "random"
 """The sampling whose draws are independent of each other."""
 
 
-class Asked(Protocol):
-    """A requirement as reports tell it: a bound (SI) of the metric `column`, the largest value allowed or the least."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def column(self) -> str: ...
-    @property
-    def bound(self) -> float: ...
-    @property
-    def at_most(self) -> bool: ...
-
-
 @dataclass(frozen=True)
 class Wording:
     """How a campaign's numbers are told: its body's metrics, the requirements by name, the SI units of metrics by name."""
 
     metric_set: MetricSet
-    asked: Mapping[str, Asked]
+    asked: Mapping[str, Requirement]
     units: Mapping[str, str]
 
     @classmethod
-    def of(cls, body: str, result: CampaignResult, requirements: Iterable[Asked] = ()) -> Wording:
+    def of(cls, body: str, result: CampaignResult) -> Wording:
         """Make the wording for a campaign on the body of this name; what its metrics are called is the body's matter."""
         known = getattr(body_module("starhold.analysis", body), "METRICS", None) or MetricSet({}, ())
         units = {spread.metric: spread.unit for law in result.laws for spread in law.spreads}
-        return cls(known, {item.name: item for item in requirements}, units)
+        return cls(known, {item.name: item for item in result.requirements}, units)
 
     def measure(self, metric: str, unit: str | None = None) -> Measure:
         """Tell how a metric is shown: as on the other pages, else in the unit (SI) that it has, angles in degrees."""

@@ -65,9 +65,9 @@ def fly_abreast(
 
 def kernel_key(flight: Flying) -> Any:
     """Equal for flights that one kernel serves, with the same tables."""
-    loop = flight.loop
-    phases = [(p.first, p.last, form(Numbers.of(p))) for p in loop.phases(flight.steps)]
-    tables = [np.array(table.cells).tobytes() for phase in loop.phases(flight.steps) for table in buffers(phase.setup)]
+    loop, cut = flight.loop, flight.loop.phases(flight.steps)
+    phases = [(p.first, p.last, form(Numbers.of(p))) for p in cut]
+    tables = [np.array(table.cells).tobytes() for phase in cut for table in buffers(phase.setup)]
     return (
         loop.composition(),
         loop.substeps,

@@ -85,9 +85,9 @@ def simulate(
     """Fly a closed loop for `steps` control periods.
 
     Returns an xarray Dataset over `time` (s), a sample every `record_every` control steps, the state before and the torque
-    after each. `run` numbers the random numbers, in place of the loop's. A motion that was lost (not finite, or faster than the integration can
-    follow) ends the samples, and its time stands in `attrs["diverged_at"]` (s); else that attribute is absent.
-    """
+    after each. `run` numbers the random numbers, in place of the loop's. A motion that was lost (not finite, or faster than
+    the integration can follow) ends the samples, and its time stands in `attrs["diverged_at"]` (s); else that attribute is
+    absent."""
     samples, carry = fly(loop, steps, record_every, run, progress)
     return label(loop, samples, carry, record_every).dataset()
 

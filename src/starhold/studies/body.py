@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from importlib.util import find_spec
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
 
 if TYPE_CHECKING:
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
     from starhold.simulation.lane import Recording
 
+Cones: TypeAlias = Mapping[str, Any]
+"""Body axes with the directions that they are to stay away from, by the names of their metrics."""
+NO_CONES: Cones = MappingProxyType({})
 Values: TypeAlias = dict[str, tuple[Any, str]]
 """Values with their units ("1" for none), by name."""
 
@@ -39,12 +43,11 @@ class BodyStudy(Protocol):
         """Measure a recorded run; `diverged_at` (s) is None for a motion that was not lost."""
         ...
 
-    def meter(
-        self, scenario: Scenario, loop: Any, gains: Any, extras: Sequence[str] = (), cones: Sequence[Any] = ()
-    ) -> Meter:
+    def meter(self, scenario: Scenario, loop: Any, gains: Any, extras: Sequence[str] = (), cones: Cones = NO_CONES) -> Meter:
         """Make what measures many flights along their way, as `metrics_of` does recordings of every control step. gains:
         those of all lanes, with an array (lanes,) in place of a number that differs; extras: metrics that are measured where
-        they are asked for; cones: axes with the directions that they are to stay away from. ValueError where the body has no
+        they are asked for; cones: axes with the directions that they are to stay away from, by
+        the names of their metrics. ValueError where the body has no
         such thing."""
         ...
 
@@ -86,7 +89,7 @@ def study_of(body: str) -> BodyStudy:
     return body_module("starhold.studies.bodies", body).STUDY
 
 
-def nothing_more(extras: Sequence[str], cones: Sequence[Any]) -> None:
+def nothing_more(extras: Sequence[str], cones: Cones) -> None:
     """ValueError for a body that has neither further metrics nor axes that could stay away from anything."""
     if cones:
         raise ValueError("a body with an attitude, for an axis that is to stay out of a cone")

@@ -80,12 +80,12 @@ class Body(Protocol):
         ...
 
     def derive(self, scenario: Scenario, columns: Mapping[str, Any]) -> dict[str, Any]:
-        """The "start" and the "craft" of many runs that differ in the values of some keys, (components..., lanes) by key,
-        with an array (lanes,) in place of each number and the bits that `build` would give; empty where only `build` can
-        tell."""
+        """The "start" and the "craft" of many runs that differ in the values of some keys, or components of theirs,
+        (components..., lanes) by key, with an array (lanes,) in place of each number and the bits that `build` would give;
+        empty where only `build` can tell."""
         return {}
 
-    def refused(self, columns: Mapping[str, Any]) -> Any:
+    def refused(self, scenario: Scenario, columns: Mapping[str, Any]) -> Any:
         """Which lanes have values, (components..., lanes) by key, that no body has, beyond the bounds of each number:
         (lanes,), or None where none are known."""
         return None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, final
 from starhold.analysis.any_body import measure, metric_set
 from starhold.certification.certificate import Certificate
 from starhold.simulation.lane import label
-from starhold.studies.body import BodyStudy, Issued, Values, nothing_more
+from starhold.studies.body import NO_CONES, BodyStudy, Cones, Issued, Values, nothing_more
 
 if TYPE_CHECKING:
     from starhold.analysis.departure import Departure
@@ -29,9 +29,7 @@ class AnyBodyStudy:
     def metrics_of(self, run: Recording) -> dict[str, Any]:
         return measure(run)
 
-    def meter(
-        self, scenario: Scenario, loop: Any, gains: Any, extras: Sequence[str] = (), cones: Sequence[Any] = ()
-    ) -> Meter:
+    def meter(self, scenario: Scenario, loop: Any, gains: Any, extras: Sequence[str] = (), cones: Cones = NO_CONES) -> Meter:
         from starhold.analysis.any_body_meter import make_meter
 
         nothing_more(extras, cones)

@@ -10,7 +10,7 @@ from starhold.analysis.libration_point import METRICS, CircleGoal, EquilibriumGo
 from starhold.parts.bodies.libration_point import Units
 from starhold.parts.craft import vector
 from starhold.simulation.lane import label
-from starhold.studies.body import BodyStudy, Issued, Values, nothing_more
+from starhold.studies.body import NO_CONES, BodyStudy, Cones, Issued, Values, nothing_more
 
 if TYPE_CHECKING:
     from starhold.analysis.departure import Departure
@@ -42,7 +42,12 @@ class LibrationPointStudy:
         return measure(run, units, goal, float(told["settling_tolerance"]))
 
     def meter(
-        self, scenario: Scenario, loop: ClosedLoop, gains: Any, extras: Sequence[str] = (), cones: Sequence[Any] = ()
+        self,
+        scenario: Scenario,
+        loop: ClosedLoop,
+        gains: Any,
+        extras: Sequence[str] = (),
+        cones: Cones = NO_CONES,
     ) -> Meter:
         from starhold.analysis.libration_point_meter import make_meter
 

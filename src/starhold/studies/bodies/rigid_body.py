@@ -16,7 +16,7 @@ from starhold.parts.craft import tensor
 from starhold.parts.effectors.wheels import gives_what_is_asked
 from starhold.parts.quaternion_sign import SIGN_POLICIES
 from starhold.simulation.lane import fly, label
-from starhold.studies.body import BodyStudy, Issued, Values
+from starhold.studies.body import NO_CONES, BodyStudy, Cones, Issued, Values
 
 if TYPE_CHECKING:
     from starhold.analysis.departure import Departure
@@ -52,10 +52,18 @@ class RigidBodyStudy:
         return found | against_limits(run, Limits(rate, acceleration), angle_end, rate_end, found["cut_off"])
 
     def meter(
-        self, scenario: Scenario, loop: ClosedLoop, gains: Any, extras: Sequence[str] = (), cones: Sequence[Any] = ()
+        self,
+        scenario: Scenario,
+        loop: ClosedLoop,
+        gains: Any,
+        extras: Sequence[str] = (),
+        cones: Cones = NO_CONES,
     ) -> Meter:
-        from starhold.analysis.rigid_body_meter import make_meter
+        from starhold.analysis.rigid_body_meter import EXTRAS, make_meter
 
+        for extra in extras:
+            if extra not in EXTRAS:
+                raise ValueError(f"{' or '.join(EXTRAS)}, not {extra}")
         settling = scenario.table.settling
         tolerances = settling.attitude_tolerance, settling.rate_tolerance
         return make_meter(loop, scenario.table.simulation.steps, *tolerances, cones, extras)

@@ -64,8 +64,8 @@ class RigidBody(Body):
     def derive(self, scenario: Scenario, columns: Mapping[str, Any]) -> dict[str, Any]:
         return derive(scenario, columns)
 
-    def refused(self, columns: Mapping[str, Any]) -> Any:
-        return refused(columns)
+    def refused(self, scenario: Scenario, columns: Mapping[str, Any]) -> Any:
+        return refused(scenario, columns)
 
     def examine(self, scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> None:
         check_events(scenario, entry, loop)

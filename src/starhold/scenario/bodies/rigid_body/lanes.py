@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra.cosines import from_angles
 from starhold.algebra.quaternion import NO_TURN, multiply, stretch, to_body
 from starhold.algebra.vector import add
 from starhold.parts.bodies.rigid_body import State
@@ -21,21 +22,42 @@ if TYPE_CHECKING:
 
 Array: TypeAlias = NDArray[np.float64]
 
-START = ("initial.attitude", "initial.rate")
+START = ("initial.attitude", "initial.angles", "initial.rate")
 
 
 def derive(scenario: Scenario, columns: Mapping[str, Array]) -> dict[str, Any]:
     """The start and the craft that these keys make, with an array (lanes,) in place of each number; columns: values
-    (components..., lanes) by key. Left out is what they do not touch, or not in a way known here."""
+    (components..., lanes) by key, of whole vectors or of single components. Left out is what they do not touch, or not in a
+    way known here."""
     found: dict[str, Any] = {}
-    if any(key in columns for key in START) and "initial.angles" not in columns:
-        found["start"] = _start(scenario, columns)
-    if "spacecraft.inertia" in columns and wheels_of(scenario) is None:
-        found["craft"] = _craft(scenario.craft, columns["spacecraft.inertia"])
+    initial = {key: _whole(columns, key, getattr(scenario.table.initial, key.partition(".")[2])) for key in START}
+    if any(values is not None for values in initial.values()):
+        found["start"] = _start(scenario, *initial.values())
+    moments = _moments(scenario, columns)
+    if moments is not None and wheels_of(scenario) is None:
+        found["craft"] = _craft(scenario.craft, moments)
     return found
 
 
-def _start(scenario: Scenario, columns: Mapping[str, Array]) -> State:
+def _moments(scenario: Scenario, columns: Mapping[str, Array]) -> Array | None:
+    return _whole(columns, "spacecraft.inertia", np.diagonal(np.asarray(scenario.table.spacecraft.inertia)))
+
+
+def _whole(columns: Mapping[str, Array], key: str, nominal: Any) -> Array | None:
+    """The vectors (components, lanes), or matrices, of a key of which all or some components are drawn; None of one that is
+    not drawn."""
+    if key in columns:
+        return columns[key]
+    drawn = {name: values for name, values in columns.items() if name.startswith(f"{key}[")}
+    if not drawn or nominal is None or any("][" in name for name in drawn):
+        return None
+    found = np.repeat(np.asarray(nominal, dtype=float)[:, None], len(next(iter(drawn.values()))), axis=1)
+    for name, values in drawn.items():
+        found[int(name[len(key) + 1 :].partition("]")[0]) - 1] = values
+    return found
+
+
+def _start(scenario: Scenario, quaternions: Array | None, angles: Array | None, rates: Array | None) -> State:
     """As `start_of` makes it, number by number."""
     goal, initial = target_of(scenario), scenario.table.initial
     first = start_of(scenario, goal)
@@ -43,11 +65,13 @@ def _start(scenario: Scenario, columns: Mapping[str, Array]) -> State:
         own = scenario.with_({"initial.relative_to": "inertial"})
         first = start_of(own, goal)
     attitude: Any = first.attitude
-    if "initial.attitude" in columns:
-        q: Any = tuple(columns["initial.attitude"])
-        q = stretch(1.0 / np.max(np.abs(columns["initial.attitude"]), axis=0), q)
+    if quaternions is not None:
+        q: Any = stretch(1.0 / np.max(np.abs(quaternions), axis=0), tuple(quaternions))  # pyright: ignore
         attitude = stretch(1.0 / np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), q)
-    rate: Any = tuple(columns["initial.rate"]) if "initial.rate" in columns else first.rate
+    elif angles is not None:
+        # One by one, for the sine of an array may differ from that of a number.
+        attitude = tuple(np.array([from_angles(*lane) for lane in angles.T.tolist()]).T)
+    rate: Any = first.rate if rates is None else tuple(rates)
     begun = first._replace(attitude=attitude, rate=rate)
     if initial.relative_to == "target":
         # Where the target's goal asks for the attitude too, this is not what a file gives, and whoever calls finds out.
@@ -73,11 +97,11 @@ def _craft(craft: Craft, moments: Array) -> Craft:
     return craft._replace(inertia=inertia, inverse_inertia=inverted)  # pyright: ignore[reportArgumentType]
 
 
-def refused(columns: Mapping[str, Array]) -> NDArray[np.bool_]:
-    """Which lanes have an inertia that no body has, (lanes,)."""
-    moments = columns.get("spacecraft.inertia")
+def refused(scenario: Scenario, columns: Mapping[str, Array]) -> NDArray[np.bool_] | None:
+    """Which lanes have an inertia that no body has, (lanes,); None where that is not drawn."""
+    moments = _moments(scenario, columns)
     if moments is None:
-        return np.zeros(next(iter(columns.values())).shape[-1], dtype=bool)
+        return None
     if moments.ndim == 2:
         ordered = np.sort(moments, axis=0).T
     else:
