@@ -7,6 +7,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -23,7 +24,7 @@ from starhold.errors import InputError
 from starhold.scenario.building import build
 from starhold.scenario.campaign import CampaignTable
 from starhold.scenario.checking import nearest, read_toml, show
-from starhold.scenario.reading import Scenario, parse
+from starhold.scenario.reading import Scenario
 from starhold.studies.compare import fly_law
 from starhold.studies.flight import Flight
 
@@ -161,13 +162,18 @@ def fly_again(folder: Path, run: int, law: str | None = None) -> FlownAgain:
     if name not in manifest.laws:
         raise InputError(str(folder), "law", show(name), nearest(name, list(manifest.laws)))
     stored = store.row(name, run)
-    scenario = parse(manifest.text, str(folder), Path(manifest.folder), manifest.allow_unstable)
-    job = Job(Source.of(scenario), scenario.table.campaign)
+    job = _job_of(Source(manifest.text, str(folder), Path(manifest.folder), manifest.allow_unstable))
     now = job(name, run, 1, 1).rows
     differs = tuple(column for column, value in stored.items() if not _equal(value, now[column][0]))
     own = scenario_of(job, job.plan.columns(run, 1), run)
     entry = own.pick(name)
     return FlownAgain(own, fly_law(own, entry, build(own, entry)), differs)
+
+
+@lru_cache(maxsize=1)
+def _job_of(source: Source) -> Job:
+    """The job that flew a campaign, kept from one of its runs to the next."""
+    return Job(source, source.read().table.campaign)
 
 
 def _equal(a: Any, b: Any) -> bool:

@@ -70,9 +70,10 @@ class Again:
 
 @dataclass(frozen=True)
 class Bracket:
-    """How bad a metric gets: *flown <= true <= proved*. flown: the worst that the runs and a search over the dispersions'
-    box have flown, with the scenario file of that run; proved: the bound of a certificate, with its assumption; None where
-    nothing is proved of the metric."""
+    """How bad a metric gets: *flown <= true <= proved*, or the other way round where `at_most` is false and less is worse.
+    flown: the worst that the runs and a search over the dispersions' box have flown, with the scenario file of that run
+    (NaN: a run without the metric, which is worse than any number); proved: the bound of a certificate, with its assumption;
+    None where nothing is proved of the metric."""
 
     metric: str
     unit: str
@@ -81,6 +82,7 @@ class Bracket:
     evaluations: int
     proved: float | None
     assumption: str
+    at_most: bool = True
 
 
 @dataclass(frozen=True)

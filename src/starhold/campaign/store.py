@@ -32,6 +32,8 @@ from starhold.files import atomic_write, claim, clear_unfinished
 RUNS, TOTALS = "runs", "campaign.json"
 MARKS = (manifests.FILE, TOTALS, RUNS)
 """A folder with one of these holds a campaign."""
+BESIDE = ("worst-*.toml", "recorded/*.nc", "report.html")
+"""What is written beside it from what it comes to."""
 _NAME = re.compile(r"(\d{9,})-(\d{9,})\.([0-9a-f]{16})\.parquet")
 
 

@@ -123,8 +123,8 @@ def brackets(job: Job, store: Store, result: LawResult, threads: int) -> tuple[B
         if proved is not None and side * value > side * proved:
             # Of what holds in the end alone.
             assumption = f"{assumption}; flights of this length have not come to their end"
-        told = (requirement.metric, requirement.unit, value, path.name, looked.evaluations, proved, assumption)
-        found.append(Bracket(*told))
+        told = (requirement.column, requirement.unit, value, path.name, looked.evaluations, proved, assumption)
+        found.append(Bracket(*told, requirement.at_most))
     return tuple(found)
 
 

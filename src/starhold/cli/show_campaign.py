@@ -21,8 +21,10 @@ from starhold.report.campaign_units import (
     counted,
     figure,
     headings_of,
+    order,
     percent,
     with_unit,
+    worst_text,
 )
 from starhold.report.campaign_words import headline, outcome_of
 
@@ -174,8 +176,8 @@ def _brackets(result: CampaignResult, words: Wording) -> None:
             measure = words.measure(item.metric, item.unit)
             proved = "; nothing is proved"
             if item.proved is not None:
-                proved = f" ≤ {with_unit(item.proved, measure)} ({_safe(item.assumption)})"
-            told = f"{_safe(measure.heading)} {with_unit(item.flown, measure)} ≤ true{proved}"
+                proved = f" {order(item)} {with_unit(item.proved, measure)} ({_safe(item.assumption)})"
+            told = f"{_safe(measure.heading)} {worst_text(item, measure)}{proved}"
             console.print(f"  {_safe(law.law)}: {told}  [dim]{_safe(item.file)}[/dim]", highlight=False, soft_wrap=True)
 
 

@@ -14,8 +14,10 @@ from starhold.report.campaign_units import (
     counted,
     figure,
     headings_of,
+    order,
     percent,
     with_unit,
+    worst_text,
 )
 from starhold.report.campaign_words import headline, outcome_of
 from starhold.report.proved import swatch
@@ -206,11 +208,11 @@ def brackets(result: CampaignResult, words: Wording) -> str:
 
 def _bracket(bracket: Bracket, number: int, law: LawResult, words: Wording) -> str:
     measure = words.measure(bracket.metric, bracket.unit)
-    told = f"<b>{escape(with_unit(bracket.flown, measure))}</b> ≤ true"
+    told = f"<b>{escape(worst_text(bracket, measure))}</b>"
     if bracket.proved is None:
         told += small("nothing is proved of it")
     else:
-        told += f" ≤ <b>{escape(with_unit(bracket.proved, measure))}</b>"
+        told += f" {order(bracket)} <b>{escape(with_unit(bracket.proved, measure))}</b>"
     tries = f"after {counted(bracket.evaluations, 'flight')} of the search" if bracket.evaluations else ""
     return (
         f'<tr><th scope="row">{escape(measure.heading)}</th><td class="whose">{named(number, law)}</td>'

@@ -12,7 +12,7 @@ from starhold.studies.body import body_module
 
 if TYPE_CHECKING:
     from starhold.campaign.requirements import Requirement
-    from starhold.campaign.results import CampaignResult
+    from starhold.campaign.results import Bracket, CampaignResult
     from starhold.campaign.verdicts import Verdict
 
 DASH = "—"
@@ -93,6 +93,18 @@ def figure(value: float, digits: int = 4) -> str:
 def with_unit(value: float, measure: Measure) -> str:
     """Show an SI value in a measure's unit, which is told."""
     return f"{figure(value * measure.scale)} {measure.unit}".rstrip()
+
+
+def worst_text(bracket: Bracket, measure: Measure) -> str:
+    """Tell a bracket up to what is true of the metric, whose worst is the largest value or the least."""
+    if math.isnan(bracket.flown):
+        return "lost, or without a value"
+    return f"{with_unit(bracket.flown, measure)} {order(bracket)} true"
+
+
+def order(bracket: Bracket) -> str:
+    """The sign between the parts of a bracket, from what is flown to what is proved."""
+    return "≤" if bracket.at_most else "≥"
 
 
 def percent(share: float) -> str:
