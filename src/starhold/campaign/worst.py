@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,7 +88,7 @@ def search(job: Job, law: str, requirement: Requirement, threads: int, seed: int
     result = differential_evolution(
         badness,
         limits,
-        init=begin,
+        init=cast(Any, begin),
         maxiter=generations,
         vectorized=True,
         updating="deferred",
