@@ -197,7 +197,8 @@ def settings(scenario: Scenario, title: str) -> str:
     parts: list[str] = []
     for name in type(scenario.table).model_fields:
         table = getattr(scenario.table, name)
-        if isinstance(table, BaseModel):
+        # What a campaign draws is not flown here.
+        if isinstance(table, BaseModel) and name != "campaign":
             parts.append(_table(name, table))
     parts += [_part(fitted) for fitted in scenario.parts]
     return f'<h2>{title}</h2>\n<div class="columns">{"".join(parts)}</div>'

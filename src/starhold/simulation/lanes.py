@@ -188,9 +188,9 @@ class Fleet:
 
         return turn
 
-    def share_out(self, work: Any, workers: int, progress: Progress | None = None) -> None:
-        """Call work(piece) for all blocks, in pieces, on so many threads."""
-        size = max(1, -(-self.count // (workers * PIECES)))
+    def share_out(self, work: Any, workers: int, progress: Progress | None = None, pieces_each: int = PIECES) -> None:
+        """Call work(piece) for all blocks, in so many pieces for each thread."""
+        size = max(1, -(-self.count // (workers * pieces_each)))
         pieces = [range(at, min(at + size, self.count)) for at in range(0, self.count, size)]
         if workers == 1 or len(pieces) < 2:
             for done, piece in enumerate(pieces, 1):

@@ -18,6 +18,10 @@ from starhold.trace.machine import widest
 Array = NDArray[np.float64]
 
 
+PIECES = 4
+"""Pieces of a batch for each thread: few, for each is called once a window."""
+
+
 class Metered(NamedTuple):
     """What is left of flights: where each lane ended (numbers, lanes), its notes (numbers, lanes), and the noted
     numbers of windows (windows, quantities, lanes)."""
@@ -70,6 +74,6 @@ def fly_metered(
             found[window, :, span] = seen[:, kept].swapaxes(0, 1)
             seen[:, kept] = 0.0
 
-    fleet.share_out(work, threads or os.cpu_count() or 1, progress)
+    fleet.share_out(work, threads or os.cpu_count() or 1, progress, PIECES)
     windows = found.reshape(len(cuts), len(rows), -1)[:, :, : carries.shape[1]]
     return Metered(fleet.carries(), fleet.notes(), windows)
