@@ -40,7 +40,7 @@ class Window(NamedTuple):
 
 
 class Flown(NamedTuple):
-    """What was noted of lanes: notes at the end, with an array (lanes,) in place of each number, and by its name each
+    """The notes of lanes: at the end, with an array (lanes,) in place of each number, and by its name each
     window's quantity (windows, lanes), as it was noted."""
 
     end: Any
@@ -49,10 +49,10 @@ class Flown(NamedTuple):
 
 @dataclass(frozen=True)
 class Meter:
-    """What is noted of lanes, and what it comes to. first: notes before a flight; observers: before the last of `marks` and
-    from it on; finish(flown): metrics; units: those of the metrics; windows: quantities of envelopes by name; steps: control
-    steps of a flight, of `instant` seconds each (or of the body's own unit of time, where that is unknown); marks: instants
-    at which windows end, in order."""
+    """The notes to be taken of lanes, and what they come to. first: before a flight; observers: before the last of `marks`
+    and from it on; finish(flown): metrics; units: those of the metrics; windows: quantities of envelopes by name; steps:
+    control steps of a flight, of `instant` seconds each (or of the body's own unit of time, where that is unknown); marks:
+    instants at which windows end, in order."""
 
     first: Any
     observers: tuple[Observer, Observer]
@@ -64,7 +64,7 @@ class Meter:
     marks: tuple[int, ...]
 
     def begun(self, lanes: int) -> Array:
-        """What is noted of lanes before they fly, (numbers, lanes)."""
+        """The notes of lanes before they fly, (numbers, lanes)."""
         return np.repeat(np.array(flatten(self.first), dtype=float)[:, None], lanes, axis=1)
 
     def cuts(self) -> list[int]:
@@ -85,8 +85,8 @@ class Meter:
 
 
 def sampled(parts: Composition) -> Callable[..., dict[str, Any]]:
-    """What gives the recorded quantities of a control instant by name: read(decided, step, setup), those of the body and of
-    effectors."""
+    """Return what gives the recorded quantities of a control instant, of the body and of effectors, by name:
+    read(decided, step, setup)."""
     sample = make_step(parts).sample
 
     def read(decided: Any, step: Any, setup: Any) -> dict[str, Any]:

@@ -85,7 +85,7 @@ class Job:
         return self._lanes[law]
 
     def meter(self, law: str, lot: Lot | None = None) -> Meter:
-        """What measures the runs of a law, or of one lot of them. InputError where it cannot be measured what is asked."""
+        """The meter of the runs of a law, or of one lot of them. InputError where it cannot be measured what is asked."""
         if lot is None:
             loop = build(self.scenario, self.scenario.pick(law))
             gains = loop.gains
@@ -100,7 +100,7 @@ class Job:
             raise InputError(self.source.where, key, "", str(error)) from None
 
     def requirements(self, law: str) -> tuple[Requirement, ...]:
-        """What runs of a law must keep."""
+        """The requirements that runs of a law must keep."""
         return read_requirements(self.table.requirement, self.meter(law).units, self.source.where)
 
     def __call__(self, law: str, first: int, count: int, threads: int) -> Chunk:
@@ -129,7 +129,7 @@ class Job:
         return Chunk(law, first, rows, {NAME: histogram}, {f"{NAME}{LEAST}": merged[0], f"{NAME}{MOST}": merged[1]})
 
     def _telling(self, law: str) -> Progress | None:
-        """What tells of the runs of a block as they are flown, lot after lot."""
+        """Return what tells of the runs of a block as they are flown, lot after lot."""
         if self.progress is None:
             return None
         tell, told, whole = self.progress, [0], [0]

@@ -1,4 +1,4 @@
-"""What a campaign comes to, law by law: distributions, envelopes, verdicts, drivers, and the runs worth flying again."""
+"""The results of a campaign, law by law: distributions, envelopes, verdicts, drivers, and the runs worth flying again."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ class Bracket:
 
 @dataclass(frozen=True)
 class LawResult:
-    """What a campaign says of one law."""
+    """The results of one law in a campaign."""
 
     law: str
     runs: int

@@ -29,7 +29,7 @@ FAILURES = 3
 
 
 def summarise(store: Store, job: Job, laws: Sequence[str], until_decided: bool = False) -> tuple[LawResult, ...]:
-    """What the stored runs of each law say."""
+    """Sum up the stored runs of each law."""
     spreads: dict[str, dict[str, Spread]] = {law: {} for law in laws}
     units = {name: unit for law in laws for name, unit in job.meter(law).units.items()}
     for name, unit in units.items():

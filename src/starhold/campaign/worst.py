@@ -129,7 +129,7 @@ def brackets(job: Job, store: Store, result: LawResult, threads: int) -> tuple[B
 
 
 def proved_of(job: Job, law: str, requirement: Requirement) -> tuple[float | None, str]:
-    """What is proved of a metric over everything that is drawn, and what that rests on; None where nothing is.
+    """The bound that is proved of a metric over everything that is drawn, and what it rests on; None where nothing is.
 
     The torque is bounded by where it is cut off. The end of a flight is, where a certificate bounds it under disturbance
     from every attitude and from rates as large as any that is drawn, where nothing but the start is drawn, and the loop has

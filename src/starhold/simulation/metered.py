@@ -23,7 +23,7 @@ PIECES = 4
 
 
 class Metered(NamedTuple):
-    """What is left of flights: where each lane ended (numbers, lanes), its notes (numbers, lanes), and the noted
+    """The remains of flights: where each lane ended (numbers, lanes), its notes (numbers, lanes), and the noted
     numbers of windows (windows, quantities, lanes)."""
 
     ends: Array
