@@ -240,7 +240,18 @@ def test_the_worst_is_flown_again_by_its_file(tmp_path):
     assert brackets["settling_time"].proved is None
 
 
+def test_angles_and_norms_are_inputs_too(tmp_path):
+    over = {key: OVER[key] for key in ("initial.attitude", "initial.rate")}
+    asked = [{"metric": "settling_time", "at_most": "14 s", "share": 0.9}]
+    # As published, a law goes the long way round where q0 is negative: then that decides.
+    scenario = small().with_({"law.pd.quaternion_sign": "shortest"})
+    drivers = fly(tmp_path / "c", scenario=scenario, runs=400, over=over, requirement=asked, law="pd").laws[0].drivers
+    assert drivers.inputs[0].input == "angle of initial.attitude"
+    assert "norm of initial.rate" in {driver.input for driver in drivers.inputs}
+
+
 BAD = [
+    ({"over": {"law.pd.k_rate": {"distribution": "normal", "sigma": 0.1}}, "law": "lyapunov"}, "changes nothing"),
     ({"runs": 0}, "campaign.runs"),
     ({"over": {"law.pd.k_rat": {"distribution": "normal", "sigma": 1}}}, "k_rate"),
     ({"over": {"law.pd.k_rate": {"distribution": "normal", "sigma": -1}}}, "sigma"),

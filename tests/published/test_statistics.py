@@ -1,4 +1,5 @@
-"""The first paper's statistical statements, by the campaigns of its built-in scenarios: figures 14 and 15, and with noise."""
+"""The first paper's statistical statements, by the campaigns of its built-in scenarios: figures 14 and 15, and with
+noise."""
 
 import numpy as np
 import pytest

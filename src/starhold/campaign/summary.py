@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from starhold.analysis.meter import Meter
 from starhold.campaign import envelopes, sensitivity
 from starhold.campaign.chunk import LEAST, MOST
+from starhold.campaign.distributions import Rotations, Shell
 from starhold.campaign.drivers import Drivers, find_drivers
 from starhold.campaign.job import Job
 from starhold.campaign.requirements import Requirement
@@ -118,10 +119,24 @@ def _drivers(
     if not names:
         return None
     inputs = {name: values[:MOST_DRIVEN] for name, values in store.columns(names, law).items()}
+    inputs |= _sizes(job, inputs)
     asked = [requirement.column for requirement in requirements if not np.isnan(requirement.bound)]
     metrics = dict.fromkeys(asked or [name for name in job.meter(law).units if name in USUAL])
     told = {name: values[:MOST_DRIVEN] for name, values in store.columns(list(metrics), law).items()} if metrics else {}
     return find_drivers(inputs, failed[:MOST_DRIVEN], told)
+
+
+def _sizes(job: Job, inputs: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[np.float64]]:
+    """What matters of vectors more than their components: the angle of an attitude, the norm of a vector in any
+    direction."""
+    found: dict[str, NDArray[np.float64]] = {}
+    for dispersion in job.dispersions:
+        told, rows = ", ".join(dispersion.keys), [inputs[name] for name in dispersion.columns]
+        if isinstance(dispersion.distribution, Rotations):
+            found[f"angle of {told}"] = 2.0 * np.arccos(np.minimum(np.abs(rows[0]), 1.0))
+        elif isinstance(dispersion.distribution, Shell):
+            found[f"norm of {told}"] = np.sqrt(sum(np.square(row) for row in rows))
+    return found
 
 
 USUAL = (
