@@ -203,7 +203,8 @@ def test_goes_on_after_a_crash_with_more_runs_and_not_after_a_change(result, tmp
     assert len(held) == 3
     held[1].write_bytes(held[1].read_bytes()[:-9] + b"corrupted")
     (folder / "campaign.json").unlink()
-    again = fly(folder, metrics=["overshoot", "iterations"], resume=True)
+    with pytest.warns(UserWarning, match="not those that were written; runs 32 to 63 are flown again"):
+        again = fly(folder, metrics=["overshoot", "iterations"], resume=True)
     assert again.digest == result.digest
     assert again.flown == 32 + 20 + 20
     changed = OVER | {"law.pd.k_rate": {"distribution": "uniform", "low": 1.4, "high": 2.5}}

@@ -10,9 +10,10 @@ from typing import Any
 import pytest
 from rich.console import Console
 
+from starhold.campaign.verdicts import percent
 from starhold.cli import show_campaign
 from starhold.cli.show_campaign import flying_campaign, print_campaign
-from starhold.report.campaign_units import figure, percent
+from starhold.report.campaign_units import figure
 from tests.report.campaign_made import result
 
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from starhold.campaign.results import CampaignResult, LawResult
-from starhold.campaign.verdicts import judge
+from starhold.campaign.verdicts import judge, percent
 from starhold.report.campaign_page import render, write_page
 from starhold.report.campaign_plots import envelopes, histograms
-from starhold.report.campaign_units import Wording, count_text, figure, percent
+from starhold.report.campaign_units import Wording, count_text, figure
 from starhold.report.campaign_words import headline
 from tests.report import flown
 from tests.report.campaign_made import ASKED, indices, law, result, spread

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import time
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -122,7 +123,10 @@ def fly_campaign(
     if options.until_decided:
         runs = _fly_until_decided(store, job, engine, arrived)
     else:
-        fly_all(job, _blocks(store, notice), store.put, engine, arrived)
+        blocks = list(_blocks(store, notice))
+        for line in store.notices:
+            warnings.warn(line, stacklevel=2)
+        fly_all(job, blocks, store.put, engine, arrived)
         runs = table.runs
     seconds = time.perf_counter() - begun
     results = summarise(store, job, laws, options.until_decided)

@@ -151,18 +151,14 @@ class Verdict:
 
     def sentence(self) -> str:
         """Tell the verdict and what it rests on."""
-        flown = (
-            f"{self.failures} of {self.runs} runs miss it ({_percent(self.observed)} keep it, {_percent(self.share)} must)"
-        )
+        flown = f"{self.failures} of {self.runs} runs miss it ({percent(self.observed)} keep it, {percent(self.share)} must)"
         if self.lower is None or self.upper is None:
             told = f"{self.name}: {flown}. The draws are not independent of each other, so no confidence can be given"
             return told + "; random sampling gives one."
-        least, most = f"at least {_percent(self.lower)}", f"at most {_percent(self.upper)}"
+        least, most = f"at least {percent(self.lower)}", f"at most {percent(self.upper)}"
         both = self.lower <= 1.0 - self.share < self.upper
         bound = f"{least} and {most}" if both else least if self.lower > 1.0 - self.share else most
-        told = (
-            f"{self.name}: {self.outcome}. {flown}; {bound} of all flights do, with {_percent(self.confidence)} confidence"
-        )
+        told = f"{self.name}: {self.outcome}. {flown}; {bound} of all flights do, with {percent(self.confidence)} confidence"
         told += " each" if both else ""
         if self.worst_part is not None:
             part = self.worst_part
@@ -306,7 +302,7 @@ def _shown(value: object) -> str:
     return f"{value:.4g}" if isinstance(value, (int, float, np.number)) else str(value)
 
 
-def _percent(share: float) -> str:
+def percent(share: float) -> str:
     """Show a share with enough digits to tell it from 0 and 100 %."""
     digits = 3 if not 0.0 < share < 1.0 else max(3, 1 - math.floor(math.log10(min(share, 1.0 - share) * 100.0)))
     return f"{100.0 * share:.{digits}f}".rstrip("0").rstrip(".") + " %"

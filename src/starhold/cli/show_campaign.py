@@ -12,6 +12,7 @@ from rich.progress import TimeRemainingColumn as TimeLeft
 from rich.table import Table
 from rich.text import Text
 
+from starhold.campaign.verdicts import percent
 from starhold.cli.show import console
 from starhold.report.campaign_units import (
     DASH,
@@ -22,7 +23,6 @@ from starhold.report.campaign_units import (
     figure,
     headings_of,
     order,
-    percent,
     with_unit,
     worst_text,
 )

@@ -7,8 +7,9 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
+from starhold.campaign.verdicts import percent
 from starhold.report.campaign_tables import named, small, table
-from starhold.report.campaign_units import DASH, Wording, counted, figure, percent
+from starhold.report.campaign_units import DASH, Wording, counted, figure
 
 if TYPE_CHECKING:
     from starhold.campaign.drivers import Drivers, FailureDriver, MetricDriver, PairDriver

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
+from starhold.campaign.verdicts import percent
 from starhold.report.campaign_units import (
     DASH,
     Wording,
@@ -15,7 +16,6 @@ from starhold.report.campaign_units import (
     figure,
     headings_of,
     order,
-    percent,
     with_unit,
     worst_text,
 )

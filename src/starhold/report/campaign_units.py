@@ -107,12 +107,6 @@ def order(bracket: Bracket) -> str:
     return "≤" if bracket.at_most else "≥"
 
 
-def percent(share: float) -> str:
-    """Show a share with enough digits to tell it from 0 and 100 %."""
-    digits = 3 if not 0.0 < share < 1.0 else max(3, 1 - math.floor(math.log10(min(share, 1.0 - share) * 100.0)))
-    return f"{100.0 * share:.{digits}f}".rstrip("0").rstrip(".") + " %"
-
-
 def few_percent(share: float) -> str:
     """Show a bound of a failure probability with three digits."""
     return f"{figure(100.0 * share, 3)} %"

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from starhold.report.campaign_units import INDEPENDENT, Wording, count_text, counted, few_percent, percent
+from starhold.campaign.verdicts import percent
+from starhold.report.campaign_units import INDEPENDENT, Wording, count_text, counted, few_percent
 from starhold.report.text import listed
 
 if TYPE_CHECKING:
