@@ -14,6 +14,11 @@ import pytest
 import typer
 
 import starhold as sh
+from starhold.analysis.rigid_body_meter import EXTRAS, UNITS
+from starhold.campaign.requirements import CONE, LOST
+from starhold.campaign.sampling import SAMPLINGS
+from starhold.campaign.sequence import runs_to_meet
+from starhold.campaign.verdicts import runs_needed
 from starhold.certification.certify import certify
 from starhold.certification.wording import HEADINGS, sentence
 from starhold.cli.main import app
@@ -21,6 +26,7 @@ from starhold.conformance.suite import examine
 from starhold.laws.catalogue import catalogue, from_file
 from starhold.parts.catalogue import PACKAGES, parts
 from starhold.scenario.building import build
+from starhold.scenario.campaign import DISTRIBUTIONS
 from starhold.scenario.checking import RENAMED
 from starhold.scenario.reading import load
 
@@ -49,6 +55,62 @@ def test_python_page_runs(monkeypatch, capsys):
     assert 110.0 < settled <= 120.0
     assert "<Scenario cubesat: pd, lyapunov; 3000 control steps> [<Flight pd: settling" in said
     assert set(drawn[0][1]["y"]) < set(drawn[0][0])
+
+
+@pytest.fixture
+def acceptance(monkeypatch, tmp_path):
+    """The scenario of the page about campaigns, in the current folder."""
+    (example,) = blocks("docs/campaigns.md", "toml")
+    monkeypatch.chdir(tmp_path)
+    Path("acceptance.toml").write_text(example, encoding="utf-8")
+    return load("acceptance.toml")
+
+
+def test_campaigns_page_runs(acceptance, capsys):
+    _, example, _ = blocks("docs/campaigns.md", "python")
+    told = {}
+    exec(compile(example, "campaigns.md", "exec"), told)
+    said = capsys.readouterr().out
+    assert said.startswith("<campaign acceptance: pd: ")
+    assert "settling_time: met" in said
+    assert told["again"].differs == ()
+    for sql in blocks("docs/campaigns.md", "sql"):
+        assert len(told["result"].query(sql)) in range(1, 10)
+
+
+@pytest.mark.xdist_group("campaign engines")
+def test_script_with_workers_of_the_campaigns_page_runs(acceptance):
+    *_, script = blocks("docs/campaigns.md", "python")
+    Path("script.py").write_text(script, encoding="utf-8")
+    done = subprocess.run([sys.executable, "script.py"], capture_output=True, text=True)
+    assert done.stdout.startswith("<campaign acceptance: pd: "), done.stderr
+
+
+def test_commands_of_the_campaigns_page_are_commands(acceptance):
+    known = typer.main.get_command(app).commands
+    listed = re.findall(r"^starhold .*$", (ROOT / "docs" / "campaigns.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
+    lines = [shlex.split(line) for line in listed]
+    assert {name for _, name, *_ in lines} == {"campaign", "query", "rerun"}
+    for _, name, *words in lines:
+        known[name].make_context(name, words)
+
+
+def test_campaigns_page_names_every_distribution_and_metric(acceptance):
+    text = (ROOT / "docs" / "campaigns.md").read_text(encoding="utf-8")
+    for name in (*DISTRIBUTIONS, *SAMPLINGS):
+        assert f"| `{name}` |" in text
+    for metric in (*UNITS, *EXTRAS, "peak_wheel_momentum", LOST, CONE):
+        assert f"`{metric}" in text
+
+
+def test_campaigns_page_tells_the_runs_that_verdicts_need():
+    text = (ROOT / "docs" / "campaigns.md").read_text(encoding="utf-8")
+    failures = (0, 1, 2, 5, 10)
+    for needed in (
+        [runs_needed(0.9973, 0.1, k) for k in failures],
+        [runs_to_meet(0.9973, 0.9, k) for k in failures],
+    ):
+        assert f"| {' | '.join(map(str, needed))} |" in text
 
 
 def test_readme_names_every_law():
@@ -135,7 +197,7 @@ def test_every_link_leads_somewhere_in_the_clone(page):
             assert anchor in {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}, link
 
 
-@pytest.mark.parametrize("name", ["run", "compare", "certify", "failures", "modal-roots", "invariant"])
+@pytest.mark.parametrize("name", ["run", "compare", "certify", "campaign", "failures", "modal-roots", "invariant"])
 def test_help_says_where_results_go(name):
     known = typer.main.get_command(app).commands[name]
     (output,) = (option for option in known.params if option.name == "output")
