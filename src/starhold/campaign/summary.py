@@ -127,8 +127,7 @@ def _drivers(
 
 
 def _sizes(job: Job, inputs: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[np.float64]]:
-    """What matters of vectors more than their components: the angle of an attitude, the norm of a vector in any
-    direction."""
+    """The angle of an attitude and the norm of a vector in any direction, which may matter more than their components."""
     found: dict[str, NDArray[np.float64]] = {}
     for dispersion in job.dispersions:
         told, rows = ", ".join(dispersion.keys), [inputs[name] for name in dispersion.columns]
