@@ -302,3 +302,20 @@ def test_lost_runs_have_a_time_and_no_metrics(tmp_path):
     assert (frame["failed"] == lost).all()
     run = int(np.flatnonzero(lost)[0])
     assert same(found.again(run).flight.lost, frame["diverged_at"][run])
+
+
+@pytest.mark.parametrize(("sampling", "runs"), [("morris", 40), ("saltelli", 64)])
+def test_designs_give_indices_in_place_of_tests(tmp_path, sampling, runs):
+    over = {
+        "law.pd.k_rate": {"distribution": "uniform", "low": 1.0, "high": 3.0},
+        "sensor.rate_noise": {"distribution": "uniform", "low": 1e-6, "high": 2e-6},
+        "initial.rate[3]": {"distribution": "uniform", "low": -0.05, "high": 0.05},
+    }
+    asked = [{"metric": "settling_time", "at_most": "30 s", "share": 0.9}]
+    law = fly(tmp_path / "c", runs=runs, sampling=sampling, over=over, requirement=asked, law="pd").laws[0]
+    assert law.drivers is None
+    found = law.indices["settling_time"]
+    strength = found.mu_star if sampling == "morris" else found.total
+    assert found.names[int(np.argmax(strength))] in ("law.pd.k_rate", "initial.rate[3]")
+    assert strength[found.names.index("sensor.rate_noise")] < 0.1 * max(strength)
+    assert law.verdicts[0].lower is None

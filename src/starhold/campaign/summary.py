@@ -25,6 +25,8 @@ BARS, WIDE = 60, 100.0
 """Of a histogram; and how many times the least the largest of a metric is that is shown on a logarithmic scale."""
 MOST_DRIVEN = 200_000
 """Runs, the first ones, that drivers are looked for among."""
+KINDS: Mapping[str, Any] = {"morris": sensitivity.morris, "saltelli": sensitivity.sobol}
+"""What tells the indices of a metric, by the samplings that are designed for them."""
 FAILURES = 3
 """Failed runs that are worth flying again, beside the worst of each requirement."""
 
@@ -116,7 +118,8 @@ def _drivers(
     store: Store, job: Job, law: str, failed: NDArray[np.bool_], requirements: tuple[Requirement, ...]
 ) -> Drivers | None:
     names = [name for dispersion in job.dispersions for name in dispersion.columns]
-    if not names:
+    if not names or job.table.sampling in KINDS:
+        # Runs of those designs repeat one another's values: no test of theirs would be one.
         return None
     inputs = {name: values[:MOST_DRIVEN] for name, values in store.columns(names, law).items()}
     inputs |= _sizes(job, inputs)
@@ -151,7 +154,7 @@ USUAL = (
 
 
 def _indices(store: Store, job: Job, law: str, requirements: tuple[Requirement, ...]) -> Mapping[str, Any]:
-    kind = {"morris": sensitivity.morris, "saltelli": sensitivity.sobol}.get(job.table.sampling)
+    kind = KINDS.get(job.table.sampling)
     if kind is None:
         return {}
     asked = [requirement.column for requirement in requirements if not np.isnan(requirement.bound)]

@@ -182,6 +182,8 @@ def _brackets(result: CampaignResult, words: Wording) -> None:
 
 
 def _drivers(law: LawResult) -> None:
+    for metric, found in law.indices.items():
+        console.print(f"\n{_safe(law.law)}, {_safe(metric)}: {_safe(found.sentence())}", highlight=False, soft_wrap=True)
     if law.drivers is None:
         return
     # The first sentence says how many runs failed.
