@@ -54,28 +54,42 @@ def test_a_number_that_says_more_fails(made, name, sign_policy, kind, keys, fact
         assert not passed(check(changed)), key
 
 
+TOLD = {
+    "pd-2": "shortest",
+    "lqr-I": "",
+    "lqr-II-uneven": "hysteresis",
+    "lyapunov-0": "as_published",
+    "sliding-1": "shortest",
+}
+"""The policy of each loop that is not slow, so that each policy and each law is there once."""
+
+
 @pytest.mark.parametrize(
-    "name", ["pd-2", pytest.param("lqr-I", marks=pytest.mark.slow), "lqr-II-uneven", "lyapunov-0", "sliding-1"]
+    ("name", "sign_policy"),
+    [
+        pytest.param(name, policy, marks=() if policy == told else pytest.mark.slow)
+        for name, told in TOLD.items()
+        for policy in ("as_published", "shortest", "hysteresis")
+    ],
 )
-def test_a_bound_that_is_dropped_or_a_witness_that_is_not_one_fails(made, name):
-    for sign_policy in ("as_published", "shortest", "hysteresis"):
-        whole = made(name, sign_policy, 1e-6)
-        for kind, claim in claims_of(whole).items():
-            if claim["outcome"] != "proved":
-                continue
-            content = alone(whole, kind)
-            unbound = {"numbers": ("level", "start", "rate", "tolerance", "rate_start"), "witness": ("level",)}
-            for part, keys in unbound.items():
-                for key in keys:
-                    if claim[part].get(key) is not None:
-                        assert not passed(check(edited(content, (kind, part, key), None))), (kind, key)
-            for key in ("epsilon", "rho", "tau", "beta"):
-                if claim["witness"].get(key):
-                    for value in (0.0, -claim["witness"][key], 1e9 * claim["witness"][key]):
-                        assert not passed(check(edited(content, (kind, "witness", key), value))), (kind, key)
-            if "everything" in claim["numbers"]:
-                flag = not claim["numbers"]["everything"]
-                assert not passed(check(edited(content, (kind, "numbers", "everything"), flag))), kind
+def test_a_bound_that_is_dropped_or_a_witness_that_is_not_one_fails(made, name, sign_policy):
+    whole = made(name, sign_policy, 1e-6)
+    for kind, claim in claims_of(whole).items():
+        if claim["outcome"] != "proved":
+            continue
+        content = alone(whole, kind)
+        unbound = {"numbers": ("level", "start", "rate", "tolerance", "rate_start"), "witness": ("level",)}
+        for part, keys in unbound.items():
+            for key in keys:
+                if claim[part].get(key) is not None:
+                    assert not passed(check(edited(content, (kind, part, key), None))), (kind, key)
+        for key in ("epsilon", "rho", "tau", "beta"):
+            if claim["witness"].get(key):
+                for value in (0.0, -claim["witness"][key], 1e9 * claim["witness"][key]):
+                    assert not passed(check(edited(content, (kind, "witness", key), value))), (kind, key)
+        if "everything" in claim["numbers"]:
+            flag = not claim["numbers"]["everything"]
+            assert not passed(check(edited(content, (kind, "numbers", "everything"), flag))), kind
 
 
 def test_every_step_towards_the_end_is_needed_and_checked(made):
@@ -150,6 +164,22 @@ def test_obligations_and_assumptions_are_exactly_those_needed(made, name):
         assert not passed(check(changed))
 
 
+def told_apart(content, path):
+    """The content with the one claim that the path is in, which is enough to see whether that fails, and the path there."""
+    if path[:3] != ("certificates", 0, "claims") or len(path) < 5:
+        return content, path
+    return alone(content, content["certificates"][0]["claims"][path[3]]["kind"]), (*path[:3], 0, *path[4:])
+
+
+@pytest.mark.parametrize(
+    ("name", "sign_policy"), [("pd-2", "as_published"), ("lqr-II-uneven", "hysteresis"), ("sliding-1", "shortest")]
+)
+def test_a_claim_told_apart_holds(made, name, sign_policy):
+    content = made(name, sign_policy, 1e-6)
+    for place in range(len(content["certificates"][0]["claims"])):
+        assert passed(check(told_apart(content, ("certificates", 0, "claims", place, "numbers"))[0])), place
+
+
 @settings(max_examples=40)
 @given(some.data())
 def test_nothing_can_be_taken_away_or_be_of_another_type(made, data):
@@ -158,6 +188,7 @@ def test_nothing_can_be_taken_away_or_be_of_another_type(made, data):
     # Versions are told, not claimed, and without one of its claims a certificate says less.
     assume("versions" not in path)
     assume(path[-2:-1] != ("claims",))
+    content, path = told_apart(content, path)
     assert not passed(check(replaced(content, path, lambda spot, key: spot.pop(key))))
     other = data.draw(some.sampled_from([[], {}, "x", True, math.nan, math.inf, -math.inf, {"x": None}, 10**400]))
     text = path[-1] in ("scenario", "name") and other == "x" and "obligations" not in path
@@ -175,4 +206,5 @@ def test_no_number_makes_the_checker_stumble(made, data):
     numbers = [p for p in spots(content) if type(content_at(content, p)) is float]
     path = data.draw(some.sampled_from(numbers))
     value = data.draw(some.floats(allow_nan=False, allow_infinity=False) | some.sampled_from([0.0, 5e-324, 1e308, -1.0]))
+    content, path = told_apart(content, path)
     check(replaced(content, path, lambda spot, key: spot.__setitem__(key, value)))
