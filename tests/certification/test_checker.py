@@ -34,8 +34,17 @@ def test_what_the_certifier_proves_holds(made, name, sign_policy):
             assert [o["name"] for o in claim["obligations"]] == [name for name in held if name]
 
 
-@pytest.mark.parametrize("sign_policy", ["as_published", "shortest", "hysteresis"])
-@pytest.mark.parametrize(("target", "limit"), [(ORBITAL, "axis"), (ORBITAL, "norm"), (aimed((1.0, 0.0, 0.0, 0.0)), "norm")])
+@pytest.mark.parametrize(
+    ("target", "limit", "sign_policy"),
+    [
+        # Each target, limit and policy once; the other pairs are slow.
+        pytest.param(target, limit, policy, marks=pytest.mark.slow if place != number else ())
+        for place, (target, limit) in enumerate(
+            [(ORBITAL, "axis"), (ORBITAL, "norm"), (aimed((1.0, 0.0, 0.0, 0.0)), "norm")]
+        )
+        for number, policy in enumerate(["hysteresis", "as_published", "shortest"])
+    ],
+)
 def test_moving_targets_and_limits_of_the_norm(tmp_path, sign_policy, target, limit):
     chosen = [LOOPS[name] for name in ("pd-0", "pd-2", "lyapunov-0", "lqr-I", "sliding-1")]
     loops = [loop_of(o.law.name, o.gains, o.craft, sign_policy=sign_policy, target=target, limit=limit) for o in chosen]
