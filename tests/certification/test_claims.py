@@ -120,7 +120,7 @@ def largest_torque(loop, P, s, level, axis):
         u = np.array(loop.law.command(measurement, loop.gains, loop.craft, NoMemory())[0])
         return -(np.linalg.norm(u) if loop.limit == "norm" else u[axis])
 
-    starts = random.normal(size=(12, 7))
+    starts = random.normal(size=(5, 7))
     return max(-minimize(torque, x, method="Nelder-Mead", options={"maxiter": 2000, "fatol": 1e-12}).fun for x in starts)
 
 
@@ -178,23 +178,29 @@ def test_disturbed_flights_end_within_the_ultimate_bound(name, sign_policy):
     random = np.random.default_rng(6)
     frame = take_apart(Motion(make_subject(loop)))
     states = draw(6, floats(frame.P), frame.potential, n["start"], random)
-    for state, mode in zip(states.T, ("away", "constant") * 3, strict=True):
-        q, w = state[:4], state[4:7]
-        direction = random.normal(size=3)
-        direction /= np.linalg.norm(direction)
-        period, peak = 0.2, []
-        for step in range(int(2000 / period)):
-            measurement = Measurement(tuple(q), tuple(w), tuple(w), (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, period)
-            u, _ = loop.law.command(measurement, loop.gains, loop.craft, NoMemory())
-            push = direction if mode == "constant" else w / max(np.linalg.norm(w), 1e-300)
-            a = np.linalg.solve(J, np.array(u) + n["torque"] * push - np.cross(w, J @ w))
-            w = w + period * a
-            q = q + period * np.array(derivative(tuple(q), tuple(w)))
-            q /= np.linalg.norm(q)
-            if step * period > 1500:
-                peak.append((2.0 * math.asin(min(1.0, np.linalg.norm(q[1:]))), np.linalg.norm(w)))
-        assert max(p[0] for p in peak) <= n["angle"]
-        assert max(p[1] for p in peak) <= n["rate"]
+    directions = random.normal(size=(3, 6))
+    directions /= np.linalg.norm(directions, axis=0)
+    away = np.array([True, False] * 3)
+
+    def command(q, w):
+        measurement = Measurement(tuple(q), tuple(w), tuple(w), (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, period)
+        return np.array(loop.law.command(measurement, loop.gains, loop.craft, NoMemory())[0])
+
+    # What only adds and multiplies takes all flights at once.
+    commands = command if name != "pd-0" else lambda q, w: np.transpose(list(map(command, q.T.tolist(), w.T.tolist())))
+    q, w, period, angle, rate = states[:4], states[4:7], 0.2, 0.0, 0.0
+    for step in range(int(2000 / period)):
+        push = np.where(away, w / np.maximum(np.linalg.norm(w, axis=0), 1e-300), directions)
+        turning = J @ w
+        gyroscopic = w[[1, 2, 0]] * turning[[2, 0, 1]] - w[[2, 0, 1]] * turning[[1, 2, 0]]
+        w = w + period * np.linalg.solve(J, commands(q, w) + n["torque"] * push - gyroscopic)
+        q = q + period * np.array(derivative(tuple(q), tuple(w)))
+        q = q / np.linalg.norm(q, axis=0)
+        if step * period > 1500:
+            angle = max(angle, 2.0 * math.asin(min(1.0, np.linalg.norm(q[1:], axis=0).max())))
+            rate = max(rate, np.linalg.norm(w, axis=0).max())
+    assert 0.0 < angle <= n["angle"]
+    assert 0.0 < rate <= n["rate"]
 
 
 @pytest.mark.parametrize("name", ["pd-0", "lqr-I", "lqr-III", "matrix-pd-inertial", "sliding-1"])
