@@ -20,6 +20,9 @@ from tests.certification.edits import alone, claims_of, content_at, edited, reas
 from tests.certification.loops import FULL, LOPSIDED, PRINCIPAL, UNEVEN, loop_of, rotors, textbook
 from tests.making import ORBITAL
 
+# Together: each worker would make all refutations and proofs for itself.
+pytestmark = pytest.mark.xdist_group("refutations")
+
 SKEWED = ((0.01, 0.02, 0.0), (0.02, 0.01, 0.0), (0.0, 0.0, 0.01))
 CASES = {
     "rises": ("matrix-pd", matrix_pd.Gains((0.09, -0.09, 0.09), (0.01,) * 3), Wanted(), "convergence"),
