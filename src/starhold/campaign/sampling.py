@@ -113,6 +113,11 @@ class Plan:
             found = _design(self.sampling, self.dims, self.seed, self.runs // self.block)[first : first + count]
         return np.clip(np.ascontiguousarray(found.T), INNERMOST, 1.0 - INNERMOST)
 
+    def points(self) -> Array:
+        """The points (runs, dims) of the whole design as its analysis takes them: of Morris's, its grid from 0 to 1."""
+        unit = self.unit(0, self.runs).T
+        return (unit * LEVELS - 0.5) / (LEVELS - 1) if self.sampling == "morris" else unit
+
     def _key(self, dispersion: Dispersion) -> int:
         """128 bits that no other seed or dispersion has."""
         told = f"starhold campaign {self.seed} {', '.join(dispersion.keys)}"

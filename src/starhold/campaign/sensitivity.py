@@ -41,7 +41,8 @@ class Refused:
 
 @dataclass(frozen=True)
 class Morris:
-    """Elementary effects of each input, in the metric's unit for the whole range of the input: the mean `mu`, the mean
+    """Elementary effects of each input, in the metric's unit for its range, from the lowest to the highest level of the
+    design (an eighth and seven eighths of the probability, see `sampling.LEVELS`): the mean `mu`, the mean
     magnitude `mu_star` with the half-width of its interval of `confidence`, and the standard deviation `sigma`, which is
     not small against mu_star where an input acts unevenly or together with others. All (inputs,).
 

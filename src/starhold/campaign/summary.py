@@ -159,7 +159,7 @@ def _indices(store: Store, job: Job, law: str, requirements: tuple[Requirement, 
         return {}
     asked = [requirement.column for requirement in requirements if not np.isnan(requirement.bound)]
     names = list(dict.fromkeys(asked or [name for name in job.meter(law).units if name in USUAL]))
-    unit, columns = job.plan.unit(0, job.plan.runs).T, store.columns(names, law)
+    unit, columns = job.plan.points(), store.columns(names, law)
     return {name: kind(job.plan.factors, unit, columns[name]) for name in names}
 
 

@@ -170,7 +170,10 @@ def _morris(found: Morris, measure: Measure) -> str:
         f"<td>{figure(measure.scale * found.mu[i])}</td><td>{figure(measure.scale * found.sigma[i])}</td></tr>"
         for i in _strongest(found.mu_star)
     ]
-    note = f"Elementary effects over the whole range of each input; ± holds with {percent(found.confidence)} confidence."
+    note = (
+        "Elementary effects from the lowest to the highest level of each input, beyond which an eighth of its probability "
+    )
+    note += f"lies on each side; ± holds with {percent(found.confidence)} confidence."
     if found.dropped:
         note += f" {found.dropped} of {found.trajectories} trajectories were dropped, for they hold failed runs."
     head = ("input", f"mean magnitude μ*{unit}", f"mean μ{unit}", f"spread σ{unit}")
