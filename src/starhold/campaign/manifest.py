@@ -164,7 +164,9 @@ def _tables(text: str) -> dict[str, Any]:
         return {"line": text.splitlines()}
     campaign = tables.get("campaign")
     if isinstance(campaign, dict):
-        cast(dict[str, Any], campaign).pop("runs", None)
+        # These are compared as numbers, so that a default is no change.
+        for key in ("runs", "seed"):
+            cast(dict[str, Any], campaign).pop(key, None)
     return tables
 
 

@@ -69,6 +69,11 @@ class Store:
             if held and not force:
                 allowed = "another folder with -o, --force, or --resume"
                 raise InputError(str(folder), "", f"a campaign already there ({held[0]})", allowed)
+            # They may be of another command, or of the user.
+            beside = [path for pattern in BESIDE for path in folder.glob(pattern)]
+            if beside and not force:
+                found = f"results already there ({beside[0].relative_to(folder)})"
+                raise InputError(str(folder), "", found, "another folder with -o, or --force")
             _clear(folder)
         except OSError as error:
             raise InputError(str(folder), "", f"cannot write there: {error.strerror}", "a folder you may write to") from None
