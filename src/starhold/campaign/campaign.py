@@ -7,6 +7,7 @@ import os
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -68,7 +69,10 @@ def begin(scenario: Scenario, laws: Sequence[str]) -> Job:
     table = scenario.table.campaign
     job = Job(Source.of(scenario), table)
     reached: set[str] = set()
-    for law in laws:
+    for number, law in enumerate(laws):
+        # Names of columns hold those of laws, and SQL does not tell case apart.
+        if law.casefold() in {other.casefold() for other in laws[:number]}:
+            raise InputError(scenario.where, "law", show(law), "names that differ by more than case")
         job.requirements(law)
         reached |= {key for key, places in job.lanes(law).moved.items() if places}
     for dispersion in job.dispersions:
@@ -98,7 +102,8 @@ def fly_campaign(
     manifest = Manifest(
         scenario=scenario.name,
         text=scenario.text,
-        settings={"files": _hashes(scenario)} | ({"until_decided": True} if options.until_decided else {}),
+        settings={"files": _hashes(scenario.text, scenario.where, scenario.folder)}
+        | ({"until_decided": True} if options.until_decided else {}),
         laws=laws,
         runs=table.runs,
         chunk=LOOK if options.until_decided else options.chunk or _chunk(table.runs, engine, at_once),
@@ -132,7 +137,8 @@ def fly_campaign(
     results = summarise(store, job, laws, options.until_decided)
     if options.search and job.dispersions and table.requirement:
         threads = engine.count if isinstance(engine, Threads) else os.cpu_count() or 1
-        results = tuple(replace(result, brackets=brackets(job, store, result, threads)) for result in results)
+        taken = set[str]()
+        results = tuple(replace(result, brackets=brackets(job, store, result, threads, taken)) for result in results)
     told = digest(store, runs)
     totals = {
         "verdicts": {
@@ -146,7 +152,8 @@ def fly_campaign(
     store.finish(told, totals)
     over = {", ".join(one.keys): in_words(one, table) for one in job.dispersions}
     asked = job.requirements(laws[0])
-    return CampaignResult(scenario.name, folder, runs, table.sampling, over, results, told, seconds, flown, asked)
+    notices = tuple(store.notices)
+    return CampaignResult(scenario.name, folder, runs, table.sampling, over, results, told, seconds, flown, asked, notices)
 
 
 class FlownAgain(NamedTuple):
@@ -166,7 +173,12 @@ def fly_again(folder: Path, run: int, law: str | None = None) -> FlownAgain:
     if name not in manifest.laws:
         raise InputError(str(folder), "law", show(name), nearest(name, list(manifest.laws)))
     stored = store.row(name, run)
-    job = _job_of(Source(manifest.text, str(folder), Path(manifest.folder), manifest.allow_unstable))
+    where = Path(manifest.folder)
+    now_there, then = _hashes(manifest.text, str(folder), where), manifest.settings.get("files", {})
+    for file in sorted({*now_there} & {*then}):
+        if now_there[file] != then[file]:
+            raise InputError(str(where / file), "", "a file that was changed since the campaign", "the file that was flown")
+    job = _job_of(Source(manifest.text, str(folder), where, manifest.allow_unstable))
     now = job(name, run, 1, 1).rows
     differs = tuple(column for column, value in stored.items() if not _equal(value, now[column][0]))
     own = scenario_of(job, job.plan.columns(run, 1), run)
@@ -226,20 +238,29 @@ def _chunk(runs: int, engine: Engine, at_once: bool) -> int:
     return max(1, min(most, runs))
 
 
-def _hashes(scenario: Scenario) -> dict[str, str]:
-    """SHA-256 of the files that a scenario names."""
+def _hashes(text: str, where: str, folder: Path) -> dict[str, str]:
+    """SHA-256 of the files that a scenario's text names, as modules or as tables of numbers."""
     found: dict[str, str] = {}
 
     def look(value: Any) -> None:
-        if isinstance(value, dict):
-            name = value.get("file")
-            if isinstance(name, str) and (scenario.folder / name).is_file():
-                found[name] = hashlib.sha256((scenario.folder / name).read_bytes()).hexdigest()
-        for item in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
-            look(item)
+        if isinstance(value, str) and value not in found:
+            # Many strings are words, and some cannot name a file.
+            with suppress(OSError, ValueError):
+                found[value] = hashlib.sha256((folder / value).read_bytes()).hexdigest()
+        elif isinstance(value, dict):
+            for key, item in value.items():
+                if key not in WORDS:
+                    look(item)
+        elif isinstance(value, list):
+            for item in value:
+                look(item)
 
-    look(read_toml(scenario.text, scenario.where))
+    look(read_toml(text, where))
     return found
+
+
+WORDS = ("name", "description", "type", "campaign")
+"""Keys of what names no file."""
 
 
 def in_words(dispersion: Dispersion, table: CampaignTable) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import count
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
@@ -31,12 +32,14 @@ POPULATION, GENERATIONS = 256, 24
 """Of the optimiser; one generation flies side by side."""
 FEW = 64, 8
 """The same where each lane is made by itself."""
-NONE = 1e300
-"""Stands for the badness of a run without the metric: lost, or never settled. Nothing is worse."""
+NONE = 1e100
+"""Stands for the badness of a run without the metric: lost, or never settled. Nothing is worse, and its square is finite."""
 
 
 _ODD = re.compile(r"[^\w.-]+")
 """What names of files are kept free of."""
+_LONGEST = 200
+"""Bytes of a file's name, without what tells it from others; systems take 255."""
 
 
 class Found(NamedTuple):
@@ -103,9 +106,9 @@ def search(job: Job, law: str, requirement: Requirement, threads: int, seed: int
     return Found(point, columns, np.nan if value == NONE else side * value, evaluations)
 
 
-def brackets(job: Job, store: Store, result: LawResult, threads: int) -> tuple[Bracket, ...]:
+def brackets(job: Job, store: Store, result: LawResult, threads: int, taken: set[str]) -> tuple[Bracket, ...]:
     """How bad what is required of a law gets: by its campaign, by a search, and at most by proof. The worst run of each is
-    kept as a scenario file in the campaign's folder."""
+    kept as a scenario file in the campaign's folder; taken: the names of such files so far."""
     found: list[Bracket] = []
     law, worst_runs = result.law, {verdict.name: verdict.worst_run for verdict in result.verdicts}
     for requirement in job.requirements(law):
@@ -116,7 +119,7 @@ def brackets(job: Job, store: Store, result: LawResult, threads: int) -> tuple[B
         looked = search(job, law, requirement, threads)
         if not np.isnan(value) and not side * value >= side * looked.value:
             value, columns, run = looked.value, looked.columns, 0
-        path = store.folder / f"worst-{law}-{_ODD.sub('-', requirement.name)}.toml"
+        path = store.folder / _file_name(law, requirement.name, taken)
         with atomic_write(path) as hidden:
             hidden.write_text(scenario_of(job, columns, run).text, encoding="utf-8")
         proved, assumption = proved_of(job, law, requirement)
@@ -126,6 +129,15 @@ def brackets(job: Job, store: Store, result: LawResult, threads: int) -> tuple[B
         told = (requirement.column, requirement.unit, value, path.name, looked.evaluations, proved, assumption)
         found.append(Bracket(*told, requirement.at_most))
     return tuple(found)
+
+
+def _file_name(law: str, requirement: str, taken: set[str]) -> str:
+    """The name of the file of the worst run, which is added to those taken."""
+    stem = f"worst-{law}-{_ODD.sub('-', requirement)}".encode()[:_LONGEST].decode(errors="ignore")
+    names = (f"{stem}{'' if number == 1 else f'-{number}'}.toml" for number in count(1))
+    name = next(name for name in names if name.casefold() not in taken)
+    taken.add(name.casefold())
+    return name
 
 
 def proved_of(job: Job, law: str, requirement: Requirement) -> tuple[float | None, str]:

@@ -238,10 +238,12 @@ class CampaignTable(Table):
 
     @model_validator(mode="after")
     def _names_differ(self) -> CampaignTable:
-        names = [requirement.called for requirement in self.requirement]
+        # Case apart, for columns are called by them, and SQL does not tell it.
+        names = [requirement.called.casefold() for requirement in self.requirement]
         for number, name in enumerate(names, 1):
             if name in names[: number - 1]:
-                raise at_key(f"requirement[{number}].name", "a name that no other requirement has", name)
+                found = self.requirement[number - 1].called
+                raise at_key(f"requirement[{number}].name", "a name that no other requirement has, in any case", found)
         return self
 
 
