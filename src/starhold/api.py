@@ -122,7 +122,11 @@ def campaign(
         "seed": seed,
         "requirement": requirement,
     }
-    plain = {key: list(value) if key in ("metrics", "requirement") and value else value for key, value in changes.items()}
+    # Of any kind that can be gone through; a word or a table is refused by what reads it.
+    plain = {
+        key: list(value) if key in ("metrics", "requirement") and not isinstance(value, str | Mapping | None) else value
+        for key, value in changes.items()
+    }
     options = Options(engine_of(threads, workers, scheduler), None, resume, force, until_decided, search)
     place = Path(_temporary() if folder is None else folder)
     return fly_campaign(with_campaign(_opened(scenario), plain), place, law, options, progress)

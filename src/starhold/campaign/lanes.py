@@ -6,6 +6,7 @@ What a value moves among the numbers of a loop is told by no list: scenarios wit
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -85,8 +86,11 @@ class Lanes:
         others = variants(self._bare, (self.plan.change(one) for one in drawn))
         for run in runs:
             try:
-                other = next(others)
-                yield Flat.of(build(other, other.pick(self.law)), self.steps)
+                # What is warned of a scenario is told of the file, not of each run.
+                with warnings.catch_warnings(action="ignore"):
+                    other = next(others)
+                    flat = Flat.of(build(other, other.pick(self.law)), self.steps)
+                yield flat
             except InputError as error:
                 where = f"{self.scenario.where}, run {run}"
                 raise InputError(where, error.key, error.found, error.allowed) from None

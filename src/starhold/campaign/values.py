@@ -18,7 +18,7 @@ from pydantic_core import PydanticCustomError
 from starhold.errors import InputError
 from starhold.laws.interface import Gain
 from starhold.parts.part import Fitted
-from starhold.scenario.checking import nearest, read_toml, show
+from starhold.scenario.checking import cut, nearest, read_toml, show
 from starhold.scenario.making import path_of
 from starhold.scenario.parts import part_model
 from starhold.scenario.quantity import declared, reader
@@ -150,7 +150,7 @@ def _filled(place: Place, raw: Any, shape: Sequence[int], name: str) -> Any:
 def locate(scenario: Scenario, key: str) -> Place:
     """The place of a key. InputError where there is no such key, or none in which runs of a campaign may differ."""
     names = {"law": [entry.name for entry in scenario.laws], "part": [fitted.called for fitted in scenario.parts]}
-    told = f'campaign.over."{key}"'
+    told = f'campaign.over."{cut(key, 200)}"'
     try:
         path = path_of(key, names, scenario.where)
         if path[0] in SHARED:
