@@ -116,6 +116,10 @@ def fly_campaign(
     store = (
         Store.open(folder).resume(manifest) if options.resume and exists else Store.create(folder, manifest, options.force)
     )
+    for name in laws:
+        store.files(name)
+    for line in store.notices:
+        warnings.warn(line, stacklevel=2)
     job.progress = notice if isinstance(engine, Threads) else None
     begun, flown = time.perf_counter(), 0
 
@@ -128,10 +132,7 @@ def fly_campaign(
     if options.until_decided:
         runs = _fly_until_decided(store, job, engine, arrived)
     else:
-        blocks = list(_blocks(store, notice))
-        for line in store.notices:
-            warnings.warn(line, stacklevel=2)
-        fly_all(job, blocks, store.put, engine, arrived)
+        fly_all(job, _blocks(store, notice), store.put, engine, arrived)
         runs = table.runs
     seconds = time.perf_counter() - begun
     results = summarise(store, job, laws, options.until_decided)
@@ -152,8 +153,7 @@ def fly_campaign(
     store.finish(told, totals)
     over = {", ".join(one.keys): in_words(one, table) for one in job.dispersions}
     asked = job.requirements(laws[0])
-    notices = tuple(store.notices)
-    return CampaignResult(scenario.name, folder, runs, table.sampling, over, results, told, seconds, flown, asked, notices)
+    return CampaignResult(scenario.name, folder, runs, table.sampling, over, results, told, seconds, flown, asked)
 
 
 class FlownAgain(NamedTuple):

@@ -119,8 +119,6 @@ class CampaignResult:
     seconds: float
     flown: int
     requirements: tuple[Requirement, ...] = ()
-    notices: tuple[str, ...] = ()
-    """A line for each file of runs that was found spoiled, and flown again."""
 
     @property
     def met(self) -> bool | None:

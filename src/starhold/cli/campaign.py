@@ -60,8 +60,6 @@ def campaign(
     with flying_campaign(laws, scenario.table.campaign.runs) as notice:
         options = Options(engine, None, resume, force, until_decided, search)
         result = fly_campaign(scenario, folder, law, options, notice)
-    for line in result.notices:
-        print(f"starhold: {line}", file=sys.stderr)
     print_campaign(result, scenario.body)
     page = write_campaign(scenario, result)
     console.print(f"Report: {page}", soft_wrap=True)
