@@ -105,7 +105,7 @@ def test_optimised_states_of_the_set(name):
     _, V, _ = SYSTEMS[name]
     level = proved(name)[1].claims[0].numbers["level"]
     x = states(name, 40_000)
-    worst = x[:, np.argsort(-rises(name, x))[:3]]
+    worst = x[:, np.argsort(-rises(name, x))[:5]]
 
     def against(s):
         value = float(V(s))
@@ -123,7 +123,7 @@ def test_motions_stay_and_come_to_the_set(name):
     rates, V, time = SYSTEMS[name]
     level = proved(name)[1].claims[0].numbers["level"]
     x = states(name)
-    outermost = x[:, np.argsort(-V(x))[:3]]
+    outermost = x[:, np.argsort(-V(x))[:6]]
     for start in outermost.T:
         flown = solve_ivp(lambda t, s: rates(s), (0.0, time), start, rtol=1e-9, atol=1e-11, max_step=0.1)
         values = V(flown.y)

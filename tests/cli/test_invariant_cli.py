@@ -63,7 +63,7 @@ def test_a_refuted_claim_ends_with_three_and_its_state(tmp_path):
 
 
 def test_an_undecided_claim_ends_with_four(tmp_path, monkeypatch):
-    # No number of boxes shows it.
+    # Nor is it shown with 25 times as many boxes.
     monkeypatch.setattr(enclosure, "MOST", 10_000)
     assert written(tmp_path, y="0", theorem="attracts").returncode == 4
 
