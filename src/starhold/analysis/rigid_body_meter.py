@@ -158,10 +158,13 @@ def make_meter(
 def _note(parts: Composition, late: bool, overshoot: bool, iterations: bool) -> Any:
     """The equations of the notes, before the last quarter or in it; one function for loops that one kernel flies."""
     read, limit = sampled(parts), parts.limit
+    # Of a target at rest the rate error is the rate; the arithmetic on its zeros is spared here, as in `observe`.
+    still = parts.target is None or parts.target.flag("STILL")
 
     def note(seen: Noted, decided: Any, carry: Any, step: Any, setup: Any, told: Told) -> Noted:
         own, now = read(decided, step, setup), number_of(step)
-        q, rate, torque, command = (own[name] for name in ("attitude_error", "rate_error", "torque", "command"))
+        q, torque, command = (own[name] for name in ("attitude_error", "torque", "command"))
+        rate = own["rate"] if still else own["rate_error"]
         angle_square = q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
         rate_square, torque_square = dot(rate, rate), dot(torque, torque)
         size, chatter, tail = sqrt(torque_square), seen.chatter_sum, (seen.first_error, seen.error, seen.torque)

@@ -50,7 +50,7 @@ def fly_metered(
     notes before the flight (numbers, lanes); cuts: control steps at which windows end, `late` among them unless it is 0, the
     last at the end of the flight; rows: noted numbers that begin anew in each window, at 0.
     """
-    fleet = Fleet(loop, carries, first_run, widest(len(carries)), observers[0], noted)
+    fleet = Fleet(loop, carries, first_run, widest(len(carries), len(noted)), observers[0], noted)
     for phase in phases:
         for observer in observers:
             fleet.prepare(phase, observer)

@@ -38,12 +38,13 @@ FEW = 16
 """Numbers carried from step to step for which 16 registers are still enough for two vectors of each."""
 
 
-def widest(carried: int) -> int:
-    """Return the number of lanes in flight at once on this processor that fly fastest, where each carries so many numbers:
-    two of its widest registers for a number where there are 32 of them, or where few numbers are carried; else one."""
+def widest(carried: int, noted: int = 0) -> int:
+    """Return the number of lanes in flight at once on this processor that fly fastest, where each carries so many numbers,
+    and so many are noted of it along the way: two of its widest registers for a number where there are 32 of them and
+    nothing is noted, or where there are few numbers; else one."""
     if _is_wide():
-        return 16
-    return 8 if carried <= FEW else 4
+        return 8 if noted else 16
+    return 8 if carried + noted <= FEW else 4
 
 
 def _is_wide() -> bool:
