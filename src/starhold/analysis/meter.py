@@ -25,7 +25,7 @@ Metrics: TypeAlias = dict[str, Array]
 """Metrics by name, (lanes,), NaN where one has no value."""
 
 
-WINDOWS = 60
+WINDOWS = 40
 """Windows of time that envelopes have, more or less."""
 
 

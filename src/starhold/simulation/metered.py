@@ -18,7 +18,7 @@ from starhold.trace.machine import widest
 Array = NDArray[np.float64]
 
 
-PIECES = 4
+PIECES = 2
 """Pieces of a batch for each thread: few, for each is called once a window."""
 
 
