@@ -127,7 +127,7 @@ def campaign(
         key: list(value) if key in ("metrics", "requirement") and not isinstance(value, str | Mapping | None) else value
         for key, value in changes.items()
     }
-    options = Options(engine_of(threads, workers, scheduler), None, resume, force, until_decided, search)
+    options = Options(engine_of(threads, workers, scheduler), resume, force, until_decided, search)
     place = Path(_temporary() if folder is None else folder)
     return fly_campaign(with_campaign(_opened(scenario), plain), place, law, options, progress)
 

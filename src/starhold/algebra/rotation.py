@@ -10,7 +10,7 @@ from starhold.algebra.scalar import absolute, minimum, side, sqrt
 from starhold.algebra.vector import Vector, dot, scale
 
 _TERMS = 20
-"""Of the series of asin(x) / x in x^2 <= sin(pi/8)^2: the rest is below 2^-55."""
+"""The series of asin(x) / x is cut after so many, in x^2 <= sin(pi/8)^2: the rest is below 2^-55."""
 _SERIES = tuple(float(Fraction(comb(2 * n, n), 4**n * (2 * n + 1))) for n in range(_TERMS))
 
 

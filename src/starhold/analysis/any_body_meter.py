@@ -9,10 +9,10 @@ import numpy as np
 
 from starhold.algebra.quantity import quantities
 from starhold.algebra.scalar import less, maximum, sqrt, where
-from starhold.algebra.structure import flatten, leaves
+from starhold.algebra.structure import flatten, leaves, places
 from starhold.algebra.words import number_of
 from starhold.analysis.any_body import COMMAND
-from starhold.analysis.meter import Flown, Meter, Metrics, Window, largest_since, most, rows_of, sampled, tail_start
+from starhold.analysis.meter import Flown, Meter, Metrics, Window, largest_since, most, sampled, tail_start
 from starhold.loop.closed_loop import ClosedLoop, Composition
 from starhold.loop.kernels import Observer, make_step
 
@@ -31,7 +31,7 @@ def make_meter(loop: ClosedLoop, steps: int) -> Meter:
     told = _recorded(loop)
     first = Noted(0.0, 0.0, (0.0,) * len(told))
     tail, clock = tail_start(steps), getattr(loop.body.module, "TIME_UNIT", "s")
-    rows = rows_of(first).windows
+    rows = places(first).windows
     windows = {
         name: Window(row, np.sqrt, quantity.text, quantity.unit)
         for row, (name, quantity) in zip(rows, told.items(), strict=True)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from starhold.algebra.scalar import absolute, less, less_equal, maximum, minimum, sqrt, where
+from starhold.algebra.scalar import absolute, less, maximum, minimum, sqrt, where
+from starhold.algebra.structure import places
 from starhold.algebra.vector import ZERO, Vector, dot, subtract
 from starhold.algebra.words import number_of
 from starhold.analysis.libration_point import YEAR, CircleGoal, EquilibriumGoal
@@ -17,15 +18,14 @@ from starhold.analysis.meter import (
     Meter,
     Metrics,
     Window,
+    is_on_limit,
     largest_since,
-    most,
     outside,
-    rows_of,
     sampled,
     tail_start,
     within_since,
 )
-from starhold.analysis.metrics import ALMOST, LAST
+from starhold.analysis.metrics import LAST
 from starhold.loop.closed_loop import ClosedLoop, Composition
 from starhold.loop.kernels import Observer
 
@@ -64,7 +64,7 @@ def make_meter(loop: ClosedLoop, steps: int, units: Units, goal: CircleGoal | Eq
     circle = isinstance(goal, CircleGoal)
     told = Told(goal.radius, ZERO, tolerance, float(steps)) if circle else Told(0.0, goal.place, tolerance, float(steps))
     first = Noted(-1.0, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, 0.0, 0.0)
-    half, tail, rows = (steps + 1) // 2, tail_start(steps), rows_of(first)
+    half, tail, rows = (steps + 1) // 2, tail_start(steps), places(first)
     length, push = units.length, units.acceleration
     windows = {
         "distance": Window(rows.window_away, lambda x: np.sqrt(x) * length, "distance from what is held", "m"),
@@ -127,8 +127,7 @@ def _note(parts: Composition, circle: bool, late: bool) -> Any:
         apart = subtract(position, told.place)
         away = off * off + x * x if circle else dot(apart, apart)
         square = dot(control, control)
-        asked = sqrt(dot(command, command)) if kind == "norm" else most(command)
-        bound = less(asked, -1.0) if kind == "none" else less_equal(setup.limit * ALMOST, asked)
+        bound = is_on_limit(command, setup.limit, kind)
         return Noted(
             outside(seen.outside, away, told.near * told.near, now),
             seen.total + where(less(now, told.last), sqrt(square), 0.0),

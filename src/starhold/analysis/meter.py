@@ -14,9 +14,10 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.scalar import absolute, less_equal, maximum, where
-from starhold.algebra.structure import flatten, places, unflatten
-from starhold.analysis.metrics import KEPT, LAST
+from starhold.algebra.scalar import absolute, less, less_equal, maximum, sqrt, where
+from starhold.algebra.structure import flatten, unflatten
+from starhold.algebra.vector import dot
+from starhold.analysis.metrics import ALMOST, KEPT, LAST
 from starhold.loop.closed_loop import Composition
 from starhold.loop.kernels import Observer, make_step
 
@@ -96,11 +97,6 @@ def sampled(parts: Composition) -> Callable[..., dict[str, Any]]:
     return read
 
 
-def rows_of(first: Any) -> Any:
-    """The place of each noted number by its name."""
-    return places(first)
-
-
 def window_ends(steps: int, marks: Sequence[int]) -> list[int]:
     """The control steps at which windows of a flight end, every mark among them."""
     edges = [0, *marks, steps]
@@ -145,3 +141,9 @@ def most(v: tuple[Any, ...]) -> Any:
     for component in v[1:]:
         found = maximum(found, absolute(component))
     return found
+
+
+def is_on_limit(command: Any, limit: Any, kind: str) -> Any:
+    """Whether a command is on its limit, as `on_limit` tells of samples; never where there is none."""
+    size = sqrt(dot(command, command)) if kind == "norm" else most(command)
+    return less(size, -1.0) if kind == "none" else less_equal(limit * ALMOST, size)

@@ -13,6 +13,7 @@ import numpy as np
 from starhold.algebra.quaternion import to_reference, vector_part
 from starhold.algebra.rotation import rotation_vector
 from starhold.algebra.scalar import absolute, both, either, less, less_equal, maximum, minimum, sqrt, where
+from starhold.algebra.structure import places
 from starhold.algebra.vector import ZERO, Vector, dot, scale, subtract
 from starhold.algebra.words import number_of
 from starhold.analysis.meter import (
@@ -22,10 +23,10 @@ from starhold.analysis.meter import (
     Metrics,
     Window,
     chosen,
+    is_on_limit,
     largest_since,
     most,
     outside,
-    rows_of,
     sampled,
     tail_start,
     within_since,
@@ -127,7 +128,7 @@ def make_meter(
     tail = tail_start(steps)
     angle = math.sin(0.5 * min(attitude_tolerance, math.pi)) ** 2
     told = Told(angle, rate_tolerance**2, float(tail), float(steps), tuple(cones.values()))
-    rows = rows_of(first)
+    rows = places(first)
     windows = {
         "attitude_error": Window(rows.window_angle, _angle, "angle to the target", "rad"),
         "rate_error": Window(rows.window_rate, np.sqrt, "rate relative to the target", "rad/s"),
@@ -174,7 +175,7 @@ def _note(parts: Composition, late: bool, overshoot: bool, iterations: bool) -> 
             change = subtract(torque, seen.torque)
             size = where(less(now, told.last), size, 0.0)
             chatter = chatter + where(chatters, sqrt(dot(change, change)), 0.0)
-        bound, peak_wheel = _on_limit(command, setup.limit, limit), seen.peak_wheel_momentum
+        bound, peak_wheel = is_on_limit(command, setup.limit, limit), seen.peak_wheel_momentum
         for momentum, asked, there in zip(*(own.get(name, ()) for name in WHEEL), strict=True):
             peak_wheel, asked = maximum(peak_wheel, absolute(momentum)), absolute(asked)
             bound = either(bound, both(less(0.0, asked), less_equal(there * ALMOST, asked)))
@@ -201,13 +202,6 @@ def _note(parts: Composition, late: bool, overshoot: bool, iterations: bool) -> 
 
 
 WHEEL = ("wheel_momentum", "wheel_command", "wheel_available")
-
-
-def _on_limit(command: Vector, limit: Any, kind: str) -> Any:
-    if kind == "norm":
-        return less_equal(limit * ALMOST, sqrt(dot(command, command)))
-    largest = most(command)
-    return less_equal(limit * ALMOST, largest) if kind == "axis" else less(largest, -1.0)
 
 
 def _nearest(least: Any, cone: Cone, attitude: Any) -> Any:

@@ -17,7 +17,7 @@ from starhold.campaign.chunk import Chunk
 from starhold.campaign.digest import digest
 from starhold.campaign.engines import Engine, Threads, Workers, fly_all
 from starhold.campaign.job import Job, Source, scenario_of
-from starhold.campaign.manifest import Manifest
+from starhold.campaign.manifest import FILE, Manifest
 from starhold.campaign.results import CampaignResult
 from starhold.campaign.store import Store
 from starhold.campaign.summary import summarise, verdicts_of
@@ -44,11 +44,9 @@ Notice = Callable[[str, int], None]
 
 @dataclass(frozen=True)
 class Options:
-    """How a campaign is flown; nothing of it changes results. engine: None for all cores of this process; chunk: runs of a
-    block, None for what suits."""
+    """How a campaign is flown; nothing of it changes results. engine: None for all cores of this process."""
 
     engine: Engine | None = None
-    chunk: int | None = None
     resume: bool = False
     force: bool = False
     until_decided: bool = False
@@ -106,13 +104,13 @@ def fly_campaign(
         | ({"until_decided": True} if options.until_decided else {}),
         laws=laws,
         runs=table.runs,
-        chunk=LOOK if options.until_decided else options.chunk or _chunk(table.runs, engine, at_once),
+        chunk=LOOK if options.until_decided else _chunk(table.runs, engine, at_once),
         seed=table.seed,
         extensible=table.sampling in ("random", "sobol"),
         folder=str(scenario.folder.resolve()),
         allow_unstable=scenario.allow_unstable,
     )
-    exists = (folder / "manifest.json").exists()
+    exists = (folder / FILE).exists()
     store = (
         Store.open(folder).resume(manifest) if options.resume and exists else Store.create(folder, manifest, options.force)
     )

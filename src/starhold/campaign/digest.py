@@ -14,7 +14,7 @@ from starhold.campaign.store import Store
 from starhold.errors import InputError
 
 _MOST_BYTES = 2**25
-"""Of columns that are held in memory at once, for 8 bytes a number."""
+"""Columns of so many bytes are held in memory at once, 8 a number."""
 
 
 def digest(store: Store, runs: int | None = None) -> str:

@@ -41,16 +41,17 @@ class Dispersion:
     """The names of the numbers that are drawn: a key, with its component from 1, "initial.rate[2]", or its row and column;
     of a symmetric matrix those on and above the diagonal."""
     shape: tuple[int, ...]
-    """Of the key: () a number or a word, (n,) a vector or a diagonal, (n, n) a matrix. Several keys hold a number each."""
+    """The key has this shape: () a number or a word, (n,) a vector or a diagonal, (n, n) a matrix. Several keys hold a
+    number each."""
     known: bool
     """Whether the values are known before flight."""
     distribution: Distribution
     nominal: tuple[Any, ...]
     """The numbers or the word that the file has, for each column; NaN where it has none."""
     places: tuple[Place, ...]
-    """What is known of each key."""
+    """Each key is found there, with its bounds."""
     scale: Numbers | None = None
-    """What numbers drawn as shares are shares of, for each column; None where they are no shares."""
+    """Numbers drawn as shares are shares of these, one for each column; None where they are no shares."""
 
     @property
     def dims(self) -> int:

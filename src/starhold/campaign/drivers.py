@@ -49,8 +49,8 @@ TOGETHER = 1e-3
 FEWEST_RUNS = 10
 """Runs that have a metric, without which nothing is said about it."""
 ROUNDS = 300
-"""Of the fit of independent causes, whose likelihood grows in each; what is missing makes a pair look the better by
-little."""
+"""The fit of independent causes takes so many; its likelihood grows in each, and what is missing makes a pair look the
+better by little."""
 
 
 @dataclass(frozen=True)

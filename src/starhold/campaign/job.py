@@ -27,6 +27,7 @@ from starhold.simulation.metered import fly_metered
 from starhold.studies.body import study_of
 
 if TYPE_CHECKING:
+    from starhold.loop.closed_loop import ClosedLoop
     from starhold.simulation.lane import Progress
 
 
@@ -58,9 +59,10 @@ class Job:
     progress: Callable[[str, int], None] | None = None
     """Called with a law and how many more of its runs were flown, as a block goes on; not from other processes."""
     _lanes: dict[str, Lanes] = field(default_factory=dict[str, Lanes])
+    _meters: dict[str, Meter] = field(default_factory=dict[str, Meter])
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"source": self.source, "table": self.table, "progress": None, "_lanes": {}}
+        return {"source": self.source, "table": self.table, "progress": None, "_lanes": {}, "_meters": {}}
 
     @cached_property
     def scenario(self) -> Scenario:
@@ -84,13 +86,16 @@ class Job:
             self._lanes[law] = Lanes(self.scenario, law, self.plan)
         return self._lanes[law]
 
-    def meter(self, law: str, lot: Lot | None = None) -> Meter:
-        """The meter of the runs of a law, or of one lot of them. InputError where it cannot be measured what is asked."""
-        if lot is None:
+    def meter(self, law: str) -> Meter:
+        """The meter of a law as the scenario has it, made when it is first asked for. InputError where it cannot be measured
+        what is asked."""
+        if law not in self._meters:
             loop = build(self.scenario, self.scenario.pick(law))
-            gains = loop.gains
-        else:
-            loop, gains = lot.loop, lot.phases[0].gains
+            self._meters[law] = self._meter_of(loop, loop.gains)
+        return self._meters[law]
+
+    def _meter_of(self, loop: ClosedLoop, gains: Any) -> Meter:
+        """The meter of lanes of a loop; gains: with an array (lanes,) in place of a number that differs."""
         required = self.table.requirement
         extras, cones = extras_of(required, self.table.metrics), cones_of(required)
         try:
@@ -156,15 +161,15 @@ class Job:
         numbers, which number their random ones; take: called with metrics and windows of each lot."""
         found: Metrics = {}
         for lot, at, told in self.lanes(law).lots(columns, runs):
-            metrics, windows = self._fly(law, lot, threads, progress)
+            metrics, windows = self._fly(lot, threads, progress)
             take(metrics, windows)
             for name, values in (told | metrics).items():
                 found.setdefault(name, np.full(len(runs), np.nan))[at] = values
         return found
 
-    def _fly(self, law: str, lot: Lot, threads: int, progress: Progress | None) -> tuple[dict[str, Any], Any]:
+    def _fly(self, lot: Lot, threads: int, progress: Progress | None) -> tuple[dict[str, Any], Any]:
         """The metrics of a lot, (lanes,), and what was noted in windows (windows, quantities, lanes)."""
-        meter = self.meter(law, lot)
+        meter = self._meter_of(lot.loop, lot.phases[0].gains)
         lanes, runs = len(lot.runs), lot.runs
         along = bool((np.diff(runs) == 1).all())
         flown = fly_metered(

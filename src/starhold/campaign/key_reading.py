@@ -30,7 +30,7 @@ class KeyReading:
     place: Place
     table: Any
     index: tuple[tuple[int, ...], ...]
-    """Of the components that are drawn."""
+    """The components that are drawn have these indices."""
     relative: bool
 
     @staticmethod

@@ -69,8 +69,9 @@ class Lanes:
         self.base = self.exact(self.first)
         self.moved: dict[str, set[int]] = {}
         self._varied: list[Flat] = []
+        more = plan.columns(0, min(TRIES, plan.runs))
         for dispersion in plan.dispersions:
-            self.moved[", ".join(dispersion.keys)] = self._moved_by(dispersion)
+            self.moved[", ".join(dispersion.keys)] = self._moved_by(dispersion, more)
         fixed = not any(_FORM in places for places in self.moved.values())
         probes = np.arange(min(plan.runs, PROBES))
         self.at_once = fixed and self._agrees(plan.columns(0, len(probes)), probes)
@@ -103,7 +104,7 @@ class Lanes:
             place = int(np.flatnonzero(refused)[0])
             next(self._each(_one(columns, place), [runs[place]]))
         # A look at two of them, for what no probe showed.
-        looked = [0, len(runs) // 2]
+        looked = sorted({0, len(runs) // 2})
         if self.at_once and self._agrees(_some(columns, looked), runs[looked]):
             lot = self._together(columns, runs)
             yield lot, np.arange(len(runs)), self._told(lot)
@@ -116,9 +117,8 @@ class Lanes:
             lot = self._apart([flats[place] for place in places], runs[places])
             yield lot, np.array(places), self._told(lot)
 
-    def _moved_by(self, dispersion: Dispersion) -> set[int]:
-        """The places of numbers that differ where the values of one dispersion alone do."""
-        more = self.plan.columns(0, min(TRIES, self.plan.runs))
+    def _moved_by(self, dispersion: Dispersion, more: Columns) -> set[int]:
+        """The places of numbers that differ where the values of one dispersion alone do; more: columns of the first runs."""
         names = dispersion.columns
         others = [run for run in range(self.plan.runs)[:TRIES] if any(more[n][run] != self.first[n][0] for n in names)]
         found: set[int] = set()

@@ -123,9 +123,8 @@ def _drivers(
         return None
     inputs = {name: values[:MOST_DRIVEN] for name, values in store.columns(names, law).items()}
     inputs |= _sizes(job, inputs)
-    asked = [requirement.column for requirement in requirements if not np.isnan(requirement.bound)]
-    metrics = dict.fromkeys(asked or [name for name in job.meter(law).units if name in USUAL])
-    told = {name: values[:MOST_DRIVEN] for name, values in store.columns(list(metrics), law).items()} if metrics else {}
+    metrics = _of_interest(job, law, requirements)
+    told = {name: values[:MOST_DRIVEN] for name, values in store.columns(metrics, law).items()} if metrics else {}
     return find_drivers(inputs, failed[:MOST_DRIVEN], told)
 
 
@@ -153,12 +152,17 @@ USUAL = (
 """Metrics whose drivers are looked for where nothing is required."""
 
 
+def _of_interest(job: Job, law: str, requirements: tuple[Requirement, ...]) -> list[str]:
+    """The metrics whose causes are looked for: those that are bounded, else the usual ones."""
+    asked = [requirement.column for requirement in requirements if not np.isnan(requirement.bound)]
+    return list(dict.fromkeys(asked or [name for name in job.meter(law).units if name in USUAL]))
+
+
 def _indices(store: Store, job: Job, law: str, requirements: tuple[Requirement, ...]) -> Mapping[str, Any]:
     kind = KINDS.get(job.table.sampling)
     if kind is None:
         return {}
-    asked = [requirement.column for requirement in requirements if not np.isnan(requirement.bound)]
-    names = list(dict.fromkeys(asked or [name for name in job.meter(law).units if name in USUAL]))
+    names = _of_interest(job, law, requirements)
     unit, columns = job.plan.points(), store.columns(names, law)
     return {name: kind(job.plan.factors, unit, columns[name]) for name in names}
 

@@ -58,7 +58,7 @@ def campaign(
     laws = [entry.name for entry in scenario.laws] if law is None else [scenario.pick(law).name]
     folder = output or Path("results") / f"{scenario.name}-campaign"
     with flying_campaign(laws, scenario.table.campaign.runs) as notice:
-        options = Options(engine, None, resume, force, until_decided, search)
+        options = Options(engine, resume, force, until_decided, search)
         result = fly_campaign(scenario, folder, law, options, notice)
     print_campaign(result, scenario.body)
     page = write_campaign(scenario, result)

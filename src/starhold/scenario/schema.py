@@ -66,6 +66,27 @@ class Timing(Table):
         return round(self.duration / self.control_period)
 
 
+class SeededTiming(Timing):
+    """How long and how finely, in whole control periods, and which random numbers."""
+
+    seed: Annotated[int, *quantity(Gain("1", at_least=0, at_most=2**53, whole=True, text="of all random numbers"))] = 1
+    run: Annotated[
+        int,
+        *quantity(
+            Gain("1", at_least=0, at_most=2**53, whole=True, text="of a campaign: each has random numbers of its own")
+        ),
+    ] = 0
+
+    @model_validator(mode="after")
+    def _whole_steps(self) -> SeededTiming:
+        count = self.duration / self.control_period
+        if abs(count - round(count)) > 1e-6:
+            raise at_key(
+                "duration", f"a whole number of control periods of {self.control_period:g}{self.unit}", self.duration
+            )
+        return self
+
+
 def columns(declared: Iterable[Parameter]) -> dict[str, Any]:
     """The keys, for pydantic's `create_model`, of a table that takes the declared parameters of a law or another part."""
     found: dict[str, Any] = {}

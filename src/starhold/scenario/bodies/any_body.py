@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, cast
 
-from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo, create_model, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo, create_model
 from pydantic_core import PydanticCustomError
 
 from starhold.algebra.quantity import quantities
@@ -28,8 +28,8 @@ from starhold.scenario.bodies.interface import Body
 from starhold.scenario.checking import nearest, show
 from starhold.scenario.parts import params_of, with_rows
 from starhold.scenario.quantity import quantity
-from starhold.scenario.schema import LawTable, ScenarioTable, Timing, columns
-from starhold.scenario.tables import Table, at_key, check_name
+from starhold.scenario.schema import LawTable, ScenarioTable, SeededTiming, columns
+from starhold.scenario.tables import Table, check_name
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
@@ -37,26 +37,12 @@ if TYPE_CHECKING:
 MARKER = "body"
 
 
-class AnyTiming(Timing):
+class AnyTiming(SeededTiming):
     """How long and how finely."""
 
     lost_beyond: Annotated[
         float | None, *quantity(Gain(above=0.0, text="distance at which the body counts its motion as lost; none if absent"))
     ] = None
-    seed: Annotated[int, *quantity(Gain("1", at_least=0, at_most=2**53, whole=True, text="of all random numbers"))] = 1
-    run: Annotated[
-        int,
-        *quantity(
-            Gain("1", at_least=0, at_most=2**53, whole=True, text="of a campaign: each has random numbers of its own")
-        ),
-    ] = 0
-
-    @model_validator(mode="after")
-    def _whole_steps(self) -> AnyTiming:
-        count = self.duration / self.control_period
-        if abs(count - round(count)) > 1e-6:
-            raise at_key("duration", f"a whole number of control periods of {self.control_period:g}", self.duration)
-        return self
 
 
 class BodyFromFile(Table):

@@ -13,7 +13,7 @@ from starhold.parts.craft import check_inertia
 from starhold.scenario.bodies.rigid_body.transient import TransientTable
 from starhold.scenario.orbit import Orbit
 from starhold.scenario.quantity import quantity, quantity_or, reader
-from starhold.scenario.schema import LawTable, ScenarioTable, Timing
+from starhold.scenario.schema import LawTable, ScenarioTable, SeededTiming
 from starhold.scenario.tables import Flag, Table, at_key, refuse
 
 QUATERNION = Gain("1", shape=(4,), spread=False, text="quaternion, scalar first, normalised on reading")
@@ -117,26 +117,12 @@ class Sensor(Table):
     rate_noise: Annotated[float, *quantity(Gain("rad/s", at_least=0.0, text="standard deviation per axis"))] = 0.0
 
 
-class Simulation(Timing):
+class Simulation(SeededTiming):
     """How long and how finely."""
 
     unit: ClassVar[str] = " s"
     duration: Annotated[float, *quantity(Gain("s", above=0.0, text="length of the run"))]
     control_period: Annotated[float, *quantity(Gain("s", above=0.0, text="for which a torque is held"))] = 0.1
-    seed: Annotated[int, *quantity(Gain("1", at_least=0, at_most=2**53, whole=True, text="of all random numbers"))] = 1
-    run: Annotated[
-        int,
-        *quantity(
-            Gain("1", at_least=0, at_most=2**53, whole=True, text="of a campaign: each has random numbers of its own")
-        ),
-    ] = 0
-
-    @model_validator(mode="after")
-    def _whole_steps(self) -> Simulation:
-        count = self.duration / self.control_period
-        if abs(count - round(count)) > 1e-6:
-            raise at_key("duration", f"a whole number of control periods of {self.control_period:g} s", self.duration)
-        return self
 
 
 class Tolerances(Table):
