@@ -7,16 +7,13 @@ from pathlib import Path
 import pytest
 
 from starhold.certification.certificate import write
-from starhold.certification.certify import Wanted, certify
-from tests.certification.loops import loop_of, textbook
+from tests.certification.loops import certified
 
 
 @cache
 def _made(name, sign_policy, disturbance, tmp):
-    loop = textbook()[name]
-    loop = loop_of(loop.law.name, loop.gains, loop.craft, sign_policy=sign_policy)
     path = Path(tmp) / f"{name}-{sign_policy}-{disturbance}.json"
-    write([certify(loop, name, Wanted(disturbance=disturbance))], "made", path)
+    write([certified(name, sign_policy, disturbance)], "made", path)
     return path.read_text(encoding="utf-8")
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from starhold.algebra.quaternion import NO_TURN
 from starhold.algebra.vector import ZERO
+from starhold.certification.certify import Wanted, certify
 from starhold.conformance.bench import sample_loop
 from starhold.laws import lqr, matrix_pd
 from starhold.laws.catalogue import catalogue
@@ -62,6 +63,18 @@ def textbook():
     return found
 
 
+def certified(name, sign_policy="as_published", disturbance=0.0):
+    """The certificate of a loop of these, made once for all tests of a worker."""
+    return _certified(name, sign_policy, disturbance)
+
+
+@cache
+def _certified(name, sign_policy, disturbance):
+    loop = textbook()[name]
+    loop = loop_of(loop.law.name, loop.gains, loop.craft, sign_policy=sign_policy)
+    return certify(loop, name, Wanted(disturbance=disturbance))
+
+
 def rotors(law, gains, target=None, layout=pyramid, **changes):
     """A law on reaction wheels that hold some momentum at the start; in orbit, under the gravity gradient, if the target is
     there."""
@@ -85,5 +98,5 @@ def gain_names(law):
     return [item.name for item in fields(catalogue()[law].gains)]
 
 
-__all__ = ["FULL", "LOPSIDED", "PRINCIPAL", "UNEVEN", "free", "gain_names", "loop_of", "random_craft", "rotors", "tensor"]
-__all__ += ["textbook"]
+__all__ = ["FULL", "LOPSIDED", "PRINCIPAL", "UNEVEN", "certified", "free", "gain_names", "loop_of", "random_craft"]
+__all__ += ["rotors", "tensor", "textbook"]

@@ -11,7 +11,6 @@ from starhold.algebra.polynomial import exact
 from starhold.algebra.quaternion import NO_TURN, derivative
 from starhold.algebra.vector import ZERO, add
 from starhold.analysis.trial import draw
-from starhold.certification.certify import Wanted, certify
 from starhold.certification.frame import take_apart, take_cross
 from starhold.certification.matrices import floats, number
 from starhold.certification.motion import Motion
@@ -20,7 +19,10 @@ from starhold.certification.subject import make_subject
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.bodies.rigid_body import angular_acceleration
 from starhold.trace.calling import Compiled
-from tests.certification.loops import textbook
+from tests.certification.loops import certified, textbook
+
+# Together: each worker would make the certificates of the textbook loops for itself.
+pytestmark = pytest.mark.xdist_group("textbook")
 
 LOOPS = textbook()
 NAMES = sorted(name for name in LOOPS if not name.startswith("sliding"))
@@ -102,7 +104,7 @@ def worst_first(loop, score, states):
 def test_no_proved_obligation_breaks(name):
     loop = LOOPS[name]
     # No bound against torque is built for a V that is even in q.
-    certificate = certify(loop, name, Wanted(disturbance=0.0 if name.startswith("wheel") else 1e-4))
+    certificate = certified(name, disturbance=0.0 if name.startswith("wheel") else 1e-4)
     random = np.random.default_rng(11)
     for claim in certificate.claims:
         assert claim.outcome == "proved"
@@ -154,7 +156,7 @@ def attack(loop, claim, function, states):
 def test_the_attack_breaks_what_is_false(kind, numbers, witness):
     """Claims made too strong by these factors, with the same states as the proved ones."""
     loop = LOOPS["lqr-III"]
-    claim = certify(loop, "", Wanted(disturbance=1e-4)).claim(kind)
+    claim = certified("lqr-III", disturbance=1e-4).claim(kind)
     strong = replace(
         claim,
         numbers={k: v * numbers[k] if k in numbers else v for k, v in claim.numbers.items()},
@@ -173,7 +175,7 @@ def test_the_attack_breaks_what_is_false(kind, numbers, witness):
 def test_no_proved_surface_breaks(name):
     """s.Js' <= sum of |s_i| (torque_i - reach_i) outside the layer, for any torque within the bounds."""
     loop = LOOPS[name]
-    certificate = certify(loop, name, Wanted(disturbance=1e-3))
+    certificate = certified(name, disturbance=1e-3)
     claim = certificate.claim("sliding")
     assert claim.outcome == "proved"
     random = np.random.default_rng(12)

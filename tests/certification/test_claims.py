@@ -4,11 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize
 
 from starhold.algebra.quaternion import derivative
 from starhold.analysis.trial import draw, fly_claims
-from starhold.certification.certify import Wanted, certify
+from starhold.certification.certify import certify
 from starhold.certification.frame import take_apart
 from starhold.certification.matrices import floats, number
 from starhold.certification.motion import Motion
@@ -17,8 +16,11 @@ from starhold.certification.subject import make_subject
 from starhold.laws import lqr, matrix_pd, pd, sliding
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.craft import make_craft
-from tests.certification.loops import FULL, PRINCIPAL, UNEVEN, loop_of, random_craft, tensor, textbook
+from tests.certification.loops import FULL, PRINCIPAL, UNEVEN, certified, loop_of, random_craft, tensor, textbook
 from tests.equations import two_body_gravity_gradient
+
+# Together: each worker would make the certificates of the textbook loops for itself.
+pytestmark = pytest.mark.xdist_group("textbook")
 
 LOOPS = textbook()
 ANY = {"wheel-0", "wheel-1", "lqr-I", "lqr-II", "lqr-III", "pd-0", "pd-1", "pd-2", "lyapunov-0", "lyapunov-1"}
@@ -26,7 +28,7 @@ ANY = {"wheel-0", "wheel-1", "lqr-I", "lqr-II", "lqr-III", "pd-0", "pd-1", "pd-2
 
 @pytest.mark.parametrize("name", sorted(LOOPS))
 def test_every_law_is_certified_under_its_textbook_assumptions(name):
-    certificate = certify(LOOPS[name], name)
+    certificate = certified(name)
     assert certificate.outcome == "proved", [(c.kind, c.outcome) for c in certificate.claims]
     main = certificate.claim("sliding" if name.startswith("sliding") else "convergence")
     assert main.numbers["everything"]
@@ -36,8 +38,7 @@ def test_every_law_is_certified_under_its_textbook_assumptions(name):
 @pytest.mark.parametrize("name", sorted(n for n in LOOPS if not n.startswith(("sliding", "wheel"))))
 @pytest.mark.parametrize("sign_policy", ["shortest", "hysteresis"])
 def test_the_quaternion_sign_is_in_the_claim(name, sign_policy):
-    loop = loop_of(LOOPS[name].law.name, LOOPS[name].gains, LOOPS[name].craft, sign_policy=sign_policy)
-    certificate = certify(loop, name)
+    certificate = certified(name, sign_policy)
     main = certificate.claim("convergence")
     assert main.outcome == "proved"
     names = [o.name for o in main.obligations]
@@ -45,7 +46,7 @@ def test_the_quaternion_sign_is_in_the_claim(name, sign_policy):
         assert names[-1] == "jumps lower V"
     else:
         # The switch at half a turn is outside the set, and all that is less than half a turn at rest is inside.
-        s = 2.0 * (main.witness["stiffness"] or take_s(loop) / 2.0)
+        s = 2.0 * (main.witness["stiffness"] or take_s(LOOPS[name]) / 2.0)
         assert main.numbers["start"] < s
         assert math.radians(179.5) < main.numbers["slew_angle"] < math.pi
 
@@ -88,53 +89,6 @@ def exact_kappa(moments, y):
     return (j[2] - j[1]) / k[0] + (j[0] - j[2]) / k[1] + (j[1] - j[0]) / k[2]
 
 
-@pytest.mark.parametrize(
-    ("name", "kind"),
-    [
-        ("pd-0", "axis"),
-        ("pd-0", "norm"),
-        ("lqr-I-gyroscopic-left", "axis"),
-        ("matrix-pd-inertial", "norm"),
-        ("lyapunov-0", "norm"),
-        # Each law has one kind above, and each kind two laws or more.
-        pytest.param("lqr-I-gyroscopic-left", "norm", marks=pytest.mark.slow),
-        pytest.param("matrix-pd-inertial", "axis", marks=pytest.mark.slow),
-        pytest.param("lyapunov-0", "axis", marks=pytest.mark.slow),
-        pytest.param("lqr-III", "axis", marks=pytest.mark.slow),
-        pytest.param("lqr-III", "norm", marks=pytest.mark.slow),
-    ],
-)
-def test_torque_limit_is_sharp(name, kind):
-    """No state of the set needs more torque; for a linear law the optimiser finds one that needs nearly as much."""
-    loop = loop_of(LOOPS[name].law.name, LOOPS[name].gains, LOOPS[name].craft, limit=kind)
-    claim = certify(loop, name).claim("torque-limit")
-    assert claim.outcome == "proved"
-    frame = take_apart(Motion(make_subject(loop)))
-    P, s, level = floats(frame.P), number(frame.s), claim.numbers["level"]
-    worst = max(largest_torque(loop, P, s, level, axis) for axis in range(3 if kind == "axis" else 1))
-    assert worst <= 0.05 * (1.0 + 1e-9)
-    if name in ("pd-0", "lqr-III") and (kind == "axis" or name == "pd-0"):
-        assert worst >= 0.05 * (1.0 - 1e-3)
-
-
-def largest_torque(loop, P, s, level, axis):
-    """The largest torque on an axis, or in norm, over {V <= level}, by optimisation from many starts."""
-    root = np.linalg.inv(np.linalg.cholesky(P)).T
-    random = np.random.default_rng(3)
-
-    def torque(x):
-        t = min(level, 2.0 * s) * 0.5 * (1.0 + math.sin(x[6]))
-        q0 = 1.0 - t / s
-        turn = math.sqrt(max(1.0 - q0 * q0, 0.0)) * x[:3] / np.linalg.norm(x[:3])
-        w = math.sqrt(2.0 * max(level - t, 0.0)) * root @ (x[3:6] / np.linalg.norm(x[3:6]))
-        measurement = Measurement((q0, *turn), tuple(w), tuple(w), (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, 0.1)
-        u = np.array(loop.law.command(measurement, loop.gains, loop.craft, NoMemory())[0])
-        return -(np.linalg.norm(u) if loop.limit == "norm" else u[axis])
-
-    starts = random.normal(size=(12, 7))
-    return max(-minimize(torque, x, method="Nelder-Mead", options={"maxiter": 2000, "fatol": 1e-12}).fun for x in starts)
-
-
 def test_limit_by_design_holds_everywhere():
     loop = loop_of("pd", pd.Gains(0.09, 0.009, 1), FULL, limit="axis")
     claim = certify(loop).claim("torque-limit")
@@ -150,7 +104,7 @@ def test_limit_by_design_holds_everywhere():
 
 
 def test_pd_alone_is_never_within_its_limit_everywhere():
-    assert not certify(loop_of("pd", pd.Gains(0.09, 0.009), FULL)).claim("torque-limit").numbers["everything"]
+    assert not certified("pd-0").claim("torque-limit").numbers["everything"]
 
 
 def test_modelled_torque_is_bounded_over_the_whole_orbit():
@@ -181,7 +135,7 @@ def test_modelled_torque_is_bounded_over_the_whole_orbit():
 def test_disturbed_flights_end_within_the_ultimate_bound(name, sign_policy):
     """A torque of the claimed size that always pushes away cannot leave the claimed ball, nor one that is constant."""
     loop = loop_of(LOOPS[name].law.name, LOOPS[name].gains, LOOPS[name].craft, sign_policy=sign_policy)
-    certificate = certify(loop, name, Wanted(disturbance=1e-4))
+    certificate = certified(name, sign_policy, 1e-4)
     claim = certificate.claim("disturbance")
     assert claim.outcome == "proved"
     n = claim.numbers
@@ -199,15 +153,17 @@ def test_disturbed_flights_end_within_the_ultimate_bound(name, sign_policy):
 
     # What only adds and multiplies takes all flights at once.
     commands = command if name != "pd-0" else lambda q, w: np.transpose(list(map(command, q.T.tolist(), w.T.tolist())))
-    q, w, period, angle, rate = states[:4], states[4:7], 0.2, 0.0, 0.0
-    for step in range(int(2000 / period)):
+    q, w, period, angle, rate = states[:4], states[4:7], 0.5, 0.0, 0.0
+    inverse = np.linalg.inv(J)
+    # The slowest loop halves its turn in half a minute.
+    for step in range(int(1200 / period)):
         push = np.where(away, w / np.maximum(np.linalg.norm(w, axis=0), 1e-300), directions)
         turning = J @ w
         gyroscopic = w[[1, 2, 0]] * turning[[2, 0, 1]] - w[[2, 0, 1]] * turning[[1, 2, 0]]
-        w = w + period * np.linalg.solve(J, commands(q, w) + n["torque"] * push - gyroscopic)
+        w = w + period * inverse @ (commands(q, w) + n["torque"] * push - gyroscopic)
         q = q + period * np.array(derivative(tuple(q), tuple(w)))
         q = q / np.linalg.norm(q, axis=0)
-        if step * period > 1500:
+        if step * period > 900:
             angle = max(angle, 2.0 * math.asin(min(1.0, np.linalg.norm(q[1:], axis=0).max())))
             rate = max(rate, np.linalg.norm(w, axis=0).max())
     assert 0.0 < angle <= n["angle"]
@@ -217,7 +173,7 @@ def test_disturbed_flights_end_within_the_ultimate_bound(name, sign_policy):
 @pytest.mark.parametrize("name", ["pd-0", "lqr-I", "lqr-III", "matrix-pd-inertial", "sliding-1"])
 def test_longest_period_is_where_the_sampled_loop_loses_stability(name):
     loop = LOOPS[name]
-    claim = certify(loop, name).claim("sampling")
+    claim = certified(name).claim("sampling")
     rate, attitude = (floats(m) for m in Motion(make_subject(loop)).linear())
     J = tensor(loop.craft.inertia)
 
@@ -248,7 +204,7 @@ def test_other_inertias_of_the_box_converge(name):
     from tests.certification.loops import free
 
     loop = free(replace(LOOPS[name], limit="none", period=0.05))
-    tolerance = certify(LOOPS[name], name).claim("inertia").numbers["tolerance"]
+    tolerance = certified(name).claim("inertia").numbers["tolerance"]
     assert tolerance is None or tolerance >= 0.2
     random = np.random.default_rng(7)
     J = tensor(loop.craft.inertia)
@@ -271,12 +227,12 @@ def test_other_inertias_of_the_box_converge(name):
 
 def test_flights_try_every_kind_of_set():
     for name in ("pd-0", "pd-2", "lqr-numeric", "sliding-0", "sliding-1"):
-        trial = fly_claims(LOOPS[name], certify(LOOPS[name], name), flights=512)
+        trial = fly_claims(LOOPS[name], certified(name), flights=512)
         assert trial.flights == 512
         assert trial.highest_share <= 1.0 + 1e-6
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2, *(pytest.param(k, marks=pytest.mark.slow) for k in range(3, 6))])
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(k, marks=pytest.mark.slow) for k in range(2, 6))])
 def test_random_bodies_and_weights_are_certified(seed):
     random = np.random.default_rng(seed)
     craft = random_craft(random)

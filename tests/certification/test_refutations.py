@@ -17,11 +17,11 @@ from starhold.laws.sliding import Gains as Sliding
 from tests import making
 from tests.certification.by_hand import by_hand, converging, proved_by_hand
 from tests.certification.edits import alone, claims_of, content_at, edited, reasons, replaced, spots
-from tests.certification.loops import FULL, LOPSIDED, PRINCIPAL, UNEVEN, loop_of, rotors, textbook
+from tests.certification.loops import FULL, LOPSIDED, PRINCIPAL, UNEVEN, certified, loop_of, rotors
 from tests.making import ORBITAL
 
 # Together: each worker would make all refutations and proofs for itself.
-pytestmark = pytest.mark.xdist_group("refutations")
+pytestmark = pytest.mark.xdist_group("textbook")
 
 SKEWED = ((0.01, 0.02, 0.0), (0.02, 0.01, 0.0), (0.0, 0.0, 0.01))
 CASES = {
@@ -114,8 +114,7 @@ def proofs(tmp_path_factory):
     """What is proved of loops of every law."""
     path, found = tmp_path_factory.mktemp("proved") / "c.json", {}
     for name in ("lqr-I", "lqr-II-uneven", "pd-0", "pd-2", "sliding-1", "wheel-0"):
-        loop = textbook()[name]
-        write([certify(loop, name, Wanted(disturbance=1e-6))], "made", path)
+        write([certified(name, disturbance=1e-6)], "made", path)
         found[name] = json.loads(path.read_text(encoding="utf-8"))
     return found
 
