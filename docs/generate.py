@@ -38,8 +38,8 @@ def vector(name: str) -> tuple[Any, ...]:
     return sympy.symbols(f"{name}_1:4", real=True)
 
 
-def first_component(law: Law) -> str:
-    """The first component of the torque at a target at rest, for a body with principal axes, as text."""
+def first_component(law: Law) -> Any:
+    """The first component of the torque at a target at rest, for a body with principal axes, as the law computes it."""
     q, w = sympy.symbols("q_0:4", real=True), vector("w")
     zero = (sympy.Integer(0),) * 3
     measurement = Measurement(q, w, w, zero, zero, vector("M"), vector("R"), sympy.Symbol("T"))
@@ -53,7 +53,7 @@ def first_component(law: Law) -> str:
     moments = vector("J")
     craft = Craft(moments, tuple(1 / m for m in moments), sympy.Symbol("u_max"), sympy.Symbol("mu"))
     torque, _ = law.command(measurement, law.gains(*gains), craft, NoMemory())
-    return str(sympy.simplify(torque[0]))
+    return torque[0]
 
 
 def described(law: Law) -> list[str]:
@@ -83,7 +83,7 @@ def page() -> str:
         lines += described(law)
         if law.remember(law.examples()[0], CRAFT, 0.1) == NoMemory():
             text = "First component of the torque, target at rest, principal axes, matrix gains multiples of the identity:"
-            lines += [text, "", f"    u_1 = {first_component(law)}", ""]
+            lines += [text, "", f"    u_1 = {sympy.simplify(first_component(law))}", ""]
     lines += ["# Laws of station keeping", "", "Numbers are scaled, see [station keeping](station-keeping.md).", ""]
     for law in catalogue("libration-point").values():
         lines += described(law)
