@@ -134,7 +134,7 @@ def test_no_proof_is_relabelled_with_the_evidence_of_a_refutation(refuted, proof
             if claim["outcome"] != "proved":
                 continue
             for place in range(len(claim["obligations"])):
-                for evidence in random.choice(np.array(evidences, dtype=object), 3, replace=False):
+                for evidence in random.choice(np.array(evidences, dtype=object), 2, replace=False):
                     assert not passed(check(relabelled(content, kind, place, evidence))), (kind, place, evidence)
                     bare = relabelled(content, kind, place, evidence)
                     bare = edited(edited(bare, (kind, "numbers"), {}), (kind, "witness"), {})
