@@ -15,8 +15,8 @@ from starhold.analysis.rigid_body_meter import EXTRAS, Cone
 from starhold.scenario.building import build
 from starhold.scenario.reading import load
 from starhold.simulation.lane import fly
-from starhold.simulation.lanes import carry_columns
-from starhold.simulation.metered import fly_metered
+from starhold.simulation.lanes import Crew, carry_columns
+from starhold.simulation.metered import begin_metered
 from starhold.studies.body import study_of
 from starhold.studies.compare import name_samples
 
@@ -54,9 +54,10 @@ def test_metrics_are_those_of_recordings(name):
     begun = starts(loop, 20)
     carries, rows = carry_columns(loop, begun), [window.row for window in meter.windows.values()]
     phases = loop.phases(steps)
-    flown = fly_metered(
-        loop, carries, phases, 5, meter.observers, meter.begun(20), meter.cuts(), meter.marks[-1], rows, threads=2
-    )
+    with Crew(2) as crew:
+        flown = begin_metered(
+            loop, carries, phases, 5, meter.observers, meter.begun(20), meter.cuts(), meter.marks[-1], rows, crew
+        )()
     assert (flown.ends[-1] < 0.0).all()
     found = meter.metrics(flown.notes, flown.windows, flown.ends[-1])
     assert set(found) == {*meter.units, "diverged_at"}

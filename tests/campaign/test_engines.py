@@ -71,6 +71,19 @@ def test_few_blocks_are_under_way_however_many_there_are(tmp_path, running):
     assert 1 <= max(ahead) <= engines._AHEAD + 1
 
 
+def test_threads_have_the_next_block_at_hand_and_no_more(store):
+    ahead, stored = [], []
+
+    class Told(Toy):
+        def __call__(self, law, first, count, crew):
+            ahead.append(len(ahead) + 1 - len(stored))
+            return super().__call__(law, first, count, crew)
+
+    fly(store, Threads(1), Told(), stored.append)
+    assert ahead == [1, *[2] * 13]
+    assert len(stored) == 14
+
+
 def test_an_interrupt_keeps_what_is_there_and_does_not_wait_for_blocks_under_way(tmp_path, store):
     def interrupt():
         while not list((tmp_path / "campaign").rglob("*.parquet")):
@@ -79,9 +92,9 @@ def test_an_interrupt_keeps_what_is_there_and_does_not_wait_for_blocks_under_way
         os.kill(os.getpid(), signal.SIGINT)
 
     class Slow(Toy):
-        def __call__(self, law, first, count, threads):
+        def fly(self, law, first, count):
             time.sleep(60.0 if first else 0.0)
-            return super().__call__(law, first, count, threads)
+            return super().fly(law, first, count)
 
     threading.Thread(target=interrupt, daemon=True).start()
     started = time.monotonic()

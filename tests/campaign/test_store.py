@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from starhold.campaign import digest as digests
+from starhold.campaign import store as stores
 from starhold.campaign.chunk import Chunk, merge
 from starhold.campaign.digest import digest
 from starhold.campaign.engines import Threads
@@ -38,7 +38,7 @@ def store(tmp_path):
 
 def test_columns_and_envelopes_are_those_of_one_chunk(flown):
     for law in LAWS:
-        whole = Toy()(law, 0, 100, 1)
+        whole = Toy().fly(law, 0, 100)
         stored = flown.columns(list(whole.rows), law)
         for name, values in whole.rows.items():
             assert stored[name].dtype.kind == ("O" if values.dtype.kind == "U" else values.dtype.kind)
@@ -51,7 +51,7 @@ def test_columns_and_envelopes_are_those_of_one_chunk(flown):
 
 def test_another_reader_of_parquet_finds_the_rows(flown):
     """Through pandas: numbers bit for bit, a missing number as missing."""
-    whole = Toy()("pd", 0, 100, 1)
+    whole = Toy().fly("pd", 0, 100)
     paths = sorted((flown.folder / "runs" / "pd").glob("*.parquet"))
     table = pd.concat([pd.read_parquet(path) for path in paths], ignore_index=True)
     pd.testing.assert_frame_equal(table, pd.DataFrame(whole.rows), check_exact=True, check_dtype=False)
@@ -70,7 +70,7 @@ def test_digest_does_not_depend_on_chunks_and_their_order(tmp_path_factory, data
     for size in data.draw(st.lists(st.integers(3, 30), min_size=2, max_size=2)):
         store = Store.create(tmp_path_factory.mktemp("cut"), manifest(runs, size))
         for law, first, count in data.draw(st.permutations(missing(store))):
-            store.put(Toy()(law, first, count, 1))
+            store.put(Toy().fly(law, first, count))
         found.add(digest(store))
         # Of what is on the disk too, and of a column at a time.
         found.add(digest(Store.open(store.folder)))
@@ -102,7 +102,7 @@ PARTS = ["initial.rate[1]", "settling_time", "failed", "spacecraft.limit", "coun
 @pytest.mark.parametrize("name", PARTS)
 def test_digest_depends_on_everything(flown, store, name):
     for law, first, count in missing(store):
-        chunk = Toy()(law, first, count, 1)
+        chunk = Toy().fly(law, first, count)
         store.put(changed(chunk, name) if (law, first) == ("lyapunov", 48) else chunk)
     assert digest(store) != digest(flown)
 
@@ -112,7 +112,7 @@ def test_digest_wants_all_runs(store):
         digest(store)
     for law in LAWS:
         for first in (0, 16):
-            store.put(Toy()(law, first, 16, 1))
+            store.put(Toy().fly(law, first, 16))
     assert len(digest(store, runs=32)) == 64
     with pytest.raises(InputError, match="not 16 runs of pd"):
         digest(store, runs=16)
@@ -121,7 +121,7 @@ def test_digest_wants_all_runs(store):
 def test_digest_of_groups_of_columns(flown, monkeypatch):
     """With room for one column only."""
     expected = digest(flown)
-    monkeypatch.setattr(digests, "_MOST_BYTES", 1)
+    monkeypatch.setattr(stores, "_MOST_BYTES", 1)
     assert digest(flown) == expected
 
 
@@ -301,7 +301,7 @@ def test_a_package_that_is_not_there_is_told():
 
 
 def test_answers_are_those_of_pandas(flown):
-    table = pd.concat([pd.DataFrame(Toy()(law, 0, 100, 1).rows).assign(law=law) for law in LAWS], ignore_index=True)
+    table = pd.concat([pd.DataFrame(Toy().fly(law, 0, 100).rows).assign(law=law) for law in LAWS], ignore_index=True)
     found = query(flown.folder, "select * from runs order by law desc, run")
     columns = list(found.columns)
     assert set(columns) == set(table.columns)

@@ -30,7 +30,10 @@ class Toy:
     trail: Path | None = None
     refused: int = -1
 
-    def __call__(self, law, first, count, threads):
+    def __call__(self, law, first, count, crew):
+        return lambda: self.fly(law, first, count)
+
+    def fly(self, law, first, count):
         if self.trail is not None:
             with atomic_write(self.trail / f"{law}-{first}") as hidden:
                 hidden.write_text(str(os.getpid()))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, TypeAlias
@@ -20,7 +19,7 @@ from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import Observer
 from starhold.loop.watch import Ends, Watched, watch
 from starhold.simulation.lane import Recording
-from starhold.simulation.lanes import Fleet, carry_columns
+from starhold.simulation.lanes import Crew, Fleet, carry_columns
 from starhold.trace.machine import widest
 
 Array: TypeAlias = NDArray[np.float64]
@@ -155,7 +154,8 @@ class Watcher:
         differs between lanes; steps: control steps."""
         fleet, phase = self._fleet(starts, gains, steps)
         fleet.prepare(phase)
-        fleet.share_out(lambda piece: fleet.fly(phase, piece), threads or os.cpu_count() or 1)
+        with Crew(threads) as crew:
+            crew.share(lambda piece: fleet.fly(phase, piece), fleet.count)()
         return self._flown(fleet, steps).transients(self.loop.period)
 
     def search(self, starts: Array, gains: Any, steps: int, enough: Callable[[Flown], bool]) -> Transients:

@@ -13,9 +13,6 @@ from numpy.typing import NDArray
 from starhold.campaign.store import Store
 from starhold.errors import InputError
 
-_MOST_BYTES = 2**25
-"""Columns of so many bytes are held in memory at once, 8 a number."""
-
 
 def digest(store: Store, runs: int | None = None) -> str:
     """SHA-256, in hexadecimal, of the results: law by law in the manifest's order, column by column in the order of names,
@@ -32,20 +29,14 @@ def digest(store: Store, runs: int | None = None) -> str:
         if covered != wanted:
             allowed = "all of them; --resume flies what is missing"
             raise InputError(str(store.folder), "", f"not {wanted} runs of {law}", allowed)
-        for part in chain([_named(law, np.array(wanted))], _columns(store, law, wanted), _envelopes(store, law)):
+        for part in chain([_named(law, np.array(wanted))], _columns(store, law), _envelopes(store, law)):
             whole.update(part)
     return whole.hexdigest()
 
 
-def _columns(store: Store, law: str, runs: int) -> Iterator[bytes]:
+def _columns(store: Store, law: str) -> Iterator[bytes]:
     names = sorted(store.manifest.columns.get(law, ()))
-    width = max(1, _MOST_BYTES // (8 * max(runs, 1)))
-    for start in range(0, len(names), width):
-        group = names[start : start + width]
-        columns = store.columns(group, law)
-        for name in group:
-            # One at a time is let go, so that at most these and the bytes of one are held.
-            yield _named(name, columns.pop(name))
+    return map(_named, names, store.each_column(names, law))
 
 
 def _envelopes(store: Store, law: str) -> Iterator[bytes]:

@@ -12,6 +12,7 @@ import signal
 import threading
 import time
 import warnings
+from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -25,26 +26,29 @@ from typing import Any, Protocol, TypeAlias
 from starhold.campaign.chunk import Chunk
 from starhold.campaign.extras import extra
 from starhold.errors import InputError
+from starhold.simulation.lanes import Crew
 from starhold.version import __version__
 
 Block: TypeAlias = tuple[str, int, int]
 """A law, the number of the first run, and the number of runs."""
 _AHEAD = 2
-"""Blocks under way for each thread of a worker: one that is flown, and one that is at hand when it ends."""
+"""Blocks under way in this process, or for each thread of a worker: one that is flown, and one at hand when it ends."""
 _LOOK = 1.0
 """Seconds between two looks at whether a cluster that returns nothing still lives."""
 _KEPT = "what was flown is kept, --resume goes on from there"
 
 
 class Job(Protocol):
-    """Flies a block; pickled for engines of other processes, which keep it from block to block."""
+    """Begins to fly a block, and returns what waits for its results; pickled for engines of other processes, which keep it
+    from block to block."""
 
-    def __call__(self, law: str, first: int, count: int, threads: int, /) -> Chunk: ...
+    def __call__(self, law: str, first: int, count: int, crew: Crew, /) -> Callable[[], Chunk]: ...
 
 
 @dataclass(frozen=True)
 class Threads:
-    """Blocks one after the other in this process, each by `count` threads of the job."""
+    """Blocks one after the other in this process, each by `count` threads; this one makes the next ready and stores the one
+    before meanwhile."""
 
     count: int
 
@@ -92,8 +96,14 @@ def fly_all(
     if not left:
         return
     if isinstance(engine, Threads):
-        for law, first, count in left:
-            take(job(law, first, count, engine.count))
+        begun = deque[Callable[[], Chunk]]()
+        with Crew(engine.count) as crew:
+            for block in left:
+                begun.append(job(*block, crew))
+                if len(begun) == _AHEAD:
+                    take(begun.popleft()())
+            while begun:
+                take(begun.popleft()())
         return
     with _local(min(engine.count, len(left))) if isinstance(engine, Workers) else _existing(engine) as crew:
         for chunk in crew.fly(job, left):
@@ -125,7 +135,8 @@ def _fly(packed: bytes, version: str, law: str, first: int, count: int) -> Chunk
     except ImportError as error:
         return _Refusal("a worker", "", "", f"cannot read the campaign: {error}; it needs the packages that are here")
     try:
-        return job(law, first, count, 1)
+        with Crew(1) as crew:
+            return job(law, first, count, crew)()
     except InputError as error:
         return _Refusal(error.where, error.key, error.found, error.allowed)
 

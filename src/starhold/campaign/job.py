@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from starhold.algebra.structure import places
 from starhold.analysis.meter import Meter, Metrics
+from starhold.campaign import envelopes
 from starhold.campaign.chunk import LEAST, MOST, Chunk
 from starhold.campaign.dispersions import Dispersion, read_dispersions
-from starhold.campaign.envelopes import NAME, count
 from starhold.campaign.lanes import Lanes, Lot
 from starhold.campaign.requirements import Requirement, cones_of, extras_of, read_requirements
 from starhold.campaign.sampling import Plan
@@ -23,7 +23,8 @@ from starhold.errors import InputError
 from starhold.scenario.building import build
 from starhold.scenario.campaign import CampaignTable
 from starhold.scenario.reading import Scenario, parse
-from starhold.simulation.metered import fly_metered
+from starhold.simulation.lanes import Crew
+from starhold.simulation.metered import begin_metered
 from starhold.studies.body import study_of
 
 if TYPE_CHECKING:
@@ -108,8 +109,8 @@ class Job:
         """The requirements that runs of a law must keep."""
         return read_requirements(self.table.requirement, self.meter(law).units, self.source.where)
 
-    def __call__(self, law: str, first: int, count: int, threads: int) -> Chunk:
-        """The results of runs first .. first+count-1 of a law."""
+    def __call__(self, law: str, first: int, count: int, crew: Crew) -> Callable[[], Chunk]:
+        """Begin to fly runs first .. first+count-1 of a law; what is returned waits for their results."""
         runs = np.arange(first, first + count)
         columns = self.plan.columns(first, count)
         histogram: Any = 0
@@ -118,20 +119,25 @@ class Job:
         def take(metrics: Metrics, windows: Any) -> None:
             nonlocal histogram
             kept = np.isnan(metrics["diverged_at"])
-            bins, least, most = counted(windows if kept.all() else windows[:, :, kept], threads)
+            bins, least, most = envelopes.count(windows if kept.all() else windows[:, :, kept])
             histogram = histogram + bins
             extremes.append((least, most))
 
-        measured = self.measure(law, columns, runs, threads, take, self._telling(law))
-        rows: dict[str, NDArray[Any]] = {"run": runs, **columns, **measured}
-        failed = ~np.isnan(rows["diverged_at"])
-        for requirement in self.requirements(law):
-            margins = requirement.margins(rows)
-            rows[f"margin.{requirement.name}"] = margins
-            failed = failed | (margins < 0.0)
-        rows["failed"] = failed
-        merged = (np.fmin.reduce([a for a, _ in extremes]), np.fmax.reduce([b for _, b in extremes]))
-        return Chunk(law, first, rows, {NAME: histogram}, {f"{NAME}{LEAST}": merged[0], f"{NAME}{MOST}": merged[1]})
+        measured = self.measure(law, columns, runs, crew, take, self._telling(law))
+
+        def finish() -> Chunk:
+            rows: dict[str, NDArray[Any]] = {"run": runs, **columns, **measured()}
+            failed = ~np.isnan(rows["diverged_at"])
+            for requirement in self.requirements(law):
+                margins = requirement.margins(rows)
+                rows[f"margin.{requirement.name}"] = margins
+                failed = failed | (margins < 0.0)
+            rows["failed"] = failed
+            merged = (np.fmin.reduce([a for a, _ in extremes]), np.fmax.reduce([b for _, b in extremes]))
+            name = envelopes.NAME
+            return Chunk(law, first, rows, {name: histogram}, {f"{name}{LEAST}": merged[0], f"{name}{MOST}": merged[1]})
+
+        return finish
 
     def _telling(self, law: str) -> Progress | None:
         """Return what tells of the runs of a block as they are flown, lot after lot."""
@@ -153,26 +159,33 @@ class Job:
         law: str,
         columns: Mapping[str, NDArray[Any]],
         runs: NDArray[np.int64],
-        threads: int,
+        crew: Crew,
         take: Callable[[Metrics, Any], None] = lambda metrics, windows: None,
         progress: Progress | None = None,
-    ) -> Metrics:
-        """The metrics of runs of a law, and the numbers read back, (lanes,), by name. columns: what was drawn; runs: their
-        numbers, which number their random ones; take: called with metrics and windows of each lot."""
-        found: Metrics = {}
-        for lot, at, told in self.lanes(law).lots(columns, runs):
-            metrics, windows = self._fly(lot, threads, progress)
-            take(metrics, windows)
-            for name, values in (told | metrics).items():
-                found.setdefault(name, np.full(len(runs), np.nan))[at] = values
-        return found
+    ) -> Callable[[], Metrics]:
+        """Begin to fly runs of a law. What is returned waits for their metrics and the numbers read back, (lanes,), by name.
+        columns: what was drawn; runs: their numbers, which number their random ones; take: called with metrics and windows
+        of each lot."""
+        under_way = [(at, told, self._begin(lot, crew)) for lot, at, told in self.lanes(law).lots(columns, runs)]
 
-    def _fly(self, lot: Lot, threads: int, progress: Progress | None) -> tuple[dict[str, Any], Any]:
-        """The metrics of a lot, (lanes,), and what was noted in windows (windows, quantities, lanes)."""
+        def finish() -> Metrics:
+            found: Metrics = {}
+            for at, told, flown in under_way:
+                metrics, windows = flown(progress)
+                take(metrics, windows)
+                for name, values in (told | metrics).items():
+                    found.setdefault(name, np.full(len(runs), np.nan))[at] = values
+            return found
+
+        return finish
+
+    def _begin(self, lot: Lot, crew: Crew) -> Callable[[Progress | None], tuple[Metrics, Any]]:
+        """Begin to fly a lot; what is returned waits for its metrics (lanes,), and for what was noted in windows (windows,
+        quantities, lanes)."""
         meter = self._meter_of(lot.loop, lot.phases[0].gains)
         lanes, runs = len(lot.runs), lot.runs
         along = bool((np.diff(runs) == 1).all())
-        flown = fly_metered(
+        wait = begin_metered(
             lot.loop,
             lot.carries,
             lot.phases,
@@ -182,11 +195,15 @@ class Job:
             meter.cuts(),
             meter.marks[-1],
             [window.row for window in meter.windows.values()],
-            threads,
-            None if progress is None else lambda done, total: progress(lanes * done // total, lanes),
+            crew,
         )
-        lost = flown.ends[places(lot.loop.carry()).lost_at]
-        return meter.metrics(flown.notes, flown.windows, lost), flown.windows
+
+        def finish(progress: Progress | None) -> tuple[Metrics, Any]:
+            flown = wait(None if progress is None else lambda done, total: progress(lanes * done // total, lanes))
+            lost = flown.ends[places(lot.loop.carry()).lost_at]
+            return meter.metrics(flown.notes, flown.windows, lost), flown.windows
+
+        return finish
 
 
 def scenario_of(job: Job, columns: Mapping[str, NDArray[Any]], run: int) -> Scenario:
@@ -196,15 +213,3 @@ def scenario_of(job: Job, columns: Mapping[str, NDArray[Any]], run: int) -> Scen
     if hasattr(job.scenario.table.simulation, "run"):
         change["simulation.run"] = run
     return job.scenario.with_(change)
-
-
-def counted(windows: Any, threads: int) -> Any:
-    """The histogram and the extremes of noted numbers, by so many threads."""
-    from concurrent.futures import ThreadPoolExecutor
-
-    parts = [part for part in np.array_split(windows, max(1, threads), axis=0) if len(part)]
-    if len(parts) < 2:
-        return count(windows)
-    with ThreadPoolExecutor(len(parts)) as pool:
-        found = list(pool.map(count, parts))
-    return tuple(np.concatenate(pieces) for pieces in zip(*found, strict=True))

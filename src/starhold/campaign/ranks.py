@@ -23,7 +23,7 @@ class Column:
         if self.empty:
             return
         # Half the memory of the usual whole numbers: columns of a million runs are held all at once.
-        self.order = np.argsort(self.values, kind="stable").astype(np.int32)
+        self.order = np.argsort(self.values).astype(np.int32)
         rising = self.values[self.order]
         self.steps = np.concatenate([[False], rising[1:] != rising[:-1]]).cumsum(dtype=np.int32)
         """Group of each value, in rising order."""

@@ -13,7 +13,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,8 @@ MARKS = (manifests.FILE, TOTALS, RUNS)
 """A folder with one of these holds a campaign."""
 BESIDE = ("worst-*.toml", "recorded/*.nc", "report.html")
 """What is written beside it from what it comes to."""
+_MOST_BYTES = 2**25
+"""Columns of so many bytes are read at once where all are wanted, 8 a number: each reading of few opens all files anew."""
 _NAME = re.compile(r"(\d{9,})-(\d{9,})\.([0-9a-f]{16})\.parquet")
 
 
@@ -176,8 +178,7 @@ class Store:
     def columns(self, names: Sequence[str], law: str) -> dict[str, NDArray[Any]]:
         """Columns by name, one element for each stored run in the order of runs.
 
-        Holds these columns and one chunk of them in memory, so that all columns of many runs are read a few at a time.
-        InputError where the law has no such column.
+        Holds these columns and one chunk of them in memory. InputError where the law has no such column.
         """
         self._check_known(names, law)
         files = self.files(law)
@@ -191,6 +192,15 @@ class Store:
                 whole[name][start : start + len(values)] = values
             start += file.last - file.first + 1
         return whole or {name: np.empty(0) for name in names}
+
+    def each_column(self, names: Sequence[str], law: str) -> Iterator[NDArray[Any]]:
+        """Columns one after the other, of which but a few are held in memory. InputError as of `columns`."""
+        width = max(1, _MOST_BYTES // (8 * self.manifest.runs))
+        for start in range(0, len(names), width):
+            group = names[start : start + width]
+            columns = self.columns(group, law)
+            for name in group:
+                yield columns.pop(name)
 
     def row(self, law: str, run: int) -> dict[str, Any]:
         """One run's values by column; InputError where this run of the law is not stored."""

@@ -35,9 +35,10 @@ def summarise(store: Store, job: Job, laws: Sequence[str], until_decided: bool =
     """Sum up the stored runs of each law."""
     spreads: dict[str, dict[str, Spread]] = {law: {} for law in laws}
     units = {name: unit for law in laws for name, unit in job.meter(law).units.items()}
+    columns = {law: store.each_column([name for name in units if name in job.meter(law).units], law) for law in laws}
     for name, unit in units.items():
         # All laws at once, for histograms that stand side by side.
-        found = {law: store.columns([name], law)[name] for law in laws if name in job.meter(law).units}
+        found = {law: next(columns[law]) for law in laws if name in job.meter(law).units}
         for law, spread in zip(found, _spreads(name, unit, list(found.values())), strict=True):
             spreads[law][name] = spread
     return tuple(_summary(store, job, law, spreads[law], until_decided) for law in laws)

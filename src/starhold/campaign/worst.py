@@ -16,6 +16,7 @@ from starhold.campaign.results import Bracket, LawResult
 from starhold.certification.openness import TOLD, assumed_away
 from starhold.files import atomic_write
 from starhold.scenario.building import build
+from starhold.simulation.lanes import Crew
 from starhold.studies.body import study_of
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ def search(job: Job, law: str, requirement: Requirement, threads: int, seed: int
         points = np.atleast_2d(points.T).T
         lanes = points.shape[1]
         evaluations += lanes
-        found = job.measure(law, job.plan.values(points), np.zeros(lanes, dtype=np.int64), threads)[requirement.column]
+        found = job.measure(law, job.plan.values(points), np.zeros(lanes, dtype=np.int64), crew)()[requirement.column]
         values = np.where(np.isnan(found), NONE, side * found)
         lost = lost or bool((values == NONE).any())
         return -values
@@ -88,18 +89,19 @@ def search(job: Job, law: str, requirement: Requirement, threads: int, seed: int
     limits = np.array(box(job))
     population, generations = (POPULATION, GENERATIONS) if job.lanes(law).at_once else FEW
     begin = np.random.default_rng(seed).uniform(limits[:, 0], limits[:, 1], (population, len(limits)))
-    result = differential_evolution(
-        badness,
-        limits,
-        init=cast(Any, begin),
-        maxiter=generations,
-        vectorized=True,
-        updating="deferred",
-        polish=False,
-        rng=seed,
-        tol=1e-6,
-        callback=lambda *_, **__: lost,
-    )
+    with Crew(threads) as crew:
+        result = differential_evolution(
+            badness,
+            limits,
+            init=cast(Any, begin),
+            maxiter=generations,
+            vectorized=True,
+            updating="deferred",
+            polish=False,
+            rng=seed,
+            tol=1e-6,
+            callback=lambda *_, **__: lost,
+        )
     point = np.asarray(result.x)
     columns = job.plan.values(point[:, None])
     value = -float(result.fun)

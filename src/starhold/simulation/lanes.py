@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,36 @@ from starhold.trace.machine import aligned, widest
 
 PIECES = 16
 """Pieces of a batch for each thread, between which progress is told and an interrupt is heeded."""
+
+
+class Crew:
+    """Threads that fly, until the `with` is left; what none of them has begun by then is dropped."""
+
+    def __init__(self, threads: int | None = None) -> None:
+        self.threads = max(1, os.cpu_count() or 1 if threads is None else threads)
+        self._pool = ThreadPoolExecutor(self.threads)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._pool.shutdown(cancel_futures=True)
+
+    def share(self, work: Callable[[range], None], count: int, pieces_each: int = PIECES) -> Callable[..., None]:
+        """Have work(piece) called for all of so many blocks, in so many pieces for each thread. What is returned waits for
+        the end, and tells progress until then."""
+        size = max(1, -(-count // (self.threads * pieces_each)))
+        begun: list[Future[None]] = [
+            self._pool.submit(work, range(at, min(at + size, count))) for at in range(0, count, size)
+        ]
+
+        def wait(progress: Progress | None = None) -> None:
+            for done, piece in enumerate(begun, 1):
+                piece.result()
+                if progress is not None:
+                    progress(done, len(begun))
+
+        return wait
 
 
 @dataclass(frozen=True)
@@ -60,7 +90,6 @@ def simulate_many(
     cut = list(loop.phases(steps) if phases is None else phases)
     carries = carry_columns(loop, start, cut[0] if cut else None)
     fleet = Fleet(loop, carries, first_run, width or widest(len(carries)))
-    workers = max(1, os.cpu_count() or 1 if threads is None else threads)
     for phase in cut:
         fleet.prepare(phase)
 
@@ -68,7 +97,8 @@ def simulate_many(
         for now in cut:
             fleet.fly(now, piece)
 
-    fleet.share_out(work, workers, progress)
+    with Crew(threads) as crew:
+        crew.share(work, fleet.count)(progress)
     ends = fleet.carries()
     moving = len(flatten((fleet.like.state, fleet.like.effectors)))
     return Batch(ends[:moving], ends[fleet.rows.lost_at], loop.start)
@@ -187,25 +217,6 @@ class Fleet:
             return phase._replace(craft=mapped(craft, cut), before=mapped(before, cut)).rate_from(rates)
 
         return turn
-
-    def share_out(self, work: Any, workers: int, progress: Progress | None = None, pieces_each: int = PIECES) -> None:
-        """Call work(piece) for all blocks, in so many pieces for each thread."""
-        size = max(1, -(-self.count // (workers * pieces_each)))
-        pieces = [range(at, min(at + size, self.count)) for at in range(0, self.count, size)]
-        if workers == 1 or len(pieces) < 2:
-            for done, piece in enumerate(pieces, 1):
-                work(piece)
-                if progress is not None:
-                    progress(done, len(pieces))
-            return
-        with ThreadPoolExecutor(max_workers=workers) as pool:
-            try:
-                for done, _ in enumerate(pool.map(work, pieces), 1):
-                    if progress is not None:
-                        progress(done, len(pieces))
-            except BaseException:
-                pool.shutdown(cancel_futures=True)
-                raise
 
 
 def carry_columns(loop: ClosedLoop, start: NDArray[np.float64], phase: Any = None) -> NDArray[np.float64]:

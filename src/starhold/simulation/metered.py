@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from starhold.loop.closed_loop import ClosedLoop, Phase
 from starhold.loop.kernels import Observer
 from starhold.simulation.lane import Progress
-from starhold.simulation.lanes import Fleet
+from starhold.simulation.lanes import Crew, Fleet
 from starhold.trace.machine import widest
 
 Array = NDArray[np.float64]
@@ -31,7 +30,7 @@ class Metered(NamedTuple):
     windows: Array
 
 
-def fly_metered(
+def begin_metered(
     loop: ClosedLoop,
     carries: Array,
     phases: Sequence[Phase],
@@ -41,10 +40,10 @@ def fly_metered(
     cuts: Sequence[int],
     late: int,
     rows: Sequence[int],
-    threads: int | None = None,
-    progress: Progress | None = None,
-) -> Metered:
-    """Fly lanes through phases, and note the instant after the last step too, at which a command is decided and not flown.
+    crew: Crew,
+) -> Callable[..., Metered]:
+    """Begin to fly lanes through phases, and note the instant after the last step too, at which a command is decided and
+    not flown. What is returned waits for the end, and tells progress until then.
 
     carries: (numbers, lanes), see `carry_columns`; observers: one before the control step `late` and one from it on; noted:
     notes before the flight (numbers, lanes); cuts: control steps at which windows end, `late` among them unless it is 0, the
@@ -74,6 +73,11 @@ def fly_metered(
             found[window, :, span] = seen[:, kept].swapaxes(0, 1)
             seen[:, kept] = 0.0
 
-    fleet.share_out(work, threads or os.cpu_count() or 1, progress, PIECES)
-    windows = found.reshape(len(cuts), len(rows), -1)[:, :, : carries.shape[1]]
-    return Metered(fleet.carries(), fleet.notes(), windows)
+    wait = crew.share(work, fleet.count, PIECES)
+
+    def finish(progress: Progress | None = None) -> Metered:
+        wait(progress)
+        windows = found.reshape(len(cuts), len(rows), -1)[:, :, : carries.shape[1]]
+        return Metered(fleet.carries(), fleet.notes(), windows)
+
+    return finish
