@@ -47,19 +47,26 @@ def document(
     ]
     # A script's text ends at the first "</", also within a string.
     embedded = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    scripts_text = [
+        f'<script type="application/json" id="data">{embedded}</script>',
+        f"<script>{get_plotlyjs()}</script>",
+        f"<script>\n{_asset('plots.js')}{_asset('tables.js')}</script>",
+        f"<script>\n{''.join(_asset(name) for name in scripts)}</script>",
+    ]
+    return plain_document(scenario.name, [*body, *scripts_text])
+
+
+def plain_document(title: str, body: Iterable[str]) -> str:
+    """A page of these parts, those that are empty left out, with the style and the title of all pages."""
     return "\n".join(
         [
             "<!DOCTYPE html>",
             '<html lang="en"><head><meta charset="utf-8">',
             f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">',
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            f"<title>{title} — starhold</title>",
+            f"<title>{escape(title)} — starhold</title>",
             f"<style>\n{_asset('page.css')}</style></head><body>",
             *(part for part in body if part),
-            f'<script type="application/json" id="data">{embedded}</script>',
-            f"<script>{get_plotlyjs()}</script>",
-            f"<script>\n{_asset('plots.js')}{_asset('tables.js')}</script>",
-            f"<script>\n{''.join(_asset(name) for name in scripts)}</script>",
             "</body></html>\n",
         ]
     )

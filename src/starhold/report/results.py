@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 SUMMARY, PAGE = "summary.json", "report.html"
 FAILURES = ("failures.csv", "failures.png")
 ROOTS = ("modal-roots.csv", "modal-roots.png")
-MARKS = (SUMMARY, "run.nc", PAGE, CERTIFICATES, "invariant.png", *FAILURES, *ROOTS)
+INDEX = "index.html"
+MARKS = (SUMMARY, "run.nc", PAGE, INDEX, CERTIFICATES, "invariant.png", *FAILURES, *ROOTS)
 """A folder with one of these holds results."""
 
 

@@ -1,0 +1,129 @@
+"""The command `reproduce`."""
+
+from __future__ import annotations
+
+import os
+import signal
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from contextlib import suppress
+from multiprocessing import get_context
+from pathlib import Path
+from queue import Empty
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from starhold.cli.arguments import FAILED_CHECK, Force, ReproductionOutput
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from starhold.reproduce.reproduction import Reproduction
+
+LONGEST_FIRST = "BEDCA"
+"""So that no process works alone for long."""
+
+
+def reproduce(
+    paper: Annotated[str, typer.Argument(metavar="[A|B|C|D|E|all]", help="which publication")] = "all",
+    output: ReproductionOutput = None,
+    force: Force = False,
+    processes: Annotated[int | None, typer.Option(min=1, help="side by side; all cores if nothing is said")] = None,
+) -> None:
+    """Make every figure, table and number of the publications again, beside what they print: a page each, with verdicts."""
+    from starhold.cli.show import console
+    from starhold.report.reproduction import write_index
+    from starhold.report.results import open_folder
+    from starhold.reproduce.paper import papers_of
+
+    letters = papers_of(paper)
+    folder = open_folder(output or Path("results") / f"reproduce-{paper.lower()}", force)
+    made = _make(letters, folder, processes)
+    _print(made)
+    page = write_index(made, folder)
+    console.print(f"Pages: {page}", soft_wrap=True)
+    if any(one.changed for one in made):
+        raise typer.Exit(FAILED_CHECK)
+
+
+def _make(letters: list[str], folder: Path, processes: int | None) -> list[Reproduction]:
+    """The publications in their order, made by processes of their own."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from starhold.cli.show import console
+
+    context = get_context("spawn")
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    count = min(processes or os.cpu_count() or 1, len(letters))
+    told: Any = context.Queue()
+    with (
+        Progress(*columns, console=console) as bars,
+        ProcessPoolExecutor(count, context, initializer=_begin, initargs=(told,)) as pool,
+    ):
+        tasks = {letter: bars.add_task(letter, total=None) for letter in letters}
+        futures = {letter: pool.submit(_work, letter, folder) for letter in sorted(letters, key=LONGEST_FIRST.index)}
+        try:
+            _watch(
+                set(futures.values()),
+                told,
+                lambda letter, done, whole: bars.update(tasks[letter], completed=done, total=whole),
+            )
+        except BaseException:
+            for process in list((pool._processes or {}).values()):
+                process.kill()
+            raise
+        return [futures[letter].result() for letter in letters]
+
+
+def _watch(left: set[Future[Any]], told: Any, show: Callable[[str, int, int], None]) -> None:
+    """Show how far they are until all are done, or one has failed."""
+    while left:
+        done, left = wait(left, timeout=0.2, return_when=FIRST_COMPLETED)
+        with suppress(Empty):
+            while True:
+                show(*told.get_nowait())
+        for future in done:
+            future.result()
+
+
+_told: Any = None
+"""Where this process says how far it is."""
+
+
+def _begin(told: Any) -> None:
+    global _told
+    _told = told
+    # Ctrl-C goes to the parent alone, which ends this process.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _work(letter: str, folder: Path) -> Reproduction:
+    from dataclasses import replace
+
+    from starhold.report.reproduction import write_paper
+
+    made = write_paper(letter, folder, lambda done, whole: _told.put((letter, done, whole)))
+    # What is drawn by now need not travel.
+    return replace(made, figures=dict.fromkeys(made.figures))
+
+
+def _print(made: list[Reproduction]) -> None:
+    from collections import Counter
+
+    from rich.table import Table
+
+    from starhold.cli.show import console
+    from starhold.reproduce.verdicts import VERDICTS
+
+    table = Table(show_edge=False, pad_edge=False)
+    for number, head in enumerate(("publication", "figures", "rows", *VERDICTS)):
+        table.add_column(head, justify="right" if number else "left")
+    for one in made:
+        counted = Counter(judged.verdict for judged in one.rows.values())
+        cells = [str(counted[verdict] or "") for verdict in VERDICTS]
+        table.add_row(f"{one.paper.letter}. {one.paper.title}", str(len(one.figures)), str(len(one.rows)), *cells)
+    console.print(table, markup=False)
+    for one in made:
+        for judged in one.changed:
+            text = f"{one.paper.letter}/{judged.row.name}: recorded {judged.row.verdict}, now {judged.verdict}"
+            console.print(text, style="red", markup=False, soft_wrap=True)

@@ -1,0 +1,1 @@
+"""Regenerates what the five publications print, and lays it beside them."""

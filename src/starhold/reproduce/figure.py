@@ -1,0 +1,49 @@
+"""A figure as data: what is drawn, not how."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal, TypeAlias
+
+Style: TypeAlias = Literal["line", "dashed", "dotted", "points", "steps", "area"]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Points that belong together: x (n,) and y (n,), in the units that the panel's labels tell. An "area" is a closed
+    outline that is filled."""
+
+    x: Any
+    y: Any
+    label: str = ""
+    style: Style = "line"
+    hue: int | None = None
+    """The number of its colour; its place in the panel if None. Curves of one hue look alike."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes. Spans are what is shown, (low, high); all of it where None. Levels are horizontal lines."""
+
+    x_label: str
+    y_label: str
+    curves: Sequence[Curve]
+    title: str = ""
+    x_span: tuple[float, float] | None = None
+    y_span: tuple[float, float] | None = None
+    log_x: bool = False
+    log_y: bool = False
+    equal: bool = False
+    """Whether a unit is as long on both axes."""
+    levels: Sequence[float] = ()
+    notes: Sequence[tuple[float, float, str]] = ()
+    """Words at places (x, y)."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """Panels side by side in so many columns, row by row."""
+
+    panels: Sequence[Panel] = field(default_factory=tuple[Panel, ...])
+    columns: int = 1

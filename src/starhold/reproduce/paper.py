@@ -1,0 +1,141 @@
+"""Reads `paper.toml`: what a publication prints, item by item, and who measures it."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import resources
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+from starhold.errors import InputError
+from starhold.reproduce.verdicts import PLAIN, Printed, Verdict
+
+PAPERS = ("A", "B", "C", "D", "E")
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+
+class Item(_Strict):
+    """Something that a measure makes: the function's name, of the paper's own `measures` or of the common ones, and what
+    it is called with beside the desk."""
+
+    by: str
+    given: dict[str, Any] = Field(default_factory=dict, alias="with")
+
+
+class FigureItem(Item):
+    """A figure: its number in the publication ("" for one of ours), what it shows, and what is to be seen in it."""
+
+    number: str = ""
+    name: str
+    """What its file is called."""
+    caption: str
+    seen: str = ""
+    after: str = ""
+    """The number of the figure that one of ours comes after."""
+
+
+class Row(Item):
+    """A printed number or a statement."""
+
+    name: str
+    where: str
+    """Its place in the publication: a section, equation, figure or table."""
+    says: str
+    published: tuple[str, ...] = ()
+    """The printed numbers, with all their digits; none where a statement is judged."""
+    unit: str = ""
+    tolerance: float = 0.0
+    """Share of the printed number within which ours counts as close."""
+    verdict: Verdict
+    """The verdict that is expected."""
+    why: str = ""
+    """What explains a verdict that is not plain agreement."""
+    erratum: int | None = None
+    """The erratum's number, of a row that shows one."""
+
+    @field_validator("published", mode="before")
+    @classmethod
+    def _several(cls, value: Any) -> Any:
+        return (value,) if isinstance(value, str) else value
+
+    @model_validator(mode="after")
+    def _explained(self) -> Row:
+        if self.verdict not in PLAIN and not self.why:
+            raise ValueError(f"{self.name}: a verdict of {self.verdict!r} wants a `why`")
+        numbers = ("agrees", "close", "differs")
+        if (self.verdict in numbers) != bool(self.published):
+            raise ValueError(f"{self.name}: {self.verdict!r} goes with {'no' if self.published else 'a'} printed number")
+        return self
+
+    @property
+    def printed(self) -> list[Printed]:
+        """The printed numbers, read."""
+        return [Printed.read(text) for text in self.published]
+
+
+class Section(_Strict):
+    """A heading, a few words, and the figures and rows under it."""
+
+    title: str
+    text: str = ""
+    figure: tuple[FigureItem, ...] = ()
+    row: tuple[Row, ...] = ()
+
+
+class Paper(_Strict):
+    """A publication, told as far as its source tells it."""
+
+    letter: str
+    title: str
+    source: str
+    about: str
+    section: tuple[Section, ...]
+
+    @model_validator(mode="after")
+    def _no_two_alike(self) -> Paper:
+        for names in ([row.name for row in self.rows], [figure.name for figure in self.figures]):
+            twice = {name for name in names if names.count(name) > 1}
+            if twice:
+                raise ValueError(f"paper {self.letter}: twice {sorted(twice)}")
+        return self
+
+    @property
+    def rows(self) -> list[Row]:
+        """All rows in their order."""
+        return [row for section in self.section for row in section.row]
+
+    @property
+    def figures(self) -> list[FigureItem]:
+        """All figures in their order."""
+        return [figure for section in self.section for figure in section.figure]
+
+
+def papers_of(word: str) -> list[str]:
+    """The letters that a word on the command line means. InputError for anything but a letter or "all"."""
+    if word.lower() == "all":
+        return list(PAPERS)
+    if word.upper() not in PAPERS:
+        raise InputError("starhold reproduce", "paper", word, f"{', '.join(PAPERS)} or all")
+    return [word.upper()]
+
+
+def folder_of(letter: str) -> Any:
+    """The folder of a publication."""
+    return resources.files("starhold.reproduce.papers") / letter
+
+
+def read_paper(letter: str) -> Paper:
+    """The publication of a letter."""
+    return Paper.model_validate(tomllib.loads((folder_of(letter) / "paper.toml").read_text(encoding="utf-8")))
+
+
+def scenario_files(letter: str) -> dict[str, str]:
+    """The scenario files of a publication, by their names without the ending."""
+    found = {item.name: item for item in folder_of(letter).iterdir() if item.name.endswith(".toml")}
+    return {
+        name.removesuffix(".toml"): found[name].read_text(encoding="utf-8") for name in sorted(found) if name != "paper.toml"
+    }

@@ -1,0 +1,89 @@
+"""Makes what a publication prints: every figure, and a verdict on every row."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+from starhold.reproduce import measures as common
+from starhold.reproduce.desk import Desk
+from starhold.reproduce.figure import Figure
+from starhold.reproduce.paper import FigureItem, Item, Paper, Row, read_paper
+from starhold.reproduce.verdicts import Finding, Verdict, judge
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A row with what was found and the verdict on it."""
+
+    row: Row
+    finding: Finding
+    verdict: Verdict
+
+    @property
+    def changed(self) -> bool:
+        """Whether the verdict is another than the one recorded."""
+        return self.verdict != self.row.verdict
+
+    def summary(self) -> dict[str, Any]:
+        """The row for `summary.json`."""
+        value = self.finding.value
+        ours = value if isinstance(value, (bool, dict)) else [value] if isinstance(value, (int, float)) else list(value)
+        row = self.row
+        return {
+            "name": row.name,
+            "where": row.where,
+            "says": row.says,
+            "published": list(row.published),
+            "ours": [float(one) for one in ours] if isinstance(ours, list) else ours,
+            "unit": row.unit,
+            "verdict": self.verdict,
+            "recorded": row.verdict,
+            "why": row.why,
+            "erratum": row.erratum,
+        }
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """A publication made again: its figures by name, its rows with verdicts by name, the texts of the scenario files that
+    were flown, and the seconds it took."""
+
+    paper: Paper
+    figures: dict[str, Figure]
+    rows: dict[str, Judged]
+    files: dict[str, str]
+    seconds: float
+
+    @property
+    def changed(self) -> list[Judged]:
+        """The rows whose verdict is another than the one recorded."""
+        return [judged for judged in self.rows.values() if judged.changed]
+
+
+def measure_of(letter: str, item: Item) -> Callable[..., Any]:
+    """The function that makes an item: the publication's own, else a common one. AttributeError where there is none."""
+    own = import_module(f"starhold.reproduce.papers.{letter}.measures")
+    return getattr(own, item.by) if hasattr(own, item.by) else getattr(common, item.by)
+
+
+def reproduce(letter: str, notice: Callable[[int, int], None] | None = None) -> Reproduction:
+    """Make a publication's figures and rows. The notice is called with the items done and those in all."""
+    begun, paper, desk = time.perf_counter(), read_paper(letter), Desk(letter)
+    figures: dict[str, Figure] = {}
+    rows: dict[str, Judged] = {}
+    items: list[FigureItem | Row] = [item for section in paper.section for item in (*section.figure, *section.row)]
+    for done, item in enumerate(items):
+        if notice is not None:
+            notice(done, len(items))
+        made = measure_of(letter, item)(desk, **item.given)
+        if isinstance(item, Row):
+            rows[item.name] = Judged(item, made, judge(made, item.printed, item.tolerance))
+        else:
+            figures[item.name] = made
+    if notice is not None:
+        notice(len(items), len(items))
+    return Reproduction(paper, figures, rows, desk.used, time.perf_counter() - begun)

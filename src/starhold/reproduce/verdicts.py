@@ -1,0 +1,92 @@
+"""What a measurement says of a printed number or statement. A verdict is computed, never written down; what is written down
+is the one expected, so that a change shows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import Literal, TypeAlias
+
+Verdict: TypeAlias = Literal["agrees", "close", "differs", "holds", "depends", "fails"]
+VERDICTS: dict[Verdict, str] = {
+    "agrees": "our number, rounded to the printed digits, is the printed one, or it lies beyond the printed bound",
+    "close": "it does not round to the printed digits, but lies within the tolerance that the row states",
+    "differs": "it lies outside that tolerance",
+    "holds": "the statement is true in every case that was tried or proved",
+    "depends": "the statement is true for some of the choices that the publication leaves open, and false for others",
+    "fails": "the statement is false in every case",
+}
+PLAIN: tuple[Verdict, ...] = ("agrees", "holds")
+"""Verdicts that need no explanation."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was measured: a number (or one for each that is printed), or whether a statement is true: of all, or by the
+    names of choices. The note says in a few words what was seen."""
+
+    value: float | Sequence[float] | bool | dict[str, bool]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Printed:
+    """A number as it is printed: its digits, and whether it is a bound that the true value lies beyond."""
+
+    text: str
+    bound: str = ""
+
+    @classmethod
+    def read(cls, text: str) -> Printed:
+        """Read "22.8", "1.2e-6", "> 3000" or "< 0.1". ValueError for anything else."""
+        stripped = text.strip()
+        bound = stripped[0] if stripped[:1] in ("<", ">") else ""
+        digits = stripped.removeprefix(bound).strip()
+        if not Decimal(digits).is_finite():
+            raise ValueError(f"not a number: {text!r}")
+        return cls(digits, bound)
+
+    @property
+    def value(self) -> float:
+        """The number."""
+        return float(self.text)
+
+    def rounds_from(self, ours: float) -> bool:
+        """Tell whether a number rounds to the printed digits, a half either way."""
+        if not math.isfinite(ours):
+            return False
+        exponent = Decimal(self.text).as_tuple().exponent
+        assert isinstance(exponent, int)
+        half = Decimal(5).scaleb(exponent - 1)
+        return abs(Decimal(ours) - Decimal(self.text)) <= half
+
+    def judge(self, ours: float, tolerance: float) -> Verdict:
+        """The verdict on a number; the tolerance is a share of the printed one."""
+        if self.bound:
+            beyond = ours > self.value if self.bound == ">" else ours < self.value
+            return "agrees" if beyond else "differs"
+        if self.rounds_from(ours):
+            return "agrees"
+        return "close" if abs(ours - self.value) <= tolerance * abs(self.value) else "differs"
+
+
+def judge(finding: Finding, printed: Sequence[Printed], tolerance: float) -> Verdict:
+    """The verdict on a finding; that of several numbers is the worst of theirs. ValueError where the finding is not of the
+    kind that is printed."""
+    value = finding.value
+    if isinstance(value, dict):
+        if printed or not value:
+            raise ValueError("cases answer a statement, of at least one choice, not a number")
+        return "holds" if all(value.values()) else "depends" if any(value.values()) else "fails"
+    if isinstance(value, bool):
+        if printed:
+            raise ValueError("yes or no does not answer a number")
+        return "holds" if value else "fails"
+    numbers = [value] if isinstance(value, (int, float)) else list(value)
+    if len(numbers) != len(printed):
+        raise ValueError(f"{len(numbers)} numbers measured, {len(printed)} printed")
+    verdicts = {one.judge(float(ours), tolerance) for one, ours in zip(printed, numbers, strict=True)}
+    worst: Sequence[Verdict] = ("differs", "close", "agrees")
+    return next(verdict for verdict in worst if verdict in verdicts)
