@@ -1,1 +1,283 @@
-"""What no scenario holds of this publication."""
+"""What no scenario holds of the publication on linear-quadratic stabilisation: its matrices, conditions and counts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from starhold.laws import lqr
+from starhold.laws.interface import Measurement, NoMemory
+from starhold.parts.craft import make_craft
+from starhold.reproduce.desk import Desk
+from starhold.reproduce.figure import Curve, Figure, Panel
+from starhold.reproduce.verdicts import Finding
+from starhold.studies.compare import build
+from starhold.synthesis.riccati import closed_form, linear_model, solve_riccati
+from starhold.synthesis.weights import balance, kappa
+
+ORBIT = 2.0 * np.pi / 86164.1
+"""The rate of a geostationary orbit (rad/s)."""
+RNG = 1812
+TRIALS = 200
+ZERO = (0.0, 0.0, 0.0)
+
+
+def gravity_torque(desk: Desk) -> Finding:
+    """The largest gravity torque (1.1) on bodies of the publication's moments, whose least moment is small: over all
+    attitudes |e x J e| is half the difference of the largest and the least moment (N m)."""
+    return Finding([1.5 * ORBIT**2 * moment for moment in (1e2, 1e4)], "for moments of 1e2 and 1e4 kg m²")
+
+
+def beside_wheels(desk: Desk) -> Finding:
+    """Tell whether each disturbance is at least a hundred times smaller than what wheels give."""
+    torques = {
+        "gravity gradient, 10⁴ kg m²": 1.5 * ORBIT**2 * 1e4,
+        "solar pressure, 10⁻⁴ N m": 1e-4,
+        "solar pressure on large panels, 10⁻³ N m": 1e-3,
+    }
+    told = ", ".join(f"1/{0.1 / torque:.0f}" for torque in torques.values())
+    return Finding({name: 0.1 / torque >= 100.0 for name, torque in torques.items()}, f"{told} of 0.1 N m")
+
+
+def controllable(desk: Desk) -> Finding:
+    """Tell whether [B, AB] of the linear model has full rank, for random inertias."""
+    ranks = set[int]()
+    for inertia in _inertias():
+        a, b = linear_model(inertia)
+        # Scaled, for J^-1 is small.
+        ranks.add(int(np.linalg.matrix_rank(np.hstack([b, a @ b]) * np.linalg.norm(inertia))))
+    return Finding(ranks == {6}, f"rank {ranks.pop()} for {TRIALS} inertias")
+
+
+def riccati_solution(desk: Desk, form: str) -> Finding:
+    """Tell whether a form's P is the stabilising solution that a numerical solver finds, and positive definite, for random
+    inertias and weights."""
+    worst, least = 0.0, np.inf
+    for inertia, spec in _specs(form):
+        q, r, p = lqr.riccati_problem(make_craft(inertia), spec)
+        other = np.asarray(solve_riccati(inertia, q, r).p)
+        # Of units that differ: each entry beside its own row and column.
+        scale = np.sqrt(np.outer(np.diag(other), np.diag(other)))
+        worst = max(worst, float(np.abs((p - other) / scale).max()))
+        least = min(least, float(np.linalg.eigvalsh(p / scale).min()))
+    return Finding(bool(worst < 1e-8) and least > 0.0, f"{TRIALS} trials: at most {worst:.0e} apart")
+
+
+def costs_least(desk: Desk) -> Finding:
+    """Tell whether the feedback of form II costs less than stable feedback near it, by the functional (2.1)."""
+    from scipy.linalg import solve_continuous_lyapunov
+
+    random, fewer, tried = np.random.default_rng(RNG), 0, 0
+    for inertia, spec in _specs("II"):
+        q, r, p = lqr.riccati_problem(make_craft(inertia), spec)
+        a, b = linear_model(inertia)
+        best = np.linalg.solve(r, b.T @ p)
+        other = best * (1.0 + 0.2 * random.normal(size=best.shape))
+        closed = a - b @ other
+        if np.linalg.eigvals(closed).real.max() < 0.0:
+            tried += 1
+            cost = solve_continuous_lyapunov(closed.T, -(q + other.T @ r @ other))
+            fewer += bool(np.linalg.eigvalsh((cost - p) / np.linalg.norm(p)).min() < -1e-9)
+    return Finding(fewer == 0, f"against {tried} other stable gains, from every start")
+
+
+def middle_weight(desk: Desk) -> Finding:
+    """Tell whether (2.24) makes (2.23) hold, and y2 positive, and whether the weights that `balance` moves obey it."""
+    random, worst = np.random.default_rng(RNG), 0.0
+    for _ in range(TRIALS):
+        moments = np.sort(10.0 ** random.uniform(2.0, 4.0, 3))
+        q, r = 10.0 ** random.uniform(-2.0, 2.0, 6), 10.0 ** random.uniform(-1.0, 1.0, 3)
+        y = np.sqrt(q[3:] / r)
+        j1, j2, j3 = moments
+        y2 = (j3 - j1) * y[0] * y[2] / ((j3 - j2) * y[2] + (j2 - j1) * y[0])
+        held = kappa(moments, np.array([y[0], y2, y[2]])) / ((j3 - j1) / y2)
+        moved, _ = balance(moments, q, r, "q5")
+        worst = max(worst, abs(held), abs(np.sqrt(moved[4] / r[1]) / y2 - 1.0))
+        if y2 <= 0.0:
+            return Finding(False, f"y2 = {y2:g}")
+    return Finding(bool(worst < 1e-9), f"{TRIALS} trials: off by {worst:.0e} of its terms")
+
+
+def sign_of_term(desk: Desk) -> Finding:
+    """Tell whether the gyroscopic term of V' takes both signs wherever (2.23) does not hold: it is kappa w1 w2 w3."""
+    random, both = np.random.default_rng(RNG), 0
+    for _ in range(TRIALS):
+        moments, y = 10.0 ** random.uniform(2.0, 4.0, 3), 10.0 ** random.uniform(-2.0, 0.0, 3)
+        rate = random.normal(size=3)
+        power = [float((w / y) @ np.cross(w, moments * w)) for w in (rate, rate * (1.0, 1.0, -1.0))]
+        both += power[0] * power[1] < 0.0
+    return Finding(both == TRIALS, f"{both} of {TRIALS} random weights")
+
+
+def channels(desk: Desk) -> Finding:
+    """The gains that the nine weights of form II move independently: all of them, and on the surface (2.23)."""
+    moments, random = np.array([2500.0, 9000.0, 9800.0]), np.random.default_rng(RNG)
+    weights = np.log(balance(moments, 10.0 ** random.uniform(-1.0, 1.0, 6), np.ones(3), "q5")[0])
+    start = np.concatenate([weights, np.zeros(3)])
+
+    def gains(logs: Any) -> Any:
+        return np.log(
+            np.concatenate([np.asarray(part) for part in closed_form(moments, np.exp(logs[:6]), np.exp(logs[6:]))])
+        )
+
+    def condition(logs: Any) -> float:
+        return kappa(moments, np.exp(0.5 * (logs[3:6] - logs[6:]))) / 1e4
+
+    step = 1e-5 * np.eye(9)
+    slopes = np.array([(gains(start + one) - gains(start - one)) / 2e-5 for one in step]).T
+    normal = np.array([(condition(start + one) - condition(start - one)) / 2e-5 for one in step])
+    # Moves of the weights along the surface are those across its normal.
+    along = np.linalg.svd(normal[None, :])[2][1:].T
+    ranks = [int(np.linalg.matrix_rank(found, tol=1e-6)) for found in (slopes, slopes @ along)]
+    return Finding([float(rank) for rank in ranks], "ranks of the gains' derivative by the weights")
+
+
+def conditions(desk: Desk, file: str, laws: Sequence[str], claim: str) -> Finding:
+    """Tell of which laws a claim is proved."""
+    outcomes = {law: {found.kind: found.outcome for found in desk.certificate(file, law).claims}.get(claim) for law in laws}
+    return Finding({law: outcome == "proved" for law, outcome in outcomes.items()}, f"{claim} proved by certificate")
+
+
+def falling(desk: Desk, runs: Sequence[tuple[str, str]]) -> Finding:
+    """Tell along which flights V never rises, but for its rounding."""
+    found: dict[str, bool] = {}
+    for file, law in runs:
+        values = _lyapunov(desk, file, law)
+        found[law] = bool((np.diff(values) <= 1e-12 * values[0]).all())
+    return Finding(found, "sample by sample, over the whole flights")
+
+
+def settled(desk: Desk, runs: Sequence[tuple[str, str]]) -> Finding:
+    """Tell which flights settle."""
+    times = {law: desk.flight(file, law).metrics["settling_time"] for file, law in runs}
+    told = ", ".join(f"{law} {time:.0f} s" for law, time in times.items() if time is not None)
+    return Finding({law: time is not None for law, time in times.items()}, told)
+
+
+def below_wheels(desk: Desk, runs: Sequence[tuple[str, str]]) -> Finding:
+    """Tell which flights need less than 0.1 N m."""
+    peaks = {law: desk.flight(file, law).metrics["peak_torque"] for file, law in runs}
+    told = ", ".join(f"{law} {peak:.3g}" for law, peak in peaks.items())
+    return Finding({law: peak < 0.1 for law, peak in peaks.items()}, f"{told} N m")
+
+
+def gyroscopic_beyond(desk: Desk, rates: Sequence[Sequence[str]]) -> Finding:
+    """Tell from which rates form I does not settle within 12 h; wheels of 0.1 N m balance the gyroscopic torque of none."""
+    found: dict[str, bool] = {}
+    told: list[str] = []
+    for rate in rates:
+        limit = {"spacecraft.limit": "axis", "spacecraft.torque_limit": 0.1}
+        changes = limit | {"initial.rate": list(rate), "simulation.duration": "12 h"}
+        flight = desk.flight("stabilisation", "lqr-I", changes)
+        spin = np.asarray(flight.recording["rate"])[0]
+        torque = float(np.abs(np.cross(spin, np.array([2500.0, 9000.0, 9800.0]) * spin)).max())
+        time, name = flight.metrics["settling_time"], f"{np.degrees(np.linalg.norm(spin)):.1f}°/s"
+        found[name] = time is None
+        told.append(
+            f"{torque:.2f} N m, settled after {time:.0f} s" if time is not None else f"{torque:.2f} N m, not settled"
+        )
+    return Finding(found, "; ".join(told))
+
+
+def globally(desk: Desk) -> Finding:
+    """Tell for which laws the required attitude attracts every start: none has q0 = -1 among those, the same attitude, where
+    their torque vanishes too."""
+    scenario = desk.scenario("stabilisation")
+    found: dict[str, bool] = {}
+    for entry in scenario.laws:
+        loop = build(scenario, entry)
+        turned = Measurement((-1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, loop.period)
+        torque, _ = loop.law.module.torque(turned, loop.gains, loop.craft, NoMemory())
+        found[entry.name] = any(part != 0.0 for part in torque)
+    return Finding(found, "at q0 = -1, a full turn away, the torque is zero")
+
+
+def offset(desk: Desk, law: str) -> Finding:
+    """Tell whether a law's error under disturbance is the one that its stiffness holds against it: |q| = |K^-1 M|, to a
+    tenth."""
+    run = desk.recording("disturbed", law)
+    scenario = desk.scenario("disturbed")
+    gain = build(scenario, scenario.pick(law)).gains.k_attitude
+    stiffness = np.full(3, gain) if isinstance(gain, float) else np.diag(gain) if np.ndim(gain) == 2 else np.asarray(gain)
+    error = float(np.linalg.norm(np.asarray(run["attitude_error"])[-1, 1:]))
+    pressure = np.array([6e-5, 6e-5, 5.29e-5])
+    wanted = float(np.linalg.norm(pressure / stiffness))
+    angle = np.degrees(2.0 * error)
+    return Finding(
+        bool(abs(error / wanted - 1.0) < 0.1), f"{angle:.4f}° left, {np.degrees(2.0 * wanted):.4f}° by the formula"
+    )
+
+
+def angles(desk: Desk, runs: Sequence[tuple[str, str]], until: float | None = None, log: bool = False) -> Figure:
+    """The angle of rotation from the target over time, of several flights."""
+    curves: list[Curve] = []
+    for file, law in runs:
+        run = desk.recording(file, law)
+        error, time = np.asarray(run["attitude_error"]), np.asarray(run["time"])
+        shown = time <= (time[-1] if until is None else until)
+        angle = np.degrees(2.0 * np.arctan2(np.linalg.norm(error[:, 1:], axis=1), np.abs(error[:, 0])))
+        curves.append(Curve(time[shown] / 60.0, angle[shown], law))
+    return Figure([Panel("time, min", "angle from the target, °", curves, log_y=log)])
+
+
+def torques(desk: Desk, runs: Sequence[tuple[str, str]], until: float) -> Figure:
+    """The torque about each axis over time, a panel a flight."""
+    panels: list[Panel] = []
+    for file, law in runs:
+        run = desk.recording(file, law)
+        time = np.asarray(run["time"])
+        shown = time <= until
+        curves = [
+            Curve(time[shown] / 60.0, np.asarray(run["torque"])[shown, axis], "xyz"[axis], "steps") for axis in range(3)
+        ]
+        panels.append(Panel("time, min", "torque, N m", curves, law))
+    return Figure(panels, columns=2)
+
+
+def lyapunov_functions(desk: Desk, runs: Sequence[tuple[str, str]]) -> Figure:
+    """V over time along several flights, as a share of its value at the start."""
+    curves: list[Curve] = []
+    for file, law in runs:
+        values = _lyapunov(desk, file, law)
+        curves.append(Curve(np.asarray(desk.recording(file, law)["time"]) / 60.0, values / values[0], law))
+    return Figure([Panel("time, min", "V / V(0)", curves, log_y=True, y_span=(1e-14, 3.0))])
+
+
+def _lyapunov(desk: Desk, file: str, law: str) -> Any:
+    """V at each sample of a flight."""
+    scenario, run = desk.scenario(file), desk.recording(file, law)
+    loop = build(scenario, scenario.pick(law))
+    q, rate = (tuple(np.asarray(run[name]).T) for name in ("attitude_error", "rate_error"))
+    given: Any = Measurement(q, rate, rate, ZERO, ZERO, ZERO, ZERO, loop.period)
+    assert loop.law.lyapunov is not None
+    return np.asarray(loop.law.lyapunov(given, loop.gains, loop.craft))
+
+
+def _inertias() -> list[Any]:
+    """Random inertias whose moments differ up to tenfold, in random axes."""
+    random = np.random.default_rng(RNG)
+    found: list[Any] = []
+    for _ in range(TRIALS):
+        axes = np.linalg.qr(random.normal(size=(3, 3)))[0]
+        moments = 10.0 ** random.uniform(3.0, 4.0, 3)
+        moments[np.argmax(moments)] = min(moments.max(), 0.99 * (moments.sum() - moments.max()))
+        found.append(axes * moments @ axes.T)
+    return found
+
+
+def _specs(form: str) -> list[tuple[Any, Any]]:
+    """Random inertias, diagonal for form II, with random weights."""
+    random, found = np.random.default_rng(RNG + 1), []
+    for inertia in _inertias():
+        if form == "I":
+            found.append((inertia, lqr.FormI(float(10.0 ** random.uniform(-6, -4)), float(10.0 ** random.uniform(-6, -4)))))
+            continue
+        weights = tuple((10.0 ** np.r_[random.uniform(1.0, 4.0, 3), random.uniform(-2.0, 0.0, 3)]).tolist())
+        costs = tuple((10.0 ** random.uniform(-1.0, 1.0, 3)).tolist())
+        if form == "II":
+            found.append((np.diag(np.sort(np.linalg.eigvalsh(inertia))), lqr.FormII(weights, costs)))
+        else:
+            found.append((inertia, lqr.FormIII(weights, costs)))
+    return found
