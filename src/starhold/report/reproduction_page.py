@@ -123,12 +123,13 @@ def _figure(item: FigureItem, picture: bytes) -> str:
 def _table(rows: Sequence[Judged]) -> str:
     if not rows:
         return ""
-    return _grid(("what is printed", "published", "ours", "difference", "verdict"), "".join(map(_row, rows)))
+    heads = ("what is printed", "published", "ours", "difference", "verdict")
+    return _grid(heads, "".join(map(_row, rows)), "wide rows")
 
 
-def _grid(heads: Sequence[str], rows: str) -> str:
+def _grid(heads: Sequence[str], rows: str, kind: str = "wide") -> str:
     head = "".join(f'<th scope="col">{word}</th>' for word in heads)
-    return f'<div class="wide"><table class="text"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
+    return f'<div class="{kind}"><table class="text"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
 
 
 def _row(judged: Judged) -> str:
@@ -140,7 +141,8 @@ def _row(judged: Judged) -> str:
     changed = "<small>recorded: " + escape(row.verdict) + "</small>" if judged.changed else ""
     return (
         f'<tr id="{escape(row.name)}"><td>{escape(mark + row.says)}<small>{escape(row.where)}</small></td>'
-        f"<td>{escape(printed)}</td><td>{escape(value_words(judged))}{note}</td><td>{escape(difference(judged))}</td>"
+        f'<td data-head="published">{escape(printed)}</td><td data-head="ours">{escape(value_words(judged))}{note}</td>'
+        f'<td data-head="difference">{escape(difference(judged))}</td>'
         f"<td>{badge(judged.verdict)}{changed}</td></tr>{why}"
     )
 
