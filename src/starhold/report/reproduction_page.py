@@ -90,17 +90,22 @@ def value_words(judged: Judged) -> str:
 
 
 def difference(judged: Judged) -> str:
-    """Ours less the printed, as a share of it; nothing of a bound or a statement."""
+    """Ours less the printed, as a share of it, or how many times it is the printed where it is far from it; nothing of a bound
+    or a statement."""
     value = judged.finding.value
     if isinstance(value, (bool, dict)):
         return ""
     numbers = [value] if isinstance(value, (int, float)) else list(value)
-    shares = [
-        f"{100.0 * (float(ours) - one.value) / abs(one.value):+.2g} %" if one.value else f"{float(ours):+.2g}"
-        for one, ours in zip(judged.row.printed, numbers, strict=True)
-        if not one.bound
-    ]
-    return ", ".join(shares)
+    return ", ".join(
+        _apart(one.value, float(ours)) for one, ours in zip(judged.row.printed, numbers, strict=True) if not one.bound
+    )
+
+
+def _apart(printed: float, ours: float) -> str:
+    if printed == 0.0:
+        return f"{ours:+.2g}"
+    ratio = ours / printed
+    return f"× {ratio:.2g}" if ratio > 3.0 or 0.0 < ratio < 1.0 / 3.0 else f"{100.0 * (ratio - 1.0):+.2g} %"
 
 
 def _section(section: Section, made: Reproduction, pictures: Mapping[str, bytes]) -> str:
@@ -137,7 +142,7 @@ def _row(judged: Judged) -> str:
     mark = f"Erratum {row.erratum}. " if row.erratum is not None else ""
     printed = ", ".join(row.published) + (f" {row.unit}" if row.unit and row.published else "")
     note = f"<small>{escape(judged.finding.note)}</small>" if judged.finding.note else ""
-    why = f'<tr class="why"><td colspan="5">{escape(row.why)}</td></tr>' if row.why else ""
+    why = f'<tr class="reason"><td colspan="5">{escape(row.why)}</td></tr>' if row.why else ""
     changed = "<small>recorded: " + escape(row.verdict) + "</small>" if judged.changed else ""
     return (
         f'<tr id="{escape(row.name)}"><td>{escape(mark + row.says)}<small>{escape(row.where)}</small></td>'
