@@ -20,7 +20,7 @@ from starhold.synthesis.weights import balance, kappa
 ORBIT = 2.0 * np.pi / 86164.1
 """The rate of a geostationary orbit (rad/s)."""
 RNG = 1812
-TRIALS = 200
+TRIALS = 60
 ZERO = (0.0, 0.0, 0.0)
 
 
