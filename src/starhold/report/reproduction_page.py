@@ -90,8 +90,7 @@ def value_words(judged: Judged) -> str:
 
 
 def difference(judged: Judged) -> str:
-    """Ours less the printed, as a share of it, or how many times it is the printed where it is far from it; nothing of a bound
-    or a statement."""
+    """Ours less the printed as a share of it, or their ratio where they are far apart; nothing of a bound or a statement."""
     value = judged.finding.value
     if isinstance(value, (bool, dict)):
         return ""
