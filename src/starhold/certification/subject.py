@@ -191,7 +191,9 @@ def perigee(loop: ClosedLoop) -> tuple[arb, arb, arb, arb]:
     r = [arb(x) for x in loop.start.position]
     v = [arb(x) for x in loop.start.velocity]
     gravity = arb(loop.craft.gravity)
-    h2 = sum(((r[i] * v[j] - r[j] * v[i]) ** 2 for i, j in ((0, 1), (1, 2), (2, 0))), arb(0))
+    across = [r[i] * v[j] - r[j] * v[i] for i, j in ((0, 1), (1, 2), (2, 0))]
+    # Not ** 2, which has no value for a ball around zero.
+    h2 = sum((part * part for part in across), arb(0))
     distance = sum((x * x for x in r), arb(0)).sqrt()
     energy = sum((x * x for x in v), arb(0)) / 2 - gravity / distance
     if not h2 > 0:

@@ -71,7 +71,9 @@ def keeps_below(
 
 def _size(way: tuple[Sequence[Sequence[Sequence[Any]]], Sequence[Any]], heights: Sequence[Any]) -> Any:
     groups, common = way
-    squares = [sum((_sum(load, heights) ** 2 for load in loads), arb(0)) for loads in groups]
+    sums = [[_sum(load, heights) for load in loads] for loads in groups]
+    # Not ** 2, which has no value for a ball around zero.
+    squares = [sum((part * part for part in parts), arb(0)) for parts in sums]
     return sum((square.nonnegative_part().sqrt() for square in squares), _sum(common, heights))
 
 
