@@ -127,8 +127,10 @@ def _figure(item: FigureItem, picture: bytes) -> str:
 def _table(rows: Sequence[Judged]) -> str:
     if not rows:
         return ""
-    heads = ("what is printed", "published", "ours", "difference", "verdict")
-    return _grid(heads, "".join(map(_row, rows)), "wide rows")
+    if any(judged.row.published for judged in rows):
+        heads = ("what is printed", "published", "ours", "difference", "verdict")
+        return _grid(heads, "".join(_row(judged, True) for judged in rows), "wide rows")
+    return _grid(("what is printed", "ours", "verdict"), "".join(_row(judged, False) for judged in rows), "wide rows plain")
 
 
 def _grid(heads: Sequence[str], rows: str, kind: str = "wide") -> str:
@@ -136,19 +138,22 @@ def _grid(heads: Sequence[str], rows: str, kind: str = "wide") -> str:
     return f'<div class="{kind}"><table class="text"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
 
 
-def _row(judged: Judged) -> str:
+def _row(judged: Judged, numbers: bool) -> str:
+    """A row of a table, and one more where something is to be explained; with the columns of printed numbers or without."""
     row = judged.row
     mark = f"Erratum {row.erratum}. " if row.erratum is not None else ""
     printed = ", ".join(row.published) + (f" {row.unit}" if row.unit and row.published else "")
     note = f"<small>{escape(judged.finding.note)}</small>" if judged.finding.note else ""
-    why = f'<tr class="reason"><td colspan="5">{escape(row.why)}</td></tr>' if row.why else ""
-    changed = "<small>recorded: " + escape(row.verdict) + "</small>" if judged.changed else ""
-    return (
-        f'<tr id="{escape(row.name)}"><td>{escape(mark + row.says)}<small>{escape(row.where)}</small></td>'
-        f'<td data-head="published">{escape(printed)}</td><td data-head="ours">{escape(value_words(judged))}{note}</td>'
-        f'<td data-head="difference">{escape(difference(judged))}</td>'
-        f"<td>{badge(judged.verdict)}{changed}</td></tr>{why}"
-    )
+    changed = f"<small>recorded: {escape(row.verdict)}</small>" if judged.changed else ""
+    cells = [
+        f"<td>{escape(mark + row.says)}<small>{escape(row.where)}</small></td>",
+        f'<td data-head="published">{escape(printed)}</td>' * numbers,
+        f'<td data-head="ours">{escape(value_words(judged))}{note}</td>',
+        f'<td data-head="difference">{escape(difference(judged))}</td>' * numbers,
+        f"<td>{badge(judged.verdict)}{changed}</td>",
+    ]
+    why = f'<tr class="reason"><td colspan="{5 if numbers else 3}">{escape(row.why)}</td></tr>' if row.why else ""
+    return f'<tr id="{escape(row.name)}">{"".join(cells)}</tr>{why}'
 
 
 def _changes(changed: Sequence[Judged]) -> str:
