@@ -1,1 +1,391 @@
-"""What no scenario holds of this publication."""
+"""Measures of this publication's turns: the roots that turn fastest within limits, the fits through them, the printed turn, and
+what the control's period and a torque from outside do to it. Those of its linear model stand in `placement`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from starhold.analysis.rigid_body import error_angle
+from starhold.analysis.roots import PUBLISHED, TwoPieceFit
+from starhold.analysis.transient import Limits
+from starhold.certification.region import ENERGY, Shape
+from starhold.parts.craft import tensor
+from starhold.reproduce.desk import Desk
+from starhold.reproduce.figure import Curve, Figure, Panel
+from starhold.reproduce.papers.D.placement import (
+    at_rest,
+    classical_algorithm,
+    controllable,
+    general_placement,
+    gyroscopic_sign,
+    inverse_of_the_skeleton,
+    loop_of_the_law,
+    model_at_the_start_of_a_step,
+    placed_poles,
+    printed_levels,
+    pseudo_inverse_formulas,
+    single_root,
+    stable_sign,
+    unstable_by_itself,
+)
+from starhold.reproduce.verdicts import Finding
+from starhold.studies.modal_roots import Study, pick_modal, problem_of, study
+
+__all__ = [
+    "at_rest",
+    "classical_algorithm",
+    "controllable",
+    "general_placement",
+    "gyroscopic_sign",
+    "inverse_of_the_skeleton",
+    "loop_of_the_law",
+    "model_at_the_start_of_a_step",
+    "placed_poles",
+    "printed_levels",
+    "pseudo_inverse_formulas",
+    "single_root",
+    "stable_sign",
+    "unstable_by_itself",
+]
+
+DEGREES = 180.0 / math.pi
+SHORT = 0.002
+"""Seconds of a control step that stands for the limit h -> 0 where roots are searched to 0.001."""
+POINTS = {"below": (10.0, 45.0, 85.0), "above": (85.0, 135.0, 180.0)}
+"""Angles (deg) that each piece of the published fit goes through."""
+TIGHT = 0.997
+"""Share of a limit from which on it is the one that decides."""
+
+
+def searched(desk: Desk) -> Study:
+    """The search of the built-in scenario `landing-limits`: every 5 degrees, every root of [-3, 0) to 0.001."""
+    scenario = desk.scenario("landing-limits")
+    return desk.once(("searched",), lambda: study(scenario, pick_modal(scenario, "published")))
+
+
+def fine_roots(desk: Desk) -> dict[float, float]:
+    """The best roots (1/s) at the published fit's points (deg), the control held for no longer than SHORT."""
+
+    def make() -> dict[float, float]:
+        angles = sorted({angle for points in POINTS.values() for angle in points})
+        changes = {"simulation.control_period": SHORT, "transient.angles": [f"{angle:g} deg" for angle in angles]}
+        scenario = desk.scenario("landing-limits", changes)
+        found = study(scenario, pick_modal(scenario, "published"))
+        return dict(zip(angles, found.roots.tolist(), strict=True))
+
+    return desk.once(("fine roots",), make)
+
+
+def through(angles: Sequence[float], roots: Sequence[float]) -> tuple[float, float, float]:
+    """The c, d, e of the curve c exp(d angle) + e, with d < 0, through three points (rad, 1/s) that flatten out."""
+    x, y = np.asarray(angles, dtype=float), np.asarray(roots, dtype=float)
+
+    def misses(d: float) -> float:
+        first, second, third = np.exp(d * (x - x[0]))
+        return float((first - second) * (y[1] - y[2]) - (second - third) * (y[0] - y[1]))
+
+    # Beyond these ends the second step is nothing beside the first, or the curve a line.
+    d = float(brentq(misses, -50.0 / (x[2] - x[0]), -1e-6, xtol=1e-13))
+    c = float((y[0] - y[1]) / (np.exp(d * x[0]) - np.exp(d * x[1])))
+    return c, d, float(y[0] - c * math.exp(d * x[0]))
+
+
+def three_point_fit(roots: Mapping[float, float]) -> TwoPieceFit:
+    """The fit through roots (1/s) at the published points (deg)."""
+    below, above = (through(np.radians(points), [roots[point] for point in points]) for points in POINTS.values())
+    return TwoPieceFit(below, above, PUBLISHED.split)
+
+
+def coefficients(desk: Desk, piece: str) -> Finding:
+    """The printed positive numbers of a piece of (5.7): -c, -d, -e."""
+    return _piece(fine_roots(desk), piece)
+
+
+def in_whole_steps(desk: Desk, piece: str, step: float) -> Finding:
+    """The same numbers from roots whose times are counted up in whole steps (s), the slowest taken of those that tie."""
+
+    def make() -> dict[float, float]:
+        limits, found = _limits(desk), dict[float, float]()
+        # Times at h = 0, from those at two periods: what holding the torque adds is of first order in the period.
+        one, two = (desk.scenario("landing-limits", {"simulation.control_period": h}) for h in (0.001, 0.002))
+        near, far = (problem_of(scenario, scenario.pick("published")) for scenario in (one, two))
+        for angle, root in fine_roots(desk).items():
+            roots = root + 1e-3 * np.arange(-4, 30)
+            flown, longer = (problem.fly(math.radians(angle), roots) for problem in (near, far))
+            counted = np.where(flown.within(limits), np.ceil((2.0 * flown.time - longer.time) / step), np.inf)
+            found[angle] = float(roots[np.flatnonzero(counted == counted.min())[-1]])
+        return found
+
+    return _piece(desk.once(("roots in whole steps", step), make), piece)
+
+
+def off_the_printed_fit(desk: Desk, share: float) -> Finding:
+    """Tell whether the printed fit is within a share of the best roots, within the limits and with their tolerances."""
+    found = searched(desk)
+    hard, eased = (np.abs(PUBLISHED.errors(found.angles, roots)) for roots in (found.roots, _eased(found)))
+    told = f"off by at most {100 * hard.max():.2f} %, and by {100 * eased.min():.1f} to {100 * eased.max():.1f} %"
+    return Finding({"limits": bool(hard.max() < share), "with the tolerances": bool(eased.max() < share)}, told)
+
+
+def least_squares(desk: Desk) -> Finding:
+    """Tell whether the least-squares fit through all roots is nearer to them than the printed one, on average and at worst."""
+    found = searched(desk)
+    assert found.own is not None
+    own, printed = (np.abs(pieces.errors(found.angles, found.roots)) for pieces in (found.own, PUBLISHED))
+    means = [100.0 * math.sqrt(float(np.mean(errors**2))) for errors in (own, printed)]
+    c, d, e = found.own.below
+    f, g, h = found.own.above
+    split = found.own.split * DEGREES
+    return Finding(
+        bool(means[0] < means[1] and own.max() < printed.max()),
+        f"{c:.3f} exp({d:.3f}ϑ) {e:+.3f} up to {split:g}°, {f:.3f} exp({g:.3f}ϑ) {h:+.3f} beyond: {means[0]:.2f} % rms, "
+        f"{100 * own.max():.2f} % at most; the printed one {means[1]:.2f} %, {100 * printed.max():.2f} %",
+    )
+
+
+def which_limit(desk: Desk) -> Finding:
+    """Tell whether the acceleration decides up to 85 degrees and the rate beyond, at every angle that was searched."""
+    limits, found = _limits(desk), searched(desk).found
+    decides: list[bool] = []
+    for item in found:
+        assert item.hard is not None
+        seen = item.hard.transient
+        shares = max(seen.peak_acceleration) / limits.acceleration, seen.peak_rate / limits.rate
+        near, far = shares if item.angle < math.radians(87.5) else shares[::-1]
+        decides.append(near > TIGHT and near > far)
+    return Finding(all(decides), f"{sum(decides)} of {len(decides)} angles")
+
+
+def inside_the_interval(desk: Desk) -> Finding:
+    """Tell whether every best root lies inside [-3, 0), with and without tolerances, and the next faster one breaks a limit."""
+    scenario, found = desk.scenario("landing-limits"), searched(desk)
+    problem, limits = problem_of(scenario, scenario.pick("published")), _limits(desk)
+    every = np.r_[found.roots, _eased(found)]
+    faster = [
+        problem.fly(angle, [root - 1e-3])[0].keeps(limits) for angle, root in zip(found.angles, found.roots, strict=True)
+    ]
+    return Finding(
+        bool(every.min() > -2.9 and every.max() < -0.1) and not any(faster), f"{every.min():g} to {every.max():g} 1/s"
+    )
+
+
+def printed_fit_flies(desk: Desk) -> Finding:
+    """Tell whether turns with the printed fit's roots keep the limits, and the limits with the least tolerances printed."""
+    scenario, found = desk.scenario("landing-limits"), searched(desk)
+    problem, hard = problem_of(scenario, scenario.pick("published")), _limits(desk)
+    eased = Limits(hard.rate + math.radians(2.0), hard.acceleration + math.radians(3.0))
+    flown = [problem.fly(angle, [root])[0] for angle, root in zip(found.angles, PUBLISHED.at(found.angles), strict=True)]
+    longer = [one.time / item.hard.time for one, item in zip(flown, found.found, strict=True) if one.time and item.hard]
+    rate, swing = max(one.peak_rate for one in flown), max(max(one.peak_acceleration) for one in flown)
+    return Finding(
+        {
+            "within 2 °/s and 3 °/s²": all(one.keeps(eased) for one in flown),
+            "without tolerance": all(one.keeps(hard) for one in flown),
+        },
+        f"{rate * DEGREES:.2f} °/s and {swing * DEGREES:.2f} °/s² at most; {100 * (max(longer) - 1):.1f} % longer at worst",
+    )
+
+
+def roots_over_angle(desk: Desk) -> Figure:
+    """The best roots, with the printed fit, the one through our roots at its points, and the least-squares one."""
+    found = searched(desk)
+    assert found.own is not None
+    at = found.angles * DEGREES
+    dense = np.linspace(10.0, 180.0, 341)
+    fits = [("(5.7) as printed", PUBLISHED, "dashed"), ("through three points", three_point_fit(fine_roots(desk)), "line")]
+    drawn: list[Any] = [*fits, ("least squares", found.own, "dotted")]
+    points = Curve(at, -found.roots, "best within the limits", "points", 0)
+    lines = [Curve(dense, -f.at(np.radians(dense)), name, style, n) for n, (name, f, style) in enumerate(drawn, 1)]
+    errors = [
+        Curve(at, 100.0 * f.errors(found.angles, found.roots), name, style, n) for n, (name, f, style) in enumerate(drawn, 1)
+    ]
+    return Figure(
+        [
+            Panel("initial angle, deg", "−a, 1/s", [points, *lines]),
+            Panel("initial angle, deg", "off the best root, %", errors, levels=[0.0]),
+        ]
+    )
+
+
+def times_over_angle(desk: Desk) -> Figure:
+    """The least transient times, within the limits and with their tolerances."""
+    found = searched(desk)
+    hard, eased = ([getattr(item, kind).time for item in found.found] for kind in ("hard", "eased"))
+    at = found.angles * DEGREES
+    curves = [Curve(at, hard, "within the limits"), Curve(at, eased, "with 3 °/s and 5 °/s² more", "dashed")]
+    return Figure([Panel("initial angle, deg", "least transient time, s", curves, y_span=(0.0, 30.0))])
+
+
+def start(desk: Desk) -> Finding:
+    """The initial angle (deg) of the printed turn."""
+    attitude = np.array(desk.recording("landing", "rounded")["attitude_error"])[0]
+    return Finding(float(error_angle(attitude)) * DEGREES)
+
+
+def fitted_root(desk: Desk) -> Finding:
+    """The root (1/s) that (5.7) gives at that angle."""
+    return Finding(float(PUBLISHED.at([start(desk).value / DEGREES])[0]))  # type: ignore[operator]
+
+
+def turn(desk: Desk, law: str, wanted: Sequence[str], changes: Mapping[str, Any] | None = None) -> Finding:
+    """Numbers of a turn: "time" (s), "rate" (deg/s), "accelerations" (deg/s2, three)."""
+    flown = desk.flight("landing", law, changes).metrics
+    told: dict[str, list[float]] = {
+        "time": [flown["transient_time"]],
+        "rate": [flown["peak_rate"] * DEGREES],
+        "accelerations": [part * DEGREES for part in flown["peak_accelerations"]],
+    }
+    return Finding([number for name in wanted for number in told[name]])
+
+
+def limits_kept(desk: Desk) -> Finding:
+    """Tell whether the printed turn keeps the limits without their tolerances."""
+    return Finding(bool(desk.flight("landing", "fit").metrics["limits_kept"]), "without tolerances")
+
+
+def one_root_for_all(desk: Desk, peaks: Sequence[str], time: str) -> Finding:
+    """Tell whether one of the roots that round to -0.428 gives all printed peaks, digit by digit, and none of them the time."""
+    scenario = desk.scenario("landing", {"simulation.control_period": 0.001})
+    roots = np.linspace(-0.4285, -0.4275, 101)
+    flown = problem_of(scenario, scenario.pick("rounded")).fly(scenario.table.transient.angles[0], roots)
+    seen = DEGREES * np.vstack([flown.peak_rate, flown.peak_acceleration])
+    halves = [(float(text), 0.5 * 10.0 ** -len(text.partition(".")[2])) for text in (*peaks, time)]
+    all_peaks = np.all([np.abs(row - at) <= half for row, (at, half) in zip(seen, halves, strict=False)], axis=0)
+    on_time = np.abs(flown.time - halves[-1][0]) <= halves[-1][1]
+    told = f"{roots[all_peaks].min():.4f} to {roots[all_peaks].max():.4f}" if all_peaks.any() else "none"
+    return Finding(bool(all_peaks.any() and not on_time.any()), f"{told}; times of {flown.time.min():.2f} s and more")
+
+
+def faster_root(desk: Desk) -> Finding:
+    """Tell how much sooner the root that a search for this very start finds comes to the end within the limits."""
+    ours, fit = (desk.flight("landing", law).metrics for law in ("searched", "fit"))
+    told = f"a = −0.454: {ours['transient_time']:.2f} s, {ours['peak_rate'] * DEGREES:.2f} °/s"
+    return Finding(bool(ours["limits_kept"] and ours["transient_time"] < fit["transient_time"] - 1.0), told)
+
+
+def scalar_root(desk: Desk, share: float) -> Finding:
+    """Tell whether the transient with b = -0.01 is within a share of that with hardly any b."""
+    time, without = (
+        desk.flight("landing", "rounded", {"law.rounded.b": b}).metrics["transient_time"] for b in (-0.01, -1e-6)
+    )
+    return Finding(bool(abs(time / without - 1.0) < share), f"{time:.2f} s beside {without:.2f} s for b → 0")
+
+
+def periods(desk: Desk, seconds: Sequence[float]) -> Finding:
+    """Tell whether the printed turn keeps the limits without tolerance when its torque is held for so many seconds."""
+    flown = {h: _held(desk, h) for h in seconds}
+    told = ", ".join(
+        f"{h:g} s: {seen['transient_time']:.1f} s, {seen['peak_rate'] * DEGREES:.1f} °/s"
+        if seen["transient_time"] is not None
+        else f"{h:g} s: comes to no end"
+        for h, seen in flown.items()
+    )
+    return Finding({f"h = {h:g} s": bool(seen["limits_kept"]) for h, seen in flown.items()}, told)
+
+
+def period_of_linear_motion(desk: Desk, at_least: float) -> Finding:
+    """Tell whether the linear motion near rest is proved stable for every period up to some seconds."""
+    claim = next(found for found in desk.certificate("landing", "rounded").claims if found.kind == "sampling")
+    longest = claim.numbers["longest"]
+    return Finding(
+        bool(claim.outcome == "proved" and claim.numbers["every_shorter"] and longest > at_least), f"{longest:.3f} s"
+    )
+
+
+def over_periods(desk: Desk, seconds: Sequence[float]) -> Figure:
+    """Transient time and peaks of the printed turn over the control period."""
+    flown = [_held(desk, h) for h in seconds]
+    times = [seen["transient_time"] for seen in flown]
+    rates = [seen["peak_rate"] * DEGREES for seen in flown]
+    first, second = Curve(seconds, times, hue=0), Curve(seconds, rates, hue=1)
+    return Figure(
+        [
+            Panel("h, s", "transient time, s", [first, Curve(seconds, times, "", "points", 0)], log_x=True),
+            Panel("h, s", "peak rate, deg/s", [second, Curve(seconds, rates, "", "points", 1)], log_x=True, levels=[30.0]),
+        ],
+        columns=2,
+    )
+
+
+def known_torque(desk: Desk) -> Finding:
+    """Tell whether the error that is left under the gravity gradient is less than a thousandth of what that torque would
+    leave if the law were not told of it."""
+    scenario = desk.scenario("known-torque")
+    inertia, orbit = tensor(scenario.craft.inertia), np.array(desk.recording("known-torque", "modal")["position"])[-1]
+    # At the target the body's axes are the inertial ones.
+    size = np.linalg.norm(orbit)
+    torque = 3.0 * scenario.craft.gravity / size**5 * np.cross(orbit, inertia @ orbit)
+    left = _left(inertia, torque, _root(scenario))
+    seen = float(desk.flight("known-torque", "modal").metrics["final_attitude_error"])
+    return Finding(seen < 1e-3 * left, f"{seen:.0e} rad left; {left:.0e} rad if the law were not told of it")
+
+
+def unknown_torque(desk: Desk) -> Finding:
+    """Tell whether the error that an untold torque leaves is 2 asin |J^-1 M / 2a^2|."""
+    scenario = desk.scenario("unknown-torque")
+    torque = np.array(next(part for part in scenario.parts if part.name == "constant-torque").params.torque)
+    left = _left(tensor(scenario.craft.inertia), torque, _root(scenario))
+    seen = float(desk.flight("unknown-torque", "modal").metrics["final_attitude_error"])
+    return Finding(abs(seen / left - 1.0) < 1e-6, f"{seen * DEGREES:.4f}° flown, {left * DEGREES:.4f}° by the formula")
+
+
+def errors_under_torque(desk: Desk) -> Figure:
+    """The error angle over time with a known and an unknown torque."""
+    curves: list[Curve] = []
+    for file, name in (("known-torque", "known: the gravity gradient"), ("unknown-torque", "not known: 23 N m")):
+        run = desk.recording(file, "modal")
+        curves.append(Curve(run["time"], error_angle(run["attitude_error"]) * DEGREES, name))
+    return Figure([Panel("time, s", "error angle, deg", curves, log_y=True)])
+
+
+def beyond_the_energy(desk: Desk) -> Finding:
+    """Tell whether the printed start is outside the set that the energy proves, and inside that of a V with a mixed term."""
+    sets = {"the energy": {"law.rounded.quaternion_sign": "hysteresis"}, "the mixed V": None}
+    run = desk.recording("landing", "rounded")
+    attitude, rate = np.array(run["attitude_error"])[0], np.array(run["rate_error"])[0]
+    told: dict[str, tuple[float, float]] = {}
+    for name, changes in sets.items():
+        claim = next(found for found in desk.certificate("landing", "rounded", changes).claims if found.kind == "region")
+        if claim.outcome != "proved":
+            return Finding(False, f"{name}: {claim.outcome}")
+        shape = Shape(**claim.witness)
+        if (shape == ENERGY) != (name == "the energy"):
+            return Finding(False, f"{name}: another V was taken")
+        told[name] = float(shape.value(_root(desk.scenario("landing"), "rounded"), attitude, rate)), claim.numbers["level"]
+    words = "; ".join(f"{name}: V = {value:.3f} of {level:.3f}" for name, (value, level) in told.items())
+    (energy, least), (mixed, level) = told.values()
+    return Finding(energy > least and mixed < level, words)
+
+
+def _piece(roots: Mapping[float, float], piece: str) -> Finding:
+    told = ", ".join(f"{roots[point]:.3f} at {point:g}°" for point in POINTS[piece])
+    return Finding([-number for number in getattr(three_point_fit(roots), piece)], f"through {told}")
+
+
+def _held(desk: Desk, period: float) -> dict[str, Any]:
+    changes = {"simulation.control_period": period, "simulation.substeps": max(1, round(period / 0.05))}
+    return desk.flight("landing", "rounded", changes).metrics
+
+
+def _left(inertia: NDArray[np.float64], torque: NDArray[np.float64], a: float) -> float:
+    """The angle (rad) at which the law balances a torque (3,) that it is not told of: 2a^2 q = J^-1 M."""
+    return 2.0 * math.asin(float(np.linalg.norm(np.linalg.solve(inertia, torque))) / (2.0 * a * a))
+
+
+def _root(scenario: Any, law: str = "modal") -> float:
+    return float(scenario.pick(law).gains.phi_0[0])
+
+
+def _limits(desk: Desk) -> Limits:
+    table: Any = desk.scenario("landing-limits").table.transient
+    return Limits(table.rate_limit, table.acceleration_limit)
+
+
+def _eased(found: Study) -> NDArray[np.float64]:
+    return np.array([math.nan if item.eased is None else item.eased.root for item in found.found])
