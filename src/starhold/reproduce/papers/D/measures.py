@@ -1,5 +1,5 @@
-"""Measures of this publication's turns: the roots that turn fastest within limits, the fits through them, the printed turn, and
-what the control's period and a torque from outside do to it. Those of its linear model stand in `placement`."""
+"""Measures of this publication's turns: the roots that turn fastest within limits, the fits through them, the printed turn,
+and what the control's period and a torque from outside do to it. Those of its linear model stand in `placement`."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def off_the_printed_fit(desk: Desk, share: float) -> Finding:
 
 
 def least_squares(desk: Desk) -> Finding:
-    """Tell whether the least-squares fit through all roots is nearer to them than the printed one, on average and at worst."""
+    """Tell whether the least-squares fit through all roots is nearer to them than the printed one, rms and at worst."""
     found = searched(desk)
     assert found.own is not None
     own, printed = (np.abs(pieces.errors(found.angles, found.roots)) for pieces in (found.own, PUBLISHED))
@@ -163,7 +163,8 @@ def which_limit(desk: Desk) -> Finding:
 
 
 def inside_the_interval(desk: Desk) -> Finding:
-    """Tell whether every best root lies inside [-3, 0), with and without tolerances, and the next faster one breaks a limit."""
+    """Tell whether every best root lies inside [-3, 0), with and without tolerances, and the next faster one breaks a
+    limit."""
     scenario, found = desk.scenario("landing-limits"), searched(desk)
     problem, limits = problem_of(scenario, scenario.pick("published")), _limits(desk)
     every = np.r_[found.roots, _eased(found)]
@@ -250,7 +251,8 @@ def limits_kept(desk: Desk) -> Finding:
 
 
 def one_root_for_all(desk: Desk, peaks: Sequence[str], time: str) -> Finding:
-    """Tell whether one of the roots that round to -0.428 gives all printed peaks, digit by digit, and none of them the time."""
+    """Tell whether one of the roots that round to -0.428 gives all printed peaks, digit by digit, and none of them the
+    time."""
     scenario = desk.scenario("landing", {"simulation.control_period": 0.001})
     roots = np.linspace(-0.4285, -0.4275, 101)
     flown = problem_of(scenario, scenario.pick("rounded")).fly(scenario.table.transient.angles[0], roots)

@@ -159,8 +159,8 @@ def gyroscopic_sign(desk: Desk) -> Finding:
 
 
 def controllable(desk: Desk) -> Finding:
-    """Tell by the levels, each of which takes some poles, whether the pair of (3.1) is controllable while the body turns, and
-    at rest."""
+    """Tell by the levels, each of which takes some poles, whether the pair of (3.1) is controllable while the body turns,
+    and at rest."""
     turning = [levels(*case.model()) == [3, 3, 1] for case, _ in cases()]
     resting = [_controllable(case._replace(rate=np.zeros(3))) for case, _ in cases()]
     found = {"while the body turns": all(turning), "at rest, where turns begin and end": any(resting)}
