@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from starhold.analysis.rigid_body import error_angle
@@ -82,7 +82,7 @@ def fine_roots(desk: Desk) -> dict[float, float]:
     return desk.once(("fine roots",), make)
 
 
-def through(angles: Sequence[float], roots: Sequence[float]) -> tuple[float, float, float]:
+def through(angles: ArrayLike, roots: ArrayLike) -> tuple[float, float, float]:
     """The c, d, e of the curve c exp(d angle) + e, with d < 0, through three points (rad, 1/s) that flatten out."""
     x, y = np.asarray(angles, dtype=float), np.asarray(roots, dtype=float)
 
@@ -91,7 +91,8 @@ def through(angles: Sequence[float], roots: Sequence[float]) -> tuple[float, flo
         return float((first - second) * (y[1] - y[2]) - (second - third) * (y[0] - y[1]))
 
     # Beyond these ends the second step is nothing beside the first, or the curve a line.
-    d = float(brentq(misses, -50.0 / (x[2] - x[0]), -1e-6, xtol=1e-13))
+    found: Any = brentq(misses, -50.0 / (x[2] - x[0]), -1e-6, xtol=1e-13)
+    d = float(found)
     c = float((y[0] - y[1]) / (np.exp(d * x[0]) - np.exp(d * x[1])))
     return c, d, float(y[0] - c * math.exp(d * x[0]))
 

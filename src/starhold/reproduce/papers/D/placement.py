@@ -276,8 +276,9 @@ def loop_of_the_law(desk: Desk) -> Finding:
         a, craft = spectra.phi_2, make_craft(case.inertia)
         gyroscopic = np.cross(case.rate, case.inertia @ case.rate)
         told = case._replace(torque=case.torque - gyroscopic)
-        seen = Measurement(*_numbers(case.attitude, case.rate, case.rate), ZERO, ZERO, *_numbers(case.torque), ZERO, 0.1)
-        flown, _ = modal.torque(seen, modal.Gains((a,) * 3, (a,) * 3, -0.01), craft, NoMemory())
+        rate = _numbers(case.rate)
+        seen = Measurement(_numbers(case.attitude), rate, rate, ZERO, ZERO, _numbers(case.torque), ZERO, 0.1)
+        flown, _ = modal.torque(seen, modal.Gains((a, a, a), (a, a, a), -0.01), craft, NoMemory())
         for name, u in zip(worst, (told.control(single_root_regulator(told, a)), np.array(flown)), strict=True):
             swing = np.linalg.solve(case.inertia, u + told.torque)
             worst[name] = max(worst[name], _apart(swing, closed_loop(case, a)))
@@ -325,5 +326,5 @@ def _errors(worst: dict[str, float]) -> str:
     return "relative difference at most " + ", ".join(f"{error:.0e}" for error in worst.values())
 
 
-def _numbers(*vectors: Array) -> list[Any]:
-    return [tuple(vector.tolist()) for vector in vectors]
+def _numbers(vector: Array) -> Any:
+    return tuple(vector.tolist())
