@@ -19,6 +19,7 @@ SEARCHES = {
     "in_whole_steps",
     "inside_the_interval",
     "least_squares",
+    "no_other_step",
     "off_the_printed_fit",
     "printed_fit_flies",
     "roots_over_angle",

@@ -18,41 +18,22 @@ from starhold.certification.region import ENERGY, Shape
 from starhold.parts.craft import tensor
 from starhold.reproduce.desk import Desk
 from starhold.reproduce.figure import Curve, Figure, Panel
-from starhold.reproduce.papers.D.placement import (
-    at_rest,
-    classical_algorithm,
-    controllable,
-    general_placement,
-    gyroscopic_sign,
-    inverse_of_the_skeleton,
-    loop_of_the_law,
-    model_at_the_start_of_a_step,
-    placed_poles,
-    printed_levels,
-    pseudo_inverse_formulas,
-    single_root,
-    stable_sign,
-    unstable_by_itself,
-)
+from starhold.reproduce.papers.D.placement import at_rest as at_rest
+from starhold.reproduce.papers.D.placement import classical_algorithm as classical_algorithm
+from starhold.reproduce.papers.D.placement import controllable as controllable
+from starhold.reproduce.papers.D.placement import general_placement as general_placement
+from starhold.reproduce.papers.D.placement import gyroscopic_sign as gyroscopic_sign
+from starhold.reproduce.papers.D.placement import inverse_of_the_skeleton as inverse_of_the_skeleton
+from starhold.reproduce.papers.D.placement import loop_of_the_law as loop_of_the_law
+from starhold.reproduce.papers.D.placement import model_at_the_start_of_a_step as model_at_the_start_of_a_step
+from starhold.reproduce.papers.D.placement import placed_poles as placed_poles
+from starhold.reproduce.papers.D.placement import printed_levels as printed_levels
+from starhold.reproduce.papers.D.placement import pseudo_inverse_formulas as pseudo_inverse_formulas
+from starhold.reproduce.papers.D.placement import single_root as single_root
+from starhold.reproduce.papers.D.placement import stable_sign as stable_sign
+from starhold.reproduce.papers.D.placement import unstable_by_itself as unstable_by_itself
 from starhold.reproduce.verdicts import Finding
 from starhold.studies.modal_roots import Study, pick_modal, problem_of, study
-
-__all__ = [
-    "at_rest",
-    "classical_algorithm",
-    "controllable",
-    "general_placement",
-    "gyroscopic_sign",
-    "inverse_of_the_skeleton",
-    "loop_of_the_law",
-    "model_at_the_start_of_a_step",
-    "placed_poles",
-    "printed_levels",
-    "pseudo_inverse_formulas",
-    "single_root",
-    "stable_sign",
-    "unstable_by_itself",
-]
 
 DEGREES = 180.0 / math.pi
 SHORT = 0.002
@@ -109,21 +90,16 @@ def coefficients(desk: Desk, piece: str) -> Finding:
 
 
 def in_whole_steps(desk: Desk, piece: str, step: float) -> Finding:
-    """The same numbers from roots whose times are counted up in whole steps (s), the slowest taken of those that tie."""
+    """The numbers of a piece from roots whose times are counted in whole steps (s), the slowest taken of those that tie."""
+    return _piece(_counted(desk, step), piece)
 
-    def make() -> dict[float, float]:
-        limits, found = _limits(desk), dict[float, float]()
-        # Times at h = 0, from those at two periods: what holding the torque adds is of first order in the period.
-        one, two = (desk.scenario("landing-limits", {"simulation.control_period": h}) for h in (0.001, 0.002))
-        near, far = (problem_of(scenario, scenario.pick("published")) for scenario in (one, two))
-        for angle, root in fine_roots(desk).items():
-            roots = root + 1e-3 * np.arange(-4, 30)
-            flown, longer = (problem.fly(math.radians(angle), roots) for problem in (near, far))
-            counted = np.where(flown.within(limits), np.ceil((2.0 * flown.time - longer.time) / step), np.inf)
-            found[angle] = float(roots[np.flatnonzero(counted == counted.min())[-1]])
-        return found
 
-    return _piece(desk.once(("roots in whole steps", step), make), piece)
+def no_other_step(desk: Desk, steps: Sequence[float]) -> Finding:
+    """Tell whether no other step (s) of counted times gives all six printed numbers."""
+    printed = np.array([PUBLISHED.below, PUBLISHED.above])
+    fits = {step: three_point_fit(_counted(desk, step)) for step in steps}
+    giving = [step for step, f in fits.items() if (np.abs(np.array([f.below, f.above]) - printed) < 5e-4).all()]
+    return Finding(not giving, f"tried: {', '.join(f'{step:g}' for step in steps)} s")
 
 
 def off_the_printed_fit(desk: Desk, share: float) -> Finding:
@@ -131,7 +107,7 @@ def off_the_printed_fit(desk: Desk, share: float) -> Finding:
     found = searched(desk)
     hard, eased = (np.abs(PUBLISHED.errors(found.angles, roots)) for roots in (found.roots, _eased(found)))
     told = f"off by at most {100 * hard.max():.2f} %, and by {100 * eased.min():.1f} to {100 * eased.max():.1f} %"
-    return Finding({"limits": bool(hard.max() < share), "with the tolerances": bool(eased.max() < share)}, told)
+    return Finding({"within the limits": bool(hard.max() < share), "with the tolerances": bool(eased.max() < share)}, told)
 
 
 def least_squares(desk: Desk) -> Finding:
@@ -261,7 +237,7 @@ def one_root_for_all(desk: Desk, peaks: Sequence[str], time: str) -> Finding:
     halves = [(float(text), 0.5 * 10.0 ** -len(text.partition(".")[2])) for text in (*peaks, time)]
     all_peaks = np.all([np.abs(row - at) <= half for row, (at, half) in zip(seen, halves, strict=False)], axis=0)
     on_time = np.abs(flown.time - halves[-1][0]) <= halves[-1][1]
-    told = f"{roots[all_peaks].min():.4f} to {roots[all_peaks].max():.4f}" if all_peaks.any() else "none"
+    told = f"{roots[all_peaks].min():.5f} to {roots[all_peaks].max():.5f}" if all_peaks.any() else "none"
     return Finding(bool(all_peaks.any() and not on_time.any()), f"{told}; times of {flown.time.min():.2f} s and more")
 
 
@@ -364,6 +340,27 @@ def beyond_the_energy(desk: Desk) -> Finding:
     words = "; ".join(f"{name}: V = {value:.3f} of {level:.3f}" for name, (value, level) in told.items())
     (energy, least), (mixed, level) = told.values()
     return Finding(energy > least and mixed < level, words)
+
+
+def _counted(desk: Desk, step: float) -> dict[float, float]:
+    """The best roots (1/s) at the published points (deg) by times in whole steps (s), the slowest of those that tie."""
+
+    def make() -> dict[float, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        limits, found = _limits(desk), dict[float, tuple[NDArray[np.float64], NDArray[np.float64]]]()
+        # Times at h = 0, from those at two periods: what holding the torque adds is of first order in the period.
+        scenarios = [desk.scenario("landing-limits", {"simulation.control_period": h}) for h in (0.001, 0.002)]
+        near, far = (problem_of(scenario, scenario.pick("published")) for scenario in scenarios)
+        for angle, root in fine_roots(desk).items():
+            roots: NDArray[np.float64] = np.arange(-4.0, 30.0) * 1e-3 + root
+            flown, longer = (problem.fly(math.radians(angle), roots) for problem in (near, far))
+            found[angle] = roots, np.where(flown.within(limits), 2.0 * flown.time - longer.time, np.inf)
+        return found
+
+    best: dict[float, float] = {}
+    for angle, (roots, times) in desk.once(("times near the best roots",), make).items():
+        counted = np.ceil(times / step)
+        best[angle] = float(roots[np.flatnonzero(counted == counted.min())[-1]])
+    return best
 
 
 def _piece(roots: Mapping[float, float], piece: str) -> Finding:
