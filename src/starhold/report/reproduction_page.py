@@ -76,7 +76,7 @@ def badge(verdict: Verdict) -> str:
 
 
 def value_words(judged: Judged) -> str:
-    """What was found, in words."""
+    """Tell what was found, in words."""
     value, unit = judged.finding.value, judged.row.unit
     if isinstance(value, dict):
         yes = [name for name, true in value.items() if true]

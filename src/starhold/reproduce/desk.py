@@ -1,4 +1,4 @@
-"""What measures ask for: scenarios, and what was flown, drawn or proved of them, each made once for a publication."""
+"""Measures ask for scenarios, and for what was flown, drawn or proved of them; each is made once for a publication."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Desk:
         return scenario_files(self.letter)
 
     def once(self, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
-        """What `make` gives, made at the first time that this key is asked for."""
+        """Return what `make` gives, made at the first time that this key is asked for."""
         told = repr(key)
         if told not in self._made:
             self._made[told] = make()
@@ -66,7 +66,7 @@ class Desk:
         return self.once(("flight", file, law, changes), make)
 
     def recording(self, file: str, law: str, changes: Mapping[str, Any] | None = None) -> Recording:
-        """What was recorded of a law's flight."""
+        """The recording of a law's flight."""
         return self.flight(file, law, changes).recording
 
     def certificate(self, file: str, law: str, changes: Mapping[str, Any] | None = None) -> Certificate:

@@ -1,4 +1,4 @@
-"""What a measurement says of a printed number or statement. A verdict is computed, never written down; what is written down
+"""A verdict says how a measurement compares with a printed number or statement. It is computed, never written down; what is written down
 is the one expected, so that a change shows."""
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ PLAIN: tuple[Verdict, ...] = ("agrees", "holds")
 
 @dataclass(frozen=True)
 class Finding:
-    """What was measured: a number (or one for each that is printed), or whether a statement is true: of all, or by the
+    """A measurement is a number (or one for each that is printed), or whether a statement is true: of all, or by the
     names of choices. The note says in a few words what was seen."""
 
     value: float | Sequence[float] | bool | dict[str, bool]

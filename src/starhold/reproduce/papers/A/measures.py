@@ -1,4 +1,4 @@
-"""What no scenario holds of the publication on linear-quadratic stabilisation: its matrices, conditions and counts."""
+"""Matrices, conditions and counts of the publication on linear-quadratic stabilisation, which no scenario holds."""
 
 from __future__ import annotations
 

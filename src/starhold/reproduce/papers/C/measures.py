@@ -1,4 +1,4 @@
-"""What no scenario holds of the publication on reaction wheels: its closed loop, its regions of gains and its optimum."""
+"""The closed loop of the publication on reaction wheels, its regions of gains and its optimum, which no scenario holds."""
 
 from __future__ import annotations
 
@@ -183,7 +183,7 @@ def euler_krylov(desk: Desk, file: str, laws: Sequence[str], until: float) -> Fi
 
 
 def wheel_torques(desk: Desk, file: str, laws: Sequence[str], until: float) -> Figure:
-    """What the wheels are commanded over time, a panel a law, with the weak wheel's limit."""
+    """The commands to the wheels over time, a panel a law, with the weak wheel's limit."""
     panels: list[Panel] = []
     for law in laws:
         run = desk.recording(file, law)
