@@ -1,5 +1,5 @@
-"""A verdict says how a measurement compares with a printed number or statement. It is computed, never written down; what is written down
-is the one expected, so that a change shows."""
+"""A verdict says how a measurement compares with a printed number or statement. It is computed; written down is the one
+that is expected, so that a change shows."""
 
 from __future__ import annotations
 
