@@ -1,0 +1,155 @@
+"""What a call of a law costs: in processor time along a flight, and in operations."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.analysis.cost import CALLS, Replay, recorded_states
+from starhold.loop.kernels import Numbers, make_step, replay
+from starhold.reproduce.figure import Curve, Figure, Panel
+from starhold.reproduce.verdicts import Finding
+from starhold.scenario.building import build
+from starhold.trace.bounds import work
+
+if TYPE_CHECKING:
+    from starhold.reproduce.desk import Desk
+
+PASSES = 3
+WINDOW = 2000
+"""Calls from the start on whose mean is told: 200 s, in which predictive control arrives."""
+
+
+class Timed(NamedTuple):
+    """A law whose calls are timed: where it is flown, and how many calls are timed at once."""
+
+    file: str
+    law: str
+    chunk: int
+
+
+TIMED = {
+    "lyapunov": Timed("three-laws", "lyapunov", 200),
+    "sliding": Timed("three-laws", "sliding", 200),
+    "N = 10": Timed("three-laws", "mpc", 20),
+    "N = 150": Timed("printed-functional", "N 150", 10),
+    "N = 300": Timed("printed-functional", "N 300", 10),
+    "N = 500": Timed("printed-functional", "N 500", 10),
+}
+
+
+def call_times(desk: Desk) -> dict[str, NDArray[np.float64]]:
+    """Processor time of a call (s) in each chunk of the first calls of a flight, (chunks,) by the names of TIMED: the least of
+    several passes, in which the laws take turns."""
+
+    def make() -> dict[str, NDArray[np.float64]]:
+        found: dict[str, NDArray[np.float64]] = {}
+        kernels: dict[str, Replay] = {}
+        for name, (file, law, chunk) in TIMED.items():
+            scenario = desk.scenario(file)
+            loop = build(scenario, scenario.pick(law))
+            kernels[name] = Replay(loop, recorded_states(loop, desk.recording(file, law)))
+            found[name] = np.full(WINDOW // chunk, np.inf)
+        empty = dict.fromkeys(TIMED, np.inf)
+        for _ in range(PASSES):
+            for name, kernel in kernels.items():
+                chunk = TIMED[name].chunk
+                empty[name] = min([empty[name], *(_timed(kernel, 0, 0) for _ in range(20))])
+                for number in range(len(found[name])):
+                    spent = _timed(kernel, number * chunk, (number + 1) * chunk) - empty[name]
+                    found[name][number] = min(found[name][number], max(spent, 1e-9) / chunk)
+        return found
+
+    return desk.once(("call times",), make)
+
+
+def _timed(kernel: Replay, first: int, last: int) -> float:
+    begun = time.thread_time()
+    kernel(first, last)
+    return time.thread_time() - begun
+
+
+def ratio(desk: Desk, name: str, to: str = "lyapunov") -> float:
+    """How many times as long a call takes as one of another law, in the mean."""
+    times = call_times(desk)
+    return float(times[name].mean() / times[to].mean())
+
+
+def total_time(desk: Desk, name: str) -> Finding:
+    """The time of 50 000 calls (s)."""
+    return Finding(CALLS * float(call_times(desk)[name].mean()))
+
+
+def time_ratio(desk: Desk, name: str) -> Finding:
+    """How many Lyapunov calls one call of a law takes the time of."""
+    return Finding(ratio(desk, name))
+
+
+def time_cases(desk: Desk, names: Sequence[str], least: float, most: float = float("inf")) -> Finding:
+    """Tell of which laws a call takes between `least` and `most` times as long as one of the Lyapunov law."""
+    found = {name: ratio(desk, name) for name in names}
+    note = ", ".join(f"{name} {value:.2g} times" for name, value in found.items())
+    return Finding({name: least < value < most for name, value in found.items()}, note)
+
+
+def operations(desk: Desk, law: str, gravity: bool) -> int:
+    """Additions, multiplications, divisions and roots of one call, from the measured state to the limited torque; `gravity`:
+    whether there is a gravity torque, which a law may have to compute."""
+    scenario = desk.scenario("three-laws", None if gravity else {"environment.gravity_gradient": False})
+    loop = build(scenario, scenario.pick(law))
+    program = replay(make_step(loop.composition()), loop.carry(), Numbers.of(loop.phases(1)[0]))
+    return work(program, {"first": 0, "count": 1}).work.arithmetic
+
+
+def operations_ratio(desk: Desk) -> Finding:
+    """The operations of a sliding call as a share of those of a Lyapunov call."""
+    sliding, lyapunov = operations(desk, "sliding", True), operations(desk, "lyapunov", True)
+    return Finding(sliding / lyapunov, f"{sliding} operations by {lyapunov}")
+
+
+def fewer_operations(desk: Desk, law: str, than: str, factor: float = 1.0) -> Finding:
+    """Tell whether a call of a law does fewer operations than `factor` times another's: with and without the gravity model,
+    which some laws have to compute."""
+    cases = {"gravity model counted": True, "gravity model not counted": False}
+    counted = {name: (operations(desk, law, gravity), operations(desk, than, gravity)) for name, gravity in cases.items()}
+    note = "; ".join(f"{name}: {mine} and {other} operations" for name, (mine, other) in counted.items())
+    return Finding({name: mine < factor * other for name, (mine, other) in counted.items()}, note)
+
+
+def call_figure(desk: Desk, names: Mapping[str, str], unit: str = "ns", scale: float = 1e9) -> Figure:
+    """The time of a call over the time of the flight: labels by the names of TIMED."""
+    times = call_times(desk)
+    curves: list[Curve] = []
+    for name, label in names.items():
+        middle = 0.1 * TIMED[name].chunk * (np.arange(len(times[name])) + 0.5)
+        curves.append(Curve(middle, scale * times[name], label, "line" if len(names) == 1 else "steps"))
+    top = 1.25 * max(float(np.quantile(curve.y, 0.98)) for curve in curves)
+    return Figure([Panel("time, s", f"time of a call, {unit}", curves, y_span=(0.0, top))])
+
+
+def horizon_figure(desk: Desk, weighted: Mapping[str, Any], printed: Mapping[str, Any], published: float) -> Figure:
+    """Steps to stay within 10^-3, and how many Lyapunov calls a call costs, over the horizon: with a terminal weight and by
+    the functional as printed. Both map horizons to [file, law]."""
+    groups = {"with terminal weight": weighted, "as printed": printed}
+    steps: list[Curve] = []
+    times: list[Curve] = []
+    for hue, (name, flights) in enumerate(groups.items()):
+        horizons = np.array([float(n) for n in flights])
+        reached = [desk.flight(*flight).metrics["iterations_1e-3"] for flight in flights.values()]
+        steps.append(Curve(horizons, [np.nan if n is None else n for n in reached], name, "points", hue))
+        known = [n for n in flights if f"N = {n}" in TIMED]
+        times.append(Curve([float(n) for n in known], [ratio(desk, f"N = {n}") for n in known], name, "points", hue))
+    lyapunov = float(desk.flight("three-laws", "lyapunov").metrics["iterations_1e-3"])
+    return Figure(
+        [
+            Panel("horizon N", "steps to stay within 10^-3", steps, log_x=True, levels=[lyapunov],
+                  notes=[(8.0, 0.95 * lyapunov, "Lyapunov law")]),
+            Panel("horizon N", "time of a call / Lyapunov law's", times, log_x=True, log_y=True, levels=[published],
+                  notes=[(30.0, 0.75 * published, "published totals")]),
+        ],
+        columns=2,
+    )  # fmt: skip

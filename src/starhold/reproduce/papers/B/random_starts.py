@@ -1,0 +1,135 @@
+"""Counts of control steps over random starts: for good, as the campaign has them, and at the first passage."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.analysis.rigid_body import DECADES
+from starhold.reproduce.figure import Curve, Figure, Panel
+from starhold.reproduce.verdicts import Finding
+from starhold.scenario.building import build
+from starhold.simulation.abreast import Flying, fly_abreast
+from starhold.simulation.lane import Recording, label
+
+if TYPE_CHECKING:
+    from starhold.reproduce.desk import Desk
+
+Array = NDArray[np.float64]
+FILE = "random-starts"
+LAWS = ("lyapunov", "sliding", "mpc")
+PREFIXES = {"attitude": "", "rate": "rate_"}
+PASSAGES = 16
+"""Starts of which first passages are counted."""
+
+
+def counts(desk: Desk, kind: str) -> dict[str, Array]:
+    """The steps after which the error stays within 10^-1 to 10^-6, (starts, 6) by law; inf where it never does."""
+
+    def make() -> dict[str, Array]:
+        frame = desk.campaign(FILE).frame()
+        names = [f"{PREFIXES[kind]}iterations_1e-{k}" for k in DECADES]
+        return {law: frame[frame["law"] == law][names].fillna(np.inf).to_numpy(dtype=float) for law in LAWS}
+
+    return desk.once(("counts", kind), make)
+
+
+def first_passages(desk: Desk, kind: str) -> dict[str, Array]:
+    """The steps after which the error is within 10^-1 to 10^-6 for the first time, likewise, of the first starts."""
+
+    def make() -> dict[str, dict[str, Array]]:
+        scenario, frame = desk.scenario(FILE), desk.campaign(FILE).frame()
+        found: dict[str, dict[str, Array]] = {"attitude": {}, "rate": {}}
+        for law in LAWS:
+            loop = build(scenario, scenario.pick(law))
+            rows = frame[frame["law"] == law].head(PASSAGES)
+            attitudes = rows[[f"flown.state.attitude[{k}]" for k in (1, 2, 3, 4)]].to_numpy(dtype=float).tolist()
+            rates = rows[[f"flown.state.rate[{k}]" for k in (1, 2, 3)]].to_numpy(dtype=float).tolist()
+            starts = [
+                loop.start._replace(attitude=tuple(attitude), rate=tuple(rate))
+                for attitude, rate in zip(attitudes, rates, strict=True)
+            ]
+            flights = [Flying(replace(loop, start=start), scenario.table.simulation.steps, 1) for start in starts]
+
+            def passages(number: int, samples: Array, carry: Any, flights: Any = flights) -> list[list[float]]:
+                return _passages(label(flights[number].loop, samples, carry, 1))
+
+            flown = fly_abreast(flights, passages)
+            for number, name in enumerate(found):
+                found[name][law] = np.array([each[number] for each in flown])
+        return found
+
+    return desk.once(("first passages",), make)[kind]
+
+
+def _passages(run: Recording) -> list[list[float]]:
+    """The first passages of attitude and of rate in a flight."""
+    errors = np.linalg.norm(run["attitude_error"][:, 1:], axis=1), np.linalg.norm(run["rate_error"], axis=1)
+    return [[first_within(error, 10.0**-k) for k in DECADES] for error in errors]
+
+
+def first_within(error: Array, bound: float) -> float:
+    """The index at which an error is within a bound for the first time; inf where it never is."""
+    inside = np.flatnonzero(error <= bound)
+    return float(inside[0]) if inside.size else float("inf")
+
+
+def steps_figure(desk: Desk, kind: str) -> Figure:
+    """The steps over the order of the deviation: medians, the middle four fifths of the starts, and first passages; and the
+    share of the starts that stay within."""
+    found, first = counts(desk, kind), first_passages(desk, kind)
+    orders = np.array(DECADES, dtype=float)
+    curves: list[Curve] = []
+    shares: list[Curve] = []
+    for hue, law in enumerate(LAWS):
+        low, middle, high = (np.quantile(found[law], share, axis=0, method="higher") for share in (0.1, 0.5, 0.9))
+        there = np.isfinite(high)
+        if there.any():
+            outline = np.concatenate([orders[there], orders[there][::-1]])
+            curves.append(Curve(outline, np.concatenate([low[there], high[there][::-1]]), "", "area", hue))
+        curves.append(Curve(orders, _drawn(middle), law, "line", hue))
+        passed = np.quantile(first[law], 0.5, axis=0, method="higher")
+        curves.append(Curve(orders, _drawn(passed), f"{law}, first passage", "dotted", hue))
+        shares.append(Curve(orders, 100.0 * np.isfinite(found[law]).mean(axis=0), law, "line", hue))
+    symbol = "|q|" if kind == "attitude" else "|ω| in rad/s"
+    across = f"k of {symbol} ≤ 10^-k"
+    return Figure([Panel(across, "control steps", curves), Panel(across, "starts that stay within, %", shares)], columns=2)
+
+
+def _drawn(steps: Array) -> Array:
+    return np.where(np.isfinite(steps), steps, np.nan)
+
+
+def medians(desk: Desk, kind: str, first: bool = False) -> dict[str, Array]:
+    """The medians of the counts, (6,) by law."""
+    found = first_passages(desk, kind) if first else counts(desk, kind)
+    return {law: np.quantile(found[law], 0.5, axis=0, method="higher") for law in LAWS}
+
+
+def fewest(desk: Desk, kind: str, law: str, against: Sequence[str], orders: Sequence[int], first: bool = False) -> Finding:
+    """Tell to which accuracies a law takes fewer steps than others, by the medians over random starts."""
+    found = medians(desk, kind, first)
+    cases = {f"to 10^-{k}": all(found[law][k - 1] < found[other][k - 1] for other in against) for k in orders}
+    note = "; ".join(f"{one}: {', '.join(_count(found[one][k - 1]) for k in orders)}" for one in (law, *against))
+    return Finding(cases, note)
+
+
+def rises(desk: Desk, law: str, orders: dict[str, int], factor: float) -> Finding:
+    """Tell whether the step from one accuracy to the next costs a law more than `factor` times what the others' costs; orders:
+    the k that is come to, for attitude and for rate."""
+    cases: dict[str, bool] = {}
+    notes: list[str] = []
+    for kind, k in orders.items():
+        found = medians(desk, kind)
+        rise = {one: float(found[one][k - 1] - found[one][k - 2]) for one in LAWS}
+        cases[f"{kind}, from 10^-{k - 1} to 10^-{k}"] = all(rise[law] > factor * rise[one] for one in LAWS if one != law)
+        notes.append(f"{kind}: " + ", ".join(f"{one} {_count(rise[one])}" for one in LAWS))
+    return Finding(cases, "; ".join(notes))
+
+
+def _count(steps: float) -> str:
+    return f"{steps:.0f}" if np.isfinite(steps) else "never"
