@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
 import tempfile
+import weakref
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
@@ -36,6 +38,12 @@ class Desk:
     @cached_property
     def _files(self) -> dict[str, str]:
         return scenario_files(self.letter)
+
+    @cached_property
+    def _folder(self) -> Path:
+        folder = tempfile.mkdtemp(prefix="starhold-reproduce-")
+        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        return Path(folder)
 
     def once(self, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
         """Return what `make` gives, made at the first time that this key is asked for."""
@@ -86,8 +94,7 @@ class Desk:
             from starhold.campaign.campaign import Options, fly_campaign
             from starhold.campaign.engines import engine_of
 
-            place = self.once(("folder",), lambda: tempfile.TemporaryDirectory(prefix="starhold-reproduce-"))
             options = Options(engine_of(None, None, None), False, True, False, False)
-            return fly_campaign(self.scenario(file), Path(place.name) / file, None, options, None)
+            return fly_campaign(self.scenario(file), self._folder / file, None, options, None)
 
         return self.once(("campaign", file), make)

@@ -1,4 +1,4 @@
-"""What no scenario holds of this publication: its equations tried by numbers, and counts of steps over random starts."""
+"""Flights of the three laws are held against what the publication says, and drawn as it draws them."""
 
 from __future__ import annotations
 
@@ -9,11 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.quaternion import to_body
 from starhold.analysis.metrics import stays_within
-from starhold.analysis.rigid_body import error_angle
 from starhold.parts.craft import tensor
-from starhold.parts.environments.gravity_gradient import gravity_gradient
 from starhold.reproduce.figure import Curve, Figure, Panel
 from starhold.reproduce.papers.B.calls import call_figure as call_figure
 from starhold.reproduce.papers.B.calls import fewer_operations as fewer_operations
@@ -22,6 +19,12 @@ from starhold.reproduce.papers.B.calls import operations_ratio as operations_rat
 from starhold.reproduce.papers.B.calls import time_cases as time_cases
 from starhold.reproduce.papers.B.calls import time_ratio as time_ratio
 from starhold.reproduce.papers.B.calls import total_time as total_time
+from starhold.reproduce.papers.B.equations import gravity_block as gravity_block
+from starhold.reproduce.papers.B.equations import near_the_target as near_the_target
+from starhold.reproduce.papers.B.equations import on_the_surface as on_the_surface
+from starhold.reproduce.papers.B.equations import one_step as one_step
+from starhold.reproduce.papers.B.equations import reaching_condition as reaching_condition
+from starhold.reproduce.papers.B.equations import target_motion as target_motion
 from starhold.reproduce.papers.B.random_starts import fewest as fewest
 from starhold.reproduce.papers.B.random_starts import rises as rises
 from starhold.reproduce.papers.B.random_starts import steps_figure as steps_figure
@@ -47,7 +50,7 @@ def gains(desk: Desk) -> Finding:
 
 
 def first_command(desk: Desk, file: str, law: str, component: bool = False) -> Finding:
-    """What a law asks for at the start, before any limit (N m): the norm, or the largest component."""
+    """Measure what a law asks for at the start, before any limit (N m): the norm, or the largest component."""
     asked = desk.recording(file, law)["command"][0]
     return Finding(float(np.abs(asked).max() if component else np.linalg.norm(asked)), f"{np.round(asked, 5).tolist()}")
 
@@ -61,135 +64,6 @@ def gravity_torque(desk: Desk) -> Finding:
     return Finding(1.5 * craft.gravity / radius**3 * (moments[-1] - moments[0]))
 
 
-# The equations
-
-
-def near_the_target(desk: Desk, degrees: float = 1.0) -> Finding:
-    """Tell whether the Lyapunov law turns the short way from rest, a little off the target, for either sign of Q."""
-    half = np.radians(degrees) / 2.0
-    found: dict[str, bool] = {}
-    notes: list[str] = []
-    for name, sign in (("q0 > 0", 1.0), ("q0 < 0, the same attitude", -1.0)):
-        start = [sign * np.cos(half), sign * np.sin(half), 0.0, 0.0]
-        changes = {"initial.attitude": start, "initial.rate": [0.0, 0.0, 0.0]}
-        angle = np.degrees(error_angle(desk.recording(COMMON, "lyapunov", changes)["attitude_error"]))
-        found[name] = bool(angle.max() < 2.0 * degrees)
-        notes.append(f"{name}: at most {angle.max():.0f} degrees off on the way")
-    return Finding(found, "; ".join(notes))
-
-
-def _cross(a: Any) -> Array:
-    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
-
-
-def _product(p: Array, q: Array) -> Array:
-    """Hamilton's product, scalars first."""
-    return np.array([p[0] * q[0] - p[1:] @ q[1:], *(p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:]))])
-
-
-def target_motion(desk: Desk, cases: int = 100) -> Finding:
-    """The largest relative errors of the two formulas (10) over random motions of a target: of the rate from the vector part
-    as printed, and of the acceleration from E."""
-    random = np.random.default_rng(1)
-    printed: list[float] = []
-    by_e: list[float] = []
-    for _ in range(cases):
-        q, rate, acceleration = random.normal(size=4), random.normal(size=3), random.normal(size=3)
-        q /= np.linalg.norm(q)
-        pure = np.array([0.0, *rate])
-        first = 0.5 * _product(q, pure)
-        second = 0.5 * (_product(first, pure) + _product(q, np.array([0.0, *acceleration])))
-        block = q[0] * np.eye(3) + _cross(q[1:])
-        # E has the scalar below.
-        e = np.vstack([block, -q[1:]])
-        printed.append(float(np.linalg.norm(2.0 * block @ first[1:] - rate) / np.linalg.norm(rate)))
-        found = 2.0 * e.T @ np.array([*second[1:], second[0]])
-        by_e.append(float(np.linalg.norm(found - acceleration) / np.linalg.norm(acceleration)))
-    note = f"off by up to {max(printed):.1g} times the rate, and {max(by_e):.0e} times the acceleration"
-    return Finding({"rate": max(printed) < 1e-9, "acceleration": max(by_e) < 1e-9}, note)
-
-
-def on_the_surface(desk: Desk, cases: int = 2000) -> Finding:
-    """The sign of V_e' = q'K q' for random attitudes on the surface w = -K q, by the sign of q0, and at the published one."""
-    gain = desk.scenario(COMMON).pick("sliding").gains.surface_gain[0]
-    random = np.random.default_rng(2)
-    attitudes = random.normal(size=(cases, 4))
-    attitudes /= np.linalg.norm(attitudes, axis=1)[:, None]
-
-    def slope(q: Array) -> float:
-        rate = -gain * q[1:]
-        return float(gain * q[1:] @ (0.5 * (q[0] * rate + np.cross(q[1:], rate))))
-
-    start = np.array([0.0, 1.0, 1.0, 1.0]) / np.sqrt(3.0)
-    found = {
-        "q0 > 0": all(slope(q) < 0.0 for q in attitudes if q[0] > 0.0),
-        "q0 = 0, the published start": slope(start) < -1e-12,
-        "q0 < 0": all(slope(q) < 0.0 for q in attitudes if q[0] < 0.0),
-    }
-    return Finding(found, f"{slope(start):.0e} at the published attitude")
-
-
-def reaching_condition(desk: Desk, cases: int = 2000) -> Finding:
-    """Tell whether V_r' = s (M - g sign s) <= 0 for random s and M within the condition (21): as printed, and of |M|."""
-    random = np.random.default_rng(3)
-    s, torque = random.normal(size=cases), random.normal(size=cases)
-    bound = random.uniform(0.0, 2.0, size=cases)
-    falls = s * (torque - bound * np.sign(s)) <= 0.0
-    return Finding(
-        {
-            "g >= |M|": bool(falls[bound >= np.abs(torque)].all()),
-            "g >= M, as printed": bool(falls[bound >= torque].all()),
-        }
-    )
-
-
-def gravity_block(desk: Desk, cases: int = 20) -> Finding:
-    """The factor that the gravity block of the printed matrix lacks: differences of the torque with the vector part of a
-    small turn of the body, against (mu/R^5) ([R]J - [JR]) [R] at random attitudes."""
-    scenario = desk.scenario(COMMON)
-    craft = build(scenario, scenario.pick("mpc")).craft
-    moments, random = tensor(craft.inertia), np.random.default_rng(4)
-    factors: list[float] = []
-    for _ in range(cases):
-        place: Any = tuple(7.0e6 * (lambda v: v / np.linalg.norm(v))(random.normal(size=3)))
-        strength = 3.0 * craft.gravity / 7.0e6**5
-
-        def torque(turn: Array, place: Any = place, strength: float = strength) -> Array:
-            quaternion: Any = (float(np.sqrt(1.0 - turn @ turn)), *map(float, turn))
-            return np.array(gravity_gradient(to_body(quaternion, place), strength, craft))
-
-        step = 1e-4
-        slopes = np.column_stack([(torque(step * e) - torque(-step * e)) / (2.0 * step) for e in np.eye(3)])
-        r = np.array(place)
-        printed = craft.gravity / 7.0e6**5 * (_cross(r) @ moments - _cross(moments @ r)) @ _cross(r)
-        factors.append(float((slopes * printed).sum() / (printed**2).sum()))
-    return Finding(float(np.mean(factors)), f"from {min(factors):.6f} to {max(factors):.6f} at {cases} places")
-
-
-def one_step(desk: Desk) -> Finding:
-    """Tell whether x(k+1) = A x(k) with the printed A = A_c + E predicts the first control period of the published motion
-    under predictive control; the errors of that and of E + A_c dt are told."""
-    scenario = desk.scenario(COMMON)
-    loop = build(scenario, scenario.pick("mpc"))
-    state, moments = loop.start, tensor(loop.craft.inertia)
-    rate, q = np.array(state.rate), np.array(state.attitude)
-    flown = fly(loop, 1)[1]
-    control = np.array(flown.command)
-    push = np.linalg.inv(moments)
-    gyroscopic = push @ (_cross(moments @ rate) - _cross(rate) @ moments)
-    continuous = np.block([[-_cross(rate), 0.5 * np.eye(3)], [np.zeros((3, 3)), gyroscopic]])
-    held = np.concatenate([np.zeros(3), push @ control])
-    x = np.concatenate([q[1:], rate])
-    end = flown.state
-    true = np.concatenate([np.array(end.attitude)[1:], np.array(end.rate)])
-    moved = float(np.linalg.norm(true - x))
-    printed = float(np.linalg.norm(x + continuous @ x + held - true)) / moved
-    stepped = float(np.linalg.norm(x + loop.period * (continuous @ x + held) - true)) / moved
-    return Finding(
-        printed < 0.5, f"off by {printed:.1f} times what the state moves; with the step in front, by {stepped:.2f}"
-    )
-
-
 # What flies
 
 
@@ -199,7 +73,7 @@ def arrives(desk: Desk, file: str, laws: Sequence[str], within: float, changes: 
 
 
 def cases(desk: Desk, of: Sequence[Mapping[str, Any]], within: float) -> Finding:
-    """The same of several flights: `name`, `file`, `law` and perhaps `changes` each."""
+    """Tell of several flights whether each ends within a bound (rad): `name`, `file`, `law` and perhaps `changes`."""
     ends = {one["name"]: _final(desk, one["file"], one["law"], one.get("changes")) for one in of}
     return Finding({name: end <= within for name, end in ends.items()}, _listed(ends, "rad"))
 
@@ -214,7 +88,7 @@ def _listed(values: Mapping[str, float], unit: str = "") -> str:
 
 
 def smooth(desk: Desk) -> Finding:
-    """The share of the largest torque by which the Lyapunov law's changes from call to call at most, and the sliding law's."""
+    """Tell whether the Lyapunov torque changes little from call to call, beside the sliding torque."""
     steps = {law: float(np.abs(np.diff(desk.recording(COMMON, law)["torque"], axis=0)).max()) for law in LAWS[:2]}
     return Finding(steps["lyapunov"] < 0.02 * steps["sliding"], "largest change a call: " + _listed(steps, "N m"))
 
@@ -286,7 +160,7 @@ def least_accurate(desk: Desk, of: Sequence[Mapping[str, Any]], law: str) -> Fin
     return Finding(found, "; ".join(notes))
 
 
-def run_length_matters(desk: Desk, law: str, bound: float, short: float) -> Finding:
+def same_after(desk: Desk, law: str, bound: float, short: float) -> Finding:
     """Tell whether the step after which the error stays within a bound is the same in a flight that ends sooner (s)."""
     error = _deviation(desk, COMMON, law)
     cut, whole = stays_within(error[: int(10.0 * short) + 1], bound), stays_within(error, bound)
@@ -333,21 +207,27 @@ def plans(desk: Desk, file: str, law: str, instants: Sequence[int], until: float
 
 
 def with_detail(
-    desk: Desk, file: str, law: str, quantity: str, label: str, names: Sequence[str], until: float, detail: Sequence[float],
+    desk: Desk,
+    file: str,
+    law: str,
+    quantity: str,
+    label: str,
+    names: Sequence[str],
+    detail: Sequence[float],
     scale: float = 1.0,
-) -> Figure:  # fmt: skip
-    """The components of a recorded quantity, and in a second panel those between two instants (s)."""
+) -> Figure:
+    """The components of a recorded quantity, a panel each, and below what each does between two instants (s); the upper
+    panels end with the later."""
     run = desk.recording(file, law)
     time, values = run["time"], scale * np.asarray(run[quantity])
-
-    def panel(first: float, last: float, style: Any, title: str) -> Panel:
-        shown = (time >= first) & (time <= last)
-        curves = [Curve(time[shown], values[shown, k], name, style) for k, name in enumerate(names)]
-        return Panel("time, s", label, curves, title)
-
-    parts = [panel(0.0, until, "line", "")]
-    parts.append(panel(detail[0], detail[1], "steps" if quantity == "torque" else "line", "the same, magnified"))
-    return Figure(parts, columns=2)
+    first, last = detail
+    whole, part = time <= last, (time >= first) & (time <= last)
+    style: Any = "steps" if quantity == "torque" else "line"
+    above = [Panel("time, s", label, [Curve(time[whole], values[whole, k])], name) for k, name in enumerate(names)]
+    below = [
+        Panel(f"time after {first:g} s, s", label, [Curve(time[part] - first, values[part, k], "", style)]) for k in range(3)
+    ]
+    return Figure([*above, *below], columns=3)
 
 
 def fall(desk: Desk, of: Mapping[str, Sequence[str]], until: float, levels: Sequence[float] = ()) -> Figure:
@@ -373,11 +253,20 @@ def by_gain(desk: Desk, least: float, most: float, count: int, limits: Mapping[s
     ends = [Curve(mine, table["final_attitude_error"].to_numpy(dtype=float), "sliding", "points")]
     levels = [_final(desk, COMMON, law) for law in limits.values()]
     notes = [(3.0 * mine[0], 2.2 * level, name) for level, name in zip(levels, limits, strict=True)]
-    label = "switching torque g, mN m"
+    label, span = "switching torque g, mN m", (0.9e3 * least, 1.1e3 * most)
     return Figure(
         [
-            Panel(label, "steps to stay within", curves, log_x=True, log_y=True),
-            Panel(label, "largest angle in the last quarter, rad", ends, log_x=True, log_y=True, levels=levels, notes=notes),
+            Panel(label, "steps to stay within", curves, x_span=span, log_x=True, log_y=True),
+            Panel(
+                label,
+                "largest angle in the last quarter, rad",
+                ends,
+                x_span=span,
+                log_x=True,
+                log_y=True,
+                levels=levels,
+                notes=notes,
+            ),
         ],
         columns=2,
     )

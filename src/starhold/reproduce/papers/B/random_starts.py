@@ -1,4 +1,4 @@
-"""Counts of control steps over random starts: for good, as the campaign has them, and at the first passage."""
+"""Control steps are counted over random starts: for good, as the campaign has them, and at the first passage."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def counts(desk: Desk, kind: str) -> dict[str, Array]:
     """The steps after which the error stays within 10^-1 to 10^-6, (starts, 6) by law; inf where it never does."""
 
     def make() -> dict[str, Array]:
-        frame = desk.campaign(FILE).frame()
+        frame: Any = desk.campaign(FILE).frame()
         names = [f"{PREFIXES[kind]}iterations_1e-{k}" for k in DECADES]
         return {law: frame[frame["law"] == law][names].fillna(np.inf).to_numpy(dtype=float) for law in LAWS}
 
@@ -42,7 +42,8 @@ def first_passages(desk: Desk, kind: str) -> dict[str, Array]:
     """The steps after which the error is within 10^-1 to 10^-6 for the first time, likewise, of the first starts."""
 
     def make() -> dict[str, dict[str, Array]]:
-        scenario, frame = desk.scenario(FILE), desk.campaign(FILE).frame()
+        scenario = desk.scenario(FILE)
+        frame: Any = desk.campaign(FILE).frame()
         found: dict[str, dict[str, Array]] = {"attitude": {}, "rate": {}}
         for law in LAWS:
             loop = build(scenario, scenario.pick(law))
@@ -93,7 +94,7 @@ def steps_figure(desk: Desk, kind: str) -> Figure:
             curves.append(Curve(outline, np.concatenate([low[there], high[there][::-1]]), "", "area", hue))
         curves.append(Curve(orders, _drawn(middle), law, "line", hue))
         passed = np.quantile(first[law], 0.5, axis=0, method="higher")
-        curves.append(Curve(orders, _drawn(passed), f"{law}, first passage", "dotted", hue))
+        curves.append(Curve(orders, _drawn(passed), "first passage" if hue == 0 else "", "dotted", hue))
         shares.append(Curve(orders, 100.0 * np.isfinite(found[law]).mean(axis=0), law, "line", hue))
     symbol = "|q|" if kind == "attitude" else "|ω| in rad/s"
     across = f"k of {symbol} ≤ 10^-k"
@@ -119,8 +120,8 @@ def fewest(desk: Desk, kind: str, law: str, against: Sequence[str], orders: Sequ
 
 
 def rises(desk: Desk, law: str, orders: dict[str, int], factor: float) -> Finding:
-    """Tell whether the step from one accuracy to the next costs a law more than `factor` times what the others' costs; orders:
-    the k that is come to, for attitude and for rate."""
+    """Tell whether the step from one accuracy to the next costs a law more than `factor` times what it costs the others;
+    orders: the k that is come to, for attitude and for rate."""
     cases: dict[str, bool] = {}
     notes: list[str] = []
     for kind, k in orders.items():

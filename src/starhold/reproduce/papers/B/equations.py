@@ -1,0 +1,146 @@
+"""The equations of the publication are tried by numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.quaternion import to_body
+from starhold.analysis.rigid_body import error_angle
+from starhold.parts.craft import tensor
+from starhold.parts.environments.gravity_gradient import gravity_gradient
+from starhold.reproduce.verdicts import Finding
+from starhold.scenario.building import build
+from starhold.simulation.lane import fly
+
+if TYPE_CHECKING:
+    from starhold.reproduce.desk import Desk
+
+Array = NDArray[np.float64]
+COMMON = "three-laws"
+
+
+def near_the_target(desk: Desk, degrees: float = 1.0) -> Finding:
+    """Tell whether the Lyapunov law turns the short way from rest, a little off the target, for either sign of Q."""
+    half = np.radians(degrees) / 2.0
+    found: dict[str, bool] = {}
+    notes: list[str] = []
+    for name, sign in (("q0 > 0", 1.0), ("q0 < 0, the same attitude", -1.0)):
+        start = [sign * np.cos(half), sign * np.sin(half), 0.0, 0.0]
+        changes = {"initial.attitude": start, "initial.rate": [0.0, 0.0, 0.0]}
+        angle = np.degrees(error_angle(desk.recording(COMMON, "lyapunov", changes)["attitude_error"]))
+        found[name] = bool(angle.max() < 2.0 * degrees)
+        notes.append(f"{name}: at most {angle.max():.0f} degrees off on the way")
+    return Finding(found, "; ".join(notes))
+
+
+def _cross(a: Any) -> Array:
+    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+
+
+def _product(p: Array, q: Array) -> Array:
+    """Hamilton's product, scalars first."""
+    return np.array([p[0] * q[0] - p[1:] @ q[1:], *(p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:]))])
+
+
+def target_motion(desk: Desk, cases: int = 100) -> Finding:
+    """The largest relative errors of the two formulas (10) over random motions of a target: of the rate from the vector part
+    as printed, and of the acceleration from E."""
+    random = np.random.default_rng(1)
+    printed: list[float] = []
+    by_e: list[float] = []
+    for _ in range(cases):
+        q, rate, acceleration = random.normal(size=4), random.normal(size=3), random.normal(size=3)
+        q /= np.linalg.norm(q)
+        pure = np.array([0.0, *rate])
+        first = 0.5 * _product(q, pure)
+        second = 0.5 * (_product(first, pure) + _product(q, np.array([0.0, *acceleration])))
+        block = q[0] * np.eye(3) + _cross(q[1:])
+        # E has the scalar below.
+        e = np.vstack([block, -q[1:]])
+        printed.append(float(np.linalg.norm(2.0 * block @ first[1:] - rate) / np.linalg.norm(rate)))
+        found = 2.0 * e.T @ np.array([*second[1:], second[0]])
+        by_e.append(float(np.linalg.norm(found - acceleration) / np.linalg.norm(acceleration)))
+    note = f"off by up to {max(printed):.1g} times the rate, and {max(by_e):.0e} times the acceleration"
+    return Finding({"rate": max(printed) < 1e-9, "acceleration": max(by_e) < 1e-9}, note)
+
+
+def on_the_surface(desk: Desk, cases: int = 2000) -> Finding:
+    """Tell whether V_e' = q'K q' is negative on the surface w = -K q, at random attitudes by the sign of q0, and at the
+    start."""
+    gain = desk.scenario(COMMON).pick("sliding").gains.surface_gain[0]
+    random = np.random.default_rng(2)
+    attitudes = random.normal(size=(cases, 4))
+    attitudes /= np.linalg.norm(attitudes, axis=1)[:, None]
+
+    def slope(q: Array) -> float:
+        rate = -gain * q[1:]
+        return float(gain * q[1:] @ (0.5 * (q[0] * rate + np.cross(q[1:], rate))))
+
+    start = np.array([0.0, 1.0, 1.0, 1.0]) / np.sqrt(3.0)
+    found = {
+        "q0 > 0": all(slope(q) < 0.0 for q in attitudes if q[0] > 0.0),
+        "q0 = 0, the published start": slope(start) < -1e-12,
+        "q0 < 0": all(slope(q) < 0.0 for q in attitudes if q[0] < 0.0),
+    }
+    return Finding(found, f"{slope(start):.0e} at the published attitude")
+
+
+def reaching_condition(desk: Desk, cases: int = 2000) -> Finding:
+    """Tell whether V_r' = s (M - g sign s) <= 0 for random s and M within the condition (21): as printed, and of |M|."""
+    random = np.random.default_rng(3)
+    s, torque = random.normal(size=cases), random.normal(size=cases)
+    bound = random.uniform(0.0, 2.0, size=cases)
+    falls = s * (torque - bound * np.sign(s)) <= 0.0
+    return Finding(
+        {
+            "g >= |M|": bool(falls[bound >= np.abs(torque)].all()),
+            "g >= M, as printed": bool(falls[bound >= torque].all()),
+        }
+    )
+
+
+def gravity_block(desk: Desk, cases: int = 20) -> Finding:
+    """The factor that the gravity block of the printed matrix lacks: differences of the torque with the vector part of a
+    small turn of the body, against (mu/R^5) ([R]J - [JR]) [R] at random attitudes."""
+    scenario = desk.scenario(COMMON)
+    craft = build(scenario, scenario.pick("mpc")).craft
+    moments, random = tensor(craft.inertia), np.random.default_rng(4)
+    factors: list[float] = []
+    for _ in range(cases):
+        place: Any = tuple(7.0e6 * (lambda v: v / np.linalg.norm(v))(random.normal(size=3)))
+        strength = 3.0 * craft.gravity / 7.0e6**5
+
+        def torque(turn: Array, place: Any = place, strength: float = strength) -> Array:
+            quaternion: Any = (float(np.sqrt(1.0 - turn @ turn)), *map(float, turn))
+            return np.array(gravity_gradient(to_body(quaternion, place), strength, craft))
+
+        step = 1e-4
+        slopes = np.column_stack([(torque(step * e) - torque(-step * e)) / (2.0 * step) for e in np.eye(3)])
+        r = np.array(place)
+        printed = craft.gravity / 7.0e6**5 * (_cross(r) @ moments - _cross(moments @ r)) @ _cross(r)
+        factors.append(float((slopes * printed).sum() / (printed**2).sum()))
+    return Finding(float(np.mean(factors)), f"from {min(factors):.6f} to {max(factors):.6f} at {cases} places")
+
+
+def one_step(desk: Desk, of: Mapping[str, Mapping[str, Any]]) -> Finding:
+    """Tell whether x + h (A_c x + B u) foresees the state (q; w) a control period later, within a tenth of what it moves,
+    under predictive control. of: cases by name; `step`: whether h is the control period, or 1 as printed; `changes`."""
+    found: dict[str, float] = {}
+    for name, case in of.items():
+        scenario = desk.scenario(COMMON, case.get("changes"))
+        loop = build(scenario, scenario.pick("mpc"))
+        end, inertia = fly(loop, 1)[1], tensor(loop.craft.inertia)
+        before, after = (np.array([*state.attitude[1:], *state.rate]) for state in (loop.start, end.state))
+        rate, control = before[3:], np.array(end.command)
+        damping = _cross(inertia @ rate) - _cross(rate) @ inertia
+        # The gravity block is six orders smaller.
+        slope = np.block([[-_cross(rate), 0.5 * np.eye(3)], [np.zeros((3, 3)), np.linalg.solve(inertia, damping)]]) @ before
+        slope[3:] += np.linalg.solve(inertia, control)
+        foreseen = before + (loop.period if case["step"] else 1.0) * slope
+        found[name] = float(np.linalg.norm(foreseen - after) / np.linalg.norm(after - before))
+    note = "off by, as a share of what the state moves: " + ", ".join(f"{name} {error:.2g}" for name, error in found.items())
+    return Finding({name: error < 0.1 for name, error in found.items()}, note)
