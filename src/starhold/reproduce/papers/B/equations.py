@@ -28,7 +28,7 @@ def near_the_target(desk: Desk, degrees: float = 1.0) -> Finding:
     half = np.radians(degrees) / 2.0
     found: dict[str, bool] = {}
     notes: list[str] = []
-    for name, sign in (("q0 > 0", 1.0), ("q0 < 0, the same attitude", -1.0)):
+    for name, sign in (("q0 > 0", 1.0), ("q0 < 0 at the same attitude", -1.0)):
         start = [sign * np.cos(half), sign * np.sin(half), 0.0, 0.0]
         changes = {"initial.attitude": start, "initial.rate": [0.0, 0.0, 0.0]}
         angle = np.degrees(error_angle(desk.recording(COMMON, "lyapunov", changes)["attitude_error"]))
@@ -83,10 +83,10 @@ def on_the_surface(desk: Desk, cases: int = 2000) -> Finding:
     start = np.array([0.0, 1.0, 1.0, 1.0]) / np.sqrt(3.0)
     found = {
         "q0 > 0": all(slope(q) < 0.0 for q in attitudes if q[0] > 0.0),
-        "q0 = 0, the published start": slope(start) < -1e-12,
+        "q0 = 0 as at the published start": slope(start) < -1e-12,
         "q0 < 0": all(slope(q) < 0.0 for q in attitudes if q[0] < 0.0),
     }
-    return Finding(found, f"{slope(start):.0e} at the published attitude")
+    return Finding(found, f"V_e' = {slope(start):.1g} at the published attitude")
 
 
 def reaching_condition(desk: Desk, cases: int = 2000) -> Finding:
@@ -98,7 +98,7 @@ def reaching_condition(desk: Desk, cases: int = 2000) -> Finding:
     return Finding(
         {
             "g >= |M|": bool(falls[bound >= np.abs(torque)].all()),
-            "g >= M, as printed": bool(falls[bound >= torque].all()),
+            "g >= M as printed": bool(falls[bound >= torque].all()),
         }
     )
 

@@ -52,7 +52,9 @@ def gains(desk: Desk) -> Finding:
 def first_command(desk: Desk, file: str, law: str, component: bool = False) -> Finding:
     """Measure what a law asks for at the start, before any limit (N m): the norm, or the largest component."""
     asked = desk.recording(file, law)["command"][0]
-    return Finding(float(np.abs(asked).max() if component else np.linalg.norm(asked)), f"{np.round(asked, 5).tolist()}")
+    return Finding(
+        float(np.abs(asked).max() if component else np.linalg.norm(asked)), f"about the axes {np.round(asked, 5).tolist()}"
+    )
 
 
 def gravity_torque(desk: Desk) -> Finding:

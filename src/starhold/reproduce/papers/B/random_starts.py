@@ -127,7 +127,7 @@ def rises(desk: Desk, law: str, orders: dict[str, int], factor: float) -> Findin
     for kind, k in orders.items():
         found = medians(desk, kind)
         rise = {one: float(found[one][k - 1] - found[one][k - 2]) for one in LAWS}
-        cases[f"{kind}, from 10^-{k - 1} to 10^-{k}"] = all(rise[law] > factor * rise[one] for one in LAWS if one != law)
+        cases[f"{kind} from 10^-{k - 1} to 10^-{k}"] = all(rise[law] > factor * rise[one] for one in LAWS if one != law)
         notes.append(f"{kind}: " + ", ".join(f"{one} {_count(rise[one])}" for one in LAWS))
     return Finding(cases, "; ".join(notes))
 
