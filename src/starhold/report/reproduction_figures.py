@@ -25,6 +25,9 @@ def draw(figure: Figure) -> bytes:
     axes = grid.ravel()
     for axis, panel in zip(axes, figure.panels, strict=False):
         _panel(axis, panel)
+        if columns > 2 and not panel.log_x:
+            # In a narrow panel more numbers would run into one another.
+            axis.locator_params(axis="x", nbins=5)
     for axis in axes[len(figure.panels) :]:
         axis.set_visible(False)
     file = BytesIO()
@@ -71,6 +74,8 @@ def _curve(axis: Any, curve: Curve, hue: str) -> None:
     label = curve.label or None
     if curve.style == "area":
         axis.fill(curve.x, curve.y, color=hue, alpha=0.22, linewidth=0.0, label=label)
+    elif curve.style == "faint":
+        axis.plot(curve.x, curve.y, color="0.72", linewidth=0.7, zorder=1, label=label)
     elif curve.style == "points":
         axis.plot(curve.x, curve.y, color=hue, linestyle="", marker="o", markersize=3.2, label=label)
     elif curve.style == "steps":

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
-Style: TypeAlias = Literal["line", "dashed", "dotted", "points", "steps", "area"]
+Style: TypeAlias = Literal["line", "dashed", "dotted", "points", "steps", "area", "faint"]
 
 
 @dataclass(frozen=True)
 class Curve:
     """Points that belong together: x (n,) and y (n,), in the units that the panel's labels tell. An "area" is a closed
-    outline that is filled."""
+    outline that is filled; "faint" is a thin grey line."""
 
     x: Any
     y: Any

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from starhold.algebra.polynomial import Polynomial
 from starhold.certification.certificate import Certificate, Claim
-from starhold.certification.invariant import InvariantProblem, WantedSet
+from starhold.certification.invariant import InvariantProblem, System, WantedSet
 from starhold.certification.invariant.descent import Candidate
 from starhold.certification.invariant.enclosure import EnclosedPolynomial
 from starhold.certification.invariant.search import Values
@@ -20,6 +22,8 @@ COARSE, STEPS = 121, 10
 """Points where there are more than two variables, and how often a grid over the others shrinks."""
 AHEAD = 60.0
 """How long a motion is followed backwards until it is on the border of the true region."""
+TINY = 1e-12
+"""Rates that count as none."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +53,33 @@ def portraits(problem: InvariantProblem, certificate: Certificate) -> list[Portr
     return [_portrait(problem, wanted, claim, problem.orbit(k)) for k, (wanted, claim) in enumerate(pairs)]
 
 
+def paths(system: System, box: Sequence[tuple[float, float]], starts: Any, length: float, steps: int = 400) -> Any:
+    """Follow motions from starts (n, N) in steps of arc length, backwards in time where the length is negative; where one
+    would turn round, as at an equilibrium, it ends. Returns (N, n, steps + 1), parameters in the middle of their
+    intervals."""
+    what = Candidate(system, Polynomial.constant(0), tuple(box))
+    moving, count = len(system.variables), np.shape(starts)[1]
+    others = [np.full(count, 0.5 * (low + high)) for low, high in what.box[moving:]]
+    rates_at = _Rates(what, moving)
+
+    def heading(state: Any) -> Any:
+        rates = rates_at(np.array([*state, *others]))
+        return rates / np.maximum(np.linalg.norm(rates, axis=0), TINY)
+
+    step, state, going = length / steps, np.array(starts, dtype=float), np.ones(count)
+    found, a = [state], heading(state)
+    for _ in range(steps):
+        b = heading(state + 0.5 * step * a)
+        c = heading(state + 0.5 * step * b)
+        d = heading(state + step * c)
+        ahead = state + going * step / 6.0 * (a + 2.0 * b + 2.0 * c + d)
+        turned = heading(ahead)
+        going = going * ((a * turned).sum(axis=0) > 0.0)
+        state, a = np.where(going > 0.0, ahead, state), turned
+        found.append(state)
+    return np.stack(found, axis=-1).swapaxes(0, 1)
+
+
 def _portrait(problem: InvariantProblem, wanted: WantedSet, claim: Claim, start: tuple[float, ...] | None) -> Portrait:
     names = problem.system.names
     if len(problem.system.variables) < 2:
@@ -60,7 +91,7 @@ def _portrait(problem: InvariantProblem, wanted: WantedSet, claim: Claim, start:
     points[0], points[1] = (side.ravel() for side in np.meshgrid(x, y))
     values = Values(what, points)
     shape = (len(y), len(x))
-    u, v = (rate.reshape(shape) for rate in _rates(what, values)[:2]) if flat else (None, None)
+    u, v = (rate.reshape(shape) for rate in _Rates(what, 2)(points)) if flat else (None, None)
     # Of what is left, all of which some motions start from.
     sign = -1.0 if wanted.theorem == "unstable" else 1.0
     V = (values.V if flat else sign * _least(what, points, len(problem.system.variables), sign)).reshape(shape)
@@ -95,28 +126,37 @@ def _least(what: Candidate, points: Any, moving: int, sign: float) -> Any:
     return values
 
 
-def _rates(what: Candidate, values: Values) -> Any:
-    found = np.full((len(what.pieces.names), values.points.shape[1]), np.nan)
-    for place, cell in enumerate(what.pieces.cells):
-        here = values.cell == place
-        for k, rate in enumerate(cell.rates):
-            found[k, here] = EnclosedPolynomial(rate).at(values.points[:, here])
-    return found
+class _Rates:
+    """The rates of what moves, in floats at points (n, N) of variables and parameters; NaN where no cell is."""
+
+    def __init__(self, what: Candidate, moving: int) -> None:
+        pieces = what.pieces
+        self._moving = moving
+        self._surfaces = [EnclosedPolynomial(surface) for surface in pieces.surfaces]
+        self._cells = [(cell.signs, [EnclosedPolynomial(rate) for rate in cell.rates[:moving]]) for cell in pieces.cells]
+
+    def __call__(self, points: Any) -> Any:
+        found = np.full((self._moving, points.shape[1]), np.nan)
+        sides, free = [surface.at(points) for surface in self._surfaces], np.ones(points.shape[1], dtype=bool)
+        for signs, rates in self._cells:
+            here = free.copy()
+            for sign, side in zip(signs, sides, strict=True):
+                here &= sign * side >= 0.0
+            free &= ~here
+            for k, rate in enumerate(rates):
+                found[k, here] = rate.at(points[:, here])
+        return found
 
 
 def _orbit(what: Candidate, start: Any) -> Any:
     """One turn of the closed motion that the motion from a state comes to backwards in time; None if it comes to none."""
     from scipy.integrate import solve_ivp
 
-    cells = [(cell.signs, [EnclosedPolynomial(rate) for rate in cell.rates[:2]]) for cell in what.pieces.cells]
-    surfaces = [EnclosedPolynomial(s) for s in what.pieces.surfaces]
+    rates = _Rates(what, 2)
     others = [0.5 * (low + high) for low, high in what.box[2:]]
 
     def back(time: float, state: Any) -> Any:
-        point = [*state, *others]
-        sides = [float(s.at(point)) for s in surfaces]
-        rates = next(r for signs, r in cells if all(s * v >= 0.0 for s, v in zip(signs, sides, strict=True)))
-        return [-float(rate.at(point)) for rate in rates]
+        return -rates(np.array([*state, *others])[:, None])[:, 0]
 
     options: dict[str, Any] = {"rtol": 1e-8, "atol": 1e-9}
     settled = solve_ivp(back, (0.0, AHEAD), start, **options)

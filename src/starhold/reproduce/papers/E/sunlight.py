@@ -1,0 +1,339 @@
+"""Sections 3.1 and 3.4 are measured: where the Sun is seen from, and how its light gives the control."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from starhold.algebra.vector import add, clip_norm
+from starhold.laws.interface import NoMemory
+from starhold.laws.point import PointMeasurement
+from starhold.parts.bodies.libration_point import EARTH_DIAMETER, PRIMARIES, linear
+from starhold.reproduce.desk import Desk
+from starhold.reproduce.figure import Curve, Figure, Panel
+from starhold.reproduce.verdicts import Finding
+from starhold.synthesis import sail as sails
+from starhold.synthesis.circle import Station, pressure_at
+
+PAIR = PRIMARIES["sun-earth"]
+TURN = np.linspace(0.0, 2.0 * np.pi, 181)
+RING = np.array([np.cos(TURN), np.sin(TURN)])
+
+
+def station(specular: float = 1.0) -> Station:
+    """Return the circle of one Earth diameter round L2, with a sail."""
+    return Station(PAIR, "L2", EARTH_DIAMETER, specular)
+
+
+def discs() -> tuple[float, float]:
+    """Return the angular diameters (degrees) of the Sun and the Earth from L2."""
+    plant = station().plant
+    pairs = ((PAIR.radius_larger, plant.from_larger), (PAIR.radius_smaller, plant.from_smaller))
+    sun, earth = (math.degrees(2.0 * radius / (away * EARTH_DIAMETER)) for radius, away in pairs)
+    return sun, earth
+
+
+def angles(desk: Desk) -> Finding:
+    """Angular diameters of the Sun and the Earth from L2 (degrees)."""
+    return Finding(discs())
+
+
+def same_angle(desk: Desk) -> Finding:
+    """Tell how nearly both discs look equal."""
+    sun, earth = discs()
+    share = earth / sun
+    ring = 100.0 * station().light(0.0)
+    told = f"the Earth's is {share:.3f} of the Sun's: on the axis a ring with {ring:.0f} % of the light is left"
+    return Finding({"within a tenth": abs(share - 1.0) < 0.1, "within a hundredth": abs(share - 1.0) < 0.01}, told)
+
+
+def clear_offset(desk: Desk) -> Finding:
+    """The offset from which on the whole Sun is seen, in Earth diameters."""
+    here = station()
+    return Finding(
+        here.clear_radius / EARTH_DIAMETER, f"at 1 diameter {100.0 * here.light(EARTH_DIAMETER):.1f} % of the Sun is seen"
+    )
+
+
+def lit_share(desk: Desk, count: int) -> Finding:
+    """Tell whether the formula for equal discs is the share of points of one disc that the other leaves free."""
+    side = (np.arange(count) + 0.5) / count * 2.0 - 1.0
+    x, y = np.meshgrid(side, side)
+    inside = x * x + y * y < 1.0
+    # Offsets in radii of the Earth: the discs' centres are as many of their radii apart.
+    offsets = np.linspace(0.0, 2.0, 9)
+    free = [float(((x - s) ** 2 + y * y >= 1.0)[inside].mean()) for s in offsets]
+    off = float(np.abs(np.array(free) - sails.lit(offsets)).max())
+    return Finding(off < 5e-3, f"counted on a grid of {count} by {count} points: within {off:.0e}")
+
+
+def mirror_force(desk: Desk) -> Finding:
+    """Tell whether the push on a mirror is p S cos g (1 + cos 2g)/cos g along its normal, 2 p S cos^2 g, by the momentum of
+    the light that turns."""
+    sail, off = sails.make_sail(4.5e-6, 150.0, 300.0), 0.0
+    for cone in np.linspace(0.0, 1.5, 31):
+        setting = sails.Setting(sail.area, float(cone), 0.7)
+        normal = np.array(sails.normal_of(setting))
+        light = np.array([1.0, 0.0, 0.0])
+        reflected = light - 2.0 * normal[0] * normal
+        lost = sail.pressure * sail.area * normal[0] * (light - reflected)
+        printed = sail.pressure * sail.area * (1.0 + math.cos(2.0 * cone)) * normal
+        off = max(
+            off, float(np.abs(np.subtract(sails.given(setting, sail), lost)).max()), float(np.abs(printed - lost).max())
+        )
+    return Finding(off < 1e-15, "light of this momentum, reflected at 31 angles, loses as much")
+
+
+def ball(desk: Desk) -> Finding:
+    """Tell whether a ball of controls is within reach: every vector of its border is given by area and two angles."""
+    sail = sails.make_sail(4.5e-6, 150.0, 300.0)
+    reach, off, most = sails.reach(sail), 0.0, 0.0
+    for lean in np.linspace(0.0, np.pi, 25):
+        for clock in np.linspace(-3.0, 3.0, 12):
+            across = math.sin(lean)
+            wanted = tuple(reach * part for part in (math.cos(lean), across * math.cos(clock), across * math.sin(clock)))
+            setting = sails.steer(wanted, sail)
+            off = max(off, float(np.linalg.norm(np.subtract(sails.steered(setting, sail), wanted))) / reach)
+            most = max(most, setting.area / sail.area)
+    radius = sails.MIRROR_RADIUS / 2.0
+    told = f"radius {radius:.4f} of 2 p S/m; its border asks for at most {100.0 * most:.1f} % of the area"
+    return Finding(off < 1e-9 and most < 1.0 + 1e-9, told)
+
+
+def shifted(desk: Desk) -> Finding:
+    """Tell whether the linear model stays as it is under a steady push, about a place nearer to the Sun."""
+    plant, push = station().plant, 2.3
+    back = push / (plant.rate**2 + 2.0 * plant.stiffness)
+    draw = np.random.default_rng(5)
+    off = 0.0
+    for _ in range(20):
+        position, velocity = (tuple(map(float, draw.normal(size=3))) for _ in range(2))
+        moved = add(linear((position[0] - back, position[1], position[2]), velocity, plant), (push, 0.0, 0.0))
+        off = max(off, float(np.abs(np.subtract(moved, linear(position, velocity, plant))).max()))
+    steady = sails.MIRROR_CENTRE / sails.MIRROR_RADIUS * station().peak() / station().units.acceleration / (push / back)
+    return Finding(off < 1e-12, f"the smallest mirror's push moves it {steady:.2f} Earth diameters towards the Sun")
+
+
+def area(desk: Desk, low: float, high: float, pressure: float) -> Finding:
+    """Tell for which reflectivities the area per mass lies between two numbers (m2/kg), at a pressure (N/m2)."""
+    here = station()
+
+    def least(mirror: float) -> float:
+        return here.peak() / (pressure * sails.MIRROR_RADIUS * mirror)
+
+    ends = " and ".join(f"{least(1.0) / value:.2f}" for value in (low, high))
+    told = (
+        f"{low:g} and {high:g} belong to reflectivities {ends}; a perfect mirror takes {least(1.0):.3f} m²/kg, in the light "
+        f"at the circle ({here.pressure * 1e6:.2f} µN/m²) {here.area_per_mass():.3f}"
+    )
+    return Finding({f"reflectivity {one:g}": low <= least(one) <= high for one in (1.0, 0.9, 0.8, 0.7, 0.6)}, told)
+
+
+def solar_cells(desk: Desk, efficiency: float, most: float) -> Finding:
+    """Tell whether solar cells as large as the sail suit a craft of at most so much power per mass (W/kg)."""
+    flux = pressure_at(station().plant.from_larger * EARTH_DIAMETER) * 299_792_458.0
+    power = station().area_per_mass() * flux * efficiency
+    return Finding(
+        power < most, f"of the area of the smallest mirror, cells of {100.0 * efficiency:g} % give {power:.0f} W/kg"
+    )
+
+
+def area_figure(desk: Desk) -> Figure:
+    """Area per mass over the reflectivity."""
+    here, mirror = station(), np.linspace(0.4, 1.0, 61)
+    areas = [here.area_per_mass(specular=float(one)) for one in mirror]
+    panel = Panel("reflectivity", "area per mass, m²/kg", [Curve(mirror, areas)], levels=(0.6, 1.0), y_span=(0.4, 1.3))
+    return Figure([panel])
+
+
+def fly_sail(desk: Desk, margin: float, lag_h: float, years: float) -> dict[str, Any]:
+    """Fly the circle on a mirror whose two angles lag and whose area follows at once, SciPy's integrator in place of the
+    loop. Returns time (revolutions), position (m, 3; radii), and settings as commanded and as they are (m, 3; share of the
+    area, degrees)."""
+    from scipy.integrate import solve_ivp
+
+    def make() -> dict[str, Any]:
+        here = station()
+        units, plant = here.units, here.plant
+        entry = desk.scenario("l2-circle").pick("smooth")
+        sail = sails.make_sail(here.pressure, (1.0 + margin) * here.area_per_mass(), 1.0)
+        lag, reach = lag_h * 3600.0 / units.time, sails.reach(sail)
+
+        def commanded(state: Any) -> sails.Setting:
+            told = PointMeasurement(tuple(state[:3]), tuple(state[3:6]), 0.0, math.inf)
+            command, _ = entry.law.command(told, entry.gains, plant, NoMemory())
+            # A hair within what the mirror reaches, lest rounding ask for more.
+            wanted = clip_norm(tuple(units.acceleration * part for part in command), reach * (1.0 - 1e-9))
+            return sails.steer(wanted, sail)
+
+        def turned(clock: float, to: float) -> float:
+            return math.remainder(to - clock, 2.0 * math.pi)
+
+        def slope(_: float, state: Any) -> list[float]:
+            asked = commanded(state)
+            cone, clock = state[6:] if lag else asked[1:]
+            given = sails.steered(sails.Setting(asked.area, cone, clock), sail)
+            field = linear(tuple(state[:3]), tuple(state[3:6]), plant)
+            pulled = [a + b / units.acceleration for a, b in zip(field, given, strict=True)]
+            rates = [(asked.cone - state[6]) / lag, turned(state[7], asked.clock) / lag] if lag else [0.0, 0.0]
+            return [*state[3:6], *pulled, *rates]
+
+        start = [0.0, 1.0, 0.0, 0.0, 0.0, entry.gains.rate]
+        first = commanded(start)
+        times = np.linspace(0.0, 2.0 * np.pi * years, round(1000 * years) + 1)
+        states = solve_ivp(
+            slope, (0.0, times[-1]), [*start, first.cone, first.clock], t_eval=times, rtol=1e-8, max_step=0.02
+        ).y
+        asked = np.array([commanded(state) for state in states.T])
+        share = asked[:, :1] / sail.area
+        return {
+            "time": times * entry.gains.rate / (2.0 * np.pi),
+            "position": states[:3].T,
+            "asked": np.concatenate([share, np.degrees(asked[:, 1:])], axis=1),
+            "set": np.concatenate([share, np.degrees(states[6:].T)], axis=1) if lag else None,
+        }
+
+    return desk.once(("sail", margin, lag_h, years), make)
+
+
+def sail_keeps(desk: Desk, margin: float, lags_h: Sequence[float], years: float) -> Finding:
+    """Tell whether the circle is kept to a hundredth of its radius by a mirror whose angles lag."""
+    off: dict[str, float] = {}
+    for lag in lags_h:
+        position = fly_sail(desk, margin, lag, years)["position"]
+        half = position[len(position) // 2 :]
+        off[f"{lag:g} h"] = float(np.hypot(np.hypot(half[:, 1], half[:, 2]) - 1.0, half[:, 0]).max())
+    told = "off by " + ", ".join(f"{value:.4f} radii at {name}" for name, value in off.items())
+    return Finding({name: value < 0.01 for name, value in off.items()}, told)
+
+
+def sail_figure(desk: Desk, margin: float, lag_h: float, years: float) -> Figure:
+    """Area and angles of the mirror over the last revolution, as commanded and as they are."""
+    flown = fly_sail(desk, margin, lag_h, years)
+    last = flown["time"] >= flown["time"][-1] - 1.0
+    time = flown["time"][last]
+    panels: list[Panel] = []
+    for k, label in enumerate(("area, share of all", "cone angle, degrees", "clock angle, degrees")):
+        asked, given = flown["asked"][last, k], flown["set"][last, k]
+        if k == 2:
+            # Whole turns are left out; the line breaks where a turn ends.
+            asked, given = (_broken(np.remainder(angle + 180.0, 360.0) - 180.0) for angle in (asked, given))
+        lines = [Curve(time, asked, "command"), *([Curve(time, given, "as it is", "dashed")] if k else [])]
+        panels.append(Panel("revolutions", label, lines))
+    return Figure(panels, 3)
+
+
+def _broken(angle: Any) -> Any:
+    return np.where(np.abs(np.diff(angle, prepend=angle[0])) > 180.0, np.nan, angle)
+
+
+def figure_2(desk: Desk) -> Figure:
+    """Axes at L2: the line from the Sun through the Earth, to scale, and the circle across it."""
+    earth = -station().plant.from_smaller * EARTH_DIAMETER / 1e9
+    side = [
+        *_arrow((0.0, 0.0), (0.5, 0.0), 1),
+        *_arrow((0.0, 0.0), (0.0, 0.35), 1),
+        *_arrow((earth, 0.0), (earth, 0.35), 0),
+        Curve([earth - 0.35, 0.5], [0.0, 0.0], style="faint"),
+        Curve([earth, 0.0], [0.0, 0.0], style="points", hue=0),
+    ]
+    notes = [
+        (0.55, -0.07, "X"),
+        (0.08, 0.37, "Y"),
+        (0.0, -0.09, "L2"),
+        (earth, -0.09, "Earth"),
+        (earth + 0.27, 0.33, "its velocity"),
+        (earth - 0.28, 0.07, "to the Sun"),
+    ]
+    across = [
+        Curve(*RING, "circle", hue=0),
+        *_arrow((0.0, 0.0), (1.5, 0.0), 1),
+        *_arrow((0.0, 0.0), (0.0, 1.5), 1),
+        *_arrow((math.sqrt(0.5), math.sqrt(0.5)), (math.sqrt(0.5) - 0.5, math.sqrt(0.5) + 0.5), 2),
+        Curve([0.0, -math.sqrt(0.5)], [0.0, -math.sqrt(0.5)], style="dashed", hue=6),
+    ]
+    words = [(1.55, -0.15, "Y"), (0.15, 1.55, "Z"), (-0.15, -0.5, "ρ"), (0.75, 1.2, "ωρ")]
+    left = Panel("million km", "", side, "in the Earth's orbit", (earth - 0.45, 0.7), (-0.9, 0.9), equal=True, notes=notes)
+    right = Panel("Earth diameters", "", across, "across X", (-1.8, 1.8), (-1.8, 1.8), equal=True, notes=words)
+    return Figure([left, right], 2)
+
+
+def _arrow(start: tuple[float, float], end: tuple[float, float], hue: int) -> list[Curve]:
+    """A line with a head."""
+    along = np.subtract(end, start)
+    size = float(np.hypot(*along))
+    ahead, aside = along / size, np.array([-along[1], along[0]]) / size
+    barbs = [np.array(end) - 0.16 * size * (ahead + sign * 0.45 * aside) for sign in (1.0, -1.0)]
+    line = np.array([start, end, barbs[0], end, barbs[1]]).T
+    return [Curve(*line, hue=hue)]
+
+
+def figure_3(desk: Desk) -> Figure:
+    """The Sun behind the Earth as the craft sees it at some offsets, and the part of it that is seen."""
+    here, (sun, earth) = station(), discs()
+    panels: list[Panel] = []
+    plant = here.plant
+    for offset in (0.5, 1.0):
+        apart = math.degrees(offset * (1.0 / plant.from_smaller - 1.0 / plant.from_larger))
+        shapes = [
+            Curve(0.5 * sun * RING[0], 0.5 * sun * RING[1], "Sun", "area", 4),
+            Curve(0.5 * earth * RING[0] - apart, 0.5 * earth * RING[1], "Earth", "area", 0),
+        ]
+        told = f"offset {offset:g} diameter: {100.0 * here.light(offset * EARTH_DIAMETER):.0f} %"
+        panels.append(Panel("degrees", "", shapes, told, (-1.0, 0.5), (-0.6, 0.75), equal=True))
+    offsets = np.linspace(0.0, 1.2, 121)
+    curves = [
+        Curve(offsets, sails.lit(2.0 * offsets), "equal discs, formula"),
+        Curve(offsets, [here.light(float(one) * EARTH_DIAMETER) for one in offsets], "real discs", "dashed"),
+    ]
+    panels.append(Panel("offset, Earth diameters", "part of the Sun that is seen", curves, "k(s)"))
+    return Figure(panels, 3)
+
+
+def figure_5(desk: Desk, margin: float, lag_h: float, years: float) -> Figure:
+    """A mirror that turns the light's push aside, and the pushes within reach, with what the circle asks for."""
+    flown = fly_sail(desk, margin, lag_h, years)
+    shares = flown["asked"][-400:]
+    lean = math.radians(float(shares[:, 1].max()))
+    normal, along = np.array([math.cos(lean), math.sin(lean)]), np.array([-math.sin(lean), math.cos(lean)])
+    panel = [
+        Curve(*np.array([-0.8 * along, 0.8 * along]).T, "mirror", hue=0),
+        *(curve for height in (-0.35, 0.0, 0.35) for curve in _arrow((-1.3, height), (-0.15 - 0.5 * height, height), 4)),
+        *_arrow((0.0, 0.0), (0.9 * normal[0], 0.9 * normal[1]), 1),
+        Curve([0.0, 1.0], [0.0, 0.0], style="dashed", hue=6),
+    ]
+    bend = np.linspace(0.0, lean, 40)
+    panel.append(Curve(0.5 * np.cos(bend), 0.5 * np.sin(bend), hue=6))
+    notes = [
+        (0.66, 0.17, "γ"),
+        (0.92 * normal[0] + 0.12, 0.92 * normal[1] + 0.1, "F"),
+        (1.08, -0.1, "X"),
+        (-1.0, 0.5, "light"),
+    ]
+    outline = sails.outline(1.0, 0.0)
+    both = np.concatenate([outline, outline[::-1] * [1.0, -1.0]])
+    centre, radius = sails.MIRROR_CENTRE, sails.MIRROR_RADIUS
+    asked = [(math.cos(cone) ** 2, math.sin(cone), share) for share, cone, _ in shares * [1.0, math.pi / 180.0, 1.0]]
+    push = np.array([2.0 * share * c2 * np.array([math.sqrt(c2), s]) for c2, s, share in asked]).T
+    reach = [
+        Curve(*both.T, style="area", hue=0),
+        Curve(centre + radius * RING[0], radius * RING[1], hue=1),
+        Curve([centre], [0.0], style="points", hue=1),
+        Curve(*push, hue=2),
+    ]
+    names = [(1.09, 0.68, "largest ball"), (1.09, 0.3, "asked for round the circle"), (0.2, -0.6, "all pushes")]
+    left = Panel("", "", panel, "F = 2 p S cos²γ along the normal", (-1.4, 1.4), (-1.15, 1.15), equal=True, notes=notes)
+    right = Panel(
+        "along X, p S",
+        "across X, p S",
+        reach,
+        "within reach of area and angles",
+        (-0.1, 2.2),
+        (-1.0, 1.0),
+        equal=True,
+        notes=names,
+    )
+    return Figure([left, right], 2)
