@@ -21,6 +21,12 @@ class Curve:
     hue: int | None = None
     """The number of its colour; its place in the panel if None. Curves of one hue look alike."""
 
+    @classmethod
+    def along(cls, points: Any, label: str = "", style: Style = "line", hue: int | None = None) -> Curve:
+        """The curve through points (2, n)."""
+        x, y = points
+        return cls(x, y, label, style, hue)
+
 
 @dataclass(frozen=True)
 class Panel:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -39,13 +40,14 @@ def constant(x: Any, y: Any) -> Any:
         return np.where(y > 0.0, (x * x + y * y) / (2.0 * x), (2.0 * x + y) ** 2 / (8.0 * (x + y)))
 
 
-def flown(start: Sequence[float], until: float, stop: Callable[[Any], float] | None = None) -> Any:
-    """Integrate (2.2) to a time (negative: backwards), or until `stop` of the state is zero. Returns times (m,), states (2,
-    m)."""
+def flown(start: Sequence[float], until: float, near: float = 0.0, far: float = 1e9) -> Any:
+    """Integrate (2.2) to a time (negative: backwards), or until it is so near the origin or so far off. Returns times (m,),
+    states (2, m)."""
     from scipy.integrate import solve_ivp
 
     def ends(_: float, state: Any) -> float:
-        return 1.0 if stop is None else stop(state)
+        away = math.hypot(*state)
+        return (away - near) * (away - far)
 
     setattr(ends, "terminal", True)  # noqa: B010 -- a function has no such attribute
     found = solve_ivp(lambda _, state: rates(*state), (0.0, until), list(start), events=ends, **TIGHT)
@@ -108,7 +110,7 @@ def where_from(desk: Desk, count: int) -> Finding:
     """Tell whether motions come from the origin where they are bounded, and from far away elsewhere."""
     bounded, others = [], []
     for start in draws(count, 2):
-        _, states = flown(start, -30.0, lambda state: (np.linalg.norm(state) - 1e-5) * (np.linalg.norm(state) - 1e3))
+        _, states = flown(start, -30.0, 1e-5, 1e3)
         (bounded if phi(*start) < 0.0 else others).append(float(np.linalg.norm(states[:, -1])))
     told = f"backwards, {len(bounded)} within G come to the origin, {len(others)} others go beyond 1000"
     return Finding(max(bounded) < 2e-5 and min(others) > 999.0, told)
@@ -128,7 +130,7 @@ def loops_kept(desk: Desk, count: int) -> Finding:
 def border(desk: Desk) -> Finding:
     """Tell whether the motion through (2, 0) runs along the zero line of the printed function, from the origin to it."""
     ahead = flown((2.0, 0.0), 20.0)[1]
-    back = flown((2.0, 0.0), -10.0, lambda state: np.linalg.norm(state) - 1e-3)[1]
+    back = flown((2.0, 0.0), -10.0, 1e-3)[1]
     off = max(float(np.abs(phi(*states)).max()) for states in (ahead, back))
     ends = max(float(np.linalg.norm(states[:, -1])) for states in (ahead, back))
     return Finding(off < 1e-6 and ends < 2e-3, f"the function is within {off:.0e} of zero along it")
@@ -149,9 +151,9 @@ def slopes(desk: Desk) -> Finding:
 def printed_halves(desk: Desk) -> Finding:
     """Tell whether the printed function, zero within G, is an indicator: it would have to be continuous."""
     read = load("switching")
-    x, y = (Polynomial.variable(name) for name in read.system.names)
+    x, y = (cast(Any, Polynomial.variable(name)) for name in read.system.names)
     below, above = (2 * x + y) * (2 * x + y) - 8 * (x + y), x * x + y * y - 2 * x
-    V = maximum(where(less(0, y), above, below), 0)
+    V = maximum(where(less(0.0, y), above, below), 0.0)
     made = certify(replace(read, claims=(replace(read.claims[0], V=V),)))
     states = [o.evidence["state"] for o in made.claims[0].obligations if o.outcome == "refuted"]
     told = f"refuted at {tuple(float(states[0][name]) for name in ('x', 'y'))}" if states else made.claims[0].outcome
@@ -199,17 +201,14 @@ def figure_1(desk: Desk) -> Figure:
 
     def both_ways(start: tuple[float, float]) -> Any:
         # Not into the origin itself, where directions have no limit.
-        back, ahead = (
-            flown(start, way, lambda state: (np.linalg.norm(state) - 1e-3) * (np.linalg.norm(state) - 20.0))[1]
-            for way in (-8.0, 20.0)
-        )
+        back, ahead = (flown(start, way, 1e-3, 20.0)[1] for way in (-8.0, 20.0))
         return np.concatenate([back[:, ::-1], ahead], axis=1)
 
     lines, edge = [both_ways(start) for start in starts], both_ways((2.0, 0.0))
     curves = [
-        Curve(*edge, "G, the loops", "area", 0),
-        *(Curve(*line, style="faint") for line in lines),
-        Curve(*edge, "through (2, 0)", hue=1),
+        Curve.along(edge, "G, the loops", "area", 0),
+        *(Curve.along(line, style="faint") for line in lines),
+        Curve.along(edge, "through (2, 0)", hue=1),
         Curve([0.0], [0.0], "equilibrium", "points", 1),
     ]
     return Figure([Panel("x", "y", curves, x_span=WINDOW[0], y_span=WINDOW[1], equal=True)])
@@ -246,8 +245,8 @@ def theorems(desk: Desk) -> Figure:
 
 
 def _panel(title: str, x: str, y: str, lines: Sequence[Any], points: Sequence[tuple[float, float]]) -> Panel:
-    marks = [Curve(*np.transpose(points), "", "points", 1)] if points else []
-    return Panel(x, y, [*(Curve(*line, hue=0) for line in lines), *marks], title, equal=True)
+    marks = [Curve.along(np.transpose(points), "", "points", 1)] if points else []
+    return Panel(x, y, [*(Curve.along(line, hue=0) for line in lines), *marks], title, equal=True)
 
 
 def _certified(desk: Desk, problem: str, claim: int, starts: Any, title: str) -> Panel:
@@ -259,10 +258,10 @@ def _certified(desk: Desk, problem: str, claim: int, starts: Any, title: str) ->
     lines = paths(read.system, read.claims[claim].box, starts, 9.0)
     contours = contour_generator(drawn.x, drawn.y, drawn.V)
     level = made.claims[claim].numbers["level"]
-    curves = [Curve(*line, hue=0) for line in lines]
+    curves = [Curve.along(line, hue=0) for line in lines]
     for value, label, hue in ((level, "certified", 2), (2e-3 * level, "the set", 1)):
-        found = contours.lines(value)
-        curves += [Curve(*np.transpose(line), label if k == 0 else "", hue=hue) for k, line in enumerate(found)]
-    spans = ((float(side[0]), float(side[-1])) for side in (drawn.x, drawn.y))
-    x_span, y_span = spans
-    return Panel(*drawn.names[:2], curves, title, x_span, y_span)
+        found: Any = contours.lines(value)
+        curves += [Curve.along(np.transpose(line), label if k == 0 else "", hue=hue) for k, line in enumerate(found)]
+    x_span, y_span = ((float(side[0]), float(side[-1])) for side in (drawn.x, drawn.y))
+    across, up = drawn.names[:2]
+    return Panel(across, up, curves, title, x_span, y_span)

@@ -146,7 +146,7 @@ def figure_4(desk: Desk) -> Figure:
     ]
     for start in starts.T:
         path = solve_ivp(lambda _, state: _slope(state), (0.0, 7.0), start, t_eval=times, rtol=1e-7).y
-        curves.append(Curve(*path, style="faint"))
+        curves.append(Curve.along(path, style="faint"))
     for k, side in enumerate((-1.0, 1.0)):
         curves.append(Curve([-4.0, 4.0], [side + 4.0, side - 4.0], "" if k else "separatrices", "dashed", 1))
     curves.append(Curve([-1.0, 1.0], [0.0, 0.0], "saddles", "points", 1))
@@ -325,13 +325,17 @@ def _lagging(law: str, lag: float) -> dict[str, Any]:
 
 
 def _apart(desk: Desk, file: str, law: str, lag: float) -> float:
-    """How far any place of the lagging path is from the other one, in x, y and in y, z, as a share of the picture."""
+    changes = _lagging(law, lag)
+    return farthest_place(desk.recording(file, law)["position"], desk.recording(file, law, changes)["position"])
+
+
+def farthest_place(path: Any, other: Any) -> float:
+    """Return how far a place of another path (m, 3) is from a path (n, 3) at most, in x, y and in y, z, as a share of the
+    picture."""
     from scipy.spatial import KDTree
 
-    path = desk.recording(file, law)["position"]
-    late = desk.recording(file, law, _lagging(law, lag))["position"]
     wide = np.ptp(path, axis=0)
-    found = [KDTree(path[:, pair] / wide[pair]).query(late[:, pair] / wide[pair])[0].max() for pair in ([0, 1], [1, 2])]
+    found = [KDTree(path[:, pair] / wide[pair]).query(other[:, pair] / wide[pair])[0].max() for pair in ([0, 1], [1, 2])]
     return float(max(found))
 
 
@@ -368,7 +372,7 @@ def _planes(runs: dict[str, Any], limit: float) -> list[Panel]:
         lines = [
             Curve(run[quantity][:, i], run[quantity][:, j], label, hue=n) for n, (label, run) in enumerate(runs.items())
         ]
-        guides = ([], [Curve(*round_, "circle", "dashed", 6)], [Curve(*(limit * round_), "limit", "dashed", 6)])[k]
+        guides = ([], [Curve.along(round_, "circle", "dashed", 6)], [Curve.along(limit * round_, "limit", "dashed", 6)])[k]
         if k and len(runs) > 1:
             lines = [Curve(line.x, line.y, hue=line.hue) for line in lines]
         found.append(Panel(name + "xyz"[i], name + "xyz"[j], [*lines, *guides], equal=k > 0))

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from starhold.algebra.vector import add, clip_norm
+from starhold.algebra.vector import add, clip_norm, scale
 from starhold.laws.interface import NoMemory
 from starhold.laws.point import PointMeasurement
 from starhold.parts.bodies.libration_point import EARTH_DIAMETER, PRIMARIES, linear
+from starhold.parts.craft import vector
 from starhold.reproduce.desk import Desk
 from starhold.reproduce.figure import Curve, Figure, Panel
 from starhold.reproduce.verdicts import Finding
@@ -94,7 +95,7 @@ def ball(desk: Desk) -> Finding:
     for lean in np.linspace(0.0, np.pi, 25):
         for clock in np.linspace(-3.0, 3.0, 12):
             across = math.sin(lean)
-            wanted = tuple(reach * part for part in (math.cos(lean), across * math.cos(clock), across * math.sin(clock)))
+            wanted = scale(reach, (math.cos(lean), across * math.cos(clock), across * math.sin(clock)))
             setting = sails.steer(wanted, sail)
             off = max(off, float(np.linalg.norm(np.subtract(sails.steered(setting, sail), wanted))) / reach)
             most = max(most, setting.area / sail.area)
@@ -110,7 +111,7 @@ def shifted(desk: Desk) -> Finding:
     draw = np.random.default_rng(5)
     off = 0.0
     for _ in range(20):
-        position, velocity = (tuple(map(float, draw.normal(size=3))) for _ in range(2))
+        position, velocity = (vector(draw.normal(size=3)) for _ in range(2))
         moved = add(linear((position[0] - back, position[1], position[2]), velocity, plant), (push, 0.0, 0.0))
         off = max(off, float(np.abs(np.subtract(moved, linear(position, velocity, plant))).max()))
     steady = sails.MIRROR_CENTRE / sails.MIRROR_RADIUS * station().peak() / station().units.acceleration / (push / back)
@@ -166,7 +167,7 @@ def fly_sail(desk: Desk, margin: float, lag_h: float, years: float) -> dict[str,
             told = PointMeasurement(tuple(state[:3]), tuple(state[3:6]), 0.0, math.inf)
             command, _ = entry.law.command(told, entry.gains, plant, NoMemory())
             # A hair within what the mirror reaches, lest rounding ask for more.
-            wanted = clip_norm(tuple(units.acceleration * part for part in command), reach * (1.0 - 1e-9))
+            wanted = clip_norm(scale(units.acceleration, command), reach * (1.0 - 1e-9))
             return sails.steer(wanted, sail)
 
         def turned(clock: float, to: float) -> float:
@@ -249,7 +250,7 @@ def figure_2(desk: Desk) -> Figure:
         (earth - 0.28, 0.07, "to the Sun"),
     ]
     across = [
-        Curve(*RING, "circle", hue=0),
+        Curve.along(RING, "circle", hue=0),
         *_arrow((0.0, 0.0), (1.5, 0.0), 1),
         *_arrow((0.0, 0.0), (0.0, 1.5), 1),
         *_arrow((math.sqrt(0.5), math.sqrt(0.5)), (math.sqrt(0.5) - 0.5, math.sqrt(0.5) + 0.5), 2),
@@ -268,7 +269,7 @@ def _arrow(start: tuple[float, float], end: tuple[float, float], hue: int) -> li
     ahead, aside = along / size, np.array([-along[1], along[0]]) / size
     barbs = [np.array(end) - 0.16 * size * (ahead + sign * 0.45 * aside) for sign in (1.0, -1.0)]
     line = np.array([start, end, barbs[0], end, barbs[1]]).T
-    return [Curve(*line, hue=hue)]
+    return [Curve.along(line, hue=hue)]
 
 
 def figure_3(desk: Desk) -> Figure:
@@ -300,7 +301,7 @@ def figure_5(desk: Desk, margin: float, lag_h: float, years: float) -> Figure:
     lean = math.radians(float(shares[:, 1].max()))
     normal, along = np.array([math.cos(lean), math.sin(lean)]), np.array([-math.sin(lean), math.cos(lean)])
     panel = [
-        Curve(*np.array([-0.8 * along, 0.8 * along]).T, "mirror", hue=0),
+        Curve.along(np.array([-0.8 * along, 0.8 * along]).T, "mirror", hue=0),
         *(curve for height in (-0.35, 0.0, 0.35) for curve in _arrow((-1.3, height), (-0.15 - 0.5 * height, height), 4)),
         *_arrow((0.0, 0.0), (0.9 * normal[0], 0.9 * normal[1]), 1),
         Curve([0.0, 1.0], [0.0, 0.0], style="dashed", hue=6),
@@ -319,10 +320,10 @@ def figure_5(desk: Desk, margin: float, lag_h: float, years: float) -> Figure:
     asked = [(math.cos(cone) ** 2, math.sin(cone), share) for share, cone, _ in shares * [1.0, math.pi / 180.0, 1.0]]
     push = np.array([2.0 * share * c2 * np.array([math.sqrt(c2), s]) for c2, s, share in asked]).T
     reach = [
-        Curve(*both.T, style="area", hue=0),
+        Curve.along(both.T, style="area", hue=0),
         Curve(centre + radius * RING[0], radius * RING[1], hue=1),
         Curve([centre], [0.0], style="points", hue=1),
-        Curve(*push, hue=2),
+        Curve.along(push, hue=2),
     ]
     names = [(1.09, 0.68, "largest ball"), (1.09, 0.3, "asked for round the circle"), (0.2, -0.6, "all pushes")]
     left = Panel("", "", panel, "F = 2 p S cos²γ along the normal", (-1.4, 1.4), (-1.15, 1.15), equal=True, notes=notes)
