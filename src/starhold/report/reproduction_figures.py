@@ -27,7 +27,7 @@ def draw(figure: Figure) -> bytes:
         _panel(axis, panel)
         if columns > 2 and not panel.log_x:
             # In a narrow panel more numbers would run into one another.
-            axis.locator_params(axis="x", nbins=5)
+            axis.locator_params(axis="x", nbins=4)
     for axis in axes[len(figure.panels) :]:
         axis.set_visible(False)
     file = BytesIO()

@@ -1,4 +1,4 @@
-"""What no scenario holds of this publication: section 2 in `loops`, section 3 in `stations` and `sunlight`."""
+"""Publication E is measured: section 2 in `loops`, section 3 in `stations` and `sunlight`."""
 
 from starhold.reproduce.papers.E.loops import (
     all_come,

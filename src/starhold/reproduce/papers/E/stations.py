@@ -346,7 +346,7 @@ def figure_6(desk: Desk) -> Figure:
 
 
 def figure_7(desk: Desk, law: str) -> Figure:
-    """The same with a deficit, from the circle."""
+    """Projections as in figure 6, with a deficit and from the circle."""
     return Figure(_planes({law: desk.recording(DEFICIT, law)}, desk.scenario(DEFICIT).pick(law).options.limit), 3)
 
 
