@@ -12,6 +12,7 @@ frame = sh.to_pandas(flights)                    # runs, flights, certificates a
 certificates = sh.certify(scenario)              # what is proved of every law
 designs = sh.design("my.toml")                   # gains that formulas give, and figures to judge them by
 certificate = sh.invariant("van-der-pol")        # what is proved of an invariant set of any small system
+made = sh.reproduce("D")                         # a publication's figures and numbers, beside what it prints
 placed = sh.place(A, B, poles)                   # u = -K x that gives A - B K these poles, for any linear system
 """
 
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
         metrics,
         modal_roots,
         place,
+        reproduce,
         simulate,
         sweep,
         to_pandas,
@@ -53,6 +55,7 @@ __all__ = [
     "metrics",
     "modal_roots",
     "place",
+    "reproduce",
     "scenario",
     "simulate",
     "sweep",

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from starhold.campaign.results import CampaignResult
     from starhold.certification.certificate import Certificate
     from starhold.certification.invariant import InvariantProblem
+    from starhold.publications.reproduction import Reproduction
     from starhold.studies.failures import Failure
     from starhold.studies.flight import Flight
     from starhold.studies.modal_roots import Study
@@ -193,6 +194,16 @@ def _opened(scenario: reading.Scenario | str | Path) -> reading.Scenario:
 
 def _turning(scenario: reading.Scenario | str | Path) -> reading.Scenario:
     return _opened(scenario).about("rigid-body")
+
+
+def reproduce(letter: str) -> Reproduction:
+    """Make the figures and numbers of a publication ("A" to "E") again. `rows` has, by name, what is printed, what was found
+    and the verdict; `figures` the curves; `changed` the rows whose verdict is another than the one recorded. InputError for
+    any other letter."""
+    from starhold.publications.paper import paper_of
+    from starhold.publications.reproduction import reproduce as make
+
+    return make(paper_of(letter))
 
 
 def invariant(problem: InvariantProblem | str | Path) -> Certificate:

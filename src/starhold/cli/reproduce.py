@@ -18,7 +18,7 @@ from starhold.cli.arguments import FAILED_CHECK, Force, ReproductionOutput
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from starhold.reproduce.reproduction import Reproduction
+    from starhold.publications.reproduction import Reproduction
 
 LONGEST_FIRST = "BEDCA"
 """So that no process works alone for long."""
@@ -32,9 +32,9 @@ def reproduce(
 ) -> None:
     """Make every figure, table and number of the publications again, beside what they print: a page each, with verdicts."""
     from starhold.cli.show import console
+    from starhold.publications.paper import papers_of
     from starhold.report.reproduction import write_index
     from starhold.report.results import open_folder
-    from starhold.reproduce.paper import papers_of
 
     letters = papers_of(paper)
     folder = open_folder(output or Path("results") / f"reproduce-{paper.lower()}", force)
@@ -113,7 +113,7 @@ def _print(made: list[Reproduction]) -> None:
     from rich.table import Table
 
     from starhold.cli.show import console
-    from starhold.reproduce.verdicts import VERDICTS
+    from starhold.publications.verdicts import VERDICTS
 
     table = Table(show_edge=False, pad_edge=False)
     for number, head in enumerate(("publication", "figures", "rows", *VERDICTS)):

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from starhold.files import atomic_write
+from starhold.publications.reproduction import Reproduction, reproduce
 from starhold.report.reproduction_figures import draw
 from starhold.report.reproduction_page import index_page, paper_page
 from starhold.report.results import INDEX, SUMMARY
-from starhold.reproduce.reproduction import Reproduction, reproduce
 from starhold.version import __version__
 
 

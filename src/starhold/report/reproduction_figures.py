@@ -5,9 +5,9 @@ from __future__ import annotations
 from io import BytesIO
 from typing import Any
 
+from starhold.publications.figure import Curve, Figure, Panel
 from starhold.report.colours import colour
 from starhold.report.figures import DPI, plain
-from starhold.reproduce.figure import Curve, Figure, Panel
 
 WIDTH = 8.0
 """Inches."""

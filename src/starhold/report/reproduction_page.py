@@ -8,11 +8,11 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
+from starhold.publications.paper import FigureItem, Paper, Section
+from starhold.publications.reproduction import Judged, Reproduction
+from starhold.publications.verdicts import PLAIN, VERDICTS, Verdict
 from starhold.report.page_parts import plain_document
 from starhold.report.text import number_text
-from starhold.reproduce.paper import FigureItem, Paper, Section
-from starhold.reproduce.reproduction import Judged, Reproduction
-from starhold.reproduce.verdicts import PLAIN, VERDICTS, Verdict
 from starhold.version import __version__
 
 MOODS: dict[Verdict, str] = {
@@ -95,14 +95,14 @@ def difference(judged: Judged) -> str:
     if isinstance(value, (bool, dict)):
         return ""
     numbers = [value] if isinstance(value, (int, float)) else list(value)
-    return ", ".join(
-        _apart(one.value, float(ours)) for one, ours in zip(judged.row.printed, numbers, strict=True) if not one.bound
-    )
+    pairs = zip(judged.row.printed, numbers, strict=True)
+    told = [_apart(one.value, float(ours)) for one, ours in pairs if not one.bound]
+    return "none" if told and set(told) == {"none"} else ", ".join(told)
 
 
 def _apart(printed: float, ours: float) -> str:
-    if printed == 0.0:
-        return f"{ours:+.2g}"
+    if printed in (ours, 0.0):
+        return "none" if printed == ours else f"{ours:+.2g}"
     ratio = ours / printed
     return f"× {ratio:.2g}" if ratio > 3.0 or 0.0 < ratio < 1.0 / 3.0 else f"{100.0 * (ratio - 1.0):+.2g} %"
 

@@ -7,9 +7,9 @@ from scipy.linalg import solve_continuous_are
 
 from starhold.laws import lqr
 from starhold.parts.craft import make_craft
-from starhold.reproduce.desk import Desk
-from starhold.reproduce.papers.A import measures
-from starhold.reproduce.reproduction import reproduce
+from starhold.publications.desk import Desk
+from starhold.publications.papers.A import measures
+from starhold.publications.reproduction import reproduce
 from starhold.synthesis.riccati import linear_model
 
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from starhold.reproduce.desk import Desk
-from starhold.reproduce.figure import Curve, Figure, Panel
-from starhold.reproduce.verdicts import Finding
+from starhold.publications.desk import Desk
+from starhold.publications.figure import Curve, Figure, Panel
+from starhold.publications.verdicts import Finding
 
 
 def metric(

@@ -11,29 +11,29 @@ from numpy.typing import NDArray
 
 from starhold.analysis.metrics import stays_within
 from starhold.parts.craft import tensor
-from starhold.reproduce.figure import Curve, Figure, Panel
-from starhold.reproduce.papers.B.calls import call_figure as call_figure
-from starhold.reproduce.papers.B.calls import fewer_operations as fewer_operations
-from starhold.reproduce.papers.B.calls import horizon_figure as horizon_figure
-from starhold.reproduce.papers.B.calls import operations_ratio as operations_ratio
-from starhold.reproduce.papers.B.calls import time_cases as time_cases
-from starhold.reproduce.papers.B.calls import time_ratio as time_ratio
-from starhold.reproduce.papers.B.calls import total_time as total_time
-from starhold.reproduce.papers.B.equations import gravity_block as gravity_block
-from starhold.reproduce.papers.B.equations import near_the_target as near_the_target
-from starhold.reproduce.papers.B.equations import on_the_surface as on_the_surface
-from starhold.reproduce.papers.B.equations import one_step as one_step
-from starhold.reproduce.papers.B.equations import reaching_condition as reaching_condition
-from starhold.reproduce.papers.B.equations import target_motion as target_motion
-from starhold.reproduce.papers.B.random_starts import fewest as fewest
-from starhold.reproduce.papers.B.random_starts import rises as rises
-from starhold.reproduce.papers.B.random_starts import steps_figure as steps_figure
-from starhold.reproduce.verdicts import Finding
+from starhold.publications.figure import Curve, Figure, Panel
+from starhold.publications.papers.B.calls import call_figure as call_figure
+from starhold.publications.papers.B.calls import fewer_operations as fewer_operations
+from starhold.publications.papers.B.calls import horizon_figure as horizon_figure
+from starhold.publications.papers.B.calls import operations_ratio as operations_ratio
+from starhold.publications.papers.B.calls import time_cases as time_cases
+from starhold.publications.papers.B.calls import time_ratio as time_ratio
+from starhold.publications.papers.B.calls import total_time as total_time
+from starhold.publications.papers.B.equations import gravity_block as gravity_block
+from starhold.publications.papers.B.equations import near_the_target as near_the_target
+from starhold.publications.papers.B.equations import on_the_surface as on_the_surface
+from starhold.publications.papers.B.equations import one_step as one_step
+from starhold.publications.papers.B.equations import reaching_condition as reaching_condition
+from starhold.publications.papers.B.equations import target_motion as target_motion
+from starhold.publications.papers.B.random_starts import fewest as fewest
+from starhold.publications.papers.B.random_starts import rises as rises
+from starhold.publications.papers.B.random_starts import steps_figure as steps_figure
+from starhold.publications.verdicts import Finding
 from starhold.scenario.building import build
 from starhold.simulation.lane import fly
 
 if TYPE_CHECKING:
-    from starhold.reproduce.desk import Desk
+    from starhold.publications.desk import Desk
 
 Array = NDArray[np.float64]
 LAWS = ("lyapunov", "sliding", "mpc")

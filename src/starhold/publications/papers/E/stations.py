@@ -12,9 +12,9 @@ from starhold.laws import l2_circle
 from starhold.laws.interface import NoMemory
 from starhold.laws.point import PointMeasurement
 from starhold.parts.bodies.libration_point import EARTH_DIAMETER, PRIMARIES, Libration, linear
-from starhold.reproduce.desk import Desk
-from starhold.reproduce.figure import Curve, Figure, Panel
-from starhold.reproduce.verdicts import Finding
+from starhold.publications.desk import Desk
+from starhold.publications.figure import Curve, Figure, Panel
+from starhold.publications.verdicts import Finding
 from starhold.synthesis.circle import best_rate, demand, peak_required, required
 
 REST, EDGE, DEFICIT = "l2-equilibrium", "near-the-edge", "l2-deficit"

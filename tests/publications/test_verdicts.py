@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from starhold.reproduce.verdicts import Finding, Printed, judge
+from starhold.publications.verdicts import Finding, Printed, judge
 
 DIGITS = st.decimals(min_value=-1000, max_value=1000, places=3).map(str)
 

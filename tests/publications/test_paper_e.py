@@ -7,11 +7,11 @@ import pytest
 from scipy.linalg import expm
 
 from starhold.certification.invariant import System, load
-from starhold.reproduce.desk import Desk
-from starhold.reproduce.paper import read_paper
-from starhold.reproduce.papers.E import loops, stations, sunlight
-from starhold.reproduce.reproduction import measure_of, reproduce
-from starhold.reproduce.verdicts import judge
+from starhold.publications.desk import Desk
+from starhold.publications.paper import read_paper
+from starhold.publications.papers.E import loops, stations, sunlight
+from starhold.publications.reproduction import measure_of, reproduce
+from starhold.publications.verdicts import judge
 from starhold.studies.phase_portraits import paths
 
 DESK = Desk("E")

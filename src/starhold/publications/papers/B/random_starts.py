@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.analysis.rigid_body import DECADES
-from starhold.reproduce.figure import Curve, Figure, Panel
-from starhold.reproduce.verdicts import Finding
+from starhold.publications.figure import Curve, Figure, Panel
+from starhold.publications.verdicts import Finding
 from starhold.scenario.building import build
 from starhold.simulation.abreast import Flying, fly_abreast
 from starhold.simulation.lane import Recording, label
 
 if TYPE_CHECKING:
-    from starhold.reproduce.desk import Desk
+    from starhold.publications.desk import Desk
 
 Array = NDArray[np.float64]
 FILE = "random-starts"

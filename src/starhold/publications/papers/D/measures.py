@@ -16,23 +16,23 @@ from starhold.analysis.roots import PUBLISHED, TwoPieceFit
 from starhold.analysis.transient import Limits
 from starhold.certification.region import ENERGY, Shape
 from starhold.parts.craft import tensor
-from starhold.reproduce.desk import Desk
-from starhold.reproduce.figure import Curve, Figure, Panel
-from starhold.reproduce.papers.D.placement import at_rest as at_rest
-from starhold.reproduce.papers.D.placement import classical_algorithm as classical_algorithm
-from starhold.reproduce.papers.D.placement import controllable as controllable
-from starhold.reproduce.papers.D.placement import general_placement as general_placement
-from starhold.reproduce.papers.D.placement import gyroscopic_sign as gyroscopic_sign
-from starhold.reproduce.papers.D.placement import inverse_of_the_skeleton as inverse_of_the_skeleton
-from starhold.reproduce.papers.D.placement import loop_of_the_law as loop_of_the_law
-from starhold.reproduce.papers.D.placement import model_at_the_start_of_a_step as model_at_the_start_of_a_step
-from starhold.reproduce.papers.D.placement import placed_poles as placed_poles
-from starhold.reproduce.papers.D.placement import printed_levels as printed_levels
-from starhold.reproduce.papers.D.placement import pseudo_inverse_formulas as pseudo_inverse_formulas
-from starhold.reproduce.papers.D.placement import single_root as single_root
-from starhold.reproduce.papers.D.placement import stable_sign as stable_sign
-from starhold.reproduce.papers.D.placement import unstable_by_itself as unstable_by_itself
-from starhold.reproduce.verdicts import Finding
+from starhold.publications.desk import Desk
+from starhold.publications.figure import Curve, Figure, Panel
+from starhold.publications.papers.D.placement import at_rest as at_rest
+from starhold.publications.papers.D.placement import classical_algorithm as classical_algorithm
+from starhold.publications.papers.D.placement import controllable as controllable
+from starhold.publications.papers.D.placement import general_placement as general_placement
+from starhold.publications.papers.D.placement import gyroscopic_sign as gyroscopic_sign
+from starhold.publications.papers.D.placement import inverse_of_the_skeleton as inverse_of_the_skeleton
+from starhold.publications.papers.D.placement import loop_of_the_law as loop_of_the_law
+from starhold.publications.papers.D.placement import model_at_the_start_of_a_step as model_at_the_start_of_a_step
+from starhold.publications.papers.D.placement import placed_poles as placed_poles
+from starhold.publications.papers.D.placement import printed_levels as printed_levels
+from starhold.publications.papers.D.placement import pseudo_inverse_formulas as pseudo_inverse_formulas
+from starhold.publications.papers.D.placement import single_root as single_root
+from starhold.publications.papers.D.placement import stable_sign as stable_sign
+from starhold.publications.papers.D.placement import unstable_by_itself as unstable_by_itself
+from starhold.publications.verdicts import Finding
 from starhold.studies.modal_roots import Study, pick_modal, problem_of, study
 
 DEGREES = 180.0 / math.pi

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from starhold.analysis.cost import CALLS, Replay, recorded_states
 from starhold.loop.kernels import Numbers, make_step, replay
-from starhold.reproduce.figure import Curve, Figure, Panel
-from starhold.reproduce.verdicts import Finding
+from starhold.publications.figure import Curve, Figure, Panel
+from starhold.publications.verdicts import Finding
 from starhold.scenario.building import build
 from starhold.trace.bounds import work
 
 if TYPE_CHECKING:
-    from starhold.reproduce.desk import Desk
+    from starhold.publications.desk import Desk
 
 PASSES = 3
 WINDOW = 2000

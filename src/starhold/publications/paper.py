@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from starhold.errors import InputError
-from starhold.reproduce.verdicts import PLAIN, Printed, Verdict
+from starhold.publications.verdicts import PLAIN, Printed, Verdict
 
 PAPERS = ("A", "B", "C", "D", "E")
 
@@ -116,16 +116,19 @@ class Paper(_Strict):
 
 def papers_of(word: str) -> list[str]:
     """The letters that a word on the command line means. InputError for anything but a letter or "all"."""
-    if word.lower() == "all":
-        return list(PAPERS)
+    return list(PAPERS) if word.lower() == "all" else [paper_of(word, " or all")]
+
+
+def paper_of(word: str, or_else: str = "") -> str:
+    """The letter of a publication, in capitals. InputError for anything else, naming what else is allowed."""
     if word.upper() not in PAPERS:
-        raise InputError("starhold reproduce", "paper", word, f"{', '.join(PAPERS)} or all")
-    return [word.upper()]
+        raise InputError("reproduce", "publication", word, f"{', '.join(PAPERS)}{or_else}")
+    return word.upper()
 
 
 def folder_of(letter: str) -> Any:
     """The folder of a publication."""
-    return resources.files("starhold.reproduce.papers") / letter
+    return resources.files("starhold.publications.papers") / letter
 
 
 def read_paper(letter: str) -> Paper:

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import differential_evolution
 
-from starhold.reproduce.desk import Desk
-from starhold.reproduce.papers.C import measures
-from starhold.reproduce.reproduction import reproduce
+from starhold.publications.desk import Desk
+from starhold.publications.papers.C import measures
+from starhold.publications.reproduction import reproduce
 
 
 def slowest(gains, ratios):

@@ -12,8 +12,8 @@ from starhold.algebra.vector import ZERO
 from starhold.laws import modal
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.craft import make_craft
-from starhold.reproduce.desk import Desk
-from starhold.reproduce.verdicts import Finding
+from starhold.publications.desk import Desk
+from starhold.publications.verdicts import Finding
 from starhold.synthesis.pole_placement import UncontrollableError, displacement, is_stable, levels, place, reached
 
 Array: TypeAlias = NDArray[np.float64]

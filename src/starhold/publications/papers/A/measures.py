@@ -10,9 +10,9 @@ import numpy as np
 from starhold.laws import lqr
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.craft import make_craft
-from starhold.reproduce.desk import Desk
-from starhold.reproduce.figure import Curve, Figure, Panel
-from starhold.reproduce.verdicts import Finding
+from starhold.publications.desk import Desk
+from starhold.publications.figure import Curve, Figure, Panel
+from starhold.publications.verdicts import Finding
 from starhold.studies.compare import build
 from starhold.synthesis.riccati import closed_form, linear_model, solve_riccati
 from starhold.synthesis.weights import balance, kappa

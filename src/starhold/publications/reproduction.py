@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from starhold.reproduce import measures as common
-from starhold.reproduce.desk import Desk
-from starhold.reproduce.figure import Figure
-from starhold.reproduce.paper import FigureItem, Item, Paper, Row, read_paper
-from starhold.reproduce.verdicts import Finding, Verdict, judge
+from starhold.publications import measures as common
+from starhold.publications.desk import Desk
+from starhold.publications.figure import Figure
+from starhold.publications.paper import FigureItem, Item, Paper, Row, read_paper
+from starhold.publications.verdicts import Finding, Verdict, judge
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Reproduction:
 
 def measure_of(letter: str, item: Item) -> Callable[..., Any]:
     """The function that makes an item: the publication's own, else a common one. AttributeError where there is none."""
-    own = import_module(f"starhold.reproduce.papers.{letter}.measures")
+    own = import_module(f"starhold.publications.papers.{letter}.measures")
     return getattr(own, item.by) if hasattr(own, item.by) else getattr(common, item.by)
 
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from starhold.reproduce.desk import Desk
-from starhold.reproduce.paper import read_paper
-from starhold.reproduce.papers.D import measures, placement
-from starhold.reproduce.papers.D.placement import Case, Spectra
-from starhold.reproduce.reproduction import measure_of
-from starhold.reproduce.verdicts import judge
+from starhold.publications.desk import Desk
+from starhold.publications.paper import read_paper
+from starhold.publications.papers.D import measures, placement
+from starhold.publications.papers.D.placement import Case, Spectra
+from starhold.publications.reproduction import measure_of
+from starhold.publications.verdicts import judge
 
 PAPER = read_paper("D")
 SEARCHES = {

@@ -12,12 +12,12 @@ from starhold.algebra.quaternion import to_body
 from starhold.analysis.rigid_body import error_angle
 from starhold.parts.craft import tensor
 from starhold.parts.environments.gravity_gradient import gravity_gradient
-from starhold.reproduce.verdicts import Finding
+from starhold.publications.verdicts import Finding
 from starhold.scenario.building import build
 from starhold.simulation.lane import fly
 
 if TYPE_CHECKING:
-    from starhold.reproduce.desk import Desk
+    from starhold.publications.desk import Desk
 
 Array = NDArray[np.float64]
 COMMON = "three-laws"

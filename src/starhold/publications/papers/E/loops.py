@@ -12,9 +12,9 @@ import numpy as np
 from starhold.algebra.polynomial import Polynomial
 from starhold.algebra.scalar import less, maximum, where
 from starhold.certification.invariant import InvariantProblem, certify, load
-from starhold.reproduce.desk import Desk
-from starhold.reproduce.figure import Curve, Figure, Panel
-from starhold.reproduce.verdicts import Finding
+from starhold.publications.desk import Desk
+from starhold.publications.figure import Curve, Figure, Panel
+from starhold.publications.verdicts import Finding
 from starhold.studies.phase_portraits import paths, portraits
 
 if TYPE_CHECKING:

@@ -1,6 +1,6 @@
 """Publication E is measured: section 2 in `loops`, section 3 in `stations` and `sunlight`."""
 
-from starhold.reproduce.papers.E.loops import (
+from starhold.publications.papers.E.loops import (
     all_come,
     border,
     definition,
@@ -15,7 +15,7 @@ from starhold.reproduce.papers.E.loops import (
     theorems,
     where_from,
 )
-from starhold.reproduce.papers.E.stations import (
+from starhold.publications.papers.E.stations import (
     alike,
     at_the_axis,
     coriolis_share,
@@ -42,7 +42,7 @@ from starhold.reproduce.papers.E.stations import (
     stiffness,
     zone_ratio,
 )
-from starhold.reproduce.papers.E.sunlight import (
+from starhold.publications.papers.E.sunlight import (
     angles,
     area,
     area_figure,

@@ -12,9 +12,9 @@ from starhold.algebra.cosines import to_angles
 from starhold.laws import wheel
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.craft import tensor
-from starhold.reproduce.desk import Desk
-from starhold.reproduce.figure import Curve, Figure, Panel
-from starhold.reproduce.verdicts import Finding
+from starhold.publications.desk import Desk
+from starhold.publications.figure import Curve, Figure, Panel
+from starhold.publications.verdicts import Finding
 from starhold.studies.body import study_of
 from starhold.studies.compare import build
 from starhold.synthesis.stability_degree import boundary, brute_force, degree, design_gains, optimum

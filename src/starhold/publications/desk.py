@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from starhold.reproduce.paper import scenario_files
+from starhold.publications.paper import scenario_files
 from starhold.scenario.reading import builtin_text, parse
 from starhold.studies import compare as studies
 from starhold.studies.body import study_of

@@ -8,12 +8,12 @@ from pydantic import ValidationError
 
 from starhold.cli import reproduce as command
 from starhold.cli.arguments import FAILED_CHECK
+from starhold.publications.desk import Desk
+from starhold.publications.figure import Curve, Figure, Panel
+from starhold.publications.paper import PAPERS, Paper, folder_of, read_paper, scenario_files
+from starhold.publications.reproduction import Judged, Reproduction, measure_of
+from starhold.publications.verdicts import Finding
 from starhold.report.reproduction_figures import draw
-from starhold.reproduce.desk import Desk
-from starhold.reproduce.figure import Curve, Figure, Panel
-from starhold.reproduce.paper import PAPERS, Paper, folder_of, read_paper, scenario_files
-from starhold.reproduce.reproduction import Judged, Reproduction, measure_of
-from starhold.reproduce.verdicts import Finding
 from starhold.scenario.reading import parse
 from tests.running import starhold
 
@@ -78,7 +78,7 @@ def test_a_figure_is_drawn_the_same_each_time():
 def test_bad_words_on_the_command_line(tmp_path):
     ended = starhold("reproduce", "Z", "-o", "r", cwd=tmp_path)
     assert ended.returncode == 2
-    assert ended.stderr.splitlines() == ["starhold: starhold reproduce: paper: found Z; allowed: A, B, C, D, E or all"]
+    assert ended.stderr.splitlines() == ["starhold: reproduce: publication: found Z; allowed: A, B, C, D, E or all"]
     assert not (tmp_path / "r").exists()
 
 

@@ -7,11 +7,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from starhold.loop.kernels import Numbers, fly_plainly, make_step, replay
-from starhold.reproduce.desk import Desk
-from starhold.reproduce.paper import read_paper
-from starhold.reproduce.papers.B import calls, measures, random_starts
-from starhold.reproduce.reproduction import measure_of, reproduce
-from starhold.reproduce.verdicts import judge
+from starhold.publications.desk import Desk
+from starhold.publications.paper import read_paper
+from starhold.publications.papers.B import calls, measures, random_starts
+from starhold.publications.reproduction import measure_of, reproduce
+from starhold.publications.verdicts import judge
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
 from starhold.trace.program import Call, Op, statements

@@ -13,9 +13,9 @@ from starhold.laws.interface import NoMemory
 from starhold.laws.point import PointMeasurement
 from starhold.parts.bodies.libration_point import EARTH_DIAMETER, PRIMARIES, linear
 from starhold.parts.craft import vector
-from starhold.reproduce.desk import Desk
-from starhold.reproduce.figure import Curve, Figure, Panel
-from starhold.reproduce.verdicts import Finding
+from starhold.publications.desk import Desk
+from starhold.publications.figure import Curve, Figure, Panel
+from starhold.publications.verdicts import Finding
 from starhold.synthesis import sail as sails
 from starhold.synthesis.circle import Station, pressure_at
 
