@@ -26,8 +26,8 @@ MOST_STEPS = 1e12
 class ScenarioTable(Table):
     """A whole file but for its laws: a body's own class adds what it has, a `simulation` among it."""
 
-    name: Name
-    description: str = ""
+    name: Annotated[Name, Field(description="how results and folders are called")]
+    description: Annotated[str, Field(description="a sentence for the report")] = ""
     campaign: CampaignTable | None = None
 
 

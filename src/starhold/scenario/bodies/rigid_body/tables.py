@@ -89,7 +89,10 @@ class Initial(Pointing):
 class TargetTable(Pointing):
     """The attitude to point at."""
 
-    mode: Literal["inertial", "orbital", "history"] = "inertial"
+    mode: Annotated[
+        Literal["inertial", "orbital", "history"],
+        Field(description="fixed, third axis to the centre of attraction, or as a file tells over time"),
+    ] = "inertial"
     file: Annotated[str | None, Field(description="CSV of a history: time (s), q0, q1, q2, q3; beside the scenario")] = None
 
     @model_validator(mode="after")
@@ -104,7 +107,7 @@ class TargetTable(Pointing):
 class Environment(Table):
     """External torques."""
 
-    gravity_gradient: Flag = False
+    gravity_gradient: Annotated[Flag, Field(description="the torque of the central body's gravity; laws know it")] = False
     torque_noise: Annotated[float, *quantity(Gain("N m", at_least=0.0, text="standard deviation per axis and step"))] = 0.0
 
 

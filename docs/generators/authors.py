@@ -1,0 +1,121 @@
+"""The tables on the pages for authors of laws and of other parts."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+from dataclasses import is_dataclass
+from itertools import pairwise
+from textwrap import dedent
+from types import ModuleType
+from typing import Any
+
+from generators.tables import fields_table, first_sentence, signature, table
+from starhold.algebra import quaternion, scalar, several, structured
+from starhold.algebra import vector as vectors
+from starhold.laws.interface import Card, Gain, Measurement, Start
+from starhold.laws.point import PointMeasurement
+from starhold.parts import roles
+from starhold.parts.bodies.libration_point import Libration
+from starhold.parts.catalogue import DEMANDED, EITHER, PACKAGES
+from starhold.parts.contract import Card as PartCard
+from starhold.parts.contract import Parameter
+from starhold.parts.craft import Craft
+from starhold.parts.random import Dice
+
+
+def roles_text() -> str:
+    """The roles of parts but bodies and laws: for each the attributes and the equations of its protocol."""
+    found: list[str] = []
+    for role in PACKAGES:
+        if role == "body":
+            continue
+        protocol = getattr(roles, role.capitalize())
+        either = EITHER.get(role, ())
+        rows: list[list[str]] = []
+        for name, kind in protocol.__annotations__.items():
+            needed = "required" if name in DEMANDED[role] else ""
+            rows.append([f"`{name}`", needed, {"type": "a NamedTuple", "bool": "True or False"}.get(kind, "names")])
+        for name, item in vars(protocol).items():
+            if inspect.isfunction(item) and not name.startswith("_"):
+                needed = (
+                    "required" if name in DEMANDED[role] else f"or `{'`, `'.join({*either} - {name})}`" * (name in either)
+                )
+                shown = f"`{name}({signature(item).removesuffix(', /')})`"
+                rows.append([shown, needed, " ".join((item.__doc__ or "").split())])
+        text = " ".join((protocol.__doc__ or "").split())
+        found += [f"### {role.capitalize()}", "", text, "", table(["equation or attribute", "", "meaning"], rows), ""]
+    return "\n".join(found).rstrip()
+
+
+OPERATORS = ("plus", "minus", "product", "negative", "select")
+"""Functions of the scalars that are written as operators, or that `where` stands for."""
+
+
+def attributes_table(cls: Any) -> str:
+    """The fields of a dataclass and of those it derives from, each told by the docstring that follows it."""
+    rows: dict[str, list[str]] = {}
+    for base in filter(is_dataclass, reversed(cls.__mro__)):
+        body = ast.parse(dedent(inspect.getsource(base))).body[0].body  # type: ignore[attr-defined]
+        for statement, told in pairwise(body):
+            if isinstance(statement, ast.AnnAssign):
+                default = "required" if statement.value is None else f"`{ast.unparse(statement.value)}`"
+                name = ast.unparse(statement.target)
+                rows[name] = [f"`{name}`", default, " ".join(told.value.value.split())]
+    return table(["keyword", "default", "meaning"], [*rows.values()])
+
+
+def functions_table(module: ModuleType) -> str:
+    """The functions that a module defines, and its classes with their methods."""
+    rows: list[list[str]] = []
+    for name, item in vars(module).items():
+        if name.startswith("_") or getattr(item, "__module__", "") != module.__name__ or name in OPERATORS:
+            continue
+        if inspect.isfunction(item):
+            rows.append([f"`{name}({signature(item)})`", first_sentence(item)])
+        elif inspect.isclass(item):
+            own = [f for n, f in vars(item).items() if inspect.isfunction(f) and not n.startswith("_")]
+            methods = "; ".join(f"`.{f.__name__}({signature(f)})`: {first_sentence(f)}" for f in own)
+            rows.append([f"`{name}`", f"{first_sentence(item)} {methods}"])
+    return table(["function", "meaning"], rows)
+
+
+def methods_table(cls: Any) -> str:
+    """The methods of a class."""
+    own = [f for name, f in vars(cls).items() if inspect.isfunction(f) and not name.startswith("_")]
+    return table(["method", "meaning"], [[f"`.{f.__name__}({signature(f)})`", first_sentence(f)] for f in own])
+
+
+def _start_table() -> str:
+    """What a design form may ask for, from the sentence that tells it."""
+    return (
+        " ".join((Start.__doc__ or "").split())
+        + f" Fields: {', '.join(f'`{n}`' for n in (*Start.__annotations__, 'angle'))}."
+    )
+
+
+TABLES = {
+    "card": lambda: attributes_table(Card),
+    "measurement": lambda: fields_table(Measurement),
+    "craft": lambda: fields_table(Craft),
+    "scalar": lambda: functions_table(scalar),
+    "vector": lambda: functions_table(vectors),
+    "quaternion": lambda: functions_table(quaternion),
+    "structured": lambda: functions_table(structured),
+    "several": lambda: functions_table(several),
+    "gain": lambda: attributes_table(Gain),
+    "start": _start_table,
+    "measurement point": lambda: fields_table(PointMeasurement),
+    "plant": lambda: fields_table(Libration),
+    "part card": lambda: attributes_table(PartCard),
+    "parameter": lambda: attributes_table(Parameter),
+    "roles": roles_text,
+    "dice": lambda: methods_table(Dice),
+}
+MARK = re.compile(r"(<!-- written by docs/generate.py: (.*?) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+def filled(text: str) -> str:
+    """A page with its tables written anew."""
+    return MARK.sub(lambda match: f"{match[1]}\n{TABLES[match[2]]()}\n\n{match[3]}", text)
