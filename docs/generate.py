@@ -5,13 +5,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from generators import api, commands, laws, parts
+from generators import api, commands, gallery, laws, parts
 from generators import keys as scenario_keys
 from generators.authors import filled
 
 PAGES = {
     "api.md": api.page,
     "commands.md": commands.page,
+    "gallery.md": gallery.page,
     "keys.md": scenario_keys.page,
     "laws.md": laws.page,
     "parts.md": parts.page_of_parts,

@@ -1,4 +1,4 @@
-"""The tutorials are true: their files are written, their commands and code run from top to bottom, and print what the page quotes."""
+"""The tutorials are true: their files are written, their commands and code run from top to bottom and print what is quoted."""
 
 import contextlib
 import io
@@ -16,7 +16,8 @@ from tests.running import starhold
 ROOT = Path(__file__).parents[1]
 TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
 FENCE = re.compile(
-    r"(?P<slow><!-- slow -->\n)?(?P<unrun><!-- not run: [^>]+ -->\n)?^```(?P<language>\w*)(?: title=\"(?P<file>[^\"]+)\")?\n(?P<text>.*?)^```$",
+    r"(?P<slow><!-- slow -->\n)?(?P<unrun><!-- not run: [^>]+ -->\n)?"
+    r"^```(?P<language>\w*)(?: title=\"(?P<file>[^\"]+)\")?\n(?P<text>.*?)^```$",
     flags=re.DOTALL | re.MULTILINE,
 )
 

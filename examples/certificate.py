@@ -1,0 +1,31 @@
+"""What is proved, over a gain
+
+For each stiffness the certifier looks for the largest turn from rest on which the torque is proved to stay within its limit,
+the law and the spacecraft being exactly as given. The shaded turns are proved; nothing is said of those above."""
+
+import sys
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import starhold as sh
+
+scenario = sh.scenario(
+    {
+        "name": "proved",
+        "spacecraft": {"inertia": [12.0, 14.0, 9.0], "torque_limit": "50 mN m"},
+        "simulation": {"duration": "4 min", "control_period": 0.2},
+        "law": [{"type": "lyapunov", "k_rate": 2.0, "k_attitude": 0.1}],
+    }
+)
+stiffnesses = np.array([0.05, 0.07, 0.1, 0.14, 0.2])
+turns = []
+for stiffness in stiffnesses:
+    (certificate,) = sh.certify(scenario.with_({"law.lyapunov.k_attitude": float(stiffness)}))
+    turns.append(np.degrees(certificate.claim("torque-limit").numbers["slew_angle"]))
+
+figure, axes = plt.subplots(figsize=(6, 3.2), layout="constrained")
+axes.fill_between(1e3 * stiffnesses, turns, alpha=0.3)
+axes.plot(1e3 * stiffnesses, turns, "o-")
+axes.set(xlabel="k_attitude, mN m", ylabel="proved turn from rest, degrees", ylim=(0, None))
+figure.savefig(sys.argv[1], dpi=80)
