@@ -1,7 +1,7 @@
 """A circle about L2
 
-Two years near L2 of the Sun and the Earth, with control for the circle and 10 % to spare: smooth feedback ends on the circle; a
-relay without a layer holds a band, and may stay on another circle of it."""
+Two years near L2 of the Sun and the Earth, with control for the circle and 10 % to spare: smooth feedback ends on the
+circle; a relay without a layer holds a band, and may stay on another circle of it."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""The tutorials are true: their files are written, their commands and code run from top to bottom and print what is quoted."""
+"""The tutorials are true: their files are written, their commands and code run, and what is quoted is printed."""
 
 import contextlib
 import io
