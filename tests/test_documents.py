@@ -1,5 +1,6 @@
 """What the documents show is run."""
 
+import json
 import os
 import re
 import shlex
@@ -20,6 +21,7 @@ from starhold.campaign.requirements import CONE, LOST
 from starhold.campaign.sampling import SAMPLINGS
 from starhold.campaign.sequence import runs_to_meet
 from starhold.campaign.verdicts import runs_needed
+from starhold.certification.certificate import write
 from starhold.certification.certify import certify
 from starhold.certification.wording import HEADINGS, sentence
 from starhold.cli.main import app
@@ -280,6 +282,55 @@ def test_example_of_parts_flies(tmp_path):
     assert {"gyro_rate", "complementary_filter_gyro_bias"} < set(run)
     # The filter finds the gyro's bias.
     assert abs(float(run["complementary_filter_gyro_bias"][-1, 0]) - 1.75e-4) < 5e-5
+
+
+BASE = {
+    "name": "base",
+    "spacecraft": {"inertia": [2.0, 3.0, 4.0], "torque_limit": 0.1},
+    "initial": {"angles": ["60 deg", 0, 0]},
+    "simulation": {"duration": "10 min", "control_period": 0.1},
+    "law": [{"type": "pd", "k_rate": 0.2, "k_attitude": 0.03}],
+}
+"""What the tables that pages show by themselves are put into."""
+
+
+def fragments():
+    """The tables that pages show by themselves."""
+    for name in ("scenarios.md", "certificates.md"):
+        text = (ROOT / "docs" / name).read_text(encoding="utf-8")
+        for indent, block in re.findall(r"^( *)```toml\n(.*?)^ *```", text, flags=re.DOTALL | re.MULTILINE):
+            table = tomllib.loads(re.sub(f"^{indent}", "", block, flags=re.MULTILINE))
+            yield pytest.param(BASE | table, id=f"{name}: {', '.join(table)}")
+
+
+@pytest.mark.parametrize("tables", [*fragments()])
+def test_table_of_a_page_is_read(tables):
+    assert sh.scenario(tables).laws
+
+
+def test_code_of_the_page_about_machines_runs(capsys):
+    (example,) = blocks("docs/machines.md", "python")
+    exec(compile(example, "machines.md", "exec"), {})
+    assert "0.18257418583505536" in capsys.readouterr().out
+
+
+def names_in(content):
+    """The keys of tables, and of those within lists; what `numbers` and the like hold differs from claim to claim."""
+    if isinstance(content, list):
+        return set().union(*map(names_in, content))
+    if isinstance(content, dict):
+        return set(content).union(*(names_in(value) for value in content.values() if isinstance(value, list)))
+    return set()
+
+
+def test_certificate_of_its_page_has_the_keys_of_one(tmp_path):
+    (example,) = blocks("docs/certificates.md", "json")
+    scenario = load("three-laws")
+    path = tmp_path / "certificate.json"
+    write([certify(build(scenario, scenario.pick("lyapunov")), "lyapunov")], scenario.name, path)
+    shown, written = json.loads(example), json.loads(path.read_text(encoding="utf-8"))
+    assert shown["format"] == written["format"]
+    assert names_in(shown) == names_in(written)
 
 
 @pytest.mark.parametrize("body", ["rigid_body", "libration_point"])
