@@ -18,7 +18,7 @@ scenario = sh.scenario(
         "law": [{"type": "lyapunov", "k_rate": 2.0, "k_attitude": 0.1}],
     }
 )
-stiffnesses = np.array([0.05, 0.07, 0.1, 0.14, 0.2])
+stiffnesses = np.array([0.05, 0.08, 0.13, 0.2])
 turns = []
 for stiffness in stiffnesses:
     (certificate,) = sh.certify(scenario.with_({"law.lyapunov.k_attitude": float(stiffness)}))
