@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from generators import api, commands, gallery, laws, parts
+from generators import api, commands, gallery, laws, parts, publications
 from generators import keys as scenario_keys
 from generators.authors import filled
 
@@ -16,6 +16,7 @@ PAGES = {
     "keys.md": scenario_keys.page,
     "laws.md": laws.page,
     "parts.md": parts.page_of_parts,
+    "publications.md": publications.page,
 }
 FILLED = ("law-authors.md", "part-authors.md")
 

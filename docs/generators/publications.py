@@ -1,0 +1,53 @@
+"""The page of the publications that `starhold reproduce` makes again."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from generators.tables import table
+from starhold.publications.paper import PAPERS, read_paper
+from starhold.publications.verdicts import VERDICTS
+
+HEAD = """# The publications, made again
+
+starhold implements what five publications describe. Each of their figures, tables and statements that can be checked is made
+again by one command and laid beside what is printed:
+
+```
+starhold reproduce all -o published   # or one of A to E; needs the extra `campaign`
+```
+
+`published/index.html` leads to a page for each publication, which opens offline, with every figure and the rows *printed,
+ours, difference, verdict*; `summary.json` has the rows for programs, and the folders `A` to `E` the scenario files that were
+flown. The command ends with exit code 1 if a verdict is another than the one recorded, so that a change of the code that
+changes a result is seen. From Python, `sh.reproduce("D")` gives the rows and the curves.
+
+Verdicts are computed from what is measured and from the printed digits:
+"""
+
+TAIL = """
+What a publication says lies in `src/starhold/publications/papers/LETTER/paper.toml`, row by row, with who measures it;
+scenario files lie beside it, and `measures.py` has what no scenario holds. Only the texts of the publications were at hand,
+not their pictures: figures are compared with what the texts say of them.
+"""
+
+
+def page() -> str:
+    """Return the page: verdicts and their meanings, the publications with the verdicts recorded, all errata."""
+    papers = [read_paper(letter) for letter in PAPERS]
+    lines = [HEAD, table(["verdict", "meaning"], [[word, meaning] for word, meaning in VERDICTS.items()]), ""]
+    rows: list[list[str]] = []
+    for paper in papers:
+        counted = Counter(row.verdict for row in paper.rows)
+        told = ", ".join(f"{counted[verdict]} {verdict}" for verdict in VERDICTS if counted[verdict])
+        rows.append([paper.letter, f"{paper.title}. {paper.source}", str(len(paper.figures)), str(len(paper.rows)), told])
+    lines += ["## Publications", "", table(["", "publication", "figures", "rows", "verdicts"], rows), ""]
+    errata = sorted(
+        (row.erratum, f"{paper.letter}, {row.where}", row.says, row.why)
+        for paper in papers
+        for row in paper.rows
+        if row.erratum is not None
+    )
+    cells = [[str(number), *texts] for number, *texts in errata]
+    lines += ["## Errata", "", table(["no.", "where", "printed", "what is found instead"], cells), TAIL]
+    return "\n".join(lines)
