@@ -80,13 +80,15 @@ Block: TypeAlias = tuple[Any, ...]
 
 
 class Function(NamedTuple):
-    """A function is a block of its own; params and outs are pairs of a name (or constant) and a kind."""
+    """A function is a block of its own; params and outs are pairs of a name (or constant) and a kind; shape: what printers
+    know of how they are grouped."""
 
     name: str
     doc: str
     params: tuple[tuple[str, str], ...]
     body: Block
     outs: tuple[tuple[Value, str], ...]
+    shape: Any = None
 
 
 class Memory(NamedTuple):

@@ -1,0 +1,1 @@
+"""Laws as they leave for flight: C99 with what it takes to trust it, and shells over it."""

@@ -1,0 +1,221 @@
+"""The part of a closed loop that flies on a computer: from what sensors tell to the command, with all that it remembers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Annotated, Any, NamedTuple
+
+from starhold.algebra.quantity import Quantity, quantities
+from starhold.algebra.structure import buffers, leaves
+from starhold.algebra.structured import Buffer
+from starhold.algebra.vector import ZERO
+from starhold.errors import InputError
+from starhold.export.rebinding import Rebinder
+from starhold.loop.closed_loop import Carry, ClosedLoop, Composition, Memories
+from starhold.loop.step import make_equations
+from starhold.parts.contract import NoMemory
+from starhold.parts.part import Part
+from starhold.parts.roles import Goal
+from starhold.trace.recording import Recorder
+
+UNITS = {
+    "attitude": Quantity("1", "inertial to body, unit quaternion, scalar first"),
+    "rate": Quantity("rad/s", "angular velocity, body axes"),
+    "position": Quantity("m", "from the centre of attraction, inertial axes"),
+    "velocity": Quantity("m/s", "inertial axes"),
+    "acceleration": Quantity("rad/s^2", "angular acceleration, target axes"),
+}
+"""What members mean whose class does not say it."""
+
+
+class Parameters(NamedTuple):
+    """The numbers that do not change in flight."""
+
+    gains: Any
+    craft: Any
+    setup: Any
+
+
+@dataclass(frozen=True)
+class FlightLaw:
+    """The step of a law is `equations`, made by `make` of the parts of its loop: step(parameters, state, inputs) ->
+    (command, state). `parameters`, `start` and `inputs` are its numbers: those of the scenario."""
+
+    loop: ClosedLoop
+    parts: Composition
+    parameters: Parameters
+    start: Any
+    inputs: Any
+    given: tuple[str, ...]
+    """Readings that an estimator is given."""
+    command: Any
+    """The class of the command."""
+
+    def equation(self, rebinder: Rebinder | None = None) -> Callable[..., Any]:
+        """Return the step; with a rebinder, of copies of the equations."""
+        if rebinder is None:
+            update = make_equations(self.parts).update
+        else:
+            update = rebinder.copy(make_equations)(_seen(self.parts, rebinder)).update
+
+        command: Any = self.command
+
+        def step(parameters: Parameters, state: Any, inputs: Any) -> tuple[Any, Any]:
+            body, gains, craft = self.loop.start, parameters.gains, parameters.craft
+            now = body._replace(**{name: getattr(inputs, name) for name in body._fields if hasattr(inputs, name)})
+            kept = state._asdict()
+            setup, wheels = parameters.setup, getattr(inputs, "wheels", None)
+            if hasattr(inputs, "target"):
+                setup = setup._replace(target=inputs.target)
+            readings = tuple(_Reading(**{name: getattr(inputs, name) for name in self.given}) for _ in self.given[:1])
+            estimate = () if self.parts.estimator is None else self.loop.carry().memories.estimate
+            memories = Memories(
+                kept.get("followed", NoMemory()),
+                tuple(NoMemory() for _ in self.parts.environments),
+                readings,
+                (),
+                kept.get("estimator", NoMemory()),
+                estimate,
+            )
+            owns = tuple(wheels for _ in self.parts.effectors)
+            sign = kept.get("sign", self.loop.carry().h)
+            carry = Carry(now, owns, (), kept.get("law", NoMemory()), memories, sign, ZERO, -1.0)
+            after = update(carry, 0, (0, 0), gains, craft, setup)
+            then = {
+                "sign": after.h,
+                "law": after.memory,
+                "estimator": after.memories.estimator,
+                "followed": after.memories.followed,
+            }
+            return command(after.command), type(state)(*(then[name] for name in state._fields))
+
+        return step
+
+
+def flight_law(loop: ClosedLoop) -> FlightLaw:
+    """Return what of a loop flies on a computer. InputError for a part that has no form in C."""
+    parts, setup, carry = loop.composition(), loop.setup(), loop.carry()
+    modelled = [place for place, part in enumerate(parts.environments) if part.flag("MODELLED")]
+    for place in modelled:
+        part = parts.environments[place]
+        if part.hook("update") or buffers((setup.environments[place],)) or carry.memories.environments[place] != NoMemory():
+            raise _no_form(part.name, "a modelled torque that is a function of the state")
+    acting = [place for place, part in enumerate(parts.effectors) if part.flag("ACTS")]
+    if len(acting) > 1:
+        raise _no_form(", ".join(parts.effectors[place].name for place in acting), "one effector that takes the command")
+    module = parts.body.module
+    fields = {name: getattr(loop.start, name) for name in loop.start._fields if name != module.COMMAND}
+    notes = {name: UNITS.get(name) or quantities(module.Sample).get(name) for name in fields}
+    given: tuple[str, ...] = ()
+    if parts.estimator is not None:
+        readings, shown = {}, {}
+        for part, memory, params in zip(parts.sensors, carry.memories.sensors, setup.sensors, strict=True):
+            first = part.module.measure(loop.start, memory, params, _Still(), 0)[0]
+            readings.update(first._asdict())
+            shown.update(quantities(part.module.Reading))
+        fields.update(readings)
+        notes.update({name: one for name, one in shown.items() if notes.get(name) is None or name not in UNITS})
+        given = tuple(readings)
+    target, numbers = parts.target, setup.target
+    if target is not None and buffers((numbers,)):
+        fields["target"] = _Target(*target.module.goal(numbers, loop.start, 0, None))
+        notes["target"] = Quantity("", "the attitude to be reached, from inertial axes, at this instant")
+        target, numbers = Part(target.name, _GOAL), ()  # pyright: ignore[reportArgumentType]
+    if acting:
+        fields["wheels"] = carry.effectors[acting[0]]
+        notes["wheels"] = Quantity("", "as their tachometers tell")
+    composition = parts._replace(
+        target=target,
+        environments=tuple(parts.environments[place] for place in modelled),
+        effectors=tuple(parts.effectors[place] for place in acting),
+        sensors=(Part("readings", _READINGS),) if given else (),  # pyright: ignore[reportArgumentType]
+        actuators=(),
+    )
+    named = setup._replace(
+        target=numbers,
+        environments=_named("Environments", [(parts.environments[k].name, setup.environments[k]) for k in modelled]),
+        effectors=_named("Effectors", [(parts.effectors[k].name, setup.effectors[k]) for k in acting]),
+        sensors=((),) if given else (),
+        actuators=(),
+    )
+    kept = {"sign": carry.h if _keeps_sign(composition, module) else (), "law": carry.memory}
+    kept |= {"estimator": carry.memories.estimator, "followed": carry.memories.followed}
+    start = _named("FlightState", [(name, value) for name, value in kept.items() if any(True for _ in leaves(value))])
+    inputs = _noted("FlightInput", fields, notes)
+    told = quantities(module.Sample).get("command", Quantity("", ""))._replace(dimension="")
+    command = NamedTuple("FlightCommand", [(module.COMMAND, Annotated[Any, told])])
+    return FlightLaw(loop, composition, Parameters(loop.gains, loop.craft, named), start, inputs, given, command)
+
+
+def _seen(parts: Composition, rebinder: Rebinder) -> Composition:
+    """Return the parts with copies of their equations."""
+
+    def seen(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return tuple(seen(part) for part in value)  # pyright: ignore
+        return replace(value, module=rebinder.seen(value.module)) if isinstance(value, Part) else value
+
+    return Composition(*(seen(value) for value in parts))
+
+
+class _Still:
+    """Dice that show nothing."""
+
+    def vector(self, place: int, deviation: Any) -> Any:
+        return ZERO
+
+    def normals(self, place: int, count: int) -> Any:
+        return (0.0,) * count
+
+
+class _Reading(SimpleNamespace):
+    def _asdict(self) -> dict[str, Any]:
+        return vars(self)
+
+
+_Target = NamedTuple(
+    "_Target",
+    [
+        ("attitude", Annotated[Any, UNITS["attitude"]]),
+        ("rate", Annotated[Any, Quantity("rad/s", "angular velocity, target axes")]),
+        ("acceleration", Annotated[Any, UNITS["acceleration"]]),
+    ],
+)
+_GOAL = SimpleNamespace(ROLE="target", goal=lambda params, state, step, before: Goal(*params))
+_READINGS = SimpleNamespace(
+    ROLE="sensor", RECORDED=False, measure=lambda state, memory, params, dice, step: (memory, memory)
+)
+
+
+def _keeps_sign(parts: Composition, body: Any) -> bool:
+    """Tell whether the quaternion sign policy remembers."""
+    policy = getattr(body, "SIGN_POLICIES", {}).get(parts.sign_policy)
+    if policy is None:
+        return False
+    recorder = Recorder()
+    with recorder.recording():
+        cells = recorder.memory("cells")
+        h = cells[5]
+        return policy((cells[0], cells[1], cells[2], cells[3]), h, cells[4])[1] is not h
+
+
+def _named(title: str, pairs: list[tuple[str, Any]]) -> Any:
+    """Return a NamedTuple of these values."""
+    return _noted(title, dict(pairs), {})
+
+
+def _noted(title: str, fields: dict[str, Any], notes: dict[str, Any]) -> Any:
+    kinds = [(name.replace("-", "_"), Annotated[Any, notes[name]] if notes.get(name) else Any) for name in fields]
+    return NamedTuple(title, kinds)(*fields.values())  # pyright: ignore
+
+
+def _no_form(name: str, allowed: str) -> InputError:
+    return InputError("export c", "", f"{name}, which has no form in C", allowed)
+
+
+def numbers(value: Any) -> list[float]:
+    """Return the numbers of a value as C has them: its floats, then those of its buffers."""
+    found = [leaf for leaf in leaves(value) if isinstance(leaf, float)]
+    return found + [leaf[k] for leaf in leaves(value) if isinstance(leaf, Buffer) for k in range(leaf.size)]
