@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from starhold.certification.certificate import Certificate
     from starhold.certification.invariant import InvariantProblem
     from starhold.publications.reproduction import Reproduction
+    from starhold.export.folder import Exported
     from starhold.studies.failures import Failure
     from starhold.studies.flight import Flight
     from starhold.studies.modal_roots import Study
@@ -169,6 +170,40 @@ def certify(scenario: reading.Scenario | str | Path, law: str | None = None) -> 
 def compare(scenario: reading.Scenario | str | Path) -> list[Flight]:
     """Fly every law of a scenario; each Flight has the run (`run`, a Dataset) and its `metrics` (SI)."""
     return studies.compare(_opened(scenario))
+
+
+def export_c(
+    scenario: reading.Scenario | str | Path,
+    folder: str | Path,
+    law: str | None = None,
+    *,
+    name: str | None = None,
+    certify: bool = True,
+    force: bool = False,
+) -> Exported:
+    """Write a law of a scenario, the first if `law` is None, as C99 into a folder: header, source, a self-test that demands
+    the simulation's bits, CMakeLists.txt, and the certificate whose digest the header has. name: what functions and files
+    begin with, the law's if None. InputError for what has no form in C, a name that is no identifier, and a folder that
+    holds results (unless `force`) or cannot be written."""
+    import hashlib
+
+    from starhold.export.code import check_name, make_code
+    from starhold.export.folder import make_files, write
+    from starhold.export.proof import UNPROVED, proof_of
+    from starhold.report.results import open_folder, write_proofs
+    from starhold.studies.certificates import certify_scenario
+
+    opened = _opened(scenario)
+    entry = opened.laws[0] if law is None else opened.pick(law)
+    code = make_code(studies.build(opened, entry), check_name(entry.name.replace("-", "_") if name is None else name))
+    into, proof = open_folder(Path(folder), force), UNPROVED
+    if certify:
+        certificates = [tried.certificate for tried in certify_scenario(opened, entry.name)]
+        path = write_proofs(certificates, opened.name, into)
+        proof = proof_of(certificates, hashlib.sha256(path.read_bytes()).hexdigest())
+    exported = make_files(code, opened.name, entry.name, proof)
+    write(exported, into, opened.name, entry.name)
+    return exported
 
 
 def failures(scenario: reading.Scenario | str | Path, law: str | None = None) -> list[Failure]:

@@ -53,6 +53,11 @@ class Code:
         return Readable(self.program, self.needs, {})
 
     @property
+    def time_unit(self) -> str:
+        """The unit of the period."""
+        return getattr(self.flight.loop.body.module, "TIME_UNIT", "s")
+
+    @property
     def signature(self) -> Signature:
         """Return what the step takes and gives."""
         return self.program.main.shape

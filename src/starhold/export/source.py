@@ -11,26 +11,12 @@ from starhold.algebra.structure import leaves
 from starhold.algebra.structured import Buffer
 from starhold.export.code import Code
 from starhold.export.printing import Readable
+from starhold.export.proof import UNPROVED, Proof
 from starhold.export.types import Member, Type, comment
 from starhold.parts.contract import fields
 from starhold.version import __version__
 
 WIDTH = 110
-
-
-class Proof(NamedTuple):
-    """What is known of a law: the certificate's file and the digest of that, the outcome, and a line for each claim;
-    `warning`: why nobody should fly it unread, else empty."""
-
-    file: str
-    digest: str
-    outcome: str
-    lines: tuple[str, ...]
-    assumptions: tuple[str, ...]
-    warning: str
-
-
-UNPROVED = Proof("", "", "", (), (), "NO CERTIFICATE: nothing was proved of this law, because it was not asked for.")
 
 
 class Text(NamedTuple):
@@ -75,8 +61,7 @@ def _header(code: Code, printed: Readable, public: dict[str, str], scenario: str
     guard = f"{name.upper()}_H"
     lines = [*_banner(code, scenario, law, proof), "", f"#ifndef {guard}", f"#define {guard}", ""]
     lines += ["#ifdef __cplusplus", 'extern "C" {', "#endif", ""]
-    unit = getattr(loop.body.module, "TIME_UNIT", "s")
-    lines += [f"/* {unit}: the step is to be called once in each such period. */", f"#define {name.upper()}_PERIOD ({loop.period!r})", ""]
+    lines += [f"/* {code.time_unit}: the step is to be called once in each such period. */", f"#define {name.upper()}_PERIOD ({loop.period!r})", ""]
     types = _types(code, printed)
     for own in public:
         if own != STATE.name:
@@ -124,10 +109,10 @@ def _banner(code: Code, scenario: str, law: str, proof: Proof) -> list[str]:
               "compile with -std=c99 -ffp-contract=off, never with -ffast-math."]  # fmt: skip
     found += [""]
     if proof.warning:
-        found += ["*" * 100, f"WARNING  {proof.warning}", "*" * 100]
+        found += ["*" * 100, *(f"WARNING  {line}" for line in proof.warning.splitlines()), "*" * 100]
     if proof.file:
         found += ["", f"Certificate: {proof.file}, sha256 {proof.digest}: {proof.outcome}", "Claims:"]
-        found += [f"  {line}" for line in proof.lines]
+        found += [f"  {line}" for line in proof.claims]
         found += [f"These claims assume: {'; '.join(proof.assumptions)}."] if proof.assumptions else []
         found += [f"Check it independently: starhold check {proof.file}"]
     return comment("\n".join(found))

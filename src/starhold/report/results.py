@@ -27,7 +27,8 @@ SUMMARY, PAGE = "summary.json", "report.html"
 FAILURES = ("failures.csv", "failures.png")
 ROOTS = ("modal-roots.csv", "modal-roots.png")
 INDEX = "index.html"
-MARKS = (SUMMARY, "run.nc", PAGE, INDEX, CERTIFICATES, "invariant.png", *FAILURES, *ROOTS)
+EXPORT = "export.json"
+MARKS = (SUMMARY, EXPORT, "run.nc", PAGE, INDEX, CERTIFICATES, "invariant.png", *FAILURES, *ROOTS)
 """A folder with one of these holds results."""
 
 
@@ -63,8 +64,18 @@ def _clear(folder: Path) -> None:
         (folder / Path(name).name / "run.nc").unlink(missing_ok=True)
         if (folder / name).is_dir() and not any((folder / name).iterdir()):
             (folder / name).rmdir()
+    for name in _exported(folder):
+        (folder / name).unlink(missing_ok=True)
     for mark in MARKS:
         (folder / mark).unlink(missing_ok=True)
+
+
+def _exported(folder: Path) -> list[str]:
+    """The files that an export of this folder lists."""
+    try:
+        return [Path(name).name for name in json.loads((folder / EXPORT).read_text(encoding="utf-8"))["files"]]
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
 
 
 def write_run(run: Recording, path: Path) -> None:

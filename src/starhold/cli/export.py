@@ -1,0 +1,63 @@
+"""The command `export`: laws as they leave for flight."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from starhold.cli.arguments import Certified, ExportOutput, Force, ScenarioFile, Unstable
+
+if TYPE_CHECKING:
+    from starhold.export.folder import Exported
+
+app = typer.Typer(help="Write a law as flight code, or for another simulator.", no_args_is_help=True, rich_markup_mode=None)
+
+
+@app.command()
+def c(
+    file: ScenarioFile,
+    law: Annotated[str | None, typer.Option(help="which law of the file; the first if not given")] = None,
+    output: ExportOutput = None,
+    name: Annotated[
+        str | None, typer.Option(metavar="NAME", help="what functions and files begin with; else the law's name")
+    ] = None,
+    force: Force = False,
+    certify: Certified = True,
+    allow_unstable: Unstable = False,
+) -> None:
+    """Write a law as C99 with a self-test: header, source, CMakeLists.txt and the certificate."""
+    from starhold.api import export_c
+    from starhold.scenario.reading import load
+
+    scenario = load(file, allow_unstable)
+    entry = scenario.laws[0] if law is None else scenario.pick(law)
+    folder = output or Path("results") / f"{scenario.name}-{entry.name}-c"
+    print_exported(export_c(scenario, folder, entry.name, name=name, certify=certify, force=force), folder)
+
+
+def print_exported(exported: Exported, folder: Path) -> None:
+    """The files, what a step costs, what is proved, and how to test them."""
+    from rich.markup import escape
+
+    from starhold.cli.show import console
+
+    code, work = exported.code, exported.code.work
+    console.print(f"[bold]{code.name}[/bold]: {', '.join(exported.files)} in {folder}", highlight=False, soft_wrap=True)
+    shown = f"{work.arithmetic} + - * / and roots, {work.comparisons} comparisons"
+    console.print(f"  a step at the most: {shown}, every {code.flight.loop.period:g} {code.time_unit}", highlight=False)
+    for cost in exported.costs:
+        console.print(
+            f"  {cost.target}: {cost.flash} bytes of flash, {cost.stack} of stack ({cost.compiler} -O2)", highlight=False
+        )
+    if exported.proof.warning:
+        for line in exported.proof.warning.splitlines():
+            console.print(f"  [red]warning[/red] {escape(line)}", highlight=False)
+    else:
+        console.print(f"  [green]proved[/green], {exported.proof.file}, sha256 {exported.proof.digest}", highlight=False, soft_wrap=True)
+    console.print(
+        f"Test it: cmake -S {folder} -B {folder}/build && cmake --build {folder}/build && ctest --test-dir {folder}/build",
+        highlight=False,
+        soft_wrap=True,
+    )

@@ -1,0 +1,47 @@
+"""What a header says of what is proved: claims in sentences, assumptions, and a warning where something is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from starhold.certification.certificate import FILE, Certificate
+from starhold.certification.wording import HEADINGS, evidence, sentence, unclaimed
+
+
+class Proof(NamedTuple):
+    """The certificate's file and the digest of that (both empty for none), its outcome, a line for each claim, what they
+    assume, and why nobody should fly the law unread (empty where all is proved)."""
+
+    file: str
+    digest: str
+    outcome: str
+    claims: tuple[str, ...]
+    assumptions: tuple[str, ...]
+    warning: str
+
+
+UNPROVED = Proof("", "", "", (), (), "NO CERTIFICATE. Nothing was proved of this law, because nobody asked for it.")
+
+
+def proof_of(certificates: Sequence[Certificate], digest: str) -> Proof:
+    """Return what certificates of one law say; digest: that of the file which holds them, as hexadecimal."""
+    claims: list[str] = []
+    wrong: list[str] = []
+    assumed: dict[str, None] = {}
+    for certificate in certificates:
+        if not certificate.claims:
+            wrong.append(f"NOTHING IS CLAIMED: {unclaimed(certificate.subject)}.")
+        for claim in certificate.claims:
+            text = f"{HEADINGS[claim.kind]}: {sentence(claim, certificate.subject)}"
+            claims.append(f"{claim.outcome}: {text}")
+            assumed |= dict.fromkeys(claim.assumptions)
+            if claim.outcome != "proved":
+                found = claim.refutation()
+                why = f" ({evidence(found)})" if found is not None else ""
+                wrong.append(f"{'REFUTED' if claim.outcome == 'refuted' else 'NOT DECIDED'}: {text}{why}.")
+    outcomes = {certificate.outcome for certificate in certificates}
+    outcome = next((one for one in ("refuted", "undecided") if one in outcomes), "proved")
+    if outcome != "proved" and not wrong:
+        wrong.append("NOT DECIDED where the motion ends: no claim is made of it.")
+    return Proof(FILE, digest, outcome, tuple(claims), tuple(assumed), "\n".join(wrong))

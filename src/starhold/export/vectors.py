@@ -1,0 +1,231 @@
+"""Test vectors of a law, and the self-test in C that demands their bits."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from starhold.algebra.structure import flatten, leaves, mapped
+from starhold.algebra.structured import Buffer
+from starhold.export.code import Code
+from starhold.export.law import numbers
+from starhold.trace.calling import bind
+from starhold.trace.machine import load
+from starhold.trace.recording import Recorder
+
+EDGES = (0.0, -0.0, 5e-324, -2.2250738585072014e-308, 1e-160, 1.0, -1.0, 1e155, -1.7976931348623157e308, math.inf, -math.inf,
+         math.nan)  # fmt: skip
+"""Numbers at which arithmetic is special."""
+RUNS, STEPS = 12, 16
+NAN = 0x7FF8000000000000
+_PRIME, _BASIS = 0x100000001B3, 0xCBF29CE484222325
+
+
+class Vector(NamedTuple):
+    """Before a step: whether the state is set anew, and what is measured (the numbers that are read); after it the numbers of
+    the command, and the digest of those of the state."""
+
+    first: bool
+    inputs: list[float]
+    command: list[float]
+    digest: int
+
+
+def kept_inputs(code: Code) -> list[bool]:
+    """Tell of each number of the inputs whether the law reads it."""
+    return [code.needs.reads(path) for path in code.signature.params[2].leaves]
+
+
+def random_like(rng: np.random.Generator, value: Any, name: str = "", edges: float = 0.0) -> Any:
+    """Return numbers in the form of a value: quaternions of unit length, flags of 0 or 1, others of any size up to twice the
+    largest of the value; of which some, by that share, are special."""
+    if hasattr(value, "_fields"):
+        return type(value)(*(random_like(rng, part, field, edges) for field, part in zip(value._fields, value, strict=True)))
+    if isinstance(value, tuple) and all(isinstance(part, tuple) for part in value):
+        return tuple(random_like(rng, part, name, edges) for part in value)
+    flat = [leaf for leaf in leaves(value) if isinstance(leaf, float)]
+    if name == "attitude" or name == "followed":
+        turn = rng.normal(size=4)
+        found = (turn / np.linalg.norm(turn)).tolist()
+    elif name in ("attitude_is_new", "begun"):
+        found = [float(rng.integers(2)) for _ in flat]
+    elif name == "sign":
+        found = [float(rng.choice([-1.0, 1.0])) for _ in flat]
+    else:
+        size = max([abs(x) for x in flat if math.isfinite(x)] or [0.0]) or 1.0
+        found = (size * rng.uniform(-2.0, 2.0, len(flat)) * 10.0 ** rng.uniform(-4.0, 0.0)).tolist()
+    source = iter([EDGES[rng.integers(len(EDGES))] if rng.random() < edges else x for x in found])
+    return mapped(value, lambda leaf: next(source) if isinstance(leaf, float) else leaf)
+
+
+class Stepper:
+    """The step that C must equal, step(state, inputs) -> (command, state): the equations of the simulation, recorded and
+    compiled as the simulation's are, so that it goes on beyond a division by zero as C does."""
+
+    def __init__(self, code: Code) -> None:
+        flight, recorder = code.flight, Recorder()
+        like = (flight.parameters, flight.start, flight.inputs)
+        with recorder.recording():
+            given, gives = recorder.memory("given", writable=True), recorder.memory("gives", writable=True)
+            command, state = flight.equation()(*bind(like, given))
+            for place, leaf in enumerate(flatten((command, state))):
+                gives[place] = leaf
+        self._like, self._after = like, (mapped(command, lambda _: 0.0), flight.start)
+        self._gives = np.empty(len(flatten(self._after)))
+        self._call = load(recorder.program("step"), 1)
+
+    def __call__(self, state: Any, inputs: Any) -> tuple[Any, Any]:
+        values = (self._like[0], state, inputs)
+        given = np.array([x for leaf in leaves(values) for x in _in_order(leaf)])
+        self._call(given.ctypes.data, self._gives.ctypes.data)
+        numbers, left = iter(self._gives.tolist()), iter(given.tolist())
+        held = [[next(left) for _ in _in_order(leaf)] for leaf in leaves(values)]
+        buffers = iter([cells for cells, leaf in zip(held, leaves(values), strict=True) if isinstance(leaf, Buffer)])
+        return mapped(self._after, lambda leaf: Buffer(next(buffers)) if isinstance(leaf, Buffer) else next(numbers))
+
+
+def _in_order(leaf: Any) -> list[float]:
+    if isinstance(leaf, Buffer):
+        return list(leaf.row(0, leaf.size))
+    return [leaf] if isinstance(leaf, float) else []
+
+
+def fresh(state: Any) -> Any:
+    """Return a copy of a state whose buffers are its own."""
+    return mapped(state, lambda leaf: Buffer([leaf[k] for k in range(leaf.size)]) if isinstance(leaf, Buffer) else leaf)
+
+
+def digest(values: list[float]) -> int:
+    """Return the 64-bit FNV-1a hash of the bits of numbers, any NaN being the same."""
+    found = _BASIS
+    for word in bits(values):
+        for shift in range(0, 64, 8):
+            found = ((found ^ (word >> shift & 0xFF)) * _PRIME) & 0xFFFFFFFFFFFFFFFF
+    return found
+
+
+def bits(values: list[float]) -> list[int]:
+    """Return the bits of numbers, any NaN being the same."""
+    words = np.asarray(values, dtype=float).view(np.uint64).tolist()
+    return [NAN if math.isnan(x) else int(word) for x, word in zip(values, words, strict=True)]
+
+
+def vectors(code: Code, seed: int = 1) -> list[Vector]:
+    """Return steps that follow one another from the start in some runs, each with measurements of its own; in every
+    second run some of them are special."""
+    rng, step, keep = np.random.default_rng(seed), Stepper(code), kept_inputs(code)
+    found: list[Vector] = []
+    for run in range(RUNS // 3 if code.buffers else RUNS):
+        state = fresh(code.flight.start)
+        for k in range(STEPS):
+            inputs = random_like(rng, code.flight.inputs, edges=0.1 * (run % 2))
+            command, state = step(state, inputs)
+            flat = [x for x, kept in zip(numbers(inputs), keep, strict=True) if kept]
+            found.append(Vector(k == 0, flat, numbers(command), digest(numbers(state))))
+    return found
+
+
+def selftest(code: Code, cases: list[Vector]) -> str:
+    """Return a program in C that makes these steps and fails unless every bit is as told."""
+    name = code.name
+    ins, outs = len(cases[0].inputs), len(cases[0].command)
+    rows = ",\n".join("    {" + ", ".join([str(int(c.first)), _braced(c.inputs), _braced(c.command), _word(c.digest)]) + "}"
+                      for c in cases)  # fmt: skip
+    values = dict(name=name, ins=max(1, ins), outs=outs, count=len(cases), rows=rows)
+    values["state"] = len(numbers(code.flight.start)) or 1
+    values["states"] = len(numbers(code.flight.start))
+    text = _SELFTEST
+    for key, value in values.items():
+        text = text.replace(f"@{key}@", str(value))
+    return text
+
+
+def _braced(values: list[float]) -> str:
+    return "{" + ", ".join(map(_word, bits(values) or [0])) + "}"
+
+
+def _word(word: int) -> str:
+    return f"UINT64_C(0x{word:016X})"
+
+
+_SELFTEST = """\
+/* Self-test of @name@: makes @count@ steps and fails unless each gives the bits of the simulation. A NaN equals any NaN.
+   Numbers stand here as the bits of IEEE doubles, so that no reading of decimals comes between. */
+
+#include "@name@.h"
+
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+typedef struct {
+    int first; /* whether the state is set anew before the step */
+    uint64_t input[@ins@];
+    uint64_t command[@outs@];
+    uint64_t state; /* digest of the state after the step: FNV-1a */
+} vector_t;
+
+/* A struct of other than doubles, or with gaps, must not compile. */
+typedef char input_is_plain[sizeof(@name@_input_t) == @ins@ * sizeof(double) ? 1 : -1];
+typedef char command_is_plain[sizeof(@name@_command_t) == @outs@ * sizeof(double) ? 1 : -1];
+typedef char state_is_plain[sizeof(@name@_state_t) == @state@ * sizeof(double) ? 1 : -1];
+
+static const vector_t vectors[@count@] = {
+@rows@
+};
+
+static uint64_t bits_of(double x)
+{
+    uint64_t bits = UINT64_C(0x7FF8000000000000);
+    if (x == x) {
+        memcpy(&bits, &x, sizeof bits);
+    }
+    return bits;
+}
+
+static uint64_t digest(const double *numbers, int count)
+{
+    uint64_t found = UINT64_C(0xCBF29CE484222325);
+    for (int k = 0; k < count; k++) {
+        const uint64_t bits = bits_of(numbers[k]);
+        for (int shift = 0; shift < 64; shift += 8) {
+            found = (found ^ ((bits >> shift) & 0xFFU)) * UINT64_C(0x100000001B3);
+        }
+    }
+    return found;
+}
+
+int main(void)
+{
+    int failed = 0;
+    @name@_state_t state;
+    @name@_init(&state);
+    for (int k = 0; k < @count@; k++) {
+        const vector_t *const vector = &vectors[k];
+        @name@_input_t input;
+        @name@_command_t command;
+        double given[@outs@];
+        double held[@state@];
+        int wrong = 0;
+        if (vector->first) {
+            @name@_init(&state);
+        }
+        memcpy(&input, vector->input, sizeof input);
+        @name@_step(&state, &input, &command);
+        memcpy(given, &command, sizeof given);
+        memcpy(held, &state, sizeof held);
+        for (int i = 0; i < @outs@; i++) {
+            wrong += bits_of(given[i]) != vector->command[i];
+        }
+        wrong += digest(held, @states@) != vector->state;
+        if (wrong != 0) {
+            printf("step %d differs\\n", k);
+            failed++;
+        }
+    }
+    printf("@name@: %d of @count@ steps give the bits of the simulation\\n", @count@ - failed);
+    return failed == 0 ? 0 : 1;
+}
+"""
