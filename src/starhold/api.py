@@ -186,6 +186,7 @@ def export_c(
     begin with, the law's if None. InputError for what has no form in C, a name that is no identifier, and a folder that
     holds results (unless `force`) or cannot be written."""
     import hashlib
+    import re
 
     from starhold.export.code import check_name, make_code
     from starhold.export.folder import make_files, write
@@ -195,7 +196,7 @@ def export_c(
 
     opened = _opened(scenario)
     entry = opened.laws[0] if law is None else opened.pick(law)
-    code = make_code(studies.build(opened, entry), check_name(entry.name.replace("-", "_") if name is None else name))
+    code = make_code(studies.build(opened, entry), check_name(re.sub(r"\W", "_", entry.name) if name is None else name))
     into, proof = open_folder(Path(folder), force), UNPROVED
     if certify:
         certificates = [tried.certificate for tried in certify_scenario(opened, entry.name)]

@@ -309,7 +309,7 @@ class Readable(C99):
         self.whole_calls[base] = (result.name, refs)
         rebound = refs in self.rebound or (len(refs) == 1 and refs[0] in self.rebound)
         # A struct that has a name is read member by member, or by its address.
-        if pure and not result.named and (rebound or hint in {None, *self.taken_here}) and self._once_whole(base, refs) and len(text) <= _SHORT:
+        if pure and not result.named and (rebound or hint in {None, *self.taken_here}) and self._once_whole(base, refs, result) and len(text) <= _SHORT:
             self._folded[base if not result.members else base + "*"] = Expression(text)
             return
         if result.name.endswith("_result_t"):
@@ -322,17 +322,35 @@ class Readable(C99):
     def _touches(self, function: Function) -> bool:
         return bool(self.memories[function.name]) or writes(function.body)
 
-    def _once_whole(self, base: str, refs: tuple[str, ...]) -> bool:
+    def _once_whole(self, base: str, refs: tuple[str, ...], kind: Type) -> bool:
         """Tell whether what a call gives is read once, as a whole."""
         if len(refs) == 1:
             return self.calls.get(base) == 1
-        return self.calls.get(base) == len(refs) and self._as_whole(refs)
+        return self.calls.get(base) == len(refs) and self._as_whole(refs, kind)
 
-    def _as_whole(self, refs: tuple[str, ...]) -> bool:
-        """Tell whether these names are read nowhere but next to each other, by a call or as what the function gives."""
+    def _as_whole(self, refs: tuple[str, ...], kind: Type) -> bool:
+        """Tell whether these names are read where a value of their type stands: in a call, or as what the function gives."""
         function = self.current
-        rows = [s.args for s in statements(function.body) if isinstance(s, Call)] + [tuple(out for out, _ in function.outs)]
-        return any(row[k : k + len(refs)] == refs for row in rows for k in range(len(row)))
+        calls = [s for s in statements(function.body) if isinstance(s, Call) and s.function.shape is not None]
+        rows = [(s.args, [param.type for param in s.function.shape.params]) for s in calls]
+        if function.shape.result is not None:
+            rows.append((tuple(out for out, _ in function.outs), [function.shape.result]))
+        for values, kinds in rows:
+            first = 0
+            for one in kinds:
+                for place, inner in _groups(one, first):
+                    if inner.name == kind.name and tuple(values[place : place + len(refs)]) == refs:
+                        return True
+                first += len(list(paths(one, "")))
+        return False
+
+
+def _groups(kind: Type, first: int) -> Iterator[tuple[int, Type]]:
+    """Yield a type and those of its members, each with the place of its first leaf."""
+    yield first, kind
+    for member in kind.members:
+        yield from _groups(member.type, first)
+        first += len(list(paths(member.type, "")))
 
 
 def _kind(kind: Type) -> str:

@@ -6,6 +6,7 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from starhold.algebra.structure import flatten, leaves, mapped
 from starhold.algebra.structured import Buffer
@@ -38,25 +39,36 @@ def kept_inputs(code: Code) -> list[bool]:
     return [code.needs.reads(path) for path in code.signature.params[2].leaves]
 
 
-def random_like(rng: np.random.Generator, value: Any, name: str = "", edges: float = 0.0) -> Any:
-    """Return numbers in the form of a value: quaternions of unit length, flags of 0 or 1, others of any size up to twice the
-    largest of the value; of which some, by that share, are special."""
+def random_columns(rng: np.random.Generator, value: Any, count: int, edges: float = 0.0, name: str = "") -> NDArray[np.float64]:
+    """Return (numbers, count) to stand in place of the floats of a value: quaternions of unit length, flags of 0 or 1, others
+    of any size up to twice the largest of their field; of which some, by the share `edges`, are special."""
     if hasattr(value, "_fields"):
-        return type(value)(*(random_like(rng, part, field, edges) for field, part in zip(value._fields, value, strict=True)))
-    if isinstance(value, tuple) and all(isinstance(part, tuple) for part in value):
-        return tuple(random_like(rng, part, name, edges) for part in value)
+        pairs = list(zip(value._fields, value, strict=True))
+    elif isinstance(value, tuple) and any(isinstance(part, tuple) for part in value):
+        pairs = [(name, part) for part in value]  # pyright: ignore
+    else:
+        pairs = []
+    if pairs:
+        return np.vstack([np.empty((0, count)), *(random_columns(rng, part, count, edges, field) for field, part in pairs)])
     flat = [leaf for leaf in leaves(value) if isinstance(leaf, float)]
-    if name == "attitude" or name == "followed":
-        turn = rng.normal(size=4)
-        found = (turn / np.linalg.norm(turn)).tolist()
+    shape = (len(flat), count)
+    if name in ("attitude", "followed") and len(flat) == 4:
+        found = rng.normal(size=shape)
+        found /= np.linalg.norm(found, axis=0)
     elif name in ("attitude_is_new", "begun"):
-        found = [float(rng.integers(2)) for _ in flat]
+        found = rng.integers(0, 2, shape).astype(float)
     elif name == "sign":
-        found = [float(rng.choice([-1.0, 1.0])) for _ in flat]
+        found = rng.choice([-1.0, 1.0], shape)
     else:
         size = max([abs(x) for x in flat if math.isfinite(x)] or [0.0]) or 1.0
-        found = (size * rng.uniform(-2.0, 2.0, len(flat)) * 10.0 ** rng.uniform(-4.0, 0.0)).tolist()
-    source = iter([EDGES[rng.integers(len(EDGES))] if rng.random() < edges else x for x in found])
+        found = size * rng.uniform(-2.0, 2.0, shape) * 10.0 ** rng.uniform(-4.0, 0.0, shape)
+    special = rng.choice(np.array(EDGES), shape)
+    return np.where(rng.random(shape) < edges, special, found)
+
+
+def with_numbers(value: Any, column: NDArray[np.float64]) -> Any:
+    """Return a value with these floats in place of its own, in order."""
+    source = iter(column.tolist())
     return mapped(value, lambda leaf: next(source) if isinstance(leaf, float) else leaf)
 
 
@@ -120,7 +132,8 @@ def vectors(code: Code, seed: int = 1) -> list[Vector]:
     for run in range(RUNS // 3 if code.buffers else RUNS):
         state = fresh(code.flight.start)
         for k in range(STEPS):
-            inputs = random_like(rng, code.flight.inputs, edges=0.1 * (run % 2))
+            column = random_columns(rng, code.flight.inputs, 1, edges=0.1 * (run % 2))[:, 0]
+            inputs = with_numbers(code.flight.inputs, column)
             command, state = step(state, inputs)
             flat = [x for x, kept in zip(numbers(inputs), keep, strict=True) if kept]
             found.append(Vector(k == 0, flat, numbers(command), digest(numbers(state))))

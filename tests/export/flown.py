@@ -1,0 +1,143 @@
+"""Laws as C, compiled here, and what calls them."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+import tempfile
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from starhold.export.code import Code, make_code
+from starhold.export.source import texts
+from starhold.export.vectors import kept_inputs
+from starhold.parts.catalogue import fit
+from starhold.scenario.building import build
+from starhold.scenario.reading import load
+from tests.simulation.loops import choices
+
+STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Wshadow", "-Wconversion", "-Werror", "-ffp-contract=off")
+LAWS = {
+    "lyapunov": ("three-laws", "lyapunov"),
+    "sliding": ("three-laws", "sliding"),
+    "mpc": ("three-laws", "mpc"),
+    "wheel": ("wheels-orbital", "wheel"),
+    "modal": ("landing", "fit"),
+    "pd": ("geostationary", "pd"),
+    "l2": ("l2-circle", "smooth"),
+    "l2_nonlinear": ("l2-nonlinear", "full model"),
+}
+"""Names in C: built-in scenario and law."""
+
+
+class Flown(NamedTuple):
+    """A law in C that was compiled: its code and the library."""
+
+    code: Code
+    library: Any
+
+    def many(self, states: Any, inputs: Any) -> tuple[Any, Any]:
+        """The commands and the states after a step of each of many, all as rows of the numbers that C has."""
+        states, inputs = np.ascontiguousarray(states), np.ascontiguousarray(inputs)
+        commands, after = np.empty((len(inputs), 3)), states.copy()
+        self.library.many(ctypes.c_long(len(inputs)), *(ctypes.c_void_p(x.ctypes.data) for x in (after, inputs, commands)))
+        return commands, after
+
+    def first(self) -> Any:
+        """The numbers of the state at the start."""
+        found = np.empty(int(self.library.state_size()))
+        self.library.begin(ctypes.c_void_p(found.ctypes.data))
+        return found
+
+
+_DRIVER = """
+#include "NAME.h"
+#include <string.h>
+long state_size(void);
+void begin(double *state);
+void many(long count, double *states, const double *inputs, double *commands);
+long state_size(void) { return (long)(sizeof(NAME_state_t) / sizeof(double)); }
+void begin(double *state)
+{
+    NAME_state_t now;
+    NAME_init(&now);
+    memcpy(state, &now, sizeof now);
+}
+void many(long count, double *states, const double *inputs, double *commands)
+{
+    for (long k = 0; k < count; k++) {
+        NAME_state_t state;
+        NAME_input_t input;
+        NAME_command_t command;
+        memcpy(&state, (char *)states + (unsigned long)k * sizeof state, sizeof state);
+        memcpy(&input, (const char *)inputs + (unsigned long)k * sizeof input, sizeof input);
+        NAME_step(&state, &input, &command);
+        memcpy((char *)states + (unsigned long)k * sizeof state, &state, sizeof state);
+        memcpy((char *)commands + (unsigned long)k * sizeof command, &command, sizeof command);
+    }
+}
+"""
+
+
+def need(*programs: str) -> None:
+    """Skip the test where one of these is not installed."""
+    for program in programs:
+        if shutil.which(program) is None:
+            pytest.skip(f"{program} is not installed")
+
+
+@cache
+def loop_of(name: str) -> Any:
+    """The loop of a law: of a built-in scenario, or one of those that differ in one choice."""
+    if name == "estimator":
+        loop = choices()["target from a table"].without("sensor")
+        tracker, gyro = fit("sensor", "star-tracker", 1e-4, 5e-4, (0.0, 0.6, 0.8), 1.0), fit("sensor", "gyro", 1e-5, (1e-4, -1e-4, 2e-4))
+        return loop.with_parts(tracker, gyro, fit("estimator", "complementary-filter", 0.1, 0.01))
+    if name not in LAWS:
+        return choices()[name]
+    scenario = load(LAWS[name][0])
+    return build(scenario, scenario.pick(LAWS[name][1]))
+
+
+@cache
+def code_of(name: str) -> Code:
+    """The code of a law."""
+    return make_code(loop_of(name), name if name in LAWS else "law")
+
+
+@cache
+def compiled(name: str, compiler: str = "gcc", *flags: str) -> Flown:
+    """A law, compiled."""
+    need(compiler)
+    code = code_of(name)
+    with tempfile.TemporaryDirectory() as folder:
+        text = texts(code, "test", name)
+        Path(folder, f"{code.name}.h").write_text(text.header)
+        Path(folder, f"{code.name}.c").write_text(text.source)
+        Path(folder, "driver.c").write_text(_DRIVER.replace("NAME", code.name))
+        build_in(folder, compiler, *STRICT, *flags, "-shared", "-fPIC", "-o", "law.so", f"{code.name}.c", "driver.c", "-lm")
+        library = ctypes.CDLL(str(Path(folder, "law.so")))
+    library.state_size.restype = ctypes.c_long
+    return Flown(code, library)
+
+
+def build_in(folder: Any, *command: str) -> None:
+    """Run a compiler in a folder."""
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, (command, done.stderr[:2000])
+
+
+def read(code: Code, inputs: Any) -> Any:
+    """The numbers that C has of rows of all numbers of the inputs."""
+    return np.asarray(inputs)[..., kept_inputs(code)]
+
+
+def same(found: Any, expected: Any) -> None:
+    """Assert equal bits; any NaN equals any NaN."""
+    a, b = (np.where(np.isnan(x), np.nan, x).view(np.uint64) for x in (np.asarray(found), np.asarray(expected)))
+    assert np.array_equal(a, b), np.argwhere(a != b)[:5]
