@@ -11,6 +11,7 @@ table = sh.sweep(scenario, {"law.lyapunov.k_rate": gains})    # a DataFrame, a r
 frame = sh.to_pandas(flights)                    # runs, flights, certificates and designs as tidy tables
 certificates = sh.certify(scenario)              # what is proved of every law
 designs = sh.design("my.toml")                   # gains that formulas give, and figures to judge them by
+exported = sh.export_c(scenario, "flight")       # a law as C99, with a self-test that demands the simulation's bits
 certificate = sh.invariant("van-der-pol")        # what is proved of an invariant set of any small system
 made = sh.reproduce("D")                         # a publication's figures and numbers, beside what it prints
 placed = sh.place(A, B, poles)                   # u = -K x that gives A - B K these poles, for any linear system
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
         certify,
         compare,
         design,
+        export_c,
         failures,
         invariant,
         load,
@@ -49,6 +51,7 @@ __all__ = [
     "certify",
     "compare",
     "design",
+    "export_c",
     "failures",
     "invariant",
     "load",

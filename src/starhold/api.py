@@ -178,18 +178,19 @@ def export_c(
     law: str | None = None,
     *,
     name: str | None = None,
+    shells: Iterable[str] = (),
     certify: bool = True,
     force: bool = False,
 ) -> Exported:
     """Write a law of a scenario, the first if `law` is None, as C99 into a folder: header, source, a self-test that demands
     the simulation's bits, CMakeLists.txt, and the certificate whose digest the header has. name: what functions and files
-    begin with, the law's if None. InputError for what has no form in C, a name that is no identifier, and a folder that
+    begin with, the law's if None; shells: what else is to call it, of "basilisk", "fmu". InputError for what has no form in C, a name that is no identifier, and a folder that
     holds results (unless `force`) or cannot be written."""
     import hashlib
     import re
 
     from starhold.export.code import check_name, make_code
-    from starhold.export.folder import make_files, write
+    from starhold.export.folder import make_files, shell_files, write
     from starhold.export.proof import UNPROVED, proof_of
     from starhold.report.results import open_folder, write_proofs
     from starhold.studies.certificates import certify_scenario
@@ -197,12 +198,13 @@ def export_c(
     opened = _opened(scenario)
     entry = opened.laws[0] if law is None else opened.pick(law)
     code = make_code(studies.build(opened, entry), check_name(re.sub(r"\W", "_", entry.name) if name is None else name))
+    more = shell_files(code, shells)
     into, proof = open_folder(Path(folder), force), UNPROVED
     if certify:
         certificates = [tried.certificate for tried in certify_scenario(opened, entry.name)]
         path = write_proofs(certificates, opened.name, into)
         proof = proof_of(certificates, hashlib.sha256(path.read_bytes()).hexdigest())
-    exported = make_files(code, opened.name, entry.name, proof)
+    exported = make_files(code, opened.name, entry.name, proof, more)
     write(exported, into, opened.name, entry.name)
     return exported
 

@@ -96,7 +96,10 @@ def loop_of(name: str) -> Any:
     """The loop of a law: of a built-in scenario, or one of those that differ in one choice."""
     if name == "estimator":
         loop = choices()["target from a table"].without("sensor")
-        tracker, gyro = fit("sensor", "star-tracker", 1e-4, 5e-4, (0.0, 0.6, 0.8), 1.0), fit("sensor", "gyro", 1e-5, (1e-4, -1e-4, 2e-4))
+        tracker, gyro = (
+            fit("sensor", "star-tracker", 1e-4, 5e-4, (0.0, 0.6, 0.8), 1.0),
+            fit("sensor", "gyro", 1e-5, (1e-4, -1e-4, 2e-4)),
+        )
         return loop.with_parts(tracker, gyro, fit("estimator", "complementary-filter", 0.1, 0.01))
     if name not in LAWS:
         return choices()[name]

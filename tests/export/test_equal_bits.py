@@ -1,5 +1,5 @@
-"""Each step of a law in C gives the bits that the simulation gives, whatever compiles it, from ordinary states and at the edges
-of numbers."""
+"""Each step of a law in C gives the bits that the simulation gives, whatever compiles it, from ordinary states and at the
+edges of numbers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,15 @@ FEW, MANY, BLOCK = 20_000, 1_000_000, 50_000
 BUILDS = [("gcc", "-O3"), ("clang", "-O0")]
 OTHERS = [("gcc", "-O0"), ("clang", "-O3", "-march=native")]
 STATELESS = [name for name in LAWS if name != "mpc"]
-MADE = ["estimator", "lqr, example 0, noise", "target from a table", "hysteresis, axis", "orbital target", "pid, example 0, noise", "super-twisting, example 0, noise"]
+MADE = [
+    "estimator",
+    "lqr, example 0, noise",
+    "target from a table",
+    "hysteresis, axis",
+    "orbital target",
+    "pid, example 0, noise",
+    "super-twisting, example 0, noise",
+]
 """Loops with a memory, or with an input of their own."""
 
 
@@ -91,7 +99,9 @@ def test_predictive_law(count, build):
     for k in range(count):
         if k % 25 == 0:
             state, held = fresh(code.flight.start), flown.first()[None]
-        inputs = with_numbers(code.flight.inputs, random_columns(rng, code.flight.inputs, 1, 0.02 if k // 25 % 2 else 0.0)[:, 0])
+        inputs = with_numbers(
+            code.flight.inputs, random_columns(rng, code.flight.inputs, 1, 0.02 if k // 25 % 2 else 0.0)[:, 0]
+        )
         command, state = step(state, inputs)
         found, held = flown.many(held, read(code, numbers(inputs))[None])
         same(found[0], numbers(command))
@@ -141,7 +151,9 @@ int main(void)
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
-@pytest.mark.parametrize(("name", "count"), [("wheel", 100_000), ("estimator", 100_000), pytest.param("mpc", 50, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("name", "count"), [("wheel", 100_000), ("estimator", 100_000), pytest.param("mpc", 50, marks=pytest.mark.slow)]
+)
 def test_sanitizers_find_nothing(name, count, compiler, tmp_path):
     """Neither in the self-test nor for doubles of any bits."""
     need(compiler)
@@ -153,6 +165,8 @@ def test_sanitizers_find_nothing(name, count, compiler, tmp_path):
     for program in (f"{code.name}_selftest", "fuzz"):
         build_in(tmp_path, compiler, *STRICT[:4], *sanitize, "-o", program, f"{program}.c", f"{code.name}.c", "-lm")
         # Leaks are looked for by tracing, which not every machine allows; nothing is allocated.
-        done = subprocess.run([str(tmp_path / program)], capture_output=True, text=True, env={"ASAN_OPTIONS": "detect_leaks=0"})
+        done = subprocess.run(
+            [str(tmp_path / program)], capture_output=True, text=True, env={"ASAN_OPTIONS": "detect_leaks=0"}
+        )
         assert done.returncode == 0, done.stdout + done.stderr
         assert program == "fuzz" or "steps give the bits" in done.stdout

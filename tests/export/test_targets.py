@@ -1,5 +1,5 @@
-"""The self-test runs on processors that fly: SPARC V8 (LEON3), SPARC V9, ARM and RISC-V, emulated in user mode. Skipped, with the
-reason, where a compiler or the emulator is not installed."""
+"""The self-test runs on processors that fly: SPARC V8 (LEON3), SPARC V9, ARM and RISC-V, emulated in user mode. Skipped,
+with the reason, where a compiler or the emulator is not installed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LINUX = {
 }
 NAMES = ["wheel", "estimator"]
 _HEADERS = {
-    "math.h": "double sqrt(double);\n#define INFINITY (__builtin_inf())\n#define NAN (__builtin_nan(\"\"))\n",
+    "math.h": 'double sqrt(double);\n#define INFINITY (__builtin_inf())\n#define NAN (__builtin_nan(""))\n',
     "stdio.h": "int printf(const char *, ...);\n",
     "stdint.h": "#include <stdint-gcc.h>\n",
     "string.h": "#include <stddef.h>\nvoid *memcpy(void *, const void *, size_t);\n",
@@ -84,7 +84,17 @@ def test_leon3(name, tmp_path):
         (tmp_path / "include" / file).write_text(text)
     sources = put(name, tmp_path)
     (tmp_path / "bare.c").write_text(_BARE)
-    flags = ["-m32", "-mcpu=leon3", "-O2", "-std=c99", "-ffp-contract=off", "-fno-math-errno", "-nostdlib", "-nostdinc", "-static"]
+    flags = [
+        "-m32",
+        "-mcpu=leon3",
+        "-O2",
+        "-std=c99",
+        "-ffp-contract=off",
+        "-fno-math-errno",
+        "-nostdlib",
+        "-nostdinc",
+        "-static",
+    ]
     flags += ["-isystem", "include", "-isystem", own]
     build_in(tmp_path, compiler, *flags, *sources, "bare.c", "-o", "test")
     assert subprocess.run(["qemu-sparc", str(tmp_path / "test")]).returncode == 0

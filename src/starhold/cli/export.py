@@ -23,6 +23,9 @@ def c(
     name: Annotated[
         str | None, typer.Option(metavar="NAME", help="what functions and files begin with; else the law's name")
     ] = None,
+    shell: Annotated[
+        list[str] | None, typer.Option(metavar="SHELL", help="basilisk or fmu: what else is to call it; repeatable")
+    ] = None,
     force: Force = False,
     certify: Certified = True,
     allow_unstable: Unstable = False,
@@ -34,7 +37,7 @@ def c(
     scenario = load(file, allow_unstable)
     entry = scenario.laws[0] if law is None else scenario.pick(law)
     folder = output or Path("results") / f"{scenario.name}-{entry.name}-c"
-    print_exported(export_c(scenario, folder, entry.name, name=name, certify=certify, force=force), folder)
+    print_exported(export_c(scenario, folder, entry.name, name=name, shells=shell or (), certify=certify, force=force), folder)
 
 
 def print_exported(exported: Exported, folder: Path) -> None:
@@ -55,7 +58,11 @@ def print_exported(exported: Exported, folder: Path) -> None:
         for line in exported.proof.warning.splitlines():
             console.print(f"  [red]warning[/red] {escape(line)}", highlight=False)
     else:
-        console.print(f"  [green]proved[/green], {exported.proof.file}, sha256 {exported.proof.digest}", highlight=False, soft_wrap=True)
+        console.print(
+            f"  [green]proved[/green], {exported.proof.file}, sha256 {exported.proof.digest}",
+            highlight=False,
+            soft_wrap=True,
+        )
     console.print(
         f"Test it: cmake -S {folder} -B {folder}/build && cmake --build {folder}/build && ctest --test-dir {folder}/build",
         highlight=False,

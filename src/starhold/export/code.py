@@ -27,7 +27,9 @@ def check_name(name: str) -> str:
     """Return a name that functions and files in C may begin with. InputError for any other."""
     free = name not in RESTRICTED and name not in RESERVED and name not in C99.taken and not name.startswith("_")
     if not re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII) or not free or len(name) > 40:
-        raise InputError("export c", "name", name, "a C identifier of at most 40 letters, digits and _, no word of the language")
+        raise InputError(
+            "export c", "name", name, "a C identifier of at most 40 letters, digits and _, no word of the language"
+        )
     return name
 
 

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
+from starhold.errors import InputError
+from starhold.export import basilisk, fmu
 from starhold.export.code import Code
 from starhold.export.cost import Cost, measure
 from starhold.export.proof import UNPROVED, Proof
@@ -26,20 +29,37 @@ class Exported:
     code: Code
     proof: Proof
     costs: tuple[Cost, ...]
-    files: Mapping[str, str]
+    files: Mapping[str, str | bytes]
     steps: int
     """Of the self-test."""
 
 
-def make_files(code: Code, scenario: str, law: str, proof: Proof = UNPROVED) -> Exported:
-    """Return the files of a law in C, and what compilers that are installed tell of them."""
+SHELLS: dict[str, Callable[[Code], Mapping[str, str | bytes]]] = {"basilisk": basilisk.files, "fmu": fmu.files}
+"""What makes the files of a shell over the C, by its name."""
+
+
+def shell_files(code: Code, shells: Iterable[str]) -> dict[str, str | bytes]:
+    """Return the files of shells. InputError for an unknown one, and where a law does not fit one."""
+    found: dict[str, str | bytes] = {}
+    for shell in shells:
+        if shell not in SHELLS:
+            raise InputError("export c", "shell", shell, f"one of {', '.join(SHELLS)}")
+        found |= SHELLS[shell](code)
+    return found
+
+
+def make_files(
+    code: Code, scenario: str, law: str, proof: Proof = UNPROVED, more: Mapping[str, str | bytes] = MappingProxyType({})
+) -> Exported:
+    """Return the files of a law in C, `more` among them, and what compilers that are installed tell of them."""
     header, source = texts(code, scenario, law, proof)
     cases = vectors(code)
-    files = {
+    files: dict[str, str | bytes] = {
         f"{code.name}.h": header,
         f"{code.name}.c": source,
         f"{code.name}_selftest.c": selftest(code, cases),
         "CMakeLists.txt": cmake(code.name),
+        **more,
     }
     return Exported(code, proof, tuple(measure(code, header, source)), files, len(cases))
 
@@ -48,7 +68,7 @@ def write(exported: Exported, folder: Path, scenario: str, law: str) -> None:
     """Write the files into an existing folder, each whole, the manifest last. InputError where one cannot be written."""
     for name, text in exported.files.items():
         with atomic_write(folder / name) as hidden:
-            hidden.write_text(text, encoding="utf-8")
+            hidden.write_bytes(text.encode() if isinstance(text, str) else text)
     content = {
         "starhold_version": __version__,
         "scenario": scenario,

@@ -175,14 +175,12 @@ class _Reading(SimpleNamespace):
         return vars(self)
 
 
-_Target = NamedTuple(
-    "_Target",
-    [
-        ("attitude", Annotated[Any, UNITS["attitude"]]),
-        ("rate", Annotated[Any, Quantity("rad/s", "angular velocity, target axes")]),
-        ("acceleration", Annotated[Any, UNITS["acceleration"]]),
-    ],
-)
+class _Target(NamedTuple):
+    attitude: Annotated[Any, UNITS["attitude"]]
+    rate: Annotated[Any, Quantity("rad/s", "angular velocity, target axes")]
+    acceleration: Annotated[Any, UNITS["acceleration"]]
+
+
 _GOAL = SimpleNamespace(ROLE="target", goal=lambda params, state, step, before: Goal(*params))
 _READINGS = SimpleNamespace(
     ROLE="sensor", RECORDED=False, measure=lambda state, memory, params, dice, step: (memory, memory)

@@ -9,8 +9,8 @@ from starhold.trace.program import Branch, Call, Function, Load, Loop, Op, Progr
 
 
 class Needs:
-    """`members`: pairs of a struct and a member that is read; `params`: pairs of a function and a parameter; `live`: for each
-    function that is called the names that are read there."""
+    """`members`: pairs of a struct and a member that is read; `params`: pairs of a function and a parameter; `live`: for
+    each function that is called the names that are read there."""
 
     def __init__(self, program: Program) -> None:
         self.functions = {function.name: single_turns(function) for function in program.functions}
@@ -86,13 +86,17 @@ class Needs:
         if shape is None:
             return s.args
         needed = [
-            (s.function.name, param.name) in self.params and self.reads(path) for param in shape.params for path in param.leaves
+            (s.function.name, param.name) in self.params and self.reads(path)
+            for param in shape.params
+            for path in param.leaves
         ]
         return tuple(value if need else 0.0 for value, need in zip(s.args, needed, strict=True))
 
     def _acts(self, block: Any) -> bool:
-        return any(not isinstance(s, (Op, Load, Call, Loop, Branch)) or (isinstance(s, Call) and self._writes[s.function.name])
-                   for s in statements(block))  # fmt: skip
+        return any(
+            self._writes[s.function.name] if isinstance(s, Call) else not isinstance(s, (Op, Load, Loop, Branch))
+            for s in statements(block)
+        )
 
     def program(self, program: Program) -> Program:
         """Return the program without what nothing needs."""
@@ -103,7 +107,8 @@ class Needs:
                 outs = function.outs
                 if shape is not None:
                     outs = tuple(
-                        (out if self.reads(path) else 0.0, kind) for (out, kind), path in zip(outs, shape.leaves, strict=True)
+                        (out if self.reads(path) else 0.0, kind)
+                        for (out, kind), path in zip(outs, shape.leaves, strict=True)
                     )
                 kept[name] = function._replace(body=self._kept(function.body, self.live[name]), outs=outs)
         return program._replace(functions=tuple(kept.values()))
@@ -129,5 +134,3 @@ class Needs:
                 s = s._replace(body=self._kept(s.body, live))
             found.append(s)
         return tuple(found)
-
-

@@ -90,7 +90,9 @@ class Readable(C99):
         # Of structs, members that nobody reads are gone.
         if self.is_main(function):
             # What the step is given has these names.
-            self.hints = {key: {"state": "body_state", "command": "wanted"}.get(hint, hint) for key, hint in self.hints.items()}
+            self.hints = {
+                key: {"state": "body_state", "command": "wanted"}.get(hint, hint) for key, hint in self.hints.items()
+            }
         last = {hint: key for key, hint in self.hints.items()}
         # Names that Python gives anew, for the last value alone: those before are mostly read once, by the next.
         self.rebound = {key for key, hint in self.hints.items() if last[hint] != key}
@@ -309,7 +311,13 @@ class Readable(C99):
         self.whole_calls[base] = (result.name, refs)
         rebound = refs in self.rebound or (len(refs) == 1 and refs[0] in self.rebound)
         # A struct that has a name is read member by member, or by its address.
-        if pure and not result.named and (rebound or hint in {None, *self.taken_here}) and self._once_whole(base, refs, result) and len(text) <= _SHORT:
+        if (
+            pure
+            and not result.named
+            and (rebound or hint in {None, *self.taken_here})
+            and self._once_whole(base, refs, result)
+            and len(text) <= _SHORT
+        ):
             self._folded[base if not result.members else base + "*"] = Expression(text)
             return
         if result.name.endswith("_result_t"):

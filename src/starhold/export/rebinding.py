@@ -14,7 +14,12 @@ from typing import Any
 from starhold.algebra import operations, structured
 from starhold.algebra.structured import repeat
 
-_LEFT = ("starhold.algebra.structured", "starhold.algebra.structure", "starhold.algebra.operations", "starhold.algebra.words")
+_LEFT = (
+    "starhold.algebra.structured",
+    "starhold.algebra.structure",
+    "starhold.algebra.operations",
+    "starhold.algebra.words",
+)
 _INLINE = frozenset({"where"})
 """What decides on truths that are known while recording."""
 
@@ -55,7 +60,11 @@ class Rebinder:
             function: Any = equation
             cells = tuple(CellType(self.seen(cell.cell_contents)) for cell in function.__closure__ or ())
             made = FunctionType(function.__code__, self._renewed(function), function.__name__, function.__defaults__, cells)
-            made.__kwdefaults__, made.__doc__, made.__module__ = function.__kwdefaults__, function.__doc__, function.__module__
+            made.__kwdefaults__, made.__doc__, made.__module__ = (
+                function.__kwdefaults__,
+                function.__doc__,
+                function.__module__,
+            )
             made.__annotations__ = function.__annotations__
             self._copies[equation] = made
         return self._copies[equation]

@@ -61,7 +61,11 @@ def _header(code: Code, printed: Readable, public: dict[str, str], scenario: str
     guard = f"{name.upper()}_H"
     lines = [*_banner(code, scenario, law, proof), "", f"#ifndef {guard}", f"#define {guard}", ""]
     lines += ["#ifdef __cplusplus", 'extern "C" {', "#endif", ""]
-    lines += [f"/* {code.time_unit}: the step is to be called once in each such period. */", f"#define {name.upper()}_PERIOD ({loop.period!r})", ""]
+    lines += [
+        f"/* {code.time_unit}: the step is to be called once in each such period. */",
+        f"#define {name.upper()}_PERIOD ({loop.period!r})",
+        "",
+    ]
     types = _types(code, printed)
     for own in public:
         if own != STATE.name:
@@ -72,9 +76,11 @@ def _header(code: Code, printed: Readable, public: dict[str, str], scenario: str
         + (": the side of the quaternion is that of its initial attitude." if "sign" in code.flight.start._fields else ".")
     )
     lines += [f"void {name}_init({name}_state_t *state);", ""]
-    lines += comment(f"One control step: {card.summary}. Takes what was measured at this instant, gives what to command until the next, "
-                      "and changes the state. It calls nothing but sqrt, keeps nothing outside the state, and never fails; a NaN "
-                      "that goes in comes out.")  # fmt: skip
+    lines += comment(
+        f"One control step: {card.summary}. Takes what was measured at this instant, gives what to command until the next, "
+        "and changes the state. It calls nothing but sqrt and keeps nothing outside the state. It does not check what it is "
+        "given: a NaN that the law uses comes out as one."
+    )
     lines += [f"void {name}_step({name}_state_t *state, const {name}_input_t *input, {name}_command_t *command);", ""]
     lines += ["#ifdef __cplusplus", "}", "#endif", "", f"#endif /* {guard} */", ""]
     return "\n".join(lines)
@@ -99,12 +105,19 @@ def _state(code: Code, printed: Readable, public: dict[str, str]) -> Iterator[st
 def _banner(code: Code, scenario: str, law: str, proof: Proof) -> list[str]:
     loop = code.flight.loop
     card, work = loop.law.card, code.work
-    found = [f"{code.name}: {card.title}", "", f"{card.summary}", "", f"Made by starhold {__version__} from the scenario {scenario}, law {law}."]
+    found = [
+        f"{code.name}: {card.title}",
+        "",
+        f"{card.summary}",
+        "",
+        f"Made by starhold {__version__} from the scenario {scenario}, law {law}.",
+    ]
     found += [f"Source: {source}" for source in card.sources]
     found += [f"Assumes: {'; '.join(card.assumptions)}.", ""]
     found += [f"Command limit: {_limit(loop)}. Quaternion sign: {loop.sign_policy.replace('_', ' ')}."]
     found += _choices(loop)
-    found += ["", f"At most {work.arithmetic} additions, multiplications, divisions and roots a step, and {work.comparisons} comparisons.",
+    done = f"{work.arithmetic} additions, multiplications, divisions and roots, and {work.comparisons} comparisons"
+    found += ["", f"A step does at most {done}.",
               "Bits are those of the simulation where doubles are IEEE and nothing is contracted or reassociated:",
               "compile with -std=c99 -ffp-contract=off, never with -ffast-math."]  # fmt: skip
     found += [""]
@@ -120,7 +133,13 @@ def _banner(code: Code, scenario: str, law: str, proof: Proof) -> list[str]:
 
 def _limit(loop: Any) -> str:
     unit = {"torque": "N m"}.get(loop.body.module.COMMAND, "")
-    return "none" if loop.limit == "none" else f"{loop.cutoff():.12g} {unit} by {loop.limit}".replace(" by axis", " on each axis").replace("by norm", "in norm")
+    return (
+        "none"
+        if loop.limit == "none"
+        else f"{loop.cutoff():.12g} {unit} by {loop.limit}".replace(" by axis", " on each axis").replace(
+            "by norm", "in norm"
+        )
+    )
 
 
 def _choices(loop: Any) -> list[str]:
@@ -137,8 +156,14 @@ def _choices(loop: Any) -> list[str]:
 
 def _source(code: Code, printed: Readable, public: dict[str, str]) -> str:
     name = code.name
-    lines = comment(f"{name}.c: made by starhold {__version__}; see {name}.h. Do not edit: change the scenario and export it again.")
-    includes = ["#include <math.h>"] if any("sqrt(" in line or "INFINITY" in line for line in printed.lines) or _unlimited(code) else []
+    lines = comment(
+        f"{name}.c: made by starhold {__version__}; see {name}.h. Do not edit: change the scenario and export it again."
+    )
+    includes = (
+        ["#include <math.h>"]
+        if any("sqrt(" in line or "INFINITY" in line for line in printed.lines) or _unlimited(code)
+        else []
+    )
     types = _types(code, printed)
     body = "\n".join(printed.lines)
     includes += ["#include <stdbool.h>"] if re.search(r"\bbool\b", body) else []
@@ -283,12 +308,16 @@ def _init(code: Code) -> Iterator[str]:
     kind = code.signature.params[1].type
     floats = iter([leaf for leaf in leaves(start) if isinstance(leaf, float)])
     held = [leaf for leaf in leaves(start) if isinstance(leaf, Buffer)]
-    firsts = {memory: _trimmed([buffer[k] for k in range(buffer.size)]) for memory, buffer in zip(code.buffers, held, strict=True)}
+    firsts = {
+        memory: _trimmed([buffer[k] for k in range(buffer.size)]) for memory, buffer in zip(code.buffers, held, strict=True)
+    }
     for memory, first in firsts.items():
         if first:
             yield f"/* What {memory} begin with; the rest are zeros. */"
             yield f"static const double first_{memory}[{len(first)}] = {{"
-            yield from textwrap.wrap(", ".join(map(printed.constant, first)), WIDTH, initial_indent="    ", subsequent_indent="    ")
+            yield from textwrap.wrap(
+                ", ".join(map(printed.constant, first)), WIDTH, initial_indent="    ", subsequent_indent="    "
+            )
             yield "};"
             yield ""
     yield f"void {name}_init({name}_state_t *state)"
@@ -305,7 +334,11 @@ def _init(code: Code) -> Iterator[str]:
     for memory, first in firsts.items():
         size = code.buffers[memory]
         yield f"    for (int32_t k = 0; k < {size}; k++) {{"
-        yield f"        state->{memory}[k] = k < {len(first)} ? first_{memory}[k] : 0.0;" if first else f"        state->{memory}[k] = 0.0;"
+        yield (
+            f"        state->{memory}[k] = k < {len(first)} ? first_{memory}[k] : 0.0;"
+            if first
+            else f"        state->{memory}[k] = 0.0;"
+        )
         yield "    }"
     yield "}"
 

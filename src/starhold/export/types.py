@@ -15,7 +15,7 @@ from starhold.trace.handles import kind_of
 
 
 class Member(NamedTuple):
-    """A member of a struct has a name and a type; `array`: its place in the array of that name, else None."""
+    """A member of a struct has a name and a type; those of an array are called by their places in it."""
 
     name: str
     type: Type
@@ -24,7 +24,7 @@ class Member(NamedTuple):
 
 
 class Type(NamedTuple):
-    """A scalar (no members), or a struct. `elements`: a struct of one array, of that name. `named`: a struct of a NamedTuple,
+    """A scalar (no members), or a struct. `elements`: a struct of one array, of that name. `named`: one of a NamedTuple,
     which is passed by pointer and loses the members that nobody reads."""
 
     name: str
@@ -104,9 +104,12 @@ class Types:
         return self.known.setdefault(found.name, found)
 
 
-RESTRICTED = frozenset("auto break case char const continue default do double else enum extern float for goto if inline int long "
-    "register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while bool "
-    "true false sqrt".split())  # fmt: skip
+_KEYWORDS = """
+    auto bool break case char const continue default do double else enum extern false float for goto if inline int long
+    register restrict return short signed sizeof sqrt static struct switch true typedef union unsigned void volatile while
+"""
+RESTRICTED = frozenset(_KEYWORDS.split())
+"""Words that nothing may be called."""
 
 
 def free(name: str) -> str:
@@ -157,8 +160,6 @@ def paths(kind: Type | None, base: str, link: str = ".") -> Iterator[Path]:
     for member in kind.members:
         for path in paths(member.type, f"{base}{link}{member.name}"):
             yield path._replace(through=((kind.name, member.name), *path.through)) if kind.named else path
-
-
 
 
 def comment(text: str, width: int = 104) -> list[str]:

@@ -25,8 +25,8 @@ _PRIME, _BASIS = 0x100000001B3, 0xCBF29CE484222325
 
 
 class Vector(NamedTuple):
-    """Before a step: whether the state is set anew, and what is measured (the numbers that are read); after it the numbers of
-    the command, and the digest of those of the state."""
+    """Before a step: whether the state is set anew, and what is measured (the numbers that are read); after it the numbers
+    of the command, and the digest of those of the state."""
 
     first: bool
     inputs: list[float]
@@ -39,9 +39,11 @@ def kept_inputs(code: Code) -> list[bool]:
     return [code.needs.reads(path) for path in code.signature.params[2].leaves]
 
 
-def random_columns(rng: np.random.Generator, value: Any, count: int, edges: float = 0.0, name: str = "") -> NDArray[np.float64]:
-    """Return (numbers, count) to stand in place of the floats of a value: quaternions of unit length, flags of 0 or 1, others
-    of any size up to twice the largest of their field; of which some, by the share `edges`, are special."""
+def random_columns(
+    rng: np.random.Generator, value: Any, count: int, edges: float = 0.0, name: str = ""
+) -> NDArray[np.float64]:
+    """Return (numbers, count) to stand in place of the floats of a value: quaternions of unit length, flags of 0 or 1,
+    others of any size up to twice the largest of their field; of which some, by the share `edges`, are special."""
     if hasattr(value, "_fields"):
         pairs = list(zip(value._fields, value, strict=True))
     elif isinstance(value, tuple) and any(isinstance(part, tuple) for part in value):
@@ -146,7 +148,7 @@ def selftest(code: Code, cases: list[Vector]) -> str:
     ins, outs = len(cases[0].inputs), len(cases[0].command)
     rows = ",\n".join("    {" + ", ".join([str(int(c.first)), _braced(c.inputs), _braced(c.command), _word(c.digest)]) + "}"
                       for c in cases)  # fmt: skip
-    values = dict(name=name, ins=max(1, ins), outs=outs, count=len(cases), rows=rows)
+    values = {"name": name, "ins": max(1, ins), "outs": outs, "count": len(cases), "rows": rows}
     values["state"] = len(numbers(code.flight.start)) or 1
     values["states"] = len(numbers(code.flight.start))
     text = _SELFTEST

@@ -1,0 +1,146 @@
+"""`starhold export c` writes what an engineer can review, build and test, and says what is wrong in one line."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+import starhold as sh
+from starhold.errors import InputError
+from starhold.trace.program import Call, statements
+from tests.export.flown import LAWS, build_in, code_of, compiled, need
+from tests.running import starhold
+
+SMALL = "three-laws"
+
+
+def export(folder: Path, *more: str, scenario: str = SMALL):
+    return starhold("export", "c", scenario, "-o", folder, *more, cwd=folder.parent)
+
+
+def test_folder_builds_and_passes_its_test(tmp_path):
+    need("cmake", "gcc")
+    done = export(tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    folder = tmp_path / "out"
+    build = tmp_path / "build"
+    build_in(tmp_path, "cmake", "-S", str(folder), "-B", str(build))
+    build_in(tmp_path, "cmake", "--build", str(build))
+    tested = subprocess.run(["ctest", "--test-dir", str(build), "-V"], capture_output=True, text=True)
+    assert tested.returncode == 0
+    assert "192 of 192 steps give the bits of the simulation" in tested.stdout
+
+
+def test_header_has_the_digest_of_a_certificate_that_checks(tmp_path):
+    export(tmp_path / "out")
+    header = (tmp_path / "out" / "lyapunov.h").read_text()
+    certificate = tmp_path / "out" / "certificate.json"
+    assert hashlib.sha256(certificate.read_bytes()).hexdigest() in header
+    assert "proved: converges: with unlimited torque" in header
+    assert "These claims assume: rigid body" in re.sub(r"\s+", " ", header)
+    assert "WARNING" not in header
+    assert starhold("check", certificate, cwd=tmp_path).returncode == 0
+    manifest = json.loads((tmp_path / "out" / "export.json").read_text())
+    assert manifest["operations_at_most"]["additions"] == 56
+    assert all(0 < cost["flash"] < 10_000 and 0 <= cost["stack"] < 2_000 for cost in manifest["measured"])
+
+
+def test_header_warns_loudly_of_what_is_not_proved(tmp_path):
+    done = export(tmp_path / "none", "--no-certify")
+    assert "WARNING  NO CERTIFICATE" in (tmp_path / "none" / "lyapunov.h").read_text()
+    assert "warning NO CERTIFICATE" in done.stdout
+    sluggish = sh.load(SMALL).with_({"law.sliding.switching_gain": 1e-7})
+    refuted = sh.export_c(sluggish, tmp_path / "refuted", "sliding")
+    assert refuted.proof.outcome == "refuted"
+    header = (tmp_path / "refuted" / "sliding.h").read_text()
+    assert re.search(r"\*{80}\n +WARNING  REFUTED: ", header)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--law", "lyapunof"], "three-laws: law: found lyapunof; did you mean lyapunov?"),
+        (["--name", "2nd"], "export c: name: found 2nd; allowed: a C identifier"),
+        (["--name", "while"], "export c: name: found while; allowed: a C identifier"),
+        (["--name", "sqrt"], "export c: name: found sqrt; allowed: a C identifier"),
+        (["--name", "loi_générale"], "allowed: a C identifier"),
+    ],
+)
+def test_bad_input_is_one_line(arguments, said, tmp_path):
+    done = export(tmp_path / "out", *arguments)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_unwritable_folder(tmp_path):
+    (tmp_path / "file").write_text("")
+    done = export(tmp_path / "file")
+    assert done.returncode == 2
+    assert "cannot write there" in done.stderr
+
+
+def test_results_are_not_overwritten_unless_forced(tmp_path):
+    assert export(tmp_path / "out", "--no-certify", "--name", "first").returncode == 0
+    assert export(tmp_path / "out", "--no-certify").returncode == 2
+    assert export(tmp_path / "out", "--no-certify", "--force", "--name", "second").returncode == 0
+    assert not (tmp_path / "out" / "first.c").exists()
+    assert (tmp_path / "out" / "second.c").exists()
+
+
+def test_part_without_a_form_in_c(tmp_path):
+    from starhold.export.code import make_code
+    from starhold.parts.part import Fitted, Part
+    from tests.export.flown import loop_of
+
+    class Drifting:
+        ROLE, MODELLED, BODY = "environment", True, "rigid-body"
+
+        @staticmethod
+        def torque(state, params, craft, memory):
+            return memory
+
+        @staticmethod
+        def remember(params):
+            return (0.0, 0.0, 0.0)
+
+        @staticmethod
+        def update(memory, state, params, dice, step):
+            return memory
+
+    loop = loop_of("lyapunov").with_parts(Fitted(Part("drifting", Drifting)))  # pyright: ignore[reportArgumentType]
+    with pytest.raises(InputError, match="drifting, which has no form in C"):
+        make_code(loop, "law")
+
+
+@pytest.mark.parametrize("name", [*LAWS, "estimator"])
+def test_code_is_written_to_be_read(name):
+    """Functions as in the equations, not one block; nothing from the library but sqrt; no recursion, no allocation."""
+    code = code_of(name)
+    printed = code.printed
+    defined: set[str] = set()
+    for function in printed.functions.values():
+        called = {s.function.name for s in statements(function.body) if isinstance(s, Call)}
+        assert called <= defined
+        defined.add(function.name)
+        lines = printed.chunks[function.name]
+        assert len(lines) < (40 if name != "mpc" else 400), function.name
+        assert all(len(line) <= 120 for line in lines)
+    text = re.sub(r"/\*.*?\*/", "", "\n".join(printed.lines), flags=re.S)
+    used = set(re.findall(r"\b([a-z_]\w*)\(", text)) - set(printed.titles.values())
+    assert used <= {"sqrt", "if", "for", "vector_t", "return"} | {w for w in used if w.endswith("_t")}, used
+    assert "goto" not in text
+    assert len(defined) > 8
+
+
+def test_strict_compilers_have_nothing_to_say():
+    for name in ("wheel", "estimator", "pid, example 0, noise"):
+        compiled(name, "gcc", "-O1")
+        compiled(name, "clang", "-O1", "-Weverything", "-Wno-padded", "-Wno-float-equal", "-Wno-declaration-after-statement",
+                 "-Wno-unsafe-buffer-usage", "-Wno-unknown-warning-option")  # fmt: skip
