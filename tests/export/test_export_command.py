@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import runpy
 import subprocess
 from pathlib import Path
 
@@ -12,10 +13,14 @@ import pytest
 
 import starhold as sh
 from starhold.errors import InputError
+from starhold.export.code import make_code
+from starhold.export.source import texts
+from starhold.scenario.building import build
 from starhold.trace.program import Call, statements
 from tests.export.flown import LAWS, build_in, code_of, compiled, need
 from tests.running import starhold
 
+DOCS = Path(__file__).parents[2] / "docs"
 SMALL = "three-laws"
 
 
@@ -95,7 +100,6 @@ def test_results_are_not_overwritten_unless_forced(tmp_path):
 
 
 def test_part_without_a_form_in_c(tmp_path):
-    from starhold.export.code import make_code
     from starhold.parts.part import Fitted, Part
     from tests.export.flown import loop_of
 
@@ -144,3 +148,18 @@ def test_strict_compilers_have_nothing_to_say():
         compiled(name, "gcc", "-O1")
         compiled(name, "clang", "-O1", "-Weverything", "-Wno-padded", "-Wno-float-equal", "-Wno-declaration-after-statement",
                  "-Wno-unsafe-buffer-usage", "-Wno-unknown-warning-option")  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["lyapunov", "lqr", "sliding", "modal", "wheel", "mpc"])
+def test_docs_show_the_code_of_today(name):
+    page = runpy.run_path(str(DOCS / "flight_code.py"))
+    scenario, law = page["shown"]()[name]
+    code = make_code(build(scenario, scenario.pick(law)), name)
+    kept = (DOCS / "flight-code" / f"{name}.c").read_text(encoding="utf-8")
+    assert texts(code, scenario.name, law).source == kept, "write it anew: python docs/flight_code.py"
+
+
+def test_docs_quote_the_law():
+    page = (DOCS / "flight-code.md").read_text(encoding="utf-8")
+    quoted = re.findall(r"```c\n(.*?)```", page, flags=re.DOTALL)[1]
+    assert quoted in (DOCS / "flight-code" / "lyapunov.c").read_text(encoding="utf-8")

@@ -37,7 +37,9 @@ def c(
     scenario = load(file, allow_unstable)
     entry = scenario.laws[0] if law is None else scenario.pick(law)
     folder = output or Path("results") / f"{scenario.name}-{entry.name}-c"
-    print_exported(export_c(scenario, folder, entry.name, name=name, shells=shell or (), certify=certify, force=force), folder)
+    print_exported(
+        export_c(scenario, folder, entry.name, name=name, shells=shell or (), certify=certify, force=force), folder
+    )
 
 
 def print_exported(exported: Exported, folder: Path) -> None:

@@ -20,7 +20,9 @@ def files(code: Code) -> dict[str, str]:
     wanted = [member.name for member in code.members(2)]
     for name in wanted:
         if name not in SOURCES:
-            raise InputError("export basilisk", "", f"the input {name}", f"inputs that messages tell of: {', '.join(SOURCES)}")
+            raise InputError(
+                "export basilisk", "", f"the input {name}", f"inputs that messages tell of: {', '.join(SOURCES)}"
+            )
     reads: list[str] = []
     for message in ("attitude", "translation"):
         own = [name for name in wanted if SOURCES[name][0] == message]

@@ -41,6 +41,8 @@ class Code:
     name: str
     program: Program
     needs: Needs
+    parts: dict[str, dict[int, str]]
+    """Names of the parts of its arrays, by their first places."""
     state: Any
     """The state with buffers in memories of the program."""
 
@@ -52,7 +54,7 @@ class Code:
     @cached_property
     def printed(self) -> Readable:
         """Return the functions as text; types that the header has are called without the name of the law in the source."""
-        return Readable(self.program, self.needs, {})
+        return Readable(self.program, self.needs, self.parts)
 
     @property
     def time_unit(self) -> str:
@@ -105,7 +107,7 @@ def make_code(loop: ClosedLoop, name: str) -> Code:
     main = Function("step", "", flat, body, outs, shape)
     program = Program((*recording.recorded, main), tuple(recording.memories))
     needs = Needs(program)
-    return Code(flight, name, needs.program(program), needs, state)
+    return Code(flight, name, needs.program(program), needs, recording.parts, state)
 
 
 def _held(recording: Recording, leaf: Any) -> Any:

@@ -1,4 +1,4 @@
-"""What a step of a law costs: operations at the most, and stack and flash as compilers that are installed tell."""
+"""Measures a step of a law: stack and flash, as compilers that are installed tell."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from starhold.export.source import texts
 from starhold.export.types import paths
 from starhold.version import __version__
 
-_TYPES = "Float32 Int8 UInt8 Int16 UInt16 Int32 UInt32 Int64 UInt64 Boolean String".split()
+_TYPES = ("Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean", "String")
 _REFS = "const fmi3ValueReference r[], size_t n"
 _CLOCKS = f"fmi3Instance i, {_REFS}"
 _STATES = "fmi3Instance i, fmi3Float64 v[], size_t m"
@@ -254,7 +254,8 @@ FMI3_Export fmi3Status fmi3Reset(fmi3Instance i)
     return fmi3OK;
 }
 
-FMI3_Export fmi3Status fmi3SetFloat64(fmi3Instance i, const fmi3ValueReference r[], size_t n, const fmi3Float64 v[], size_t m)
+FMI3_Export fmi3Status fmi3SetFloat64(fmi3Instance i, const fmi3ValueReference r[], size_t n, const fmi3Float64 v[],
+    size_t m)
 {
     instance_t *const own = i;
     double numbers[INPUTS];

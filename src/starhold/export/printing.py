@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 from starhold.algebra.operations import INDEX, NUMBER, TRUTH, WORD
 from starhold.export.liveness import Needs
+from starhold.export.memory import Place, Places, Run, runs
 from starhold.export.recording import Parameter, Signature
 from starhold.export.types import Type, comment, paths, sentence
+from starhold.export.wording import SHORT, groups, kind_of_type, names_of, strings, tied
 from starhold.trace.c99 import C99
-from starhold.trace.program import Call, Function, Load, Program, Value, reads, statements, writes
-from starhold.trace.source import TIE, Expression, names
+from starhold.trace.program import Call, Function, Load, Program, Store, Value, reads, statements, writes
+from starhold.trace.source import TIE, Expression, fitted
 
 TYPES = {NUMBER: "double", TRUTH: "bool", INDEX: "int32_t", WORD: "uint64_t"}
-_SHORT = 130
-"""Characters of a call that is written where its value is used."""
 
 
 class Whole(NamedTuple):
@@ -31,8 +31,9 @@ class Readable(C99):
     """The printer of the functions of one law. What it prints of `main` is the body of the step, whose values go to the
     members of `state` and `command`."""
 
-    def __init__(self, program: Program, needs: Needs, aliases: dict[str, str]) -> None:
-        self.needs, self.aliases = needs, aliases
+    def __init__(self, program: Program, needs: Needs, parts: dict[str, dict[int, str]]) -> None:
+        self.needs, self.parts = needs, parts
+        self.rows: dict[str, Type] = {}
         self.used: dict[str, Type] = {}
         self.chunks: dict[str, list[str]] = {}
         self.heads: dict[str, str] = {}
@@ -50,7 +51,7 @@ class Readable(C99):
             self.called(member.type)
         if kind.members:
             self.used.setdefault(kind.name, kind)
-        return self.aliases.get(kind.name, kind.name)
+        return kind.name
 
     def params(self, function: Function) -> list[Parameter]:
         """Return the parameters that the body reads."""
@@ -97,7 +98,7 @@ class Readable(C99):
         # Names that Python gives anew, for the last value alone: those before are mostly read once, by the next.
         self.rebound = {key for key, hint in self.hints.items() if last[hint] != key}
         self.named = {
-            _strings(x for x in key if x in live or str(x).startswith("@")): hint
+            strings(x for x in key if x in live or str(x).startswith("@")): hint
             for key, hint in self.hints.items()
             if isinstance(key, tuple)
         }
@@ -106,6 +107,7 @@ class Readable(C99):
         self.taken_here |= {param.name for param in shape.params} if shape is not None else {x for x, _ in function.params}
         self.taken_here |= {"parameters", "state", "input", "command"} if self.is_main(function) else set()
         self.taken_here |= {memory.name for memory in self.memories[function.name]}
+        self.places = Places()
         self.calls, self.current, self.whole_calls = self._reading(function), function, dict[str, Any]()
         if shape is not None:
             for param in shape.params:
@@ -131,14 +133,14 @@ class Readable(C99):
             self.put(self._head(function))
             self.put("{")
             self.depth += 1
-            super()._block(function.body)
+            self._statements(function.body)
             result = self.result(function)
             if result is not None:
                 self.put(f"return {self.whole(result, [out for out, _ in function.outs], hint='')};")
             self.close()
         else:
             self.depth += 1
-            super()._block(function.body)
+            self._statements(function.body)
             self._finish(function)
             self.depth -= 1
         self.chunks[function.name] = self.lines[first:]
@@ -210,7 +212,7 @@ class Readable(C99):
         if not kind.members:
             return self.hints.get(key[0])
         if kind.named:
-            return self.named.get((f"@{re.sub(r'(_[0-9]+)?_t$', '', kind.name)}", *_strings(key)))
+            return self.named.get((f"@{re.sub(r'(_[0-9]+)?_t$', '', kind.name)}", *strings(key)))
         return self.hints.get(key)
 
     def whole(self, kind: Type, values: list[Value], hint: str | None = None, address: bool = False) -> str:
@@ -248,9 +250,9 @@ class Readable(C99):
             own, rest = rest[:count], rest[count:]
             if member not in live:
                 continue
-            text = self.whole(member.type, own) if member.type.members else self.text(own[0], _kind(member.type))
+            text = self.whole(member.type, own) if member.type.members else self.text(own[0], kind_of_type(member.type))
             plain = text.removeprefix(f"({self.called(member.type)})") if text.startswith("(") and "){" in text else text
-            parts.append(_tied(f".{member.name} = {plain}" if kind.named else plain))
+            parts.append(tied(f".{member.name} = {plain}" if kind.named else plain))
         inner = ", ".join(parts)
         return f"{{{{{inner}}}}}" if kind.elements else f"{{{inner}}}"
 
@@ -264,11 +266,56 @@ class Readable(C99):
 
     def _block(self, block: tuple[Any, ...]) -> None:
         with self._scope():
-            super()._block(block)
+            self._statements(block)
+
+    def _statements(self, block: tuple[Any, ...]) -> None:
+        for s in runs(block, self.places):
+            if isinstance(s, Run):
+                self._run(s)
+            elif isinstance(s, (Load, Store)) and self.places.knows(s.index):
+                text = self._at(s.memory, self.places.of(s.index))
+                if isinstance(s, Load):
+                    self._keep(s.ref, NUMBER, Expression(text), moves=False)
+                else:
+                    self.put(f"{text} = {self.text(s.value, NUMBER)};")
+            else:
+                super()._block((s,))
+
+    def _at(self, memory: str, place: Place) -> str:
+        names = {first: f"{name.upper()}_AT" for first, name in self.parts.get(memory, {}).items()}
+        place = place._replace(terms=tuple(self._term(term) for term in place.terms))
+        return f"{memory}[{place.text(names)}]"
+
+    def _term(self, term: str) -> str:
+        return " * ".join(fitted(self.use(factor, INDEX), "*", 1) for factor in term.split(" * "))
+
+    def _run(self, run: Run) -> None:
+        """Read or write some numbers at once, or one by one where they are not a value of their own."""
+        kind, memory = run.kind, run.own[0].memory
+        assert kind is not None
+        text = self._at(memory, run.first)
+        stem = kind.name.removesuffix("_t")
+        if isinstance(run.own[0], Load):
+            refs = tuple(s.ref for s in run.own)
+            name = self.fresh(self.hints.get(refs) or "row")
+            self.rows[kind.name] = kind
+            self.put(f"const {self.called(kind)} {name} = {stem}_at(&{text});")
+            for ref, member in zip(refs, kind.members, strict=True):
+                self.own[ref] = f"{name}.{member.name}"
+            self.scopes[-1][kind.name, refs] = Whole(name)
+            return
+        values = tuple(s.value for s in run.own)
+        if self._found(kind, values) is not None or self.hints.get(values):
+            self.rows[kind.name] = kind
+            self.put(f"put_{stem}(&{text}, {self.whole(kind, list(values))});")
+            return
+        for k, s in enumerate(run.own):
+            place = run.first._replace(first=run.first.first + k)
+            self.put(f"{self._at(memory, place)} = {self.text(s.value, NUMBER)};")
 
     def _keep(self, ref: str, kind: str, expression: Expression, moves: bool = True) -> None:
         hint = self.hints.get(ref)
-        if re.fullmatch(r"-[\w.>-]*\w", expression.text) and len(expression.text) < _SHORT // 3:
+        if re.fullmatch(r"-[\w.>-]*\w", expression.text) and len(expression.text) < SHORT // 3:
             # Written where it is read, however often.
             self._folded[ref] = expression
         elif hint is None or kind == INDEX or "." in ref or (ref in self.rebound and ref in self._once):
@@ -298,7 +345,7 @@ class Readable(C99):
             own, args = args[: len(param.leaves)], args[len(param.leaves) :]
             if param in needed:
                 given.append(self.whole(param.type, own, hint=None if param.by_pointer else "", address=param.by_pointer))
-        text = f"{self.titles[function.name]}({', '.join(map(_tied, given))})"
+        text = f"{self.titles[function.name]}({', '.join(map(tied, given))})"
         result = self.result(function)
         if result is None or not any(ref in self._read for ref, _ in s.refs):
             self.put(f"{text};" if result is None else f"(void){text};")
@@ -316,7 +363,7 @@ class Readable(C99):
             and not result.named
             and (rebound or hint in {None, *self.taken_here})
             and self._once_whole(base, refs, result)
-            and len(text) <= _SHORT
+            and len(text) <= SHORT
         ):
             self._folded[base if not result.members else base + "*"] = Expression(text)
             return
@@ -346,34 +393,8 @@ class Readable(C99):
         for values, kinds in rows:
             first = 0
             for one in kinds:
-                for place, inner in _groups(one, first):
+                for place, inner in groups(one, first):
                     if inner.name == kind.name and tuple(values[place : place + len(refs)]) == refs:
                         return True
                 first += len(list(paths(one, "")))
         return False
-
-
-def _groups(kind: Type, first: int) -> Iterator[tuple[int, Type]]:
-    """Yield a type and those of its members, each with the place of its first leaf."""
-    yield first, kind
-    for member in kind.members:
-        yield from _groups(member.type, first)
-        first += len(list(paths(member.type, "")))
-
-
-def _kind(kind: Type) -> str:
-    return TRUTH if kind.name == "bool" else NUMBER
-
-
-def _tied(text: str) -> str:
-    """Return a text that stays on one line where it is short."""
-    return text.replace(" ", TIE) if len(text) < _SHORT // 2 else text
-
-
-def _strings(values: Iterable[Value]) -> tuple[str, ...]:
-    return tuple(value for value in values if isinstance(value, str))
-
-
-def names_of(function: Function) -> set[str]:
-    """Return the first parts of all names within a function."""
-    return {name.split(".")[0].split("->")[0] for name in names(function)}

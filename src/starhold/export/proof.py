@@ -1,4 +1,4 @@
-"""What a header says of what is proved: claims in sentences, assumptions, and a warning where something is missing."""
+"""Headers say what is proved: claims in sentences, assumptions, and a warning where something is missing."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from starhold.export.rebinding import Rebinder
 from starhold.export.types import BOOL, MATRIX, QUATERNION, VECTOR, Member, Path, Type, Types, free, paths, title
 from starhold.trace.handles import HANDLES, Handle, kind_of
 from starhold.trace.program import Call, Function, prune, renamed, writes
-from starhold.trace.recording import Recorder
+from starhold.trace.recording import Cells, Recorder
 
 _PLAIN = (VECTOR, QUATERNION, MATRIX)
 _SIZES = (3, 4, 6)
@@ -56,6 +56,8 @@ class Recording(Recorder):
         self.rebinder = Rebinder(self._hook)
         self._inline: set[Any] = set()
         self._depths: dict[Any, int] = {}
+        self.parts: dict[str, dict[int, str]] = {}
+        """Names of the parts of memories, by their first places."""
 
     @contextmanager
     def recording(self) -> Generator[None]:
@@ -193,6 +195,7 @@ class Recording(Recorder):
                 for name, value in frame.f_locals.items():
                     if seen.get(name) != id(value):
                         seen[name] = id(value)
+                        self._note_parts(value)
                         key = _key(value)
                         # What the outermost function calls it.
                         if key is not None and depth < self._depths.get(key, 1 << 30):
@@ -200,6 +203,16 @@ class Recording(Recorder):
             return note
 
         return note
+
+    def _note_parts(self, value: Any) -> None:
+        """Remember what parts of a memory are called; the whole of it has a name of its own."""
+        if not isinstance(value, tuple):
+            return
+        for name, part in zip(getattr(value, "_fields", ()), value, strict=False):  # pyright: ignore
+            if isinstance(part, Buffer) and type(part.base) is int and isinstance(part.cells, Cells):
+                memory = part.cells.memory
+                if part.size != memory.size:
+                    self.parts.setdefault(memory.name, {}).setdefault(part.base, free(name))
 
 
 _OF_ROLES = frozenset(("torque", "control", "acceleration", "goal", "estimate", "momentum", "inertia", "command"))

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from starhold.algebra.structure import leaves
 from starhold.algebra.structured import Buffer
 from starhold.export.code import Code
+from starhold.export.memory import helpers
 from starhold.export.printing import Readable
 from starhold.export.proof import UNPROVED, Proof
 from starhold.export.types import Member, Type, comment
@@ -178,6 +179,13 @@ def _source(code: Code, printed: Readable, public: dict[str, str]) -> str:
     parameters = code.signature.params[0].type
     if printed.members(parameters):
         lines += [*declaration(parameters, printed, {}, {}), "", *_values(code, printed), ""]
+    for memory in code.buffers:
+        parts = printed.parts.get(memory, {})
+        if parts:
+            lines += [*comment(f"Where the parts of {memory} begin."), "enum {"]
+            lines += [f"    {part.upper()}_AT = {first}," for first, part in sorted(parts.items())]
+            lines += ["};"]
+    lines += helpers(list(printed.rows.values()))
     module = ""
     for function in printed.functions.values():
         if printed.is_main(function):

@@ -41,6 +41,9 @@ QUATERNION = Type(
 )
 MATRIX = Type("matrix_t", tuple(Member(f"row[{k}]", VECTOR) for k in range(3)), "row", text="Rows of a 3x3 matrix.")
 
+SIX = Type("six_t", tuple(Member(f"e[{k}]", DOUBLE) for k in range(6)), "e", text="Six numbers.")
+_NAMES = {"sixs6_t": "six_rows_t", "vectors6_t": "six_vectors_t"}
+
 
 class Path(NamedTuple):
     """A leaf of a value: how it is reached from the value, its kind, and the members of named structs on the way."""
@@ -78,8 +81,10 @@ class Types:
                 return QUATERNION
             if first == VECTOR and count == 3:
                 return MATRIX
+            if first == DOUBLE and count == 6:
+                return SIX
             name = f"{first.name.removesuffix('_t')}s{count}_t"
-            return self.keep(Type(name, tuple(Member(f"e[{k}]", first) for k in range(count)), "e"))
+            return self.keep(Type(_NAMES.get(name, name), tuple(Member(f"e[{k}]", first) for k in range(count)), "e"))
         members = tuple(Member(f"part{k}", one) for k, one in enumerate(found) if one is not None)
         return self.keep(Type(f"{hint or 'several'}_t", members))
 

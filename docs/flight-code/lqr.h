@@ -1,0 +1,86 @@
+/* lqr: Closed-form LQR
+
+   u = -K_rate w - K_attitude q (+ w x Jw), optimal for the linearised motion; gains from formulas by
+   `form`
+
+   Made by starhold 0.1.0 from the scenario three-laws, law lqr.
+   Source: published study of inertial stabilisation by closed-form linear-quadratic laws
+   Assumes: rigid body; inertia known; no external torque; torque not limited; K_attitude^-1 J > 0,
+   K_attitude^-1 K_rate > 0; w.K_attitude^-1(w x Jw) = 0 for all w, or the gyroscopic torque cancelled.
+
+   Command limit: 0.01 N m on each axis. Quaternion sign: as published.
+
+   A step does at most 112 additions, multiplications, divisions and roots, and 6 comparisons.
+   Bits are those of the simulation where doubles are IEEE and nothing is contracted or reassociated:
+   compile with -std=c99 -ffp-contract=off, never with -ffast-math.
+
+
+   Certificate: certificate.json, sha256 64fd369e776360cd6d37aa9cafdac822917b02f14eae92d120a573da09c4b131:
+   proved
+   Claims:
+     proved: converges: with unlimited torque, from every attitude and rate the body comes to rest on
+     target, almost always at q0 = 1; it may turn the long way to get there (unwinding)
+     proved: within the torque limit: from the level set of V that holds rest at up to 16.55° and, on
+     target, 1.169°/s about any axis, the torque never exceeds 0.01 N m on every axis
+     proved: torque from outside: with unlimited torque, from the level set of V that holds rest at every
+     attitude told by the shorter of its quaternions, and by the longer up to 286.7° of 360° and, on
+     target, 15.38°/s about any axis, against any torque from outside of up to 3.486e-06 N m, it ends
+     within 0.02474° and 0.001523°/s
+     proved: uncertain inertia: with unlimited torque, from every attitude and rate it converges with every
+     entry of the inertia off by up to 100 % of sqrt(J_ii J_jj)
+     proved: torque held between samples: the linear loop is stable with the torque held for 0.1 s and for
+     every period up to 19.99 s
+   These claims assume: rigid body; inertia exactly as given; exact measurement and ideal actuators; torque
+   applied continuously; torque not limited; no torque from outside but what the law cancels; torque from
+   outside bounded in norm; inertia within the tolerance; no torque from outside; target at rest; linear
+   motion near rest on a target at rest.
+   Check it independently: starhold check certificate.json */
+
+#ifndef LQR_H
+#define LQR_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* s: the step is to be called once in each such period. */
+#define LQR_PERIOD (0.1)
+
+/* Scalar part first, Hamilton product. */
+typedef struct {
+    double q0, q1, q2, q3;
+} lqr_quaternion_t;
+
+/* Components along the axes. */
+typedef struct {
+    double x, y, z;
+} lqr_vector_t;
+
+typedef struct {
+    lqr_quaternion_t attitude; /* inertial to body, unit quaternion, scalar first */
+    lqr_vector_t rate; /* rad/s: angular velocity, body axes */
+} lqr_input_t;
+
+typedef struct {
+    lqr_vector_t torque; /* N m: torque commanded, within the limits, body axes */
+} lqr_command_t;
+
+/* What the law remembers: nothing. C has no empty structs. */
+typedef struct {
+    double unused;
+} lqr_state_t;
+
+/* Sets the state to that of the scenario's start. */
+void lqr_init(lqr_state_t *state);
+
+/* One control step: u = -K_rate w - K_attitude q (+ w x Jw), optimal for the linearised motion; gains from
+   formulas by `form`. Takes what was measured at this instant, gives what to command until the next, and
+   changes the state. It calls nothing but sqrt and keeps nothing outside the state. It does not check what
+   it is given: a NaN that the law uses comes out as one. */
+void lqr_step(lqr_state_t *state, const lqr_input_t *input, lqr_command_t *command);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* LQR_H */

@@ -1,0 +1,80 @@
+/* lyapunov: Lyapunov
+
+   u = -k_rate w - k_attitude q + w x Jw - M_ext: V falls whatever the modelled torque
+
+   Made by starhold 0.1.0 from the scenario three-laws, law lyapunov.
+   Source: published comparison of Lyapunov, sliding-mode and predictive attitude control, eq. (9)
+   Assumes: rigid body; inertia known; external torque known; torque not limited.
+
+   Command limit: 0.01 N m on each axis. Quaternion sign: as published.
+
+   A step does at most 141 additions, multiplications, divisions and roots, and 6 comparisons.
+   Bits are those of the simulation where doubles are IEEE and nothing is contracted or reassociated:
+   compile with -std=c99 -ffp-contract=off, never with -ffast-math.
+
+
+   Certificate: certificate.json, sha256 8b5d6dfed5aee0e2958972df6532592dc2d4cfb016a749519496632932ac0885:
+   proved
+   Claims:
+     proved: converges: with unlimited torque, from every attitude and rate the body comes to rest on
+     target, almost always at q0 = 1; it may turn the long way to get there (unwinding)
+     proved: within the torque limit: from the level set of V that holds rest at up to 96.98° and, on
+     target, 3.156°/s about any axis, the torque never exceeds 0.01 N m on every axis
+     proved: uncertain inertia: with unlimited torque, from every attitude and rate it converges whatever
+     the inertia of the body really is
+     proved: torque held between samples: the linear loop is stable with the torque held for 0.1 s and for
+     every period up to 39.99 s
+   These claims assume: rigid body; inertia exactly as given; exact measurement and ideal actuators; torque
+   applied continuously; torque not limited; no torque from outside but what the law cancels; no torque
+   from outside; target at rest; linear motion near rest on a target at rest.
+   Check it independently: starhold check certificate.json */
+
+#ifndef LYAPUNOV_H
+#define LYAPUNOV_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* s: the step is to be called once in each such period. */
+#define LYAPUNOV_PERIOD (0.1)
+
+/* Scalar part first, Hamilton product. */
+typedef struct {
+    double q0, q1, q2, q3;
+} lyapunov_quaternion_t;
+
+/* Components along the axes. */
+typedef struct {
+    double x, y, z;
+} lyapunov_vector_t;
+
+typedef struct {
+    lyapunov_quaternion_t attitude; /* inertial to body, unit quaternion, scalar first */
+    lyapunov_vector_t rate; /* rad/s: angular velocity, body axes */
+    lyapunov_vector_t position; /* m: from the centre of attraction, inertial axes */
+} lyapunov_input_t;
+
+typedef struct {
+    lyapunov_vector_t torque; /* N m: torque commanded, within the limits, body axes */
+} lyapunov_command_t;
+
+/* What the law remembers: nothing. C has no empty structs. */
+typedef struct {
+    double unused;
+} lyapunov_state_t;
+
+/* Sets the state to that of the scenario's start. */
+void lyapunov_init(lyapunov_state_t *state);
+
+/* One control step: u = -k_rate w - k_attitude q + w x Jw - M_ext: V falls whatever the modelled torque.
+   Takes what was measured at this instant, gives what to command until the next, and changes the state. It
+   calls nothing but sqrt and keeps nothing outside the state. It does not check what it is given: a NaN
+   that the law uses comes out as one. */
+void lyapunov_step(lyapunov_state_t *state, const lyapunov_input_t *input, lyapunov_command_t *command);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* LYAPUNOV_H */

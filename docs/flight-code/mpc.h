@@ -1,0 +1,75 @@
+/* mpc: Predictive
+
+   minimises the sum of x'Qx + u'Ru over a horizon of the motion linearised anew, inside the torque limit
+
+   Made by starhold 0.1.0 from the scenario three-laws, law mpc.
+   Source: published comparison of Lyapunov, sliding-mode and predictive attitude control
+   Assumes: rigid body; inertia known; no external torque but the gravity gradient; small attitude error,
+   or a horizon short against the turn.
+
+   Command limit: 0.01 N m on each axis. Quaternion sign: as published.
+   Fixed in this code: horizon = 10, terminal = riccati, limit = axis, budget = 50.
+
+   A step does at most 48809922 additions, multiplications, divisions and roots, and 1345182 comparisons.
+   Bits are those of the simulation where doubles are IEEE and nothing is contracted or reassociated:
+   compile with -std=c99 -ffp-contract=off, never with -ffast-math.
+
+   ****************************************************************************************************
+   WARNING  NOTHING IS CLAIMED: proofs are for laws with a Lyapunov function, one root, or a surface and no
+   wheels.
+   ****************************************************************************************************
+
+   Certificate: certificate.json, sha256 cdc8969afac304d60e954e0ecf60fbfcf1281b44b7a30076a5576c7911c9d91c:
+   undecided
+   Claims:
+   Check it independently: starhold check certificate.json */
+
+#ifndef MPC_H
+#define MPC_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* s: the step is to be called once in each such period. */
+#define MPC_PERIOD (0.1)
+
+/* Scalar part first, Hamilton product. */
+typedef struct {
+    double q0, q1, q2, q3;
+} mpc_quaternion_t;
+
+/* Components along the axes. */
+typedef struct {
+    double x, y, z;
+} mpc_vector_t;
+
+typedef struct {
+    mpc_quaternion_t attitude; /* inertial to body, unit quaternion, scalar first */
+    mpc_vector_t rate; /* rad/s: angular velocity, body axes */
+    mpc_vector_t position; /* m: from the centre of attraction, inertial axes */
+} mpc_input_t;
+
+typedef struct {
+    mpc_vector_t torque; /* N m: torque commanded, within the limits, body axes */
+} mpc_command_t;
+
+/* What is remembered from step to step: set it by the function below, and leave it alone. */
+typedef struct {
+    double numbers[697];
+} mpc_state_t;
+
+/* Sets the state to that of the scenario's start. */
+void mpc_init(mpc_state_t *state);
+
+/* One control step: minimises the sum of x'Qx + u'Ru over a horizon of the motion linearised anew, inside
+   the torque limit. Takes what was measured at this instant, gives what to command until the next, and
+   changes the state. It calls nothing but sqrt and keeps nothing outside the state. It does not check what
+   it is given: a NaN that the law uses comes out as one. */
+void mpc_step(mpc_state_t *state, const mpc_input_t *input, mpc_command_t *command);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* MPC_H */

@@ -1,0 +1,457 @@
+/* wheel.c: made by starhold 0.1.0; see wheel.h. Do not edit: change the scenario and export it again. */
+
+#include "wheel.h"
+
+#include <math.h>
+#include <stdbool.h>
+
+#if defined(__FAST_MATH__) || (defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ != 0)
+#error "this code needs IEEE arithmetic in doubles: no -ffast-math, no x87"
+#endif
+#if !defined(__GNUC__) || defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#endif
+
+typedef wheel_quaternion_t quaternion_t;
+typedef wheel_vector_t vector_t;
+typedef wheel_doubles4_t doubles4_t;
+typedef wheel_wheels_state_t wheels_state_t;
+
+/* Rows of a 3x3 matrix. */
+typedef struct {
+    vector_t row[3];
+} matrix_t;
+
+/* Attitude q_BN (inertial to body), rate omega_BN_B (rad/s), position and velocity (inertial; m, m/s), and
+   the torque the actuators give (body, N m), which has dynamics of its own when the actuators lag. */
+typedef struct {
+    quaternion_t attitude;
+    vector_t rate;
+    vector_t position;
+    vector_t velocity;
+} state_t;
+
+/* The attitude to be reached: q_RN (inertial to target axes), and the target's angular velocity (rad/s)
+   and acceleration (rad/s2), both in target axes. */
+typedef struct {
+    quaternion_t attitude;
+    vector_t rate;
+    vector_t acceleration;
+} goal_t;
+
+/* A rigid spacecraft. */
+typedef struct {
+    vector_t inertia; /* kg m^2: of a craft with wheels without their rotors' about their axes */
+    double gravity; /* m^3/s^2: gravitational parameter of the body that it orbits */
+    vector_t with_rotors; /* kg m^2: inertia with the rotors; () without wheels */
+} craft_t;
+
+/* What attraction gives. */
+typedef struct {
+    double scalar;
+    double inverse_square;
+} attraction_result_t;
+
+typedef struct {
+    vector_t e[4];
+} vectors4_t;
+
+/* N wheels: unit spin axes (body), rotor inertias about them (kg m2), largest motor torques (N m; 0 for a
+   lost wheel), largest axial momenta (N m s), viscous (N m s) and Coulomb friction (N m); and how to share
+   out a torque, by least squares (one row a wheel, zero for one that takes no part) or with the least peak
+   (see `envelope.with_facets`, without which there is nothing to share it out with). */
+typedef struct {
+    vectors4_t axes;
+} wheels_t;
+
+/* Beside the state all that a measurement is made of: the goal (None where the loop has no target),
+   whether it never turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s,
+   body), the control period and the limit of the command. */
+typedef struct {
+    goal_t goal;
+    vector_t torque;
+    vector_t momentum;
+} scene_t;
+
+/* Quantities that a law is told at a control instant; vectors are in body axes. */
+typedef struct {
+    quaternion_t attitude; /* rotation from the target axes to the body axes, scalar first */
+    vector_t rate; /* rad/s: angular velocity relative to the target */
+    vector_t body_rate; /* rad/s: absolute angular velocity */
+    vector_t target_acceleration; /* rad/s^2: derivative of target_rate as the turning body sees it */
+    vector_t external_torque; /* N m: modelled torque from outside at this attitude */
+    vector_t wheel_momentum; /* N m s: angular momentum of the body's wheels */
+} measurement_t;
+
+/* What as_published gives. */
+typedef struct {
+    quaternion_t attitude;
+} as_published_result_t;
+
+/* The gains are damping, stiffness, and the share of the modelled torque that is compensated. */
+typedef struct {
+    double k_rate; /* N m s: damping */
+    vector_t k_attitude; /* N m: weights of 1 - a_ii, one for all or one each */
+    double compensation; /* share of the gyroscopic, target and external torque compensated */
+} gains_t;
+
+typedef struct {
+    wheels_t wheels;
+} effectors_t;
+
+/* The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. */
+typedef struct {
+    effectors_t effectors;
+} setup_t;
+
+/* The numbers that do not change in flight. */
+typedef struct {
+    gains_t gains;
+    craft_t craft;
+    setup_t setup;
+} parameters_t;
+
+static const parameters_t parameters = {
+    .gains = {
+        .k_rate = 0.7338343309438073, /* N m s */
+        .k_attitude = {0.011572066137231305, 0.011572066137231305, 0.011572066137231305}, /* N m */
+        .compensation = 1.0,
+    },
+    .craft = {
+        .inertia = {5.998666666666667, 7.998666666666667, 4.998666666666667}, /* kg m^2 */
+        .gravity = 398600000000000.0, /* m^3/s^2 */
+        .with_rotors = {6.0, 8.0, 5.0}, /* kg m^2 */
+    },
+    .setup = {
+        .effectors = {
+            .wheels = {
+                .axes = {{{0.5773502691896258, 0.5773502691896258, 0.5773502691896258}, {-0.5773502691896258, 0.5773502691896258, 0.5773502691896258}, {-0.5773502691896258, -0.5773502691896258, 0.5773502691896258}, {0.5773502691896258, -0.5773502691896258, 0.5773502691896258}}},
+            },
+        },
+    },
+};
+
+
+/* ------------------------------------ algebra.vector ------------------------------------ */
+
+/* Return the vector product. */
+static vector_t cross(vector_t a, vector_t b)
+{
+    return (vector_t){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+/* Return the scalar product. */
+static double dot(vector_t a, vector_t b)
+{
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+/* Return c a. */
+static vector_t scale(double c, vector_t a)
+{
+    return (vector_t){c * a.x, c * a.y, c * a.z};
+}
+
+/* ----------------------------------- algebra.cosines ------------------------------------ */
+
+static quaternion_t choose(bool condition, quaternion_t a, quaternion_t b)
+{
+    return (quaternion_t){condition ? a.q0 : b.q0, condition ? a.q1 : b.q1, condition ? a.q2 : b.q2,
+        condition ? a.q3 : b.q3};
+}
+
+/* ---------------------------------- algebra.quaternion ---------------------------------- */
+
+/* Return c q. */
+static quaternion_t stretch(double c, quaternion_t q)
+{
+    return (quaternion_t){c * q.q0, c * q.q1, c * q.q2, c * q.q3};
+}
+
+/* Return q / |q|; not defined at zero. */
+static quaternion_t normalise(quaternion_t q)
+{
+    return stretch(1.0 / sqrt(q.q0 * q.q0 + q.q1 * q.q1 + q.q2 * q.q2 + q.q3 * q.q3), q);
+}
+
+/* ----------------------------------- algebra.cosines ------------------------------------ */
+
+/* Return the quaternion of a rotation matrix, from the largest of its four squared components (Shepperd's
+   method). */
+static quaternion_t to_quaternion(matrix_t a)
+{
+    const double trace = a.row[0].x + a.row[1].y + a.row[2].z;
+    const double x = a.row[1].z - a.row[2].y;
+    const double y = a.row[2].x - a.row[0].z;
+    const double z = a.row[0].y - a.row[1].x;
+    const double xy = a.row[0].y + a.row[1].x;
+    const double yz = a.row[1].z + a.row[2].y;
+    const double zx = a.row[2].x + a.row[0].z;
+    const double t9 = 1.0 + trace;
+    const double t12 = 1.0 + 2.0 * a.row[0].x - trace;
+    const double t15 = 1.0 + 2.0 * a.row[1].y - trace;
+    const double t18 = 1.0 + 2.0 * a.row[2].z - trace;
+    const bool t19 = t9 < t12;
+    const double size = t19 ? t12 : t9;
+    const bool t21 = size < t15;
+    const quaternion_t largest = choose(t21, (quaternion_t){y, xy, t15, yz}, choose(t19,
+        (quaternion_t){x, t12, xy, zx}, (quaternion_t){t9, x, y, z}));
+    const double size_2 = t21 ? t15 : size;
+    return normalise(choose(size_2 < t18, (quaternion_t){z, zx, yz, t18}, largest));
+}
+
+/* ------------------------------------ algebra.scalar ------------------------------------ */
+
+/* Return -1 for negative x, else +1: the sign that never vanishes. */
+static double side(double x)
+{
+    return x < 0.0 ? -1.0 : 1.0;
+}
+
+/* ---------------------------------- algebra.quaternion ---------------------------------- */
+
+/* Choose of q and -q, the same attitude, the one nearer to `other`. */
+static quaternion_t nearer(quaternion_t q, quaternion_t other)
+{
+    return stretch(side(q.q0 * other.q0 + q.q1 * other.q1 + q.q2 * other.q2 + q.q3 * other.q3), q);
+}
+
+/* -------------------------------- parts.targets.orbital --------------------------------- */
+
+/* The frame at this position and velocity. */
+static goal_t orbital_goal(const state_t *state, quaternion_t before)
+{
+    const vector_t h = cross(state->position, state->velocity);
+    const double r2_2 = dot(state->position, state->position);
+    const double h2 = dot(h, h);
+    const double size = sqrt(h2);
+    const vector_t down = scale(-1.0 / sqrt(r2_2), state->position);
+    const vector_t against = scale(-1.0 / size, h);
+    const quaternion_t attitude = nearer(to_quaternion((matrix_t){{cross(against, down), against, down}}),
+        before);
+    const double rate = size / r2_2;
+    return (goal_t){.attitude = attitude, .rate = {0.0, -rate, 0.0}, .acceleration = {0.0,
+        2.0 * rate * dot(state->position, state->velocity) / r2_2, 0.0}};
+}
+
+/* ----------------------------- parts.environments.two_body ------------------------------ */
+
+/* mu/r3 and 1/r2, with one division. */
+static attraction_result_t attraction(vector_t position, const craft_t *craft)
+{
+    const double inverse_square = 1.0 / dot(position, position);
+    return (attraction_result_t){.scalar = craft->gravity * inverse_square * sqrt(inverse_square),
+        .inverse_square = inverse_square};
+}
+
+/* ---------------------------------- algebra.quaternion ---------------------------------- */
+
+/* Return (q1, q2, q3). */
+static vector_t vector_part(quaternion_t q)
+{
+    return (vector_t){q.q1, q.q2, q.q3};
+}
+
+/* ------------------------------------ algebra.vector ------------------------------------ */
+
+/* Return a + b. */
+static vector_t add(vector_t a, vector_t b)
+{
+    return (vector_t){a.x + b.x, a.y + b.y, a.z + b.z};
+}
+
+/* ---------------------------------- algebra.quaternion ---------------------------------- */
+
+/* Return body components of a vector given in reference axes, R = q* r q. */
+static vector_t to_body(quaternion_t q, vector_t r)
+{
+    const vector_t v = vector_part(q);
+    const vector_t t = scale(2.0, cross(r, v));
+    return add(add(r, scale(q.q0, t)), cross(t, v));
+}
+
+/* ------------------------------------- parts.craft -------------------------------------- */
+
+/* The inertia with all that is in the craft, which gravity acts on (kg m2). */
+static vector_t total_inertia(const craft_t *craft)
+{
+    return craft->with_rotors;
+}
+
+/* ------------------------------------ algebra.vector ------------------------------------ */
+
+/* Return a x (m a) for a symmetric m: the gyroscopic torque is gyroscopic_torque(J, w). */
+static vector_t gyroscopic_torque(vector_t m, vector_t a)
+{
+    return (vector_t){(m.z - m.y) * (a.y * a.z), (m.x - m.z) * (a.z * a.x), (m.y - m.x) * (a.x * a.y)};
+}
+
+/* ------------------------- parts.environments.gravity_gradient -------------------------- */
+
+/* Gravity-gradient torque (N m) for the position in body axes (m) and strength 3 mu/r5 (1/(m2 s2)). */
+static vector_t gravity_gradient(vector_t position, double strength, const craft_t *craft)
+{
+    return scale(strength, gyroscopic_torque(total_inertia(craft), position));
+}
+
+/* Torque on the body (N m, body axes). */
+static vector_t gravity_gradient_torque(const state_t *state, const craft_t *craft)
+{
+    const attraction_result_t attraction_result = attraction(state->position, craft);
+    const vector_t gravity_gradient_2 = gravity_gradient(to_body(state->attitude, state->position), 3.0 *
+        attraction_result.scalar * attraction_result.inverse_square, craft);
+    return gravity_gradient_2;
+}
+
+/* ----------------------------------- algebra.several ------------------------------------ */
+
+/* Return the sum of weights[i] * vectors[i], from the first to the last; there is at least one. */
+static vector_t weighted(quaternion_t weights, vectors4_t vectors)
+{
+    const vector_t total = add(add(add(scale(weights.q0, vectors.e[0]), scale(weights.q1, vectors.e[1])),
+        scale(weights.q2, vectors.e[2])), scale(weights.q3, vectors.e[3]));
+    return total;
+}
+
+/* -------------------------------- parts.effectors.wheels -------------------------------- */
+
+/* The wheels' momentum in body axes (N m s): sum a_i h_i. */
+static vector_t wheel_momentum(quaternion_t momentum, const wheels_t *wheels)
+{
+    return weighted(momentum, wheels->axes);
+}
+
+/* The rotors' momentum in body axes (N m s). */
+static vector_t wheels_momentum(const wheels_state_t *own, const wheels_t *params)
+{
+    return wheel_momentum((quaternion_t){own->momentum.e[0], own->momentum.e[1], own->momentum.e[2],
+        own->momentum.e[3]}, params);
+}
+
+/* ---------------------------------- algebra.quaternion ---------------------------------- */
+
+/* Return the inverse rotation. */
+static quaternion_t conjugate(quaternion_t q)
+{
+    return (quaternion_t){q.q0, -q.q1, -q.q2, -q.q3};
+}
+
+/* Return the Hamilton product a b: first the rotation a, then the rotation b about the axes already
+   rotated. */
+static quaternion_t multiply(quaternion_t a, quaternion_t b)
+{
+    return (quaternion_t){a.q0 * b.q0 - a.q1 * b.q1 - a.q2 * b.q2 - a.q3 * b.q3,
+        a.q0 * b.q1 + a.q1 * b.q0 + a.q2 * b.q3 - a.q3 * b.q2,
+        a.q0 * b.q2 + a.q2 * b.q0 + a.q3 * b.q1 - a.q1 * b.q3,
+        a.q0 * b.q3 + a.q3 * b.q0 + a.q1 * b.q2 - a.q2 * b.q1};
+}
+
+/* Return the rotation from the target axes to the body axes, target* q; the identity when the attitudes
+   agree. */
+static quaternion_t relative(quaternion_t target, quaternion_t q)
+{
+    return multiply(conjugate(target), q);
+}
+
+/* ------------------------------------ algebra.vector ------------------------------------ */
+
+/* Return a - b. */
+static vector_t subtract(vector_t a, vector_t b)
+{
+    return (vector_t){a.x - b.x, a.y - b.y, a.z - b.z};
+}
+
+/* ------------------------------- parts.bodies.rigid_body -------------------------------- */
+
+/* The measurement that a law is told of a state as sensors or estimators tell it. */
+static measurement_t observe(const state_t *state, const scene_t *scene)
+{
+    const quaternion_t error = relative(scene->goal.attitude, state->attitude);
+    const vector_t target_rate = to_body(error, scene->goal.rate);
+    const vector_t error_rate = subtract(state->rate, target_rate);
+    const vector_t target_acceleration = subtract(to_body(error, scene->goal.acceleration),
+        cross(error_rate, target_rate));
+    return (measurement_t){.attitude = error, .rate = error_rate, .body_rate = state->rate,
+        .target_acceleration = target_acceleration, .external_torque = scene->torque,
+        .wheel_momentum = scene->momentum};
+}
+
+/* -------------------------------- parts.quaternion_sign --------------------------------- */
+
+/* Feed back q itself: continuous, but the body may turn the long way (unwinding). */
+static as_published_result_t as_published(quaternion_t attitude)
+{
+    return (as_published_result_t){.attitude = attitude};
+}
+
+/* -------------------------------------- laws.wheel -------------------------------------- */
+
+/* Return M q with M = tr(k) - diag(k): sum k_i (1 - a_ii) = 2 q.Mq. */
+static vector_t twist(vector_t k, vector_t q)
+{
+    return (vector_t){(k.y + k.z) * q.x, (k.z + k.x) * q.y, (k.x + k.y) * q.z};
+}
+
+/* ------------------------------------ algebra.vector ------------------------------------ */
+
+/* Return the product component by component. */
+static vector_t times(vector_t a, vector_t b)
+{
+    return (vector_t){a.x * b.x, a.y * b.y, a.z * b.z};
+}
+
+/* Return the matrix-vector product; a vector in place of the matrix is a diagonal one. */
+static vector_t apply(vector_t m, vector_t a)
+{
+    return times(m, a);
+}
+
+/* -------------------------------------- laws.wheel -------------------------------------- */
+
+/* Return the torque asked of the wheels (N m, body). */
+static vector_t wheel_torque(const measurement_t *measurement, const gains_t *gains, const craft_t *craft)
+{
+    const vector_t q = vector_part(measurement->attitude);
+    const vector_t twist_2 = twist(gains->k_attitude, q);
+    const vector_t cosines = scale(2.0, add(scale(measurement->attitude.q0, twist_2), cross(twist_2, q)));
+    const vector_t feedback = add(scale(gains->k_rate, measurement->rate), cosines);
+    const vector_t momentum = add(apply(craft->inertia, measurement->body_rate), measurement->wheel_momentum);
+    const vector_t model = subtract(add(cross(measurement->body_rate, momentum),
+        apply(craft->inertia, measurement->target_acceleration)), measurement->external_torque);
+    return subtract(scale(gains->compensation, model), feedback);
+}
+
+/* -------------------------------- parts.actuators.limits -------------------------------- */
+
+/* The command as it is. */
+static vector_t limit_none(vector_t command)
+{
+    return command;
+}
+
+/* -------------------------------------- interface --------------------------------------- */
+
+void wheel_init(wheel_state_t *state)
+{
+    const quaternion_t followed = {0.7055202438209324, 0.047341161359353054, -0.7055202438209324, -0.047341161359353054};
+    state->followed = followed;
+}
+
+void wheel_step(wheel_state_t *state, const wheel_input_t *input, wheel_command_t *command)
+{
+    const state_t body_state = {.attitude = input->attitude, .rate = input->rate, .position = input->position,
+        .velocity = input->velocity};
+    const goal_t goal = orbital_goal(&body_state, state->followed);
+    const vector_t torque = gravity_gradient_torque(&body_state, &parameters.craft);
+    const vector_t momentum = wheels_momentum(&input->wheels, &parameters.setup.effectors.wheels);
+    const scene_t scene = {.goal = goal, .torque = torque, .momentum = momentum};
+    const measurement_t told = observe(&body_state, &scene);
+    const as_published_result_t as_published_result = as_published(told.attitude);
+    const measurement_t told_2 = {.attitude = as_published_result.attitude, .rate = told.rate,
+        .body_rate = told.body_rate, .target_acceleration = told.target_acceleration,
+        .external_torque = told.external_torque, .wheel_momentum = told.wheel_momentum};
+    const vector_t wanted = limit_none(wheel_torque(&told_2, &parameters.gains, &parameters.craft));
+    command->torque = wanted;
+    const quaternion_t followed = goal.attitude;
+    state->followed = followed;
+}

@@ -1,0 +1,93 @@
+/* wheel: Reaction-wheel law
+
+   u = -k_rate w - S + w_abs x (J w_abs + H) + J w_target' - M_ext, S = 4 k q0 q from direction cosines
+
+   Made by starhold 0.1.0 from the scenario wheels-orbital, law wheel.
+   Source: published study of reaction-wheel attitude control with a given degree of stability
+   Assumes: rigid body; inertia and wheel momentum known; external torque known; torque not limited.
+
+   Command limit: none. Quaternion sign: as published.
+
+   A step does at most 356 additions, multiplications, divisions and roots, and 4 comparisons.
+   Bits are those of the simulation where doubles are IEEE and nothing is contracted or reassociated:
+   compile with -std=c99 -ffp-contract=off, never with -ffast-math.
+
+
+   Certificate: certificate.json, sha256 3cc1c3be8f2c31aef798167487e172adb5bfbf90e8f6c39fdab992441e773c31:
+   proved
+   Claims:
+     proved: converges: with wheels that have neither limits nor friction, from every attitude and rate the
+     body comes to rest on target, almost always: it could also rest at half turns, which are unstable
+     proved: within the wheels' limits: from the level set of V that holds rest at up to 26.57° and, on
+     target, 1.416°/s about any axis, while the total momentum is at most 0.02945 N m s, no motor gives
+     more than 0.02 N m and no wheel stores more than 0.1771 N m s
+     proved: uncertain inertia: with wheels that have neither limits nor friction, from every attitude and
+     rate it converges whatever the inertia of the body really is
+     proved: torque held between samples: the linear loop is stable with the torque held for 0.1 s and for
+     every period up to 13.62 s
+   These claims assume: rigid body; inertia exactly as given; exact measurement and ideal actuators; torque
+   applied continuously; neither torque nor wheels limited, wheels without friction; no torque from outside
+   but what the law cancels; wheels without friction; total momentum at most as told; no torque from
+   outside; target at rest; linear motion near rest on a target at rest; no stored momentum.
+   Check it independently: starhold check certificate.json */
+
+#ifndef WHEEL_H
+#define WHEEL_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* s: the step is to be called once in each such period. */
+#define WHEEL_PERIOD (0.1)
+
+/* Scalar part first, Hamilton product. */
+typedef struct {
+    double q0, q1, q2, q3;
+} wheel_quaternion_t;
+
+/* Components along the axes. */
+typedef struct {
+    double x, y, z;
+} wheel_vector_t;
+
+typedef struct {
+    double e[4];
+} wheel_doubles4_t;
+
+/* The absolute angular momentum of each rotor about its spin axis (N m s). */
+typedef struct {
+    wheel_doubles4_t momentum;
+} wheel_wheels_state_t;
+
+typedef struct {
+    wheel_quaternion_t attitude; /* inertial to body, unit quaternion, scalar first */
+    wheel_vector_t rate; /* rad/s: angular velocity, body axes */
+    wheel_vector_t position; /* m: from the centre of attraction, inertial axes */
+    wheel_vector_t velocity; /* m/s: inertial axes */
+    wheel_wheels_state_t wheels; /* as their tachometers tell */
+} wheel_input_t;
+
+typedef struct {
+    wheel_vector_t torque; /* N m: torque commanded, within the limits, body axes */
+} wheel_command_t;
+
+/* What is remembered from step to step: set it by the function below, and leave it alone. */
+typedef struct {
+    wheel_quaternion_t followed;
+} wheel_state_t;
+
+/* Sets the state to that of the scenario's start. */
+void wheel_init(wheel_state_t *state);
+
+/* One control step: u = -k_rate w - S + w_abs x (J w_abs + H) + J w_target' - M_ext, S = 4 k q0 q from
+   direction cosines. Takes what was measured at this instant, gives what to command until the next, and
+   changes the state. It calls nothing but sqrt and keeps nothing outside the state. It does not check what
+   it is given: a NaN that the law uses comes out as one. */
+void wheel_step(wheel_state_t *state, const wheel_input_t *input, wheel_command_t *command);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* WHEEL_H */
