@@ -72,7 +72,7 @@ class Recording(Recorder):
 
     @property
     def block(self) -> list[Any]:
-        """What was recorded outside of functions."""
+        """The notes that were taken outside of functions."""
         return self._open[0]
 
     @property
