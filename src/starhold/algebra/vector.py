@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, TypeAlias
 
-from starhold.algebra.scalar import Scalar, clip, less, maximum, sign, sqrt, where
+from starhold.algebra.scalar import Scalar, absolute, clip, less, maximum, sign, sqrt, where
 
 Vector: TypeAlias = tuple[Scalar, Scalar, Scalar]
 Matrix: TypeAlias = tuple[Vector, Vector, Vector]
@@ -46,6 +46,14 @@ def cross(a: Vector, b: Vector) -> Vector:
 def norm(a: Vector) -> Scalar:
     """Return the Euclidean length."""
     return sqrt(dot(a, a))
+
+
+def most(a: tuple[Scalar, ...]) -> Scalar:
+    """Return the largest size of a component."""
+    found = absolute(a[0])
+    for component in a[1:]:
+        found = maximum(found, absolute(component))
+    return found
 
 
 def unit(a: Vector) -> Vector:

@@ -14,9 +14,9 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.scalar import absolute, less, less_equal, maximum, sqrt, where
+from starhold.algebra.scalar import less, less_equal, sqrt, where
 from starhold.algebra.structure import flatten, unflatten
-from starhold.algebra.vector import dot
+from starhold.algebra.vector import dot, most
 from starhold.analysis.metrics import ALMOST, KEPT, LAST
 from starhold.loop.closed_loop import Composition
 from starhold.loop.kernels import Observer, make_step
@@ -133,14 +133,6 @@ def outside(then: Any, square: Any, bound: Any, now: Any) -> Any:
 def chosen(condition: Any, a: Any, b: Any) -> Any:
     """A vector, number by number the one or the other."""
     return tuple(where(condition, x, y) for x, y in zip(a, b, strict=True))
-
-
-def most(v: tuple[Any, ...]) -> Any:
-    """The largest size of a component."""
-    found = absolute(v[0])
-    for component in v[1:]:
-        found = maximum(found, absolute(component))
-    return found
 
 
 def is_on_limit(command: Any, limit: Any, kind: str) -> Any:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.vector import Matrix, Vector
+from starhold.algebra.vector import inverse as inverse_matrix
 
 EARTH = 3.986e14
 """Gravitational parameter of the Earth, m3/s2, as the published experiment uses it."""
@@ -47,7 +48,14 @@ def make_craft(inertia: Any, torque_limit: float = math.inf, gravity: float = EA
     full = check_inertia(inertia)
     if not torque_limit > 0.0:
         raise ValueError(f"the torque limit must be positive, not {torque_limit:g}")
-    return Craft(compact(full), compact(np.linalg.inv(full)), float(torque_limit), float(gravity))
+    moments = compact(full)
+    return Craft(moments, inverse(moments), float(torque_limit), float(gravity))
+
+
+def inverse(inertia: Matrix | Vector) -> Matrix | Vector:
+    """The inverse of an inertia, of the same form: an equation, so that whoever makes a craft makes the same bits."""
+    rows: Any = inertia
+    return inverse_matrix(rows) if isinstance(rows[0], tuple) else (1.0 / rows[0], 1.0 / rows[1], 1.0 / rows[2])
 
 
 def tensor(inertia: Matrix | Vector) -> NDArray[np.float64]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from starhold.laws.catalogue import Law
 
@@ -23,6 +24,17 @@ class Made(Protocol):
         ...
 
 
+class Moved(NamedTuple):
+    """The numbers of a loop that values of a file's keys give: the body's first state as its motion begins and as the loop
+    is made with it, the craft that flies, the nominal model that the law has, and where the command is cut off."""
+
+    start: Any
+    made_with: Any
+    craft: Any
+    nominal: Any
+    limit: Any
+
+
 class Body(Protocol):
     """One body: its tables, its laws, and how loops are built of them. Its `tables` have a `simulation` that is a `Timing`;
     a table of a part's parameters is made of `schema.columns`."""
@@ -37,6 +49,8 @@ class Body(Protocol):
     """The keys of tables of laws beside their gains."""
     example: str
     """A small scenario in TOML, to which a law's table can be appended."""
+    linked: Mapping[str, str] = MappingProxyType({})
+    """Keys of `dials` whose value is that of another key until they are moved themselves."""
 
     @property
     def template(self) -> str:
@@ -84,6 +98,19 @@ class Body(Protocol):
         (components..., lanes) by key, with an array (lanes,) in place of each number and the bits that `build` would give;
         empty where only `build` can tell."""
         return {}
+
+    def dials(self, scenario: Scenario) -> dict[str, Any]:
+        """The keys that `moved` takes, with the numbers that the scenario has there."""
+        return {}
+
+    def moved(self, scenario: Scenario, loop: Any, values: Mapping[str, Any]) -> Moved:
+        """The numbers of a law's loop under other values of the keys of `dials`: an equation, with the bits that `build`
+        gives of the scenario that `changes` tells."""
+        return Moved(loop.start, loop.start, loop.craft, loop.craft, loop.cutoff())
+
+    def changes(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """The changes of a file, as a scenario's `with_` takes them, that values of these keys mean."""
+        return dict(values)
 
     def refused(self, scenario: Scenario, columns: Mapping[str, Any]) -> Any:
         """Which lanes have values, (components..., lanes) by key, that no body has, beyond the bounds of each number:

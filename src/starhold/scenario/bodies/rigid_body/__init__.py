@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from starhold.laws.catalogue import Law, catalogue
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.scenario.bodies.interface import Body
+from starhold.scenario.bodies.interface import Body, Moved
 from starhold.scenario.bodies.rigid_body.building import build, check_events
 from starhold.scenario.bodies.rigid_body.craft import Made, make
+from starhold.scenario.bodies.rigid_body.dials import KNOWN, TRUE, changes, dials, moved
 from starhold.scenario.bodies.rigid_body.lanes import derive, refused
 from starhold.scenario.bodies.rigid_body.start import told_to_design
 from starhold.scenario.bodies.rigid_body.tables import AttitudeLawTable, RigidBodyTable
@@ -45,6 +47,7 @@ class RigidBody(Body):
     tables = RigidBodyTable
     law_table = AttitudeLawTable
     example = EXAMPLE
+    linked = MappingProxyType({TRUE: KNOWN})
 
     def laws(self) -> Mapping[str, Law]:
         return catalogue()
@@ -63,6 +66,15 @@ class RigidBody(Body):
 
     def derive(self, scenario: Scenario, columns: Mapping[str, Any]) -> dict[str, Any]:
         return derive(scenario, columns)
+
+    def dials(self, scenario: Scenario) -> dict[str, Any]:
+        return dials(scenario)
+
+    def moved(self, scenario: Scenario, loop: ClosedLoop, values: Mapping[str, Any]) -> Moved:
+        return moved(scenario, loop, values)
+
+    def changes(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        return changes(values)
 
     def refused(self, scenario: Scenario, columns: Mapping[str, Any]) -> Any:
         return refused(scenario, columns)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from starhold.errors import InputError
-from starhold.parts.craft import Craft, compact, make_craft
+from starhold.parts.craft import Craft, compact, inverse, make_craft
 from starhold.parts.effectors.envelope import authority
 from starhold.parts.effectors.wheels import Wheels, body_inertia
 from starhold.scenario.bodies.rigid_body.rotors import make_rotors
@@ -50,7 +50,7 @@ def _craft(table: RigidBodyTable, wheels: Wheels | None, inertia: Any) -> Craft:
     if wheels is None:
         return craft
     rest = body_inertia(inertia, wheels)
-    return craft._replace(inertia=compact(rest), inverse_inertia=compact(np.linalg.inv(rest)), with_rotors=craft.inertia)
+    return craft._replace(inertia=compact(rest), inverse_inertia=inverse(compact(rest)), with_rotors=craft.inertia)
 
 
 def torque_limit(table: RigidBodyTable, wheels: Wheels | None) -> float:

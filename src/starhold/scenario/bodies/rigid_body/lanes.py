@@ -13,7 +13,7 @@ from starhold.algebra.cosines import from_angles
 from starhold.algebra.quaternion import NO_TURN, multiply, stretch, to_body
 from starhold.algebra.vector import add
 from starhold.parts.bodies.rigid_body import State
-from starhold.parts.craft import Craft
+from starhold.parts.craft import Craft, inverse
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.bodies.rigid_body.start import goal_at_start, start_of, target_of
 
@@ -88,13 +88,12 @@ def _craft(craft: Craft, moments: Array) -> Craft:
     else:
         full = np.moveaxis(moments, -1, 0)
         full = 0.5 * (full + full.swapaxes(1, 2))
-    inverse = np.linalg.inv(full)
+    made: Any
     if isinstance(craft.inertia[0], tuple):
-        made = (tuple(tuple(row.T) for row in part.swapaxes(0, 1)) for part in (full, inverse))
+        made = tuple(tuple(row.T) for row in full.swapaxes(0, 1))
     else:
-        made = (tuple(part[:, k, k] for k in range(3)) for part in (full, inverse))
-    inertia, inverted = made
-    return craft._replace(inertia=inertia, inverse_inertia=inverted)  # pyright: ignore[reportArgumentType]
+        made = tuple(full[:, k, k] for k in range(3))
+    return craft._replace(inertia=made, inverse_inertia=inverse(made))
 
 
 def refused(scenario: Scenario, columns: Mapping[str, Array]) -> NDArray[np.bool_] | None:

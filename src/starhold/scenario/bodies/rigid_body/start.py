@@ -11,7 +11,7 @@ import numpy as np
 from starhold.algebra.cosines import from_angles
 from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise, relative, stretch, to_body
 from starhold.algebra.scalar import side
-from starhold.algebra.vector import ZERO, add, subtract
+from starhold.algebra.vector import ZERO, add, most, subtract
 from starhold.errors import InputError
 from starhold.laws.interface import Start
 from starhold.parts.bodies.rigid_body import State
@@ -32,10 +32,13 @@ if TYPE_CHECKING:
 def _attitude(pointing: Pointing) -> Quaternion:
     if pointing.angles is not None:
         return from_angles(*pointing.angles)
-    if pointing.attitude is None:
-        return NO_TURN
+    return NO_TURN if pointing.attitude is None else unit_of(pointing.attitude)
+
+
+def unit_of(given: Quaternion) -> Quaternion:
+    """The unit quaternion in the direction of four numbers; an equation."""
     # Scaled first, so that the squares of odd numbers neither vanish nor overflow.
-    return normalise(stretch(1.0 / max(map(abs, pointing.attitude)), pointing.attitude))
+    return normalise(stretch(1.0 / most(given), given))
 
 
 def target_of(scenario: Scenario) -> Fitted:
@@ -68,12 +71,13 @@ def _history(scenario: Scenario, use: Callable[..., Any]) -> Any:
         raise InputError(scenario.where, "target.file", f"{path}: {error}", allowed) from None
 
 
-def start_of(scenario: Scenario, goal: Fitted) -> State:
-    """The first state of a run with this target."""
+def start_of(scenario: Scenario, goal: Fitted, attitude: Any = None, rate: Any = None) -> State:
+    """The first state of a run with this target; of numbers in the place of those of [initial] an equation."""
     table = scenario.table
     orbit = table.orbit
     position, velocity = (ZERO, ZERO) if orbit is None else orbit.start
-    begun = State(_attitude(table.initial), table.initial.rate, position, velocity, ZERO)
+    turned = _attitude(table.initial) if attitude is None else unit_of(attitude)
+    begun = State(turned, table.initial.rate if rate is None else rate, position, velocity, ZERO)
     if table.initial.relative_to == "target":
         held = goal_at_start(goal, begun)
         rate = add(begun.rate, to_body(begun.attitude, held.rate))

@@ -1,0 +1,107 @@
+"""What of a spacecraft can be moved while its loop stays the same program: inertia, limit and start, as equations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import reduce
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from starhold.algebra.scalar import both, less_equal, minimum, where
+from starhold.algebra.structure import leaves
+from starhold.algebra.vector import apply
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.craft import Craft, compact, inverse
+from starhold.parts.effectors.wheels import body_inertia
+from starhold.scenario.bodies.interface import Moved
+from starhold.scenario.bodies.rigid_body.craft import torque_limit, wheels_of
+from starhold.scenario.bodies.rigid_body.start import start_of, target_of
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import Scenario
+
+KNOWN, TRUE = "spacecraft.inertia", "fault[1].inertia"
+"""The inertia that the laws know, and the one that the craft has where they do not know it."""
+LIMIT, ATTITUDE, RATE = "spacecraft.torque_limit", "initial.attitude", "initial.rate"
+
+
+def dials(scenario: Scenario) -> dict[str, Any]:
+    """The keys that may be moved, with their numbers; an attitude given by angles comes as a quaternion, and a limit that
+    is infinite not at all. With faults nothing may: what they change is not told by equations."""
+    table = scenario.table
+    if table.fault:
+        return {}
+    inertia = compact(table.spacecraft.inertia)
+    found: dict[str, Any] = {KNOWN: inertia, TRUE: inertia}
+    if math.isfinite(table.spacecraft.torque_limit) and table.spacecraft.limit != "none":
+        found[LIMIT] = table.spacecraft.torque_limit
+    given = table.initial.attitude
+    own = start_of(scenario.with_({"initial.relative_to": "inertial"}), target_of(scenario)).attitude
+    found[ATTITUDE] = tuple(map(float, own if given is None else given))
+    return found | {RATE: tuple(map(float, table.initial.rate))}
+
+
+def changes(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The changes of a file that values of these keys mean: an inertia that the laws do not know is that of a fault at the
+    start, about which nothing is done."""
+    found = {key: value for key, value in values.items() if key != TRUE}
+    if ATTITUDE in found:
+        found["initial.angles"] = None
+    if TRUE in values:
+        found["fault"] = [{"time": 0.0, "inertia": values[TRUE], "action": "none"}]
+    return found
+
+
+def moved(scenario: Scenario, loop: ClosedLoop, values: Mapping[str, Any]) -> Moved:
+    """The numbers of a loop under these values, as `build` and `make_events` give them."""
+    craft, limit = loop.craft, values.get(LIMIT)
+    cutoff = loop.cutoff()
+    if limit is not None:
+        cutoff, reckoned = limit, limit
+        wheels = wheels_of(scenario)
+        if wheels is not None:
+            # What the wheels surely give does not depend on the limit.
+            free = scenario.table.model_copy(
+                update={"spacecraft": scenario.table.spacecraft.model_copy(update={"torque_limit": math.inf})}
+            )
+            reckoned = minimum(limit, torque_limit(free, wheels))
+        craft = craft._replace(torque_limit=reckoned)
+    nominal = _with_inertia(scenario, craft, values[KNOWN]) if KNOWN in values else craft
+    flown = _with_inertia(scenario, craft, values[TRUE]) if TRUE in values else nominal
+    begun = start_of(scenario, target_of(scenario), values.get(ATTITUDE), values.get(RATE))
+    # An inertia that changes as the motion begins leaves the angular momentum, as in `Phase.rate_from`.
+    pairs = zip(leaves(flown.inertia), leaves(nominal.inertia), strict=True)
+    same = reduce(both, (both(less_equal(a, b), less_equal(b, a)) for a, b in pairs))
+    jumped = apply(flown.inverse_inertia, apply(nominal.inertia, begun.rate))
+    rate: Any = tuple(where(same, kept, other) for kept, other in zip(begun.rate, jumped, strict=True))
+    return Moved(begun._replace(rate=rate), begun, flown, nominal, cutoff)
+
+
+def _with_inertia(scenario: Scenario, craft: Craft, inertia: Any) -> Craft:
+    """The craft with another inertia of the same form, its wheels included."""
+    wheels = wheels_of(scenario)
+    if wheels is None:
+        return craft._replace(inertia=inertia, inverse_inertia=inverse(inertia))
+    nominal = scenario.table.spacecraft.inertia
+    rest = body_inertia(nominal, wheels)
+    rotors = (np.array(wheels.axes).T * np.array(wheels.inertia)) @ np.array(wheels.axes)
+    own = _less(_as_form(inertia, craft.inertia), rotors, rest)
+    return craft._replace(inertia=own, inverse_inertia=inverse(own), with_rotors=inertia)
+
+
+def _as_form(inertia: Any, like: Any) -> Any:
+    """An inertia written as a matrix where the one without rotors is one."""
+    if isinstance(like[0], tuple) and not isinstance(inertia[0], tuple):
+        return tuple(tuple(inertia[i] if i == j else 0.0 for j in range(3)) for i in range(3))
+    return inertia
+
+
+def _less(inertia: Any, rotors: Any, rest: Any) -> Any:
+    """An inertia without the rotors' moments; what is zero of the nominal one stays so, for it is but rounding."""
+    if not isinstance(inertia[0], tuple):
+        return tuple(inertia[i] - float(rotors[i, i]) for i in range(3))
+    return tuple(
+        tuple(inertia[i][j] - float(rotors[i, j]) if rest[i, j] != 0.0 else 0.0 for j in range(3)) for i in range(3)
+    )

@@ -1,0 +1,351 @@
+"""A scenario that flies again elsewhere with other numbers: each law's loop as a program, and the equations that give its
+numbers from values of the file's keys.
+
+Which keys a loop can follow is told by no list: scenarios with other values are built, and a key counts where the equations
+give their bits. What follows a key otherwise, such as a law's matrices, holds the key.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import islice
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.structure import flatten, leaves, mapped
+from starhold.errors import InputError
+from starhold.loop.kernels import Arguments, Numbers, form, make_step, numbers_of, one
+from starhold.scenario.building import build
+from starhold.scenario.checking import read_toml
+from starhold.scenario.making import changed, plain, variants
+from starhold.simulation.lane import recorded
+from starhold.trace.calling import record_call
+from starhold.trace.handles import Handle
+from starhold.trace.program import Load, Program, statements
+
+if TYPE_CHECKING:
+    from starhold.laws.interface import Field
+    from starhold.loop.closed_loop import ClosedLoop
+    from starhold.scenario.reading import LawEntry, Scenario
+
+Array: TypeAlias = NDArray[np.float64]
+Values: TypeAlias = dict[str, Any]
+"""Numbers, vectors or matrices by the keys of a file."""
+
+FAULTS = "faults change the loop on the way"
+COMPUTED = "it enters numbers that no recorded equation gives, such as a law's matrices"
+ALONE = "no value beside the file's own is allowed"
+TRIED = ((1.05, 0.97, 1.02), (1.02, 1.02, 1.02), (0.9, 0.9, 0.9))
+"""Factors by which components are changed to see what follows them: the first that the scenario takes."""
+NUDGE = 1e-3
+"""What takes the place of a zero there."""
+
+
+@dataclass(frozen=True)
+class Reflown:
+    """One law's loop, to be flown elsewhere.
+
+    program: `fly` as `kernels.one` records it; derive: the numbers at `places` among those of the carry and, after them, of
+    the shared arguments, from the values of the keys `follows`, in order; numbers, tables: all as the scenario has them;
+    held: why each other key is not followed; every, steps, seed, run, period: as for `fly`; columns: names of the recorded
+    quantities with how many numbers each has; reads: which numbers of the nominal model the law looks at, "inertia" or
+    "torque_limit".
+    """
+
+    name: str
+    program: Program
+    derive: Program | None
+    follows: tuple[str, ...]
+    places: tuple[int, ...]
+    carried: int
+    numbers: Array
+    tables: Array
+    lost_place: int
+    columns: tuple[tuple[str, int], ...]
+    steps: int
+    seed: int
+    run: int
+    period: float
+    held: dict[str, str] = field(default_factory=dict[str, str])
+    reads: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class Reflight:
+    """A scenario to be flown again: keys that can be moved, with the numbers there; the laws; why a law cannot fly again;
+    and the file, with the keys' values left open, see `pieces`."""
+
+    scenario: Scenario
+    dials: Values
+    gains: dict[str, Field]
+    laws: tuple[Reflown, ...]
+    grounded: dict[str, str]
+    pieces: tuple[Piece, ...]
+
+    def changed(self, values: Mapping[str, Any]) -> Scenario:
+        """The scenario with these values at keys of `dials`, as the page's file has it."""
+        return changed(self.scenario, _changes(self.scenario, values))
+
+
+class Piece(NamedTuple):
+    """A piece of a file: a text, or the value of a key. `only`: the key without whose move the piece is left out."""
+
+    text: str = ""
+    key: str = ""
+    only: str = ""
+
+
+def reflight(scenario: Scenario) -> Reflight:
+    """What flies a scenario again. Designed gains are held as they are: the scenario has them as numbers."""
+    held = _explicit(scenario)
+    dials = dict(held.hooks.dials(held))
+    shared = list(dials)
+    gains: dict[str, Field] = {}
+    for entry in held.laws:
+        for item, value in zip(entry.law.fields(), entry.gains, strict=True):
+            if _is_numbers(value) and not item.gain.whole and not item.gain.choices:
+                key = f"law.{entry.name}.{item.name}"
+                dials[key], gains[key] = value, item
+    # An attitude that is given by angles is moved as a quaternion.
+    held = changed(held, _changes(held, {key: dials[key] for key in shared if key == "initial.attitude"}))
+    tried = _Tried(held, dials)
+    laws: list[Reflown] = []
+    grounded: dict[str, str] = {}
+    for entry in held.laws:
+        loop = build(held, entry)
+        if loop.events:
+            grounded[entry.name] = FAULTS
+        else:
+            own = [key for key in gains if key.startswith(f"law.{entry.name}.") and key[len(entry.name) + 5 :] in _names(entry)]
+            laws.append(_reflown(held, entry, loop, {key: dials[key] for key in (*shared, *own)}, tried))
+    return Reflight(held, dials, gains, tuple(laws), grounded, tuple(_pieces(held, dials)))
+
+
+def _names(entry: LawEntry) -> list[str]:
+    return [item.name for item in entry.law.fields()]
+
+
+def _is_numbers(value: Any) -> bool:
+    return all(isinstance(leaf, float) and math.isfinite(leaf) for leaf in leaves(value)) and value != ()
+
+
+def _explicit(scenario: Scenario) -> Scenario:
+    """The scenario with the gains that forms gave written out."""
+    if all(entry.form is None for entry in scenario.laws):
+        return scenario
+    changes: dict[str, Any] = {}
+    for place, entry in enumerate(scenario.laws, 1):
+        if entry.form is None:
+            continue
+        changes |= {f"law[{place}].{item.name}": None for item in entry.law.fields(entry.form)}
+        changes[f"law[{place}].form"] = None
+        for item, value in zip(entry.law.fields(), entry.gains, strict=True):
+            changes[f"law[{place}].{item.name}"] = item.gain.choices[value] if item.gain.choices else value
+    return changed(scenario, changes)
+
+
+def _changes(scenario: Scenario, values: Mapping[str, Any]) -> dict[str, Any]:
+    """The changes of the file that values of dials mean."""
+    own = {key: value for key, value in values.items() if key.startswith("law.")}
+    return scenario.hooks.changes({key: value for key, value in values.items() if key not in own}) | own
+
+
+class _Tried:
+    """Scenarios with other values of one key, built for each law where they are asked for."""
+
+    def __init__(self, scenario: Scenario, dials: Values) -> None:
+        self.scenario, self.dials = scenario, dials
+        self._known: dict[str, list[tuple[Any, Scenario]]] = {}
+
+    def of(self, key: str) -> list[tuple[Any, Scenario]]:
+        """Another value of a key, with the scenario that has it; none where no other is allowed."""
+        if key not in self._known:
+            found = ((value, other) for value in _others(self.dials[key]) for other in self._with({key: value}))
+            self._known[key] = list(islice(found, 1))
+        return self._known[key]
+
+    def together(self, keys: Sequence[str]) -> list[tuple[Values, Scenario]]:
+        """All these keys moved at once."""
+        values = {key: self.of(key)[0][0] for key in keys}
+        return [(values, other) for other in self._with(values)]
+
+    def _with(self, values: Values) -> Iterator[Scenario]:
+        try:
+            yield from variants(self.scenario, [_changes(self.scenario, values)])
+        except InputError:
+            return
+
+
+def _others(value: Any) -> Iterator[Any]:
+    for factors in TRIED:
+        turn = iter(range(1 << 20))
+        moved = mapped(value, lambda x, f=factors, t=turn: x * f[next(t) % 3] if x else NUDGE)
+        # Of a symmetric matrix another symmetric one.
+        if isinstance(moved, tuple) and isinstance(moved[0], tuple):
+            moved = tuple(tuple(moved[min(i, j)][max(i, j)] for j in range(3)) for i in range(3))
+        yield moved
+
+
+def _reflown(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, own: Values, tried: _Tried) -> Reflown:
+    timing = scenario.table.simulation
+    steps = timing.steps
+    numbers, like = _numbers(loop, steps), _form(loop, steps)
+
+    def follows(values: Values, other: Scenario, keys: Sequence[str]) -> bool:
+        try:
+            # Not tried out, as `build` does: only its numbers are looked at.
+            made = other.hooks.build(other, other.pick(entry.name))
+            # A key that goes with another has its value, unless it is moved itself.
+            along = {key: values[leader] for key, leader in scenario.hooks.linked.items() if leader in values}
+            given = {key: (own | along | values)[key] for key in keys}
+            return _form(made, steps) == like and _same(_numbers(made, steps), _given(scenario, loop, given))
+        except (InputError, ValueError, ZeroDivisionError):
+            return False
+
+    held: dict[str, str] = {}
+    # The start is the file's own with no key moved, as with all of them given.
+    kept = [key for key in own if not key.startswith("law.")]
+    kept = kept if _same(numbers, _given(scenario, loop, {key: own[key] for key in kept})) else []
+    held |= {key: COMPUTED for key in own if not key.startswith("law.") and key not in kept}
+    kept += [key for key in own if key.startswith("law.")]
+    for key in list(kept):
+        others = tried.of(key)
+        if not others or not all(follows({key: value}, other, kept) for value, other in others):
+            held[key] = COMPUTED if others else ALONE
+    kept = [key for key in kept if key not in held]
+    if kept and not all(follows(values, other, kept) for values, other in tried.together(kept)):
+        held |= dict.fromkeys(kept, COMPUTED)
+        kept = []
+    derive, places = _recorded(scenario, loop, {key: own[key] for key in kept}) if kept else (None, ())
+    carry, phase = loop.carry(), loop.phases(steps)[0]
+    step = make_step(loop.composition())
+    program = one(step, carry, Numbers.of(phase), loop.substeps)
+    lost = len(flatten(carry)) - 1
+    return Reflown(
+        entry.name,
+        program,
+        derive,
+        tuple(kept),
+        places,
+        len(numbers_of(carry)),
+        numbers,
+        Arguments(*Numbers.of(phase)).tables,
+        lost,
+        tuple((name, size) for name, _, size in recorded(loop)),
+        steps,
+        loop.seed,
+        loop.run,
+        loop.period,
+        held,
+        _reads(program, phase),
+    )
+
+
+def _numbers(loop: ClosedLoop, steps: int) -> Array:
+    """The numbers of a loop as its motion begins: of the carry, then those that the kernel's lanes share."""
+    phase = loop.phases(steps)[0]
+    return np.array([*numbers_of(phase.entered(loop.carry())), *_shared(Numbers.of(phase))], dtype=float)
+
+
+def _shared(numbers: Any) -> list[Any]:
+    return [leaf for leaf in leaves(numbers) if isinstance(leaf, float | Handle)]
+
+
+def _form(loop: ClosedLoop, steps: int) -> Any:
+    """Equal for loops that one program flies."""
+    return loop.composition(), form(loop.carry()), form(Numbers.of(loop.phases(steps)[0])), loop.substeps
+
+
+def _same(a: Array, b: Array) -> bool:
+    return a.shape == b.shape and a.tobytes() == b.tobytes()
+
+
+def _equation(scenario: Scenario, loop: ClosedLoop, keys: Sequence[str]) -> Callable[[Any], list[Any]]:
+    """The equation that gives all numbers of a loop from values of these keys, in order."""
+    names = [item.name for item in loop.law.fields()]
+
+    def numbers(values: Any) -> list[Any]:
+        given = dict(zip(keys, values, strict=True))
+        own = {key.rpartition(".")[2]: value for key, value in given.items() if key.startswith("law.")}
+        gains = loop.gains._replace(**{name: own[name] for name in names if name in own})
+        moved = scenario.hooks.moved(scenario, loop, {k: v for k, v in given.items() if not k.startswith("law.")})
+        setup = loop.setup()
+        setup = setup._replace(limit=moved.limit)
+        # What a law remembers is made by its own means, of the file's numbers.
+        carry = loop.carry(moved.made_with, loop.gains, loop.craft, setup)._replace(state=moved.start)
+        shared = Numbers(gains, moved.nominal, moved.craft, setup)
+        return [*numbers_of(carry), *_shared(shared)]
+
+    return numbers
+
+
+def _given(scenario: Scenario, loop: ClosedLoop, values: Values) -> Array:
+    return np.array(_equation(scenario, loop, list(values))(tuple(values.values())), dtype=float)
+
+
+def _recorded(scenario: Scenario, loop: ClosedLoop, own: Values) -> tuple[Program, tuple[int, ...]]:
+    """The equation as a program, which gives the numbers that depend on the values alone, and their places."""
+    equation, found = _equation(scenario, loop, list(own)), list[int]()
+
+    def depending(values: Any) -> tuple[Any, ...]:
+        numbers = equation(values)
+        found[:] = [place for place, number in enumerate(numbers) if isinstance(number, Handle)]
+        return tuple(numbers[place] for place in found)
+
+    return record_call(depending, (tuple(own.values()),))[0], tuple(found)
+
+
+def _reads(program: Program, phase: Any) -> frozenset[str]:
+    """Which numbers of the nominal model a program looks at; nothing but the law does."""
+    first = len(_shared(phase.gains))
+    places: dict[int, str] = {}
+    for name, value in phase.nominal._asdict().items():
+        for _ in _shared(value):
+            places[first + len(places)] = name
+    read: set[int] = set()
+    for function in program.functions:
+        read |= {
+            s.index
+            for s in statements(function.body)
+            if isinstance(s, Load) and s.memory == "shared" and isinstance(s.index, int)
+        }
+    return frozenset("inertia" if "inertia" in name else name for place, name in places.items() if place in read)
+
+
+MARK = "\ue000"
+
+
+def _pieces(scenario: Scenario, dials: Values) -> Iterator[Piece]:
+    """The scenario as a file whose values at the keys of the dials are left open."""
+    from starhold.scenario.making import path_of
+    from starhold.scenario.writing import toml_text
+
+    tables = read_toml(scenario.text, scenario.where)
+    names = {"law": [entry.name for entry in scenario.laws], "part": [part.called for part in scenario.parts]}
+    last: list[str] = []
+    for key in dials:
+        changes = _changes(scenario, {key: f"{MARK}{key}{MARK}"})
+        if "fault" in changes:
+            last.append(key)
+            continue
+        for name, value in changes.items():
+            here: Any = tables
+            *way, end = path_of(name, names, scenario.where)
+            for part in way:
+                here = here[part] if isinstance(part, int) else here.setdefault(part, {})
+            if value is None:
+                here.pop(end, None)
+            else:
+                here[end] = value
+    text = toml_text(plain(tables, scenario.where, ""))
+    for place, part in enumerate(text.replace(f'"{MARK}', MARK).replace(f'{MARK}"', MARK).split(MARK)):
+        yield Piece(key=part) if place % 2 else Piece(part)
+    for key in last:
+        faults = toml_text(plain(_changes(scenario, {key: f"{MARK}{key}{MARK}"}), scenario.where, ""))
+        before, _, after = faults.replace(f'"{MARK}', MARK).replace(f'{MARK}"', MARK).split(MARK)
+        yield from (Piece(before, only=key), Piece(key=key, only=key), Piece(after, only=key))
+
