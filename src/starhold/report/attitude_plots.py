@@ -51,22 +51,26 @@ class AttitudePlots:
 def collect(flights: Sequence[Flight], points: int, scenario: Scenario, end: float = math.inf) -> AttitudePlots:
     """The plots of a comparison, each curve thinned to about `points` samples; marks up to `end` (s)."""
     longest = max((flight.recording["time"] for flight in flights), key=len)
-    factor = 1 if len(longest) <= points else int(np.ceil(2 * len(longest) / points))
+    factor = thinning(len(longest), points)
 
     def curves(name: str, column: int, scale: float = 1.0) -> list[Curve]:
         return [thin(flight.recording[name][:, column] * scale, factor) for flight in flights]
 
     rate_scale, rate_unit = _rate_unit(flights)
     levels, dashed = _limit(flights, scenario)
-    rates = [Panel(f"{axis}, {rate_unit}", curves("rate_error", i, rate_scale)) for i, axis in enumerate("xyz")]
-    torques = [Panel(f"{axis}, N m", curves("torque", i), False, levels) for i, axis in enumerate("xyz")]
-    scalar = Panel("q₀", curves("attitude_error", 0))
-    vector = [Panel(f"q{'₁₂₃'[i]}", curves("attitude_error", i + 1)) for i in range(3)]
+
+    def panel(label: str, name: str, column: int, scale: float = 1.0, levels: tuple[float, ...] = ()) -> Panel:
+        return Panel(label, curves(name, column, scale), False, levels, source=("column", name, column, scale))
+
+    rates = [panel(f"{axis}, {rate_unit}", "rate_error", i, rate_scale) for i, axis in enumerate("xyz")]
+    torques = [panel(f"{axis}, N m", "torque", i, levels=levels) for i, axis in enumerate("xyz")]
+    scalar = panel("q₀", "attitude_error", 0)
+    vector = [panel(f"q{'₁₂₃'[i]}", "attitude_error", i + 1) for i in range(3)]
     return AttitudePlots(
         thin_times(longest, factor),
         Plot("scalar", "scalar part of the error quaternion", [scalar]),
         Plot("attitude", "vector part of the error quaternion", vector),
-        Plot("rate", "angular velocity relative to the target", [sound(panel, flights) for panel in rates]),
+        Plot("rate", "angular velocity relative to the target", [sound(one, flights) for one in rates]),
         Plot("torque", "torque applied", torques, dashed, True),
         _angle(flights, factor, scenario),
         _roll_pitch_yaw(flights, factor),
@@ -77,6 +81,11 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario, end: flo
         ),
         tuple(time for time in fault_times(scenario) if time <= end),
     )
+
+
+def thinning(count: int, points: int) -> int:
+    """Of how many samples a curve keeps two, of so many in all for about `points`."""
+    return 1 if count <= points else int(np.ceil(2 * count / points))
 
 
 def steps_within(flight: Flight, kind: str) -> list[int | None]:
@@ -93,14 +102,17 @@ def _angle(flights: Sequence[Flight], factor: int, scenario: Scenario) -> Plot:
     speeds = [thin(np.linalg.norm(flight.recording["rate_error"], axis=1) * degrees, factor) for flight in flights]
     settling = scenario.table.settling
     within, slow = (settling.attitude_tolerance * degrees,), (settling.rate_tolerance * degrees,)
-    panels = [positive("angle, deg", angles, within), sound(positive("rate, deg/s", speeds, slow), flights)]
+    panels = [
+        replace(positive("angle, deg", angles, within), source=("angle", degrees)),
+        replace(sound(positive("rate, deg/s", speeds, slow), flights), source=("norm", "rate_error", degrees)),
+    ]
     return Plot("angle", "error angle and relative rate", panels, "tolerance")
 
 
 def _roll_pitch_yaw(flights: Sequence[Flight], factor: int) -> Plot:
     errors = [roll_pitch_yaw(flight.recording["attitude_error"]) for flight in flights]
     panels = [
-        Panel(f"{name}, deg", [_unwrapped(thin(own[:, i], factor)) for own in errors])
+        Panel(f"{name}, deg", [_unwrapped(thin(own[:, i], factor)) for own in errors], source=("turn", i))
         for i, name in enumerate(("roll", "pitch", "yaw"))
     ]
     return Plot("roll-pitch-yaw", "roll, pitch and yaw error", panels)
@@ -155,11 +167,12 @@ def _transient(flights: Sequence[Flight], factor: int, scenario: Scenario) -> tu
     rates = [thin(np.linalg.norm(flight.recording["rate"], axis=1) * degrees, factor) for flight in flights]
     turned = [acceleration(flight.recording) * degrees for flight in flights]
     fastest = table.rate_limit * degrees
-    panels = [Panel("norm, deg/s", rates, False, near((fastest,), rates))]
+    panels = [Panel("norm, deg/s", rates, False, near((fastest,), rates), source=("norm", "rate", degrees))]
     for i, axis in enumerate("xyz"):
         curves = [thin(own[:, i], factor) for own in turned]
         limit = table.acceleration_limit * degrees
-        panels.append(Panel(f"{axis}, deg/s²", curves, False, near((-limit, limit), curves)))
+        levels = near((-limit, limit), curves)
+        panels.append(Panel(f"{axis}, deg/s²", curves, False, levels, source=("acceleration", i, degrees)))
     return (
         Plot(
             "transient",
@@ -183,7 +196,7 @@ def _wheels(flights: Sequence[Flight], factor: int, scenario: Scenario) -> tuple
         for wheel in range(flights[0].recording[name].shape[1]):
             curves = [thin(flight.recording[name][:, wheel], factor) for flight in flights]
             levels = () if limits is None else (-limits[wheel], limits[wheel])
-            panels.append(Panel(f"wheel {wheel + 1}, {unit}", curves, False, levels))
+            panels.append(Panel(f"wheel {wheel + 1}, {unit}", curves, False, levels, source=("column", name, wheel, 1.0)))
         plots.append(Plot(name.replace("_", "-"), title, panels, "limit" if limits else ""))
     return tuple(plots)
 

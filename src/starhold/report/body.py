@@ -13,6 +13,13 @@ if TYPE_CHECKING:
     from starhold.studies.flight import Flight
 
 
+class Sampling(NamedTuple):
+    """Plots keep two of so many samples; where the transient is shown alone, of so many samples two of so many."""
+
+    factor: int
+    early: tuple[int, int] | None = None
+
+
 class PageParts(NamedTuple):
     """The parts of a page that are the body's own: the data of its scripts, of which "plots" has a box each, HTML, and the
     names of scripts among the assets."""
@@ -30,6 +37,8 @@ class PageParts(NamedTuple):
     """A section above the settings."""
     scripts: Sequence[str] = ()
     footer: str = ""
+    sampling: Sampling | None = None
+    """How curves are thinned on a page that flies again, None for one that does not."""
 
 
 class BodyReport(Protocol):

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from starhold.report.body import report_of
+from starhold.report.living import living_data
 from starhold.report.page_parts import (
     columns_list,
     document,
@@ -48,4 +49,5 @@ def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
         columns_list(flights),
     ]
     data = {"laws": law_data(flights), **own.data}
-    return document(scenario, sections, data, own.scripts, f"{versions()}{own.footer}.")
+    living = None if own.sampling is None else living_data(scenario, flights, own.sampling)
+    return document(scenario, sections, data, own.scripts, f"{versions()}{own.footer}.", living)

@@ -27,16 +27,23 @@ MANY = 9
 """Numbers of a setting beyond which only the first and the last are shown."""
 
 BEST, LOST = '<td class="best">', '<tr class="lost">'
-_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
+_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; worker-src blob:"
+)
+WITH_PLOTLY = ("planes.js", "campaign.js")
+"""Scripts that draw with Plotly; plots over time need less."""
 
 
 def document(
-    scenario: Scenario, sections: Iterable[str], data: Mapping[str, Any], scripts: Sequence[str], footer: str
+    scenario: Scenario,
+    sections: Iterable[str],
+    data: Mapping[str, Any],
+    scripts: Sequence[str],
+    footer: str,
+    living: Mapping[str, Any] | None = None,
 ) -> str:
     """A page of these sections, headed by the scenario's name and ended by its text; the scripts, of the assets, read the
-    data, which names the laws."""
-    from plotly.offline import get_plotlyjs
-
+    data, which names the laws. living: what its scenario flies again with, None for a page that does not."""
     title = escape(scenario.name)
     body = [
         f"<h1>{title}</h1>",
@@ -45,15 +52,27 @@ def document(
         f"<details><summary>Scenario text</summary><pre>{escape(scenario.text)}</pre></details>",
         f"<footer>{escape(footer)}</footer>",
     ]
-    # A script's text ends at the first "</", also within a string.
-    embedded = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    scripts_text = [
-        f'<script type="application/json" id="data">{embedded}</script>',
-        f"<script>{get_plotlyjs()}</script>",
-        f"<script>\n{_asset('plots.js')}{_asset('tables.js')}</script>",
-        f"<script>\n{''.join(_asset(name) for name in scripts)}</script>",
+    libraries, own = [], [*scripts]
+    if any(name in WITH_PLOTLY for name in scripts):
+        from plotly.offline import get_plotlyjs
+
+        libraries.append(get_plotlyjs())
+        own.insert(0, "look.js")
+    if data["plots"]:
+        libraries.append(_asset("uplot.js"))
+        own.insert(0, "plots.js")
+    held = [_held("data", data)]
+    if living is not None:
+        held += [_held("living", living), f'<script type="text/plain" id="flight">\n{_asset("flight.js")}</script>']
+        body.append(DIALS)
+        own += ["living.js", "sliders.js"]
+    ending = [
+        *held,
+        *(f"<script>{library}</script>" for library in libraries),
+        f"<script>\n{_asset('page.js')}{_asset('tables.js')}</script>",
+        *(f"<script>\n{_asset(name)}</script>" for name in own),
     ]
-    return plain_document(scenario.name, [*body, *scripts_text])
+    return plain_document(scenario.name, [*body, *ending])
 
 
 def plain_document(title: str, body: Iterable[str]) -> str:
@@ -65,11 +84,28 @@ def plain_document(title: str, body: Iterable[str]) -> str:
             f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">',
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
             f"<title>{escape(title)} — starhold</title>",
-            f"<style>\n{_asset('page.css')}</style></head><body>",
+            f"<style>\n{_asset('uplot.css')}{_asset('page.css')}</style></head><body>",
             *(part for part in body if part),
             "</body></html>\n",
         ]
     )
+
+
+DIALS = """\
+<button id="dials-button" type="button" aria-expanded="false" aria-controls="dials">Fly again</button>
+<aside id="dials" aria-label="Fly again with other numbers">
+<header><b>Fly again</b><button id="dials-close" type="button" aria-label="close">×</button></header>
+<p class="tools"><button id="dials-reset" type="button">Reset</button><button id="dials-copy" type="button">Copy as TOML</button>\
+<button id="dials-link" type="button">Copy link</button></p>
+<p class="note" id="followed"></p><p class="alarm" id="unsound" hidden></p><div id="staying"></div>
+<div id="groups"></div>
+</aside>"""
+
+
+def _held(name: str, data: Mapping[str, Any]) -> str:
+    """Data for scripts. A script's text ends at the first "</", also within a string."""
+    embedded = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    return f'<script type="application/json" id="{name}">{embedded}</script>'
 
 
 def _asset(name: str) -> str:
@@ -281,6 +317,7 @@ def panel_data(panel: Panel, order: list[int], thin: bool = False) -> dict[str, 
         "ticks": max(1, math.ceil(panel.decades() / 6.0)) if panel.decades() > 2.0 else None,
         "levels": rounded(panel.levels),
         "span": None if panel.span is None else rounded(panel.span),
+        "source": panel.source,
     }
 
 

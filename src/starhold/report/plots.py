@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Container, Sequence
-from dataclasses import dataclass
-from typing import TypeAlias
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,10 @@ class Panel:
     levels: tuple[float, ...] = ()
     span: tuple[float, float] | None = None
     """The ordinates to show, where the curves would not say it well."""
+    source: tuple[Any, ...] = ()
+    """What a page makes the curves of when it flies again: ("column", recorded quantity, component, factor), ("norm",
+    quantity, factor), ("angle", factor), ("turn", 0 roll, 1 pitch, 2 yaw) or ("acceleration", component, factor); nothing
+    for curves that stay."""
 
     def decades(self) -> float:
         """How many powers of ten a logarithmic panel spans."""
@@ -112,7 +116,7 @@ def sound(panel: Panel, flights: Sequence[Flight]) -> Panel:
     high = max(float(np.nanmax(curve)) for curve in kept)
     margin = 0.5 * (high - low) + 1e-9
     span = (low / 2.0, high * 10.0) if panel.log else (low - margin, high + margin)
-    return Panel(panel.label, panel.curves, panel.log, panel.levels, span)
+    return replace(panel, span=span)
 
 
 def recorded_plots(flights: Sequence[Flight], factor: int, known: Container[str] = ()) -> list[Plot]:
@@ -127,7 +131,11 @@ def recorded_plots(flights: Sequence[Flight], factor: int, known: Container[str]
         runs = [np.reshape(flight.recording[name], (len(flight.recording["time"]), -1)) for flight in flights]
         labels = coordinates[dimension].data if dimension in coordinates else range(1, runs[0].shape[1] + 1)
         panels = [
-            Panel(f"{label}, {unit}" if dimension else unit, [thin(run[:, column], factor) for run in runs])
+            Panel(
+                f"{label}, {unit}" if dimension else unit,
+                [thin(run[:, column], factor) for run in runs],
+                source=("column", name, column, 1.0),
+            )
             for column, label in enumerate(labels)
         ]
         shown = [sound(panel, flights) for panel in panels]

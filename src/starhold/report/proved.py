@@ -68,7 +68,8 @@ def _law(flight: Flight, number: int, place: int) -> str:
     certificate = flight.certificates[place]
     head = f"<h3>{swatch(number)}{escape(certificate.name)}</h3>"
     claims = "".join(
-        _claim(claim, certificate.subject, left_text(flight, place, claim.kind)) for claim in certificate.claims
+        _claim(claim, certificate.subject, left_text(flight, place, claim.kind), f"{number}:{place}:{i}")
+        for i, claim in enumerate(certificate.claims)
     )
     if not claims:
         why = escape(unclaimed(certificate.subject))
@@ -76,7 +77,7 @@ def _law(flight: Flight, number: int, place: int) -> str:
     return f'<section class="law">{head}{claims}</section>\n'
 
 
-def _claim(claim: Claim, subject: Mapping[str, Any], left: str) -> str:
+def _claim(claim: Claim, subject: Mapping[str, Any], left: str, mark: str) -> str:
     told = sentence(claim, subject)
     why = "".join(
         f'<span class="why">{escape(f"Needed, but {o.outcome}: {OBLIGATIONS[o.name]}.")} <b>{escape(evidence(o))}</b></span>'
@@ -87,7 +88,7 @@ def _claim(claim: Claim, subject: Mapping[str, Any], left: str) -> str:
         why += f'<span class="why left">This flight leaves the claim: <b>{escape(left)}.</b></span>'
     rows = "".join(_obligation(o) for o in claim.obligations)
     return (
-        f'<details class="claim"><summary>{_outcome(claim.outcome)}<span class="what">'
+        f'<details class="claim" data-claim="{mark}"><summary>{_outcome(claim.outcome)}<span class="what">'
         f"<b>{escape(_sentence_case(HEADINGS[claim.kind]))}</b> {escape(_sentence_case(told))}. "
         f"<small>By {escape(methods(claim))}.</small>{why}</span></summary>\n"
         f'<div class="wide"><table class="text"><tbody>{rows}</tbody></table></div>{_numbers(claim)}'

@@ -63,7 +63,7 @@ function craft() {
       part(cut + gap, half[long], 0.06, panel, "panel")],
   };
 }
-const model = craft();
+let model = craft();
 // Principal axes are the columns of scene.axes.
 const toBody = (p) => [0, 1, 2].map((i) => dot(scene.axes[i], p));
 
@@ -212,4 +212,4 @@ function reach(i) {
   return Math.min(...e.map((c, k) => scene.size[k] / Math.max(Math.abs(c), 1e-9)));
 }
 
-startShow(views, paint, (time) => `${time.toFixed(scene.digits)} s`);
+const repaint = startShow(views, paint, (time) => `${time.toFixed(scene.digits)} s`);

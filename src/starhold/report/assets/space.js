@@ -34,7 +34,7 @@ function timeAt(where) {
   return scene.times[k] + (where - k) * (scene.times[k + 1] - scene.times[k]);
 }
 
-// Slider, button and clock; `paint(view, where)` draws a view at a frame, which need not be whole.
+// Slider, button and clock; `paint(view, where)` draws a view at a frame, which need not be whole. Returns what paints again.
 function startShow(views, paint, timeText) {
   const slider = document.getElementById("moment");
   const clock = document.getElementById("clock");
@@ -80,6 +80,7 @@ function startShow(views, paint, timeText) {
     });
   }
   new ResizeObserver(() => show(place)).observe(views[0].canvas);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => show(place));
+  dark.addEventListener("change", () => show(place));
   show(Number(slider.value));
+  return () => show(place);
 }

@@ -14,8 +14,8 @@ from starhold.algebra.quaternion import conjugate, multiply, to_body
 from starhold.analysis.rigid_body import DECADES
 from starhold.parts.craft import EARTH, total_inertia
 from starhold.report import transients
-from starhold.report.attitude_plots import ACCURACIES, AttitudePlots, collect, early, steps_within, until
-from starhold.report.body import BodyReport, PageParts
+from starhold.report.attitude_plots import ACCURACIES, AttitudePlots, collect, early, steps_within, thinning, until
+from starhold.report.body import BodyReport, PageParts, Sampling
 from starhold.report.colours import colour
 from starhold.report.figures import POINTS, blank, over_time, width_of, without_runs
 from starhold.report.page_parts import POINTS as PAGE_POINTS
@@ -86,8 +86,13 @@ class RigidBodyReport:
             "plots": [*_drawn(plots, flights), _accuracy(flights)],
             "scene": scene,
         }
+        longest = max(len(flight.recording["time"]) for flight in flights)
+        sampling = Sampling(thinning(longest, PAGE_POINTS))
         if end is not None:
-            first = collect(until(flights, end), EARLY_POINTS, scenario, end)
+            early_flights = until(flights, end)
+            count = max(len(flight.recording["time"]) for flight in early_flights)
+            sampling = sampling._replace(early=(count, thinning(count, EARLY_POINTS)))
+            first = collect(early_flights, EARLY_POINTS, scenario, end)
             drawn = {one["name"]: one for one in _drawn(first, flights)}
             data["transient"] = {"times": rounded(first.times), "plots": drawn}
         return PageParts(
@@ -98,6 +103,7 @@ class RigidBodyReport:
             settings="Spacecraft and settings",
             scripts=("space.js", "body.js"),
             footer=f"; seed {scenario.table.simulation.seed}",
+            sampling=sampling,
         )
 
 
@@ -168,6 +174,7 @@ def _scene(scenario: Scenario, flights: Sequence[Flight]) -> dict[str, Any]:
         "times": rounded(times),
         "digits": max(0, min(3, 3 - math.floor(math.log10(max(float(times[-1]), 1e-3))))),
         "attitudes": attitudes,
+        "places": places.tolist(),
         "size": rounded(size, 4),
         "axes": [rounded(row) for row in axes],
         "earth": None if scenario.table.orbit is None else _earth(flights, places),

@@ -1,0 +1,257 @@
+// Flies one law again, and measures and thins what was flown: a worker's whole program, but for the law's own functions,
+// `fly` and `derive`, and `law`, what the page knows of it. The numbers are those that Python gives, bit for bit.
+"use strict";
+
+const { sqrt, abs, max, min, atan2, asin, floor, ceil } = Math;
+
+function floats(text) {
+  const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  return new Float64Array(bytes.buffer);
+}
+
+const base = floats(law.numbers);
+const tables = floats(law.tables);
+const none = new Float64Array(0);
+const width = law.columns.reduce((sum, [, size]) => sum + size, 0);
+const column = {};
+law.columns.reduce((place, [name, size]) => { column[name] = [place, size]; return place + size; }, 0);
+const { every, steps } = law;
+const count = floor(steps / every) + 1;
+const record = new Float64Array(count * width);
+const tick = law.period * every;
+
+// All numbers of the loop from the values of the keys that the law follows, in order.
+function numbersOf(values) {
+  const all = base.slice();
+  if (derive) {
+    const found = new Float64Array(law.places.length);
+    derive(Float64Array.from(values), found, 1);
+    law.places.forEach((place, k) => { all[place] = found[k]; });
+  }
+  return all;
+}
+
+// The samples lie in `record`; returns how many there are, and the control step at which the motion was lost (-1: it was not).
+function flown(values) {
+  const all = numbersOf(values);
+  const carry = all.slice(0, law.carried);
+  const shared = all.slice(law.carried);
+  const memories = { carry, record, shared, own: none, tables };
+  const given = law.memories.map((name) => memories[name]);
+  const call = (first, groups, each, row) => fly(...given, first, groups, each, 0, row, law.seed, law.run);
+  const groups = floor(steps / every);
+  if (groups) call(0, groups, every, 0);
+  const lost = () => carry[law.lost];
+  const rest = steps - groups * every;
+  if (lost() < 0 && rest) call(groups * every, 1, rest, groups);
+  if (lost() >= 0) return { n: max(1, ceil(lost() / every)), lost: lost() };
+  // The last sample shows what would be commanded next; the step that follows is flown for it and forgotten.
+  if (!rest) call(steps, 1, 1, groups);
+  return { n: count, lost: -1 };
+}
+
+// --- quantities of a sample, as `starhold.report` and `starhold.analysis` make them ---
+
+const at = (name, part = 0) => column[name][0] + part;
+// By products, for a power may round otherwise.
+const square3 = (p) => record[p] * record[p] + record[p + 1] * record[p + 1] + record[p + 2] * record[p + 2];
+const norm3 = (k, place) => sqrt(square3(k * width + place));
+
+function angleOf(k) {
+  const p = k * width + at("attitude_error");
+  return 2 * atan2(sqrt(square3(p + 1)), abs(record[p]));
+}
+
+function turnOf(k, which) {
+  const p = k * width + at("attitude_error");
+  const [a, b, c, d] = [record[p], record[p + 1], record[p + 2], record[p + 3]];
+  const degrees = 180 / Math.PI;
+  if (which === 0) return atan2(2 * (c * d + a * b), 1 - 2 * (b * b + c * c)) * degrees;
+  if (which === 1) return asin(max(-1, min(1, 2 * (a * c - b * d)))) * degrees;
+  return atan2(2 * (b * c + a * d), 1 - 2 * (c * c + d * d)) * degrees;
+}
+
+// The mean derivative of the body's rate from a sample to the next, the last repeated.
+function accelerationOf(k, n, part) {
+  if (n < 2) return 0;
+  const j = min(k, n - 2);
+  return (record[(j + 1) * width + at("rate", part)] - record[j * width + at("rate", part)]) / tick;
+}
+
+function curve([kind, ...told], n) {
+  const values = new Float64Array(n);
+  if (kind === "column") {
+    const place = at(told[0], told[1]);
+    for (let k = 0; k < n; k++) values[k] = record[k * width + place] * told[2];
+  } else if (kind === "norm") {
+    const place = at(told[0]);
+    for (let k = 0; k < n; k++) values[k] = norm3(k, place) * told[1];
+  } else if (kind === "angle") {
+    for (let k = 0; k < n; k++) values[k] = angleOf(k) * told[0];
+  } else if (kind === "turn") {
+    for (let k = 0; k < n; k++) values[k] = turnOf(k, told[0]);
+  } else {
+    for (let k = 0; k < n; k++) values[k] = accelerationOf(k, n, told[0]) * told[1];
+  }
+  return values;
+}
+
+// Two of every `factor` samples, as `report.plots.thin` keeps them: the least and the greatest where the others swing further.
+function thin(values, factor) {
+  const n = values.length;
+  if (factor === 1 || !n) return values;
+  const groups = ceil(n / factor);
+  const found = new Float64Array(2 * groups);
+  const value = (k) => values[min(k, n - 1)];
+  for (let g = 0; g < groups; g++) {
+    const first = g * factor;
+    let low = first, high = first;
+    for (let k = first + 1; k < first + factor; k++) {
+      if (value(k) < value(low)) low = k;
+      if (value(k) > value(high)) high = k;
+    }
+    const middle = first + floor(factor / 2);
+    const three = [value(first), value(middle), value(g + 1 < groups ? first + factor : n - 1)];
+    const wild = value(high) - value(low) > 3 * (max(...three) - min(...three));
+    found[2 * g] = value(wild ? min(low, high) : first);
+    found[2 * g + 1] = value(wild ? max(low, high) : middle);
+  }
+  found[0] = values[0];
+  found[2 * groups - 1] = values[n - 1];
+  return found;
+}
+
+// Angles with gaps where they jump from one end of their range to the other.
+function unwrapped(values) {
+  return values.map((value, k) => (k && abs(value - values[k - 1]) > 180 ? NaN : value));
+}
+
+// --- metrics, as `starhold.analysis.rigid_body.measure` and `transient.against_limits` take them of a recording ---
+
+const LAST = 0.25, ALMOST = 1 - 1e-9, KEPT = 0.1;
+
+function metrics(n, lost, asked) {
+  const tail = floor(n * (1 - LAST));
+  const [error, rate, torque, command] = ["attitude_error", "rate_error", "torque", "command"].map((name) => at(name));
+  const outside = {};
+  const levels = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
+  const attitude = new Int32Array(6).fill(-1), speeds = new Int32Array(6).fill(-1);
+  let turned = -1, slowed = -1, peak = 0, peakNorm = 0, effort = 0, limited = 0, chatter = 0, lastAngle = 0, lastSpeed = 0;
+  let fx = 0, fy = 0, fz = 0, start = 0, crossed = false, beyond = 0;
+  const size = asked.limit;
+  const wheels = column.wheel_command;
+  for (let k = 0; k < n; k++) {
+    const row = k * width;
+    const deviation = norm3(k, error + 1), speed = norm3(k, rate), q0 = record[row + error];
+    const angle = 2 * atan2(deviation, abs(q0));
+    if (!(angle <= asked.tolerances[0])) turned = k;
+    if (!(speed <= asked.tolerances[1])) slowed = k;
+    for (let d = 0; d < 6; d++) {
+      if (!(deviation <= levels[d])) attitude[d] = k;
+      if (!(speed <= levels[d])) speeds[d] = k;
+    }
+    const push = norm3(k, torque);
+    for (let i = 0; i < 3; i++) peak = max(peak, abs(record[row + torque + i]));
+    peakNorm = max(peakNorm, push);
+    if (k < n - 1) effort += push * ((k + 1) * tick - k * tick);
+    let bound = false;
+    if (asked.kind !== "none" && size !== null) {
+      const most = asked.kind === "norm" ? norm3(k, command)
+        : max(abs(record[row + command]), abs(record[row + command + 1]), abs(record[row + command + 2]));
+      bound = most >= size * ALMOST;
+    }
+    if (wheels) {
+      for (let w = 0; w < wheels[1]; w++) {
+        const want = abs(record[row + wheels[0] + w]);
+        if (want > 0 && want >= record[row + column.wheel_available[0] + w] * ALMOST) bound = true;
+      }
+    }
+    if (bound) limited++;
+    if (k >= tail) {
+      lastAngle = max(lastAngle, angle);
+      lastSpeed = max(lastSpeed, speed);
+      if (k > tail) {
+        const p = row + torque;
+        const x = record[p] - record[p - width], y = record[p + 1] - record[p + 1 - width], z = record[p + 2] - record[p + 2 - width];
+        chatter += sqrt(x * x + y * y + z * z);
+      }
+    }
+    const share = (q0 < 0 ? -1 : 1) * angle / max(deviation, 1e-300);
+    const vx = record[row + error + 1] * share, vy = record[row + error + 2] * share, vz = record[row + error + 3] * share;
+    if (k === 0) {
+      [fx, fy, fz] = [vx, vy, vz];
+      start = sqrt(vx * vx + vy * vy + vz * vz);
+    }
+    if (start >= 1e-9) {
+      const along = (vx * fx + vy * fy + vz * fz) / (start * start);
+      crossed = crossed || abs(along) < 0.5;
+      if (crossed) beyond = max(beyond, -along);
+    }
+  }
+  const whole = lost < 0;
+  const since = (last) => (whole && last + 1 < n ? last + 1 : null);
+  const reached = {
+    settling_time: since(max(turned, slowed)), attitude_settling_time: since(turned), rate_settling_time: since(slowed),
+  };
+  levels.forEach((_, d) => {
+    reached[`iterations_1e-${d + 1}`] = since(attitude[d]);
+    reached[`rate_iterations_1e-${d + 1}`] = since(speeds[d]);
+  });
+  const late = (index) => index > (1 - KEPT) * (n - 1);
+  const cut = Object.keys(reached).filter((name) => reached[name] !== null && late(reached[name]));
+  for (const [name, index] of Object.entries(reached)) {
+    if (cut.includes(name) || index === null) outside[name] = null;
+    else outside[name] = name.includes("iterations") ? index * every : index * tick;
+  }
+  const found = {
+    diverged_at: whole ? null : lost * law.period, cut_off: cut, ...outside, overshoot: beyond, peak_torque: peak,
+    peak_torque_norm: peakNorm, effort, limit_share: limited / n, chatter: n - tail > 1 ? chatter / (n - tail - 1) : 0,
+    final_attitude_error: whole ? lastAngle : null, final_rate_error: whole ? lastSpeed : null,
+  };
+  return asked.transient ? { ...found, ...againstLimits(n, whole, asked.transient, cut) } : found;
+}
+
+function againstLimits(n, whole, table, cut) {
+  const ends = [1 / (Math.sin(0.5 * table.angle_end) * Math.sin(0.5 * table.angle_end)), 1 / (table.rate_end * table.rate_end)];
+  const places = [at("attitude_error", 1), at("rate_error")];
+  const times = ends.map((scale, which) => {
+    const value = (k) => scale * square3(k * width + places[which]);
+    let last = n - 1;
+    while (last >= 0 && value(last) <= 1) last--;
+    if (last < 0) return 0;
+    if (last + 1 === n) return null;
+    return last + (value(last) - 1) / (value(last) - value(last + 1));
+  });
+  let square = 0;
+  const rate = at("rate");
+  const peaks = [0, 0, 0];
+  for (let k = 0; k < n; k++) {
+    square = max(square, square3(k * width + rate));
+    peaks.forEach((peak, i) => { peaks[i] = max(peak, abs(accelerationOf(k, n, i))); });
+  }
+  const time = whole && !times.includes(null) ? max(...times) * every * law.period : null;
+  const late = time !== null && time / tick > (1 - KEPT) * (n - 1);
+  return {
+    cut_off: late ? [...cut, "transient_time"] : cut, transient_time: late ? null : time, peak_rate: sqrt(square),
+    peak_acceleration: max(...peaks), peak_accelerations: peaks,
+  };
+}
+
+// What the page asks for at a move: values, plots by name with what their panels are made of, thinned, frames, metrics.
+function answer(asked) {
+  const { n, lost } = flown(asked.values);
+  const shown = asked.early ? min(n, asked.early) : n;
+  const curves = {};
+  for (const [name, sources] of Object.entries(asked.plots)) {
+    curves[name] = sources.map((source) => {
+      const values = thin(curve(source, shown), asked.factor);
+      return source[0] === "turn" ? unwrapped(values) : values;
+    });
+  }
+  const frames = asked.frames.filter((k) => k < n).map((k) => [0, 1, 2, 3].map((i) => record[k * width + at("attitude_error", i)]));
+  return {
+    number: asked.number, n, lost, curves, frames, metrics: metrics(n, lost, asked), last: record.slice((n - 1) * width, n * width),
+  };
+}
+
+if (typeof postMessage === "function") onmessage = ({ data }) => postMessage(answer(data));

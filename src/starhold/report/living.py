@@ -1,0 +1,151 @@
+"""What a page needs to fly its scenario again: programs as JavaScript, sliders, the file with open values, claims' standing."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from starhold.certification.standing import standing
+from starhold.report.colours import colour
+from starhold.studies.reflight import Reflight, Reflown, reflight
+from starhold.trace.javascript import JavaScript
+
+if TYPE_CHECKING:
+    from starhold.report.body import Sampling
+    from starhold.scenario.reading import Scenario
+    from starhold.studies.flight import Flight
+    from starhold.trace.program import Program
+
+LABELS = {
+    "spacecraft.inertia": "inertia",
+    "fault[1].inertia": "true inertia",
+    "spacecraft.torque_limit": "torque limit",
+    "initial.attitude": "attitude",
+    "initial.rate": "rate",
+}
+UNITS = {
+    "spacecraft.inertia": "kg m²",
+    "fault[1].inertia": "kg m²",
+    "spacecraft.torque_limit": "N m",
+    "initial.attitude": "",
+    "initial.rate": "rad/s",
+}
+
+
+def living_data(scenario: Scenario, flights: Sequence[Flight], sampling: Sampling) -> dict[str, Any] | None:
+    """The data of the page's sliders; None where nothing can be moved."""
+    made = reflight(scenario)
+    numbers = {flight.name: number for number, flight in enumerate(flights)}
+    laws = [law for law in made.laws if law.name in numbers]
+    if not any(law.follows for law in laws):
+        return None
+    table = scenario.table
+    transient = getattr(table, "transient", None)
+    keys = [key for key in made.dials if key not in made.gains or key.partition(".")[2].rpartition(".")[0] in numbers]
+    return {
+        "dials": [_dial(made, key) for key in keys],
+        "linked": dict(scenario.hooks.linked),
+        "file": [piece._asdict() for piece in made.pieces],
+        "laws": {str(numbers[law.name]): _law(law) for law in laws},
+        "grounded": {str(numbers[name]): why for name, why in made.grounded.items() if name in numbers},
+        "every": table.simulation.record_every,
+        "factor": sampling.factor,
+        "early": None if sampling.early is None else dict(zip(("samples", "factor"), sampling.early, strict=True)),
+        "tolerances": [table.settling.attitude_tolerance, table.settling.rate_tolerance],
+        "transient": None if transient is None else _finite(transient.model_dump()),
+        "claims": _claims(flights, {law.name: law for law in laws}),
+        "ranking": _ranking(flights),
+    }
+
+
+def _dial(made: Reflight, key: str) -> dict[str, Any]:
+    """A key that can be moved: its numbers, bounds and words."""
+    item = made.gains.get(key)
+    found: dict[str, Any] = {"key": key, "value": made.dials[key]}
+    if item is None:
+        return found | {"label": LABELS.get(key, key), "unit": UNITS.get(key, ""), "law": None, "text": "", "above": None}
+    gain = item.gain
+    bounds = {"above": gain.above, "least": gain.at_least, "most": gain.at_most}
+    law = key.partition(".")[2].rpartition(".")[0]
+    unit = "" if gain.unit == "1" else gain.unit.replace("^2", "²")
+    return found | bounds | {"label": item.name, "unit": unit, "law": law, "text": gain.text}
+
+
+def _law(law: Reflown) -> dict[str, Any]:
+    """What the page flies a law with; numbers as the bytes of 64-bit floats."""
+    return {
+        "name": law.name,
+        "fly": _script(law.program),
+        "derive": None if law.derive is None else _script(law.derive),
+        "follows": law.follows,
+        "held": law.held,
+        "places": law.places,
+        "carried": law.carried,
+        "numbers": _bytes(law.numbers),
+        "tables": _bytes(law.tables),
+        "memories": [memory.name for memory in law.program.memories],
+        "lost": law.lost_place,
+        "columns": law.columns,
+        "steps": law.steps,
+        "seed": [law.seed >> 32, law.seed & 0xFFFFFFFF],
+        "run": [law.run >> 32, law.run & 0xFFFFFFFF],
+        "period": law.period,
+    }
+
+
+def _script(program: Program) -> dict[str, str]:
+    """A program's text, and what in it is called."""
+    text = JavaScript(program)
+    return {"text": str(text), "name": text.name}
+
+
+def _bytes(numbers: Any) -> str:
+    return base64.b64encode(np.asarray(numbers, dtype="<f8").tobytes()).decode()
+
+
+def _finite(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Numbers for JSON, None in the place of infinite ones."""
+    return {name: value if value is None or np.isfinite(value) else None for name, value in values.items()}
+
+
+def _claims(flights: Sequence[Flight], laws: Mapping[str, Reflown]) -> list[dict[str, Any]]:
+    """What every proved claim of the page stands on."""
+    found: list[dict[str, Any]] = []
+    for number, flight in enumerate(flights):
+        if flight.name not in laws:
+            continue
+        for place, certificate in enumerate(flight.certificates):
+            for i, claim in enumerate(certificate.claims):
+                told = asdict(standing(claim, laws[flight.name].reads))
+                moments = [certificate.subject["inertia"][k][k] for k in range(3)] if "inertia" in certificate.subject else []
+                found.append({"mark": f"{number}:{place}:{i}", "law": flight.name, "moments": moments, **told})
+    return found
+
+
+def _ranking(flights: Sequence[Flight]) -> dict[str, Any]:
+    """What the page ranks laws by, and the metrics that the table began with."""
+    metric_set = flights[0].metric_set
+    metrics = metric_set.columns({flight.name: flight.metrics for flight in flights})
+    shown = [{"name": name, "scale": metric_set.measures[name].scale} for name in metrics]
+    rows = [
+        {
+            "name": flight.name,
+            "law": flight.law,
+            "colour": colour(number),
+            "metrics": {name: flight.metrics.get(name) for name in (*metrics, "diverged_at", "cut_off")},
+            "limit": _limit(flight),
+        }
+        for number, flight in enumerate(flights)
+    ]
+    return {"measures": shown, "order": list(metric_set.order), "rows": rows}
+
+
+def _limit(flight: Flight) -> dict[str, Any]:
+    attrs = flight.recording.attrs
+    limit = float(attrs["torque_limit"])
+    return {"kind": attrs["limit"], "size": limit if np.isfinite(limit) else None}
+
