@@ -28,7 +28,9 @@ class Browser:
         if found is None:
             pytest.skip("no Chromium is installed")
         # Away from 3 and 4, where the browser looks for its ends.
-        (to_browser, self._out), (self._in, from_browser) = ([fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 10) for end in os.pipe()] for _ in range(2))
+        (to_browser, self._out), (self._in, from_browser) = (
+            [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 10) for end in os.pipe()] for _ in range(2)
+        )
         self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         flags = ["--headless=new", "--no-sandbox", "--disable-gpu", "--remote-debugging-pipe", "--no-first-run"]
         flags += [f"--user-data-dir={self._profile.name}", "--disable-dev-shm-usage", "about:blank"]

@@ -56,7 +56,7 @@ def living_data(scenario: Scenario, flights: Sequence[Flight], sampling: Samplin
         "factor": sampling.factor,
         "early": None if sampling.early is None else dict(zip(("samples", "factor"), sampling.early, strict=True)),
         "tolerances": [table.settling.attitude_tolerance, table.settling.rate_tolerance],
-        "transient": None if transient is None else _finite(transient.model_dump()),
+        "transient": None if transient is None else {"angle_end": transient.angle_end, "rate_end": transient.rate_end},
         "claims": _claims(flights, {law.name: law for law in laws}),
         "ranking": _ranking(flights),
     }
@@ -107,11 +107,6 @@ def _bytes(numbers: Any) -> str:
     return base64.b64encode(np.asarray(numbers, dtype="<f8").tobytes()).decode()
 
 
-def _finite(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Numbers for JSON, None in the place of infinite ones."""
-    return {name: value if value is None or np.isfinite(value) else None for name, value in values.items()}
-
-
 def _claims(flights: Sequence[Flight], laws: Mapping[str, Reflown]) -> list[dict[str, Any]]:
     """What every proved claim of the page stands on."""
     found: list[dict[str, Any]] = []
@@ -121,7 +116,9 @@ def _claims(flights: Sequence[Flight], laws: Mapping[str, Reflown]) -> list[dict
         for place, certificate in enumerate(flight.certificates):
             for i, claim in enumerate(certificate.claims):
                 told = asdict(standing(claim, laws[flight.name].reads))
-                moments = [certificate.subject["inertia"][k][k] for k in range(3)] if "inertia" in certificate.subject else []
+                moments = (
+                    [certificate.subject["inertia"][k][k] for k in range(3)] if "inertia" in certificate.subject else []
+                )
                 found.append({"mark": f"{number}:{place}:{i}", "law": flight.name, "moments": moments, **told})
     return found
 
@@ -148,4 +145,3 @@ def _limit(flight: Flight) -> dict[str, Any]:
     attrs = flight.recording.attrs
     limit = float(attrs["torque_limit"])
     return {"kind": attrs["limit"], "size": limit if np.isfinite(limit) else None}
-

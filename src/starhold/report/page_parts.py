@@ -27,9 +27,7 @@ MANY = 9
 """Numbers of a setting beyond which only the first and the last are shown."""
 
 BEST, LOST = '<td class="best">', '<tr class="lost">'
-_POLICY = (
-    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; worker-src blob:"
-)
+_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; worker-src blob:"
 WITH_PLOTLY = ("planes.js", "campaign.js")
 """Scripts that draw with Plotly; plots over time need less."""
 

@@ -120,7 +120,9 @@ def reflight(scenario: Scenario) -> Reflight:
         if loop.events:
             grounded[entry.name] = FAULTS
         else:
-            own = [key for key in gains if key.startswith(f"law.{entry.name}.") and key[len(entry.name) + 5 :] in _names(entry)]
+            own = [
+                key for key in gains if key.startswith(f"law.{entry.name}.") and key[len(entry.name) + 5 :] in _names(entry)
+            ]
             laws.append(_reflown(held, entry, loop, {key: dials[key] for key in (*shared, *own)}, tried))
     return Reflight(held, dials, gains, tuple(laws), grounded, tuple(_pieces(held, dials)))
 
@@ -348,4 +350,3 @@ def _pieces(scenario: Scenario, dials: Values) -> Iterator[Piece]:
         faults = toml_text(plain(_changes(scenario, {key: f"{MARK}{key}{MARK}"}), scenario.where, ""))
         before, _, after = faults.replace(f'"{MARK}', MARK).replace(f'{MARK}"', MARK).split(MARK)
         yield from (Piece(before, only=key), Piece(key=key, only=key), Piece(after, only=key))
-
