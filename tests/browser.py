@@ -1,4 +1,4 @@
-"""Drives headless Chromium through its DevTools pipe: pages are opened, asked and photographed, and their complaints noted."""
+"""Drives headless Chromium through its DevTools pipe: opens pages, asks and photographs them, and notes their complaints."""
 
 from __future__ import annotations
 

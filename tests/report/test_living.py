@@ -283,7 +283,8 @@ def on_node(jobs: list[tuple[Any, Any]], every: int) -> list[Any]:
         )
         told = {key: value for key, value in law.items() if key not in ("fly", "derive")} | {"every": every}
         script.append(
-            f"answers.push((() => {{\nconst law = {json.dumps(told)};\n{programs}{worker}\nconst found = answer({json.dumps(asked)});"
+            f"answers.push((() => {{\nconst law = {json.dumps(told)};\n{programs}{worker}\n"
+            f"const found = answer({json.dumps(asked)});"
             "\nreturn { metrics: found.metrics, last: Buffer.from(found.last.buffer).toString('hex') };\n})());"
         )
     script.append("process.stdout.write(JSON.stringify(answers));")

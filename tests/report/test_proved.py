@@ -123,7 +123,7 @@ def test_the_whole_page_with_certificates_is_deterministic_and_loads_nothing() -
     page = render(flown.scenario(), flights)
     assert page == render(flown.scenario(), flights)
     found = Reader(page)
-    assert sum(tag == "script" for tag, _ in found.tags) == 4
+    assert sum(tag == "script" for tag, _ in found.tags) == 6
     assert not any({"src", "href"} & set(attrs) for _, attrs in found.tags)
     assert page.index("<h2>Ranking</h2>") < page.index("<h2>What is proved</h2>") < page.index("<h2>The turning body</h2>")
 

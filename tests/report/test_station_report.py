@@ -90,7 +90,7 @@ def test_names_from_files_are_no_markup() -> None:
     name = flown.HOSTILE.replace("'", "")
     scenario = flown.called(told("l2-circle"), name)
     found = Reader(render(scenario, flights("l2-circle")))
-    assert sum(tag == "script" for tag, _ in found.tags) == 4
+    assert sum(tag == "script" for tag, _ in found.tags) == 5
     assert "alert(" not in "".join(found.scripts[1:])
     assert name in found.words
 

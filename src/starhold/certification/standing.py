@@ -1,4 +1,4 @@
-"""What a claim stands on: which numbers of its loop may be others, and within which bounds, with the claim still proved."""
+"""A claim stands on some numbers of its loop; others may change, or change within bounds, with the claim still proved."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Standing:
 
 
 def standing(claim: Claim, reads: Set[str]) -> Standing:
-    """What a claim stands on, of a law that reads these numbers of its nominal model: "inertia", "torque_limit"."""
+    """Tell what a claim stands on, of a law that reads these numbers of its nominal model: "inertia", "torque_limit"."""
     free = UNLIMITED in claim.assumptions or WHEELS in claim.assumptions
     limit = "given"
     if "torque_limit" not in reads:

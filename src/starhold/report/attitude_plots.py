@@ -84,7 +84,7 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario, end: flo
 
 
 def thinning(count: int, points: int) -> int:
-    """Of how many samples a curve keeps two, of so many in all for about `points`."""
+    """The number of samples of which a curve keeps two, of so many in all for about `points`."""
     return 1 if count <= points else int(np.ceil(2 * count / points))
 
 

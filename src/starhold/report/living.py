@@ -1,4 +1,4 @@
-"""What a page needs to fly its scenario again: programs as JavaScript, sliders, the file with open values, claims' standing."""
+"""Pages fly their scenario again with these data: programs, sliders, the file with open values, what claims stand on."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def _dial(made: Reflight, key: str) -> dict[str, Any]:
 
 
 def _law(law: Reflown) -> dict[str, Any]:
-    """What the page flies a law with; numbers as the bytes of 64-bit floats."""
+    """The page flies a law with these; numbers are the bytes of 64-bit floats."""
     return {
         "name": law.name,
         "fly": _script(law.program),
@@ -108,7 +108,7 @@ def _bytes(numbers: Any) -> str:
 
 
 def _claims(flights: Sequence[Flight], laws: Mapping[str, Reflown]) -> list[dict[str, Any]]:
-    """What every proved claim of the page stands on."""
+    """Tell what every claim of the page stands on."""
     found: list[dict[str, Any]] = []
     for number, flight in enumerate(flights):
         if flight.name not in laws:
@@ -124,7 +124,7 @@ def _claims(flights: Sequence[Flight], laws: Mapping[str, Reflown]) -> list[dict
 
 
 def _ranking(flights: Sequence[Flight]) -> dict[str, Any]:
-    """What the page ranks laws by, and the metrics that the table began with."""
+    """The measures that the page ranks laws by, and the metrics that the table began with."""
     metric_set = flights[0].metric_set
     metrics = metric_set.columns({flight.name: flight.metrics for flight in flights})
     shown = [{"name": name, "scale": metric_set.measures[name].scale} for name in metrics]

@@ -68,7 +68,7 @@ def document(
         *held,
         *(f"<script>{library}</script>" for library in libraries),
         f"<script>\n{_asset('page.js')}{_asset('tables.js')}</script>",
-        *(f"<script>\n{_asset(name)}</script>" for name in own),
+        f"<script>\n{''.join(_asset(name) for name in own)}</script>",
     ]
     return plain_document(scenario.name, [*body, *ending])
 
@@ -92,8 +92,9 @@ def plain_document(title: str, body: Iterable[str]) -> str:
 DIALS = """\
 <button id="dials-button" type="button" aria-expanded="false" aria-controls="dials">Fly again</button>
 <aside id="dials" aria-label="Fly again with other numbers">
-<header><b>Fly again</b><button id="dials-close" type="button" aria-label="close">×</button></header>
-<p class="tools"><button id="dials-reset" type="button">Reset</button><button id="dials-copy" type="button">Copy as TOML</button>\
+<header><h2>Fly again</h2><button id="dials-close" type="button" aria-label="close">×</button></header>
+<p class="tools"><button id="dials-reset" type="button">Reset</button>\
+<button id="dials-copy" type="button">Copy as TOML</button>\
 <button id="dials-link" type="button">Copy link</button></p>
 <p class="note" id="followed"></p><p class="alarm" id="unsound" hidden></p><div id="staying"></div>
 <div id="groups"></div>

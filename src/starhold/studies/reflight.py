@@ -100,7 +100,7 @@ class Piece(NamedTuple):
 
 
 def reflight(scenario: Scenario) -> Reflight:
-    """What flies a scenario again. Designed gains are held as they are: the scenario has them as numbers."""
+    """Make what flies a scenario again. Designed gains are held as they are: the scenario has them as numbers."""
     held = _explicit(scenario)
     dials = dict(held.hooks.dials(held))
     shared = list(dials)

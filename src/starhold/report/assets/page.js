@@ -5,5 +5,5 @@ const report = JSON.parse(document.getElementById("data").textContent);
 if (document.getElementById("living")) report.living = JSON.parse(document.getElementById("living").textContent);
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 // What reads names as HTML is given what comes from files as it stands.
-const plain = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
+const plain = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;").replace(/"/g, "&quot;");
 const dark = matchMedia("(prefers-color-scheme: dark)");

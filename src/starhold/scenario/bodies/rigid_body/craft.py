@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from starhold.errors import InputError
 from starhold.parts.craft import Craft, compact, inverse, make_craft
 from starhold.parts.effectors.envelope import authority

@@ -1,4 +1,4 @@
-"""What of a spacecraft can be moved while its loop stays the same program: inertia, limit and start, as equations."""
+"""Inertia, limit and start of a spacecraft can be moved while its loop stays the same program; here are their equations."""
 
 from __future__ import annotations
 
