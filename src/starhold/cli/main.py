@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from starhold.cli import campaign, certifying, export, failures, invariant, modal_roots, parts, reproduce, sail
+from starhold.cli import campaign, certifying, export, failures, invariant, modal_roots, parts, reproduce, sail, studio
 from starhold.cli.arguments import (
     DIVERGED,
     INTERNAL_ERROR,
@@ -168,6 +168,7 @@ app.command()(invariant.invariant)
 app.command()(sail.sail)
 app.command()(reproduce.reproduce)
 app.add_typer(export.app, name="export")
+app.command()(studio.studio)
 app.command()(parts.parts)
 app.command("check-part")(parts.check_part)
 app.command("check-law", help="The old name of check-part.")(parts.check_part)

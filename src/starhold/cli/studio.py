@@ -1,0 +1,50 @@
+"""The command that serves the studio."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from starhold.errors import InputError
+
+EXTRA = "pip install 'starhold[studio]'"
+
+
+def studio(
+    file: Annotated[
+        str | None, typer.Argument(metavar="FILE", help="a scenario file, or the name of a built-in scenario to begin with")
+    ] = None,
+    port: Annotated[int, typer.Option(help="on which it listens, on this machine alone; 0: any that is free")] = 0,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open the page in the browser")] = True,
+) -> None:
+    """Serve a page on this machine: edit a scenario, certify, design, fly and compare, and see results beside each other."""
+    from starhold.cli.show import console
+    from starhold.scenario.reading import builtin_names, builtin_text, nearest
+    from starhold.scenario.template import template_text
+
+    if find_spec("starlette") is None or find_spec("uvicorn") is None:
+        raise InputError("studio", "", "no starlette and uvicorn installed", EXTRA)
+    if not 0 <= port < 65536:
+        raise InputError("studio", "--port", str(port), "0 to 65535")
+    path, text = None, template_text("rigid-body")
+    if file is not None and file in builtin_names() and not Path(file).is_file():
+        text = builtin_text(file)
+    elif file is not None:
+        path = Path(file)
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, ValueError) as error:
+            why = getattr(error, "strerror", None) or type(error).__name__
+            allowed = f"a scenario file, or a built-in scenario: {nearest(file, builtin_names())}"
+            raise InputError(file, "", why, allowed) from None
+
+    from starhold.studio.server import serve
+
+    def told(address: str) -> None:
+        console.print(f"Studio: {address}", soft_wrap=True, highlight=False, markup=False)
+        console.print("Nothing leaves this machine. Ctrl-C ends it.", highlight=False)
+
+    serve(path, text, port, told, browser)

@@ -1,0 +1,116 @@
+"""An editor is told where in a file an error stands, and which keys and values fit a place."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from starhold.errors import InputError
+from starhold.laws.catalogue import catalogue
+from starhold.scenario.parts import installed
+from starhold.scenario.json_schema import json_schema
+from starhold.scenario.reading import builtin_names, parse
+
+_HEAD = re.compile(r"\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(?:#.*)?$")
+
+
+def check(text: str, where: str, folder: Any) -> dict[str, Any]:
+    """Tell whether a text is a scenario, with its name and laws, or what is wrong, where."""
+    try:
+        scenario = parse(text, where, folder)
+    except InputError as error:
+        line = line_of(text, error.key, error.found)
+        return {"error": str(error), "key": error.key, "line": line}
+    return {"name": scenario.name, "laws": [entry.name for entry in scenario.laws], "body": scenario.body}
+
+
+def line_of(text: str, key: str, found: str = "") -> int | None:
+    """The line, from 1, that holds a key as errors call it ("law[2].k_rate", "spacecraft.inertia"), its table where the key
+    is missing, or what a TOML error says; None where that is nowhere."""
+    if told := re.search(r"at line (\d+)", found):
+        return int(told[1])
+    parts = re.findall(r"([^.\[\]]+)(?:\[(\d+)\])?", key.replace("law ", "law."))
+    if not parts:
+        return None
+    counts: dict[str, int] = {}
+    table, best, wanted = "", None, (parts[0][0], int(parts[0][1] or 1))
+    leaf = parts[1][0] if len(parts) > 1 else None
+    for number, line in enumerate(text.splitlines(), 1):
+        if head := _HEAD.match(line):
+            table = head[2]
+            counts[table] = counts.get(table, 0) + 1
+            if (table, counts[table]) == wanted or table == key:
+                best = number
+        elif "=" in line and not line.lstrip().startswith("#"):
+            own = line.partition("=")[0].strip().strip('"')
+            here = (table, counts.get(table, 0))
+            if (here == wanted and own == leaf) or (not table and own == key) or (table == parts[0][0] == own):
+                return number
+    return best
+
+
+def words() -> dict[str, Any]:
+    """The tables of files with their keys, of every body, by table; those of laws and parts by type; each key with what it
+    means and, where there are such, the words it may be."""
+    schema = json_schema()
+    tables: dict[str, dict[str, Any]] = {}
+    kinds: dict[str, dict[str, Any]] = {"law": {}, "part": {}}
+
+    def opened(what: Any) -> Any:
+        while isinstance(what, dict) and "$ref" in what:
+            what = schema["$defs"][what["$ref"].rpartition("/")[2]]
+        return what
+
+    def keys(table: Any) -> dict[str, Any]:
+        return {name: _told(opened(item)) for name, item in opened(table).get("properties", {}).items()}
+
+    for body in schema["anyOf"]:
+        for name, item in body["properties"].items():
+            if name in kinds:
+                for one in opened(item)["items"]["anyOf"]:
+                    own = opened(one)
+                    kind = own["properties"].get("type", {})
+                    label = kind.get("const") or kind.get("default")
+                    if label:
+                        kinds[name].setdefault(str(label), {}).update(keys(own))
+                continue
+            item = opened(item)
+            options = [opened(one) for one in item.get("anyOf", [item])]
+            found = next((one for one in (*options, *(opened(o.get("items", {})) for o in options)) if "properties" in one), None)
+            if found is None:
+                tables.setdefault("", {})[name] = _told(item)
+            else:
+                tables.setdefault(name, {}).update(keys(found))
+    return {"tables": tables, **kinds}
+
+
+def _told(item: Any) -> dict[str, Any]:
+    options = [item, *item.get("anyOf", [])]
+    found = next((one["enum"] for one in options if isinstance(one, dict) and "enum" in one), None)
+    if found is None and item.get("type") == "boolean":
+        found = [True, False]
+    return {"text": item.get("description", ""), **({} if found is None else {"words": found})}
+
+
+def choices() -> dict[str, Any]:
+    """The laws and parts to pick from, each with a line about it and a table to put into a file, and the built-in
+    scenarios."""
+    from starhold.scenario.writing import law_table, part_table, toml_text
+
+    laws = [
+        {"name": name, "text": law.card.summary, "table": law_table(law, law.examples()[0])}
+        for name, law in catalogue().items()
+        if law.examples()
+    ]
+    parts: list[dict[str, str]] = []
+    for name, part in installed().items():
+        examples = part.module.examples() if hasattr(part.module, "examples") else []
+        if part.role in ("body", "law") or not examples:
+            continue
+        try:
+            table = toml_text({"part": [part_table(part, examples[0])]}).lstrip("\n")
+        except (InputError, TypeError, ValueError):
+            # One that holds a table of samples, which is no line of a file.
+            continue
+        parts.append({"name": name, "text": f"{part.role}: {part.module.CARD.summary}", "table": table})
+    return {"laws": laws, "parts": parts, "scenarios": builtin_names()}
