@@ -144,7 +144,9 @@ def test_the_page_edits_and_shows(served: Served, size: tuple[int, int]) -> None
         # The token is not left in the address.
         assert "token" not in browser.ask("location.href")
         browser.ask('editor.setValue(editor.getValue().replace("k_rate = 0.09", "k_rat = 0.09"))')
-        browser.wait('document.querySelector(".wrong-line") && document.getElementById("verdict").textContent.includes("k_rate?")')
+        browser.wait(
+            'document.querySelector(".wrong-line") && document.getElementById("verdict").textContent.includes("k_rate?")'
+        )
         before = browser.ask("boxes.size")
         browser.ask('begin("campaign")')
         assert browser.ask("boxes.size") == before
@@ -189,7 +191,11 @@ def test_errors_stand_at_the_key(old: str, new: str, at: str) -> None:
 
 @pytest.mark.parametrize(
     ("given", "said"),
-    [(["nothing.toml"], "No such file"), (["--port", "70000"], "0 to 65535"), (["three-laws", "--port", "1"], "another port")],
+    [
+        (["nothing.toml"], "No such file"),
+        (["--port", "70000"], "0 to 65535"),
+        (["three-laws", "--port", "1"], "another port"),
+    ],
 )
 def test_bad_input_is_one_line(given: list[str], said: str) -> None:
     if "1" in given and hasattr(os, "geteuid") and os.geteuid() == 0:

@@ -7,8 +7,8 @@ from typing import Any
 
 from starhold.errors import InputError
 from starhold.laws.catalogue import catalogue
-from starhold.scenario.parts import installed
 from starhold.scenario.json_schema import json_schema
+from starhold.scenario.parts import installed
 from starhold.scenario.reading import builtin_names, parse
 
 _HEAD = re.compile(r"\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(?:#.*)?$")
@@ -76,7 +76,9 @@ def words() -> dict[str, Any]:
                 continue
             item = opened(item)
             options = [opened(one) for one in item.get("anyOf", [item])]
-            found = next((one for one in (*options, *(opened(o.get("items", {})) for o in options)) if "properties" in one), None)
+            found = next(
+                (one for one in (*options, *(opened(o.get("items", {})) for o in options)) if "properties" in one), None
+            )
             if found is None:
                 tables.setdefault("", {})[name] = _told(item)
             else:

@@ -85,17 +85,20 @@ class Jobs:
 def _follow(job: Job, text: str) -> None:
     """Hand a process its scenario, and note what it tells until it ends."""
     process = job.process
-    assert process.stdin is not None and process.stdout is not None and process.stderr is not None
+    given, told, errors = process.stdin, process.stdout, process.stderr
+    assert given is not None
+    assert told is not None
+    assert errors is not None
     # Read beside, for a full pipe would stop the process.
     complaints: list[str] = []
-    listener = threading.Thread(target=lambda: complaints.extend(process.stderr), daemon=True)
+    listener = threading.Thread(target=lambda: complaints.extend(errors), daemon=True)
     listener.start()
     try:
-        process.stdin.write(text)
-        process.stdin.close()
+        given.write(text)
+        given.close()
     except BrokenPipeError:
         pass
-    for line in process.stdout:
+    for line in told:
         if "error" not in job.state:
             job.state = json.loads(line)
     process.wait()

@@ -120,7 +120,9 @@ class Studio:
 
     async def _builtin(self, request: Request) -> Response:
         name = request.path_params["name"]
-        return PlainTextResponse(builtin_text(name)) if name in builtin_names() else PlainTextResponse("no such scenario", 404)
+        return (
+            PlainTextResponse(builtin_text(name)) if name in builtin_names() else PlainTextResponse("no such scenario", 404)
+        )
 
     async def _check(self, request: Request) -> Response:
         asked = await _asked(request, "text")
@@ -182,7 +184,7 @@ def _text(name: str) -> str:
 
 
 def serve(path: Path | None, text: str, port: int, told: Callable[[str], None], browse: bool) -> None:
-    """Serve a studio until it is interrupted. told: hears the address, token included. InputError where the port is taken."""
+    """Serve a studio until it is interrupted. told: hears the address with its token. InputError where the port is taken."""
     import uvicorn
 
     token, studio = secrets.token_urlsafe(24), Studio(path, text)
@@ -192,7 +194,11 @@ def serve(path: Path | None, text: str, port: int, told: Callable[[str], None], 
         listener.bind((HOST, port))
     except OSError as error:
         listener.close()
-        raise InputError("studio", "--port", f"{port}: {error.strerror}", "another port, or 0 for any that is free") from None
+        raise InputError(
+            "studio", "--port", f"{port}: {error.strerror}", "another port, or 0 for any that is free"
+        ) from None
+    # Who reads the address and asks at once waits for the server to begin.
+    listener.listen()
     address = f"http://{HOST}:{listener.getsockname()[1]}/?token={token}"
     told(address)
     if browse:

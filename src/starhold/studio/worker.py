@@ -42,11 +42,11 @@ def _certify(scenario: Scenario, folder: Path, tell: Tell) -> str:
     from starhold.report.proved import section
     from starhold.report.results import write_proofs
     from starhold.scenario.building import build
+    from starhold.simulation.lane import fly
     from starhold.studies.body import study_of
     from starhold.studies.certificates import certify_scenario
-    from starhold.studies.flight import Flight
     from starhold.studies.compare import name_samples
-    from starhold.simulation.lane import fly
+    from starhold.studies.flight import Flight
 
     study, found = study_of(scenario.body), list[Any]()
     for place, entry in enumerate(scenario.laws):
@@ -78,7 +78,9 @@ def _design(scenario: Scenario, folder: Path, tell: Tell) -> str:
                 for item in items
             )
             head = "".join(f"<th>{name}</th>" for name in (title, "value", "unit", "meaning"))
-            parts.append(f'<div class="wide"><table class="text"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>')
+            parts.append(
+                f'<div class="wide"><table class="text"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
+            )
         figures = "".join(
             f"<dt>{escape(name)}</dt><dd>{escape(number_text(value) if isinstance(value, float) else str(value))}</dd>"
             for name, value in found.figures.items()
