@@ -78,6 +78,12 @@ def landed(browser: Browser) -> None:
     )
 
 
+def see(browser: Browser) -> None:
+    """Have all plots drawn, as if all were in sight at once."""
+    browser.ask('charts.forEach((chart) => { chart.seen = true; }); document.dispatchEvent(new Event("plots-seen"))')
+    landed(browser)
+
+
 def ends(browser: Browser) -> list[dict[str, float]]:
     """The last values of each law's curves that the page has drawn, by plot and panel."""
     return browser.ask(
@@ -100,8 +106,7 @@ def test_a_slider_flies_the_laws_again(browser: Browser, page: Path, size: tuple
     browser.complaints.clear()
     browser.open(page, *size)
     before = ends(browser)
-    # Whatever size of window, all plots are in sight at one time or another.
-    browser.ask("charts.forEach((chart) => { chart.seen = true; })")
+    see(browser)
     slide(browser, "rate y", 0.9)
     slide(browser, "lyapunov k_rate", 0.7)
     text = browser.ask("fileText()")
@@ -161,12 +166,13 @@ def test_claims_grey_out_and_stay_lit(browser: Browser, page: Path) -> None:
 
 def test_the_address_holds_the_sliders(browser: Browser, page: Path) -> None:
     browser.open(page)
+    see(browser)
     slide(browser, "attitude yaw", 0.31)
     slide(browser, "inertia z", 0.45)
     address = browser.wait("location.hash.length > 1 && location.hash.slice(1) === hash() && location.href")
     values, drawn = browser.ask("[...moved]"), ends(browser)
     browser.open(address)
-    landed(browser)
+    see(browser)
     assert browser.ask("[...moved]") == values
     assert ends(browser) == drawn
     # Nonsense in an address moves nothing.

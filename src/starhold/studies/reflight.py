@@ -214,14 +214,24 @@ def _reflown(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, own: Values,
     kept = kept if _same(numbers, _given(scenario, loop, {key: own[key] for key in kept})) else []
     held |= {key: COMPUTED for key in own if not key.startswith("law.") and key not in kept}
     kept += [key for key in own if key.startswith("law.")]
-    for key in list(kept):
-        others = tried.of(key)
-        if not others or not all(follows({key: value}, other, kept) for value, other in others):
-            held[key] = COMPUTED if others else ALONE
+    held |= {key: ALONE for key in kept if not tried.of(key)}
     kept = [key for key in kept if key not in held]
-    if kept and not all(follows(values, other, kept) for values, other in tried.together(kept)):
-        held |= dict.fromkeys(kept, COMPUTED)
-        kept = []
+
+    def all_follow(keys: Sequence[str]) -> bool:
+        found = tried.together(keys)
+        return bool(found) and all(follows(values, other, keys) for values, other in found)
+
+    # All at once, and those alone that others go with; one by one only where that does not do.
+    alone = [key for key in scenario.hooks.linked.values() if key in kept]
+    if kept and not (
+        all_follow(kept) and all(follows({key: value}, other, kept) for key in alone for value, other in tried.of(key))
+    ):
+        own_way = [key for key in kept if not all(follows({key: value}, other, kept) for value, other in tried.of(key))]
+        held |= dict.fromkeys(own_way, COMPUTED)
+        kept = [key for key in kept if key not in held]
+        if kept and not all_follow(kept):
+            held |= dict.fromkeys(kept, COMPUTED)
+            kept = []
     derive, places = _recorded(scenario, loop, {key: own[key] for key in kept}) if kept else (None, ())
     carry, phase = loop.carry(), loop.phases(steps)[0]
     step = make_step(loop.composition())
