@@ -263,6 +263,32 @@ def test_what_flies_in_node_is_what_python_flies(name: str) -> None:
                 assert value == near, (law["name"], metric)
 
 
+def test_a_move_takes_less_than_a_sixtieth_of_a_second() -> None:
+    need("node")
+    scenario = shortened("three-laws", "2000 s", "lyapunov", "sliding")
+    data = living_data(scenario, fly(scenario), Sampling(27))
+    assert data is not None
+    panels = {
+        "angle": [("angle", 57.3), ("norm", "rate_error", 57.3)],
+        "torque": [("column", "torque", k, 1.0) for k in range(3)],
+    }
+    for number, law in data["laws"].items():
+        values = [x for key in law["follows"] for x in np.ravel(reflight(scenario).dials[key]).tolist()]
+        limit = data["ranking"]["rows"][int(number)]["limit"]
+        asked = {
+            "number": 1,
+            "values": values,
+            "plots": panels,
+            "early": None,
+            "factor": 27,
+            "frames": list(range(0, 20000, 111)),
+        }
+        asked |= {"tolerances": data["tolerances"], "transient": None, "kind": limit["kind"], "limit": limit["size"]}
+        # Each law has a worker of its own. The least of many, for a machine that does other things too.
+        (found,) = on_node([(law, asked)], data["every"], repeats=40)
+        assert found["ms"] < 1000.0 / 60.0, (law["name"], found["ms"])
+
+
 def moves_of(dials: dict[str, Any]) -> list[dict[str, Any]]:
     """Sets of values: start and gains; inertia that the laws know; inertia that they do not, and another limit."""
     gains = {key: value * 0.7 for key, value in dials.items() if key.startswith("law.") and isinstance(value, float)}
@@ -278,8 +304,8 @@ def moves_of(dials: dict[str, Any]) -> list[dict[str, Any]]:
     return found
 
 
-def on_node(jobs: list[tuple[Any, Any]], every: int) -> list[Any]:
-    """The worker's program for each law, in node."""
+def on_node(jobs: list[tuple[Any, Any]], every: int, repeats: int = 1) -> list[Any]:
+    """The worker's program for each law, in node; with the least processor time (ms) of so many answers."""
     worker = (resources.files("starhold.report") / "assets" / "flight.js").read_text(encoding="utf-8")
     script = ["const answers = [];"]
     for law, asked in jobs:
@@ -290,8 +316,10 @@ def on_node(jobs: list[tuple[Any, Any]], every: int) -> list[Any]:
         told = {key: value for key, value in law.items() if key not in ("fly", "derive")} | {"every": every}
         script.append(
             f"answers.push((() => {{\nconst law = {json.dumps(told)};\n{programs}{worker}\n"
-            f"const found = answer({json.dumps(asked)});"
-            "\nreturn { metrics: found.metrics, last: Buffer.from(found.last.buffer).toString('hex') };\n})());"
+            f"const asked = {json.dumps(asked)};\nlet found, ms = Infinity;\nfor (let k = 0; k < {repeats}; k++) {{\n"
+            "const begun = process.cpuUsage();\nfound = answer(asked);\nconst used = process.cpuUsage(begun);\n"
+            "ms = Math.min(ms, (used.user + used.system) / 1000);\n}"
+            "\nreturn { ms, metrics: found.metrics, last: Buffer.from(found.last.buffer).toString('hex') };\n})());"
         )
     script.append("process.stdout.write(JSON.stringify(answers));")
     with tempfile.TemporaryDirectory() as folder:
