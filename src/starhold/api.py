@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from starhold.campaign.results import CampaignResult
     from starhold.certification.certificate import Certificate
     from starhold.certification.invariant import InvariantProblem
-    from starhold.publications.reproduction import Reproduction
     from starhold.export.folder import Exported
+    from starhold.publications.reproduction import Reproduction
     from starhold.studies.failures import Failure
     from starhold.studies.flight import Flight
     from starhold.studies.modal_roots import Study
