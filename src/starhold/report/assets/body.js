@@ -189,7 +189,10 @@ function paint(view, where) {
     pen.textAlign = "center";
     pen.textBaseline = "middle";
     pen.fillStyle = colour;
-    pen.fillText(scene.centre, x2 + 28 * ux, y2 + 15 * uy);
+    // Within the view, however narrow it is.
+    const half = pen.measureText(scene.centre).width / 2 + 3;
+    const middle = Math.min(Math.max(x2 + 28 * ux, half), width - half);
+    pen.fillText(scene.centre, middle, y2 + 15 * uy);
   }
 
   // Solar cells, five along the panel and three across.
