@@ -1,0 +1,63 @@
+"""When a flight begins, for parts that need the turn of the Earth or the place of the Sun.
+
+Inertial axes are those of the mean equator and equinox of date: the third along the Earth's axis, the first to the equinox.
+Within a flight they rest.
+"""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+from typing import TypeAlias
+
+from starhold.algebra.scalar import Scalar
+from starhold.algebra.vector import Vector
+from starhold.parts.contract import Parameter
+
+Date: TypeAlias = tuple[float, float, float, float, float, float]
+"""Year, month, day, hour, minute and second of Universal Time."""
+EPOCH = Parameter(shape=(6,), spread=False, text="when the flight begins, UTC: year, month, day, hour, minute, second")
+"""How parts declare it, in the same words."""
+START: Date = (2026.0, 1.0, 1.0, 0.0, 0.0, 0.0)
+"""The epoch of a part that is given none."""
+DAY = 86400.0
+SIDEREAL = 360.98564736629 / 360.0
+"""Turns of the Earth in a day of Universal Time."""
+_J2000 = datetime(2000, 1, 1, 12)
+
+
+def days_of(epoch: Date) -> float:
+    """The days since J2000, 2000 January 1 at noon. ValueError for what is no date."""
+    *date, second = epoch
+    if any(number != int(number) for number in date) or not 0.0 <= second < 60.0:
+        raise ValueError(
+            f"the epoch is a whole year, month, day, hour and minute, and a second below 60, not {_told(epoch)}"
+        )
+    try:
+        year, month, day, hour, minute = (int(number) for number in date)
+        begun = datetime(year, month, day, hour, minute)
+    except ValueError as error:
+        raise ValueError(f"the epoch {_told(epoch)} is no date: {error}") from None
+    return ((begun - _J2000) + timedelta(seconds=second)) / timedelta(days=1)
+
+
+def _told(epoch: Date) -> str:
+    return f"[{', '.join(f'{number:g}' for number in epoch)}]"
+
+
+def sidereal(days: float) -> float:
+    """The turns, from 0 to 1, by which the meridian of Greenwich is ahead of the equinox: mean sidereal time, of days since
+    J2000 (Meeus, Astronomical Algorithms, 12.4). Universal Time is taken for UT1, which is right to 0.9 s."""
+    centuries = days / 36525.0
+    more = (280.46061837 + 0.000387933 * centuries**2) / 360.0 + (SIDEREAL - 1.0) * days
+    return (days % 1.0 + more) % 1.0
+
+
+def turned(start: float, time: Scalar) -> Scalar:
+    """The turns of the Earth so many seconds after the start, where it was at `start`."""
+    return start + (SIDEREAL / DAY) * time
+
+
+def spun(vector: Vector, cosine: Scalar, sine: Scalar) -> Vector:
+    """Return a vector turned about the third axis by an angle of this cosine and sine: by the Earth's, from its own axes
+    to inertial ones."""
+    return (cosine * vector[0] - sine * vector[1], sine * vector[0] + cosine * vector[1], vector[2])

@@ -1,0 +1,156 @@
+"""The Earth's magnetic field: the International Geomagnetic Reference Field, turning with the Earth."""
+
+from __future__ import annotations
+
+from math import factorial, sqrt
+from typing import NamedTuple, TypeAlias
+
+from starhold.algebra.circular import cosine_sine
+from starhold.algebra.scalar import Scalar
+from starhold.algebra.scalar import sqrt as root
+from starhold.algebra.vector import Vector, dot, scale
+from starhold.parts.epoch import Date, days_of, sidereal, spun, turned
+
+SOURCE = "International Geomagnetic Reference Field, 14th generation (2024)"
+"""For the cards of parts that take it."""
+ASSUMPTIONS = (
+    "internal field up to degree and order 8: with storms and currents outside the Earth left out",
+    "inertial axes of the equator and equinox of date",
+)
+RADIUS = 6.3712e6
+"""Which the coefficients refer to, m."""
+FIRST, LAST = (days_of((year, 1.0, 1.0, 0.0, 0.0, 0.0)) for year in (2025.0, 2030.0))
+"""Days since J2000 that the coefficients are for."""
+Row: TypeAlias = tuple[int, int, float, float, float, float]
+ROWS: tuple[Row, ...] = (
+    (1, 0, -29350.0, 0.0, 12.6, 0.0),
+    (1, 1, -1410.3, 4545.5, 10.0, -21.5),
+    (2, 0, -2556.2, 0.0, -11.2, 0.0),
+    (2, 1, 2950.9, -3133.6, -5.3, -27.3),
+    (2, 2, 1648.7, -814.2, -8.3, -11.1),
+    (3, 0, 1360.9, 0.0, -1.5, 0.0),
+    (3, 1, -2404.2, -56.9, -4.4, 3.8),
+    (3, 2, 1243.8, 237.6, 0.4, -0.2),
+    (3, 3, 453.4, -549.6, -15.6, -3.9),
+    (4, 0, 894.7, 0.0, -1.7, 0.0),
+    (4, 1, 799.6, 278.6, -2.3, -1.3),
+    (4, 2, 55.8, -134.0, -5.8, 4.1),
+    (4, 3, -281.1, 212.0, 5.4, 1.6),
+    (4, 4, 12.0, -375.4, -6.8, -4.1),
+    (5, 0, -232.9, 0.0, 0.6, 0.0),
+    (5, 1, 369.0, 45.3, 1.3, -0.5),
+    (5, 2, 187.2, 220.0, 0.0, 2.1),
+    (5, 3, -138.7, -122.9, 0.7, 0.5),
+    (5, 4, -141.9, 42.9, 2.3, 1.7),
+    (5, 5, 20.9, 106.2, 1.0, 1.9),
+    (6, 0, 64.3, 0.0, -0.2, 0.0),
+    (6, 1, 63.8, -18.4, -0.3, 0.3),
+    (6, 2, 76.7, 16.8, 0.8, -1.6),
+    (6, 3, -115.7, 48.9, 1.2, -0.4),
+    (6, 4, -40.9, -59.8, -0.8, 0.8),
+    (6, 5, 14.9, 10.9, 0.4, 0.7),
+    (6, 6, -60.8, 72.8, 0.9, 0.9),
+    (7, 0, 79.6, 0.0, -0.1, 0.0),
+    (7, 1, -76.9, -48.9, -0.1, 0.6),
+    (7, 2, -8.8, -14.4, -0.1, 0.5),
+    (7, 3, 59.3, -1.0, 0.5, -0.7),
+    (7, 4, 15.8, 23.5, -0.1, 0.0),
+    (7, 5, 2.5, -7.4, -0.8, -0.9),
+    (7, 6, -11.2, -25.1, -0.8, 0.5),
+    (7, 7, 14.3, -2.2, 0.9, -0.3),
+    (8, 0, 23.1, 0.0, -0.1, 0.0),
+    (8, 1, 10.9, 7.2, 0.2, -0.3),
+    (8, 2, -17.5, -12.6, 0.0, 0.4),
+    (8, 3, 2.0, 11.5, 0.4, -0.3),
+    (8, 4, -21.8, -9.7, -0.1, 0.4),
+    (8, 5, 16.9, 12.7, 0.3, -0.5),
+    (8, 6, 14.9, 0.7, 0.1, -0.6),
+    (8, 7, -16.8, -5.2, 0.0, 0.3),
+    (8, 8, 1.0, 3.9, 0.3, 0.2),
+)
+"""Degree, order, Gauss coefficients g and h at 2025.0 (nT), and their changes in a year (nT): facts of IGRF-14."""
+
+
+class Numbers(NamedTuple):
+    """What the equation takes: for each order the coefficients of cosine and sine (T), by degree, scaled for its recursion;
+    and the turns of the Earth at the start."""
+
+    cosines: tuple[tuple[Scalar, ...], ...]
+    sines: tuple[tuple[Scalar, ...], ...]
+    turn: Scalar
+
+
+def prepared(epoch: Date, rows: tuple[Row, ...] = ROWS) -> Numbers:
+    """The numbers of the field for a flight that begins at an epoch (UTC), within which the coefficients rest.
+
+    ValueError for an epoch that is no date, or not from 2025 to 2030.
+    """
+    days = days_of(epoch)
+    if not FIRST <= days <= LAST:
+        raise ValueError(f"the magnetic field is known from 2025 to 2030, not in {epoch[0]:g}")
+    years = 5.0 * (days - FIRST) / (LAST - FIRST)
+    highest = max(row[0] for row in rows)
+    found = [[(0.0, 0.0) for _ in range(max(m, 1), highest + 1)] for m in range(highest + 1)]
+    for n, m, g, h, g_change, h_change in rows:
+        # From Schmidt's normalisation to none, in T; (n - m)! makes one factor of all that the gradient needs.
+        size = 1e-9 * sqrt((2.0 if m else 1.0) * factorial(n - m) / factorial(n + m)) / factorial(n - m)
+        found[m][n - max(m, 1)] = (size * (g + years * g_change), size * (h + years * h_change))
+    cosines, sines = (tuple(tuple(pair[k] for pair in order) for order in found) for k in (0, 1))
+    return Numbers(cosines, sines, sidereal(days))
+
+
+def field(position: Vector, time: Scalar, params: Numbers) -> Vector:
+    """The magnetic field (T) at a position (m) so many seconds after the start, both in inertial axes; not defined at the
+    centre."""
+    cosine, sine = cosine_sine(turned(params.turn, time))
+    return spun(earth_fixed(spun(position, cosine, -sine), params), cosine, sine)
+
+
+def earth_fixed(position: Vector, params: Numbers) -> Vector:
+    """The magnetic field (T) at a position (m), both in axes of the Earth: minus the gradient of the potential.
+
+    The harmonics are those of Cunningham, made of x, y, z alone, so that no angle is needed and the poles are places as any
+    (Montenbruck and Gill, Satellite Orbits, 3.2.4).
+    """
+    highest = len(params.cosines) - 1
+    inverse_square = 1.0 / dot(position, position)
+    x, y, z = scale(RADIUS * inverse_square, position)
+    square = RADIUS * RADIUS * inverse_square
+    # Powers of x + i y, and the factors that go with them.
+    powers: list[tuple[Scalar, Scalar]] = [(1.0, 0.0)]
+    for _ in range(highest + 1):
+        c, s = powers[-1]
+        powers.append((x * c - y * s, x * s + y * c))
+    columns: list[list[Scalar]] = []
+    begin = root(square)
+    for m in range(highest + 2):
+        column = [begin]
+        for n in range(m + 1, highest + 2):
+            higher = (2.0 * n - 1.0) * z * column[-1]
+            column.append(higher if n == m + 1 else higher - float((n + m - 1) * (n - m - 1)) * square * column[-2])
+        columns.append(column)
+        begin = (2.0 * m + 1.0) * begin
+    east = north = up = 0.0
+    for m, (g, h) in enumerate(zip(params.cosines, params.sines, strict=True)):
+        least = max(m, 1)
+
+        def total(weights: tuple[Scalar, ...], order: int, least: int = least) -> Scalar:
+            """The sum over degrees of the weights times the harmonics of one degree more, of an order."""
+            harmonics = columns[order][least + 1 - order :]
+            found = weights[0] * harmonics[0]
+            for weight, harmonic in zip(weights[1:], harmonics[1:], strict=False):
+                found = found + weight * harmonic
+            return found
+
+        c, s = powers[m + 1]
+        if m == 0:
+            outer = total(g, 1)
+            east, north, up = outer * c, outer * s, total(g, 0)
+            continue
+        outer_g, outer_h, inner_g, inner_h = total(g, m + 1), total(h, m + 1), total(g, m - 1), total(h, m - 1)
+        below_c, below_s = powers[m - 1]
+        east = east + 0.5 * ((outer_g * c + outer_h * s) - (inner_g * below_c + inner_h * below_s))
+        north = north + 0.5 * ((outer_g * s - outer_h * c) + (inner_g * below_s - inner_h * below_c))
+        here_c, here_s = powers[m]
+        up = up + (total(g, m) * here_c + total(h, m) * here_s)
+    return (east, north, up)

@@ -1,0 +1,105 @@
+from datetime import datetime
+
+import erfa
+import numpy as np
+import ppigrf
+import pytest
+
+from starhold.parts.epoch import DAY, days_of, sidereal
+from starhold.parts.magnetic_field import RADIUS, ROWS, earth_fixed, field, prepared
+
+NEW_YEAR = (2025.0, 1.0, 1.0, 0.0, 0.0, 0.0)
+ALTITUDE = 5e5
+
+
+def places(count=400, seed=1):
+    """Positions (m) all over a sphere, two beside the poles, where angles are hard, among them."""
+    found = np.random.default_rng(seed).normal(size=(count, 3))
+    found[0], found[1] = (1e-6, 0.0, 1.0), (0.0, 1e-6, -1.0)
+    return (RADIUS + ALTITUDE) * found / np.linalg.norm(found, axis=1)[:, None]
+
+
+def reference(positions, date):
+    """The full field (T) in the same axes, by ppigrf, whose equations are those of the angles."""
+    x, y, z = positions.T
+    distance = np.linalg.norm(positions, axis=1)
+    colatitude, longitude = np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
+    parts = ppigrf.igrf_gc(distance / 1e3, np.degrees(colatitude), np.degrees(longitude), date)
+    outward, south, east = (1e-9 * np.ravel(part)[:, None] for part in parts)
+    (st, ct), (sp, cp) = ((np.sin(a), np.cos(a)) for a in (colatitude, longitude))
+    axes = [(st * cp, st * sp, ct), (ct * cp, ct * sp, -st), (-sp, cp, 0.0 * cp)]
+    return sum(size * np.stack(axis, axis=1) for size, axis in zip((outward, south, east), axes, strict=True))
+
+
+def full_rows():
+    g, h = ppigrf.ppigrf.read_shc()
+    first, last = g.index.get_loc(datetime(2025, 1, 1)), g.index.get_loc(datetime(2030, 1, 1))
+    return tuple(
+        (n, m, g[n, m].iloc[first], h[n, m].iloc[first], *((c[n, m].iloc[last] - c[n, m].iloc[first]) / 5 for c in (g, h)))
+        for n, m in g.columns
+    )
+
+
+def computed(positions, numbers):
+    return np.array([earth_fixed(tuple(position), numbers) for position in positions.tolist()])
+
+
+def test_with_all_coefficients_it_is_the_field_of_ppigrf():
+    for epoch in (NEW_YEAR, (2027.0, 7.0, 3.0, 18.0, 0.0, 0.0)):
+        expected = reference(places(), datetime(*(int(part) for part in epoch)))
+        assert np.abs(computed(places(), prepared(epoch, full_rows())) - expected).max() < 1e-12 * np.abs(expected).max()
+
+
+def test_coefficients_are_those_of_the_model():
+    given = {row[:2]: row[2:] for row in full_rows() if row[0] <= 8}
+    assert {row[:2] for row in ROWS} == set(given)
+    for n, m, *numbers in ROWS:
+        assert numbers == pytest.approx(given[n, m], abs=1e-9)
+
+
+def test_truncation_costs_a_fifth_of_a_percent():
+    expected = reference(places(), datetime(2025, 1, 1))
+    apart = np.linalg.norm(computed(places(), prepared(NEW_YEAR)) - expected, axis=1)
+    rms = float(np.sqrt((apart**2).mean()))
+    assert 40e-9 < rms < 70e-9
+    assert apart.max() < 160e-9
+    assert rms < 0.0022 * np.linalg.norm(expected, axis=1).mean()
+
+
+def test_it_turns_with_the_earth():
+    epoch = (2026.0, 3.0, 5.0, 6.0, 7.0, 8.5)
+    numbers = prepared(epoch)
+    for time in (0.0, 1.25, 4321.0, 3.0 * DAY):
+        # The angle of the Earth by another formula, of the IAU 2006, from the time in UT1 and TT.
+        day = days_of(epoch) + time / DAY
+        angle = erfa.gmst06(2451545.0, day, 2451545.0, day + 69.2 / DAY)
+        turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+        for place in places(20):
+            expected = turn @ computed((turn.T @ place)[None], numbers)[0]
+            # The formulas differ by 0.2 arcsec.
+            assert np.abs(np.array(field(tuple(place.tolist()), time, numbers)) - expected).max() < 1e-10
+
+
+def test_at_a_pole():
+    numbers = prepared(NEW_YEAR)
+    pole, beside = computed(np.array([[0.0, 0.0, 7e6], [1.0, 1.0, 7e6]]), numbers)
+    assert np.abs(pole - beside).max() < 1e-11
+
+
+def test_sidereal_time_against_the_astronomical_union():
+    for days in (0.0, 9496.25, 10592.5, -3652.75):
+        apart = (sidereal(days) - erfa.gmst82(2451545.0, days) / (2.0 * np.pi) + 0.5) % 1.0 - 0.5
+        assert abs(apart) < 1e-9
+
+
+def test_days_and_bad_epochs():
+    assert days_of((2000.0, 1.0, 2.0, 0.0, 0.0, 0.0)) == 0.5
+    assert days_of((2026.0, 2.0, 28.0, 23.0, 59.0, 59.5)) == erfa.cal2jd(2026, 2, 28)[1] - 51544.5 + 86399.5 / DAY
+    for epoch, words in (
+        ((2026.0, 2.0, 29.0, 0.0, 0.0, 0.0), "no date"),
+        ((2026.5, 2.0, 2.0, 0.0, 0.0, 0.0), "whole"),
+        ((2026.0, 2.0, 2.0, 0.0, 0.0, 60.0), "below 60"),
+        ((2031.0, 2.0, 2.0, 0.0, 0.0, 0.0), "2025 to 2030"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            prepared(epoch)
