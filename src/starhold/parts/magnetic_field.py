@@ -72,8 +72,8 @@ ROWS: tuple[Row, ...] = (
 
 
 class Numbers(NamedTuple):
-    """The equation takes for each order the coefficients of cosine and sine (T), by degree, scaled for its recursion, and the
-    turns of the Earth at the start."""
+    """The equation takes for each order the coefficients of cosine and sine (T), by degree, scaled for its recursion, and
+    the turns of the Earth at the start."""
 
     cosines: tuple[tuple[Scalar, ...], ...]
     sines: tuple[tuple[Scalar, ...], ...]
