@@ -6,7 +6,7 @@ import ppigrf
 import pytest
 
 from starhold.parts.epoch import DAY, days_of, sidereal
-from starhold.parts.magnetic_field import RADIUS, ROWS, earth_fixed, field, prepared
+from starhold.parts.magnetic_field import RADIUS, ROWS, earth_fixed, field, prepared, strongest
 
 NEW_YEAR = (2025.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 ALTITUDE = 5e5
@@ -78,6 +78,12 @@ def test_it_turns_with_the_earth():
             expected = turn @ computed((turn.T @ place)[None], numbers)[0]
             # The formulas differ by 0.2 arcsec.
             assert np.abs(np.array(field(tuple(place.tolist()), time, numbers)) - expected).max() < 1e-10
+
+
+def test_no_place_has_a_stronger_field_than_the_bound():
+    surface = places(2000) * (RADIUS / (RADIUS + ALTITUDE))
+    sizes = np.linalg.norm(reference(surface, datetime(2025, 1, 1)), axis=1)
+    assert sizes.max() < strongest(NEW_YEAR) < 2.0 * sizes.max()
 
 
 def test_at_a_pole():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import factorial, sqrt
 from typing import NamedTuple, TypeAlias
 
@@ -85,18 +86,44 @@ def prepared(epoch: Date, rows: tuple[Row, ...] = ROWS) -> Numbers:
 
     ValueError for an epoch that is no date, or not from 2025 to 2030.
     """
+    days = _known(epoch)
+    highest = max(row[0] for row in rows)
+    found = [[(0.0, 0.0) for _ in range(max(m, 1), highest + 1)] for m in range(highest + 1)]
+    for n, m, g, h in _at(days, rows):
+        # From Schmidt's normalisation to none, in T; (n - m)! makes one factor of all that the gradient needs.
+        size = 1e-9 * sqrt((2.0 if m else 1.0) * factorial(n - m) / factorial(n + m)) / factorial(n - m)
+        found[m][n - max(m, 1)] = (size * g, size * h)
+    cosines, sines = (tuple(tuple(pair[k] for pair in order) for order in found) for k in (0, 1))
+    return Numbers(cosines, sines, sidereal(days))
+
+
+def strongest(epoch: Date) -> float:
+    """A bound of the field's strength (T) wherever the distance is at least `RADIUS`, at an epoch (UTC).
+
+    In no direction do the harmonics of degree n give more than n + 1 times the root of the sum of their squared
+    coefficients, by the addition theorem. Errors as of `prepared`.
+    """
+    days = _known(epoch)
+    total = 0.0
+    for degree in range(1, ROWS[-1][0] + 1):
+        squares = [g * g + h * h for n, _, g, h in _at(days, ROWS) if n == degree]
+        total += (degree + 1.0) * sqrt(sum(squares))
+    return 1e-9 * total
+
+
+def _known(epoch: Date) -> float:
+    """The days since J2000. ValueError for an epoch that is no date, or beyond the coefficients."""
     days = days_of(epoch)
     if not FIRST <= days <= LAST:
         raise ValueError(f"the magnetic field is known from 2025 to 2030, not in {epoch[0]:g}")
+    return days
+
+
+def _at(days: float, rows: tuple[Row, ...]) -> Iterator[tuple[int, int, float, float]]:
+    """Degree, order and coefficients (nT) so many days after J2000."""
     years = 5.0 * (days - FIRST) / (LAST - FIRST)
-    highest = max(row[0] for row in rows)
-    found = [[(0.0, 0.0) for _ in range(max(m, 1), highest + 1)] for m in range(highest + 1)]
     for n, m, g, h, g_change, h_change in rows:
-        # From Schmidt's normalisation to none, in T; (n - m)! makes one factor of all that the gradient needs.
-        size = 1e-9 * sqrt((2.0 if m else 1.0) * factorial(n - m) / factorial(n + m)) / factorial(n - m)
-        found[m][n - max(m, 1)] = (size * (g + years * g_change), size * (h + years * h_change))
-    cosines, sines = (tuple(tuple(pair[k] for pair in order) for order in found) for k in (0, 1))
-    return Numbers(cosines, sines, sidereal(days))
+        yield n, m, g + years * g_change, h + years * h_change
 
 
 def field(position: Vector, time: Scalar, params: Numbers) -> Vector:

@@ -1,0 +1,42 @@
+"""The flattening of the Earth, by which the plane of an orbit turns and its perigee wanders: J2."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+from starhold.algebra.scalar import Scalar
+from starhold.algebra.vector import Vector, scale
+from starhold.parts.contract import Card, Parameter
+from starhold.parts.craft import Craft
+from starhold.parts.environments.two_body import attraction
+from starhold.parts.orbit import BODIES
+
+CARD = Card(
+    title="Oblateness",
+    summary="r'' = -3/2 J2 mu R^2/r^5 ((1 - 5 z^2/r^2) r + 2 z e_z), beside the point mass",
+    sources=("Fundamentals of Astrodynamics and Applications (2013)",),
+    assumptions=("the third inertial axis is that of the flattened body", "no harmonics of the field beyond the second"),
+)
+ROLE = "environment"
+NEEDS = ("two-body",)
+
+
+class Params(NamedTuple):
+    """How flat the body is; by default the Earth."""
+
+    j2: Annotated[float, Parameter("1", text="second zonal harmonic, not normalised")] = 1.08262668e-3
+    radius: Annotated[float, Parameter("m", above=0.0, text="equatorial radius that it refers to")] = BODIES["Earth"].radius
+
+
+def acceleration(state: Any, params: Params, craft: Craft, memory: Any) -> Vector:
+    """Acceleration of the centre of mass beside that by a point mass (inertial, m/s2)."""
+    n2, inverse_square = attraction(state.position, craft)
+    size: Scalar = 1.5 * params.j2 * params.radius * params.radius * (n2 * inverse_square)
+    x, y, z = scale(size, state.position)
+    slope = 5.0 * (state.position[2] * state.position[2]) * inverse_square
+    return (x * (slope - 1.0), y * (slope - 1.0), z * (slope - 3.0))
+
+
+def examples() -> list[Params]:
+    """The Earth, and Mars."""
+    return [Params(), Params(1.96045e-3, BODIES["Mars"].radius)]

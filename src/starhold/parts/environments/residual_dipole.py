@@ -1,0 +1,73 @@
+"""The torque of the Earth's magnetic field on what is magnetic in a spacecraft."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+from starhold.algebra.quaternion import to_body
+from starhold.algebra.scalar import Scalar
+from starhold.algebra.vector import ZERO, Vector, cross, norm
+from starhold.algebra.words import number_of
+from starhold.parts import magnetic_field
+from starhold.parts.contract import Card, Parameter
+from starhold.parts.craft import Craft
+from starhold.parts.epoch import EPOCH, START, Date
+from starhold.parts.random import Dice
+
+CARD = Card(
+    title="Residual dipole",
+    summary="M = m x B, B the Earth's magnetic field",
+    sources=(magnetic_field.SOURCE, "Fundamentals of Spacecraft Attitude Determination and Control (2014)"),
+    assumptions=(
+        *magnetic_field.ASSUMPTIONS,
+        "the field in inertial axes is held for a control period",
+        "no law is told of it",
+    ),
+)
+ROLE = "environment"
+NEEDS = ("two-body",)
+
+
+class Params(NamedTuple):
+    """How magnetic the craft is, and when it flies."""
+
+    dipole: Annotated[Vector, Parameter("A m^2", shape=(3,), spread=False, text="magnetic moment, body axes")]
+    epoch: Annotated[Date, EPOCH] = START
+
+
+class Numbers(NamedTuple):
+    """The dipole, the field, and the control period (s)."""
+
+    dipole: Vector
+    field: magnetic_field.Numbers
+    period: Scalar
+
+
+def prepare(params: Params, period: float) -> Numbers:
+    """The numbers of a flight. ValueError for an epoch that the field is not known at."""
+    return Numbers(params.dipole, magnetic_field.prepared(params.epoch), period)
+
+
+def remember(params: Numbers) -> Vector:
+    """No field yet."""
+    return ZERO
+
+
+def update(memory: Vector, state: Any, params: Numbers, dice: Dice, step: int) -> Vector:
+    """The field where the control step begins (T, inertial axes)."""
+    return magnetic_field.field(state.position, number_of(step) * params.period, params.field)
+
+
+def torque(state: Any, params: Numbers, craft: Craft, memory: Vector) -> Vector:
+    """Torque on the body (N m, body axes)."""
+    return cross(params.dipole, to_body(state.attitude, memory))
+
+
+def bound(params: Params) -> float:
+    """The largest norm that it has (N m) wherever the distance from the Earth's centre is at least 6371.2 km."""
+    return norm(params.dipole) * magnetic_field.strongest(params.epoch)
+
+
+def examples() -> list[Params]:
+    """A CubeSat, and a larger craft at another time."""
+    return [Params((0.01, -0.005, 0.02)), Params((0.0, 1.0, 0.3), (2027.0, 6.0, 21.0, 12.0, 30.0, 15.0))]

@@ -1,0 +1,127 @@
+"""The torque of sunlight on a spacecraft of flat plates, which the Earth's shadow ends."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple, TypeAlias
+
+from starhold.algebra.quaternion import to_body
+from starhold.algebra.scalar import Scalar, maximum
+from starhold.algebra.several import weighted
+from starhold.algebra.vector import Vector, add, cross, dot, norm, scale
+from starhold.algebra.words import number_of
+from starhold.parts import sun
+from starhold.parts.contract import Card, Parameter
+from starhold.parts.craft import Craft
+from starhold.parts.epoch import EPOCH, START, Date
+from starhold.parts.plates import BOX, COLUMNS, TEXT, Plates, plates_of
+from starhold.parts.random import Dice
+
+CARD = Card(
+    title="Solar pressure",
+    summary="M = sum of c_i x F_i, F_i = -P A_i c ((1 - specular) s + 2 (specular c + diffuse/3) n_i), c = max(n_i.s, 0)",
+    sources=("Fundamentals of Spacecraft Attitude Determination and Control (2014)", *sun.SOURCES),
+    assumptions=(
+        *sun.ASSUMPTIONS,
+        sun.SHADOW,
+        "plates do not shade one another",
+        "the light is held for a control period",
+        "the torque alone: the orbit is not pushed by it",
+        "no light from the Earth",
+        "no law is told of it",
+    ),
+)
+ROLE = "environment"
+NEEDS = ("two-body",)
+Row: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
+
+
+class Params(NamedTuple):
+    """The plates, and when they fly."""
+
+    plates: Annotated[
+        tuple[Row, ...],
+        Parameter(
+            "m^2, 1, m, 1",
+            columns=(*COLUMNS, "specular", "diffuse"),
+            text=f"{TEXT}; shares of the light that are reflected specularly and diffusely",
+        ),
+    ]
+    epoch: Annotated[Date, EPOCH] = START
+
+
+class Numbers(NamedTuple):
+    """The plates, for each the part of the force towards the Sun and twice the shares of the part along the normal, the Sun,
+    and the control period (s)."""
+
+    plates: Plates
+    absorbed: tuple[Scalar, ...]
+    specular: tuple[Scalar, ...]
+    diffuse: tuple[Scalar, ...]
+    sun: sun.Numbers
+    period: Scalar
+
+
+class Memory(NamedTuple):
+    """The direction to the Sun (unit vector, inertial axes), and the pressure of its light (N/m2)."""
+
+    direction: Vector
+    pressure: Scalar
+
+
+def prepare(params: Params, period: float) -> Numbers:
+    """The numbers of a flight. ValueError for a plate that cannot be, and a bad epoch."""
+    shares = [row[7:] for row in params.plates]
+    for number, (specular, diffuse) in enumerate(shares, 1):
+        if not (specular >= 0.0 and diffuse >= 0.0 and specular + diffuse <= 1.0):
+            raise ValueError(f"plate {number} needs shares of reflected light from 0 to 1 in all")
+    return Numbers(
+        plates_of(params.plates),
+        tuple(1.0 - specular for specular, _ in shares),
+        tuple(2.0 * specular for specular, _ in shares),
+        tuple(2.0 / 3.0 * diffuse for _, diffuse in shares),
+        sun.prepared(params.epoch),
+        period,
+    )
+
+
+def remember(params: Numbers) -> Memory:
+    """No light yet."""
+    return Memory((1.0, 0.0, 0.0), 0.0)
+
+
+def update(memory: Memory, state: Any, params: Numbers, dice: Dice, step: int) -> Memory:
+    """The light where the control step begins."""
+    seen = sun.sun(number_of(step) * params.period, params.sun)
+    return Memory(seen.direction, sun.pressure(seen) * sun.in_view(state.position, seen))
+
+
+def torque(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector:
+    """Torque on the body (N m, body axes)."""
+    toward = to_body(state.attitude, memory.direction)
+    areas, normals, centres = params.plates
+    cosines = tuple(maximum(dot(normal, toward), 0.0) for normal in normals)
+    lit = tuple(area * cosine for area, cosine in zip(areas, cosines, strict=True))
+    pushed = weighted(tuple(a * b for a, b in zip(lit, params.absorbed, strict=True)), centres)
+    along = (
+        scale(size * (specular * cosine + diffuse), cross(centre, normal))
+        for size, cosine, specular, diffuse, centre, normal in zip(
+            lit, cosines, params.specular, params.diffuse, centres, normals, strict=True
+        )
+    )
+    total = cross(pushed, toward)
+    for part in along:
+        total = add(total, part)
+    return scale(-memory.pressure, total)
+
+
+def bound(params: Params) -> float:
+    """The largest norm that it has (N m): every plate seen square on, at the perihelion."""
+    numbers = prepare(params, 1.0)
+    sizes = zip(*numbers.plates[::2], numbers.absorbed, numbers.specular, numbers.diffuse, strict=True)
+    return sun.STRONGEST * sum(a * norm(centre) * (absorbed + s + d) for a, centre, absorbed, s, d in sizes)
+
+
+def examples() -> list[Params]:
+    """The six sides of a 6U CubeSat, and one mirror at another time."""
+    sides = tuple((*row, 0.1, 0.3) for row in BOX)
+    return [Params(sides), Params(((0.5, 0.0, 0.6, 0.8, 0.1, -0.2, 0.3, 0.9, 0.05),), (2027.0, 6.0, 21.0, 12.0, 30.0, 15.0))]

@@ -1,0 +1,90 @@
+"""The Sun: its direction and distance over time, and how much of it the Earth leaves in view."""
+
+from __future__ import annotations
+
+from math import cos, pi, radians, sin
+from typing import NamedTuple
+
+from starhold.algebra.circular import cosine_sine
+from starhold.algebra.rotation import rotation_vector
+from starhold.algebra.scalar import Scalar, clip, less, maximum, sqrt, where
+from starhold.algebra.vector import Vector, dot
+from starhold.parts.epoch import DAY, Date, days_of
+from starhold.parts.orbit import BODIES
+
+SOURCES = ("The Astronomical Almanac: low-precision formulas for the Sun",)
+ASSUMPTIONS = ("the Sun's direction to 0.01 deg, from 1950 to 2050", "inertial axes of the equator and equinox of date")
+SHADOW = "the Earth's shadow is that of a sphere without air, its edge straight across the Sun's disc"
+"""For the cards of parts that take it."""
+UNIT = 1.495978707e11
+"""The astronomical unit, m."""
+PRESSURE = 1361.0 / 299792458.0
+"""The pressure of sunlight on what absorbs it, at one astronomical unit, N/m2 (Kopp and Lean 2011)."""
+STRONGEST = PRESSURE / 0.983**2
+"""The same at the perihelion, rounded up."""
+RADIUS, EARTH = BODIES["Sun"].radius, BODIES["Earth"].radius
+# Degrees at J2000, and in a day.
+_LONGITUDE, _ANOMALY = (280.460, 0.9856474), (357.528, 0.9856003)
+
+
+class Numbers(NamedTuple):
+    """At the start the Sun's mean longitude and mean anomaly (turns), and cosine and sine of the equator's slope."""
+
+    longitude: Scalar
+    anomaly: Scalar
+    cosine: Scalar
+    sine: Scalar
+
+
+class Sun(NamedTuple):
+    """The unit vector from the Earth to the Sun, inertial axes, and the distance (astronomical units)."""
+
+    direction: Vector
+    distance: Scalar
+
+
+def prepared(epoch: Date) -> Numbers:
+    """The numbers of the Sun for a flight that begins at an epoch (UTC). ValueError for one that is no date."""
+    days = days_of(epoch)
+    longitude, anomaly = (((at_j2000 + daily * days) / 360.0) % 1.0 for at_j2000, daily in (_LONGITUDE, _ANOMALY))
+    slope = radians(23.439 - 4e-7 * days)
+    return Numbers(longitude, anomaly, cos(slope), sin(slope))
+
+
+def sun(time: Scalar, params: Numbers) -> Sun:
+    """The Sun so many seconds after the start."""
+    c, s = cosine_sine(params.anomaly + _ANOMALY[1] / (360.0 * DAY) * time)
+    ahead = 1.915 * s + 0.040 * (s * c)
+    x, along = cosine_sine(params.longitude + _LONGITUDE[1] / (360.0 * DAY) * time + (1.0 / 360.0) * ahead)
+    # cos 2g = 2 c2 - 1.
+    distance = (1.00014 + 0.00014) - 0.01671 * c - 0.00028 * (c * c)
+    return Sun((x, params.cosine * along, params.sine * along), distance)
+
+
+def in_view(position: Vector, seen: Sun) -> Scalar:
+    """The share of the Sun's disc, from 0 to 1, that the Earth leaves in view at a position (m, inertial) outside it.
+
+    The Earth's edge is taken for straight across the disc, which is small beside it: up to geostationary height that changes
+    the share by less than 0.4 %.
+    """
+    square = dot(position, position)
+    # Of the angle between the Sun and the Earth's centre, and of the Earth's angular radius, cosine and sine.
+    toward = -dot(position, seen.direction) / sqrt(square)
+    across = sqrt(maximum(1.0 - toward * toward, 0.0))
+    half = EARTH / sqrt(square)
+    open_sky = sqrt(maximum(1.0 - half * half, 0.0))
+    # How far the Sun's centre stands above the edge, in radii of its disc: angles that small are their sines.
+    height = (across * open_sky - toward * half) * (seen.distance * (UNIT / RADIUS))
+    # The Sun's direction is that from the Earth's centre.
+    height = height - across * sqrt(square) / RADIUS
+    # Where the Sun is on the other side the sine of the distance from the edge means nothing.
+    height = where(less(toward, 0.0), 1.0, clip(height, 1.0))
+    cosine = sqrt(maximum(1.0 - height * height, 0.0))
+    arc = 0.5 * rotation_vector((cosine, height, 0.0, 0.0))[0]
+    share = 0.5 + (1.0 / pi) * (arc + height * cosine)
+    return where(less(height, 1.0), where(less(-1.0, height), share, 0.0), 1.0)
+
+
+def pressure(seen: Sun) -> Scalar:
+    """The pressure of sunlight on what absorbs it, where the Earth does not hide it (N/m2)."""
+    return PRESSURE / (seen.distance * seen.distance)
