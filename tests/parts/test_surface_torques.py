@@ -1,0 +1,152 @@
+"""Drag, sunlight, and its shadow against Basilisk, an independent simulator in C++, and against sums by hand."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from starhold.algebra.quaternion import to_body
+from starhold.conformance.bench import CRAFT
+from starhold.parts import sun
+from starhold.parts.catalogue import find
+from starhold.parts.environments import drag, solar_pressure
+from starhold.parts.plates import BOX
+from starhold.parts.sun import EARTH
+
+PERIOD = 0.5
+EPOCH = (2026.0, 10.0, 9.0, 8.0, 7.0, 6.0)
+AIR = drag.Params(BOX, 2.1, 3.5e-12, 4e5, 5.8515e4, 1.2)
+SIDES = tuple((*row, 0.1 * k, 0.5 - 0.1 * k) for k, row in enumerate(BOX))
+LIGHT = solar_pressure.Params(SIDES, EPOCH)
+
+
+def states(count=12, seed=4):
+    """Attitudes, positions (m) and velocities (m/s) about the Earth, a third of them in its shadow."""
+    random = np.random.default_rng(seed)
+    for _ in range(count):
+        q, r, v = random.normal(size=4), random.normal(size=3), random.normal(size=3)
+        r *= (EARTH + random.uniform(3e5, 6e5)) / np.linalg.norm(r)
+        v = np.cross(r, v)
+        v *= 7.6e3 / np.linalg.norm(v)
+        vectors = (tuple(map(float, x)) for x in (q / np.linalg.norm(q), r, v))
+        yield SimpleNamespace(**dict(zip(("attitude", "position", "velocity"), vectors, strict=True)))
+
+
+def torque(part, params, state, step=0):
+    """The torque of a part at a state (N m, body axes)."""
+    numbers = part.prepare(params, PERIOD)
+    memory = part.update(part.remember(numbers), state, numbers, None, step)
+    return np.array(part.torque(state, numbers, CRAFT, memory))
+
+
+def in_basilisk(effector, state, models=()):
+    """The torque (N m, body axes) that an effector of Basilisk gives a spacecraft at a state."""
+    from Basilisk.simulation import spacecraft
+    from Basilisk.utilities import RigidBodyKinematics, SimulationBaseClass, macros
+
+    simulation = SimulationBaseClass.SimBaseClass()
+    simulation.CreateNewProcess("p").addTask(simulation.CreateNewTask("t", macros.sec2nano(1e-6)))
+    craft = spacecraft.Spacecraft()
+    craft.hub.mHub, craft.hub.IHubPntBc_B = 12.0, np.diag([2.0, 3.0, 4.0]).tolist()
+    craft.hub.sigma_BNInit = RigidBodyKinematics.EP2MRP(np.array(state.attitude)).tolist()
+    craft.hub.r_CN_NInit, craft.hub.v_CN_NInit = list(state.position), list(state.velocity)
+    craft.addDynamicEffector(effector)
+    for model in (*models, craft, effector):
+        simulation.AddModelToTask("t", model)
+    for model in models:
+        if hasattr(model, "addSpacecraftToModel"):
+            model.addSpacecraftToModel(craft.scStateOutMsg)
+    simulation.InitializeSimulation()
+    simulation.ConfigureStopTime(macros.sec2nano(2e-6))
+    simulation.ExecuteSimulation()
+    return np.array(effector.torqueExternalPntB_B).ravel(), craft
+
+
+def test_drag_against_basilisk():
+    pytest.importorskip("Basilisk")
+    from Basilisk.architecture import messaging
+    from Basilisk.simulation import facetDragDynamicEffector
+
+    for state in states():
+        effector = facetDragDynamicEffector.FacetDragDynamicEffector()
+        for area, nx, ny, nz, *centre in BOX:
+            effector.addFacet(area, AIR.coefficient, [nx, ny, nz], centre)
+        air = messaging.AtmoPropsMsgPayload()
+        height = np.linalg.norm(state.position) - EARTH
+        air.neutralDensity = AIR.density * np.exp(-(height - AIR.height) / AIR.scale_height)
+        density = messaging.AtmoPropsMsg().write(air)
+        effector.atmoDensInMsg.subscribeTo(density)
+        moving = messaging.WindMsgPayload()
+        moving.v_air_N = np.cross((0.0, 0.0, AIR.rotation * drag.TURN), state.position).tolist()
+        wind = messaging.WindMsg().write(moving)
+        effector.windVelInMsg.subscribeTo(wind)
+        expected, _ = in_basilisk(effector, state)
+        found = torque(drag, AIR, state)
+        assert np.abs(found - expected).max() < 1e-8 * np.abs(expected).max(), (found, expected)
+
+
+def test_sunlight_against_basilisk():
+    pytest.importorskip("Basilisk")
+    from Basilisk.architecture import messaging
+    from Basilisk.simulation import facetSRPDynamicEffector
+
+    shaded = 0
+    for step, state in enumerate(states()):
+        seen = sun.sun(step * PERIOD, sun.prepared(EPOCH))
+        effector = facetSRPDynamicEffector.FacetSRPDynamicEffector()
+        effector.setNumFacets(len(SIDES))
+        for area, nx, ny, nz, x, y, z, specular, diffuse in SIDES:
+            effector.addFacet(area, np.eye(3).tolist(), [nx, ny, nz], [1.0, 0.0, 0.0], [x, y, z], diffuse, specular)
+        place = messaging.SpicePlanetStateMsgPayload()
+        # In the direction from the Earth's centre, which the craft's differs from by 0.003 deg.
+        place.PositionVector = (np.array(state.position) + seen.distance * sun.UNIT * np.array(seen.direction)).tolist()
+        sun_at = messaging.SpicePlanetStateMsg().write(place)
+        effector.sunInMsg.subscribeTo(sun_at)
+        shadow = messaging.EclipseMsgPayload()
+        shadow.illuminationFactor = sun.in_view(state.position, seen)
+        eclipse = messaging.EclipseMsg().write(shadow)
+        effector.sunEclipseInMsg.subscribeTo(eclipse)
+        shaded += shadow.illuminationFactor == 0.0
+        expected, _ = in_basilisk(effector, state)
+        found = torque(solar_pressure, LIGHT, state, step)
+        # Its solar constant is 1368 W/m2.
+        assert np.abs(1368.0 / 1361.0 * found - expected).max() <= 1e-7 * np.abs(expected).max(), (found, expected)
+        assert np.linalg.norm(found) < solar_pressure.bound(LIGHT)
+    assert 0 < shaded < 12
+
+
+def test_shadow_against_basilisk():
+    pytest.importorskip("Basilisk")
+    from Basilisk.architecture import messaging
+    from Basilisk.simulation import eclipse
+
+    seen = sun.sun(0.0, sun.prepared(EPOCH))
+    toward = np.array(seen.direction)
+    side = np.cross(toward, (0.0, 0.0, 1.0))
+    side /= np.linalg.norm(side)
+    partly = 0
+    for altitude in (4e5, 3.5786e7):
+        edge = np.pi - np.arcsin(EARTH / (EARTH + altitude))
+        for angle in (0.3, *(edge + np.linspace(-0.008, 0.008, 9)), 3.0):
+            position = (EARTH + altitude) * (np.cos(angle) * toward + np.sin(angle) * side)
+            shadow = eclipse.Eclipse()
+            bodies = {"sun": seen.distance * sun.UNIT * toward, "earth": np.zeros(3)}
+            told = {}
+            for name, place in bodies.items():
+                payload = messaging.SpicePlanetStateMsgPayload()
+                payload.PlanetName, payload.PositionVector = name, place.tolist()
+                payload.J20002Pfix = np.eye(3).tolist()
+                told[name] = messaging.SpicePlanetStateMsg().write(payload)
+            shadow.sunInMsg.subscribeTo(told["sun"])
+            shadow.addPlanetToModel(told["earth"])
+            flying = messaging.SCStatesMsgPayload()
+            flying.r_BN_N = position.tolist()
+            craft = messaging.SCStatesMsg().write(flying)
+            shadow.addSpacecraftToModel(craft)
+            shadow.Reset(0)
+            shadow.UpdateState(0)
+            payload = shadow.eclipseOutMsgs[0].read()
+            expected = payload.shadowFactor
+            partly += 0.0 < expected < 1.0
+            assert abs(sun.in_view(tuple(position.tolist()), seen) - expected) < 0.006, (altitude, angle)
+    assert partly > 5
