@@ -5,10 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from starhold.algebra.quaternion import to_body
 from starhold.conformance.bench import CRAFT
 from starhold.parts import sun
-from starhold.parts.catalogue import find
 from starhold.parts.environments import drag, solar_pressure
 from starhold.parts.plates import BOX
 from starhold.parts.sun import EARTH

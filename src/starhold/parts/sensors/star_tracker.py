@@ -7,16 +7,17 @@ from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import Quaternion, multiply, normalise
-from starhold.algebra.scalar import Scalar, less, where
+from starhold.algebra.scalar import Scalar, both, less, opposite, where
 from starhold.algebra.vector import Vector, add, dot, scale, subtract
 from starhold.parts.contract import Card, Parameter
+from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
 from starhold.parts.random import Dice
 
 CARD = Card(
     title="Star tracker",
     summary="q_m = q(t - delay) turned by Gaussian angles, less sure about the boresight; held between updates",
     sources=("Fundamentals of Spacecraft Attitude Determination and Control (2014)",),
-    assumptions=("stars are always in view", "errors independent from update to update"),
+    assumptions=("stars are in view but in the outage", "errors independent from update to update"),
 )
 ROLE = "sensor"
 FIRST = {"attitude_is_new": 0.0}
@@ -36,16 +37,19 @@ class Params(NamedTuple):
     )
     interval: Annotated[float, Parameter("s", at_least=0.0, text="between updates; each control step if 0")] = 0.0
     delay: Annotated[float, Parameter("s", at_least=0.0, text="from exposure to reading")] = 0.0
+    outage: Annotated[Window, OUTAGE] = NEVER
 
 
 class Numbers(NamedTuple):
-    """Deviations (rad), the unit vector of the boresight, control steps from update to update, and those of the delay."""
+    """Deviations (rad), the unit vector of the boresight, control steps from update to update, those of the delay, and those
+    of the outage."""
 
     cross: Scalar
     roll: Scalar
     boresight: Vector
     every: Scalar
     late: int
+    outage: Window
 
 
 class Memory(NamedTuple):
@@ -66,7 +70,7 @@ class Reading(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a control step. ValueError for a boresight without direction, and for too long a delay."""
+    """The numbers of a control step. ValueError for a boresight without direction, too long a delay, and a bad outage."""
     size = math.hypot(*params.boresight)
     if not size > 0.0:
         raise ValueError("the boresight needs a direction")
@@ -74,7 +78,12 @@ def prepare(params: Params, period: float) -> Numbers:
     if late > MOST:
         raise ValueError(f"the delay must be at most {MOST} control periods, {MOST * period:g} s")
     return Numbers(
-        params.cross, params.roll, scale(1.0 / size, params.boresight), float(max(1, round(params.interval / period))), late
+        params.cross,
+        params.roll,
+        scale(1.0 / size, params.boresight),
+        float(max(1, round(params.interval / period))),
+        late,
+        in_steps(params.outage, period),
     )
 
 
@@ -90,7 +99,7 @@ def measure(state: Any, memory: Memory, params: Numbers, dice: Dice, step: int) 
     along = scale(dot(angles, params.boresight), params.boresight)
     error = add(scale(0.5 * params.cross, subtract(angles, along)), scale(0.5 * params.roll, along))
     fresh = normalise(multiply(seen, (1.0, *error)))
-    due = less(memory.left, 0.5)
+    due = both(less(memory.left, 0.5), opposite(is_out(step, params.outage)))
     shown: Any = tuple(where(due, new, old) for new, old in zip(fresh, memory.shown, strict=True))
     waiting = (state.attitude, *memory.waiting[:-1]) if params.late else ()
     left = where(due, params.every - 1.0, memory.left - 1.0)

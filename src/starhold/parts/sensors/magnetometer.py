@@ -1,0 +1,85 @@
+"""A magnetometer: the Earth's magnetic field with bias and noise."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+from starhold.algebra.quantity import Quantity
+from starhold.algebra.quaternion import to_body
+from starhold.algebra.scalar import Scalar, where
+from starhold.algebra.vector import ZERO, Vector, add, scale
+from starhold.algebra.words import number_of
+from starhold.parts import magnetic_field
+from starhold.parts.contract import Card, Parameter
+from starhold.parts.epoch import EPOCH, START, Date
+from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
+from starhold.parts.random import Dice
+
+CARD = Card(
+    title="Magnetometer",
+    summary="B_m = (1 + scale_error) B + bias + noise, B the Earth's magnetic field in body axes",
+    sources=(magnetic_field.SOURCE, "Fundamentals of Spacecraft Attitude Determination and Control (2014)"),
+    assumptions=(
+        *magnetic_field.ASSUMPTIONS,
+        "axes along the body's",
+        "white noise from control step to control step",
+        "what is magnetic on board shows as a constant bias: torque rods are off while it measures",
+    ),
+)
+ROLE = "sensor"
+NEEDS = ("two-body",)
+FIRST = {"magnetic_field": ZERO, "magnetic_field_is_new": 0.0}
+
+
+class Params(NamedTuple):
+    """How good it is, and when it flies."""
+
+    noise: Annotated[float, Parameter("T", at_least=0.0, text="standard deviation of each component")] = 0.0
+    bias: Annotated[Vector, Parameter("T", shape=(3,), spread=False, text="added to the field, body axes")] = ZERO
+    scale_error: Annotated[float, Parameter("1", at_least=-0.5, at_most=0.5, text="of the scale factor")] = 0.0
+    epoch: Annotated[Date, EPOCH] = START
+    outage: Annotated[Window, OUTAGE] = NEVER
+
+
+class Numbers(NamedTuple):
+    """Deviation and bias (T), the scale factor, the field, the control period (s), and the outage (control steps)."""
+
+    noise: Scalar
+    bias: Vector
+    factor: Scalar
+    field: magnetic_field.Numbers
+    period: Scalar
+    outage: Window
+
+
+class Reading(NamedTuple):
+    """The field that it shows, and whether it is a new one (1) or that of an earlier control step (0)."""
+
+    magnetic_field: Annotated[Vector, Quantity("T", "magnetic field as the magnetometer measures it, body axes", "axis")]
+    magnetic_field_is_new: Annotated[float, Quantity("1", "1 where the magnetic field is a new one, else 0")]
+
+
+def prepare(params: Params, period: float) -> Numbers:
+    """The numbers of a flight. ValueError for an epoch that the field is not known at, and for a bad outage."""
+    field, outage = magnetic_field.prepared(params.epoch), in_steps(params.outage, period)
+    return Numbers(params.noise, params.bias, 1.0 + params.scale_error, field, period, outage)
+
+
+def remember(params: Numbers, state: Any) -> Vector:
+    """No reading yet (T)."""
+    return ZERO
+
+
+def measure(state: Any, memory: Vector, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Vector]:
+    """The field at this control step, or in an outage the last one before it."""
+    true = magnetic_field.field(state.position, number_of(step) * params.period, params.field)
+    shown = add(add(scale(params.factor, to_body(state.attitude, true)), params.bias), dice.vector(0, params.noise))
+    out = is_out(step, params.outage)
+    held: Any = tuple(where(out, old, new) for old, new in zip(memory, shown, strict=True))
+    return Reading(held, where(out, 0.0, 1.0)), held
+
+
+def examples() -> list[Params]:
+    """One of a CubeSat, and an exact one that is out for a while, at another time."""
+    small = Params(noise=5e-8, bias=(2e-7, -1e-7, 3e-7), scale_error=0.002)
+    return [small, Params(epoch=(2027.0, 6.0, 21.0, 12.0, 30.0, 15.0), outage=(0.5, 1.5))]

@@ -1,0 +1,99 @@
+"""A sun sensor: the Sun's direction, where it is in the field of view and the Earth does not hide it."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, NamedTuple
+
+from starhold.algebra.quantity import Quantity
+from starhold.algebra.quaternion import to_body
+from starhold.algebra.scalar import Scalar, both, less, less_equal, opposite, where
+from starhold.algebra.vector import ZERO, Vector, add, dot, scale, unit
+from starhold.algebra.words import number_of
+from starhold.parts import sun
+from starhold.parts.contract import Card, Parameter
+from starhold.parts.epoch import EPOCH, START, Date
+from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
+from starhold.parts.random import Dice
+
+CARD = Card(
+    title="Sun sensor",
+    summary="s_m = unit(s + noise) where s is within field_of_view of the boresight and half of the Sun is in view, else 0",
+    sources=(*sun.SOURCES, "Fundamentals of Spacecraft Attitude Determination and Control (2014)"),
+    assumptions=(
+        *sun.ASSUMPTIONS,
+        sun.SHADOW,
+        "no light from the Earth",
+        "white noise from control step to control step",
+    ),
+)
+ROLE = "sensor"
+NEEDS = ("two-body",)
+FIRST = {"sun": ZERO, "sun_is_seen": 0.0}
+
+
+class Params(NamedTuple):
+    """How good it is, where it looks, and when it flies."""
+
+    noise: Annotated[float, Parameter("rad", at_least=0.0, text="standard deviation about each axis")] = 0.0
+    boresight: Annotated[Vector, Parameter("1", shape=(3,), spread=False, text="where it looks, body axes")] = (
+        0.0,
+        0.0,
+        1.0,
+    )
+    field_of_view: Annotated[
+        float, Parameter("rad", above=0.0, at_most=math.pi, text="half of it, from the boresight; half a turn sees all")
+    ] = math.pi
+    epoch: Annotated[Date, EPOCH] = START
+    outage: Annotated[Window, OUTAGE] = NEVER
+
+
+class Numbers(NamedTuple):
+    """The deviation (rad), the unit vector of the boresight, the cosine of half the field of view, the Sun, the control
+    period (s), and the outage (control steps)."""
+
+    noise: Scalar
+    boresight: Vector
+    cosine: Scalar
+    sun: sun.Numbers
+    period: Scalar
+    outage: Window
+
+
+class Reading(NamedTuple):
+    """The direction that it shows, nothing where it does not see the Sun."""
+
+    sun: Annotated[Vector, Quantity("1", "direction to the Sun as the sensor measures it, 0 if unseen, body axes", "axis")]
+    sun_is_seen: Annotated[float, Quantity("1", "1 where the sensor sees the Sun, else 0")]
+
+
+def prepare(params: Params, period: float) -> Numbers:
+    """The numbers of a flight. ValueError for a boresight without direction, a bad epoch and a bad outage."""
+    size = math.hypot(*params.boresight)
+    if not size > 0.0:
+        raise ValueError("the boresight needs a direction")
+    # With a margin for rounding a sensor that sees all does so.
+    cosine = math.cos(params.field_of_view) - 1e-12
+    outage = in_steps(params.outage, period)
+    return Numbers(params.noise, scale(1.0 / size, params.boresight), cosine, sun.prepared(params.epoch), period, outage)
+
+
+def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
+    """The Sun at this control step."""
+    seen = sun.sun(number_of(step) * params.period, params.sun)
+    toward = to_body(state.attitude, seen.direction)
+    inside = less_equal(params.cosine, dot(toward, params.boresight))
+    lit = less(0.5, sun.in_view(state.position, seen))
+    found = both(both(inside, lit), opposite(is_out(step, params.outage)))
+    # Along the direction itself the noise has no effect.
+    shown = unit(add(toward, dice.vector(0, params.noise)))
+    told: Any = tuple(where(found, x, 0.0) for x in shown)
+    return Reading(told, where(found, 1.0, 0.0)), memory
+
+
+def examples() -> list[Params]:
+    """A fine one, and an exact one that sees all."""
+    return [
+        Params(math.radians(0.1), (1.0, 0.0, 1.0), math.radians(60.0)),
+        Params(epoch=(2027.0, 6.0, 21.0, 12.0, 30.0, 15.0)),
+    ]
