@@ -82,12 +82,8 @@ class Estimate(NamedTuple):
     attitude: Annotated[Quaternion, Quantity("1", "estimated attitude, inertial to body, scalar first", "quaternion")]
     rate: Annotated[Vector, Quantity("rad/s", "estimated angular velocity, body axes", "axis")]
     gyro_bias: Annotated[Vector, Quantity("rad/s", "estimated bias of the gyro", "axis")]
-    attitude_deviation: Annotated[
-        Vector, Quantity("rad", "standard deviation of the attitude's error about each body axis, by the filter", "axis")
-    ]
-    gyro_bias_deviation: Annotated[
-        Vector, Quantity("rad/s", "standard deviation of the bias's error, by the filter", "axis")
-    ]
+    attitude_deviation: Annotated[Vector, Quantity("rad", "standard deviation of its error, body axes", "axis")]
+    gyro_bias_deviation: Annotated[Vector, Quantity("rad/s", "standard deviation of its error, body axes", "axis")]
 
 
 class Memory(NamedTuple):

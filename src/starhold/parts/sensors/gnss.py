@@ -29,8 +29,8 @@ class Params(NamedTuple):
 class Reading(NamedTuple):
     """Position and velocity in inertial axes."""
 
-    position: Annotated[Vector, Quantity("m", "position as the receiver measures it, inertial", "axis")]
-    velocity: Annotated[Vector, Quantity("m/s", "velocity as the receiver measures it, inertial", "axis")]
+    position: Annotated[Vector, Quantity("m", "as measured, inertial", "axis")]
+    velocity: Annotated[Vector, Quantity("m/s", "as measured, inertial", "axis")]
 
 
 def measure(state: Any, memory: NoMemory, params: Params, dice: Dice, step: int) -> tuple[Reading, NoMemory]:

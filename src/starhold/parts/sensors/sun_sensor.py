@@ -63,7 +63,7 @@ class Numbers(NamedTuple):
 class Reading(NamedTuple):
     """The direction that it shows, nothing where it does not see the Sun."""
 
-    sun: Annotated[Vector, Quantity("1", "direction to the Sun as the sensor measures it, 0 if unseen, body axes", "axis")]
+    sun: Annotated[Vector, Quantity("1", "direction as measured, 0 if unseen, body axes", "axis")]
     sun_is_seen: Annotated[float, Quantity("1", "1 where the sensor sees the Sun, else 0")]
 
 
