@@ -7,6 +7,7 @@ import pytest
 
 from starhold.parts.epoch import DAY, days_of, sidereal
 from starhold.parts.magnetic_field import RADIUS, ROWS, earth_fixed, field, prepared, strongest
+from tests.parts.fields import reference
 
 NEW_YEAR = (2025.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 ALTITUDE = 5e5
@@ -17,18 +18,6 @@ def places(count=400, seed=1):
     found = np.random.default_rng(seed).normal(size=(count, 3))
     found[0], found[1] = (1e-6, 0.0, 1.0), (0.0, 1e-6, -1.0)
     return (RADIUS + ALTITUDE) * found / np.linalg.norm(found, axis=1)[:, None]
-
-
-def reference(positions, date):
-    """The full field (T) in the same axes, by ppigrf, whose equations are those of the angles."""
-    x, y, z = positions.T
-    distance = np.linalg.norm(positions, axis=1)
-    colatitude, longitude = np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
-    parts = ppigrf.igrf_gc(distance / 1e3, np.degrees(colatitude), np.degrees(longitude), date)
-    outward, south, east = (1e-9 * np.ravel(part)[:, None] for part in parts)
-    (st, ct), (sp, cp) = ((np.sin(a), np.cos(a)) for a in (colatitude, longitude))
-    axes = [(st * cp, st * sp, ct), (ct * cp, ct * sp, -st), (-sp, cp, 0.0 * cp)]
-    return sum(size * np.stack(axis, axis=1) for size, axis in zip((outward, south, east), axes, strict=True))
 
 
 def full_rows():
