@@ -183,6 +183,7 @@ def test_bad_numbers():
         (magnetometer, magnetometer.Params(outage=(2.0, 1.0)), "outage ends"),
         (magnetometer, magnetometer.Params(epoch=(2035.0, 1.0, 1.0, 0.0, 0.0, 0.0)), "2025 to 2030"),
         (sun_sensor, sun_sensor.Params(boresight=(0.0, 0.0, 0.0)), "boresight"),
+        (sun_sensor, sun_sensor.Params(epoch=(2051.0, 1.0, 1.0, 0.0, 0.0, 0.0)), "1950 to 2050"),
         (star_tracker, star_tracker.Params(1e-4, 1e-4, outage=(2.0, 1.0)), "outage ends"),
     ):
         with pytest.raises(ValueError, match=words):

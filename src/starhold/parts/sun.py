@@ -44,8 +44,13 @@ class Sun(NamedTuple):
 
 
 def prepared(epoch: Date) -> Numbers:
-    """The numbers of the Sun for a flight that begins at an epoch (UTC). ValueError for one that is no date."""
+    """The numbers of the Sun for a flight that begins at an epoch (UTC).
+
+    ValueError for an epoch that is no date, or not from 1950 to 2050.
+    """
     days = days_of(epoch)
+    if not 1950.0 <= epoch[0] <= 2050.0:
+        raise ValueError(f"the Sun's place is known from 1950 to 2050, not in {epoch[0]:g}")
     longitude, anomaly = (((at_j2000 + daily * days) / 360.0) % 1.0 for at_j2000, daily in (_LONGITUDE, _ANOMALY))
     slope = radians(23.439 - 4e-7 * days)
     return Numbers(longitude, anomaly, cos(slope), sin(slope))

@@ -146,9 +146,9 @@ def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, perio
         attitude,
         bias,
         readings.rate,
-        symmetric(differing(before.turn, product(gain, before.turn))),
-        differing(before.mixed, product(gain, before.mixed)),
-        symmetric(differing(before.walk, product(mixed_gain, before.mixed))),
+        symmetric(combine(1.0, before.turn, -1.0, product(gain, before.turn))),
+        combine(1.0, before.mixed, -1.0, product(gain, before.mixed)),
+        symmetric(combine(1.0, before.walk, -1.0, product(mixed_gain, before.mixed))),
         where(new, 1.0, memory.begun),
     )
     found = Estimate(attitude, subtract(readings.rate, bias), bias, deviations(after.turn), deviations(after.walk))
@@ -186,11 +186,6 @@ def chosen(condition: Truth, one: Any, other: Any) -> Any:
 def summed(a: Matrix, b: Matrix) -> Matrix:
     """Return a + b."""
     return combine(1.0, a, 1.0, b)
-
-
-def differing(a: Matrix, b: Matrix) -> Matrix:
-    """Return a - b."""
-    return (subtract(a[0], b[0]), subtract(a[1], b[1]), subtract(a[2], b[2]))
 
 
 def weighted(c: Scalar, a: Matrix) -> Matrix:

@@ -18,7 +18,7 @@ from starhold.parts.random import Dice
 
 CARD = Card(
     title="Sun sensor",
-    summary="s_m = unit(s + noise) where s is within field_of_view of the boresight and half of the Sun is in view, else 0",
+    summary="s_m = unit(s + noise) where s is within half_angle of the boresight and half of the Sun is in view, else 0",
     sources=(*sun.SOURCES, "Fundamentals of Spacecraft Attitude Determination and Control (2014)"),
     assumptions=(
         *sun.ASSUMPTIONS,
@@ -41,8 +41,9 @@ class Params(NamedTuple):
         0.0,
         1.0,
     )
-    field_of_view: Annotated[
-        float, Parameter("rad", above=0.0, at_most=math.pi, text="half of it, from the boresight; half a turn sees all")
+    half_angle: Annotated[
+        float,
+        Parameter("rad", above=0.0, at_most=math.pi, text="of the field of view, from the boresight; half a turn sees all"),
     ] = math.pi
     epoch: Annotated[Date, EPOCH] = START
     outage: Annotated[Window, OUTAGE] = NEVER
@@ -73,7 +74,7 @@ def prepare(params: Params, period: float) -> Numbers:
     if not size > 0.0:
         raise ValueError("the boresight needs a direction")
     # With a margin for rounding a sensor that sees all does so.
-    cosine = math.cos(params.field_of_view) - 1e-12
+    cosine = math.cos(params.half_angle) - 1e-12
     outage = in_steps(params.outage, period)
     return Numbers(params.noise, scale(1.0 / size, params.boresight), cosine, sun.prepared(params.epoch), period, outage)
 
