@@ -183,7 +183,10 @@ def keeps_momentum(part: Part) -> None:
             own = zip(loop.used("effector"), carry.effectors, numbers, strict=True)
             total = apply(loop.craft.inertia, carry.state.rate)
             for fitted, state, prepared in own:
-                total = add(total, fitted.part.module.momentum(state, prepared))
+                module = fitted.part.module
+                total = add(total, module.momentum(state, prepared))
+                if fitted.part.hook("inertia_change") is not None:
+                    total = add(total, apply(module.inertia_change(state, prepared), carry.state.rate))
             totals.append(to_reference(carry.state.attitude, total))
         apart = float(np.abs(np.subtract(*totals)).max()) / max(float(np.abs(totals).max()), 1e-300)
         require(apart < 1e-7, f"the angular momentum changes by {apart:.1e} of itself")

@@ -141,6 +141,11 @@ class Effector(Protocol):
         """Its angular momentum relative to the body (N m s, body axes)."""
         ...
 
+    def inertia_change(self, own: Any, params: Any, /) -> Matrix:
+        """How much more inertia (3, 3; kg m2) the whole has than the body's numbers say, where its shape changes: what the
+        momentum has besides, times the body's rate."""
+        ...
+
     def record(self, own: Any, command: Any, body: State, params: Any, /) -> Any:
         """A NamedTuple of what is recorded of it."""
         ...

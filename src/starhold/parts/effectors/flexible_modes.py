@@ -1,0 +1,129 @@
+"""Bending modes of appendages, as finite elements give them: small deflections beside a rigid hub."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+from starhold.algebra.quantity import Quantity
+from starhold.algebra.scalar import Scalar
+from starhold.algebra.several import each, weighted
+from starhold.algebra.vector import Matrix, Vector, cross, dot, scale, subtract
+from starhold.parts.contract import Card, Parameter
+
+CARD = Card(
+    title="Flexible modes",
+    summary="x_i'' + 2 damping f x_i' + f^2 x_i = -d_i.w'; the body feels -sum d_i x_i'' - w x sum d_i x_i'",
+    sources=("Spacecraft Dynamics and Control (1997): hybrid coordinates",),
+    assumptions=(
+        "small deflections, which leave the inertia as it is",
+        "cantilever modes of unit modal mass, whose coupling takes in that the craft's centre of mass gives way",
+        "gravity acts on the craft as if nothing were deflected",
+    ),
+)
+ROLE = "effector"
+COLUMNS = ("frequency", "damping", "coupling_x", "coupling_y", "coupling_z", "deflection")
+
+
+class Params(NamedTuple):
+    """A row for each mode."""
+
+    modes: Annotated[
+        tuple[tuple[float, ...], ...],
+        Parameter(
+            "rad/s, 1, sqrt(kg) m, sqrt(kg) m",
+            columns=COLUMNS,
+            text="frequency with the hub held fast; damping ratio; angular momentum about the craft's centre of mass per "
+            "modal speed; modal deflection at the start",
+        ),
+    ]
+
+
+class Numbers(NamedTuple):
+    """For each mode the stiffness f^2 (1/s2), the damper 2 damping f (1/s), the coupling and the deflection at the start."""
+
+    stiffness: tuple[Scalar, ...]
+    damping: tuple[Scalar, ...]
+    coupling: tuple[Vector, ...]
+    deflection: tuple[Scalar, ...]
+
+
+class State(NamedTuple):
+    """The deflection of each mode (sqrt(kg) m) and its rate."""
+
+    deflection: tuple[Scalar, ...]
+    rate: tuple[Scalar, ...]
+
+
+class Sample(NamedTuple):
+    """The quantities that are recorded of the modes."""
+
+    mode_deflection: Annotated[tuple[float, ...], Quantity("sqrt(kg) m", "modal deflection of each mode", "mode")]
+    mode_rate: Annotated[tuple[float, ...], Quantity("sqrt(kg) m/s", "rate of that deflection", "mode")]
+
+
+def prepare(params: Params, period: float) -> Numbers:
+    """The numbers that equations take. ValueError for no mode, a frequency that is not positive or a negative damping."""
+    if not params.modes:
+        raise ValueError("there is no mode")
+    for number, (frequency, damping, *_) in enumerate(params.modes, 1):
+        if not (frequency > 0.0 and damping >= 0.0):
+            raise ValueError(f"mode {number} needs a frequency above 0 and a damping of at least 0")
+    rows = [(f * f, 2.0 * damping * f, (x, y, z), at) for f, damping, x, y, z, at in params.modes]
+    return Numbers(*zip(*rows, strict=True))
+
+
+def remember(params: Numbers) -> State:
+    """The state at the start: the modes deflected, at rest."""
+    return State(params.deflection, (0.0,) * len(params.deflection))
+
+
+def _spring(stiffness: Scalar, damping: Scalar, deflection: Scalar, rate: Scalar) -> Scalar:
+    return stiffness * deflection + damping * rate
+
+
+def springs(own: State, params: Numbers) -> tuple[Scalar, ...]:
+    """The forces of springs and dampers on the modes (sqrt(kg) m/s2), with the sign of the deflection."""
+    return each(_spring, (params.stiffness, params.damping, own.deflection, own.rate))
+
+
+def reaction(own: State, command: Any, body: Any, params: Numbers) -> Vector:
+    """The torque of the modes on the body (N m)."""
+    return subtract(weighted(springs(own, params), params.coupling), cross(body.rate, momentum(own, params)))
+
+
+def inertia(own: State, params: Numbers) -> Matrix:
+    """The inertia that the body's angular acceleration meets besides the body's own (kg m2): -sum d d^T."""
+
+    def row(axis: int) -> Vector:
+        return scale(-1.0, weighted(tuple(d[axis] for d in params.coupling), params.coupling))
+
+    return (row(0), row(1), row(2))
+
+
+def rates(own: State, command: Any, body: Any, acceleration: Vector, params: Numbers) -> State:
+    """d(deflections, rates)/dt."""
+    pairs = zip(springs(own, params), params.coupling, strict=True)
+    return State(own.rate, tuple(-spring - dot(coupling, acceleration) for spring, coupling in pairs))
+
+
+def momentum(own: State, params: Numbers) -> Vector:
+    """The modes' angular momentum relative to the body (N m s)."""
+    return weighted(own.rate, params.coupling)
+
+
+def record(own: State, command: Any, body: Any, params: Numbers) -> Sample:
+    """The recorded quantities."""
+    return Sample(own.deflection, own.rate)
+
+
+def fastest(params: Params) -> float:
+    """The fastest rate (1/s) of a mode with the hub held fast."""
+    return max((row[0] for row in params.modes), default=0.0)
+
+
+def examples() -> list[Params]:
+    """A bending and a twisting mode, and one without damping."""
+    return [
+        Params(((0.6, 0.005, 0.3, 0.0, 0.1, 0.0), (2.4, 0.005, 0.0, 0.2, 0.0, 0.01))),
+        Params(((1.5, 0.0, 0.0, 0.5, 0.2, 0.05),)),
+    ]

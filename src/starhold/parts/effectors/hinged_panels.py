@@ -1,0 +1,336 @@
+"""Rigid panels on hinges with springs and dampers, whose motion moves the centre of mass and changes the inertia.
+
+The body's axes are those of the hub, its inertia that of the whole with all panels at their rest. About the centre of mass
+of the whole, which shifts as panels swing, the angular momentum is H = (J + dJ(x)) w + sum A_i(x) x_i', with x_i the angles
+of the hinges. Panels feel each other through the acceleration of that centre, three numbers, which are solved for first: so
+the work grows with the number of panels and not with its cube."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+
+from starhold.algebra.circular import cosine_sine
+from starhold.algebra.quantity import Quantity
+from starhold.algebra.scalar import Scalar
+from starhold.algebra.vector import (
+    ZERO,
+    Matrix,
+    Vector,
+    add,
+    apply,
+    combine,
+    cross,
+    diagonal,
+    dot,
+    inverse,
+    multiply,
+    scale,
+    subtract,
+    transpose,
+)
+from starhold.parts.contract import Card, Parameter
+from starhold.parts.craft import vector
+
+CARD = Card(
+    title="Hinged panels",
+    summary="D_i x_i'' + damping x_i' + stiffness x_i = -A_i.w' - what the rates give; the body feels the panels' momentum",
+    sources=("Lagrange's equations of a hub with rigid panels on hinges",),
+    assumptions=(
+        "rigid panels, springs and dampers linear in the angle",
+        "the craft's inertia and centre of mass are those of the whole with every panel at its rest, angle zero",
+        "a panel's principal axes are the hinge's, that towards its centre of mass, and their normal",
+        "gravity acts on the craft as if no panel were deflected",
+    ),
+)
+ROLE = "effector"
+COLUMNS = (
+    "mass",
+    *(f"{what}_{axis}" for what in ("hinge", "axis", "centre") for axis in "xyz"),
+    "about_hinge",
+    "about_centre_line",
+    "about_normal",
+    "stiffness",
+    "damping",
+    "angle",
+)
+
+
+class Params(NamedTuple):
+    """The mass that is moved about, and a row for each panel."""
+
+    mass: Annotated[float, Parameter("kg", above=0.0, text="of the whole craft")]
+    panels: Annotated[
+        tuple[tuple[float, ...], ...],
+        Parameter(
+            "kg, m, 1, m, kg m^2, N m/rad, N m s/rad, rad",
+            columns=COLUMNS,
+            text="mass; a point of the hinge, from the craft's centre of mass; direction of the hinge; centre of mass "
+            "of the panel, from that point; moments of inertia about that centre; spring; damper; angle at the start",
+        ),
+    ]
+
+
+class Panel(NamedTuple):
+    """A panel as equations take it: mass, the point of its hinge next to its centre of mass (m), the unit axes of the hinge,
+    to the centre and normal to both, the distance of the centre (m), moments about these axes (kg m2), the inertia about the
+    hinge (kg m2), spring, damper, and the angle at the start."""
+
+    mass: Scalar
+    hinge: Vector
+    axis: Vector
+    out: Vector
+    normal: Vector
+    length: Scalar
+    moments: Vector
+    swung: Scalar
+    stiffness: Scalar
+    damping: Scalar
+    angle: Scalar
+
+
+class Numbers(NamedTuple):
+    """The panels, the mass of the whole (kg), and the inertia that the panels have at their rest (kg m2)."""
+
+    panels: tuple[Panel, ...]
+    mass: Scalar
+    rest: Matrix
+
+
+class State(NamedTuple):
+    """The angle (rad) and the rate (rad/s) of each hinge."""
+
+    angle: tuple[Scalar, ...]
+    rate: tuple[Scalar, ...]
+
+
+class Sample(NamedTuple):
+    """The quantities that are recorded of the panels."""
+
+    panel_angle: Annotated[tuple[float, ...], Quantity("rad", "angle of each panel about its hinge", "panel")]
+    panel_rate: Annotated[tuple[float, ...], Quantity("rad/s", "rate of that angle", "panel")]
+
+
+class _Swung(NamedTuple):
+    """A panel where it is: its angle and rate, its axes to the centre and normal, its centre of mass from the craft's as it is
+    now (m), its momentum for a unit of rate (kg m), and that of rotation about the craft's centre of mass (kg m2)."""
+
+    panel: Panel
+    angle: Scalar
+    rate: Scalar
+    out: Vector
+    normal: Vector
+    place: Vector
+    pushed: Vector
+    turned: Vector
+
+
+def prepare(params: Params, period: float) -> Numbers:
+    """The numbers that equations take. ValueError for a panel that no craft has."""
+    panels = tuple(_panel(k, row) for k, row in enumerate(params.panels, 1))
+    if not panels:
+        raise ValueError("there is no panel")
+    if not sum(panel.mass for panel in panels) < params.mass:
+        raise ValueError(f"the panels together must have less than the craft's mass of {params.mass:g} kg")
+    still = Numbers(panels, params.mass, ((0.0, 0.0, 0.0),) * 3)
+    return still._replace(rest=_whole(*_swung(State((0.0,) * len(panels), (0.0,) * len(panels)), still), still))
+
+
+def _panel(number: int, row: tuple[float, ...]) -> Panel:
+    mass, *places, about, along, across, stiffness, damping, angle = row
+    point, axis, centre = np.array(places).reshape(3, 3)
+    if not (mass > 0.0 and min(about, along, across) >= 0.0 and stiffness >= 0.0 and damping >= 0.0):
+        raise ValueError(f"panel {number} needs a mass above 0, and moments, stiffness and damping of at least 0")
+    if not axis.any():
+        raise ValueError(f"the hinge of panel {number} has no direction")
+    a = axis / np.linalg.norm(axis)
+    out = centre - a * (a @ centre)
+    length = float(np.linalg.norm(out))
+    if not length > 1e-9 * np.linalg.norm(centre):
+        raise ValueError(f"the centre of mass of panel {number} lies on its hinge")
+    e = out / length
+    return Panel(
+        mass,
+        vector(point + centre - out),
+        vector(a),
+        vector(e),
+        vector(np.cross(a, e)),
+        length,
+        (about, along, across),
+        about + mass * length**2,
+        stiffness,
+        damping,
+        angle,
+    )
+
+
+def remember(params: Numbers) -> State:
+    """The state at the start: panels at rest at their angles."""
+    return State(tuple(panel.angle for panel in params.panels), (0.0,) * len(params.panels))
+
+
+def _swung(own: State, params: Numbers) -> tuple[list[_Swung], Vector]:
+    """The panels where they are, and how far the craft's centre of mass has shifted (m)."""
+    shift: Vector = ZERO
+    placed: list[tuple[Vector, Vector, Vector]] = []
+    for panel, angle in zip(params.panels, own.angle, strict=True):
+        cosine, sine = cosine_sine(angle * (0.5 / math.pi))
+        out = add(scale(cosine, panel.out), scale(sine, panel.normal))
+        normal = subtract(scale(cosine, panel.normal), scale(sine, panel.out))
+        shift = add(shift, scale(panel.mass * panel.length / params.mass, subtract(out, panel.out)))
+        placed.append((out, normal, add(panel.hinge, scale(panel.length, out))))
+    found: list[_Swung] = []
+    for panel, angle, rate, (out, normal, place) in zip(params.panels, own.angle, own.rate, placed, strict=True):
+        place, pushed = subtract(place, shift), scale(panel.mass * panel.length, normal)
+        turned = add(scale(panel.moments[0], panel.axis), cross(place, pushed))
+        found.append(_Swung(panel, angle, rate, out, normal, place, pushed, turned))
+    return found, shift
+
+
+def _whole(swung: list[_Swung], shift: Vector, params: Numbers) -> Matrix:
+    """The panels' share of the inertia about the craft's centre of mass as it is (kg m2), but for what does not change."""
+    found = _point(-params.mass, shift)
+    for one in swung:
+        axes = (one.panel.axis, one.out, one.normal)
+        parts = [_outer(size, axis, axis) for size, axis in zip(one.panel.moments, axes, strict=True)]
+        for part in (*parts, _point(one.panel.mass, add(one.place, shift))):
+            found = combine(1.0, found, 1.0, part)
+    return found
+
+
+def _outer(c: Scalar, a: Vector, b: Vector) -> Matrix:
+    """c a b^T."""
+    x, y, z = scale(c, a)
+    return (scale(x, b), scale(y, b), scale(z, b))
+
+
+def _point(mass: Scalar, place: Vector) -> Matrix:
+    """The inertia of a point of mass (kg m2)."""
+    square = dot(place, place)
+    return combine(mass, diagonal((square, square, square)), -mass, _outer(1.0, place, place))
+
+
+def _moving(swung: list[_Swung], params: Numbers) -> Vector:
+    """How fast the panels shift the centre of mass (m/s)."""
+    found = ZERO
+    for one in swung:
+        found = add(found, scale(one.rate / params.mass, one.pushed))
+    return found
+
+
+def _moments(swung: list[_Swung], rate: Vector, params: Numbers) -> list[Scalar]:
+    """The moments about the hinges (N m) of springs, dampers and rates."""
+    moving, pulled = _moving(swung, params), ZERO
+    for one in swung:
+        pulled = add(pulled, scale(one.panel.mass * one.panel.length / params.mass * one.rate * one.rate, one.out))
+    found: list[Scalar] = []
+    for one in swung:
+        panel = one.panel
+        turning = (panel.moments[1] - panel.moments[2]) * (dot(one.out, rate) * dot(one.normal, rate))
+        carried = add(cross(rate, subtract(cross(rate, one.place), scale(2.0, moving))), pulled)
+        spring = panel.stiffness * one.angle + panel.damping * one.rate
+        found.append(turning - dot(one.pushed, carried) - spring)
+    return found
+
+
+def _shared(swung: list[_Swung], params: Numbers) -> Matrix:
+    """The inverse of what couples the hinges through the centre of mass: 1 - sum p p^T / (mass D)."""
+    found: Matrix = diagonal((1.0, 1.0, 1.0))
+    for one in swung:
+        found = combine(1.0, found, -1.0, _outer(1.0 / (params.mass * one.panel.swung), one.pushed, one.pushed))
+    return inverse(found)
+
+
+def _accelerations(swung: list[_Swung], moments: list[Scalar], params: Numbers) -> list[Scalar]:
+    """The hinges' accelerations (rad/s2) under these moments (N m), each sharing in the acceleration of the centre."""
+    pushing = ZERO
+    for one, moment in zip(swung, moments, strict=True):
+        pushing = add(pushing, scale(moment / one.panel.swung, one.pushed))
+    centre = scale(1.0 / params.mass, apply(_shared(swung, params), pushing))
+    pairs = zip(swung, moments, strict=True)
+    return [(moment + dot(one.pushed, centre)) / one.panel.swung for one, moment in pairs]
+
+
+def reaction(own: State, command: Any, body: Any, params: Numbers) -> Vector:
+    """The torque of the panels on the body (N m)."""
+    swung, shift = _swung(own, params)
+    w, moving = body.rate, _moving(swung, params)
+    carried = add(apply(inertia_change(own, params), w), momentum(own, params))
+    # The change of the inertia, times w, and what the hinges' rates and accelerations change of their momentum.
+    given = scale(-params.mass, _swept(shift, moving, w))
+    for one, speeding in zip(swung, _accelerations(swung, _moments(swung, w, params), params), strict=True):
+        panel = one.panel
+        along, across = dot(one.out, w), dot(one.normal, w)
+        given = add(given, scale(panel.mass, _swept(add(one.place, shift), _speed(one), w)))
+        turned = add(scale(along, one.normal), scale(across, one.out))
+        given = add(given, scale((panel.moments[1] - panel.moments[2]) * one.rate, turned))
+        given = subtract(given, scale(panel.mass * panel.length * one.rate * one.rate, cross(one.place, one.out)))
+        given = add(given, scale(speeding, one.turned))
+    return scale(-1.0, add(cross(w, carried), given))
+
+
+def _speed(one: _Swung) -> Vector:
+    return scale(one.rate * one.panel.length, one.normal)
+
+
+def _swept(place: Vector, speed: Vector, rate: Vector) -> Vector:
+    """The change of the inertia of a unit mass that moves, times a rate."""
+    twice = scale(2.0 * dot(place, speed), rate)
+    return subtract(twice, add(scale(dot(place, rate), speed), scale(dot(speed, rate), place)))
+
+
+def inertia(own: State, params: Numbers) -> Matrix:
+    """The inertia that the body's angular acceleration meets besides the body's own (kg m2)."""
+    swung, _ = _swung(own, params)
+    found, coupled = inertia_change(own, params), ((0.0, 0.0, 0.0),) * 3
+    for one in swung:
+        share = 1.0 / one.panel.swung
+        found = combine(1.0, found, -1.0, _outer(share, one.turned, one.turned))
+        coupled = combine(1.0, coupled, 1.0, _outer(share, one.pushed, one.turned))
+    through = multiply(transpose(coupled), multiply(_shared(swung, params), coupled))
+    return combine(1.0, found, -1.0 / params.mass, through)
+
+
+def inertia_change(own: State, params: Numbers) -> Matrix:
+    """How much more inertia the whole has than with the panels at their rest (kg m2)."""
+    return combine(1.0, _whole(*_swung(own, params), params), -1.0, params.rest)
+
+
+def rates(own: State, command: Any, body: Any, acceleration: Vector, params: Numbers) -> State:
+    """d(angles, rates)/dt."""
+    swung, _ = _swung(own, params)
+    moments = _moments(swung, body.rate, params)
+    left = [moment - dot(one.turned, acceleration) for one, moment in zip(swung, moments, strict=True)]
+    return State(own.rate, tuple(_accelerations(swung, left, params)))
+
+
+def momentum(own: State, params: Numbers) -> Vector:
+    """The panels' angular momentum relative to the body (N m s)."""
+    found = ZERO
+    for one in _swung(own, params)[0]:
+        found = add(found, scale(one.rate, one.turned))
+    return found
+
+
+def record(own: State, command: Any, body: Any, params: Numbers) -> Sample:
+    """The recorded quantities."""
+    return Sample(own.angle, own.rate)
+
+
+def fastest(params: Params) -> float:
+    """The fastest rate (1/s) at which a panel swings, or its damper brings it to rest, on a hub that does not turn but
+    gives way."""
+    found = 0.0
+    for panel in prepare(params, 1.0).panels:
+        swung = panel.swung - (panel.mass * panel.length) ** 2 / params.mass
+        found = max(found, math.sqrt(panel.stiffness / swung), panel.damping / swung)
+    return found
+
+
+def examples() -> list[Params]:
+    """Two wings with different hinges, one of them deflected, and one panel that is free to swing."""
+    wing = (0.4, 0.5, 0.1, 0.0, 0.0, 1.0, 0.1, 0.6, 0.1, 0.0, 0.01, 0.005, 0.015, 0.2, 0.01)
+    other = (0.3, -0.5, 0.0, 0.1, 0.1, 1.0, 0.0, -0.7, 0.0, 0.05, 0.012, 0.005, 0.016, 0.3, 0.0)
+    return [Params(30.0, ((*wing, 0.15), (*other, 0.0))), Params(30.0, ((*wing[:-2], 0.0, 0.0, -0.1),))]

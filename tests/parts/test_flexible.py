@@ -1,0 +1,271 @@
+"""Flexible appendages against Lagrange's equations of hub and panels, written by SymPy and integrated by SciPy, and against
+Basilisk; energy and angular momentum where nothing acts from outside."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+import sympy
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+import starhold as sh
+from starhold.algebra.cosines import from_angles
+from starhold.algebra.vector import ZERO
+from starhold.errors import InputError
+from starhold.laws.catalogue import catalogue
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.bodies.rigid_body import State
+from starhold.parts.catalogue import fit
+from starhold.parts.craft import make_craft
+from starhold.scenario.reading import parse
+from starhold.simulation.lane import fly, label
+from tests.parts.files import BODY, PD, part
+
+MASS = 30.0
+INERTIA = np.array([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]])
+"""Of the whole, panels at rest, about its centre of mass."""
+ROWS = np.array(
+    [
+        (0.4, 0.5, 0.1, 0.0, 0.1, 1.0, 0.2, 0.6, 0.1, 0.05, 0.010, 0.005, 0.015, 0.20, 0.0, 0.15),
+        (0.3, -0.5, 0.0, 0.1, 0.1, 1.0, 0.0, -0.7, 0.1, 0.05, 0.012, 0.005, 0.016, 0.30, 0.0, -0.1),
+        (0.2, 0.0, 0.4, 0.1, 1.0, 0.0, 0.3, 0.0, 0.5, 0.0, 0.004, 0.002, 0.006, 0.10, 0.0, 0.0),
+    ]
+)
+RATE, ANGLES = (0.12, -0.2, 0.15), (0.4, -0.3, 0.2)
+
+
+def panels(damping, count=3):
+    """Rows of the part with these dampers."""
+    rows = ROWS[:count].copy()
+    rows[:, 14] = damping
+    return tuple(map(tuple, rows.tolist()))
+
+
+def free(*parts, period=0.1, substeps=20):
+    """A craft on which nothing acts from outside."""
+    law = catalogue()["pd"]
+    start = State(from_angles(*ANGLES), RATE, ZERO, ZERO, ZERO)
+    craft = make_craft(INERTIA.tolist())
+    return ClosedLoop(craft, law, law.gains(0.9, 0.09), start, period, substeps, parts=parts, command_limit=0.0)
+
+
+def flown(loop, steps):
+    """The recording of a flight."""
+    return label(loop, *fly(loop, steps), 1)
+
+
+def dyad(x):
+    """The inertia of a unit mass at a place."""
+    return x @ x * np.eye(3) - np.outer(x, x)
+
+
+def bodies(rows):
+    """Hub and panels as (mass, inertia about the own centre, hinge, axis, centre from the hinge), panels at rest: what makes
+    the whole have its mass and inertia about its centre of mass."""
+    found, inertia, moment = [], INERTIA.copy(), np.zeros(3)
+    for row in np.array(rows):
+        hinge, axis, centre = row[1:4], row[4:7] / np.linalg.norm(row[4:7]), row[7:10]
+        out = centre - axis * (axis @ centre)
+        frame = np.array([axis, out / np.linalg.norm(out), np.cross(axis, out / np.linalg.norm(out))])
+        own = frame.T @ np.diag(row[10:13]) @ frame
+        found.append((row[0], own, hinge, axis, centre))
+        inertia -= own + row[0] * dyad(hinge + centre)
+        moment -= row[0] * (hinge + centre)
+    mass = MASS - sum(body[0] for body in found)
+    hub = mass, inertia - mass * dyad(moment / mass), moment / mass
+    assert np.linalg.eigvalsh(hub[1])[0] > 0.0
+    return hub, found
+
+
+@cache
+def lagrangian(rows):
+    """The slope of the energy of motion in the angles of the hinges, and its Hessian in velocity and angular velocity of the
+    hub (in axes of its own, in which the energy does not depend on its attitude) and the rates of the hinges."""
+    hub, others = bodies(rows)
+    angles, v = sympy.symbols(f"x:{len(others)}"), sympy.symbols(f"v:{6 + len(others)}")
+    push, w = sympy.Matrix(v[:3]), sympy.Matrix(v[3:6])
+    energy = _energy(hub[0], hub[1], push + w.cross(sympy.Matrix(hub[2])), w)
+    for angle, rate, (mass, own, hinge, axis, centre) in zip(angles, v[6:], others, strict=True):
+        a = sympy.Matrix(axis)
+        skew = sympy.Matrix([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+        swing = sympy.eye(3) + sympy.sin(angle) * skew + (1 - sympy.cos(angle)) * skew * skew
+        out = swing * sympy.Matrix(centre)
+        speed = push + w.cross(sympy.Matrix(hinge) + out) + (rate * a).cross(out)
+        energy += _energy(mass, own, speed, swing.T * (w + rate * a))
+    slopes = [energy.diff(x) for x in angles]
+    hessian = [[energy.diff(x).diff(y) for y in v] for x in v]
+    return sympy.lambdify([angles, v], [slopes, hessian], cse=True)
+
+
+def _energy(mass, inertia, speed, rate):
+    return mass * speed.dot(speed) / 2 + rate.dot(sympy.Matrix(inertia) * rate) / 2
+
+
+def integrated(rows, times):
+    """Body rates, angles and rates of the hinges by SciPy from Lagrange's equations of the hinges and, for the hub, those of
+    Poincare: the momentum p of its rotation changes by -w x p, that of the whole is none."""
+    count, call = len(rows), lagrangian(rows)
+    stiffness, damping, begun = np.array(rows)[:, 13:].T
+
+    def moved(y):
+        mass = np.array(call(y[:count], np.zeros(6 + count))[1])
+        return np.linalg.solve(mass, [0.0, 0.0, 0.0, *y[count:]])
+
+    def slope(_, y):
+        x, v = y[:count], moved(y)
+        spring = stiffness * x + damping * v[6:]
+        return [*v[6:], *-np.cross(v[3:6], y[count : count + 3]), *(np.array(call(x, v)[0]) - spring)]
+
+    mass = np.array(call(begun, np.zeros(6 + count))[1])
+    push = -np.linalg.solve(mass[:3, :3], mass[:3, 3:6] @ RATE)
+    start = [*begun, *(mass @ [*push, *RATE, *np.zeros(count)])[3:]]
+    exact = solve_ivp(slope, (0.0, times[-1]), start, "DOP853", times, rtol=1e-12, atol=1e-14).y
+    rates = np.array([moved(y) for y in exact.T])
+    return rates[:, 3:6], exact[:count].T, rates[:, 6:]
+
+
+def test_panels_swing_as_lagrange_s_equations_say():
+    rows = panels(0.02, 2)
+    run = flown(free(fit("effector", "hinged-panels", MASS, rows)), 80)
+    rate, angle, speed = integrated(rows, run["time"])
+    assert np.ptp(run["panel_angle"], axis=0).min() > 0.03
+    assert np.abs(run["rate"] - rate).max() < 1e-9
+    assert np.abs(run["panel_angle"] - angle).max() < 1e-9
+    assert np.abs(run["panel_rate"] - speed).max() < 1e-9
+
+
+def whole(rows, attitude, rate, angle, speed):
+    """The energy (J) and the angular momentum (N m s, inertial axes) of hub and panels about their common centre of mass."""
+    (hub_mass, hub_inertia, hub_centre), others = bodies(rows)
+    places, speeds, masses = [hub_centre], [np.cross(rate, hub_centre)], [hub_mass]
+    energy, momentum = 0.5 * rate @ hub_inertia @ rate, hub_inertia @ rate
+    for x, v, row, (mass, own, hinge, axis, centre) in zip(angle, speed, rows, others, strict=True):
+        swing = Rotation.from_rotvec(x * axis).as_matrix()
+        out, inertia, turning = swing @ centre, swing @ own @ swing.T, rate + v * axis
+        places.append(hinge + out)
+        speeds.append(np.cross(rate, hinge) + np.cross(turning, out))
+        masses.append(mass)
+        energy += 0.5 * turning @ inertia @ turning + 0.5 * row[13] * x**2
+        momentum = momentum + inertia @ turning
+    masses, places, speeds = np.array(masses), np.array(places), np.array(speeds)
+    places, speeds = places - masses @ places / MASS, speeds - masses @ speeds / MASS
+    energy += 0.5 * masses @ np.sum(speeds**2, 1)
+    momentum = momentum + masses @ np.cross(places, speeds)
+    return energy, Rotation.from_quat(attitude, scalar_first=True).apply(momentum)
+
+
+def test_panels_keep_energy_and_momentum_for_minutes():
+    rows = panels(0.0)
+    run = flown(free(fit("effector", "hinged-panels", MASS, rows)), 3000)
+    columns = [run[name][::10] for name in ("attitude", "rate", "panel_angle", "panel_rate")]
+    energies, momenta = (
+        np.array(part) for part in zip(*(whole(rows, *row) for row in zip(*columns, strict=True)), strict=True)
+    )
+    assert np.abs(energies / energies[0] - 1.0).max() < 1e-10
+    assert np.abs(momenta - momenta[0]).max() < 1e-10 * np.linalg.norm(momenta[0])
+    # The hub alone keeps neither.
+    alone = np.einsum("ti,ij,tj->t", run["rate"], INERTIA, run["rate"])
+    assert np.ptp(alone) > 1e-2 * alone[0]
+
+
+def test_panels_swing_as_in_basilisk():
+    pytest.importorskip("Basilisk", reason="Basilisk comes with the test extra where it has a wheel")
+    from Basilisk.simulation import hingedRigidBodyStateEffector, spacecraft
+    from Basilisk.utilities import SimulationBaseClass, macros
+
+    rows = panels(0.02)
+    run = flown(free(fit("effector", "hinged-panels", MASS, rows)), 200)
+    simulation, craft = SimulationBaseClass.SimBaseClass(), spacecraft.Spacecraft()
+    simulation.CreateNewProcess("p").addTask(simulation.CreateNewTask("t", macros.sec2nano(0.005)))
+    (mass, inertia, centre), others = bodies(rows)
+    craft.hub.mHub, craft.hub.IHubPntBc_B, craft.hub.r_BcB_B = mass, inertia.tolist(), [[x] for x in centre]
+    craft.hub.omega_BN_BInit = [[x] for x in RATE]
+    made = []
+    for row, (mass, _, hinge, axis, centre) in zip(rows, others, strict=True):
+        panel = hingedRigidBodyStateEffector.HingedRigidBodyStateEffector()
+        out = centre - axis * (axis @ centre)
+        length = np.linalg.norm(out)
+        # Its panels lie along the negative first axis from the hinge, which is their second.
+        frame = np.array([-out / length, axis, np.cross(-out / length, axis)])
+        panel.mass, panel.d, panel.k, panel.c, panel.thetaInit = mass, length, row[13], row[14], row[15]
+        panel.IPntS_S = np.diag([row[11], row[10], row[12]]).tolist()
+        panel.r_HB_B, panel.dcm_HB = [[x] for x in hinge + centre - out], frame.tolist()
+        craft.addStateEffector(panel)
+        made.append(panel)
+    logs = [craft.scStateOutMsg.recorder(), *(panel.hingedRigidBodyOutMsg.recorder() for panel in made)]
+    for model in (craft, *made, *logs):
+        simulation.AddModelToTask("t", model)
+    simulation.InitializeSimulation()
+    simulation.ConfigureStopTime(macros.sec2nano(20.0))
+    simulation.ExecuteSimulation()
+    assert np.abs(run["rate"] - logs[0].omega_BN_B[::20]).max() < 1e-9
+    assert np.abs(run["panel_angle"] - np.array([log.theta[::20] for log in logs[1:]]).T).max() < 1e-9
+
+
+COUPLING = np.array([(0.5, 0.2, 0.9), (-0.3, 0.6, 0.1)])
+FREQUENCY = np.array([2.0, 3.5])
+
+
+def modes(damping, deflection=0.03):
+    """Rows of the part with these dampers."""
+    columns = FREQUENCY, (damping, damping), *COUPLING.T, (deflection, 0.0)
+    return tuple(tuple(float(x) for x in row) for row in zip(*columns, strict=True))
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.05])
+def test_modes_move_as_the_coupled_equations_say_and_keep_energy_and_momentum(damping):
+    run = flown(free(fit("effector", "flexible-modes", modes(damping)), substeps=40), 200 if damping else 1800)
+    mass = np.block([[INERTIA, COUPLING.T], [COUPLING, np.eye(2)]])
+    w, x, v = run["rate"], run["mode_deflection"], run["mode_rate"]
+
+    def slope(_, y):
+        w, x, v = y[:3], y[3:5], y[5:]
+        spring = FREQUENCY * (2.0 * damping * v + FREQUENCY * x)
+        *spin, first, second = np.linalg.solve(mass, [*-np.cross(w, INERTIA @ w + v @ COUPLING), *-spring])
+        return [*spin, *v, first, second]
+
+    times = run["time"][:201]
+    exact = solve_ivp(slope, (0.0, times[-1]), [*w[0], *x[0], *v[0]], "DOP853", times, rtol=1e-12, atol=1e-14).y.T
+    assert np.abs(np.hstack([w, x, v])[:201] - exact).max() < 1e-9
+    turns = Rotation.from_quat(run["attitude"], scalar_first=True)
+    momentum = turns.apply(w @ INERTIA + v @ COUPLING)
+    assert np.abs(momentum - momentum[0]).max() < 1e-10 * np.linalg.norm(momentum[0])
+    moving = np.hstack([w, v])
+    energy = 0.5 * np.einsum("ti,ij,tj->t", moving, mass, moving) + 0.5 * np.sum((FREQUENCY * x) ** 2, 1)
+    if damping:
+        assert np.diff(energy).max() < 0.0
+        assert energy[-1] < 0.99 * energy[0]
+    else:
+        assert np.abs(energy / energy[0] - 1.0).max() < 1e-10
+        assert np.ptp(x, axis=0).min() > 0.005
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({0: 40.0}, "the panels together must have less than the craft's mass of 30 kg"),
+        ({0: 0.0}, "panel 1 needs a mass above 0"),
+        ({4: 0.0, 5: 0.0, 6: 0.0}, "the hinge of panel 1 has no direction"),
+        ({4: 0.6, 5: 0.1, 6: 0.05, 7: 0.6, 8: 0.1, 9: 0.05}, "the centre of mass of panel 1 lies on its hinge"),
+    ],
+)
+def test_a_panel_that_no_craft_has_is_refused_in_one_line(change, words):
+    row = [change.get(k, x) for k, x in enumerate(panels(0.0, 1)[0])]
+    text = BODY + part(f'type = "hinged-panels"\nmass = 30.0\npanels = [{row}]\n') + PD
+    with pytest.raises(InputError) as caught:
+        sh.simulate(parse(text, "own"))
+    assert "part hinged-panels" in str(caught.value)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_panels_fly_from_a_scenario_and_claims_leave_them_out():
+    row = [0.2, *panels(0.01, 1)[0][1:]]
+    text = BODY + part(f'type = "hinged-panels"\nname = "wing"\nmass = "30 kg"\npanels = [{row}]\n') + PD
+    run = sh.simulate(parse(text, "own"))
+    assert run.panel_angle.dims == ("time", "panel")
+    assert run.panel_angle.attrs["units"] == "rad"
+    assert float(np.abs(run.panel_angle).max()) == pytest.approx(0.15)
+    (certificate,) = sh.certify(parse(text, "own"))
+    assert all("without the effector wing" in claim.assumptions for claim in certificate.claims)
