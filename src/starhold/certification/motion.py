@@ -85,7 +85,16 @@ class Motion:
         if self.subject.loop.wheels is not None:
             stored = subtract(direction("h"), apply(self.plant.inertia, absolute))
         return Measurement(
-            direction("q", 0, 4), rate, absolute, turning, acceleration, known, direction("p"), period, stored
+            direction("q", 0, 4),
+            rate,
+            absolute,
+            turning,
+            acceleration,
+            known,
+            direction("p"),
+            period,
+            stored,
+            direction("b"),
         )
 
     @cached_property

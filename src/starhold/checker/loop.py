@@ -102,7 +102,8 @@ class ExactLoop:
         if self.subject.wheels is not None:
             stored = subtract(variables(named("h")), apply(self.plant[0].inertia, rate))
         outside, position, period = variables(named("e")), variables(named("p")), Polynomial.variable("period")
-        return Measurement(variables(ATTITUDE), W, rate, turning, relative, outside, position, period, stored)  # pyright: ignore
+        told: Any = (turning, relative, outside, position, period, stored, variables(named("b")))
+        return Measurement(variables(ATTITUDE), W, rate, *told)
 
     @cached_property
     def moving(self) -> Measurement:

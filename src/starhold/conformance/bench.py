@@ -14,7 +14,7 @@ from starhold.laws.catalogue import Law
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.rigid_body import State
-from starhold.parts.catalogue import fit
+from starhold.parts.catalogue import fit, telling
 from starhold.parts.craft import Craft, make_craft
 
 CRAFT = make_craft([2.0, 3.0, 4.0], torque_limit=0.05)
@@ -29,13 +29,14 @@ def random_quaternions(count: int, seed: int = 7) -> list[Quaternion]:
 
 def random_measurements(count: int, external: bool = True, seed: int = 11) -> Iterator[Measurement]:
     """Measurements that a law is shown at random states of a body at a target at rest, with or without a modelled torque."""
-    random = np.random.default_rng(seed)
+    random, magnetic = np.random.default_rng(seed), np.random.default_rng(seed + 2)
     for attitude in random_quaternions(count, seed + 1):
         rate: Vector = unflatten(random.normal(scale=0.05, size=3), ZERO)
         torque: Vector = unflatten(random.normal(scale=1e-5, size=3), ZERO) if external else ZERO
         position: Vector = unflatten(random.normal(scale=4e6, size=3), ZERO) if external else ZERO
         wheel_momentum: Vector = unflatten(random.normal(scale=0.1, size=3), ZERO) if external else ZERO
-        yield Measurement(attitude, rate, rate, ZERO, ZERO, torque, position, PERIOD, wheel_momentum)
+        field: Vector = unflatten(magnetic.normal(scale=3e-5, size=3), ZERO)
+        yield Measurement(attitude, rate, rate, ZERO, ZERO, torque, position, PERIOD, wheel_momentum, field)
 
 
 ORBIT = (fit("environment", "two-body"), fit("environment", "gravity-gradient"))
@@ -53,7 +54,7 @@ def sample_loop(law: Law, gains: Any) -> ClosedLoop:
         gains,
         start,
         PERIOD,
-        parts=(fit("target", "inertial", goal), *ORBIT),
+        parts=(fit("target", "inertial", goal), *ORBIT, *telling(law.reads)),
         limit="axis",
         sign_policy="hysteresis",
     )

@@ -168,6 +168,8 @@ def keeps_momentum(part: Part) -> None:
     """Without torque from outside the angular momentum of body and effector stays as it is."""
     if part.role != "effector":
         raise NotApplicableError("only effectors share the body's momentum")
+    if part.flag("OUTSIDE"):
+        raise NotApplicableError("its torque comes from outside")
     for params in part.examples():
         loop = loop_with(part, params).without("environment")
         # The command of a law is a torque from outside where the effector does not take it.

@@ -93,6 +93,7 @@ def make_equations(parts: Composition) -> Step:
             ZERO if momentum is None else momentum,
             setup.period,
             setup.limit,
+            readings,
         )
         followed = goal.attitude if goal is not None and follows else memories.followed
         return body.observe(found, scene), memories._replace(
@@ -114,6 +115,10 @@ def make_equations(parts: Composition) -> Step:
         for actuator, params in zip(parts.actuators, setup.actuators, strict=True):
             if actuator.hook("command") is not None:
                 passed = actuator.module.command(passed, params)
+        effectors = tuple(
+            e.module.switch(own, passed, told, carry.state, params, step) if e.hook("switch") is not None else own
+            for e, own, params in zip(parts.effectors, carry.effectors, setup.effectors, strict=True)
+        )
         state = carry.state if named.dynamic else carry.state._replace(**{body.COMMAND: passed})
         environments = [
             e.module.update(m, carry.state, p, Dice(key, word_of(step), first), step) if e.hook("update") else m
@@ -122,7 +127,7 @@ def make_equations(parts: Composition) -> Step:
             )
         ]
         memories = memories._replace(environments=tuple(environments))
-        return Carry(state, carry.effectors, carry.actuators, memory, memories, h, passed, carry.lost_at)
+        return Carry(state, effectors, carry.actuators, memory, memories, h, passed, carry.lost_at)
 
     def outside(kind, state, craft, memories, setup):
         """The sum of what environments give of a kind."""
@@ -137,7 +142,7 @@ def make_equations(parts: Composition) -> Step:
         applied = getattr(state, body.COMMAND)
         commands = begun.commands
         if commands is None:
-            commands = tuple(_commands(applied, setup))
+            commands = tuple(_commands(applied, effectors, setup))
         reactions, inertias = [], []
         for effector, own, command, params in zip(parts.effectors, effectors, commands, setup.effectors, strict=True):
             reactions.append(effector.module.reaction(own, command, state, params))
@@ -159,9 +164,14 @@ def make_equations(parts: Composition) -> Step:
         )
         return (rates, own_rates, output_rates)
 
-    def _commands(applied, setup):
-        for effector, params in zip(parts.effectors, setup.effectors, strict=True):
-            yield effector.module.command(applied, params) if effector.flag("ACTS") else ()
+    def _commands(applied, effectors, setup):
+        for effector, own, params in zip(parts.effectors, effectors, setup.effectors, strict=True):
+            if effector.hook("pulse") is not None:
+                yield effector.module.pulse(own, setup.substep, params)
+            elif effector.flag("ACTS") and effector.hook("switch") is None:
+                yield effector.module.command(applied, params)
+            else:
+                yield ()
 
     def _driven(outputs, applied, carry, begun, setup):
         """d(output)/dt of the actuators that lag: of those before the last, and of the last, whose output acts."""
@@ -183,7 +193,7 @@ def make_equations(parts: Composition) -> Step:
         """One substep."""
         applied = getattr(carry.state, body.COMMAND)
         # A command that is held is shared out once.
-        commands = tuple(_commands(applied, setup)) if not named.dynamic else None
+        commands = tuple(_commands(applied, carry.effectors, setup)) if not named.dynamic else None
         begun = _Begun(commands, applied, carry.actuators)
         state, effectors, outputs = advance(
             (carry.state, carry.effectors, carry.actuators), setup.substep, begun, carry, craft, setup
@@ -199,7 +209,7 @@ def make_equations(parts: Composition) -> Step:
     def sample(carry, step, setup):
         state = carry.state
         applied = getattr(state, body.COMMAND)
-        commands = tuple(_commands(applied, setup))
+        commands = tuple(_commands(applied, carry.effectors, setup))
         users = list(zip(parts.effectors, carry.effectors, commands, setup.effectors, strict=True))
         given = total(e.module.applied(own, command, state, p) for e, own, command, p in users if e.flag("ACTS"))
         own = body.sample(state, goal_of(carry, state, step, setup), applied if given is None else given, carry.command)

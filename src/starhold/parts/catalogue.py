@@ -9,7 +9,7 @@ import linecache
 import pkgutil
 import sys
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -80,6 +80,19 @@ def fit(role: str, name: str, *numbers: Any, called: str = "", start: Any = None
     """An installed part with these parameters, for a loop; start: the state of an effector. KeyError for an unknown part."""
     part = find(role, name)
     return Fitted(part, part.params(*numbers), called, start)
+
+
+def telling(readings: Iterable[str]) -> list[Fitted]:
+    """Installed sensors that tell of these readings, one for each or for several, with parameters of their examples.
+    LookupError where there is none."""
+    found: dict[str, Fitted] = {}
+    for reading in readings:
+        sensors = (one for one in parts("sensor").values() if not one.table and reading in one.module.Reading._fields)
+        sensor = next(sensors, None)
+        if sensor is None:
+            raise LookupError(f"no sensor of starhold measures {reading}")
+        found.setdefault(sensor.name, Fitted(sensor, sensor.examples()[0]))
+    return list(found.values())
 
 
 def installed(package: str, role: str, make: Callable[..., AnyPart]) -> dict[str, AnyPart]:

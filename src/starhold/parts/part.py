@@ -47,6 +47,11 @@ class Part:
         return getattr(self.module, "NEEDS", ())
 
     @property
+    def reads(self) -> tuple[str, ...]:
+        """Readings, by name, that a law or an effector with `switch` cannot do without."""
+        return getattr(self.module, "READS", ())
+
+    @property
     def params(self) -> Any:
         """The class of its parameters, a NamedTuple."""
         return self.module.Params

@@ -43,8 +43,8 @@ class Loads(NamedTuple):
 
 class Scene(NamedTuple):
     """Beside the state all that a measurement is made of: the goal (None where the loop has no target), whether it never
-    turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s, body), the control period and the
-    limit of the command."""
+    turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s, body), the control period, the
+    limit of the command, and all readings of the sensors, an attribute for each."""
 
     goal: Any
     still: bool
@@ -52,6 +52,7 @@ class Scene(NamedTuple):
     momentum: Vector
     period: Scalar
     limit: Scalar
+    readings: Any
 
 
 class Body(Protocol):
@@ -116,12 +117,24 @@ class Environment(Protocol):
 
 class Effector(Protocol):
     """A mechanism that moves with the body and shares its momentum. None knows another: each adds its reaction, and inertia
-    if it has to, and gets the body's angular acceleration for its own rates. With `ACTS` it takes the command of the law."""
+    if it has to, and gets the body's angular acceleration for its own rates. With `ACTS` it takes the command of the law.
+    One that decides at control instants alone, or without the law, has `switch`; `OUTSIDE`: whether its torque comes from
+    outside, as of a field or of mass that is expelled, and not from momentum of its own."""
 
     ACTS: bool
+    OUTSIDE: bool
 
     def command(self, applied: Vector, params: Any, /) -> Any:
         """The commands of its motors for a wanted torque on the body (N m)."""
+        ...
+
+    def switch(self, own: Any, wanted: Vector, told: Any, state: State, params: Any, step: int, /) -> Any:
+        """The own state as a control step begins, in place of `command`; wanted: the command (N m), told: the measurement
+        that the law is told."""
+        ...
+
+    def pulse(self, own: Any, substep: Scalar, params: Any, /) -> Any:
+        """The command for a substep that begins, of one with `switch`; without it there is none."""
         ...
 
     def reaction(self, own: Any, command: Any, body: State, params: Any, /) -> Vector:
@@ -134,7 +147,7 @@ class Effector(Protocol):
         ...
 
     def rates(self, own: Any, command: Any, body: State, acceleration: Vector, params: Any, /) -> Any:
-        """d(own state)/dt; acceleration: the body's angular one (rad/s2)."""
+        """d(own state)/dt, None for what does not change; acceleration: the body's angular one (rad/s2)."""
         ...
 
     def momentum(self, own: Any, params: Any, /) -> Vector:

@@ -165,6 +165,14 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
             if need not in (readings if estimates else there):
                 allowed = f"a sensor that measures {need}" if estimates else f"the part {need}"
                 raise InputError(where, _key(one), f"no {need}, which {one.called} needs", allowed)
+    for one, key in (*((f.part, _key(f)) for f in fitted), (loop.law, f"law {loop.law.name}")):
+        for need in one.reads:
+            if need not in readings:
+                raise InputError(where, key, f"no {need}, which {one.name} needs", f"a sensor that measures {need}")
+    late = next((f for f in loop.used("actuator") if f.part.hook("rates") is not None), None)
+    if late is not None and acting and acting[0].part.hook("switch") is not None:
+        allowed = f"none before {acting[0].called}, which takes the command at control instants alone"
+        raise InputError(where, _key(late), "an actuator whose output moves between control instants", allowed)
     if loop.used("effector") and "rate" not in loop.body.module.State._fields:
         raise InputError(
             where, _key(loop.used("effector")[0]), f"an effector on the body {loop.body.name}", "a body that turns"
@@ -243,8 +251,8 @@ class _Watched:
         if (part.role, name) == ("target", "goal"):
             like = Goal((1.0, 0.0, 0.0, 0.0), ZERO, ZERO)
             return "" if isinstance(found, Goal) and _alike(found, like) else "a Goal of four, three and three numbers"
-        if (part.role, name) in (("effector", "rates"), ("environment", "update")):
-            return "" if _alike(found, given[0]) else "numbers formed as those of the first argument"
+        if (part.role, name) in (("effector", "rates"), ("effector", "switch"), ("environment", "update")):
+            return "" if _alike(found, given[0], name == "rates") else "numbers formed as those of the first argument"
         if name == "record":
             return _undeclared(type(found))
         if name not in ("measure", "estimate"):
@@ -277,10 +285,13 @@ def _undeclared(kind: Any) -> str:
     return ""
 
 
-def _alike(one: Any, other: Any) -> bool:
+def _alike(one: Any, other: Any, still: bool = False) -> bool:
+    """Whether two states have one form; still: None in the first stands for what does not change."""
+    if still and one is None:
+        return True
     if isinstance(one, tuple):
         same = isinstance(other, tuple) and len(cast(Any, one)) == len(cast(Any, other))
-        return same and all(_alike(a, b) for a, b in zip(cast(Any, one), cast(Any, other), strict=True))
+        return same and all(_alike(a, b, still) for a, b in zip(cast(Any, one), cast(Any, other), strict=True))
     return not isinstance(other, tuple) and isinstance(one, (int, float, Buffer)) and not isinstance(one, bool)
 
 

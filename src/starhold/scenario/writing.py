@@ -10,6 +10,7 @@ from typing import Any
 
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law
+from starhold.parts.catalogue import telling
 from starhold.parts.part import Part
 from starhold.scenario.bodies import body_for
 
@@ -63,8 +64,12 @@ def law_table(law: Law, gains: Any) -> str:
 
 
 def scenario_with(law: Law, gains: Any) -> str:
-    """A small scenario of the body that a law is for, which holds this law alone."""
-    return body_for(law).example + law_table(law, gains)
+    """A small scenario of the body that a law is for, which holds this law alone, and the sensors that it reads."""
+    body, sensors = body_for(law), telling(law.reads)
+    text = body.example + (body.orbit if any("two-body" in sensor.part.needs for sensor in sensors) else "")
+    if sensors:
+        text += toml_text({"part": [part_table(sensor.part, sensor.params) for sensor in sensors]})
+    return text + law_table(law, gains)
 
 
 def part_table(part: Part, params: Any) -> dict[str, Any]:

@@ -52,6 +52,7 @@ class Measurement(NamedTuple):
     position: Annotated[Vector, Quantity("m", "from the centre of attraction")]
     period: Annotated[float, Quantity("s", "for which the torque will be held")]
     wheel_momentum: Annotated[Vector, Quantity("N m s", "angular momentum of the body's wheels")] = ZERO
+    magnetic_field: Annotated[Vector, Quantity("T", "as a magnetometer tells it; zero without one")] = ZERO
 
 
 class Sample(NamedTuple):
@@ -122,7 +123,7 @@ def observe(state: State, scene: Scene) -> Measurement:
     goal = scene.goal
     error = relative(goal.attitude, state.attitude)
     position = to_body(state.attitude, state.position)
-    told = (scene.torque, position, scene.period, scene.momentum)
+    told = (scene.torque, position, scene.period, scene.momentum, getattr(scene.readings, "magnetic_field", ZERO))
     if scene.still:
         # The arithmetic on the zeros of a target at rest is spared here, for a compiler must not drop it.
         return Measurement(error, state.rate, state.rate, ZERO, ZERO, *told)

@@ -46,6 +46,7 @@ CARD = Card(
     ),
 )
 ROLE = "effector"
+_NONE: Matrix = (ZERO, ZERO, ZERO)
 COLUMNS = (
     "mass",
     *(f"{what}_{axis}" for what in ("hinge", "axis", "centre") for axis in "xyz"),
@@ -114,8 +115,8 @@ class Sample(NamedTuple):
 
 
 class _Swung(NamedTuple):
-    """A panel where it is: its angle and rate, its axes to the centre and normal, its centre of mass from the craft's as it is
-    now (m), its momentum for a unit of rate (kg m), and that of rotation about the craft's centre of mass (kg m2)."""
+    """A panel where it is: its angle and rate, its axes to the centre and normal, its centre of mass from the craft's as
+    that is now (m), its momentum for a unit of rate (kg m), and its angular momentum about the craft's centre (kg m2)."""
 
     panel: Panel
     angle: Scalar
@@ -134,7 +135,7 @@ def prepare(params: Params, period: float) -> Numbers:
         raise ValueError("there is no panel")
     if not sum(panel.mass for panel in panels) < params.mass:
         raise ValueError(f"the panels together must have less than the craft's mass of {params.mass:g} kg")
-    still = Numbers(panels, params.mass, ((0.0, 0.0, 0.0),) * 3)
+    still = Numbers(panels, params.mass, _NONE)
     return still._replace(rest=_whole(*_swung(State((0.0,) * len(panels), (0.0,) * len(panels)), still), still))
 
 
@@ -284,7 +285,7 @@ def _swept(place: Vector, speed: Vector, rate: Vector) -> Vector:
 def inertia(own: State, params: Numbers) -> Matrix:
     """The inertia that the body's angular acceleration meets besides the body's own (kg m2)."""
     swung, _ = _swung(own, params)
-    found, coupled = inertia_change(own, params), ((0.0, 0.0, 0.0),) * 3
+    found, coupled = inertia_change(own, params), _NONE
     for one in swung:
         share = 1.0 / one.panel.swung
         found = combine(1.0, found, -1.0, _outer(share, one.turned, one.turned))

@@ -51,6 +51,8 @@ class Body(Protocol):
     """A small scenario in TOML, to which a law's table can be appended."""
     linked: Mapping[str, str] = MappingProxyType({})
     """Keys of `dials` whose value is that of another key until they are moved themselves."""
+    orbit: str = ""
+    """The table that it has besides where a part needs an orbit."""
 
     @property
     def template(self) -> str:

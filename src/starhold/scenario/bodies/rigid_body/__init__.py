@@ -28,6 +28,11 @@ torque_limit = 0.05
 duration = 1.0
 control_period = 0.1
 """
+ORBIT = """\
+[orbit]
+position = [7e6, 0.0, 0.0]
+velocity = [0.0, 4e3, 6.4e3]
+"""
 
 
 class Options(NamedTuple):
@@ -48,6 +53,7 @@ class RigidBody(Body):
     law_table = AttitudeLawTable
     example = EXAMPLE
     linked = MappingProxyType({TRUE: KNOWN})
+    orbit = ORBIT
 
     def laws(self) -> Mapping[str, Law]:
         return catalogue()

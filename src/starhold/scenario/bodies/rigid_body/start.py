@@ -48,6 +48,11 @@ def target_of(scenario: Scenario) -> Fitted:
     if own is not None:
         if "target" in scenario.table.model_fields_set:
             raise InputError(scenario.where, f"part {own.called}", "a second target, beside [target]", "one target")
+        try:
+            own.prepared(simulation.control_period)
+        except ValueError as error:
+            # The start may be relative to it, before the parts are tried together.
+            raise InputError(scenario.where, f"part {own.called}", "", str(error)) from None
         return own
     if table.mode == "orbital":
         return fit("target", "orbital")

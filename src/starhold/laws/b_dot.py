@@ -1,0 +1,76 @@
+"""A dipole against the change of the measured magnetic field slows a tumbling body."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+
+from starhold.algebra.scalar import Scalar, divide, less, where
+from starhold.algebra.vector import ZERO, Vector, cross, dot, scale, subtract
+from starhold.laws.interface import Card, Gain, Measurement
+from starhold.parts.craft import Craft, tensor
+
+CARD = Card(
+    title="B-dot",
+    summary="u = m x B with m = -k B'/|B|^2, B' from one measurement to the next; about -k w across the field",
+    sources=(
+        "Magnetic detumbling of a rigid spacecraft (2012): the design",
+        "Fundamentals of Spacecraft Attitude Determination and Control (2014)",
+    ),
+    assumptions=("the field changes because the body turns", "less than half a turn in a control period"),
+    claims="none",
+    quaternion_sign="even",
+)
+READS = ("magnetic_field",)
+
+
+class Gains(NamedTuple):
+    """The gain is a damping."""
+
+    k: Annotated[float, Gain("N m s", above=0.0, text="damping across the field")]
+
+
+class Orbit(NamedTuple):
+    """The form takes the gain from the orbit, in which the field must turn before all axes have been slowed."""
+
+    orbit_period: Annotated[float, Gain("s", above=0.0, text="of the orbit")]
+    inclination: Annotated[float, Gain("rad", at_least=0.0, at_most=math.pi, text="of the orbit to the magnetic equator")]
+
+
+FORMS: dict[str, Any] = {"orbit": Orbit}
+
+
+class Memory(NamedTuple):
+    """The field at the call before (T, body axes), and whether there was one."""
+
+    field: Vector
+    known: Scalar
+
+
+def design(craft: Craft, spec: Orbit) -> Gains:
+    """Return k = 2 n (1 + sin i) J_min with n the rate of the orbit: quick, and slow enough not to leave a rate along the
+    field."""
+    least = float(np.linalg.eigvalsh(tensor(craft.inertia))[0])
+    return Gains(2.0 * math.tau / spec.orbit_period * (1.0 + math.sin(spec.inclination)) * least)
+
+
+def remember(gains: Gains, craft: Craft, period: float) -> Memory:
+    """Return the memory at the start: no field yet."""
+    return Memory(ZERO, 0.0)
+
+
+def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: Memory) -> tuple[Vector, Memory]:
+    """Return the torque of the dipole (N m, body)."""
+    field = measurement.magnetic_field
+    square = dot(field, field)
+    # Without a field, or with one alone, nothing is known.
+    share = where(less(0.0, square), divide(-gains.k / measurement.period, square), 0.0)
+    dipole = scale(memory.known * share, subtract(field, memory.field))
+    return cross(dipole, field), Memory(field, where(less(0.0, square), 1.0, 0.0))
+
+
+def examples() -> list[Gains]:
+    """Return gains for a CubeSat and for a body of a few kg m2."""
+    return [Gains(1e-4), Gains(0.01)]

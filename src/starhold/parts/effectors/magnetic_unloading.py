@@ -1,0 +1,91 @@
+"""Magnetorquers that take momentum out of the wheels, whatever law steers these."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+from starhold.algebra.quantity import Quantity
+from starhold.algebra.scalar import Scalar
+from starhold.algebra.vector import ZERO, Vector, scale, subtract
+from starhold.algebra.words import number_of
+from starhold.parts import magnetic_field
+from starhold.parts.contract import Card, Parameter
+from starhold.parts.effectors import magnetorquers
+from starhold.parts.effectors.magnetorquers import LIMIT, LIMITED, State, dipole_for, within
+from starhold.parts.epoch import EPOCH, START, Date
+
+CARD = Card(
+    title="Magnetic unloading",
+    summary="M = m x B with m = -gain B_m x (h - momentum) / |B_m|^2 within the dipole limit, h of the wheels",
+    sources=(magnetic_field.SOURCE, "Spacecraft Dynamics and Control (1997): momentum unloading, cross-product law"),
+    assumptions=(
+        *magnetorquers.CARD.assumptions[:-1],
+        "no law is told of its torque, which wheels take up as they hold the attitude",
+        "what lies along the field is left until the field has turned",
+    ),
+)
+ROLE = "effector"
+OUTSIDE = True
+NEEDS = ("two-body", "wheels")
+READS = ("magnetic_field",)
+
+
+class Params(NamedTuple):
+    """How fast momentum is taken out, what the magnetorquers give, and when they fly."""
+
+    gain: Annotated[float, Parameter("1/s", above=0.0, text="share of the momentum across the field taken out in a second")]
+    dipole_limit: Annotated[Vector, LIMIT]
+    limited: Annotated[int, LIMITED] = 0
+    momentum: Annotated[
+        Vector, Parameter("N m s", shape=(3,), spread=False, text="that the wheels are to keep, body axes")
+    ] = ZERO
+    epoch: Annotated[Date, EPOCH] = START
+
+
+class Numbers(NamedTuple):
+    """The gain (1/s), the largest dipoles (A m2), how they are limited, the momentum that stays (N m s), the field, and the
+    control period (s)."""
+
+    gain: Scalar
+    dipole_limit: Vector
+    limited: int
+    momentum: Vector
+    field: magnetic_field.Numbers
+    period: Scalar
+
+
+class Sample(NamedTuple):
+    """The quantities that are recorded of the unloading."""
+
+    unloading_dipole: Annotated[Vector, Quantity("A m^2", "dipole that unloads the wheels, body axes", "axis")]
+    unloading_torque: Annotated[Vector, Quantity("N m", "torque that unloads the wheels, body axes", "axis")]
+
+
+def prepare(params: Params, period: float) -> Numbers:
+    """The numbers of a flight. ValueError for an epoch that the field is not known at."""
+    return Numbers(*params[:4], magnetic_field.prepared(params.epoch), period)
+
+
+def switch(own: State, wanted: Vector, told: Any, state: Any, params: Numbers, step: int) -> State:
+    """The dipole for the wheels' momentum in the measured field, and the field that is there."""
+    torque = scale(-params.gain, subtract(told.wheel_momentum, params.momentum))
+    dipole = within(dipole_for(torque, told.magnetic_field), params.dipole_limit, params.limited)
+    return State(dipole, magnetic_field.field(state.position, number_of(step) * params.period, params.field))
+
+
+remember, reaction, rates, momentum = (
+    magnetorquers.remember,
+    magnetorquers.reaction,
+    magnetorquers.rates,
+    magnetorquers.momentum,
+)
+
+
+def record(own: State, command: Any, body: Any, params: Numbers) -> Sample:
+    """The recorded quantities."""
+    return Sample(own.dipole, reaction(own, command, body, params))
+
+
+def examples() -> list[Params]:
+    """Slow unloading by a CubeSat's magnetorquers, and a quick one that leaves a bias."""
+    return [Params(1e-3, (0.2, 0.2, 0.2)), Params(0.02, (30.0, 30.0, 20.0), 1, (0.0, 0.01, 0.0))]

@@ -1,0 +1,133 @@
+"""Three magnetic rods or coils along the body axes, which act against the Earth's magnetic field."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+from starhold.algebra.quantity import Quantity
+from starhold.algebra.quaternion import to_body
+from starhold.algebra.scalar import Scalar, absolute, clip, divide, less, maximum, where
+from starhold.algebra.several import each
+from starhold.algebra.vector import ZERO, Vector, cross, dot, scale
+from starhold.algebra.words import number_of
+from starhold.parts import magnetic_field
+from starhold.parts.contract import Card, Parameter
+from starhold.parts.epoch import EPOCH, START, Date
+
+CARD = Card(
+    title="Magnetorquers",
+    summary="M = m x B with m = B_m x command / |B_m|^2 within the dipole limit, B_m the measured field",
+    sources=(magnetic_field.SOURCE, "Fundamentals of Spacecraft Attitude Determination and Control (2014)"),
+    assumptions=(
+        *magnetic_field.ASSUMPTIONS,
+        "along the body axes, without lag or hysteresis, held for a control period",
+        "the field in inertial axes is held for a control period",
+        "what is wanted along the field is not given",
+    ),
+)
+ROLE = "effector"
+ACTS = OUTSIDE = True
+NEEDS = ("two-body",)
+READS = ("magnetic_field",)
+LIMIT = Parameter("A m^2", above=0.0, shape=(3,), text="largest dipole along each body axis")
+LIMITED = Parameter(
+    choices=("together", "each"),
+    text="dipoles beyond the limit are reduced together, so that the torque keeps its line, or each",
+)
+"""How parts with magnetorquers declare what they give, in the same words."""
+
+
+class Params(NamedTuple):
+    """What the magnetorquers give, and when they fly."""
+
+    dipole_limit: Annotated[Vector, LIMIT]
+    limited: Annotated[int, LIMITED] = 0
+    epoch: Annotated[Date, EPOCH] = START
+
+
+class Numbers(NamedTuple):
+    """The largest dipoles (A m2), how they are limited, the field, and the control period (s)."""
+
+    dipole_limit: Vector
+    limited: int
+    field: magnetic_field.Numbers
+    period: Scalar
+
+
+class State(NamedTuple):
+    """The dipole (A m2, body axes) and the field (T, inertial axes) of a control period."""
+
+    dipole: Vector
+    field: Vector
+
+
+class Sample(NamedTuple):
+    """The quantities that are recorded of the magnetorquers."""
+
+    magnetic_dipole: Annotated[Vector, Quantity("A m^2", "dipole of the magnetorquers, body axes", "axis")]
+
+
+def prepare(params: Params, period: float) -> Numbers:
+    """The numbers of a flight. ValueError for an epoch that the field is not known at."""
+    return Numbers(params.dipole_limit, params.limited, magnetic_field.prepared(params.epoch), period)
+
+
+def remember(params: Any) -> State:
+    """The state at the start: switched off."""
+    return State(ZERO, ZERO)
+
+
+def switch(own: State, wanted: Vector, told: Any, state: Any, params: Numbers, step: int) -> State:
+    """The dipole for a wanted torque (N m) in the measured field, and the field that is there."""
+    dipole = within(dipole_for(wanted, told.magnetic_field), params.dipole_limit, params.limited)
+    return State(dipole, magnetic_field.field(state.position, number_of(step) * params.period, params.field))
+
+
+def dipole_for(torque: Vector, field: Vector) -> Vector:
+    """The least dipole (A m2) that in a field (T) gives a torque (N m), but for its part along the field; none where there
+    is no field."""
+    square = dot(field, field)
+    return scale(where(less(0.0, square), divide(1.0, square), 0.0), cross(field, torque))
+
+
+def within(dipole: Vector, limit: Vector, limited: int) -> Vector:
+    """A dipole (A m2) within the limit of each axis, reduced together or each on its own."""
+    if limited:
+        cut: Any = each(clip, (dipole, limit))
+        return cut
+    x, y, z = each(_filled, (dipole, limit))
+    return scale(1.0 / maximum(maximum(maximum(x, y), z), 1.0), dipole)
+
+
+def _filled(dipole: Scalar, limit: Scalar) -> Scalar:
+    return absolute(dipole) / limit
+
+
+def reaction(own: State, command: Any, body: Any, params: Any) -> Vector:
+    """The torque on the body (N m)."""
+    return cross(own.dipole, to_body(body.attitude, own.field))
+
+
+def rates(own: State, command: Any, body: Any, acceleration: Vector, params: Any) -> Any:
+    """Nothing changes between control instants."""
+    return None
+
+
+def momentum(own: State, params: Any) -> Vector:
+    """None of its own (N m s)."""
+    return ZERO
+
+
+def applied(own: State, command: Any, body: Any, params: Numbers) -> Vector:
+    """The torque on the body (N m)."""
+    return reaction(own, command, body, params)
+
+
+def record(own: State, command: Any, body: Any, params: Numbers) -> Sample:
+    """The recorded quantities."""
+    return Sample(own.dipole)
+
+
+def examples() -> list[Params]:
+    """Those of a CubeSat, and larger ones at another time."""
+    return [Params((0.2, 0.2, 0.2)), Params((30.0, 30.0, 20.0), 1, (2027.0, 6.0, 21.0, 12.0, 30.0, 15.0))]

@@ -1,0 +1,153 @@
+"""Pairs of thrusters for each way round each body axis, that are on or off: pulses of modulated width behind a Schmitt
+trigger."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+from starhold.algebra.quantity import Quantity
+from starhold.algebra.scalar import Scalar, absolute, less, maximum, minimum, sign, where
+from starhold.algebra.several import each
+from starhold.algebra.vector import ZERO, Vector, scale, times
+from starhold.parts.contract import Card, Parameter
+
+CARD = Card(
+    title="On-off thrusters",
+    summary="full torque for t = |command| / torque of the control period, once |command| > on and until |command| < off",
+    sources=("Spacecraft Dynamics and Control (1997): reaction pulses, Schmitt trigger, pulse-width modulation",),
+    assumptions=(
+        "torques in pairs about the body axes, without force, at once on and at once off",
+        "a pulse begins with the control period; of a substep in which it ends the torque is the mean",
+        "the propellant that is spent leaves mass and inertia as they are",
+    ),
+)
+ROLE = "effector"
+ACTS = OUTSIDE = True
+GRAVITY = 9.80665
+"""Standard gravity, by which a specific impulse is told in seconds (m/s2)."""
+
+
+class Params(NamedTuple):
+    """What a pair gives, and when it fires."""
+
+    torque: Annotated[Vector, Parameter("N m", above=0.0, shape=(3,), text="of a pair about each body axis that fires")]
+    minimum: Annotated[float, Parameter("s", at_least=0.0, text="shortest time that a pair is on")] = 0.0
+    on: Annotated[Vector, Parameter("N m", at_least=0.0, shape=(3,), text="command above which a pair begins to fire")] = (
+        ZERO
+    )
+    off: Annotated[Vector, Parameter("N m", at_least=0.0, shape=(3,), text="command below which it ends; at most `on`")] = (
+        ZERO
+    )
+    pulses: Annotated[
+        int,
+        Parameter(choices=("modulated", "whole"), text="as long as the command asks for, or as long as a control period"),
+    ] = 0
+    lever: Annotated[float, Parameter("m", above=0.0, text="arm of a thruster about its axis")] = 1.0
+    specific_impulse: Annotated[float, Parameter("s", above=0.0, text="of the propellant")] = 220.0
+
+
+class Numbers(NamedTuple):
+    """The parameters, the control period (s), and the propellant for an impulse of torque (kg/(N m s))."""
+
+    torque: Vector
+    minimum: Scalar
+    on: Vector
+    off: Vector
+    pulses: int
+    period: Scalar
+    propellant: Scalar
+
+
+class State(NamedTuple):
+    """For each axis which way round its thrusters fire (-1, 0, 1), for how long yet (s), and the impulse of their torque
+    since the start, whichever way (N m s)."""
+
+    firing: Vector
+    left: Vector
+    impulse: Vector
+
+
+class Sample(NamedTuple):
+    """The quantities that are recorded of the thrusters."""
+
+    thruster_time: Annotated[Vector, Quantity("s", "time on in the control period that begins, with its sense", "axis")]
+    thruster_impulse: Annotated[Vector, Quantity("N m s", "impulse of the thrusters' torque, either way", "axis")]
+    propellant: Annotated[float, Quantity("kg", "propellant spent")]
+
+
+def prepare(params: Params, period: float) -> Numbers:
+    """The numbers of a control period (s). ValueError where thresholds or the shortest pulse do not fit."""
+    if any(off > on for off, on in zip(params.off, params.on, strict=True)):
+        raise ValueError("a pair cannot end to fire at a command above that at which it begins: off must be at most on")
+    if params.minimum > period:
+        raise ValueError(f"the shortest pulse must be at most the control period of {period:g} s, not {params.minimum:g} s")
+    spent = 1.0 / (params.lever * params.specific_impulse * GRAVITY)
+    return Numbers(*params[:5], period, spent)
+
+
+def remember(params: Numbers) -> State:
+    """The state at the start: nothing fires."""
+    return State(ZERO, ZERO, ZERO)
+
+
+def switch(own: State, wanted: Vector, told: Any, state: Any, params: Numbers, step: int) -> State:
+    """What fires in the control step that begins, for a wanted torque (N m)."""
+    firing: Any = each(_trigger, (wanted, own.firing, params.on, params.off))
+    left: Any = each(_width, (wanted, firing, params.torque), params)
+    return State(firing, left, own.impulse)
+
+
+def _trigger(wanted: Scalar, firing: Scalar, on: Scalar, off: Scalar) -> Scalar:
+    threshold = where(less(0.0, firing * wanted), off, on)
+    return where(less(threshold, absolute(wanted)), sign(wanted), 0.0)
+
+
+def _width(wanted: Scalar, firing: Scalar, torque: Scalar, params: Numbers) -> Scalar:
+    asked = params.period * (absolute(wanted) / torque)
+    width = params.period if params.pulses else minimum(maximum(asked, params.minimum), params.period)
+    return absolute(firing) * width
+
+
+def pulse(own: State, substep: Scalar, params: Numbers) -> Vector:
+    """The share of a substep that each pair is on, with its sense."""
+    share: Any = each(_share, (own.firing, own.left), substep)
+    return share
+
+
+def _share(firing: Scalar, left: Scalar, substep: Scalar) -> Scalar:
+    return firing * minimum(maximum(left / substep, 0.0), 1.0)
+
+
+def reaction(own: State, command: Vector, body: Any, params: Numbers) -> Vector:
+    """The torque on the body (N m)."""
+    return times(params.torque, command)
+
+
+def rates(own: State, command: Vector, body: Any, acceleration: Vector, params: Numbers) -> Any:
+    """d(state)/dt: the time runs, the impulse grows."""
+    share: Any = each(absolute, (command,))
+    return State(None, scale(-1.0, share), times(params.torque, share))  # pyright: ignore[reportArgumentType]
+
+
+def momentum(own: State, params: Numbers) -> Vector:
+    """None of its own (N m s)."""
+    return ZERO
+
+
+def applied(own: State, command: Vector, body: Any, params: Numbers) -> Vector:
+    """The mean torque of the control period that begins (N m)."""
+    return scale(1.0 / params.period, times(params.torque, times(own.firing, own.left)))
+
+
+def record(own: State, command: Vector, body: Any, params: Numbers) -> Sample:
+    """The recorded quantities."""
+    x, y, z = own.impulse
+    return Sample(times(own.firing, own.left), own.impulse, params.propellant * (x + y + z))
+
+
+def examples() -> list[Params]:
+    """A pair of 20 mN m with a trigger, and one that fires for whole control periods."""
+    return [
+        Params((0.02, 0.02, 0.02), 0.02, (5e-3, 5e-3, 5e-3), (2e-3, 2e-3, 2e-3), lever=0.5),
+        Params((0.05, 0.04, 0.03), 0.0, (0.01, 0.01, 0.01), (4e-3, 4e-3, 4e-3), 1),
+    ]

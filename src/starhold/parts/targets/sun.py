@@ -1,0 +1,63 @@
+"""A body axis points at the Sun."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+from starhold.algebra.quaternion import Quaternion
+from starhold.algebra.scalar import Scalar
+from starhold.algebra.vector import ZERO, Matrix, Vector, norm
+from starhold.algebra.words import number_of
+from starhold.parts import sun
+from starhold.parts.contract import Card, Parameter
+from starhold.parts.epoch import EPOCH, START, Date
+from starhold.parts.roles import Goal
+from starhold.parts.targets.alignment import AXIS, OTHER, Moving, aligned, body_axes, towards_sun
+
+CARD = Card(
+    title="Sun",
+    summary="a body axis along the Sun's direction, another as near as it can to a direction that rests",
+    sources=sun.SOURCES,
+    assumptions=(*sun.ASSUMPTIONS, "in the Earth's shadow too"),
+)
+ROLE = "target"
+FOLLOWS = True
+
+
+class Params(NamedTuple):
+    """Which axes point where, and when they fly."""
+
+    axis: Annotated[Vector, AXIS] = (0.0, 0.0, 1.0)
+    other: Annotated[Vector, OTHER] = (1.0, 0.0, 0.0)
+    reference: Annotated[
+        Vector,
+        Parameter("1", shape=(3,), spread=False, text="the second direction, inertial axes; the Earth's pole if absent"),
+    ] = (0.0, 0.0, 1.0)
+    epoch: Annotated[Date, EPOCH] = START
+
+
+class Numbers(NamedTuple):
+    """The triad of the body axes, the second direction, the Sun, and the control period (s)."""
+
+    axes: Matrix
+    reference: Vector
+    sun: sun.Numbers
+    period: Scalar
+
+
+def prepare(params: Params, period: float) -> Numbers:
+    """The numbers of a flight. ValueError for axes that leave the attitude open, and for an epoch that is no date."""
+    if not norm(params.reference) > 0.0:
+        raise ValueError("the reference needs a direction")
+    return Numbers(body_axes(params.axis, params.other), params.reference, sun.prepared(params.epoch), period)
+
+
+def goal(params: Numbers, state: Any, step: int, before: Quaternion) -> Goal:
+    """The attitude at this control step."""
+    seen = towards_sun(number_of(step) * params.period, params.sun)
+    return aligned(seen, Moving(params.reference, ZERO, ZERO), params.axes, before)
+
+
+def examples() -> list[Params]:
+    """The third axis at the Sun, and a slanted one at another time."""
+    return [Params(), Params((0.0, 1.0, 1.0), (0.0, 0.0, 1.0), (1.0, 2.0, 3.0), (2027.0, 6.0, 21.0, 12.0, 30.0, 15.0))]

@@ -1,0 +1,73 @@
+"""A body axis points at the Earth's centre, and the body turns about it so that another faces the Sun."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+from starhold.algebra.quaternion import Quaternion
+from starhold.algebra.scalar import Scalar
+from starhold.algebra.vector import Matrix, Vector
+from starhold.algebra.words import number_of
+from starhold.parts import sun
+from starhold.parts.contract import Card
+from starhold.parts.craft import EARTH
+from starhold.parts.epoch import EPOCH, START, Date
+from starhold.parts.roles import Goal
+from starhold.parts.targets.alignment import (
+    AXIS,
+    GRAVITY,
+    OTHER,
+    aligned,
+    body_axes,
+    opposite_of,
+    orbiting,
+    towards_sun,
+)
+
+CARD = Card(
+    title="Yaw steering",
+    summary="a body axis to the centre of attraction, another as near as it can to the Sun",
+    sources=(*sun.SOURCES, "GNSS satellite geometry and attitude models (2015)"),
+    assumptions=(
+        *sun.ASSUMPTIONS,
+        "two-body motion",
+        "the Sun stands beside the line through craft and Earth: near it the yaw turns without bound",
+    ),
+)
+ROLE = "target"
+NEEDS = ("two-body",)
+FOLLOWS = True
+
+
+class Params(NamedTuple):
+    """Which axes point where, and when they fly."""
+
+    axis: Annotated[Vector, AXIS] = (0.0, 0.0, 1.0)
+    other: Annotated[Vector, OTHER] = (1.0, 0.0, 0.0)
+    epoch: Annotated[Date, EPOCH] = START
+    gravity: Annotated[float, GRAVITY] = EARTH
+
+
+class Numbers(NamedTuple):
+    """The triad of the body axes, the Sun, the gravitational parameter (m3/s2), and the control period (s)."""
+
+    axes: Matrix
+    sun: sun.Numbers
+    gravity: Scalar
+    period: Scalar
+
+
+def prepare(params: Params, period: float) -> Numbers:
+    """The numbers of a flight. ValueError for axes that leave the attitude open, and for an epoch that is no date."""
+    return Numbers(body_axes(params.axis, params.other), sun.prepared(params.epoch), params.gravity, period)
+
+
+def goal(params: Numbers, state: Any, step: int, before: Quaternion) -> Goal:
+    """The attitude at this control step."""
+    down = opposite_of(orbiting(state.position, state.velocity, params.gravity))
+    return aligned(down, towards_sun(number_of(step) * params.period, params.sun), params.axes, before)
+
+
+def examples() -> list[Params]:
+    """The usual axes, and others at another time."""
+    return [Params(), Params((0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (2027.0, 6.0, 21.0, 12.0, 30.0, 15.0))]
