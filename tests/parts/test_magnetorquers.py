@@ -1,0 +1,134 @@
+"""Magnetorquers and what they unload: against SciPy in the field of an independent implementation, and the balance of the
+angular momentum."""
+
+import datetime
+import math
+import warnings
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+import starhold as sh
+from starhold.parts.effectors.magnetorquers import dipole_for, within
+from starhold.scenario.reading import parse
+
+INERTIA = np.array([0.05, 0.065, 0.025])
+EPOCH = (2026.0, 3.0, 5.0, 6.0, 30.0, 0.0)
+CRAFT = """
+name = "own"
+[spacecraft]
+inertia = [0.05, 0.065, 0.025]
+torque_limit = "2 mN m"
+[orbit]
+position = ["6878 km", 0, 0]
+velocity = [0, "-1.017 km/s", "7.544 km/s"]
+[initial]
+angles = ["20 deg", "-10 deg", "30 deg"]
+rate = [0.02, -0.03, 0.025]
+[simulation]
+duration = 400
+control_period = 0.5
+"""
+WHEELS = """
+[wheels]
+layout = "pyramid"
+inertia = 2e-5
+torque_limit = "2 mN m"
+momentum_limit = "15 mN m s"
+momentum = [5e-3, -4e-3, 3e-3, 6e-3]
+"""
+TIME = f"epoch = {list(EPOCH)}\n"
+METER = '[[part]]\ntype = "magnetometer"\n' + TIME
+RODS = '[[part]]\ntype = "magnetorquers"\ndipole_limit = 0.2\n' + TIME
+UNLOADING = '[[part]]\ntype = "magnetic-unloading"\ndipole_limit = 0.3\n' + TIME
+PD = '[[law]]\ntype = "pd"\nk_rate = 4e-4\nk_attitude = 2e-6\n'
+
+
+def test_the_torque_is_that_of_the_dipole_in_the_field_that_an_independent_implementation_has():
+    ppigrf, erfa = pytest.importorskip("ppigrf"), pytest.importorskip("erfa")
+    run = sh.simulate(parse(CRAFT + METER + RODS + PD, "own"))
+    days = sum(erfa.cal2jd(2026, 3, 5)) - 2400000.5 + 6.5 / 24.0
+    date = datetime.datetime(2026, 3, 5, 6, 30)
+    for k in range(0, 801, 40):
+        spin = Rotation.from_rotvec([0.0, 0.0, erfa.gmst82(2400000.5, days + 0.5 * k / 86400.0)])
+        place = spin.inv().apply(run.position.values[k])
+        radius, north = np.linalg.norm(place), math.acos(place[2] / np.linalg.norm(place))
+        east = math.atan2(place[1], place[0])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            out, south, eastward = (
+                float(np.ravel(x)[0]) for x in ppigrf.igrf_gc(radius / 1e3, math.degrees(north), math.degrees(east), date)
+            )
+        axes = Rotation.from_euler("ZY", [east, north])
+        field = spin.apply(axes.apply([south, eastward, out])) * 1e-9
+        body = Rotation.from_quat(run.attitude.values[k], scalar_first=True).inv().apply(field)
+        wanted = np.cross(run.magnetic_dipole.values[k], body)
+        # The field has coefficients up to degree 8.
+        assert np.abs(run.torque.values[k] - wanted).max() < 2e-3 * np.linalg.norm(body) * np.abs(run.magnetic_dipole[k]).max()
+
+
+def test_the_body_turns_as_scipy_says_under_the_recorded_dipoles():
+    run = sh.simulate(parse(CRAFT + METER + RODS + PD, "own"))
+    torques, rate, attitude = run.torque.values, run.rate.values, run.attitude.values
+    turns = Rotation.from_quat(attitude, scalar_first=True)
+    for k in (0, 100, 333, 700):
+        # The field rests in inertial axes for a control period; of it only what lies across the dipole acts.
+        dipole = run.magnetic_dipole.values[k]
+        field = turns[k].apply(run.magnetometer_magnetic_field.values[k])
+        assert np.abs(np.cross(dipole, turns[k].inv().apply(field)) - torques[k]).max() < 1e-18
+
+        def slope(_, y, dipole=dipole, field=field):
+            q, w = y[:4], y[4:]
+            body = Rotation.from_quat(q, scalar_first=True).inv().apply(field)
+            turning = 0.5 * np.array([-q[1:] @ w, *(q[0] * w + np.cross(q[1:], w))])
+            return [*turning, *((np.cross(dipole, body) - np.cross(w, INERTIA * w)) / INERTIA)]
+
+        end = solve_ivp(slope, (0.0, 0.5), [*attitude[k], *rate[k]], "DOP853", rtol=1e-12, atol=1e-15).y[:, -1]
+        assert np.abs(end[4:] - rate[k + 1]).max() < 1e-9
+
+
+def test_a_dipole_gives_what_lies_across_the_field_and_no_more_than_it_can():
+    rng = np.random.default_rng(5)
+    limit = (0.2, 0.3, 0.1)
+    for _ in range(200):
+        torque, field = rng.normal(size=3) * 1e-6, rng.normal(size=3) * 3e-5
+        dipole = np.array(dipole_for(tuple(torque), tuple(field)))
+        across = torque - field * (field @ torque) / (field @ field)
+        assert np.abs(np.cross(dipole, field) - across).max() < 1e-20
+        # Of all dipoles that give it the least.
+        assert abs(dipole @ field) < 1e-15 * np.linalg.norm(field)
+        big = dipole * 100.0
+        together, each = np.array(within(tuple(big), limit, 0)), np.array(within(tuple(big), limit, 1))
+        assert np.abs(np.cross(together, big)).max() < 1e-15 * np.abs(big).max()
+        assert np.max(np.abs(together) / limit) == pytest.approx(min(1.0, np.max(np.abs(big) / limit)))
+        np.testing.assert_array_equal(each, np.clip(big, np.negative(limit), limit))
+    assert dipole_for((1.0, 2.0, 3.0), (0.0, 0.0, 0.0)) == (0.0, 0.0, 0.0)
+
+
+LAW = '[[law]]\ntype = "lyapunov"\nk_rate = 0.01\nk_attitude = 0.002\n'
+
+
+def test_wheels_are_unloaded_by_what_comes_from_outside():
+    text = CRAFT.replace("duration = 400", "duration = 6000\nrecord_every = 1")
+    plain = sh.simulate(parse(text + WHEELS + LAW, "own"))
+    run = sh.simulate(parse(text + WHEELS + METER + UNLOADING + "gain = 2e-3\n" + LAW, "own"))
+    axes = np.array(sh.load_axes(run)) if hasattr(sh, "load_axes") else None
+    del axes
+    before, after = (np.linalg.norm(one.wheel_momentum.values[-1] @ pyramid()) for one in (plain, run))
+    assert after < 0.05 * before
+    # The law holds the attitude meanwhile.
+    assert 2.0 * np.linalg.norm(run.attitude_error.values[-2000:, 1:], axis=1).max() < 2e-2
+    turns = Rotation.from_quat(run.attitude.values, scalar_first=True)
+    total = turns.apply(run.rate.values * INERTIA + run.wheel_momentum.values @ pyramid() - stored(run))
+    impulse = np.cumsum(turns.apply(run.unloading_torque.values), axis=0)[:-1] * 0.5
+    # What body and wheels lose is the impulse of the torque, which turns a little within a control period.
+    assert np.abs(total[1:] - total[0] - impulse).max() < 2e-3 * np.linalg.norm(total[0])
+    assert np.abs(run.unloading_dipole.values).max() <= 0.3
+
+
+def test_the_unloading_of_a_wheel_keeps_what_it_is_told_to():
+    text = CRAFT.replace("duration = 400", "duration = 6000") + WHEELS + METER + UNLOADING
+    run = sh.simulate(parse(text + "gain = 2e-3\nmomentum = [0, 3e-3, 0]\n" + LAW, "own"))
+    assert run.wheel_momentum.values[-1] @ pyramid() == pytest.approx([0.0, 3e-3, 0.0], abs=4e-4)
