@@ -92,11 +92,11 @@ def dipole_for(torque: Vector, field: Vector) -> Vector:
 
 def within(dipole: Vector, limit: Vector, limited: int) -> Vector:
     """A dipole (A m2) within the limit of each axis, reduced together or each on its own."""
-    if limited:
-        cut: Any = each(clip, (dipole, limit))
-        return cut
-    x, y, z = each(_filled, (dipole, limit))
-    return scale(1.0 / maximum(maximum(maximum(x, y), z), 1.0), dipole)
+    if not limited:
+        x, y, z = each(_filled, (dipole, limit))
+        dipole = scale(1.0 / maximum(maximum(maximum(x, y), z), 1.0), dipole)
+    cut: Any = each(clip, (dipole, limit))
+    return cut
 
 
 def _filled(dipole: Scalar, limit: Scalar) -> Scalar:
