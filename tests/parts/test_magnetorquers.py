@@ -5,6 +5,7 @@ from datetime import datetime
 
 import erfa
 import numpy as np
+import ppigrf
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
@@ -13,7 +14,6 @@ import starhold as sh
 from starhold.parts.effectors.layouts import pyramid
 from starhold.parts.effectors.magnetorquers import dipole_for, within
 from starhold.scenario.reading import parse
-from tests.parts.test_magnetic_field import reference
 
 INERTIA = np.array([0.05, 0.065, 0.025])
 EPOCH = (2026.0, 3.0, 5.0, 6.0, 30.0, 0.0)
@@ -53,7 +53,14 @@ def test_the_torque_is_that_of_the_dipole_in_the_field_that_an_independent_imple
     days = sum(erfa.cal2jd(2026, 3, 5)) - 2400000.5 + 6.5 / 24.0
     places, turns = run.position.values, Rotation.from_quat(run.attitude.values, scalar_first=True)
     spins = Rotation.from_rotvec([[0.0, 0.0, erfa.gmst82(2400000.5, days + t / 86400.0)] for t in run.time.values])
-    fields = turns.inv().apply(spins.apply(reference(spins.inv().apply(places), datetime(2026, 3, 5, 6, 30))))
+    x, y, z = spins.inv().apply(places).T
+    east, south = np.arctan2(y, x), np.arctan2(np.hypot(x, y), z)
+    where = np.linalg.norm(places, axis=1) / 1e3, np.degrees(south), np.degrees(east)
+    parts = [1e-9 * np.ravel(part) for part in ppigrf.igrf_gc(*where, datetime(2026, 3, 5, 6, 30))]
+    # The axes of its components, outward, south and east, are those of the Earth turned by both angles.
+    local = Rotation.from_euler("ZY", np.stack([east, south], axis=1))
+    outward, southward, eastward = parts
+    fields = turns.inv().apply(spins.apply(local.apply(np.stack([southward, eastward, outward], axis=1))))
     wanted = np.cross(run.magnetic_dipole.values, fields)
     size = np.linalg.norm(run.magnetic_dipole.values, axis=1) * np.linalg.norm(fields, axis=1)
     # The field here has coefficients up to degree 8, that of the reference all.

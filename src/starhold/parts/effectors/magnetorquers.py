@@ -38,7 +38,7 @@ LIMITED = Parameter(
 
 
 class Params(NamedTuple):
-    """What the magnetorquers give, and when they fly."""
+    """How strong the magnetorquers are, and when they fly."""
 
     dipole_limit: Annotated[Vector, LIMIT]
     limited: Annotated[int, LIMITED] = 0

@@ -28,7 +28,7 @@ GRAVITY = 9.80665
 
 
 class Params(NamedTuple):
-    """What a pair gives, and when it fires."""
+    """The torque of a pair, when it fires, and what that costs."""
 
     torque: Annotated[Vector, Parameter("N m", above=0.0, shape=(3,), text="of a pair about each body axis that fires")]
     minimum: Annotated[float, Parameter("s", at_least=0.0, text="shortest time that a pair is on")] = 0.0
@@ -70,7 +70,7 @@ class State(NamedTuple):
 class Sample(NamedTuple):
     """The quantities that are recorded of the thrusters."""
 
-    thruster_time: Annotated[Vector, Quantity("s", "time on in the control period that begins, with its sense", "axis")]
+    thruster_time: Annotated[Vector, Quantity("s", "time on in each control period, signed", "axis")]
     thruster_impulse: Annotated[Vector, Quantity("N m s", "impulse of the thrusters' torque, either way", "axis")]
     propellant: Annotated[float, Quantity("kg", "propellant spent")]
 
@@ -91,7 +91,7 @@ def remember(params: Numbers) -> State:
 
 
 def switch(own: State, wanted: Vector, told: Any, state: Any, params: Numbers, step: int) -> State:
-    """What fires in the control step that begins, for a wanted torque (N m)."""
+    """The pairs that fire in the control step that begins, and for how long, for a wanted torque (N m)."""
     firing: Any = each(_trigger, (wanted, own.firing, params.on, params.off))
     left: Any = each(_width, (wanted, firing, params.torque), params)
     return State(firing, left, own.impulse)
