@@ -76,8 +76,8 @@ class Params(NamedTuple):
 
 class Panel(NamedTuple):
     """A panel as equations take it: mass, the point of its hinge next to its centre of mass (m), the unit axes of the hinge,
-    to the centre and normal to both, the distance of the centre (m), moments about these axes (kg m2), the inertia about the
-    hinge (kg m2), spring, damper, and the angle at the start."""
+    to the centre and normal to both, the distance of the centre (m), moments about these axes (kg m2), the inverse of the
+    inertia about the hinge (1/(kg m2)), spring, damper, and the angle at the start."""
 
     mass: Scalar
     hinge: Vector
@@ -86,17 +86,18 @@ class Panel(NamedTuple):
     normal: Vector
     length: Scalar
     moments: Vector
-    swung: Scalar
+    inverse: Scalar
     stiffness: Scalar
     damping: Scalar
     angle: Scalar
 
 
 class Numbers(NamedTuple):
-    """The panels, the mass of the whole (kg), and the inertia that the panels have at their rest (kg m2)."""
+    """The panels, the mass of the whole (kg) and its inverse, and the inertia that the panels have at their rest (kg m2)."""
 
     panels: tuple[Panel, ...]
     mass: Scalar
+    inverse: Scalar
     rest: Matrix
 
 
@@ -135,7 +136,7 @@ def prepare(params: Params, period: float) -> Numbers:
         raise ValueError("there is no panel")
     if not sum(panel.mass for panel in panels) < params.mass:
         raise ValueError(f"the panels together must have less than the craft's mass of {params.mass:g} kg")
-    still = Numbers(panels, params.mass, _NONE)
+    still = Numbers(panels, params.mass, 1.0 / params.mass, _NONE)
     return still._replace(rest=_whole(*_swung(State((0.0,) * len(panels), (0.0,) * len(panels)), still), still))
 
 
@@ -160,7 +161,7 @@ def _panel(number: int, row: tuple[float, ...]) -> Panel:
         vector(np.cross(a, e)),
         length,
         (about, along, across),
-        about + mass * length**2,
+        1.0 / (about + mass * length**2),
         stiffness,
         damping,
         angle,
@@ -180,7 +181,7 @@ def _swung(own: State, params: Numbers) -> tuple[list[_Swung], Vector]:
         cosine, sine = cosine_sine(angle * (0.5 / math.pi))
         out = add(scale(cosine, panel.out), scale(sine, panel.normal))
         normal = subtract(scale(cosine, panel.normal), scale(sine, panel.out))
-        shift = add(shift, scale(panel.mass * panel.length / params.mass, subtract(out, panel.out)))
+        shift = add(shift, scale(panel.mass * panel.length * params.inverse, subtract(out, panel.out)))
         placed.append((out, normal, add(panel.hinge, scale(panel.length, out))))
     found: list[_Swung] = []
     for panel, angle, rate, (out, normal, place) in zip(params.panels, own.angle, own.rate, placed, strict=True):
@@ -217,7 +218,7 @@ def _moving(swung: list[_Swung], params: Numbers) -> Vector:
     """How fast the panels shift the centre of mass (m/s)."""
     found = ZERO
     for one in swung:
-        found = add(found, scale(one.rate / params.mass, one.pushed))
+        found = add(found, scale(one.rate * params.inverse, one.pushed))
     return found
 
 
@@ -225,7 +226,7 @@ def _moments(swung: list[_Swung], rate: Vector, params: Numbers) -> list[Scalar]
     """The moments about the hinges (N m) of springs, dampers and rates."""
     moving, pulled = _moving(swung, params), ZERO
     for one in swung:
-        pulled = add(pulled, scale(one.panel.mass * one.panel.length / params.mass * one.rate * one.rate, one.out))
+        pulled = add(pulled, scale(one.panel.mass * one.panel.length * params.inverse * one.rate * one.rate, one.out))
     found: list[Scalar] = []
     for one in swung:
         panel = one.panel
@@ -240,7 +241,7 @@ def _shared(swung: list[_Swung], params: Numbers) -> Matrix:
     """The inverse of what couples the hinges through the centre of mass: 1 - sum p p^T / (mass D)."""
     found: Matrix = diagonal((1.0, 1.0, 1.0))
     for one in swung:
-        found = combine(1.0, found, -1.0, _outer(1.0 / (params.mass * one.panel.swung), one.pushed, one.pushed))
+        found = combine(1.0, found, -1.0, _outer(params.inverse * one.panel.inverse, one.pushed, one.pushed))
     return inverse(found)
 
 
@@ -248,10 +249,10 @@ def _accelerations(swung: list[_Swung], moments: list[Scalar], params: Numbers) 
     """The hinges' accelerations (rad/s2) under these moments (N m), each sharing in the acceleration of the centre."""
     pushing = ZERO
     for one, moment in zip(swung, moments, strict=True):
-        pushing = add(pushing, scale(moment / one.panel.swung, one.pushed))
-    centre = scale(1.0 / params.mass, apply(_shared(swung, params), pushing))
+        pushing = add(pushing, scale(moment * one.panel.inverse, one.pushed))
+    centre = scale(params.inverse, apply(_shared(swung, params), pushing))
     pairs = zip(swung, moments, strict=True)
-    return [(moment + dot(one.pushed, centre)) / one.panel.swung for one, moment in pairs]
+    return [one.panel.inverse * (moment + dot(one.pushed, centre)) for one, moment in pairs]
 
 
 def reaction(own: State, command: Any, body: Any, params: Numbers) -> Vector:
@@ -287,11 +288,11 @@ def inertia(own: State, params: Numbers) -> Matrix:
     swung, _ = _swung(own, params)
     found, coupled = inertia_change(own, params), _NONE
     for one in swung:
-        share = 1.0 / one.panel.swung
+        share = one.panel.inverse
         found = combine(1.0, found, -1.0, _outer(share, one.turned, one.turned))
         coupled = combine(1.0, coupled, 1.0, _outer(share, one.pushed, one.turned))
     through = multiply(transpose(coupled), multiply(_shared(swung, params), coupled))
-    return combine(1.0, found, -1.0 / params.mass, through)
+    return combine(1.0, found, -params.inverse, through)
 
 
 def inertia_change(own: State, params: Numbers) -> Matrix:
@@ -325,7 +326,7 @@ def fastest(params: Params) -> float:
     gives way."""
     found = 0.0
     for panel in prepare(params, 1.0).panels:
-        swung = panel.swung - (panel.mass * panel.length) ** 2 / params.mass
+        swung = 1.0 / panel.inverse - (panel.mass * panel.length) ** 2 / params.mass
         found = max(found, math.sqrt(panel.stiffness / swung), panel.damping / swung)
     return found
 
