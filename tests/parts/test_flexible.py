@@ -94,7 +94,8 @@ def lagrangian(rows):
         speed = push + w.cross(sympy.Matrix(hinge) + out) + (rate * a).cross(out)
         energy += _energy(mass, own, speed, swing.T * (w + rate * a))
     slopes = [energy.diff(x) for x in angles]
-    hessian = [[energy.diff(x).diff(y) for y in v] for x in v]
+    pushes = [energy.diff(x) for x in v]
+    hessian = [[pushes[max(i, j)].diff(v[min(i, j)]) for j in range(len(v))] for i in range(len(v))]
     return sympy.lambdify([angles, v], [slopes, hessian], cse=True)
 
 
@@ -127,9 +128,9 @@ def integrated(rows, times):
 
 def test_panels_swing_as_lagrange_s_equations_say():
     rows = panels(0.02, 2)
-    run = flown(free(fit("effector", "hinged-panels", MASS, rows)), 80)
+    run = flown(free(fit("effector", "hinged-panels", MASS, rows)), 60)
     rate, angle, speed = integrated(rows, run["time"])
-    assert np.ptp(run["panel_angle"], axis=0).min() > 0.03
+    assert np.ptp(run["panel_angle"], axis=0).min() > 0.02
     assert np.abs(run["rate"] - rate).max() < 1e-9
     assert np.abs(run["panel_angle"] - angle).max() < 1e-9
     assert np.abs(run["panel_rate"] - speed).max() < 1e-9
