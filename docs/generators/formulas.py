@@ -231,6 +231,11 @@ def rigid_body(law: Law) -> list[str]:
     """Lines about the torque of a law of attitude control, and about its Lyapunov function."""
     if any(hasattr(law.module, name) for name in ("solve_plan", "Plan")) or law.name == "mpc":
         return ["The torque is the first move of a plan that is found by iterations, so that there is no formula of it.", ""]
+    if getattr(law.module, "READS", ()):
+        return [
+            "The torque is that of rods in the measured field; the formula above is of their dipole and of what it gives.",
+            "",
+        ]
     read = Read(law)
     if any(sympy.count_ops(c) > MOST_TO_SORT for c in read.torque):
         return components(law)
