@@ -172,7 +172,8 @@ def print_law(law: Law) -> None:
     card = law.card
     console.print(f"[bold]{law.name}[/bold]: {card.title}", highlight=False)
     console.print(card.summary, highlight=False)
-    console.print(f"Claims: {card.claims} asymptotic stability, if: {'; '.join(card.assumptions)}", highlight=False)
+    claim = "no stability; assumes" if card.claims == "none" else f"{card.claims} asymptotic stability, if"
+    console.print(f"Claims: {claim}: {'; '.join(card.assumptions)}", highlight=False)
     for source in card.sources:
         console.print(f"Source: {source}", highlight=False)
     print_fields("Gains", law.fields())
