@@ -14,6 +14,7 @@ designs = sh.design("my.toml")                   # gains that formulas give, and
 exported = sh.export_c(scenario, "flight")       # a law as C99, with a self-test that demands the simulation's bits
 certificate = sh.invariant("van-der-pol")        # what is proved of an invariant set of any small system
 made = sh.reproduce("D")                         # a publication's figures and numbers, beside what it prints
+told = sh.budget("cubesat-slew")                 # the pointing error by source, over the windows of ECSS
 placed = sh.place(A, B, poles)                   # u = -K x that gives A - B K these poles, for any linear system
 """
 
@@ -25,6 +26,7 @@ from starhold.version import __version__
 
 if TYPE_CHECKING:
     from starhold.api import (
+        budget,
         campaign,
         certify,
         compare,
@@ -47,6 +49,7 @@ if TYPE_CHECKING:
 __all__ = [
     "InputError",
     "__version__",
+    "budget",
     "campaign",
     "certify",
     "compare",

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from starhold.certification.invariant import InvariantProblem
     from starhold.export.folder import Exported
     from starhold.publications.reproduction import Reproduction
+    from starhold.studies.budget import Budget
     from starhold.studies.failures import Failure
     from starhold.studies.flight import Flight
     from starhold.studies.modal_roots import Study
@@ -215,6 +216,16 @@ def failures(scenario: reading.Scenario | str | Path, law: str | None = None) ->
     """Tell what is left of a scenario on wheels after the loss of any one or two of them, under a law, the first if not
     given."""
     from starhold.studies.failures import study
+
+    opened = _turning(scenario)
+    return study(opened, opened.laws[0] if law is None else opened.pick(law))
+
+
+def budget(scenario: reading.Scenario | str | Path, law: str | None = None) -> Budget:
+    """Tell a law's pointing error by source: the first law if not given, at the times and windows of the [budget] table.
+    Each source flies alone, and all together, in as many runs as the table says; `level(source, index)` is in rad, `table()`
+    a DataFrame with every axis. InputError where nothing disturbs the loop, windows do not fit, or a motion is lost."""
+    from starhold.studies.budget import study
 
     opened = _turning(scenario)
     return study(opened, opened.laws[0] if law is None else opened.pick(law))

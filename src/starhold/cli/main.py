@@ -14,7 +14,19 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from starhold.cli import campaign, certifying, export, failures, invariant, modal_roots, parts, reproduce, sail, studio
+from starhold.cli import (
+    budget,
+    campaign,
+    certifying,
+    export,
+    failures,
+    invariant,
+    modal_roots,
+    parts,
+    reproduce,
+    sail,
+    studio,
+)
 from starhold.cli.arguments import (
     DIVERGED,
     INTERNAL_ERROR,
@@ -163,6 +175,7 @@ app.command()(campaign.rerun)
 app.command()(certifying.certify)
 app.command()(certifying.check)
 app.command()(failures.failures)
+app.command()(budget.budget)
 app.command("modal-roots")(modal_roots.modal_roots)
 app.command()(invariant.invariant)
 app.command()(sail.sail)

@@ -26,9 +26,10 @@ if TYPE_CHECKING:
 SUMMARY, PAGE = "summary.json", "report.html"
 FAILURES = ("failures.csv", "failures.png")
 ROOTS = ("modal-roots.csv", "modal-roots.png")
+BUDGET = ("budget.csv", "budget.png")
 INDEX = "index.html"
 EXPORT = "export.json"
-MARKS = (SUMMARY, EXPORT, "run.nc", PAGE, INDEX, CERTIFICATES, "invariant.png", *FAILURES, *ROOTS)
+MARKS = (SUMMARY, EXPORT, "run.nc", PAGE, INDEX, CERTIFICATES, "invariant.png", *FAILURES, *ROOTS, *BUDGET)
 """A folder with one of these holds results."""
 
 

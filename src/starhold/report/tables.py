@@ -13,6 +13,7 @@ from starhold.files import atomic_write
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry
+    from starhold.studies.budget import Budget
     from starhold.studies.failures import Failure
     from starhold.studies.modal_roots import Study
     from starhold.synthesis.circle import Station
@@ -27,6 +28,13 @@ def write_failures(found: Sequence[Failure], entry: LawEntry, path: Path) -> Non
         for failure in found
     ]
     _write(path, [[*_cells(found[0]), *gains], *rows])
+
+
+def write_budget(budget: Budget, path: Path) -> None:
+    """Write a pointing budget, one row a source, index and axis."""
+    units = {"level": "level (rad)", "mean": "mean (rad)", "deviation": "standard deviation (rad)"}
+    rows = budget.records()
+    _write(path, [[units.get(name, name) for name in rows[0]], *(map(_numbers, row.values()) for row in rows)])
 
 
 def write_modal_roots(what: Study, path: Path) -> None:

@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from starhold.laws.interface import Gain
 from starhold.parts.craft import check_inertia
+from starhold.scenario.bodies.rigid_body.budget import BudgetTable
 from starhold.scenario.bodies.rigid_body.transient import TransientTable
 from starhold.scenario.orbit import Orbit
 from starhold.scenario.quantity import quantity, quantity_or, reader
@@ -246,6 +247,7 @@ class RigidBodyTable(ScenarioTable):
     settling: Tolerances = Tolerances()
     certify: CertifyTable = CertifyTable()
     transient: TransientTable | None = None
+    budget: BudgetTable = BudgetTable()
     wheels: WheelsTable | None = None
     wheel: list[WheelTable] = Field(default_factory=list[WheelTable])
     fault: list[FaultTable] = Field(default_factory=list[FaultTable])

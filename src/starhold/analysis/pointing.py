@@ -1,0 +1,89 @@
+"""Pointing errors over windows of time, by the indices of ECSS-E-ST-60-10C (2008, control performance).
+
+Errors are rotation vectors (rad, body axes), small ones, so that they add up: arrays (runs, instants, 3).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+Interpretation: TypeAlias = Literal["mixed", "temporal", "ensemble"]
+
+PERFORMANCE = {
+    "APE": "absolute error: at an instant",
+    "MPE": "mean error: over a window",
+    "RPE": "relative error: at an instant, less the mean over its window",
+    "PDE": "drift error: between the means over two windows",
+}
+KNOWLEDGE = {"AKE": "APE", "MKE": "MPE", "RKE": "RPE", "KDE": "PDE"}
+"""The indices of knowledge, each with that of performance that is taken of the estimate's error likewise."""
+MEANINGS = {**PERFORMANCE, **{name: f"{like} of the estimate" for name, like in KNOWLEDGE.items()}}
+ANGLE, LINE = "angle", "line of sight"
+OVERLAP = 4
+"""Windows in which errors are relative to the mean begin so many times a window."""
+
+
+class Figures(NamedTuple):
+    """The numbers of an index about an axis: the level that the share of confidence keeps (rad), the mean of the index, with
+    its sign where it has one, and its standard deviation (rad). None where errors are combined that it is not known of."""
+
+    level: float
+    mean: float | None
+    deviation: float
+
+
+def indices(errors: Array, length: int, apart: int) -> dict[str, Array]:
+    """The vectors of each index of PERFORMANCE, (runs, number, 3). errors: (runs, instants, 3); length: instants of a
+    window; apart: instants from the start of a window to that of the other, for drift. ValueError where they do not fit."""
+    instants = errors.shape[1]
+    if min(length, apart) < 1 or length + apart > instants:
+        raise ValueError(f"windows of {length} instants, {apart} apart, among {instants}")
+    sums = np.cumsum(errors, axis=1)
+    sums = np.concatenate([np.zeros_like(sums[:, :1]), sums], axis=1)
+    means = (sums[:, length:] - sums[:, :-length]) / length
+    every = max(1, length // OVERLAP)
+    windows = sliding_window_view(errors, length, axis=1)[:, ::every]
+    relative = np.moveaxis(windows - means[:, ::every, :, None], -1, 2)
+    return {
+        "APE": errors,
+        "MPE": means,
+        "RPE": relative.reshape(len(errors), -1, 3),
+        "PDE": means[:, apart:] - means[:, :-apart],
+    }
+
+
+def about_axes(vectors: Array, boresight: Any = None) -> dict[str, Array]:
+    """Errors (runs, number) about each body axis, with their signs, and the angle about whatever axis; with a boresight (any
+    length, body axes) by how much that is tilted: half the cone that it sweeps."""
+    found = {axis: vectors[..., place] for place, axis in enumerate("xyz")}
+    found[ANGLE] = np.linalg.norm(vectors, axis=-1)
+    if boresight is not None:
+        found[LINE] = np.linalg.norm(np.cross(vectors, np.asarray(boresight) / math.hypot(*boresight)), axis=-1)
+    return found
+
+
+def level(values: Array, confidence: float, interpretation: Interpretation) -> float:
+    """The least size that the share `confidence` of errors (runs, number) keeps. mixed: of all of them; temporal: of those
+    of each run, the largest over the runs; ensemble: of the runs, by the largest of each."""
+    sizes = np.abs(values)
+    if interpretation == "mixed":
+        return float(np.quantile(sizes, confidence, method="inverted_cdf"))
+    if interpretation == "temporal":
+        return float(np.quantile(sizes, confidence, axis=1, method="inverted_cdf").max())
+    return float(np.quantile(sizes.max(axis=1), confidence, method="inverted_cdf"))
+
+
+def figures(values: Array, confidence: float, interpretation: Interpretation) -> Figures:
+    """The figures of errors (runs, number)."""
+    return Figures(level(values, confidence, interpretation), float(values.mean()), float(values.std()))
+
+
+def root_sum_square(found: list[Figures]) -> Figures:
+    """The figures of the sum of independent errors: levels and deviations as the root of their sums of squares."""
+    return Figures(math.hypot(*(one.level for one in found)), None, math.hypot(*(one.deviation for one in found)))

@@ -1,0 +1,357 @@
+"""A pointing error budget: what each source contributes to the error, what all of them together do, and the root sum square
+of the contributions beside it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
+
+from starhold.algebra.quaternion import relative
+from starhold.algebra.rotation import rotation_vector
+from starhold.algebra.structure import flatten, places
+from starhold.algebra.vector import ZERO
+from starhold.analysis.meter import sampled
+from starhold.analysis.pointing import (
+    ANGLE,
+    KNOWLEDGE,
+    LINE,
+    Array,
+    Figures,
+    Interpretation,
+    about_axes,
+    figures,
+    indices,
+    root_sum_square,
+)
+from starhold.errors import InputError
+from starhold.loop.closed_loop import Composition
+from starhold.loop.kernels import Observer, numbers_of
+from starhold.parts.contract import Parameter
+from starhold.parts.part import Fitted
+from starhold.scenario.bodies.rigid_body.craft import wheels_of
+from starhold.scenario.building import build
+from starhold.simulation.lanes import Crew, Fleet, carry_columns
+from starhold.trace.machine import widest
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+    from starhold.loop.closed_loop import ClosedLoop
+    from starhold.scenario.reading import LawEntry, Scenario
+
+LOOP, TOGETHER, COMBINED = "the loop itself", "all together", "root sum square"
+MOST = 5_000_000
+"""Errors that are kept of one flight of all runs."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How errors were taken: from when on (s), over windows of what length (s), whose starts are how far apart for drift
+    (s), the share of the errors that their level keeps and what it is a share of, how many runs, the line of sight."""
+
+    start: float
+    window: float
+    separation: float
+    confidence: float
+    interpretation: Interpretation
+    runs: int
+    boresight: tuple[float, float, float] | None
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """One row of a budget: a source, the loop without any, their root sum square, or all of them together."""
+
+    name: str
+    kind: Literal["loop", "source", "combined", "together"]
+    figures: Mapping[str, Mapping[str, Figures]]
+    """Level, mean and standard deviation (rad) of an index ("APE", "MPE", "RPE", "PDE"; with an estimator "AKE", "MKE",
+    "RKE", "KDE" of its error) about an axis ("x", "y", "z", "angle" about whatever, "line of sight" with a boresight)."""
+
+
+@dataclass(frozen=True)
+class Budget:
+    """The pointing errors of a law by source. Levels are told about the line of sight where there is one, else of the angle
+    about whatever axis."""
+
+    scenario: str
+    law: str
+    settings: Settings
+    rows: tuple[Contribution, ...]
+    """The loop itself, each source, their root sum square, all together."""
+    required: Mapping[str, float]
+    """The largest level (rad) of an index that is allowed, by the index."""
+
+    @property
+    def axis(self) -> str:
+        """The axis that levels are told about."""
+        return ANGLE if self.settings.boresight is None else LINE
+
+    @property
+    def indices(self) -> tuple[str, ...]:
+        """The indices that there are."""
+        return tuple(self.rows[0].figures)
+
+    @property
+    def met(self) -> bool:
+        """Whether all together keep what is required."""
+        return all(self.level(TOGETHER, index) <= most for index, most in self.required.items())
+
+    def row(self, name: str) -> Contribution:
+        """The row of this name. KeyError where there is none."""
+        found = {row.name: row for row in self.rows}
+        return found[name]
+
+    def level(self, name: str, index: str) -> float:
+        """The level of an index (rad) in the row of this name."""
+        return self.row(name).figures[index][self.axis].level
+
+    def table(self) -> DataFrame:
+        """A table with a row for each source, index and axis: level, mean and standard deviation (rad)."""
+        from starhold.studies.frames import frame_of
+
+        return frame_of(self.records())
+
+    def summary(self) -> dict[str, Any]:
+        """All numbers as JSON has them: settings, and levels (rad) by source and index."""
+        return {
+            **asdict(self.settings),
+            "axis": self.axis,
+            "required": dict(self.required),
+            "met": self.met,
+            "levels": {row.name: {index: self.level(row.name, index) for index in self.indices} for row in self.rows},
+            "together_over_root_sum_square": {
+                index: self.level(TOGETHER, index) / combined if (combined := self.level(COMBINED, index)) else None
+                for index in self.indices
+            },
+        }
+
+    def records(self) -> list[dict[str, Any]]:
+        """The rows of `table`."""
+        return [
+            {"source": row.name, "kind": row.kind, "index": index, "axis": axis, **found._asdict()}
+            for row in self.rows
+            for index, axes in row.figures.items()
+            for axis, found in axes.items()
+        ]
+
+
+class Source(NamedTuple):
+    """Something that disturbs a loop, and the changes of a scenario that take it away."""
+
+    name: str
+    without: Mapping[str, Any]
+
+
+def study(
+    scenario: Scenario, entry: LawEntry, notice: Callable[[int, int, str], None] = lambda done, total, name: None
+) -> Budget:
+    """Fly a law of a scenario without any source of error, with each of them alone, and with all of them; faults never come.
+
+    A source's contribution is by how much it moves the error of the loop without any, run by run and instant by instant.
+    `notice` hears the number done, that of all, and the flight that comes next. InputError where nothing disturbs the loop,
+    the windows do not fit into the run, or a motion is lost.
+    """
+    scenario = scenario.about("rigid-body").with_({"fault": None, "campaign": None})
+    found, clock = sources(scenario), _Clock.of(scenario)
+    if not found:
+        allowed = "noise, a torque, wheel friction or another source of error"
+        raise InputError(scenario.where, "", "nothing that disturbs the loop", allowed)
+    names = (LOOP, *(source.name for source in found), TOGETHER)
+    flown: list[tuple[Array, Array | None]] = []
+    for done, name in enumerate(names):
+        notice(done, len(names), name)
+        away = [source for source in found if name not in (source.name, TOGETHER)]
+        changes = {key: value for source in away for key, value in source.without.items()}
+        # With the gains of the scenario, which a design would choose anew.
+        loop = build(scenario.with_(changes), entry)
+        flown.append(_flown(scenario, loop, entry, clock, name))
+    notice(len(names), len(names), "")
+    still, rows = flown[0], list[Contribution]()
+    for name, errors in zip(names, flown, strict=True):
+        kind = "loop" if name == LOOP else "together" if name == TOGETHER else "source"
+        own = errors if kind != "source" else tuple(_less(a, b) for a, b in zip(errors, still, strict=True))
+        rows.append(Contribution(name, kind, _figures(clock, *own)))
+    rows.insert(-1, Contribution(COMBINED, "combined", _combined(rows[:-1])))
+    wanted = scenario.table.budget.requirement.model_dump()
+    required = {index.upper(): most for index, most in wanted.items() if most is not None}
+    return Budget(scenario.name, entry.name, clock.settings, tuple(rows), required)
+
+
+def sources(scenario: Scenario) -> tuple[Source, ...]:
+    """What disturbs the loops of a scenario: torques, moving parts that take no command, friction of wheels, and whatever of
+    a sensor may be zero and is not, but for times. Actuators, estimators and sampling belong to the loop itself."""
+    table = scenario.table
+    told: list[tuple[str, bool, dict[str, Any]]] = [
+        ("gravity gradient", table.environment.gravity_gradient, {"environment.gravity_gradient": False}),
+        ("torque noise", table.environment.torque_noise > 0.0, {"environment.torque_noise": 0.0}),
+        ("attitude noise", table.sensor.attitude_noise > 0.0, {"sensor.attitude_noise": 0.0}),
+        ("rate noise", table.sensor.rate_noise > 0.0, {"sensor.rate_noise": 0.0}),
+        ("wheel friction", _rubs(scenario), _smooth(scenario)),
+    ]
+    found = [Source(name, without) for name, there, without in told if there]
+    for fitted in scenario.parts:
+        key, part = f"part.{fitted.called}", fitted.part
+        passive = part.role == "effector" and not part.flag("ACTS")
+        if passive or (part.role == "environment" and part.hook("torque") is not None):
+            found.append(Source(fitted.called, {key: None}))
+        elif part.role == "sensor":
+            errors = _errors_of(fitted)
+            found += [
+                Source(f"{fitted.called} {name.replace('_', ' ')}", {f"{key}.{name}": zero}) for name, zero in errors.items()
+            ]
+    return tuple(found)
+
+
+def _rubs(scenario: Scenario) -> bool:
+    wheels = wheels_of(scenario)
+    return wheels is not None and bool(np.any(wheels.viscous) or np.any(wheels.coulomb))
+
+
+def _smooth(scenario: Scenario) -> dict[str, Any]:
+    tables = [f"wheel[{place}]" for place in range(1, len(scenario.table.wheel) + 1)] or ["wheels"]
+    return {f"{table}.{key}": 0.0 for table in tables for key in ("viscous", "coulomb")}
+
+
+def _errors_of(fitted: Fitted) -> dict[str, Any]:
+    """The parameters of a sensor that are errors, with zeros in their place."""
+    found: dict[str, Any] = {}
+    for item, value in zip(fitted.part.fields(), fitted.params, strict=True):
+        # What has to be given may be a direction, unless zero is where its bounds begin.
+        absent = item.gain.at_least == 0.0 if item.required else not np.any(item.default)
+        if absent and _may_be_zero(item.gain) and np.any(value):
+            found[item.name] = [0.0] * item.gain.shape[0] if item.gain.shape else 0.0
+    return found
+
+
+def _may_be_zero(gain: Parameter) -> bool:
+    plain = not (gain.whole or gain.choices or gain.columns or len(gain.shape) > 1)
+    # Delays and intervals shape the loop: without them noise of the same size would do less, or more.
+    return plain and gain.unit != "s" and gain.above is None and (gain.at_least or 0.0) <= 0.0 <= (gain.at_most or 0.0)
+
+
+class _Clock(NamedTuple):
+    """When errors are taken: control steps of a run and of a sample, the first sample, those of a window and of a drift."""
+
+    settings: Settings
+    steps: int
+    every: int
+    first: int
+    length: int
+    apart: int
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> _Clock:
+        """The times of a scenario's [budget] table. InputError where they do not fit into its runs."""
+        timing, told = scenario.table.simulation, scenario.table.budget
+        period = timing.control_period * timing.record_every
+        last = (timing.steps - 1) // timing.record_every
+        start = 0.5 * timing.duration if told.start is None else told.start
+        first = math.ceil(start / period - 1e-9)
+        count = last - first + 1
+
+        def samples(key: str, given: float | None, share: float, most: int, least: int) -> int:
+            number = max(least, int(share * count)) if given is None else round(given / period)
+            if not least <= number <= most:
+                shown = f"{number * period:g} s" if given is None else f"{given:g} s"
+                allowed = f"between {least * period:g} s and {most * period:g} s, of {count * period:g} s that count"
+                raise InputError(scenario.where, f"budget.{key}", shown, allowed)
+            return number
+
+        if count < 4:
+            raise InputError(scenario.where, "budget.start", f"{start:g} s", f"at most {(last - 3) * period:g} s")
+        length = samples("window", told.window, 0.1, count - 1, 2)
+        apart = samples("separation", told.separation, 0.5, count - length, 1)
+        if count * told.runs > MOST:
+            raise InputError(scenario.where, "budget.runs", f"{told.runs} of {count} samples", f"at most {MOST} in all")
+        boresight = None if told.boresight is None else tuple(told.boresight)
+        settings = Settings(
+            first * period, length * period, apart * period, told.confidence, told.interpretation, told.runs, boresight
+        )
+        return cls(settings, timing.steps, timing.record_every, first, length, apart)
+
+
+class _Noted(NamedTuple):
+    """The error of the attitude, and that of its estimate, as rotation vectors (rad, body axes)."""
+
+    error: Any
+    knowledge: Any
+
+
+@cache
+def _note(parts: Composition, knows: bool) -> Any:
+    """The equations of the notes; one function for loops that one kernel flies."""
+    read = sampled(parts)
+
+    def note(seen: Any, decided: Any, carry: Any, step: Any, setup: Any, told: Any) -> _Noted:
+        error = rotation_vector(read(decided, step, setup)["attitude_error"])
+        estimate = decided.memories.estimate
+        return _Noted(error, rotation_vector(relative(decided.state.attitude, estimate.attitude)) if knows else ())
+
+    return note
+
+
+def _flown(scenario: Scenario, loop: ClosedLoop, entry: LawEntry, clock: _Clock, name: str) -> tuple[Array, Array | None]:
+    """The errors of all runs of a loop, (runs, instants, 3), and those of the estimate, None without one."""
+    runs, (phase,) = clock.settings.runs, loop.phases(clock.steps)
+    knows = hasattr(loop.carry().memories.estimate, "attitude")
+    first = _Noted(ZERO, ZERO if knows else ())
+    size = len(flatten(first))
+    start = np.repeat(np.array(flatten(loop.start), dtype=float)[:, None], runs, axis=1)
+    observer = Observer(_note(loop.composition(), knows), first, ())
+    width = widest(len(numbers_of(loop.carry())), size)
+    fleet = Fleet(loop, carry_columns(loop, start), loop.run, width, observer, np.zeros((size, runs)))
+    fleet.prepare(phase)
+    instants = range(clock.first * clock.every, clock.steps, clock.every)
+    noted = np.empty((fleet.count, fleet.width, len(instants), size))
+
+    def work(piece: range) -> None:
+        done, span = 0, slice(piece.start, piece.stop)
+        for place, instant in enumerate(instants):
+            # Up to the instant and the step that begins there, of which the notes are left.
+            fleet.fly(phase, piece, done, instant + 1 - done)
+            done = instant + 1
+            noted[span, :, place] = fleet.noted[span].swapaxes(1, 2)
+
+    with Crew() as crew:
+        crew.share(work, fleet.count, 1)()
+    lost = fleet.carries()[places(fleet.like).lost_at]
+    if (lost >= 0.0).any():
+        found = f"{name}: the motion is lost at {lost[lost >= 0.0].min() * loop.period:g} s"
+        raise InputError(scenario.where, f"law.{entry.name}", found, "a law that holds the attitude")
+    errors = noted.reshape(-1, len(instants), size)[:runs]
+    return errors[..., :3], errors[..., 3:] if knows else None
+
+
+def _less(errors: Array | None, still: Array | None) -> Array | None:
+    return None if errors is None or still is None else errors - still
+
+
+def _figures(clock: _Clock, errors: Array | None, knowledge: Array | None) -> dict[str, dict[str, Figures]]:
+    """The figures of each index about each axis."""
+    told, vectors = clock.settings, dict[str, Array]()
+    if errors is not None:
+        vectors |= indices(errors, clock.length, clock.apart)
+    if knowledge is not None:
+        own = indices(knowledge, clock.length, clock.apart)
+        vectors |= {name: own[like] for name, like in KNOWLEDGE.items()}
+    return {
+        index: {
+            axis: figures(values, told.confidence, told.interpretation)
+            for axis, values in about_axes(found, told.boresight).items()
+        }
+        for index, found in vectors.items()
+    }
+
+
+def _combined(rows: list[Contribution]) -> dict[str, dict[str, Figures]]:
+    """The root sum square of rows."""
+    return {
+        index: {axis: root_sum_square([row.figures[index][axis] for row in rows]) for axis in axes}
+        for index, axes in rows[0].figures.items()
+    }
