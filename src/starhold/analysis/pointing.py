@@ -23,7 +23,9 @@ PERFORMANCE = {
 }
 KNOWLEDGE = {"AKE": "APE", "MKE": "MPE", "RKE": "RPE", "KDE": "PDE"}
 """The indices of knowledge, each with that of performance that is taken of the estimate's error likewise."""
-MEANINGS = {**PERFORMANCE, **{name: f"{like} of the estimate" for name, like in KNOWLEDGE.items()}}
+MEANINGS = PERFORMANCE | {
+    name: PERFORMANCE[like].replace(" error", " error of the estimate") for name, like in KNOWLEDGE.items()
+}
 ANGLE, LINE = "angle", "line of sight"
 OVERLAP = 4
 """Windows in which errors are relative to the mean begin so many times a window."""

@@ -256,11 +256,12 @@ class _Clock(NamedTuple):
         count = last - first + 1
 
         def samples(key: str, given: float | None, share: float, most: int, least: int) -> int:
-            number = max(least, int(share * count)) if given is None else round(given / period)
+            if given is None:
+                return min(max(least, int(share * count)), most)
+            number = round(given / period)
             if not least <= number <= most:
-                shown = f"{number * period:g} s" if given is None else f"{given:g} s"
                 allowed = f"between {least * period:g} s and {most * period:g} s, of {count * period:g} s that count"
-                raise InputError(scenario.where, f"budget.{key}", shown, allowed)
+                raise InputError(scenario.where, f"budget.{key}", f"{given:g} s", allowed)
             return number
 
         if count < 4:

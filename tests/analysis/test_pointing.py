@@ -1,0 +1,93 @@
+"""The indices of pointing errors against closed forms and independent formulas."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from starhold.analysis.pointing import about_axes, figures, indices, level, root_sum_square
+
+LENGTH, APART = 20, 35
+
+
+def test_indices_of_a_sine_are_those_of_the_closed_forms():
+    """Of a sine sampled at no whole part of its period, every phase comes up."""
+    amplitude, turn = 3e-4, 0.0317
+    errors = np.zeros((1, 40_000, 3))
+    errors[0, :, 1] = amplitude * np.sin(turn * np.arange(40_000) + 0.4)
+    found = {name: np.abs(vectors[..., 1]).max() for name, vectors in indices(errors, LENGTH, APART).items()}
+    mean = np.sin(0.5 * LENGTH * turn) / (LENGTH * np.sin(0.5 * turn))
+    # At the edge of a window it is farthest from the mean; the mean is that of a sine in phase with the middle.
+    edge = abs(np.exp(0.5j * (LENGTH - 1) * turn) - mean)
+    expected = {"APE": 1.0, "MPE": mean, "RPE": edge, "PDE": 2.0 * mean * np.sin(0.5 * APART * turn)}
+    for name, share in expected.items():
+        assert found[name] == pytest.approx(amplitude * share, rel=1e-4), name
+
+
+def test_deviations_of_white_noise_are_those_of_theory():
+    noise = np.random.default_rng(5).normal(scale=2e-5, size=(200, 4000, 3))
+    found = indices(noise, LENGTH, APART)
+    variances = {"APE": 1.0, "MPE": 1.0 / LENGTH, "RPE": 1.0 - 1.0 / LENGTH, "PDE": 2.0 / LENGTH}
+    for name, share in variances.items():
+        assert found[name].var() == pytest.approx(4e-10 * share, rel=0.02), name
+
+
+def test_indices_of_a_ramp_are_exact():
+    errors = np.arange(100.0)[None, :, None] * np.array([1.0, -2.0, 0.0])
+    found = indices(errors, 10, 30)
+    assert np.ptp(found["PDE"], axis=1) == pytest.approx(np.zeros((1, 3)), abs=1e-12)
+    assert found["PDE"][0, 0] == pytest.approx([30.0, -60.0, 0.0], rel=1e-12)
+    assert np.abs(found["RPE"]).max(axis=(0, 1)) == pytest.approx([4.5, 9.0, 0.0], rel=1e-12)
+
+
+@pytest.mark.parametrize(("length", "apart"), [(1, 1), (2, 5), (16, 3), (25, 25)])
+def test_indices_are_those_of_rolling_means(length, apart):
+    errors = np.random.default_rng(length).normal(size=(3, 50, 3))
+    found = indices(errors, length, apart)
+    for run in range(3):
+        means = pd.DataFrame(errors[run]).rolling(length).mean().to_numpy()[length - 1 :]
+        assert found["MPE"][run] == pytest.approx(means, abs=1e-13)
+        assert found["PDE"][run] == pytest.approx(means[apart:] - means[:-apart], abs=1e-13)
+        starts = range(0, len(means), max(1, length // 4))
+        relative = [errors[run, at : at + length] - means[at] for at in starts]
+        assert found["RPE"][run] == pytest.approx(np.concatenate(relative), abs=1e-13)
+
+
+@pytest.mark.parametrize(("length", "apart"), [(0, 1), (5, 0), (30, 21), (51, 1)])
+def test_windows_that_do_not_fit_are_refused(length, apart):
+    with pytest.raises(ValueError, match="among 50"):
+        indices(np.zeros((1, 50, 3)), length, apart)
+
+
+def test_levels_are_the_quantiles_of_what_they_are_told_to_be_of():
+    values = np.array([[-9.0, *range(9)], [*range(10, 19), -30.0]])
+    sizes = np.abs(values)
+    assert level(values, 0.5, "mixed") == np.sort(sizes.ravel())[9]
+    assert level(values, 0.9, "temporal") == np.sort(sizes[1])[8]
+    assert level(values, 0.5, "ensemble") == 9.0
+    for interpretation in ("mixed", "temporal", "ensemble"):
+        assert level(values, 1.0, interpretation) == 30.0
+
+
+def test_levels_of_gaussian_errors_are_those_of_their_distributions():
+    vectors = np.random.default_rng(11).normal(size=(400, 2000, 3))
+    found = {axis: level(values, 0.9973, "mixed") for axis, values in about_axes(vectors, (0.0, 3.0, 4.0)).items()}
+    assert found["x"] == pytest.approx(stats.norm.isf(0.5 * 0.0027), rel=0.01)
+    assert found["angle"] == pytest.approx(stats.maxwell.isf(0.0027), rel=0.01)
+    assert found["line of sight"] == pytest.approx(stats.rayleigh.isf(0.0027), rel=0.01)
+
+
+def test_line_of_sight_is_tilted_by_turns_across_it_alone():
+    turns = np.array([[[0.0, 3e-4, 4e-4], [2e-4, 0.0, 0.0], [0.0, 4e-4, -3e-4]]])
+    assert about_axes(turns, (0.0, 0.3, 0.4))["line of sight"] == pytest.approx(np.array([[0.0, 2e-4, 5e-4]]), abs=1e-19)
+    assert "line of sight" not in about_axes(turns)
+
+
+def test_root_sum_square_of_independent_errors_is_the_deviation_of_their_sum():
+    rng = np.random.default_rng(3)
+    parts = [rng.normal(scale=scale, size=(50, 4000)) for scale in (1.0, 2.0, 0.5)]
+    combined = root_sum_square([figures(part, 0.9973, "mixed") for part in parts])
+    total = figures(sum(parts), 0.9973, "mixed")
+    assert combined.deviation == pytest.approx(total.deviation, rel=0.01)
+    assert combined.level == pytest.approx(total.level, rel=0.02)
+    assert combined.mean is None
