@@ -200,7 +200,7 @@ def test_every_link_leads_somewhere_in_the_clone(page):
             assert anchor in {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}, link
 
 
-@pytest.mark.parametrize("name", ["run", "compare", "certify", "campaign", "failures", "modal-roots", "invariant"])
+@pytest.mark.parametrize("name", ["run", "compare", "certify", "campaign", "failures", "budget", "modal-roots", "invariant"])
 def test_help_says_where_results_go(name):
     known = typer.main.get_command(app).commands[name]
     (output,) = (option for option in known.params if option.name == "output")
@@ -296,7 +296,7 @@ BASE = {
 
 def fragments():
     """The tables that pages show by themselves."""
-    for name in ("scenarios.md", "certificates.md"):
+    for name in ("scenarios.md", "certificates.md", "pointing-budget.md"):
         text = (ROOT / "docs" / name).read_text(encoding="utf-8")
         for indent, block in re.findall(r"^( *)```toml\n(.*?)^ *```", text, flags=re.DOTALL | re.MULTILINE):
             table = tomllib.loads(re.sub(f"^{indent}", "", block, flags=re.MULTILINE))

@@ -20,6 +20,7 @@ from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.invariant import InvariantProblem, WantedSet
 from starhold.scenario.designing import Design
 from starhold.scenario.reading import Scenario
+from starhold.studies.budget import Budget, Contribution, Settings
 from starhold.studies.failures import Failure
 from starhold.studies.flight import Flight
 from starhold.studies.modal_roots import Study
@@ -29,7 +30,21 @@ HEAD = """# Python API
 Written from the code by `make docs`. `import starhold as sh` gives all of it; what is not listed here may change from one
 version to the next. Numbers are SI and radians, near a libration point scaled. [From Python](python.md) shows it in use.
 """
-CLASSES = (Scenario, Flight, Certificate, Claim, Design, CampaignResult, Failure, Study, InvariantProblem, WantedSet)
+CLASSES = (
+    Scenario,
+    Flight,
+    Certificate,
+    Claim,
+    Design,
+    CampaignResult,
+    Failure,
+    Budget,
+    Contribution,
+    Settings,
+    Study,
+    InvariantProblem,
+    WantedSet,
+)
 
 
 def page() -> str:

@@ -2,6 +2,8 @@
 
 import csv
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -143,17 +145,15 @@ def test_every_number_that_disturbs_is_a_source_and_what_shapes_the_loop_is_none
     assert full.level("star-tracker cross", "AKE") > 0.1 * full.level(TOGETHER, "AKE")
 
 
-def test_gains_of_a_design_are_those_of_the_whole_scenario():
-    """Without gravity gradient and noise a design would choose others."""
-    designed = {"type": "wheel", "form": "degree-of-stability", "angle": "5 deg", "rate": "0.1 deg/s"}
-    limits = {"torque": "2 mN m", "momentum": "15 mN m s"}
-    bare = FULL | {"part": FULL["part"][3:]}
-    scenario = sh.scenario(bare | {"law": [designed | limits]})
-    entry = scenario.laws[0]
-    plain = [item.name for item in entry.law.fields()]
-    gains = {name: np.array(value).tolist() for name, value in zip(plain, entry.gains, strict=True)}
-    given = sh.scenario(bare | {"law": [{"type": "wheel", **gains}]})
-    assert sh.budget(scenario).records() == sh.budget(given).records()
+def test_contributions_are_what_sources_add_to_the_loop_itself():
+    """A start off target moves the loop itself, and of a linear loop nothing else."""
+    short = LINEAR | {"simulation": {"duration": 100.0, "control_period": PERIOD}, "budget": {"start": 5.0, "runs": 8}}
+    turned = short | {"initial": {"angles": ["0.2 deg", 0, 0]}}
+    on, off = (sh.budget(sh.scenario(tables)) for tables in (short, turned))
+    assert off.level(LOOP, "APE") > 5.0 * off.level("attitude noise", "APE")
+    for source in NOISE:
+        for index in on.indices:
+            assert off.level(source, index) == pytest.approx(on.level(source, index), rel=1e-2), (source, index)
 
 
 def test_constant_torques_add_up_and_not_as_squares():
@@ -214,29 +214,36 @@ def test_other_bodies_and_unknown_laws_are_refused():
 
 @pytest.fixture
 def folder(tmp_path):
-    (tmp_path / "imager.toml").write_text(sh.scenario(FULL).text, encoding="utf-8")
+    (tmp_path / "full.toml").write_text(sh.scenario(FULL).text, encoding="utf-8")
     return tmp_path
 
 
-def test_command_writes_and_prints_the_budget(folder, full):
+def cells(text):
+    """The rows of a printed table, cell by cell."""
+    return [[cell.strip() for cell in line.split("│")] for line in text.splitlines() if "│" in line]
+
+
+def test_command_writes_what_its_page_quotes(folder):
+    page = (Path(__file__).parents[2] / "docs" / "pointing-budget.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"`imager.toml`:\n\n```toml\n(.*?)```", page, flags=re.DOTALL)
+    (quoted,) = re.findall(r"```text\n(.*?)```", page, flags=re.DOTALL)
+    (folder / "imager.toml").write_text(example, encoding="utf-8")
     done = starhold("budget", "imager.toml", "-o", "out", cwd=folder)
     assert done.returncode == 0, done.stderr
+    assert cells(done.stdout) == cells(quoted)
     assert sorted(path.name for path in (folder / "out").iterdir()) == ["budget.csv", "budget.png", "summary.json"]
-    rows = list(csv.DictReader((folder / "out" / "budget.csv").read_text(encoding="utf-8").splitlines()))
-    table = full.table()
-    assert [float(row["level (rad)"]) for row in rows] == table["level"].tolist()
-    assert [row["source"] for row in rows] == table["source"].tolist()
-    told = json.loads((folder / "out" / "summary.json").read_text(encoding="utf-8"))["laws"]["lyapunov"]
-    assert told["levels"][TOGETHER]["RPE"] == full.level(TOGETHER, "RPE")
-    assert (told["window"], told["runs"], told["met"]) == (4.0, 3, True)
-    assert all(row.name in done.stdout for row in full.rows)
+    told = json.loads((folder / "out" / "summary.json").read_text(encoding="utf-8"))["laws"]["wheel"]
+    assert (told["window"], told["runs"], told["met"]) == (10.0, 32, True)
+    rows = csv.DictReader((folder / "out" / "budget.csv").read_text(encoding="utf-8").splitlines())
+    levels = {(row["source"], row["index"]): float(row["level (rad)"]) for row in rows if row["axis"] == told["axis"]}
+    assert levels == {(name, index): level for name, own in told["levels"].items() for index, level in own.items()}
     again = starhold("budget", "imager.toml", "-o", "out", cwd=folder)
     assert again.returncode == 2
     assert "results already there" in again.stderr
 
 
 def test_options_take_the_place_of_the_files_keys_and_a_missed_requirement_is_told(folder):
-    text = (folder / "imager.toml").read_text(encoding="utf-8")
+    text = (folder / "full.toml").read_text(encoding="utf-8")
     (folder / "strict.toml").write_text(text + '\n[budget.requirement]\nape = "1 mas"\nrpe = "1 deg"\n', encoding="utf-8")
     options = ("--start", "20", "--window", "0.1 min", "--separation", "8 s", "--runs", "2")
     done = starhold("budget", "strict.toml", *options, "-o", "out", cwd=folder)

@@ -168,7 +168,6 @@ def study(
         notice(done, len(names), name)
         away = [source for source in found if name not in (source.name, TOGETHER)]
         changes = {key: value for source in away for key, value in source.without.items()}
-        # With the gains of the scenario, which a design would choose anew.
         loop = build(scenario.with_(changes), entry)
         flown.append(_flown(scenario, loop, entry, clock, name))
     notice(len(names), len(names), "")
