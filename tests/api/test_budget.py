@@ -14,6 +14,7 @@ from scipy.stats import norm
 
 import starhold as sh
 from starhold.errors import InputError
+from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.studies.budget import COMBINED, LOOP, TOGETHER, sources
 from tests.running import starhold
 
@@ -198,6 +199,28 @@ def test_what_cannot_be_is_one_line(changes, line):
         sh.budget(sh.scenario(LINEAR).with_(changes))
     assert line in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_large_errors_are_warned_of():
+    far = LINEAR | {"initial": {"angles": ["30 deg", 0, 0]}, "budget": {"start": 0.0, "runs": 1}}
+    with pytest.warns(UserWarning, match="errors up to 30 deg from 0 s on"):
+        sh.budget(sh.scenario(far))
+
+
+def test_friction_is_taken_from_wheels_wherever_it_stands():
+    axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    tables = [
+        {"wheels": FULL["wheels"]},
+        {"wheels": None, "wheel": [{"axis": axis, "unit": "RW0", "viscous": 1e-6} for axis in axes]},
+    ]
+    for changes in tables:
+        scenario = sh.scenario(FULL).with_(changes)
+        (friction,) = (source for source in sources(scenario) if source.name == "wheel friction")
+        before, after = (wheels_of(one) for one in (scenario, scenario.with_(friction.without)))
+        assert np.any(before.viscous)
+        assert not np.any(after.viscous)
+        assert not np.any(after.coulomb)
+        assert after.momentum_limit == before.momentum_limit
 
 
 def test_windows_of_no_given_length_fit_beside_those_given():

@@ -4,6 +4,7 @@ of the contributions beside it."""
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -45,6 +46,8 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
 
 LOOP, TOGETHER, COMBINED = "the loop itself", "all together", "root sum square"
+SMALL = math.radians(5.0)
+"""Rotation vectors up to here add up, to less than a twentieth of their size."""
 MOST = 5_000_000
 """Errors that are kept of one flight of all runs."""
 
@@ -171,6 +174,10 @@ def study(
         loop = build(scenario.with_(changes), entry)
         flown.append(_flown(scenario, loop, entry, clock, name))
     notice(len(names), len(names), "")
+    largest = max(float(np.linalg.norm(errors, axis=-1).max()) for errors, _ in flown)
+    if largest > SMALL:
+        seen = f"errors up to {math.degrees(largest):.3g} deg from {clock.settings.start:g} s on"
+        warnings.warn(f"{scenario.where}: {seen}, which do not add up as small ones do", stacklevel=2)
     still, rows = flown[0], list[Contribution]()
     for name, errors in zip(names, flown, strict=True):
         kind = "loop" if name == LOOP else "together" if name == TOGETHER else "source"
@@ -183,8 +190,8 @@ def study(
 
 
 def sources(scenario: Scenario) -> tuple[Source, ...]:
-    """What disturbs the loops of a scenario: torques, moving parts that take no command, friction of wheels, and whatever of
-    a sensor may be zero and is not, but for times. Actuators, estimators and sampling belong to the loop itself."""
+    """Tell what disturbs the loops of a scenario: torques, moving parts that take no command, friction of wheels, and
+    whatever of a sensor may be zero and is not, but for times. Actuators, estimators and sampling belong to the loop."""
     table = scenario.table
     told: list[tuple[str, bool, dict[str, Any]]] = [
         ("gravity gradient", table.environment.gravity_gradient, {"environment.gravity_gradient": False}),
