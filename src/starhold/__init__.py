@@ -12,6 +12,7 @@ frame = sh.to_pandas(flights)                    # runs, flights, certificates a
 certificates = sh.certify(scenario)              # what is proved of every law
 designs = sh.design("my.toml")                   # gains that formulas give, and figures to judge them by
 exported = sh.export_c(scenario, "flight")       # a law as C99, with a self-test that demands the simulation's bits
+linear = sh.linearise(scenario, "lyapunov")       # the loop near rest as systems of python-control; sh.margins tells margins
 certificate = sh.invariant("van-der-pol")        # what is proved of an invariant set of any small system
 made = sh.reproduce("D")                         # a publication's figures and numbers, beside what it prints
 told = sh.budget("cubesat-slew")                 # the pointing error by source, over the windows of ECSS
@@ -34,7 +35,9 @@ if TYPE_CHECKING:
         export_c,
         failures,
         invariant,
+        linearise,
         load,
+        margins,
         metrics,
         modal_roots,
         place,
@@ -57,7 +60,9 @@ __all__ = [
     "export_c",
     "failures",
     "invariant",
+    "linearise",
     "load",
+    "margins",
     "metrics",
     "modal_roots",
     "place",

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from pandas import DataFrame
 
+    from starhold.analysis.margins import Margins
     from starhold.campaign.results import CampaignResult
     from starhold.certification.certificate import Certificate
     from starhold.certification.invariant import InvariantProblem
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from starhold.studies.budget import Budget
     from starhold.studies.failures import Failure
     from starhold.studies.flight import Flight
+    from starhold.studies.linear import LinearLoop
     from starhold.studies.modal_roots import Study
 
 
@@ -148,7 +150,7 @@ def _temporary() -> str:
 
 def to_pandas(results: Any) -> DataFrame:
     """Results as a tidy table: a run with a row a sample and a column a component (`rate_x`), flights with a row a law,
-    certificates with a row a claim, designs with a row a law. TypeError for anything else."""
+    certificates with a row a claim, designs with a row a law, margins with a row an axis. TypeError for anything else."""
     from starhold.studies.frames import to_pandas as table_of
 
     return table_of(results)
@@ -229,6 +231,27 @@ def budget(scenario: reading.Scenario | str | Path, law: str | None = None) -> B
 
     opened = _turning(scenario)
     return study(opened, opened.laws[0] if law is None else opened.pick(law))
+
+
+def linearise(scenario: reading.Scenario | str | Path, law: str | None = None, delay: float = 0.0) -> LinearLoop:
+    """The linear loop of a law of a scenario, the first if `law` is None, near rest on target, as systems of python-control:
+    `plant`, `law`, `loop` (cut at the command) and `closed` in continuous time, the same in `sampled`, exact for a held
+    command. delay: from the control instant until the command acts (s). InputError for a law that iterates or switches
+    there, and where python-control is not installed."""
+    from starhold.studies.linear import linear_of, systems_of
+
+    opened = _turning(scenario)
+    return systems_of(linear_of(opened, opened.laws[0] if law is None else opened.pick(law), delay))
+
+
+def margins(scenario: reading.Scenario | str | Path, law: str | None = None, delay: float = 0.0) -> list[Margins]:
+    """Gain, phase and delay margins of the linear loop about each body axis, the loops about the others closed: see
+    `linearise`, of whose sampled loop they are."""
+    from starhold.analysis.margins import margins as margins_of
+    from starhold.studies.linear import linear_of
+
+    opened = _turning(scenario)
+    return margins_of(linear_of(opened, opened.laws[0] if law is None else opened.pick(law), delay))
 
 
 def modal_roots(scenario: reading.Scenario | str | Path, law: str | None = None) -> Study:

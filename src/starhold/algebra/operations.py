@@ -77,6 +77,8 @@ def _read(entry: Operation, values: tuple[Any, ...]) -> Any:
     for value, reader in zip(values, map(_reader, values), strict=True):
         if reader == "record":
             return value.recorder.apply(entry, values)
+        if reader == "dual":
+            return value.read(entry, values)
     # SymPy and polynomials keep their own truths; a ball's are True, False and None.
     reader = next((found for found in readers if found != "ball"), "ball")
     if reader not in entry.meanings:

@@ -19,13 +19,15 @@ from starhold.parts.roles import Loads, Scene
 
 
 class Step(NamedTuple):
-    """The equations of one control step. `measure` gives what the law is told, before the quaternion sign policy chooses."""
+    """The equations of one control step. `measure` gives what the law is told, before the quaternion sign policy chooses;
+    `slope` the rates of (state, effectors, outputs of actuators that another one follows), which `propagate` integrates."""
 
     measure: Callable[..., Any]
     update: Callable[..., Any]
     propagate: Callable[..., Any]
     check: Callable[..., Any]
     sample: Callable[..., Any]
+    slope: Callable[..., Any]
 
 
 def runge_kutta(slope: Callable[..., Any]) -> Callable[..., Any]:
@@ -216,7 +218,12 @@ def make_equations(parts: Composition) -> Step:
         records = tuple(e.module.record(s, command, state, p) for e, s, command, p in users if e.hook("record"))
         return (own, records, carry.memories.readings, carry.memories.estimate)
 
-    return Step(measure, update, propagate, check, sample)
+    def slope_of(carry, craft, setup):
+        applied = getattr(carry.state, body.COMMAND)
+        begun = _Begun(None, applied, carry.actuators)
+        return slope((carry.state, carry.effectors, carry.actuators), begun, carry, craft, setup)
+
+    return Step(measure, update, propagate, check, sample, slope_of)
 
 
 class _Begun(NamedTuple):

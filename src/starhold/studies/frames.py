@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from starhold.analysis.margins import Margins
 from starhold.certification.certificate import Certificate
 from starhold.scenario.designing import Design
 from starhold.studies.flight import Flight
@@ -26,10 +27,10 @@ def frame_of(rows: Sequence[dict[str, Any]]) -> DataFrame:
 
 
 def to_pandas(results: Any) -> DataFrame:
-    """A run, or a list of flights, certificates or designs, as a table; see `starhold.to_pandas`."""
+    """A run, or a list of flights, certificates, designs or margins, as a table; see `starhold.to_pandas`."""
     if hasattr(results, "data_vars"):
         return run_frame(results)
-    items = [results] if isinstance(results, Flight | Certificate | Design) else list(results)
+    items = [results] if isinstance(results, Flight | Certificate | Design | Margins) else list(results)
     rows: list[dict[str, Any]] = []
     for item in items:
         if isinstance(item, Flight):
@@ -38,10 +39,14 @@ def to_pandas(results: Any) -> DataFrame:
             rows += [
                 {"name": item.name, "claim": claim.kind, "outcome": claim.outcome, **claim.numbers} for claim in item.claims
             ]
+        elif isinstance(item, Margins):
+            rows.append(item._asdict())
         elif isinstance(item, Design):
             rows.append({"name": item.name, "law": item.law, "form": item.form, **item.inputs, **item.gains})
         else:
-            raise TypeError(f"no table is made of {type(item).__name__}: a run, flights, certificates or designs are wanted")
+            raise TypeError(
+                f"no table is made of {type(item).__name__}: a run, flights, certificates, designs or margins are wanted"
+            )
     return frame_of(rows)
 
 

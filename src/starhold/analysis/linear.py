@@ -1,0 +1,306 @@
+"""The linear loop near rest on target: matrices of the plant, of the law and of both, read off the equations that fly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from starhold.algebra.dual import BorderError, Dual, differentiate, variables
+from starhold.algebra.quaternion import NO_TURN, relative, to_body
+from starhold.algebra.structure import buffers, flatten, mapped
+from starhold.algebra.vector import ZERO
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.loop.kernels import make_step
+from starhold.parts.catalogue import fit
+
+Array = NDArray[np.float64]
+AXES = "xyz"
+ERROR = tuple(f"{name}_{axis}" for name in ("theta", "rate") for axis in AXES)
+"""The states that every plant begins with: the error's rotation vector (rad), twice the quaternion's vector part, and the
+rate relative to the target (rad/s), body axes."""
+COMMAND = tuple(f"command_{axis}" for axis in AXES)
+DISTURBANCE = tuple(f"disturbance_{axis}" for axis in AXES)
+MOST_HELD = 1000
+"""Control periods that a delay may last."""
+
+
+class LinearityError(ValueError):
+    """A loop has no linear form near rest on target; the text says why."""
+
+
+class System(NamedTuple):
+    """x' = A x + B u, y = C x + D u, or of a step of `period` (s) x+ = A x + B u; period 0 for continuous time. The names of
+    states, inputs and outputs stand in order."""
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    period: float = 0.0
+
+    def at(self, points: Array) -> Array:
+        """Return the transfer matrices (n, outputs, inputs) at complex points (n,): of s, or of z."""
+        size = len(self.states)
+        if not size:
+            return np.broadcast_to(self.D, (len(points), *self.D.shape)).astype(complex)
+        return self.C @ np.linalg.solve(points[:, None, None] * np.eye(size) - self.A, self.B.astype(complex)) + self.D
+
+    def take(self, inputs: tuple[str, ...]) -> System:
+        """Return the system with these of its inputs."""
+        places = [self.inputs.index(name) for name in inputs]
+        return self._replace(B=self.B[:, places], D=self.D[:, places], inputs=inputs)
+
+
+@dataclass(frozen=True)
+class Linear:
+    """A linear loop: the plant from command and disturbance (N m, body axes) to its states, the law from these to the
+    command, in continuous time and sampled.
+
+    Continuous: `plant`, `law` (of one with a memory what its differences are over a period). Sampled: `stepped`, exact for
+    a command that is held for a period and acts `delay` (s) later, and for a disturbance that is held, and `stepped_law`.
+    `left_out` names what flies and is not in the matrices.
+    """
+
+    plant: System
+    law: System
+    stepped: System
+    stepped_law: System
+    delay: float
+    left_out: tuple[str, ...]
+
+    @property
+    def period(self) -> float:
+        """The control period (s)."""
+        return self.stepped.period
+
+    @cached_property
+    def stepped_loop(self) -> System:
+        """The sampled loop, cut at the command, from a command to the negative of what the law answers with."""
+        return in_series(self.stepped, self.stepped_law)
+
+    @cached_property
+    def stepped_closed(self) -> System:
+        """The sampled closed loop, from the disturbance to the plant's states and the command."""
+        return closed(self.stepped, self.stepped_law)
+
+    @property
+    def poles(self) -> Array:
+        """The eigenvalues of a step of the closed loop, the largest first."""
+        found = np.linalg.eigvals(self.stepped_closed.A)
+        return found[np.lexsort((found.imag, -np.round(np.abs(found), 12)))]
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether all of them lie inside the unit circle, by floating point."""
+        return bool(np.abs(self.poles).max() < 1.0)
+
+
+def linearise(loop: ClosedLoop, delay: float = 0.0) -> Linear:
+    """Return the linear loop near rest on target, the target held where it is at the start. delay: from the control instant
+    until the command acts (s). LinearityError where there is none."""
+    if not 0.0 <= delay <= MOST_HELD * loop.period:
+        raise LinearityError(f"a delay between 0 and {MOST_HELD} control periods is wanted, not {delay:g} s")
+    if not loop.aims:
+        raise LinearityError("the body has no attitude")
+    left_out: list[str] = []
+    still = _at_rest(loop, left_out)
+    with np.errstate(all="ignore"):
+        plant, law = _matrices(still)
+    plant, law = _needed(plant, law)
+    if len(law.states):
+        difference = (law.A - np.eye(len(law.states))) / loop.period
+        continuous = law._replace(A=difference, B=law.B / loop.period, period=0.0)
+    else:
+        continuous = law._replace(period=0.0)
+    return Linear(plant, continuous, sampled(plant, loop.period, delay), law, delay, tuple(left_out))
+
+
+def _at_rest(loop: ClosedLoop, left_out: list[str]) -> ClosedLoop:
+    """The loop at rest on target, in inertial axes that are those of the target, so that the error there is exactly zero;
+    names what was taken from it."""
+    counted = loop.law.counters(loop.law.remember(loop.gains, loop.craft, loop.period))
+    if counted is not None or buffers(loop.carry().memory):
+        raise LinearityError(f"the law {loop.law.name} iterates, and has no derivative")
+    for role in ("sensor", "estimator"):
+        left_out += [f"{role} {fitted.called}" for fitted in loop.used(role)]
+    gone = [f for f in loop.used("environment") if f.part.hook("torque") is not None and not f.part.flag("MODELLED")]
+    rated = [f for f in loop.used("actuator") if f.part.name == "rate-limit"]
+    left_out += [fitted.called for fitted in (*gone, *rated)]
+    if loop.events:
+        left_out.append("what changes during the run")
+    if not loop.target.part.flag("STILL"):
+        left_out.append("the target's own turning")
+    goal = loop.first_attitude()
+    kept = loop.without("sensor", "estimator", "target", *(fitted.part.name for fitted in (*gone, *rated)))
+    start = loop.start
+    start = start._replace(
+        attitude=NO_TURN,
+        rate=ZERO,
+        position=to_body(goal, start.position),
+        velocity=to_body(goal, start.velocity),
+        torque=ZERO,
+    )
+    parts = (*kept.parts, fit("target", "inertial", NO_TURN), fit("environment", "constant-torque", ZERO, 0))
+    return replace(kept, parts=parts, start=start, limit="none", events=(), sign_policy="as_published")
+
+
+def _matrices(loop: ClosedLoop) -> tuple[System, System]:
+    """The plant in continuous time and the law in steps, with all states."""
+    step, setup, carry = make_step(loop.composition()), loop.setup(), loop.carry()
+    lags = any(fitted.part.hook("rates") is not None for fitted in loop.used("actuator"))
+    inner = flatten((carry.effectors, carry.actuators))
+    more = [f"{f.called}_{k + 1}" for f, own in zip(loop.used("effector"), carry.effectors, strict=True)
+            for k in range(len(flatten((own,))))]  # fmt: skip
+    more += [f"actuator_{k + 1}_{axis}" for k in range(len(carry.actuators)) for axis in AXES]
+    more += [f"torque_{axis}" for axis in AXES] * lags
+    states = (*ERROR, *more)
+    memory = flatten((carry.memory,))
+    size = len(states)
+    count = size + 6 + len(memory)
+    x = variables([0.0] * 6 + inner + [0.0] * 3 * lags, 0, count)
+    u, d = variables(ZERO, size, count), variables(ZERO, size + 3, count)
+    kept = iter(variables(memory, size + 6, count))
+    numbers = iter(x[6:])
+    effectors, outputs = (mapped(part, lambda _: next(numbers)) for part in (carry.effectors, carry.actuators))
+    told: Any = [*NO_TURN[:1], *(0.5 * turn for turn in x[:3])]
+    # The scalar part of the quaternion has no slope at rest.
+    attitude = (Dual(1.0, np.zeros(count)), *told[1:])
+    torque = tuple(x[-3:]) if lags else tuple(u)
+    state = carry.state._replace(attitude=attitude, rate=tuple(x[3:6]), torque=torque)
+    pushed = setup.environments[-1]._replace(torque=tuple(d))
+    setup = setup._replace(environments=(*setup.environments[:-1], pushed))
+    now = carry._replace(state=state, effectors=effectors, actuators=outputs, command=tuple(u))
+    now = now._replace(memory=mapped(carry.memory, lambda _: next(kept)))
+
+    def moving() -> list[Any]:
+        rates, own, driven = step.slope(now, loop.craft, setup)
+        turning = relative(NO_TURN, rates[0])[1:]
+        found = [*(2.0 * part for part in turning), *rates[1], *_filled(own, carry.effectors)]
+        return found + _filled(driven, carry.actuators) + (list(rates[4]) if lags else [])
+
+    def decided() -> list[Any]:
+        after = step.update(now, 0, loop.seed, loop.gains, loop.craft, setup)
+        return [*after.command, *flatten((after.memory,))]
+
+    try:
+        by_all, answer = differentiate(moving, count), differentiate(decided, count)
+    except BorderError:
+        raise LinearityError(f"the law {loop.law.name}, or a part of the loop, has no slope at rest on target") from None
+    plant = System(
+        by_all[:, :size], by_all[:, size : size + 6], np.eye(size), np.zeros((size, 6)),
+        states, (*COMMAND, *DISTURBANCE), states,
+    )  # fmt: skip
+    known = tuple(f"memory_{k + 1}" for k in range(len(memory)))
+    to_law = answer[:, :size]
+    kept_by = answer[:, size + 6 :]
+    law = System(kept_by[3:], to_law[3:], kept_by[:3], to_law[:3], known, states, COMMAND, loop.period)
+    return plant, law
+
+
+def _filled(rates: Any, states: Any) -> list[Any]:
+    """The rates of states, 0 where a part says that there are none."""
+    found: list[Any] = []
+    for rate, state in zip(rates or (None,) * len(states), states, strict=True):
+        numbers = flatten((state,))
+        own = [0.0] * len(numbers) if rate is None else _flat(rate, state)
+        found += own
+    return found
+
+
+def _flat(rate: Any, state: Any) -> list[Any]:
+    if not isinstance(state, tuple):
+        return [0.0 if rate is None else rate]
+    if rate is None:
+        return [0.0] * len(flatten(state))
+    return [x for r, s in zip(rate, state, strict=True) for x in _flat(r, s)]
+
+
+def _needed(plant: System, law: System) -> tuple[System, System]:
+    """Both without states of the plant that nothing depends on, as the momenta of wheels whose friction is none."""
+    feeds = plant.A != 0.0
+    heard = (law.D != 0.0).any(axis=0) | (law.B != 0.0).any(axis=0)
+    needed = np.array([name in ERROR for name in plant.states]) | heard
+    while True:
+        wider = needed | feeds[needed].any(axis=0)
+        if (wider == needed).all():
+            break
+        needed = wider
+    names = tuple(name for name, keep in zip(plant.states, needed, strict=True) if keep)
+    reduced = plant._replace(
+        A=plant.A[np.ix_(needed, needed)], B=plant.B[needed], C=np.eye(len(names)), D=plant.D[needed],
+        states=names, outputs=names,
+    )  # fmt: skip
+    return reduced, law._replace(B=law.B[:, needed], D=law.D[:, needed], inputs=names)
+
+
+def sampled(plant: System, period: float, delay: float = 0.0) -> System:
+    """Return a plant from instant to instant, exactly, under a command that is held for a period and acts `delay` (s) later,
+    and a disturbance that is held. Commands that are still to act are states (Astrom and Wittenmark, Computer-Controlled
+    Systems, 1997)."""
+    size = len(plant.states)
+    held = int(np.floor(delay / period * (1.0 + 1e-12)))
+    rest = max(0.0, delay - held * period)
+    split = rest > 1e-12 * period
+    over, pushed = _held(plant, period)
+    command, others = slice(0, 3), slice(3, None)
+    # Until `rest` the command before acts, and then the new one.
+    late, new = _held(plant, period - rest)[1][:, command], np.zeros((size, 3))
+    if split:
+        to_end = expm(plant.A * (period - rest))
+        new, late = late, to_end @ _held(plant, rest)[1][:, command]
+    waiting = held + split
+    names = tuple(f"{name}_{-k}_steps" for k in range(-waiting, 0) for name in COMMAND)
+    total = size + 3 * waiting
+    A, B = np.zeros((total, total)), np.zeros((total, len(plant.inputs)))
+    A[:size, :size], B[:size, others] = over, pushed[:, others]
+    if not waiting:
+        B[:size, command] = late
+    else:
+        # The oldest command comes first; the newest is the input.
+        A[:size, size : size + 3] = late
+        if split and waiting > 1:
+            A[:size, size + 3 : size + 6] = new
+        elif split:
+            B[:size, command] = new
+        A[size : total - 3, size + 3 :] = np.eye(3 * (waiting - 1))
+        B[total - 3 :, command] = np.eye(3)
+    C = np.hstack([plant.C, np.zeros((len(plant.outputs), 3 * waiting))])
+    return System(A, B, C, plant.D, (*plant.states, *names), plant.inputs, plant.outputs, period)
+
+
+def _held(plant: System, time: float) -> tuple[Array, Array]:
+    """What the states, and inputs that are held, make of the states in a time (s)."""
+    size, inputs = plant.B.shape
+    whole = np.zeros((size + inputs, size + inputs))
+    whole[:size] = np.hstack([plant.A, plant.B])
+    found = expm(whole * time)
+    return found[:size, :size], found[:size, size:]
+
+
+def in_series(plant: System, law: System) -> System:
+    """Return the loop cut at the command: from a command to the negative of the law's answer."""
+    plant = plant.take(COMMAND)
+    A = np.block([[plant.A, np.zeros((len(plant.states), len(law.states)))], [law.B @ plant.C, law.A]])
+    B = np.vstack([plant.B, law.B @ plant.D])
+    C, D = -np.hstack([law.D @ plant.C, law.C]), -law.D @ plant.D
+    return System(A, B, C, D, (*plant.states, *law.states), COMMAND, COMMAND, plant.period)
+
+
+def closed(plant: System, law: System) -> System:
+    """Return the closed loop from the disturbance to the plant's outputs and the command."""
+    act, push = plant.take(COMMAND), plant.take(DISTURBANCE)
+    command = np.hstack([law.D @ plant.C, law.C])
+    A = np.block([[plant.A, np.zeros((len(plant.states), len(law.states)))], [law.B @ plant.C, law.A]])
+    A += np.vstack([act.B, np.zeros((len(law.states), 3))]) @ command
+    B = np.vstack([push.B, np.zeros((len(law.states), 3))])
+    C = np.vstack([np.hstack([plant.C, np.zeros((len(plant.outputs), len(law.states)))]), command])
+    D = np.zeros((len(C), 3))
+    return System(A, B, C, D, (*plant.states, *law.states), DISTURBANCE, (*plant.outputs, *COMMAND), plant.period)

@@ -1,0 +1,108 @@
+"""Gain, phase and delay margins of a linear loop about each body axis, read off its sampled frequency response."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from starhold.analysis.linear import AXES, Linear
+
+POINTS = 600
+"""Frequencies of a response."""
+BELOW = 1e-3
+"""The lowest frequency, in parts of that of the slowest pole of the closed loop."""
+
+
+class Margins(NamedTuple):
+    """What the loop about one axis bears before it loses its stability, the loops about the others being closed.
+
+    gain: the least factor above 1 of the command that does (inf for none); less: the greatest factor below 1 that does (0
+    for none); phase (rad) and delay (s): the least further lag that does (inf for none); crossover: the highest frequency
+    (rad/s) at which the loop's gain is 1, its bandwidth (NaN for none); sensitivity: the largest |1/(1 + L)|, whose inverse
+    is the least distance of L from -1. NaN, but for the crossover, where the loop is not stable in the first place."""
+
+    axis: str
+    gain: float
+    less: float
+    phase: float
+    delay: float
+    crossover: float
+    sensitivity: float
+
+
+class Response(NamedTuple):
+    """The loop cut about each axis: frequencies (n,) in rad/s, up to half the sampling frequency, and L (3, n)."""
+
+    frequencies: NDArray[np.float64]
+    loops: NDArray[np.complex128]
+
+
+def response(linear: Linear) -> Response:
+    """Return the frequency response of the loop that is cut about one axis, with those about the others closed."""
+    # A pole of z is exp(s period); of a loop that waits some are zero.
+    turns = [abs(np.log(pole)) / linear.period for pole in linear.poles.astype(complex) if abs(pole) > 1e-9]
+    highest = math.pi / linear.period
+    slowest = min((turn for turn in turns if turn > 0.0), default=highest)
+    frequencies = np.geomspace(BELOW * min(slowest, highest), highest, POINTS)
+    return Response(frequencies, _cut(linear, frequencies, range(3)))
+
+
+def _cut(linear: Linear, frequencies: Any, axes: Iterable[int]) -> NDArray[np.complex128]:
+    """L (axes, n) about some of the axes."""
+    whole = linear.stepped_loop.at(np.exp(1j * np.asarray(frequencies) * linear.period))
+    found: list[Any] = []
+    for i in axes:
+        others = [k for k in range(3) if k != i]
+        across = whole[:, others, i]
+        if across.any() and whole[:, i, others].any():
+            inner = np.eye(2) + whole[:, others][:, :, others]
+            across = np.linalg.solve(inner, across[:, :, None])[:, :, 0]
+        found.append(whole[:, i, i] - np.sum(whole[:, i, others] * across, axis=1))
+    return np.array(found)
+
+
+def margins(linear: Linear, shown: Response | None = None) -> list[Margins]:
+    """Return the margins about the three body axes; shown: the response, where it is known already."""
+    found = response(linear) if shown is None else shown
+    return [_about(linear, k, found) for k in range(3)]
+
+
+def _about(linear: Linear, k: int, found: Response) -> Margins:
+    w, L = found.frequencies, found.loops[k]
+
+    def at(frequency: float) -> complex:
+        return complex(_cut(linear, [frequency], [k])[0, 0])
+
+    crossings = _roots(w, np.log(np.abs(L)), lambda f: math.log(abs(at(f))))
+    crossover = max(crossings, default=math.nan)
+    if not linear.is_stable:
+        return Margins(AXES[k], math.nan, math.nan, math.nan, math.nan, crossover, math.nan)
+    # Where L is real and negative; at half the sampling frequency it always is real.
+    reals = [at(f) for f in _roots(w, L.imag, lambda f: at(f).imag)] + [complex(L[-1])]
+    gains = [-1.0 / value.real for value in reals if value.real < 0.0]
+    lags = [((math.pi + np.angle(at(f))) % (2.0 * math.pi), f) for f in crossings]
+    return Margins(
+        AXES[k],
+        min((g for g in gains if g > 1.0), default=math.inf),
+        max((g for g in gains if g < 1.0), default=0.0),
+        float(min((lag for lag, _ in lags), default=math.inf)),
+        float(min((lag / f for lag, f in lags), default=math.inf)),
+        crossover,
+        float(np.max(1.0 / np.abs(1.0 + L))),
+    )
+
+
+def _roots(w: Any, values: Any, function: Callable[[float], float]) -> list[float]:
+    """The frequencies at which a function changes its sign between two of w; not those at which it jumps, as it does across
+    a resonance without damping."""
+    found: list[float] = []
+    for p in np.flatnonzero((values[:-1] < 0.0) != (values[1:] < 0.0)):
+        root = float(brentq(function, w[p], w[p + 1], xtol=1e-9 * w[p], rtol=1e-9))  # pyright: ignore
+        if abs(function(root)) <= max(abs(values[p]), abs(values[p + 1])):
+            found.append(root)
+    return found

@@ -1,0 +1,107 @@
+"""Linear loops of a scenario's laws: their margins, and the loops as systems of python-control."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.signal import tf2ss
+
+from starhold.analysis.linear import (
+    COMMAND,
+    DISTURBANCE,
+    Linear,
+    LinearityError,
+    System,
+    closed,
+    in_series,
+    linearise,
+)
+from starhold.errors import InputError
+from starhold.scenario.building import build
+
+if TYPE_CHECKING:
+    from control import StateSpace
+
+    from starhold.scenario.reading import LawEntry, Scenario
+
+ORDER = 4
+"""Of the Pade approximant that stands for a delay in continuous time."""
+
+
+@dataclass(frozen=True)
+class Systems:
+    """The parts of a linear loop: `plant` from command and disturbance (N m, body axes) to its states, `law` from these to the
+    command, `loop` from a command to the negative of the law's answer, and `closed` from the disturbance to states and
+    command. States begin with the error's rotation vector theta (rad) and the rate relative to the target (rad/s)."""
+
+    plant: StateSpace
+    law: StateSpace
+    loop: StateSpace
+    closed: StateSpace
+
+
+@dataclass(frozen=True)
+class LinearLoop(Systems):
+    """A linear loop in continuous time, with a delay approximated, and as `sampled`, exact between control instants;
+    `left_out` names what flies and is not in it. `margins` of it are found by `starhold.margins`."""
+
+    sampled: Systems
+    delay: float
+    left_out: tuple[str, ...]
+
+
+def linear_of(scenario: Scenario, entry: LawEntry, delay: float = 0.0) -> Linear:
+    """The linear loop of a law of a scenario. InputError where there is none."""
+    try:
+        return linearise(build(scenario, entry), delay)
+    except LinearityError as error:
+        raise InputError(scenario.where, f"law {entry.name}", str(error), "a loop that is linear near rest") from None
+
+
+def systems_of(linear: Linear) -> LinearLoop:
+    """The linear loop as systems of python-control. InputError where that is not installed."""
+    try:
+        control = import_module("control")
+    except ImportError:
+        raise InputError("linearise", "", "no python-control", "pip install 'starhold[interop]'") from None
+    plant = _delayed(linear.plant, linear.delay, control)
+    stepped = _systems(linear.stepped, linear.stepped_law, control)
+    continuous = _systems(plant, linear.law, control)
+    return LinearLoop(
+        continuous.plant, continuous.law, continuous.loop, continuous.closed, stepped, linear.delay, linear.left_out
+    )
+
+
+def _systems(plant: System, law: System, control: Any) -> Systems:
+    def made(system: System) -> Any:
+        names = {"states": list(system.states)} if system.states else {}
+        return control.ss(
+            system.A,
+            system.B,
+            system.C,
+            system.D,
+            system.period,
+            inputs=list(system.inputs),
+            outputs=list(system.outputs),
+            remove_useless_states=False,
+            **names,
+        )
+
+    return Systems(made(plant), made(law), made(in_series(plant, law)), made(closed(plant, law)))
+
+
+def _delayed(plant: System, delay: float, control: Any) -> System:
+    """The plant behind a Pade approximant of the delay of each command."""
+    if delay == 0.0:
+        return plant
+    a, b, c, d = (np.kron(np.eye(3), part) for part in tf2ss(*control.pade(delay, ORDER)))
+    act, push = plant.take(COMMAND), plant.take(DISTURBANCE)
+    size, more = len(plant.states), len(a)
+    A = np.block([[plant.A, act.B @ c], [np.zeros((more, size)), a]])
+    B = np.block([[act.B @ d, push.B], [b, np.zeros((more, 3))]])
+    C = np.hstack([plant.C, np.zeros((len(plant.outputs), more))])
+    names = tuple(f"delay_{k + 1}" for k in range(more))
+    return System(A, B, C, plant.D, (*plant.states, *names), plant.inputs, plant.outputs)

@@ -1,0 +1,43 @@
+"""Dual numbers differentiate equations: against finite differences, and they refuse where there is no slope."""
+
+import numpy as np
+import pytest
+
+from starhold.algebra.dual import BorderError, Dual, differentiate, variables
+from starhold.algebra.quaternion import multiply, normalise, to_body
+from starhold.algebra.scalar import absolute, clip, divide, maximum, sign, sqrt, where
+from starhold.algebra.vector import clip_norm, solve
+
+POINT = (0.9, -0.2, 0.3, 0.1, 0.5, -1.5, 2.0)
+EQUATIONS = {
+    "turned": lambda x: to_body(normalise(tuple(x[:4])), tuple(x[4:])),
+    "product": lambda x: multiply(tuple(x[:4]), (x[4], 2.0, x[5], 1.0 - x[6])),
+    "limited": lambda x: clip_norm(tuple(x[4:]), x[0]),
+    "solved": lambda x: solve(((x[6], x[1], x[2]), (x[1], 3.0, x[3]), (x[2], x[3], 4.0)), tuple(x[3:6])),
+    "scalars": lambda x: (sqrt(x[0]) / x[5], divide(2.0, x[6]), -absolute(x[5]), maximum(x[1], x[2]), 3.0 - clip(x[6], 1.0)),
+}
+
+
+@pytest.mark.parametrize("name", EQUATIONS)
+def test_slopes_are_those_of_finite_differences(name):
+    equation, count, step = EQUATIONS[name], len(POINT), 1e-6
+    found = differentiate(lambda: equation(variables(POINT, 0, count)), count)
+    for k in range(count):
+        ahead, behind = (np.array(equation([x + s * (i == k) for i, x in enumerate(POINT)])) for s in (step, -step))
+        np.testing.assert_allclose(found[:, k], (ahead - behind) / (2 * step), atol=2e-8)
+
+
+def test_slopes_that_agree_on_both_sides_of_a_border_are_taken():
+    # The largest of three sizes is 0 here, and the limit of 1 is far off.
+    def equation():
+        x = variables((0.0, 0.0, 0.0), 0, 3)
+        size = maximum(absolute(x[0]), maximum(absolute(x[1]), absolute(x[2])))
+        return [where(size > 1.0 if not isinstance(size, Dual) else size.value > 1.0, size, x[0] + 2.0 * x[1])]
+
+    np.testing.assert_array_equal(differentiate(equation, 3), [[1.0, 2.0, 0.0]])
+
+
+@pytest.mark.parametrize("equation", [sign, absolute, lambda x: sqrt(absolute(x)), lambda x: sqrt(x * x), lambda x: 1.0 / x])
+def test_what_has_no_slope_is_refused(equation):
+    with np.errstate(all="ignore"), pytest.raises(BorderError):
+        differentiate(lambda: [equation(*variables((0.0,), 0, 1))], 1)
