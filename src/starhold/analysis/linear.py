@@ -94,7 +94,7 @@ class Linear:
     @property
     def poles(self) -> Array:
         """The eigenvalues of a step of the closed loop, the largest first."""
-        found = np.linalg.eigvals(self.stepped_closed.A)
+        found: Any = np.linalg.eigvals(self.stepped_closed.A)
         return found[np.lexsort((found.imag, -np.round(np.abs(found), 12)))]
 
     @property
@@ -281,7 +281,7 @@ def _held(plant: System, time: float) -> tuple[Array, Array]:
     size, inputs = plant.B.shape
     whole = np.zeros((size + inputs, size + inputs))
     whole[:size] = np.hstack([plant.A, plant.B])
-    found = expm(whole * time)
+    found: Any = expm(whole * time)
     return found[:size, :size], found[:size, size:]
 
 

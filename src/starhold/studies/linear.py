@@ -33,8 +33,8 @@ ORDER = 4
 
 @dataclass(frozen=True)
 class Systems:
-    """The parts of a linear loop: `plant` from command and disturbance (N m, body axes) to its states, `law` from these to the
-    command, `loop` from a command to the negative of the law's answer, and `closed` from the disturbance to states and
+    """The parts of a linear loop: `plant` from command and disturbance (N m, body axes) to its states, `law` from these to
+    the command, `loop` from a command to the negative of the law's answer, and `closed` from the disturbance to states and
     command. States begin with the error's rotation vector theta (rad) and the rate relative to the target (rad/s)."""
 
     plant: StateSpace
