@@ -13,6 +13,7 @@ certificates = sh.certify(scenario)              # what is proved of every law
 designs = sh.design("my.toml")                   # gains that formulas give, and figures to judge them by
 exported = sh.export_c(scenario, "flight")       # a law as C99, with a self-test that demands the simulation's bits
 linear = sh.linearise(scenario, "lyapunov")       # the loop near rest as systems of python-control; sh.margins tells margins
+path = sh.export_aem(run, "run.aem")              # attitudes as a CCSDS message; sh.read_aem reads one
 certificate = sh.invariant("van-der-pol")        # what is proved of an invariant set of any small system
 made = sh.reproduce("D")                         # a publication's figures and numbers, beside what it prints
 told = sh.budget("cubesat-slew")                 # the pointing error by source, over the windows of ECSS
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
         certify,
         compare,
         design,
+        export_aem,
         export_c,
         failures,
         invariant,
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
         metrics,
         modal_roots,
         place,
+        read_aem,
         reproduce,
         simulate,
         sweep,
@@ -57,6 +60,7 @@ __all__ = [
     "certify",
     "compare",
     "design",
+    "export_aem",
     "export_c",
     "failures",
     "invariant",
@@ -66,6 +70,7 @@ __all__ = [
     "metrics",
     "modal_roots",
     "place",
+    "read_aem",
     "reproduce",
     "scenario",
     "simulate",

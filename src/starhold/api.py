@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 from starhold.algebra.quantity import Quantity
+from starhold.errors import InputError
 from starhold.scenario import designing, reading
 from starhold.scenario.making import make_scenario as make_scenario
 from starhold.simulation.lane import Recording
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from starhold.campaign.results import CampaignResult
     from starhold.certification.certificate import Certificate
     from starhold.certification.invariant import InvariantProblem
+    from starhold.export.aem import Aem
     from starhold.export.folder import Exported
     from starhold.publications.reproduction import Reproduction
     from starhold.studies.budget import Budget
@@ -212,6 +214,61 @@ def export_c(
     exported = make_files(code, opened.name, entry.name, proof, more)
     write(exported, into, opened.name, entry.name)
     return exported
+
+
+def export_aem(
+    run: xr.Dataset | str | Path,
+    file: str | Path,
+    *,
+    epoch: str = "2000-01-01T12:00:00",
+    object_name: str = "SPACECRAFT",
+    object_id: str = "0000-000A",
+    frame: str = "EME2000",
+    version: Literal["1.0", "2.0"] = "2.0",
+) -> Path:
+    """Write the attitudes of a run as a CCSDS attitude ephemeris message, and return its path.
+
+    run: what `simulate` returns, a run.nc or the folder of one. epoch: UTC at the start of the run; frame: what its inertial
+    axes are called. The quaternions turn the frame to the body's axes, scalar last. InputError for a run without
+    attitudes, a word that does not fit, and a file that cannot be written."""
+    from starhold.export.aem import write_aem
+
+    into, flown = Path(file), _read_run(run)
+    if "attitude" not in flown:
+        raise InputError("export aem", "", "a run without attitudes", "one of a rigid body")
+    times, attitudes = flown["time"].to_numpy(), flown["attitude"].to_numpy()
+    try:
+        write_aem(
+            into, times, attitudes, epoch=epoch, object_name=object_name, object_id=object_id, frame=frame, version=version
+        )
+    except ValueError as error:
+        raise InputError("export aem", "", str(error), "what a CCSDS message may hold") from None
+    return into
+
+
+def read_aem(file: str | Path) -> Aem:
+    """Read a CCSDS attitude ephemeris message of one segment: `times` (s, since the first), `attitudes` (scalar first, from
+    the reference frame to the body's axes), and what it is about. InputError where it is none."""
+    from starhold.export.aem import read_aem as read
+
+    try:
+        return read(Path(file))
+    except OSError as error:
+        raise InputError(str(file), "", f"{error.strerror}", "a file that can be read") from None
+    except ValueError as error:
+        raise InputError(str(file), "", str(error), "a CCSDS attitude ephemeris message") from None
+
+
+def _read_run(run: xr.Dataset | str | Path) -> xr.Dataset:
+    if not isinstance(run, str | Path):
+        return run
+    import xarray as xr
+
+    path = Path(run) / "run.nc" if Path(run).is_dir() else Path(run)
+    try:
+        return xr.load_dataset(path, engine="h5netcdf")
+    except OSError as error:
+        raise InputError(str(path), "", error.strerror or "no netCDF-4 file", "a run.nc, or the folder of one") from None
 
 
 def failures(scenario: reading.Scenario | str | Path, law: str | None = None) -> list[Failure]:

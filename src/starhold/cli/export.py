@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -40,6 +40,28 @@ def c(
     print_exported(
         export_c(scenario, folder, entry.name, name=name, shells=shell or (), certify=certify, force=force), folder
     )
+
+
+@app.command()
+def aem(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="a run.nc, or the folder of one")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="the message, such as run.aem")],
+    epoch: Annotated[str, typer.Option(help="UTC at the start of the run")] = "2000-01-01T12:00:00",
+    object_name: Annotated[str, typer.Option("--object", help="name of the spacecraft")] = "SPACECRAFT",
+    object_id: Annotated[str, typer.Option("--id", help="its international designator")] = "0000-000A",
+    frame: Annotated[str, typer.Option(help="what the inertial axes are called")] = "EME2000",
+    version: Annotated[str, typer.Option(help="of the message, 1.0 or 2.0")] = "2.0",
+    force: Force = False,
+) -> None:
+    """Write the attitudes of a run as a CCSDS attitude ephemeris message."""
+    from starhold.api import export_aem
+    from starhold.cli.show import console
+    from starhold.errors import InputError
+
+    if output.exists() and not force:
+        raise InputError(str(output), "", "a file already there", "another one with -o, or --force")
+    words: dict[str, Any] = {"epoch": epoch, "object_name": object_name, "object_id": object_id, "frame": frame}
+    console.print(f"{export_aem(run, output, version=version, **words)}", highlight=False, soft_wrap=True)  # type: ignore
 
 
 def print_exported(exported: Exported, folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""Reads the attitudes that a target follows from a CSV file."""
+"""Reads the attitudes that a target follows from a CSV file or a CCSDS attitude ephemeris message."""
 
 from __future__ import annotations
 
@@ -9,17 +9,20 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.export.aem import OFF_UNIT, read_aem
+
 COLUMNS = ("time", "q0", "q1", "q2", "q3")
-OFF_UNIT = 1e-3
-"""By how much the length of a quaternion may differ from 1: more is no rounding, but a wrong column."""
 
 
 def read_history(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Times (n,) in s and quaternions (n, 4), scalar first. Columns that are named may stand in any order; without names
-    they are those of COLUMNS.
+    they are those of COLUMNS. A file that ends in .aem is an attitude ephemeris message, whose first epoch is time 0.
 
     Raises OSError, or ValueError that names the line and what is wrong with it.
     """
+    if path.suffix.lower() == ".aem":
+        message = read_aem(path)
+        return message.times, message.attitudes
     rows: list[list[float]] = []
     order = list(range(len(COLUMNS)))
     with path.open(encoding="utf-8", newline="") as file:

@@ -68,6 +68,8 @@ def _history(scenario: Scenario, use: Callable[..., Any]) -> Any:
     """The result of `use` on the times and attitudes in the file of a history. InputError where it cannot be used."""
     path = scenario.folder / str(scenario.table.target.file)
     allowed = "a CSV file of columns time,q0,q1,q2,q3 (in another order if named), unit quaternions, times that increase"
+    if path.suffix.lower() == ".aem":
+        allowed = "a CCSDS attitude ephemeris message of one segment, unit quaternions, epochs that increase"
     try:
         return use(*read_history(path))
     except OSError as error:

@@ -94,7 +94,10 @@ class TargetTable(Pointing):
         Literal["inertial", "orbital", "history"],
         Field(description="fixed, third axis to the centre of attraction, or as a file tells over time"),
     ] = "inertial"
-    file: Annotated[str | None, Field(description="CSV of a history: time (s), q0, q1, q2, q3; beside the scenario")] = None
+    file: Annotated[
+        str | None,
+        Field(description="history beside the scenario: CSV of time (s), q0, q1, q2, q3, or a CCSDS AEM (.aem)"),
+    ] = None
 
     @model_validator(mode="after")
     def _fits_mode(self) -> TargetTable:

@@ -1,0 +1,225 @@
+"""Attitudes over time as CCSDS attitude ephemeris messages (AEM), written and read in their keyword = value form.
+
+Versions 1.0 (CCSDS 504.0-B-1) and 2.0 (504.0-B-2). The quaternion Q1 Q2 Q3 QC of a message has its scalar last, and turns
+REF_FRAME_A into REF_FRAME_B as `starhold.algebra.quaternion` has it: a vector's components in A become those in B.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from datetime import UTC, date, datetime, timedelta
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.files import atomic_write
+
+Version = Literal["1.0", "2.0"]
+BODY = "SC_BODY"
+"""How the names of frames fixed to the spacecraft begin."""
+OFF_UNIT = 1e-3
+"""By how much the length of a quaternion may differ from 1: more is no rounding."""
+VALUES = {
+    "QUATERNION": 4,
+    "QUATERNION/DERIVATIVE": 8,
+    "QUATERNION/RATE": 7,
+    "QUATERNION/ANGVEL": 7,
+}
+"""Types of attitude that are read, and the numbers of a line of theirs; all but the quaternion are passed over."""
+NAME = re.compile(r"[ -~]*[!-~][ -~]*")
+_EPOCH = re.compile(r"(\d{4})-(?:(\d{2})-(\d{2})|(\d{3}))T(\d{2}):(\d{2}):(\d{2})(?:\.(\d*))?Z?")
+_SECOND = 10**9
+
+
+class Aem(NamedTuple):
+    """The attitudes of a message: times (n,) in s since the first of them, whose epoch it is, quaternions (n, 4), scalar
+    first, from the reference frame to the body's, and the names of the object, the frame and the time system."""
+
+    times: NDArray[np.float64]
+    attitudes: NDArray[np.float64]
+    epoch: str
+    object_name: str
+    frame: str
+    time_system: str
+
+
+def write_aem(
+    path: Path,
+    times: Any,
+    attitudes: Any,
+    *,
+    epoch: str,
+    object_name: str,
+    object_id: str,
+    frame: str = "EME2000",
+    time_system: str = "UTC",
+    version: Version = "2.0",
+) -> None:
+    """Write attitudes as a message. times: (n,) s since the epoch, increasing; attitudes: (n, 4), scalar first, from the
+    frame to the body's axes. ValueError where a word does not fit, InputError where the file cannot be written."""
+    begun = _instant(epoch)
+    for told in (object_name, object_id, frame, time_system):
+        if not NAME.fullmatch(told):
+            raise ValueError(f"{told!r}, which is no line of printable ASCII")
+    if version not in ("1.0", "2.0"):
+        raise ValueError(f"version {version}, which is neither 1.0 nor 2.0")
+    stamps = [_stamp(begun + round(float(time) * _SECOND)) for time in times]
+    if len(set(stamps)) < max(len(stamps), 2):
+        raise ValueError("fewer than two different times")
+    old = version == "1.0"
+    lines = [
+        f"CCSDS_AEM_VERS = {version}",
+        f"CREATION_DATE = {datetime.now(UTC):%Y-%m-%dT%H:%M:%S}",
+        "ORIGINATOR = STARHOLD",
+        "",
+        "META_START",
+        f"OBJECT_NAME = {object_name}",
+        f"OBJECT_ID = {object_id}",
+        f"REF_FRAME_A = {frame}",
+        f"REF_FRAME_B = {BODY}_1",
+        *["ATTITUDE_DIR = A2B"] * old,
+        f"TIME_SYSTEM = {time_system}",
+        f"START_TIME = {stamps[0]}",
+        f"STOP_TIME = {stamps[-1]}",
+        "ATTITUDE_TYPE = QUATERNION",
+        *["QUATERNION_TYPE = LAST"] * old,
+        "META_STOP",
+        "",
+        "DATA_START",
+    ]
+    for stamp, (q0, q1, q2, q3) in zip(stamps, np.asarray(attitudes, dtype=float).tolist(), strict=True):
+        lines.append(f"{stamp} {q1!r} {q2!r} {q3!r} {q0!r}")
+    with atomic_write(path) as hidden:
+        hidden.write_text("\n".join([*lines, "DATA_STOP", ""]), encoding="ascii", newline="\n")
+
+
+def read_aem(path: Path) -> Aem:
+    """Read the attitudes of a message of one segment. OSError, or ValueError that names the line and what is wrong."""
+    lines = _Lines(path.read_text(encoding="utf-8"))
+    version = lines.value("CCSDS_AEM_VERS")
+    if version not in ("1.0", "2.0"):
+        raise ValueError(f"line {lines.number}: CCSDS_AEM_VERS = {version}, of which 1.0 and 2.0 are read")
+    lines.until("META_START")
+    told = dict(lines.pairs("META_STOP"))
+    lines.until("DATA_START")
+    rows = list(lines.rows("DATA_STOP", _numbers(told)))
+    lines.nothing_more()
+    if len(rows) < 2:
+        raise ValueError(f"{len(rows)} attitudes")
+    instants, table = [row[0] for row in rows], np.array([row[1] for row in rows])
+    for earlier, later in pairwise(instants):
+        if later <= earlier:
+            raise ValueError(f"the epoch {_stamp(later)} after {_stamp(earlier)}")
+    # In version 1.0 the scalar may come first.
+    first = told.get("QUATERNION_TYPE") == "FIRST"
+    attitudes = table if first else np.roll(table, 1, axis=1)
+    frame = told["REF_FRAME_A"]
+    if (told.get("ATTITUDE_DIR") == "B2A") != frame.startswith(BODY):
+        attitudes = attitudes * np.array([1.0, -1.0, -1.0, -1.0])
+    times = np.array([(instant - instants[0]) / _SECOND for instant in instants])
+    name = told["REF_FRAME_B"] if frame.startswith(BODY) else frame
+    return Aem(times, attitudes, _stamp(instants[0]), told["OBJECT_NAME"], name, told["TIME_SYSTEM"])
+
+
+def _numbers(told: dict[str, str]) -> int:
+    """How many numbers a line of data has. ValueError for what is not read."""
+    for key in ("OBJECT_NAME", "REF_FRAME_A", "REF_FRAME_B", "TIME_SYSTEM", "ATTITUDE_TYPE"):
+        if key not in told:
+            raise ValueError(f"no {key}")
+    allowed = {"ATTITUDE_DIR": ("A2B", "B2A"), "QUATERNION_TYPE": ("FIRST", "LAST"), "ATTITUDE_TYPE": tuple(VALUES)}
+    for key, words in allowed.items():
+        if key in told and told[key] not in words:
+            raise ValueError(f"{key} = {told[key]}, of which {', '.join(words)} are read")
+    frames = told["REF_FRAME_A"], told["REF_FRAME_B"]
+    if sum(frame.startswith(BODY) for frame in frames) != 1:
+        raise ValueError(f"frames {' and '.join(frames)}, of which one is to be {BODY}_…")
+    return VALUES[told["ATTITUDE_TYPE"]]
+
+
+class _Lines:
+    """The lines of a message that are neither empty nor comments, in order; `number` is that of the last one taken."""
+
+    def __init__(self, text: str) -> None:
+        self.number = 0
+        self._left = iter(enumerate(text.splitlines(), 1))
+
+    def _next(self) -> str | None:
+        for number, raw in self._left:
+            self.number, line = number, raw.strip()
+            if line and not line.startswith("COMMENT"):
+                return line
+        return None
+
+    def value(self, key: str) -> str:
+        """The value of the next line, which has this key."""
+        line = self._next() or ""
+        name, sign, value = line.partition("=")
+        if not sign or name.strip() != key:
+            raise ValueError(f"line {max(self.number, 1)}: {line[:40]!r} in place of {key} = …")
+        return value.strip()
+
+    def until(self, word: str) -> None:
+        """Pass over all up to a line."""
+        while (line := self._next()) is not None:
+            if line == word:
+                return
+        raise ValueError(f"no {word}")
+
+    def pairs(self, end: str) -> Iterator[tuple[str, str]]:
+        """Keys and values up to a line."""
+        while (line := self._next()) != end:
+            key, sign, value = (line or "").partition("=")
+            if not sign:
+                raise ValueError(f"line {self.number}: {line!r} in place of key = value" if line else f"no {end}")
+            yield key.strip(), value.strip()
+
+    def rows(self, end: str, count: int) -> Iterator[tuple[int, list[float]]]:
+        """Instants (ns) and quaternions up to a line."""
+        while (line := self._next()) != end:
+            if line is None:
+                raise ValueError(f"no {end}")
+            epoch, *cells = line.split()
+            try:
+                values = [float(cell) for cell in cells]
+                yield _instant(epoch), self._unit(values, count)[:4]
+            except ValueError as error:
+                raise ValueError(f"line {self.number}: {error}") from None
+
+    def _unit(self, values: Sequence[float], count: int) -> list[float]:
+        if len(values) != count:
+            raise ValueError(f"{len(values)} numbers behind the epoch, {count} are wanted")
+        length = math.hypot(*values[:4])
+        if not abs(length - 1.0) <= OFF_UNIT:
+            raise ValueError(f"a quaternion of length {length:.6g}")
+        return list(values)
+
+    def nothing_more(self) -> None:
+        """Refuse what stands behind."""
+        if self._next() is not None:
+            raise ValueError(f"line {self.number}: a second segment, of which one alone is read")
+
+
+def _instant(epoch: str) -> int:
+    """Nanoseconds since the year 1 of an epoch, by days of 86400 s. ValueError for none."""
+    found = _EPOCH.fullmatch(epoch)
+    if found is None:
+        raise ValueError(f"{epoch!r} in place of an epoch such as 2026-03-01T12:00:00")
+    year, month, day, of_year, hour, minute, second, part = found.groups()
+    when = date(int(year), int(month or 1), int(day or 1)) + timedelta(days=int(of_year or 1) - 1)
+    if not (int(hour) < 24 and int(minute) < 60 and int(second) <= 60) or when.year != int(year):
+        raise ValueError(f"{epoch!r}, which is no time of a day")
+    seconds = 86400 * when.toordinal() + 3600 * int(hour) + 60 * int(minute) + int(second)
+    return seconds * _SECOND + int(f"{part or '0':0<9}"[:9])
+
+
+def _stamp(instant: int) -> str:
+    seconds, part = divmod(instant, _SECOND)
+    days, second = divmod(seconds, 86400)
+    clock = f"{second // 3600:02}:{second // 60 % 60:02}:{second % 60:02}"
+    fraction = f".{part:09}".rstrip("0") if part else ""
+    return f"{date.fromordinal(days).isoformat()}T{clock}{fraction}"
