@@ -15,13 +15,13 @@ from starhold.algebra.operations import Operation
 
 TOWARD: ContextVar[NDArray[np.float64] | None] = ContextVar("toward", default=None)
 """The direction (n,) into which one looks where an equation chooses between branches just there."""
-DIRECTIONS = 8
+DIRECTIONS = 4
 """Directions, each with its opposite, in which branches must agree."""
 AGREED = 1e-9
 
 
 class BorderError(ArithmeticError):
-    """An equation chooses just where it is differentiated between branches that do not agree."""
+    """An equation has no slope: it chooses just there between branches that do not agree, or looks at a number's bits."""
 
 
 class _UndecidedError(ArithmeticError):
@@ -87,7 +87,7 @@ class Dual:
                 return bool(np.dot(da - db, toward) < 0.0)
             return entry.plain(a, b)
         if "symbolic" not in entry.meanings or entry.takes[0] != "number":
-            raise TypeError(f"{entry.name} has no derivative")
+            raise BorderError(f"{entry.name} has no derivative")
         # What is left are the four operations, which duals have of their own.
         return entry.meanings["symbolic"](*values)
 

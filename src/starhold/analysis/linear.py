@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from starhold.algebra.dual import BorderError, Dual, differentiate, variables
+from starhold.algebra.dual import Dual, differentiate, variables
 from starhold.algebra.quaternion import NO_TURN, relative, to_body
 from starhold.algebra.structure import buffers, flatten, mapped
 from starhold.algebra.vector import ZERO
@@ -192,7 +192,8 @@ def _matrices(loop: ClosedLoop) -> tuple[System, System]:
 
     try:
         by_all, answer = differentiate(moving, count), differentiate(decided, count)
-    except BorderError:
+    except ArithmeticError:
+        # A division by zero, too.
         raise LinearityError(f"the law {loop.law.name}, or a part of the loop, has no slope at rest on target") from None
     plant = System(
         by_all[:, :size], by_all[:, size : size + 6], np.eye(size), np.zeros((size, 6)),

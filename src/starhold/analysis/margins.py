@@ -14,7 +14,7 @@ from starhold.analysis.linear import AXES, Linear
 
 POINTS = 600
 """Frequencies of a response."""
-BELOW = 1e-3
+BELOW = 1e-2
 """The lowest frequency, in parts of that of the slowest pole of the closed loop."""
 
 

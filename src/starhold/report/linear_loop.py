@@ -1,0 +1,194 @@
+"""The part of the page that tells the linear loop near the target: its margins, and Bode and Nichols plots."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from html import escape
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from starhold.analysis.linear import AXES, Linear
+from starhold.analysis.margins import Margins, Response, margins, response
+from starhold.errors import InputError
+from starhold.report.colours import colour
+from starhold.report.proved import swatch
+from starhold.report.text import number_text
+from starhold.studies.linear import linear_of
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import Scenario
+    from starhold.studies.flight import Flight
+
+NOTE = (
+    "The loop near rest on target, the target standing still, exact between control instants under the held torque, at "
+    "the gains of the file; no limit of the torque, and no delay of the computation. Each axis is cut by itself, the others "
+    "stay closed. The margins are computed in floating point and are no proof."
+)
+DASHES = {"x": "none", "y": "7 3", "z": "2 3"}
+DIGITS = 4
+POINTS = 4
+"""A point of a curve stands for so many frequencies of the response."""
+DEEPEST = 60.0
+"""How far below the crossover (dB) plots reach."""
+WIDTH, HEIGHT, LEFT, BOTTOM = 430.0, 250.0, 52.0, 36.0
+
+
+class _Known(NamedTuple):
+    """A law's linear loop, its response and margins, by the law's number; `why` there is none."""
+
+    number: int
+    name: str
+    linear: Linear | None = None
+    shown: Response | None = None
+    margins: Sequence[Margins] = ()
+    why: str = ""
+
+
+def section(scenario: Scenario, flights: Sequence[Flight]) -> str:
+    """The section as HTML; nothing where no law has a linear form."""
+    known = [_know(scenario, number, flight.name) for number, flight in enumerate(flights)]
+    if not any(one.linear for one in known):
+        return ""
+    rows = "".join(_rows(one) for one in known)
+    heads = (
+        "law",
+        "axis",
+        "gain margin, dB",
+        "phase margin, deg",
+        "delay margin, s",
+        "crossover, rad/s",
+        "peak of |1/(1 + L)|",
+    )
+    head = "".join(f'<th scope="col">{text}</th>' for text in heads)
+    left = sorted({text for one in known if one.linear for text in one.linear.left_out})
+    apart = f" Left out: {escape(', '.join(left))}." if left else ""
+    return (
+        f'<h2>Linear loop near the target</h2>\n<p class="note">{NOTE}{apart}</p>\n'
+        f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>\n'
+        f'<div class="plot"><h3>Bode and Nichols plots of the loop, cut about each axis</h3>{_plots(known)}</div>'
+        '<p class="note">Solid: about x, dashed: y, dotted: z. The cross in the Nichols plot is the point −1.</p>'
+    )
+
+
+def _know(scenario: Scenario, number: int, name: str) -> _Known:
+    try:
+        linear = linear_of(scenario, scenario.pick(name))
+    except InputError as error:
+        return _Known(number, name, why=error.found)
+    shown = response(linear)
+    return _Known(number, name, linear, shown, margins(linear, shown))
+
+
+def _rows(one: _Known) -> str:
+    name = f"{swatch(one.number)}{escape(one.name)}"
+    if one.linear is None:
+        return f'<tr><th scope="row">{name}</th><td colspan="6">no linear form: {escape(one.why)}</td></tr>'
+    told = "" if one.linear.is_stable else '<td colspan="3">not stable</td>'
+    found: list[str] = []
+    for about in one.margins:
+        values = [_decibels(about), number_text(math.degrees(about.phase), DIGITS), number_text(about.delay, DIGITS)]
+        cells = told or "".join(f"<td>{value}</td>" for value in values)
+        rest = [
+            number_text(value, DIGITS) if math.isfinite(value) else "—" for value in (about.crossover, about.sensitivity)
+        ]
+        cells += "".join(f"<td>{value}</td>" for value in rest)
+        found.append(f'<tr><th scope="row">{name}</th><td>{about.axis}</td>{cells}</tr>')
+    return "".join(found)
+
+
+def _decibels(about: Margins) -> str:
+    """Up, and down where less gain loses the stability, too."""
+    up = f"{20.0 * math.log10(about.gain):.1f}" if math.isfinite(about.gain) else "none"
+    return f"{up}, −{-20.0 * math.log10(about.less):.1f}" if about.less > 0.0 else up
+
+
+class _Panel(NamedTuple):
+    """A pair of axes in the picture: where it begins, what it shows (from, to), labels, and where ticks are."""
+
+    left: float
+    x: tuple[float, float]
+    y: tuple[float, float]
+    words: tuple[str, str]
+    ticks: tuple[dict[float, str], Sequence[float]]
+
+    def at(self, x: Any, y: Any) -> tuple[Any, Any]:
+        across = (np.asarray(x) - self.x[0]) / (self.x[1] - self.x[0])
+        up = (np.asarray(y) - self.y[0]) / (self.y[1] - self.y[0])
+        return self.left + LEFT + across * (WIDTH - LEFT - 12.0), 8.0 + (1.0 - up) * (HEIGHT - BOTTOM - 8.0)
+
+
+def _plots(known: Sequence[_Known]) -> str:
+    curves: list[tuple[int, str, Any, Any, Any]] = []
+    for one in known:
+        if one.shown is not None:
+            w = np.log10(one.shown.frequencies[::POINTS])
+            for axis, loop in zip(AXES, one.shown.loops[:, ::POINTS], strict=True):
+                size = 20.0 * np.log10(np.maximum(np.abs(loop), 1e-12))
+                curves.append((one.number, axis, w, size, np.degrees(_unwrapped(loop))))
+    low = min(float(w[0]) for _, _, w, _, _ in curves)
+    high = max(float(w[-1]) for _, _, w, _, _ in curves)
+    near = [np.abs(size) <= DEEPEST for _, _, _, size, _ in curves]
+    turns = np.concatenate([turn[inside] for (*_, turn), inside in zip(curves, near, strict=True)])
+    first, last = math.floor(turns.min(initial=-181.0) / 90.0), math.ceil(turns.max(initial=-90.0) / 90.0)
+    phases = (90.0 * first, 90.0 * last)
+    decades = {float(k): f"1e{k}" for k in range(math.ceil(low), math.floor(high) + 1, 1 + round((high - low) / 6))}
+    sizes, angles = range(-60, 61, 20), range(90 * first, 90 * last + 1, 90)
+    gain, phase, frequency = "gain, dB", "phase, deg", "frequency, rad/s"
+    by_angle = {float(angle): f"{angle}" for angle in angles}
+    panels = (
+        _Panel(0.0, (low, high), (-DEEPEST, DEEPEST), (frequency, gain), (decades, sizes)),
+        _Panel(WIDTH, (low, high), phases, (frequency, phase), (decades, angles)),
+        _Panel(2 * WIDTH, phases, (-DEEPEST, DEEPEST), (phase, gain), (by_angle, sizes)),
+    )
+    drawn = "".join(_frame(panel) for panel in panels)
+    for number, axis, w, size, turn in curves:
+        for k, (panel, x, y) in enumerate(zip(panels, (w, w, turn), (size, turn, size), strict=True)):
+            drawn += _curve(panel, x, y, k, colour(number), DASHES[axis])
+    x, y = panels[2].at(-180.0, 0.0)
+    drawn += f'<path d="M{x - 5:.0f} {y:.0f}h10M{x:.0f} {y - 5:.0f}v10" stroke="currentColor" stroke-width="1.5"/>'
+    clips = "".join(
+        f'<clipPath id="linear{k}"><rect x="{p.left + LEFT:g}" y="8" width="{WIDTH - LEFT - 12:g}" '
+        f'height="{HEIGHT - BOTTOM - 8:g}"/></clipPath>'
+        for k, p in enumerate(panels)
+    )
+    return (
+        f'<div class="wide"><svg viewBox="0 0 {3 * WIDTH:g} {HEIGHT:g}" style="min-width:{2 * WIDTH:g}px;width:100%" '
+        f'role="img" aria-label="Bode and Nichols plots" font-size="11" fill="currentColor">'
+        f"<defs>{clips}</defs>{drawn}</svg></div>"
+    )
+
+
+def _unwrapped(loop: Any) -> Any:
+    """The phase without jumps, from the highest gain on, within (-270, 90] degrees there."""
+    found = np.unwrap(np.angle(loop))
+    return found - 2.0 * math.pi * np.ceil((found[0] - 0.5 * math.pi) / (2.0 * math.pi))
+
+
+def _frame(panel: _Panel) -> str:
+    (x0, y0), (x1, y1) = panel.at(panel.x[0], panel.y[0]), panel.at(panel.x[1], panel.y[1])
+    lines, texts = "", ""
+    for value, word in panel.ticks[0].items():
+        x = panel.at(value, panel.y[0])[0]
+        lines += f"M{x:.1f} {y0:.1f}V{y1:.1f}"
+        texts += f'<text x="{x:.1f}" y="{y0 + 14:.1f}" text-anchor="middle">{word}</text>'
+    for value in panel.ticks[1]:
+        y = panel.at(panel.x[0], value)[1]
+        lines += f"M{x0:.1f} {y:.1f}H{x1:.1f}"
+        texts += f'<text x="{x0 - 6:.1f}" y="{y + 4:.1f}" text-anchor="end">{value:g}</text>'
+    middle = 0.5 * (y0 + y1)
+    return (
+        f'<path d="{lines}" stroke="currentColor" stroke-opacity="0.15" fill="none"/>{texts}'
+        f'<text x="{0.5 * (x0 + x1):.1f}" y="{y0 + 30:.1f}" text-anchor="middle">{panel.words[0]}</text>'
+        f'<text transform="translate({panel.left + 12:g} {middle:.1f}) rotate(-90)" text-anchor="middle">'
+        f"{panel.words[1]}</text>"
+    )
+
+
+def _curve(panel: _Panel, x: Any, y: Any, k: int, shade: str, dashes: str) -> str:
+    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(*panel.at(x, y), strict=True))
+    return (
+        f'<polyline points="{points}" clip-path="url(#linear{k})" fill="none" stroke="{shade}" stroke-width="1.6" '
+        f'stroke-dasharray="{dashes}"/>'
+    )
