@@ -190,7 +190,8 @@ def export_c(
     """Write a law of a scenario, the first if `law` is None, as C99 into a folder: header, source, a self-test that demands
     the simulation's bits, CMakeLists.txt, and the certificate whose digest the header has.
 
-    name: what functions and files begin with, the law's if None; shells: what else is to call it, of "basilisk", "fmu".
+    name: what functions and files begin with, the law's if None; shells: what else is to call it, of "basilisk",
+    "fmu", "cfs", "fprime".
     InputError for what has no form in C, a name that is no identifier, and a folder that holds results (unless `force`) or
     cannot be written."""
     import hashlib

@@ -65,7 +65,7 @@ def test_basilisk_flies_the_same_loop(steps, tmp_path):
 def test_basilisk_refuses_what_no_message_tells_of():
     with pytest.raises(InputError, match="the input wheels"):
         basilisk.files(code_of("wheel"))
-    with pytest.raises(InputError, match=r"shell: found simulink; allowed: one of basilisk, fmu"):
+    with pytest.raises(InputError, match=r"shell: found simulink; allowed: one of basilisk, fmu, cfs, fprime"):
         shell_files(code_of("lyapunov"), ["simulink"])
 
 

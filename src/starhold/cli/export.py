@@ -24,7 +24,8 @@ def c(
         str | None, typer.Option(metavar="NAME", help="what functions and files begin with; else the law's name")
     ] = None,
     shell: Annotated[
-        list[str] | None, typer.Option(metavar="SHELL", help="basilisk or fmu: what else is to call it; repeatable")
+        list[str] | None,
+        typer.Option(metavar="SHELL", help="basilisk, fmu, cfs or fprime: what else is to call it; repeatable"),
     ] = None,
     force: Force = False,
     certify: Certified = True,

@@ -84,7 +84,7 @@ def contents(code: Code) -> dict[str, str]:
     """Return what is in the archive: the description of the model, of the build, and the sources."""
     text = texts(code, "", code.flight.loop.law.name)
     shell = _SHELL.replace("@NAME@", code.name).replace("@PERIOD@", repr(code.flight.loop.period))
-    shell = shell.replace("@REFUSED@", "\n".join(_refused())).replace("@INPUTS@", str(len(_variables(code)[0])))
+    shell = shell.replace("@REFUSED@", "\n".join(_refused())).replace("@INPUTS@", str(len(variables(code)[0])))
     return {
         "modelDescription.xml": _description(code),
         "sources/buildDescription.xml": _BUILD.replace("@NAME@", code.name),
@@ -99,7 +99,7 @@ def _token(code: Code) -> str:
     return str(uuid.uuid5(uuid.NAMESPACE_URL, repr((code.name, code.program, code.flight.parameters))))
 
 
-def _variables(code: Code) -> tuple[list[str], list[str]]:
+def variables(code: Code) -> tuple[list[str], list[str]]:
     """Return the names of the inputs, and those of the command."""
     given = [p.text.replace("input->", "") for p in code.signature.params[2].leaves if code.needs.reads(p)]
     shape = code.signature.result
@@ -109,7 +109,7 @@ def _variables(code: Code) -> tuple[list[str], list[str]]:
 
 
 def _description(code: Code) -> str:
-    given, told = _variables(code)
+    given, told = variables(code)
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
         f'<fmiModelDescription fmiVersion="3.0" modelName={quoteattr(code.name)} instantiationToken="{_token(code)}"',

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from starhold.errors import InputError
-from starhold.export import basilisk, fmu
+from starhold.export import basilisk, cfs, fmu, fprime
 from starhold.export.code import Code
 from starhold.export.cost import Cost, measure
 from starhold.export.proof import UNPROVED, Proof
@@ -34,7 +34,12 @@ class Exported:
     """Of the self-test."""
 
 
-SHELLS: dict[str, Callable[[Code], Mapping[str, str | bytes]]] = {"basilisk": basilisk.files, "fmu": fmu.files}
+SHELLS: dict[str, Callable[[Code], Mapping[str, str | bytes]]] = {
+    "basilisk": basilisk.files,
+    "fmu": fmu.files,
+    "cfs": cfs.files,
+    "fprime": fprime.files,
+}
 """What makes the files of a shell over the C, by its name."""
 
 
@@ -64,9 +69,18 @@ def make_files(
     return Exported(code, proof, tuple(measure(code, header, source)), files, len(cases))
 
 
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(str(folder), "", "", f"cannot be made: {error.strerror or error}") from None
+
+
 def write(exported: Exported, folder: Path, scenario: str, law: str) -> None:
     """Write the files into an existing folder, each whole, the manifest last. InputError where one cannot be written."""
     for name, text in exported.files.items():
+        if Path(name).parent != Path():
+            _make(folder / Path(name).parent)
         with atomic_write(folder / name) as hidden:
             hidden.write_bytes(text.encode() if isinstance(text, str) else text)
     content = {

@@ -67,6 +67,10 @@ def _clear(folder: Path) -> None:
             (folder / name).rmdir()
     for name in _exported(folder):
         (folder / name).unlink(missing_ok=True)
+        for above in (folder / name).parents:
+            if above == folder or not above.is_dir() or any(above.iterdir()):
+                break
+            above.rmdir()
     for mark in MARKS:
         (folder / mark).unlink(missing_ok=True)
 
@@ -74,7 +78,9 @@ def _clear(folder: Path) -> None:
 def _exported(folder: Path) -> list[str]:
     """The files that an export of this folder lists."""
     try:
-        return [Path(name).name for name in json.loads((folder / EXPORT).read_text(encoding="utf-8"))["files"]]
+        names = [Path(name) for name in json.loads((folder / EXPORT).read_text(encoding="utf-8"))["files"]]
+        # Whatever the list says, nothing outside the folder.
+        return [str(name) for name in names if not name.is_absolute() and ".." not in name.parts]
     except (OSError, ValueError, KeyError, TypeError):
         return []
 
