@@ -278,7 +278,7 @@ def sampled(plant: System, period: float, delay: float = 0.0) -> System:
 
 
 def _held(plant: System, time: float) -> tuple[Array, Array]:
-    """What the states, and inputs that are held, make of the states in a time (s)."""
+    """Return what the states, and inputs that are held, make of the states in a time (s)."""
     size, inputs = plant.B.shape
     whole = np.zeros((size + inputs, size + inputs))
     whole[:size] = np.hstack([plant.A, plant.B])

@@ -19,7 +19,7 @@ BELOW = 1e-2
 
 
 class Margins(NamedTuple):
-    """What the loop about one axis bears before it loses its stability, the loops about the others being closed.
+    """These are what the loop about one axis bears before it loses its stability, those about the others being closed.
 
     gain: the least factor above 1 of the command that does (inf for none); less: the greatest factor below 1 that does (0
     for none); phase (rad) and delay (s): the least further lag that does (inf for none); crossover: the highest frequency
