@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import typer
@@ -21,12 +22,20 @@ folder that holds results is refused without `--force`.
 def page() -> str:
     """Every command with its arguments and options."""
     lines = [HEAD, *exit_codes()]
-    for name, command in typer.main.get_command(app).commands.items():  # type: ignore[attr-defined]
+    for name, command in _commands(typer.main.get_command(app)):
         lines += [f"## starhold {name}", "", " ".join((command.help or "").split()), ""]
         rows = [_row(p) for p in command.params if not p.hidden]
         if rows:
             lines += [table(["argument or option", "meaning", "default"], rows), ""]
     return "\n".join(lines)
+
+
+def _commands(group: Any, before: str = "") -> Iterator[tuple[str, Any]]:
+    """The commands of a group with those of the groups in it, by their full names."""
+    for name, command in group.commands.items():
+        yield before + name, command
+        if hasattr(command, "commands"):
+            yield from _commands(command, f"{before}{name} ")
 
 
 def _row(parameter: Any) -> list[str]:

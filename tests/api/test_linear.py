@@ -1,0 +1,65 @@
+"""`sh.linearise` and `sh.margins`: systems of python-control, that agree in continuous time and sampled."""
+
+import sys
+
+import control
+import numpy as np
+import pytest
+
+import starhold as sh
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.07])
+def test_continuous_and_sampled_agree_where_sampling_is_fast(delay):
+    linear = sh.linearise("cubesat-slew", "pd", delay)
+    assert isinstance(linear.loop, control.StateSpace)
+    assert linear.plant.dt == 0
+    assert linear.sampled.plant.dt == 0.1
+    assert linear.plant.input_labels[:4] == ["command_x", "command_y", "command_z", "disturbance_x"]
+    assert linear.law.input_labels[:6] == linear.plant.state_labels[:6]
+    for frequency in (0.01, 0.1, 0.3):
+        # A command that is held comes half a period later on the average.
+        held = np.exp(-0.05j * frequency)
+        slow = linear.loop(1j * frequency) * held
+        np.testing.assert_allclose(linear.sampled.loop(np.exp(0.1j * frequency)), slow, rtol=2e-4, atol=1e-6)
+        late, prompt = (
+            np.diag(found.plant(1j * frequency)[:3, :3]) for found in (linear, sh.linearise("cubesat-slew", "pd"))
+        )
+        np.testing.assert_allclose(late, prompt * np.exp(-1j * delay * frequency), rtol=1e-9)
+
+
+def test_closed_is_the_loop_closed():
+    linear = sh.linearise("cubesat-slew", "pd", 0.05)
+    for parts in (linear, linear.sampled):
+        shut = control.feedback(parts.loop, np.eye(3))
+        np.testing.assert_allclose(np.poly(shut.poles()), np.poly(parts.closed.poles()), rtol=1e-6, atol=1e-9)
+    assert linear.left_out == ("sensor gaussian",)
+
+
+def test_margins_are_a_table():
+    found = sh.to_pandas(sh.margins("cubesat-slew", "pd"))
+    assert list(found["axis"]) == ["x", "y", "z"]
+    assert (found["gain"] > 10.0).all()
+
+
+@pytest.mark.parametrize(
+    ("scenario", "law", "why"),
+    [
+        ("three-laws", "mpc", "law mpc: found the law mpc iterates"),
+        ("three-laws", "sliding", "has no slope at rest on target"),
+        ("l2-circle", None, "rigid-body"),
+        ("three-laws", "none", "none"),
+    ],
+)
+def test_what_cannot_be_linearised_is_told(scenario, law, why):
+    with pytest.raises(sh.InputError, match=why):
+        sh.margins(scenario, law)
+    with pytest.raises(sh.InputError, match=why):
+        sh.linearise(scenario, law)
+
+
+def test_without_python_control_margins_are_still_found(monkeypatch):
+    monkeypatch.setitem(sys.modules, "control", None)
+    with pytest.raises(sh.InputError, match=r"no python-control; allowed: pip install 'starhold\[interop\]'"):
+        sh.linearise("cubesat-slew", "pd")
+    assert len(sh.margins("cubesat-slew", "pd")) == 3
