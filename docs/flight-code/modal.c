@@ -34,7 +34,8 @@ typedef struct {
 
 /* Beside the state all that a measurement is made of: the goal (None where the loop has no target),
    whether it never turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s,
-   body), the control period and the limit of the command. */
+   body), the control period, the limit of the command, and all readings of the sensors, an attribute for
+   each. */
 typedef struct {
     goal_t goal;
     vector_t torque;

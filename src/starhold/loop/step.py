@@ -3,7 +3,9 @@ a control instant) and `propagate` (the motion under the held command), composed
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Callable
+from functools import cache
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -95,7 +97,7 @@ def make_equations(parts: Composition) -> Step:
             ZERO if momentum is None else momentum,
             setup.period,
             setup.limit,
-            readings,
+            _readings(tuple(vars(readings)))(*vars(readings).values()),
         )
         followed = goal.attitude if goal is not None and follows else memories.followed
         return body.observe(found, scene), memories._replace(
@@ -270,3 +272,9 @@ def _matrices(inertias: Any) -> Any:
     for more in inertias[1:]:
         found = tuple(add(a, b) for a, b in zip(found, more, strict=True))
     return found
+
+
+@cache
+def _readings(names: tuple[str, ...]) -> Any:
+    """The class of all readings of a loop's sensors."""
+    return namedtuple("Readings", names)
