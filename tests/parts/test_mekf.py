@@ -17,7 +17,7 @@ from starhold.loop.kernels import Observer, numbers_of
 from starhold.parts.estimators import mekf
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
-from starhold.simulation.lanes import Fleet
+from starhold.simulation.lanes import Crew, Fleet
 
 ARCSEC = math.radians(1.0 / 3600.0)
 PERIOD = 0.5
@@ -173,7 +173,8 @@ def fly_all(lanes):
     (phase,) = loop.phases(240)
     begun = 0
     for stop in (119, 180, 239):
-        fleet.share_out(lambda piece, begun=begun, stop=stop: fleet.fly(phase, piece, begun, stop - begun), 2)
+        with Crew(2) as crew:
+            crew.share(lambda piece, begun=begun, stop=stop: fleet.fly(phase, piece, begun, stop - begun), fleet.count)()
         begun = stop
         notes = fleet.notes().T
         turn, mixed, walk = notes[:, 6:].reshape(lanes, 3, 3, 3).swapaxes(0, 1)
