@@ -66,7 +66,8 @@ class Law(Part):
 
     def fields(self, form: str | None = None) -> list[Field]:
         """The gains in order, or the inputs of a design form."""
-        return fields(self.gains if form is None else self.forms[form])
+        own = self.hook("fields") if form is None else None
+        return fields(self.gains if form is None else self.forms[form]) if own is None else own()
 
     def examples(self) -> list[Any]:
         """Gains that tests, docs and benchmarks run."""

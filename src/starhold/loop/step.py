@@ -218,6 +218,8 @@ def make_equations(parts: Composition) -> Step:
         given = total(e.module.applied(own, command, state, p) for e, own, command, p in users if e.flag("ACTS"))
         own = body.sample(state, goal_of(carry, state, step, setup), applied if given is None else given, carry.command)
         records = tuple(e.module.record(s, command, state, p) for e, s, command, p in users if e.hook("record"))
+        if parts.law.hook("record") is not None:
+            records = (*records, parts.law.module.record(carry.memory, setup.period))
         return (own, records, carry.memories.readings, carry.memories.estimate)
 
     def slope_of(carry, craft, setup):

@@ -18,17 +18,15 @@ from starhold.scenario.checking import (
     LONGEST_TEXT,
     cut,
     free_name,
-    make_gains,
     numbered,
-    pick_law,
     read_toml,
-    refuse_unstable,
-    refusing,
     validate,
 )
 from starhold.scenario.checking import nearest as nearest
+from starhold.scenario.gains import read_gains
+from starhold.scenario.modes import has_modes, read_modes
 from starhold.scenario.parts import read_parts
-from starhold.scenario.schema import APART, law_model
+from starhold.scenario.schema import APART
 
 LONGEST_PATH = 200
 """Characters of a path that errors show whole."""
@@ -176,16 +174,9 @@ def read_tables(data: Mapping[str, Any], text: str, where: str, folder: Path, al
 
 def _read_law(data: Any, scenario: Scenario, context: Any, key: str, taken: set[str]) -> LawEntry:
     """The law of a raw table, for a scenario that as yet has none."""
-    body, where, craft = scenario.hooks, scenario.where, scenario.craft
-    found, law, form = pick_law(data, body.laws(), body.name, scenario.folder, where, key)
-    extra = ["file", *(["form"] if law.forms else [])]
-    own = validate(law_model(law, form, body.law_table), found, where, key, extra, context)
-    values = [getattr(own, item.name) for item in law.fields(form)]
-    with refusing(law, where, key):
-        spec = None if form is None else body.complete(scenario, law, law.forms[form](*values), own)
-    gains = make_gains(law, values, spec, craft, where, key)
-    if not scenario.allow_unstable:
-        refuse_unstable(lambda: law.check(gains, craft), where, key)
+    body, where = scenario.hooks, scenario.where
+    reads = read_modes if has_modes(data, body) else read_gains
+    law, form, own, spec, gains = reads(data, scenario, context, key)
     options = body.options(scenario, own, gains, key)
     name = free_name(own.name, law.name, taken, where, key)
     return LawEntry(name, law, gains, options, form, spec)

@@ -189,7 +189,7 @@ def recorded(loop: ClosedLoop) -> list[tuple[str, Quantity, int]]:
     found: list[tuple[str, Quantity, int]] = []
     taken: set[str] = set()
     groups = [("", own), *(("", one) for one in records)]
-    callers = ["", *(f.called for f in effectors)]
+    callers = ["", *(f.called for f in effectors), *([loop.law.name] if loop.law.hook("record") is not None else [])]
     groups += [(f.called, one) for f, one in zip(sensors, readings, strict=True)]
     groups += [(f.called, estimate) for f in estimators]
     callers += [f.called for f in (*sensors, *estimators)]

@@ -49,6 +49,8 @@ class Body(Protocol):
     """The keys of tables of laws beside their gains."""
     example: str
     """A small scenario in TOML, to which a law's table can be appended."""
+    modes: bool = False
+    """Whether a law may be made of modes: the body's `Measurement` has what their conditions look at."""
     linked: Mapping[str, str] = MappingProxyType({})
     """Keys of `dials` whose value is that of another key until they are moved themselves."""
     orbit: str = ""

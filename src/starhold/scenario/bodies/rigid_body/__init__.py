@@ -52,6 +52,7 @@ class RigidBody(Body):
     tables = RigidBodyTable
     law_table = AttitudeLawTable
     example = EXAMPLE
+    modes = True
     linked = MappingProxyType({TRUE: KNOWN})
     orbit = ORBIT
 

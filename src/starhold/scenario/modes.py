@@ -1,0 +1,125 @@
+"""Reads laws of modes: a [[law]] of the type "modes" with [[law.mode]] tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+
+from pydantic import Field, create_model, model_validator
+
+from starhold.errors import InputError
+from starhold.laws.modes import AFTER, DWELL, NAME, TESTS, Mode, Switch, level_of, make_law
+from starhold.scenario.bodies.interface import Body
+from starhold.scenario.checking import nearest, show, validate
+from starhold.scenario.gains import Read, read_gains
+from starhold.scenario.quantity import quantity
+from starhold.scenario.schema import LawTable
+from starhold.scenario.tables import Name, Table, at_key
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import Scenario
+
+
+class _Condition(Table):
+    """When another mode begins: all that is asked for holds for so long."""
+
+    to: Annotated[str | None, Field(description="the mode that begins; until: the next, back: the one before")] = None
+    after: Annotated[float, *quantity(AFTER)] = 0.0
+    dwell: Annotated[float, *quantity(DWELL)] = 0.0
+
+    @model_validator(mode="after")
+    def _asks(self) -> _Condition:
+        if self.after == 0.0 and not self.tests:
+            raise at_key("", f"after, or one of {', '.join(TESTS)}", "no condition")
+        return self
+
+    @property
+    def tests(self) -> tuple[str, ...]:
+        """The tests that it asks for."""
+        return tuple(test for test in TESTS if getattr(self, test) is not None)
+
+
+_LEVELS: dict[str, Any] = {test: (Annotated[float | None, *quantity(level_of(test))], None) for test in TESTS}
+Condition: Any = create_model("Condition", __base__=_Condition, __doc__=_Condition.__doc__, **_LEVELS)
+
+
+class ModeTable(LawTable):
+    """The keys of every mode's table beside its law's own gains."""
+
+    name: Annotated[Name, Field(description="how switches, recordings and certificates call it")]
+    until: Annotated[Condition | None, Field(description="when the next mode begins")] = None
+    back: Annotated[Condition | None, Field(description="when the mode before begins again")] = None
+
+
+@cache
+def modes_model(base: type[LawTable]) -> type[LawTable]:
+    """The table of a law of modes, but for its modes; base: what a body's tables of laws have."""
+    made: Any = create_model("Modes", __base__=base, __doc__="A law for each mode.", type=(Literal[NAME], NAME))
+    return made
+
+
+def has_modes(data: Any, body: Body) -> bool:
+    """Whether a raw table is that of a law of modes."""
+    return isinstance(data, dict) and cast(Any, data).get("type") == NAME and body.modes
+
+
+def read_modes(data: Any, scenario: Scenario, context: Any, key: str) -> Read:
+    """The law of a raw table with [[law.mode]] tables, called `key` in errors. InputError for the first mode that is wrong, or
+    that none leads to."""
+    where = scenario.where
+    rest = {name: value for name, value in data.items() if name != "mode"}
+    table = validate(modes_model(scenario.hooks.law_table), rest, where, key, ["mode"], context)
+    given = data.get("mode")
+    if not isinstance(given, list) or len(cast(list[Any], given)) < 2:
+        found = "nothing" if given is None else "one mode" if isinstance(given, list) and given else show(given)
+        raise InputError(where, f"{key}.mode", found, "at least two [[law.mode]] tables")
+    reads: list[Read] = []
+    for number, one in enumerate(cast(list[Any], given), 1):
+        place = f"{key}.mode[{number}]"
+        if not isinstance(one, dict):
+            raise InputError(where, place, show(one), "a [[law.mode]] table")
+        reads.append(read_gains(one, scenario, context, place, ModeTable))
+    modes, gains = _joined([read.table for read in reads], reads, where, key)
+    law = make_law(tuple(modes))
+    return Read(law, None, table, None, law.gains(*gains))
+
+
+def _joined(tables: Sequence[Any], reads: Sequence[Read], where: str, key: str) -> tuple[list[Mode], list[Any]]:
+    """The modes with their switches, and the numbers of all of them."""
+    names: list[str] = [table.name for table in tables]
+    modes, gains, reached = list[Mode](), list[Any](), {0}
+    for place, (table, read) in enumerate(zip(tables, reads, strict=True)):
+        here = f"{key}.mode[{place + 1}]"
+        if names.index(table.name) < place:
+            raise InputError(where, f"{here}.name", show(table.name), "a name that no other mode of the law has")
+        if table.until is None and place < len(names) - 1:
+            raise InputError(where, f"{here}.until", "nothing", "a condition, for only the last mode may fly to the end")
+        gains += read.gains
+        switches: list[Switch] = []
+        for way, beside in (("until", place + 1), ("back", place - 1)):
+            condition = getattr(table, way)
+            if condition is None:
+                continue
+            to = _to(condition.to, names, place, beside, where, f"{here}.{way}")
+            reached.add(to)
+            switches.append(Switch(way, to, condition.tests))
+            gains += [condition.after, condition.dwell, *(getattr(condition, test) for test in condition.tests)]
+        modes.append(Mode(table.name, read.law, tuple(switches)))
+    unreached = next((place for place in range(len(names)) if place not in reached), None)
+    if unreached is not None:
+        allowed = "a mode that a condition of another one leads to"
+        raise InputError(where, f"{key}.mode[{unreached + 1}]", show(names[unreached]), allowed)
+    return modes, gains
+
+
+def _to(given: str | None, names: list[str], place: int, beside: int, where: str, key: str) -> int:
+    """The mode that a condition leads to."""
+    if given is None:
+        if not 0 <= beside < len(names):
+            raise InputError(where, f"{key}.to", "nothing", f"the name of a mode, for none is {'after' if beside else 'before'} it")
+        return beside
+    others = [name for name in names if name != names[place]]
+    if given not in others:
+        raise InputError(where, f"{key}.to", show(given), nearest(given, others))
+    return names.index(given)
