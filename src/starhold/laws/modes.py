@@ -1,8 +1,8 @@
 """A law made of laws: each mode has one, and conditions on what it is told say when another mode begins.
 
-At a control instant the conditions of the mode that flew are looked at first, and the law of the mode that they give commands:
-so the state with which a mode begins is one that fulfils the condition of the switch. A mode's law begins with its first
-memory each time.
+At a control instant the conditions of the mode that flew until then are looked at, and the law of the mode that they give
+commands: so the state with which a mode begins is one that fulfils the condition of the switch. A mode's law begins with its
+first memory each time.
 """
 
 from __future__ import annotations
@@ -135,8 +135,6 @@ class Modes:
                 holds = now.later(age, after)
                 for test, level in zip(switch.tests, levels, strict=True):
                     holds = both(holds, now.holds(test, level))
-                # The instant at which the mode begins is that of the switch to it.
-                holds = both(holds, less(0.5, age))
                 held[slot] = where(both(here, opposite(holds)), 0.0, held[slot])
                 due.append((both(here, now.later(held[slot] - 1.0, dwell)), switch.to))
         for truth, to in due:

@@ -204,14 +204,14 @@ def _reflown(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, own: Values,
             # A key that goes with another has its value, unless it is moved itself.
             along = {key: values[leader] for key, leader in scenario.hooks.linked.items() if leader in values}
             given = {key: (own | along | values)[key] for key in keys}
-            return _form(made, steps) == like and _same(_numbers(made, steps), _given(scenario, loop, given))
+            return _form(made, steps) == like and _same(_numbers(made, steps), _given(scenario, entry, loop, given))
         except (InputError, ValueError, ZeroDivisionError):
             return False
 
     held: dict[str, str] = {}
     # The start is the file's own with no key moved, as with all of them given.
     kept = [key for key in own if not key.startswith("law.")]
-    kept = kept if _same(numbers, _given(scenario, loop, {key: own[key] for key in kept})) else []
+    kept = kept if _same(numbers, _given(scenario, entry, loop, {key: own[key] for key in kept})) else []
     held |= {key: COMPUTED for key in own if not key.startswith("law.") and key not in kept}
     kept += [key for key in own if key.startswith("law.")]
     held |= {key: ALONE for key in kept if not tried.of(key)}
@@ -232,7 +232,7 @@ def _reflown(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, own: Values,
         if kept and not all_follow(kept):
             held |= dict.fromkeys(kept, COMPUTED)
             kept = []
-    derive, places = _recorded(scenario, loop, {key: own[key] for key in kept}) if kept else (None, ())
+    derive, places = _recorded(scenario, entry, loop, {key: own[key] for key in kept}) if kept else (None, ())
     carry, phase = loop.carry(), loop.phases(steps)[0]
     step = make_step(loop.composition())
     program = one(step, carry, Numbers.of(phase), loop.substeps)
@@ -276,14 +276,14 @@ def _same(a: Array, b: Array) -> bool:
     return a.shape == b.shape and a.tobytes() == b.tobytes()
 
 
-def _equation(scenario: Scenario, loop: ClosedLoop, keys: Sequence[str]) -> Callable[[Any], list[Any]]:
+def _equation(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, keys: Sequence[str]) -> Callable[[Any], list[Any]]:
     """The equation that gives all numbers of a loop from values of these keys, in order."""
     names = [item.name for item in loop.law.fields()]
 
     def numbers(values: Any) -> list[Any]:
         given = dict(zip(keys, values, strict=True))
-        own = {key.rpartition(".")[2]: value for key, value in given.items() if key.startswith("law.")}
-        gains = loop.gains._replace(**{name: own[name] for name in names if name in own})
+        own = {key.removeprefix(f"law.{entry.name}."): value for key, value in given.items() if key.startswith("law.")}
+        gains = type(loop.gains)(*(own.get(name, value) for name, value in zip(names, loop.gains, strict=True)))
         moved = scenario.hooks.moved(scenario, loop, {k: v for k, v in given.items() if not k.startswith("law.")})
         setup = loop.setup()
         setup = setup._replace(limit=moved.limit)
@@ -295,13 +295,13 @@ def _equation(scenario: Scenario, loop: ClosedLoop, keys: Sequence[str]) -> Call
     return numbers
 
 
-def _given(scenario: Scenario, loop: ClosedLoop, values: Values) -> Array:
-    return np.array(_equation(scenario, loop, list(values))(tuple(values.values())), dtype=float)
+def _given(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, values: Values) -> Array:
+    return np.array(_equation(scenario, entry, loop, list(values))(tuple(values.values())), dtype=float)
 
 
-def _recorded(scenario: Scenario, loop: ClosedLoop, own: Values) -> tuple[Program, tuple[int, ...]]:
+def _recorded(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, own: Values) -> tuple[Program, tuple[int, ...]]:
     """The equation as a program, which gives the numbers that depend on the values alone, and their places."""
-    equation, found = _equation(scenario, loop, list(own)), list[int]()
+    equation, found = _equation(scenario, entry, loop, list(own)), list[int]()
 
     def depending(values: Any) -> tuple[Any, ...]:
         numbers = equation(values)

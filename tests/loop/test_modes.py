@@ -1,0 +1,110 @@
+"""Laws of modes: each mode flies as its law alone would from there, and switches come when their conditions say."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from starhold.algebra.structure import flatten
+from starhold.laws.modes import mode_laws
+from starhold.loop.kernels import fly_plainly
+from starhold.scenario.building import build
+from starhold.scenario.reading import parse
+from starhold.simulation.lane import fly, recorded
+from starhold.simulation.lanes import simulate_many
+
+BASE = """
+name = "mission"
+[spacecraft]
+inertia = [0.05, 0.065, 0.025]
+torque_limit = 0.002
+[initial]
+attitude = [0.2, 0.7, -0.5, 0.4]
+rate = ["6 deg/s", "-5 deg/s", "4 deg/s"]
+[simulation]
+duration = 60.0
+control_period = 0.1
+[[law]]
+name = "mission"
+type = "modes"
+quaternion_sign = "shortest"
+"""
+DETUMBLE = """
+[[law.mode]]
+name = "detumble"
+type = "pd"
+k_rate = 0.02
+k_attitude = 1e-6
+until = { rate_below = "0.5 deg/s", dwell = "2 s" }
+"""
+POINT = """
+[[law.mode]]
+name = "point"
+type = "pid"
+k_rate = 0.006
+k_attitude = 0.0008
+k_integral = 1e-5
+integral_limit = 1e-4
+"""
+
+
+def loop_of(modes=DETUMBLE + POINT, text=BASE):
+    scenario = parse(text + modes, "mission.toml")
+    return build(scenario, scenario.laws[0])
+
+
+def flown(loop, steps=600):
+    samples, carry = fly(loop, steps)
+    rows, row = {}, 0
+    for name, _, size in recorded(loop):
+        rows[name] = samples[row : row + size]
+        row += size
+    return rows, carry
+
+
+def alone(loop, mode):
+    """The loop of one mode's law."""
+    _, law, gains = mode_laws(loop.law, loop.gains)[mode]
+    return replace(loop, law=law, gains=gains)
+
+
+def test_modes_fly_as_their_laws_one_after_another_from_the_switch():
+    loop = loop_of()
+    both, _ = flown(loop)
+    switch = int(np.argmax(both["mode"][0] > 1.5))
+    assert 50 < switch < 500 and (both["mode"][0][switch:] == 2.0).all()
+    first, carry = flown(alone(loop, 0), switch)
+    second = alone(loop, 1)
+    # The quaternion's sign goes on where it was, as h is carried.
+    then, _ = flown(replace(second, start=carry.state), 600 - switch)
+    for name in ("attitude", "rate", "command"):
+        joined = np.concatenate([first[name][:, :switch], then[name]], axis=1)
+        assert joined.tobytes() == both[name].tobytes(), name
+
+
+def test_one_lane_many_lanes_and_plain_python_agree_bit_for_bit():
+    loop = loop_of(DETUMBLE + POINT + 'back = { rate_above = "1 deg/s" }\n')
+    run, carry = flown(loop, 400)
+    # There and back again.
+    assert {(1.0, 2.0), (2.0, 1.0)} <= set(pairwise(run["mode"][0].tolist()))
+    plain = fly_plainly(loop, 400)
+    starts = [loop.start._replace(rate=tuple(factor * w for w in loop.start.rate)) for factor in (1.0, 3.0, 0.05)]
+    many = simulate_many(loop, starts * 3, 400)
+    assert np.array(flatten(plain)).tobytes() == np.array(flatten(carry)).tobytes()
+    for lane, start in enumerate(starts * 3):
+        assert many.states[:, lane].tolist() == flatten(fly(replace(loop, start=start), 400)[1].state)
+
+
+def test_a_dwell_is_counted_without_breaks_and_a_switch_leads_back():
+    loop = loop_of(DETUMBLE + POINT + 'back = { rate_above = "1 deg/s" }\n')
+    run, _ = flown(loop)
+    rate = np.degrees(np.linalg.norm(run["rate"], axis=0))
+    mode, held, wanted = 1.0, 0, list[float]()
+    for now in rate:
+        held = held + 1 if now < 0.5 else 0
+        # So many instants span 2 s.
+        mode, held = (2.0, 0) if mode == 1.0 and held == 21 else (1.0, 0) if mode == 2.0 and now > 1.0 else (mode, held)
+        wanted.append(mode)
+    assert run["mode"][0].tolist() == wanted
+    assert wanted.count(2.0) > 10 and (1.0, 2.0) in pairwise(wanted) and (2.0, 1.0) in pairwise(wanted)
+
