@@ -67,18 +67,23 @@ class Span:
 
 
 def departures(
-    certificate: Certificate, loop: ClosedLoop, run: Recording, first: int = 0, last: int | None = None
+    certificate: Certificate,
+    loop: ClosedLoop,
+    run: Recording,
+    first: int = 0,
+    last: int | None = None,
+    change: str = "what flies, or what the law knows of it, changes",
 ) -> dict[str, tuple[Departure, ...]]:
     """Tell for each proved kind of claim about motions how a run leaves it, in order of time; empty where it does not.
 
-    loop: what the certificate speaks of, flown from control step `first` until it changes at `last` (None: it does not).
+    loop: what the certificate speaks of, flown from control step `first` until it changes at `last` (None: it does not), as `change` tells.
     That torque is held between samples counts only where it is refuted that it may be.
     """
     span = Span(loop, run, first, last)
     if not len(span["time"]):
         return {}
     sampled = certificate.claim("sampling")
-    common = _changes(span)
+    common = [] if span.changes is None else [Departure(span.changes, change)]
     if sampled is not None and sampled.outcome == "refuted":
         common += span.always(f"the torque is held for {loop.period:g} s, with which not even the linear loop is stable")
     if run.attrs.get("diverged_at") is not None:
@@ -89,10 +94,6 @@ def departures(
             own = [one for assumed in claim.assumptions for one in _met(assumed, span)]
             found[claim.kind] = tuple(sorted({*common, *own, *_set(claim, span)}))
     return found
-
-
-def _changes(span: Span) -> list[Departure]:
-    return [] if span.changes is None else [Departure(span.changes, "what flies, or what the law knows of it, changes")]
 
 
 # --- assumptions ------------------------------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ from starhold.laws.catalogue import known_law
 
 HEADINGS = {
     "convergence": "converges",
+    "hand-over": "takes over",
     "region": "region of attraction",
     "torque-limit": "within the torque limit",
     "inertia": "uncertain inertia",
@@ -39,6 +40,7 @@ OBLIGATIONS = {
     "equilibria too, but unstable, so that only a set of measure zero ends there",
     "jumps lower V": "every switch of the hysteresis lowers V",
     "convergence": "the set lies in the region of convergence",
+    "holds what is handed over": "every state in which the mode before may end is in the set",
     "torque": "the torque is within the limit on the whole set",
     "momentum": "no wheel stores more than it can on the whole set",
     "end": "outside a small ball V falls in spite of the torque",
@@ -175,6 +177,17 @@ def _convergence(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     return f"{place(n, subject)} the body comes to rest on target{_cover(n, subject)}".strip()
 
 
+def _hand_over(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
+    def most(value: float, unit: str) -> str:
+        # Without the rounding of the law's own comparison.
+        return shown(float(f"{math.degrees(value):.12g}"), unit, up=True)
+
+    bounds = [f"a rate of at most {most(n['rate'], '°/s')}"] if n["rate"] is not None else []
+    bounds += [f"an angle of at most {most(n['angle'], '°')}"] if n["angle"] is not None else []
+    where = f"with {' and '.join(bounds)}" if bounds else "with any attitude and rate"
+    return f"wherever the mode before hands over, {where}, the body comes to rest on target{_cover(n, subject)}"
+
+
 def _region(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     where = place(n, subject) or "from a level set of V"
     either = ", from either quaternion of an attitude" if subject["quaternion_sign"] == "hysteresis" else ""
@@ -277,6 +290,7 @@ def _saturated_axis(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 
 _SENTENCES = {
     "convergence": _convergence,
+    "hand-over": _hand_over,
     "region": _region,
     "torque-limit": _torque_limit,
     "wheels": _wheels,

@@ -23,6 +23,7 @@ from starhold.checker.exact import (
     plus,
     rational,
     root_above,
+    times,
     transpose,
     within_circle,
 )
@@ -94,6 +95,37 @@ def convergence(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
     """Every motion from {V <= start} comes to rest on target."""
     region = claimed(subject, claim)
     return [*_converges(region, claim), _told(region, claim["numbers"])]
+
+
+def hand_over(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
+    """Motions from {V <= start} come to rest on target, and the set holds all states with rates and angles up to those
+    told (None: any)."""
+    region, numbers = claimed(subject, claim), claim["numbers"]
+    rate, angle, part = (optional(x) for x in (numbers["rate"], numbers["angle"], claim["witness"]["attitude_level"]))
+
+    def inside() -> str:
+        everything = numbers["everything"]
+        demand(everything == (region.level is None) == (region.start is None), "only without a level it is everything")
+        if everything:
+            return "every state is in it"
+        start, even = region.start, is_even(region.loop)
+        if rate is None or part is None or start is None:
+            raise CheckError("the rate is not bounded")
+        demand(rate >= 0 and 0 < part <= start, "the rate is negative, or there is no room for the attitude")
+        for P in region.frame.tops:
+            left = plus(identity(3, 2 * (start - part)), times(rate**2, P), -1)
+            demand(definite(left, strictly=False), "with such a rate V may be larger")
+        shorter = subject.sign_policy == "shortest" and not even
+        if angle is None:
+            demand((2 if shorter else 1) * part >= region.highest, "at some attitude V may be larger")
+        else:
+            # Which of its quaternions tells an attitude matters but for these.
+            demand(even or shorter, "an attitude may be told by the longer of its quaternions")
+            below = _region(region.loop, numbers["level"], claim["witness"]["attitude_level"], claim["witness"])
+            demand(angle >= 0 and below.holds_turn(angle), "at such an angle V may be larger")
+        return "its largest V is at most that of the set"
+
+    return [*_converges(region, claim), ("holds what is handed over", BALLS, inside)]
 
 
 def torque_limit(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
@@ -275,6 +307,7 @@ def _instead(old: str, *new: str) -> tuple[str, ...]:
 
 CLAIMS: dict[str, Kind] = {
     "convergence": Kind(_BASE, convergence),
+    "hand-over": Kind(_BASE, hand_over),
     "torque-limit": Kind(_instead(_UNLIMITED), torque_limit, wheels=False),
     "wheels": Kind(
         _instead(_UNLIMITED, "wheels without friction", "total momentum at most as told"), wheels_limits, wheels=True

@@ -112,6 +112,7 @@ HOWS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(("form", "target"), _EXACT),
     "descent": _SIGN + _BALLS,
     **dict.fromkeys(("only equilibrium", "only the circle"), ("LaSalle",)),
+    "holds what is handed over": _BALLS,
     **dict.fromkeys(("torque", "control", "stays", "nothing returns from beyond"), _BALLS),
     "strict": _SIGN + _BALLS,
     "other equilibrium repels": _SIGN + _ROOTS,
@@ -183,6 +184,7 @@ _CONTENTS: dict[str, Test] = {
 }
 NUMBERS: dict[str, dict[str, Test]] = {
     "convergence": {"level": _MAYBE, **_CONTENTS},
+    "hand-over": {**dict.fromkeys(("level", "start", "rate", "angle"), _MAYBE), "everything": _flag},
     "torque-limit": {"level": _MAYBE, **_CONTENTS, "limit": _number, "kind": _one("axis", "norm")},
     "wheels": {
         "level": _MAYBE,
@@ -218,6 +220,7 @@ STEP: dict[str, Test] = {"form": _list(_list(_number, 6), 6), "decay": _number, 
 _PROOF: dict[str, Test] = {"stiffness": _MAYBE, "epsilon": _number, "rho": _number}
 WITNESS: dict[str, dict[str, Test]] = {
     "convergence": {**_PROOF, "rate_bound": _MAYBE},
+    "hand-over": {**_PROOF, **dict.fromkeys(("rate_bound", "attitude_level"), _MAYBE)},
     "torque-limit": {**_PROOF, **dict.fromkeys(("rate_bound", "shift", "weight"), _MAYBE)},
     "wheels": {**_PROOF, "rate_bound": _MAYBE},
     "inertia": {**_PROOF, "level": _MAYBE},

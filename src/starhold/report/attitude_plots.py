@@ -14,7 +14,7 @@ from starhold.analysis.metrics import stays_within
 from starhold.analysis.rigid_body import DECADES, acceleration, error_angle
 from starhold.parts.bodies import rigid_body
 from starhold.parts.effectors import wheels
-from starhold.report.plots import OFF_SCALE, Curve, Panel, Plot, near, positive, recorded_plots, sound, thin, thin_times
+from starhold.report.plots import OFF_SCALE, Curve, Mark, Panel, Plot, near, positive, recorded_plots, sound, thin, thin_times
 from starhold.scenario.bodies.rigid_body.craft import torque_limit, wheels_of
 from starhold.scenario.bodies.rigid_body.faults import fault_times
 
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 ACCURACIES = (("", "attitude, |q| ≤ 10⁻ᵏ"), ("rate_", "rate, |ω| ≤ 10⁻ᵏ rad/s"))
 """Errors whose steps to an accuracy are counted: the prefix of the metric, and the heading."""
+MOST_MARKS = 20
+"""Switches of a flight that are marked."""
 NEAR = 0.02
 """Share of the largest error that counts as near the target."""
 KNOWN = (*rigid_body.Sample._fields, *wheels.Sample._fields)
@@ -44,8 +46,8 @@ class AttitudePlots:
     further: tuple[Plot, ...] = ()
     """Rate and acceleration against their limits, momenta and torques of reaction wheels, where there are any, and what
     other parts record."""
-    marks: tuple[float, ...] = ()
-    """When faults happen and are acted on (s)."""
+    marks: tuple[Mark, ...] = ()
+    """When faults happen and are acted on, and modes begin (s)."""
 
 
 def collect(flights: Sequence[Flight], points: int, scenario: Scenario, end: float = math.inf) -> AttitudePlots:
@@ -79,8 +81,18 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario, end: flo
             *_wheels(flights, factor, scenario),
             *recorded_plots(flights, factor, KNOWN),
         ),
-        tuple(time for time in fault_times(scenario) if time <= end),
+        tuple(mark for mark in (*map(Mark, fault_times(scenario)), *_begun(flights)) if mark.time <= end),
     )
+
+
+def _begun(flights: Sequence[Flight]) -> list[Mark]:
+    """When modes begin; of laws that switch to and fro the first of them."""
+    of = {flight.name: flight.modes for flight in flights if flight.modes}
+    return [
+        Mark(one.time, one.mode if len(of) == 1 else f"{name}: {one.mode}")
+        for name, modes in of.items()
+        for one in modes[:MOST_MARKS]
+    ]
 
 
 def thinning(count: int, points: int) -> int:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from starhold.files import atomic_write
 from starhold.report.colours import colour
-from starhold.report.plots import Plot, back_to_front
+from starhold.report.plots import Mark, Plot, back_to_front
 from starhold.report.text import lost_text
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def warm_up() -> None:
     figure.savefig(BytesIO())
 
 
-def over_time(plot: Plot, times: Any, marks: Sequence[float], flights: Sequence[Flight], name: str) -> Any:
+def over_time(plot: Plot, times: Any, marks: Sequence[Mark], flights: Sequence[Flight], name: str) -> Any:
     """A figure of panels over one time axis."""
     count = len(plot.panels)
     height = {1: 3.6, 2: 5.2}.get(count, 1.6 * (count + 1))
@@ -74,7 +74,10 @@ def over_time(plot: Plot, times: Any, marks: Sequence[float], flights: Sequence[
         for level in panel.levels:
             axis.axhline(level, color="0.35", linewidth=0.9, dashes=(5, 3))
         for mark in marks:
-            axis.axvline(mark, color="0.2", linewidth=0.9, linestyle=":")
+            axis.axvline(mark.time, color="0.2", linewidth=0.9, linestyle=":")
+            if mark.word and axis is axes[0]:
+                place = {"xy": (mark.time, 1.0), "xycoords": axis.get_xaxis_transform(), "textcoords": "offset points"}
+                axis.annotate(mark.word, xytext=(3, -3), rotation=90, va="top", fontsize=8, color="0.2", **place)
         if panel.span is not None:
             axis.set_ylim(*panel.span)
         axis.set_ylabel(panel.label)

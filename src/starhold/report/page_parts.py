@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from starhold.report.colours import colour
-from starhold.report.plots import Panel, Plot, back_to_front
+from starhold.report.plots import Mark, Panel, Plot, back_to_front
 from starhold.report.proved import swatch
 from starhold.report.text import lost_text, number_text, value_text
 from starhold.studies.flight import Flight
@@ -149,7 +149,7 @@ def over_time_heading(transient: float | None) -> str:
     )
 
 
-def over_time(plot: Plot, flights: Sequence[Flight], marks: Sequence[float] = ()) -> dict[str, Any]:
+def over_time(plot: Plot, flights: Sequence[Flight], marks: Sequence[Mark] = ()) -> dict[str, Any]:
     """A plot over time for the script that draws it."""
     order = back_to_front(flights, plot)
     panels = [panel_data(panel, order, thin=plot.chatters) for panel in plot.panels]
@@ -160,7 +160,7 @@ def over_time(plot: Plot, flights: Sequence[Flight], marks: Sequence[float] = ()
         "dashed": plot.dashed,
         "xlabel": label,
         "panels": panels,
-        "marks": tuple(marks),
+        "marks": [(mark.time, mark.word) for mark in marks],
     }
 
 

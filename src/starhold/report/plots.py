@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,13 @@ class Plot:
     """Whether curves may jump from sample to sample; their lines are thin, and the wildest behind."""
     clock: str = "s"
     """The unit of the times."""
+
+
+class Mark(NamedTuple):
+    """A line across a plot at a time, with a word at its head."""
+
+    time: float
+    word: str = ""
 
 
 def thin(values: Curve, factor: int) -> Curve:

@@ -30,6 +30,10 @@ class Issued(NamedTuple):
     certificate: Certificate
     loop: Any
     step: int = 0
+    mode: int | None = None
+    """Of a flight of modes the one that it speaks of, counted from 1."""
+    before: int | None = None
+    """The mode before, of a certificate about how that hands over."""
 
 
 class BodyStudy(Protocol):

@@ -10,6 +10,7 @@ from starhold.scenario.building import build as build
 from starhold.simulation.lane import Progress, Recording, fly
 from starhold.studies.body import study_of
 from starhold.studies.flight import Flight
+from starhold.studies.modes import modes_flown
 from starhold.version import __version__
 
 if TYPE_CHECKING:
@@ -30,7 +31,8 @@ def fly_law(scenario: Scenario, entry: Any, loop: Any, notice: Notice | None = N
         item.name: (item.gain.choices[value], "1") if item.gain.choices else (value, item.gain.unit)
         for item, value in zip(entry.law.fields(), entry.gains, strict=True)
     }
-    return Flight(entry.name, entry.law.name, run, metrics, gains | study.resources(entry), study.metric_set(run))
+    values, modes = gains | study.resources(entry), modes_flown(entry.law, run)
+    return Flight(entry.name, entry.law.name, run, metrics, values, study.metric_set(run), modes=modes)
 
 
 def timed(scenario: Scenario, loop: Any, flight: Flight) -> Flight:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -16,6 +16,13 @@ if TYPE_CHECKING:
     from starhold.certification.certificate import Certificate
     from starhold.simulation.lane import Recording
     from starhold.studies.body import Values
+
+
+class Begun(NamedTuple):
+    """A mode of this name begins at a time (s)."""
+
+    mode: str
+    time: float
 
 
 @dataclass(frozen=True, repr=False)
@@ -33,6 +40,9 @@ class Flight:
     """All that is proved of the law on this spacecraft: as it starts, and after faults."""
     departures: tuple[Mapping[str, tuple[Departure, ...]], ...] = ()
     """How this flight leaves the proved claims of each certificate, by their kinds."""
+
+    modes: tuple[Begun, ...] = ()
+    """The modes that flew, one after another, of a law that has such."""
 
     def __repr__(self) -> str:
         shown = self.metric_set
@@ -58,7 +68,7 @@ class Flight:
         return self.departures[certificate].get(kind, ()) if self.departures else ()
 
     def results(self) -> dict[str, Any]:
-        """The content of a summary: the metrics and, of a certified law, each claim with its outcome, the time (s) from
+        """The content of a summary: the metrics and, of a law of modes, when each begins, of a certified law, each claim with its outcome, the time (s) from
         which on this flight is not what it speaks of (None: it is throughout), and what happens then and later."""
         claims: list[dict[str, Any]] = []
         for number, certificate in enumerate(self.certificates):
@@ -66,4 +76,5 @@ class Flight:
                 left = [one._asdict() for one in self.left(number, claim.kind)]
                 told = {"certificate": certificate.name, "claim": claim.kind, "outcome": claim.outcome}
                 claims.append(told | {"left_at": left[0]["time"] if left else None, "left": left})
-        return self.metrics | ({"claims": claims} if self.certificates else {})
+        modes = {"modes": [one._asdict() for one in self.modes]} if self.modes else {}
+        return self.metrics | modes | ({"claims": claims} if self.certificates else {})

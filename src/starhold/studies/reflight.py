@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.structure import flatten, leaves, mapped
 from starhold.errors import InputError
+from starhold.laws.modes import mode_laws
 from starhold.loop.kernels import Arguments, Numbers, form, make_step, numbers_of, one
 from starhold.scenario.building import build
 from starhold.scenario.checking import read_toml
@@ -37,6 +38,7 @@ Values: TypeAlias = dict[str, Any]
 """Numbers, vectors or matrices by the keys of a file."""
 
 FAULTS = "faults change the loop on the way"
+MODES = "its modes have gains of their own, which the page does not move"
 COMPUTED = "it enters numbers that no recorded equation gives, such as a law's matrices"
 ALONE = "no value beside the file's own is allowed"
 TRIED = ((1.05, 0.97, 1.02), (1.02, 1.02, 1.02), (0.9, 0.9, 0.9))
@@ -105,7 +107,11 @@ def reflight(scenario: Scenario) -> Reflight:
     dials = dict(held.hooks.dials(held))
     shared = list(dials)
     gains: dict[str, Field] = {}
+    grounded: dict[str, str] = {}
     for entry in held.laws:
+        if mode_laws(entry.law, entry.gains):
+            grounded[entry.name] = MODES
+            continue
         for item, value in zip(entry.law.fields(), entry.gains, strict=True):
             if _is_numbers(value) and not item.gain.whole and not item.gain.choices:
                 key = f"law.{entry.name}.{item.name}"
@@ -114,8 +120,9 @@ def reflight(scenario: Scenario) -> Reflight:
     held = changed(held, _changes(held, {key: dials[key] for key in shared if key == "initial.attitude"}))
     tried = _Tried(held, dials)
     laws: list[Reflown] = []
-    grounded: dict[str, str] = {}
     for entry in held.laws:
+        if entry.name in grounded:
+            continue
         loop = build(held, entry)
         if loop.events:
             grounded[entry.name] = FAULTS
@@ -204,14 +211,14 @@ def _reflown(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, own: Values,
             # A key that goes with another has its value, unless it is moved itself.
             along = {key: values[leader] for key, leader in scenario.hooks.linked.items() if leader in values}
             given = {key: (own | along | values)[key] for key in keys}
-            return _form(made, steps) == like and _same(_numbers(made, steps), _given(scenario, entry, loop, given))
+            return _form(made, steps) == like and _same(_numbers(made, steps), _given(scenario, loop, given))
         except (InputError, ValueError, ZeroDivisionError):
             return False
 
     held: dict[str, str] = {}
     # The start is the file's own with no key moved, as with all of them given.
     kept = [key for key in own if not key.startswith("law.")]
-    kept = kept if _same(numbers, _given(scenario, entry, loop, {key: own[key] for key in kept})) else []
+    kept = kept if _same(numbers, _given(scenario, loop, {key: own[key] for key in kept})) else []
     held |= {key: COMPUTED for key in own if not key.startswith("law.") and key not in kept}
     kept += [key for key in own if key.startswith("law.")]
     held |= {key: ALONE for key in kept if not tried.of(key)}
@@ -232,7 +239,7 @@ def _reflown(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, own: Values,
         if kept and not all_follow(kept):
             held |= dict.fromkeys(kept, COMPUTED)
             kept = []
-    derive, places = _recorded(scenario, entry, loop, {key: own[key] for key in kept}) if kept else (None, ())
+    derive, places = _recorded(scenario, loop, {key: own[key] for key in kept}) if kept else (None, ())
     carry, phase = loop.carry(), loop.phases(steps)[0]
     step = make_step(loop.composition())
     program = one(step, carry, Numbers.of(phase), loop.substeps)
@@ -276,14 +283,14 @@ def _same(a: Array, b: Array) -> bool:
     return a.shape == b.shape and a.tobytes() == b.tobytes()
 
 
-def _equation(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, keys: Sequence[str]) -> Callable[[Any], list[Any]]:
+def _equation(scenario: Scenario, loop: ClosedLoop, keys: Sequence[str]) -> Callable[[Any], list[Any]]:
     """The equation that gives all numbers of a loop from values of these keys, in order."""
     names = [item.name for item in loop.law.fields()]
 
     def numbers(values: Any) -> list[Any]:
         given = dict(zip(keys, values, strict=True))
-        own = {key.removeprefix(f"law.{entry.name}."): value for key, value in given.items() if key.startswith("law.")}
-        gains = type(loop.gains)(*(own.get(name, value) for name, value in zip(names, loop.gains, strict=True)))
+        own = {key.rpartition(".")[2]: value for key, value in given.items() if key.startswith("law.")}
+        gains = loop.gains._replace(**{name: own[name] for name in names if name in own})
         moved = scenario.hooks.moved(scenario, loop, {k: v for k, v in given.items() if not k.startswith("law.")})
         setup = loop.setup()
         setup = setup._replace(limit=moved.limit)
@@ -295,13 +302,13 @@ def _equation(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, keys: Seque
     return numbers
 
 
-def _given(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, values: Values) -> Array:
-    return np.array(_equation(scenario, entry, loop, list(values))(tuple(values.values())), dtype=float)
+def _given(scenario: Scenario, loop: ClosedLoop, values: Values) -> Array:
+    return np.array(_equation(scenario, loop, list(values))(tuple(values.values())), dtype=float)
 
 
-def _recorded(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, own: Values) -> tuple[Program, tuple[int, ...]]:
+def _recorded(scenario: Scenario, loop: ClosedLoop, own: Values) -> tuple[Program, tuple[int, ...]]:
     """The equation as a program, which gives the numbers that depend on the values alone, and their places."""
-    equation, found = _equation(scenario, entry, loop, list(own)), list[int]()
+    equation, found = _equation(scenario, loop, list(own)), list[int]()
 
     def depending(values: Any) -> tuple[Any, ...]:
         numbers = equation(values)

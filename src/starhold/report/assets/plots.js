@@ -69,9 +69,17 @@ function guides(panel, plot) {
       const y = u.valToPos(level, "y", true);
       line([bbox.left, y], [bbox.left + bbox.width, y], [6, 4]);
     }
-    for (const mark of plot.marks || []) {
-      const x = u.valToPos(mark, "x", true);
+    ctx.fillStyle = colours.soft;
+    ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
+    for (const [time, word] of plot.marks || []) {
+      const x = u.valToPos(time, "x", true);
       line([x, bbox.top], [x, bbox.top + bbox.height], [2, 3]);
+      if (panel !== plot.panels[0]) continue;
+      ctx.save();
+      ctx.translate(x + 4 * devicePixelRatio, bbox.top + 4 * devicePixelRatio);
+      ctx.rotate(Math.PI / 2);
+      ctx.fillText(word, 0, 0);
+      ctx.restore();
     }
     ctx.restore();
   };

@@ -10,6 +10,7 @@ import numpy as np
 
 from starhold.analysis.rigid_body import METRICS, measure
 from starhold.analysis.transient import Limits, against_limits
+from starhold.laws.modes import mode_laws
 from starhold.loop.kernels import make_step
 from starhold.parts.bodies.rigid_body import kinetic_energy
 from starhold.parts.craft import tensor
@@ -17,6 +18,7 @@ from starhold.parts.effectors.wheels import gives_what_is_asked
 from starhold.parts.quaternion_sign import SIGN_POLICIES
 from starhold.simulation.lane import fly, label
 from starhold.studies.body import NO_CONES, BodyStudy, Cones, Issued, Values
+from starhold.studies.modes import certify_modes, mode_departures
 
 if TYPE_CHECKING:
     from starhold.analysis.departure import Departure
@@ -89,6 +91,8 @@ class RigidBodyStudy:
     def departures(self, issued: Issued, loop: ClosedLoop, run: Recording) -> dict[str, tuple[Departure, ...]]:
         from starhold.analysis.departure import departures
 
+        if issued.mode is not None:
+            return mode_departures(issued, run)
         # A certificate ends where the loop changes next.
         last = min((event.step for event in loop.events if event.step > issued.step), default=None)
         within = last is not None and last * loop.period <= float(run["time"][-1])
@@ -100,7 +104,7 @@ class RigidBodyStudy:
         return fly_claims(issued.loop, issued.certificate)
 
     def start_inside(self, issued: Issued) -> dict[str, bool]:
-        return start_inside(issued.certificate, issued.loop)
+        return start_inside(issued.certificate, issued.loop) if issued.mode in (None, 1) and issued.before is None else {}
 
 
 STUDY: BodyStudy = RigidBodyStudy()
@@ -113,6 +117,8 @@ def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[I
 
     table = scenario.table.certify
     wanted = Wanted(table.rate, table.slew_angle, table.inertia_tolerance, table.disturbance, table.momentum)
+    if mode_laws(loop.law, loop.gains):
+        return certify_modes(loop, entry.name, wanted)
     found: list[Issued] = []
     for step, now in _known(loop, scenario.table.simulation.steps):
         name = f"{entry.name} from {step * loop.period:g} s" if step else entry.name

@@ -1,0 +1,106 @@
+"""Flights of modes: when they switch, and what is certified of each mode and of the hand-over to it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from starhold.laws.modes import Modes, mode_laws
+from starhold.studies.body import Issued
+from starhold.studies.flight import Begun
+
+if TYPE_CHECKING:
+    from starhold.analysis.departure import Departure
+    from starhold.certification.certify import Wanted
+    from starhold.laws.catalogue import Law
+    from starhold.loop.closed_loop import ClosedLoop
+    from starhold.simulation.lane import Recording
+
+
+NEXT = "another mode begins"
+
+
+class Stretch(NamedTuple):
+    """A mode, counted from 1, flies from the control step `first` on until `last` (None: the end)."""
+
+    mode: int
+    first: int
+    last: int | None
+
+
+def stretches(run: Recording) -> list[Stretch]:
+    """The modes of a recorded run, one after another; none of a law without modes. One that begins and ends between two
+    samples is not among them."""
+    if "mode" not in run.arrays:
+        return []
+    period = run.attrs["control_period"]
+    modes, begun = run["mode"], np.rint((run["time"] - run["time_in_mode"]) / period).astype(int)
+    places = np.flatnonzero(np.r_[True, (np.diff(modes) != 0.0) | (np.diff(begun) != 0)])
+    starts = [max(0, int(begun[place])) for place in places]
+    return [
+        Stretch(int(modes[place]), first, last) for place, first, last in zip(places, starts, [*starts[1:], None], strict=True)
+    ]
+
+
+def modes_flown(law: Law, run: Recording) -> tuple[Begun, ...]:
+    """The modes of a recorded run by their names, with the times at which they begin."""
+    period = run.attrs["control_period"]
+    return tuple(Begun(law.module.modes[one.mode - 1].name, one.first * period) for one in stretches(run))
+
+
+def loop_of_mode(loop: ClosedLoop, place: int) -> ClosedLoop:
+    """The loop of the law of one mode, counted from 0, as if that flew alone."""
+    _, law, gains = mode_laws(loop.law, loop.gains)[place]
+    return replace(loop, law=law, gains=gains, events=())
+
+
+def certify_modes(loop: ClosedLoop, name: str, wanted: Wanted) -> list[Issued]:
+    """The certificates of the law of each mode, and of each switch whose next mode is known to converge."""
+    from starhold.certification.certify import certify
+    from starhold.certification.hand_over import hand_over
+
+    module: Any = loop.law.module
+    assert isinstance(module, Modes)
+    found: list[Issued] = []
+    for place, mode in enumerate(module.modes):
+        own = loop_of_mode(loop, place)
+        found.append(Issued(certify(own, f"{name}: {mode.name}", wanted), own, mode=place + 1))
+    for place, (mode, _, switches) in enumerate(module.parts(loop.gains)):
+        for switch, (_, _, *levels) in switches:
+            own = loop_of_mode(loop, switch.to)
+            rate, angle = _ends(dict(zip(switch.tests, levels, strict=True)), own)
+            certificate = hand_over(own, f"{name}: {mode.name} to {module.modes[switch.to].name}", rate, angle)
+            if certificate is not None:
+                found.append(Issued(certificate, own, mode=switch.to + 1, before=place + 1))
+    return found
+
+
+def _ends(levels: dict[str, float], loop: ClosedLoop) -> tuple[float | None, float | None]:
+    """Rate and angle, relative to the target, up to which the tests of a switch hold; None for no bound."""
+    rates = [levels.get("rate_below")]
+    if loop.target.part.flag("STILL"):
+        rates.append(levels.get("body_rate_below"))
+    return min((rate for rate in rates if rate is not None), default=None), levels.get("angle_below")
+
+
+def mode_departures(issued: Issued, run: Recording) -> dict[str, tuple[Departure, ...]]:
+    """How a run leaves the proved claims about a mode, or about the hand-over to it, while that mode flies."""
+    from starhold.analysis.departure import Departure, departures
+
+    flown = stretches(run)
+    befores = [None, *(one.mode for one in flown)]
+    own = [
+        one
+        for one, before in zip(flown, befores, strict=False)
+        if one.mode == issued.mode and issued.before in (None, before)
+    ]
+    if not own:
+        never = Departure(0.0, "this flight has no such mode" if issued.before is None else "this flight has no such switch")
+        return {claim.kind: (never,) for claim in issued.certificate.claims if claim.outcome == "proved"}
+    found: dict[str, set[Departure]] = {}
+    for one in own:
+        for kind, left in departures(issued.certificate, issued.loop, run, one.first, one.last, NEXT).items():
+            found.setdefault(kind, set()).update(left)
+    return {kind: tuple(sorted(left)) for kind, left in found.items()}

@@ -1,0 +1,116 @@
+"""What is certified of modes, and of the hand-over from one to the next."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from starhold.certification.certificate import write
+from starhold.checker import check_file, passed
+from starhold.laws.interface import Measurement
+from starhold.scenario.building import build
+from starhold.scenario.reading import parse
+from starhold.studies.bodies.rigid_body import STUDY
+from starhold.studies.compare import fly_law, prove
+from starhold.studies.modes import loop_of_mode
+from tests.loop.test_modes import BASE, DETUMBLE
+
+POINT = """
+[[law.mode]]
+name = "point"
+type = "lyapunov"
+k_rate = 0.006
+k_attitude = 0.0008
+"""
+
+
+def issued(modes, text=BASE):
+    scenario = parse(text + modes, "mission.toml")
+    entry = scenario.laws[0]
+    return {one.certificate.name: one for one in STUDY.certify(scenario, entry, build(scenario, entry))}
+
+
+def bounded(rate, angle=None):
+    told = f', angle_below = "{angle}"' if angle else ""
+    return DETUMBLE.replace('rate_below = "0.5 deg/s"', f'rate_below = "{rate}"{told}')
+
+
+def handed(modes, text=BASE):
+    return issued(modes, text)["mission: detumble to point"].certificate
+
+
+def test_each_mode_is_certified_as_its_law_alone_is():
+    found = issued(DETUMBLE + POINT)
+    alone = parse(BASE.partition("[[law]]")[0] + "[[law]]" + POINT.partition("]]")[2].replace(
+        'name = "point"', 'quaternion_sign = "shortest"'), "alone.toml")
+    own = STUDY.certify(alone, alone.laws[0], build(alone, alone.laws[0]))[0].certificate
+    of_mode = found["mission: point"].certificate
+    assert of_mode.outcome == "proved"
+    assert (of_mode.subject, of_mode.claims) == (own.subject, own.claims)
+
+
+def test_a_hand_over_is_proved_exactly_as_far_as_the_level_of_v_reaches(tmp_path):
+    """V = w.Jw/2 + 2 k (1 - q0), by the largest moment, up to the level 2 k at which the quaternion's sign switches."""
+    k, moment, angle = 0.0008, 0.065, math.radians(150.0)
+    most = math.degrees(math.sqrt(2.0 * 2.0 * k * math.cos(0.5 * angle) / moment))
+    inside, outside = (handed(bounded(f"{share * most:.6g} deg/s", "150 deg") + POINT) for share in (0.9999, 1.0001))
+    assert (inside.outcome, outside.outcome) == ("proved", "undecided")
+    path = tmp_path / "certificate.json"
+    write([inside, outside], "mission", path)
+    assert [f for f in check_file(path) if f.verdict not in ("holds", "not claimed")] == []
+
+
+@pytest.mark.parametrize(
+    ("part", "key", "factor"), [("numbers", "rate", 1.001), ("numbers", "angle", 1.001), ("witness", "attitude_level", 0.99)]
+)
+def test_the_checker_refuses_a_hand_over_that_says_more(tmp_path, part, key, factor):
+    angle = math.radians(150.0)
+    most = math.degrees(math.sqrt(2.0 * 2.0 * 0.0008 * math.cos(0.5 * angle) / 0.065))
+    path = tmp_path / "certificate.json"
+    write([handed(bounded(f"{0.9999 * most:.6g} deg/s", "150 deg") + POINT)], "mission", path)
+    content = json.loads(path.read_text())
+    content["certificates"][0]["claims"][0][part][key] *= factor
+    path.write_text(json.dumps(content))
+    assert not passed(check_file(path))
+
+
+def test_corners_of_what_is_handed_over_have_a_v_below_the_level():
+    """By the law's own V in floats, at random states of the box."""
+    found = issued(bounded("6 deg/s", "120 deg") + POINT)["mission: detumble to point"]
+    claim = found.certificate.claims[0]
+    assert claim.outcome == "proved"
+    random, loop = np.random.default_rng(5), found.loop
+    for _ in range(200):
+        axis, spin = random.normal(size=(2, 3))
+        axis, spin = axis / np.linalg.norm(axis), spin / np.linalg.norm(spin) * claim.numbers["rate"]
+        half = 0.5 * claim.numbers["angle"]
+        told = Measurement((math.cos(half), *(math.sin(half) * axis)), tuple(spin), tuple(spin), *[(0.0, 0.0, 0.0)] * 4, 0.1)
+        assert loop.law.lyapunov(told, loop.gains, loop.craft) <= claim.numbers["start"]
+
+
+def test_a_hand_over_to_a_law_that_converges_from_everywhere_needs_no_bounds():
+    text = BASE.replace('quaternion_sign = "shortest"\n', "")
+    after = DETUMBLE.replace('rate_below = "0.5 deg/s"', 'after = "10 s"') + POINT
+    assert handed(after, text).outcome == "proved"
+    # Where a level bounds the set, nothing is known of where the mode before ends.
+    assert set(issued(after)) == {"mission: detumble", "mission: point"}
+
+
+def test_a_law_with_a_memory_is_handed_to_without_a_claim():
+    pid = POINT.replace("lyapunov", "pid") + "k_integral = 1e-5\nintegral_limit = 1e-4\n"
+    assert set(issued(DETUMBLE + pid)) == {"mission: detumble", "mission: point"}
+
+
+def test_a_flight_leaves_the_claims_of_a_mode_when_that_ends():
+    scenario = parse(BASE + bounded("0.5 deg/s", "178 deg") + POINT, "mission.toml")
+    entry = scenario.laws[0]
+    loop = build(scenario, entry)
+    flight = prove(scenario, entry, loop, fly_law(scenario, entry, loop))
+    names = [certificate.name for certificate in flight.certificates]
+    assert names == ["mission: detumble", "mission: point", "mission: detumble to point"]
+    run = flight.recording
+    switch = float(run["time"][np.argmax(run["mode"] > 1.5)])
+    assert ("another mode begins", switch) in [(one.how, one.time) for one in flight.left(0, "convergence")]
+    assert flight.left(1, "convergence") == () and flight.left(2, "hand-over") == ()
+    assert loop_of_mode(loop, 1).law.name == "lyapunov"
