@@ -17,9 +17,11 @@ from pydantic_core import PydanticCustomError
 
 from starhold.errors import InputError
 from starhold.laws.interface import Gain
+from starhold.laws.modes import mode_laws
 from starhold.parts.part import Fitted
 from starhold.scenario.checking import cut, nearest, read_toml, show
 from starhold.scenario.making import path_of
+from starhold.scenario.modes import CONDITIONS, Condition, ModeTable
 from starhold.scenario.parts import part_model
 from starhold.scenario.quantity import declared, reader
 from starhold.scenario.reading import LawEntry, Scenario
@@ -243,9 +245,23 @@ def _of_array(scenario: Scenario, path: tuple[str | int, ...]) -> _Held:
         return part_model(fitted.part), lambda name: getattr(fitted.params, name, None), after[1:]
     entry: LawEntry = _numbered(scenario.laws, array, after)
     names = [item.name for item in entry.law.fields(entry.form)]
+    if after[1] == "mode" and mode_laws(entry.law, entry.gains):
+        return _of_mode(entry, dict(zip(names, entry.gains, strict=True)), after[2:])
     numbers = dict(zip(names, entry.gains if entry.form is None else entry.spec, strict=True))
     model = law_model(entry.law, entry.form, scenario.hooks.law_table)
     return model, lambda name: numbers[name] if name in numbers else getattr(entry.options, name, None), after[1:]
+
+
+def _of_mode(entry: LawEntry, numbers: dict[str, Any], after: tuple[str | int, ...]) -> _Held:
+    """The table of a mode, or of a condition of it, that a path leads to."""
+    laws = [law for _, law, _ in mode_laws(entry.law, entry.gains)]
+    law, way = _numbered(laws, "mode", after or ("",)), after[1:]
+    model, begun = law_model(law, None, ModeTable), f"mode[{int(after[0]) + 1}]."
+    if way and way[0] in CONDITIONS:
+        model, begun, way = Condition, f"{begun}{way[0]}.", way[1:]
+    if not way:
+        raise _no("a whole table", "one of its keys")
+    return model, lambda name: numbers.get(f"{begun}{name}"), way
 
 
 def _plainly(gain: Gain | None, value: Any) -> Any:

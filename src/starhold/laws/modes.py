@@ -262,5 +262,9 @@ def _own(mode: Mode) -> list[Field]:
 
 @cache
 def _gains_of(modes: Modes) -> Any:
-    names = [f"{item.name}_of_{place}".replace(".", "_") for place, mode in enumerate(modes.modes, 1) for item in _own(mode)]
-    return NamedTuple("Gains", [(name, float) for name in names])  # pyright: ignore
+    named = [
+        (f"{item.name}_of_{place}".replace(".", "_"), Annotated[Any, item.gain])
+        for place, mode in enumerate(modes.modes, 1)
+        for item in _own(mode)
+    ]
+    return NamedTuple("Gains", named)  # pyright: ignore

@@ -6,8 +6,9 @@ from typing import Any
 
 from starhold.scenario.bodies import bodies, others
 from starhold.scenario.bodies.interface import Body
+from starhold.scenario.modes import ModeTable, modes_model
 from starhold.scenario.parts import part_schemas
-from starhold.scenario.schema import law_model
+from starhold.scenario.schema import LawTable, law_model
 
 
 def json_schema() -> dict[str, Any]:
@@ -23,22 +24,35 @@ def json_schema() -> dict[str, Any]:
 def _file_schema(body: Body) -> dict[str, Any]:
     """A JSON Schema of the files of one body: its tables, those of its laws, gains and design forms, and of its parts."""
     base = body.law_table
-    models = [law_model(law, form, base) for law in body.laws().values() for form in (None, *law.forms)]
     schema = body.tables.model_json_schema()
+    known = schema.setdefault("$defs", {})
+    tables = _law_schemas(body, base, known)
+    if body.modes:
+        table = modes_model(base).model_json_schema()
+        known.update(table.pop("$defs", {}))
+        table["properties"]["mode"] = {"type": "array", "minItems": 2, "items": {"anyOf": _law_schemas(body, ModeTable, known)}}
+        table["required"] = ["type", "mode"]
+        tables.append(table)
+    schema["properties"]["law"] = {"type": "array", "minItems": 1, "items": {"anyOf": tables}}
+    schema["properties"]["part"] = {"type": "array", "items": {"anyOf": part_schemas(body.name)}}
+    schema["required"].append("law")
+    return schema
+
+
+def _law_schemas(body: Body, base: type[LawTable], known: dict[str, Any]) -> list[dict[str, Any]]:
+    """JSON Schemas of the tables of all laws for a body, and of one from a file, with what `base` has beside the gains;
+    their definitions go to the known ones."""
     tables: list[dict[str, Any]] = []
-    for model in models:
+    for model in (law_model(law, form, base) for law in body.laws().values() for form in (None, *law.forms)):
         table = model.model_json_schema()
-        schema.setdefault("$defs", {}).update(table.pop("$defs", {}))
+        known.update(table.pop("$defs", {}))
         # TOML tables name their type, though pydantic has a default for it.
         table["required"] = sorted({"type", *table.get("required", [])} | ({"form"} & set(table["properties"])))
         tables.append(table)
     shared = base.model_json_schema()
     shared["properties"].pop("type")
     file = {"type": "string", "description": "a Python file that holds a law, relative to this one; it is run"}
-    tables.append({"title": "LawFromFile", "type": "object", "properties": {"file": file, **shared["properties"]}})
-    tables[-1] |= {"required": ["file"], "not": {"required": ["type"]}}
-    schema.setdefault("$defs", {}).update(shared.get("$defs", {}))
-    schema["properties"]["law"] = {"type": "array", "minItems": 1, "items": {"anyOf": tables}}
-    schema["properties"]["part"] = {"type": "array", "items": {"anyOf": part_schemas(body.name)}}
-    schema["required"].append("law")
-    return schema
+    own = {"title": "LawFromFile", "type": "object", "properties": {"file": file, **shared["properties"]}}
+    needed = [name for name in shared.get("required", []) if name != "type"]
+    known.update(shared.get("$defs", {}))
+    return [*tables, own | {"required": ["file", *needed], "not": {"required": ["type"]}}]

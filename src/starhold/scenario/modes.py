@@ -44,6 +44,10 @@ _LEVELS: dict[str, Any] = {test: (Annotated[float | None, *quantity(level_of(tes
 Condition: Any = create_model("Condition", __base__=_Condition, __doc__=_Condition.__doc__, **_LEVELS)
 
 
+CONDITIONS = ("until", "back")
+"""The keys of conditions."""
+
+
 class ModeTable(LawTable):
     """The keys of every mode's table beside its law's own gains."""
 
@@ -97,7 +101,7 @@ def _joined(tables: Sequence[Any], reads: Sequence[Read], where: str, key: str) 
             raise InputError(where, f"{here}.until", "nothing", "a condition, for only the last mode may fly to the end")
         gains += read.gains
         switches: list[Switch] = []
-        for way, beside in (("until", place + 1), ("back", place - 1)):
+        for way, beside in zip(CONDITIONS, (place + 1, place - 1), strict=True):
             condition = getattr(table, way)
             if condition is None:
                 continue

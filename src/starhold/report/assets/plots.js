@@ -70,6 +70,8 @@ function guides(panel, plot) {
       line([bbox.left, y], [bbox.left + bbox.width, y], [6, 4]);
     }
     ctx.fillStyle = colours.soft;
+    ctx.textAlign = "left";
+    ctx.textBaseline = "alphabetic";
     ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
     for (const [time, word] of plot.marks || []) {
       const x = u.valToPos(time, "x", true);

@@ -151,6 +151,7 @@ class NamedByTable:
     tables = BodyFromFileTables
     law_table = LawTable
     example = ""
+    modes = False
 
     def laws(self) -> Mapping[str, Law]:
         return {}

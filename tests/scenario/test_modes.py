@@ -1,0 +1,87 @@
+"""Laws of modes in files: what is read, and that every fault becomes one clear line."""
+
+import tomllib
+
+import jsonschema
+import pytest
+
+from starhold.campaign.values import value_at
+from starhold.errors import InputError
+from starhold.laws.modes import mode_laws
+from starhold.scenario.building import build
+from starhold.scenario.json_schema import json_schema
+from starhold.scenario.reading import parse
+from tests.loop.test_modes import BASE, DETUMBLE, POINT
+
+TEXT = BASE + DETUMBLE + POINT + 'back = { rate_above = "5 deg/s" }\n'
+
+
+def read(text):
+    scenario = parse(text, "mission.toml")
+    return scenario, build(scenario, scenario.laws[0])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('type = "pd"', 'type = "pdd"', "law[1].mode[1].type: found \"pdd\"; did you mean pd?"),
+        ("k_rate = 0.02", "k_rat = 0.02", "law[1].mode[1].k_rat: found an unknown key; did you mean k_rate?"),
+        ("rate_below =", "speed_below =", "law[1].mode[1].until.speed_below: found an unknown key"),
+        ('rate_below = "0.5 deg/s", dwell', "dwell", "law[1].mode[1].until"),
+        (DETUMBLE[DETUMBLE.index("until") :], "", "law[1].mode[1].until: found nothing; allowed: a condition"),
+        ('name = "point"', 'name = "detumble"', "law[1].mode[2].name: found \"detumble\"; allowed: a name that no other mode"),
+        ('name = "point"\n', "", "law[1].mode[2].name: found nothing; allowed: this key is required"),
+        ("back = { ", 'back = { to = "pint", ', "law[1].mode[2].back.to: found \"pint\"; allowed: one of detumble"),
+        ("back = { ", 'until = { after = "9 s" }\nback = { ', "law[1].mode[2].until.to: found nothing"),
+        ("until = {", "back = { after = 5 }\nuntil = {", "law[1].mode[1].back.to: found nothing"),
+        ('"0.5 deg/s"', '"0.5 deg"', "law[1].mode[1].until.rate_below"),
+        (POINT, "", "law[1].mode: found one mode; allowed: at least two [[law.mode]] tables"),
+        (DETUMBLE + POINT, "", "law[1].mode: found nothing; allowed: at least two [[law.mode]] tables"),
+        ('type = "modes"', 'type = "modes"\nk_rate = 1', "law[1].k_rate: found an unknown key"),
+        ("k_integral = 1e-5", "k_integral = 1.0", "law[1].mode[2]: k_integral must be below"),
+    ],
+)
+def test_a_fault_is_told_in_one_line(old, new, told):
+    assert old in TEXT
+    text = TEXT.replace(old, new)
+    text = text.partition("\nback")[0] if told.startswith("law[1].mode: ") else text
+    with pytest.raises(InputError) as caught:
+        read(text)
+    message = str(caught.value)
+    assert told in message
+    assert "\n" not in message
+
+
+def test_a_mode_that_nothing_leads_to_is_refused():
+    third = POINT.replace('"point"', '"rest"')
+    text = BASE + DETUMBLE.replace("dwell", 'to = "rest", dwell') + POINT + "until = { after = 5 }" + third
+    with pytest.raises(InputError, match=r'mode\[2\]: found "point"; allowed: a mode that a condition of another one leads to'):
+        read(text)
+
+
+def test_a_mode_changes_by_its_key_and_designs_its_gains():
+    scenario, _ = read(TEXT)
+    changes = {"law.mission.mode[1].k_rate": 0.03, "law.mission.mode[1].until.rate_below": "1 deg/s"}
+    entry = scenario.with_(changes).laws[0]
+    numbers = {item.name: value for item, value in zip(entry.law.fields(), entry.gains, strict=True)}
+    assert numbers["mode[1].k_rate"] == 0.03
+    assert numbers["mode[1].until.rate_below"] == pytest.approx(0.017453292519943295)
+    assert numbers["mode[1].until.dwell"] == 2.0
+    assert numbers["mode[2].integral_limit"] == 1e-4
+    assert value_at(scenario, "law.mission.mode[1].until.dwell") == 2.0
+    assert value_at(scenario, "law.mission.mode[2].k_rate") == 0.006
+    for key in ("law.mission.mode[1].until", "law.mission.mode[3].k_rate", "law.mission.mode[1].gain"):
+        with pytest.raises(InputError):
+            value_at(scenario, key)
+    designed, _ = read(TEXT.replace("k_rate = 0.02\nk_attitude = 1e-6", 'form = "bandwidth"\nbandwidth = "0.1 rad/s"'))
+    name, law, gains = mode_laws(designed.laws[0].law, designed.laws[0].gains)[0]
+    assert (name, law.name) == ("detumble", "pd")
+    assert gains.k_attitude > 1e-4
+
+
+def test_the_schema_takes_modes():
+    schema = json_schema()
+    jsonschema.validate(tomllib.loads(TEXT), schema)
+    for old, new in (("rate_below", "speed_below"), ('name = "point"\n', ""), ("k_rate = 0.02", "k_rat = 0.02")):
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate(tomllib.loads(TEXT.replace(old, new)), schema)
