@@ -120,6 +120,8 @@ def flight_law(loop: ClosedLoop) -> FlightLaw:
         given = tuple(readings)
     target, numbers = parts.target, setup.target
     if target is not None and buffers((numbers,)):
+        if target.flag("BY_MODE"):
+            raise _no_form(target.name, "one target for all modes, or none that follows a history")
         fields["target"] = _Target(*target.module.goal(numbers, loop.start, 0, None))
         notes["target"] = Quantity("", "the attitude to be reached, from inertial axes, at this instant")
         target, numbers = Part(target.name, _GOAL), ()  # pyright: ignore[reportArgumentType]

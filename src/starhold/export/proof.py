@@ -33,7 +33,8 @@ def proof_of(certificates: Sequence[Certificate], digest: str) -> Proof:
         if not certificate.claims:
             wrong.append(f"NOTHING IS CLAIMED: {unclaimed(certificate.subject)}.")
         for claim in certificate.claims:
-            text = f"{HEADINGS[claim.kind]}: {sentence(claim, certificate.subject)}"
+            whose = f"{certificate.name}: " if len(certificates) > 1 else ""
+            text = f"{whose}{HEADINGS[claim.kind]}: {sentence(claim, certificate.subject)}"
             claims.append(f"{claim.outcome}: {text}")
             assumed |= dict.fromkeys(claim.assumptions)
             if claim.outcome != "proved":

@@ -91,7 +91,7 @@ class Modes:
             title="Modes",
             summary=", then ".join(f"{mode.name} ({mode.law.name})" for mode in self.modes),
             sources=("supervisor by conditions with dwell times",),
-            assumptions=(),
+            assumptions=tuple(dict.fromkeys(text for law in laws for text in law.card.assumptions)),
             claims="none",
             quaternion_sign="even" if all(law.card.quaternion_sign == "even" for law in laws) else "odd",
         )

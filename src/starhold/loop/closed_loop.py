@@ -300,7 +300,8 @@ class ClosedLoop:
 
     def _goal(self, start: Any, setup: Setup) -> Goal:
         """The goal at the start, from whichever of equal attitudes."""
-        return self.target.part.module.goal(setup.target, start, 0, (1.0, 0.0, 0.0, 0.0))
+        mode = (0.0,) if self.target.part.flag("BY_MODE") else ()
+        return self.target.part.module.goal(setup.target, start, 0, (1.0, 0.0, 0.0, 0.0), *mode)
 
 
 def is_recorded(sensor: Part) -> bool:

@@ -9,7 +9,7 @@ from functools import cache
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
-from starhold.algebra.scalar import both, less, opposite, where
+from starhold.algebra.scalar import both, less, opposite, side, where
 from starhold.algebra.structure import move
 from starhold.algebra.vector import ZERO, add
 from starhold.algebra.words import number_of, word_of
@@ -56,17 +56,22 @@ def total(vectors: Any) -> Any:
 def make_equations(parts: Composition) -> Step:
     """The equations of a control step made of these parts."""
     body, target = parts.body.module, parts.target
-    command_of, limit = parts.law.command, LIMITS[parts.limit]
+    limit = LIMITS[parts.limit]
     policy = getattr(body, "SIGN_POLICIES", {}).get(parts.sign_policy)
     named = _Named(parts)
     still = target is None or target.flag("STILL")
     follows = target is not None and target.flag("FOLLOWS")
+    by_mode = target is not None and target.flag("BY_MODE")
+    command_of = parts.law.module.command if by_mode else parts.law.command
 
     def goal_of(carry, state, step, setup):
-        return None if target is None else target.module.goal(setup.target, state, step, carry.memories.followed)
+        if target is None:
+            return None
+        mode = (carry.memory.mode,) if by_mode else ()
+        return target.module.goal(setup.target, state, step, carry.memories.followed, *mode)
 
     def observed(carry, step, key, craft, setup):
-        """The measurement that the law is told, and what sensors and estimator keep of it."""
+        """What shows the law a measurement towards a goal, with what sensors and estimator keep of it; and the goal."""
         state, memories = carry.state, carry.memories
         goal = goal_of(carry, state, step, setup)
         readings, kept = SimpleNamespace(), []
@@ -90,26 +95,37 @@ def make_equations(parts: Composition) -> Step:
         # Those that take the command know their speeds; others have no sensor.
         turning = zip(parts.effectors, carry.effectors, setup.effectors, strict=True)
         momentum = total(e.module.momentum(own, params) for e, own, params in turning if e.flag("ACTS"))
-        scene = Scene(
-            goal,
-            still,
-            ZERO if torque is None else torque,
-            ZERO if momentum is None else momentum,
-            setup.period,
-            setup.limit,
-            _readings(tuple(vars(readings)))(*vars(readings).values()),
-        )
-        followed = goal.attitude if goal is not None and follows else memories.followed
-        return body.observe(found, scene), memories._replace(
-            followed=followed, sensors=tuple(kept), readings=tuple(shown), estimator=own, estimate=estimate
-        )
+
+        def show(goal):
+            scene = Scene(
+                goal,
+                still,
+                ZERO if torque is None else torque,
+                ZERO if momentum is None else momentum,
+                setup.period,
+                setup.limit,
+                _readings(tuple(vars(readings)))(*vars(readings).values()),
+            )
+            followed = goal.attitude if goal is not None and follows else memories.followed
+            return body.observe(found, scene), memories._replace(
+                followed=followed, sensors=tuple(kept), readings=tuple(shown), estimator=own, estimate=estimate
+            )
+
+        return show, goal
 
     def measure(carry, step, key, craft, setup):
-        return observed(carry, step, key, craft, setup)[0]
+        show, goal = observed(carry, step, key, craft, setup)
+        return show(goal)[0]
 
     def update(carry, step, key, gains, craft, setup):
-        told, memories = observed(carry, step, key, craft, setup)
+        show, goal = observed(carry, step, key, craft, setup)
+        told, memories = show(goal)
         h = carry.h
+        if by_mode:
+            # The law of the mode that begins is told of its own target.
+            carry = carry._replace(memory=parts.law.module.decide(told, gains, carry.memory))
+            told, memories = show(goal_of(carry, carry.state, step, setup))
+            h = where(less(carry.memory.age, 0.5), side(told.attitude[0]), h)
         if policy is not None:
             attitude, h = policy(told.attitude, h, setup.width)
             told = told._replace(attitude=attitude)

@@ -45,7 +45,8 @@ def watch(parts: Composition) -> Any:
 
     def note(seen: Watched, decided: Any, carry: Any, step: Any, setup: Any, ends: Ends) -> Watched:
         s = carry.state
-        goal = target.module.goal(setup.target, s, step + 1, carry.memories.followed)
+        mode = (carry.memory.mode,) if target.flag("BY_MODE") else ()
+        goal = target.module.goal(setup.target, s, step + 1, carry.memories.followed, *mode)
         error = relative(goal.attitude, s.attitude)
         left = subtract(s.rate, to_body(error, goal.rate))
         angle = ends.angle * (error[1] * error[1] + error[2] * error[2] + error[3] * error[3])

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from starhold.laws.modes import mode_laws
 from starhold.loop.closed_loop import ClosedLoop
+from starhold.loop.modes import loop_of_mode
 from starhold.scenario.checking import check_substeps, try_law
 from starhold.scenario.parts import check_fit, try_parts
 from starhold.scenario.reading import LawEntry, Scenario
@@ -19,7 +18,7 @@ def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
     try_parts(loop, scenario.where, f"law {entry.name}")
     check_substeps(loop, scenario.where)
     try_law(loop, scenario.where, f"law {entry.name}")
-    for mode, law, gains in mode_laws(entry.law, entry.gains):
-        try_law(replace(loop, law=law, gains=gains, events=()), scenario.where, f"law {entry.name}, mode {mode}")
+    for place, (mode, _, _) in enumerate(mode_laws(entry.law, entry.gains)):
+        try_law(loop_of_mode(loop, place), scenario.where, f"law {entry.name}, mode {mode}")
     scenario.hooks.examine(scenario, entry, loop)
     return loop

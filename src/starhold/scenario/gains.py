@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from starhold.laws.catalogue import Law
+from starhold.parts.part import Fitted
 from starhold.scenario.checking import make_gains, pick_law, refuse_unstable, refusing, validate
 from starhold.scenario.schema import LawTable, law_model
 
@@ -20,6 +21,8 @@ class Read(NamedTuple):
     table: Any
     spec: Any
     gains: Any
+    targets: tuple[Fitted, ...] = ()
+    """Of a law of modes that have targets of their own, one each."""
 
 
 def read_gains(data: Any, scenario: Scenario, context: Any, key: str, base: type[LawTable] | None = None) -> Read:

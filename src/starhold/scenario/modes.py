@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
-from pydantic import Field, create_model, model_validator
+from pydantic import Field, WithJsonSchema, create_model, model_validator
 
 from starhold.errors import InputError
 from starhold.laws.modes import AFTER, DWELL, NAME, TESTS, Mode, Switch, level_of, make_law
+from starhold.parts.part import Fitted
 from starhold.scenario.bodies.interface import Body
 from starhold.scenario.checking import nearest, show, validate
 from starhold.scenario.gains import Read, read_gains
@@ -52,6 +53,9 @@ class ModeTable(LawTable):
     """The keys of every mode's table beside its law's own gains."""
 
     name: Annotated[Name, Field(description="how switches, recordings and certificates call it")]
+    target: Annotated[
+        Any, WithJsonSchema({"type": "object"}), Field(description="as [target], or a [[part]] of this role; [target] if absent")
+    ] = None
     until: Annotated[Condition | None, Field(description="when the next mode begins")] = None
     back: Annotated[Condition | None, Field(description="when the mode before begins again")] = None
 
@@ -86,7 +90,16 @@ def read_modes(data: Any, scenario: Scenario, context: Any, key: str) -> Read:
         reads.append(read_gains(one, scenario, context, place, ModeTable))
     modes, gains = _joined([read.table for read in reads], reads, where, key)
     law = make_law(tuple(modes))
-    return Read(law, None, table, None, law.gains(*gains))
+    return Read(law, None, table, None, law.gains(*gains), _targets(reads, scenario, context, key))
+
+
+def _targets(reads: Sequence[Read], scenario: Scenario, context: Any, key: str) -> tuple[Fitted, ...]:
+    """The target of each mode; none where no mode has its own."""
+    given: list[Any] = [read.table.target for read in reads]
+    if all(one is None for one in given):
+        return ()
+    keys = [f"{key}.mode[{place}].target" for place in range(1, len(given) + 1)]
+    return tuple(scenario.hooks.target(scenario, one, context, at) for one, at in zip(given, keys, strict=True))
 
 
 def _joined(tables: Sequence[Any], reads: Sequence[Read], where: str, key: str) -> tuple[list[Mode], list[Any]]:

@@ -62,16 +62,21 @@ def read_parts(tables: Any, body: str, folder: Path, where: str, units: Any = No
         key = f"part[{number}]"
         if not isinstance(data, dict):
             raise InputError(where, key, show(data), "a [[part]] table")
-        table = cast(dict[str, Any], data)
-        part = _in_file(table, folder, where, key) if "file" in table else _of_type(table, where, key)
-        if part.body not in ("", body):
-            raise InputError(where, key, f"{part.name}, for the body {part.body}", f"a part for {body}")
-        table = {name: value for name, value in table.items() if name != "file"} | {"type": part.name}
-        table = with_rows(part, table, folder, where, key)
-        read = validate(part_model(part), table, where, key, ["file"], units)
+        read = read_part(cast(dict[str, Any], data), body, folder, where, key, units)
         taken = {fitted.name for fitted in found}
-        found.append(Fitted(part, params_of(part, read), free_name(read.name, part.name, taken, where, key)))
+        found.append(replace(read, name=free_name(read.name or None, read.part.name, taken, where, key)))
     return tuple(found)
+
+
+def read_part(table: dict[str, Any], body: str, folder: Path, where: str, key: str, units: Any = None) -> Fitted:
+    """The part of a raw table, called `key` in errors, under the name that this gives, if any."""
+    part = _in_file(table, folder, where, key) if "file" in table else _of_type(table, where, key)
+    if part.body not in ("", body):
+        raise InputError(where, key, f"{part.name}, for the body {part.body}", f"a part for {body}")
+    table = {name: value for name, value in table.items() if name != "file"} | {"type": part.name}
+    table = with_rows(part, table, folder, where, key)
+    read = validate(part_model(part), table, where, key, ["file"], units)
+    return Fitted(part, params_of(part, read), read.name or "")
 
 
 def params_of(part: Part, read: Any) -> Any:

@@ -44,6 +44,8 @@ class LawEntry:
     form: str | None = None
     spec: Any = None
     """The design form that gave the gains, and its inputs; None where the file gives the gains themselves."""
+    targets: tuple[Fitted, ...] = ()
+    """Of a law of modes that have targets of their own, one each."""
 
     def __repr__(self) -> str:
         return f"<law {self.name}: {self.law.name}, {self.gains}>"
@@ -176,7 +178,7 @@ def _read_law(data: Any, scenario: Scenario, context: Any, key: str, taken: set[
     """The law of a raw table, for a scenario that as yet has none."""
     body, where = scenario.hooks, scenario.where
     reads = read_modes if has_modes(data, body) else read_gains
-    law, form, own, spec, gains = reads(data, scenario, context, key)
+    law, form, own, spec, gains, targets = reads(data, scenario, context, key)
     options = body.options(scenario, own, gains, key)
     name = free_name(own.name, law.name, taken, where, key)
-    return LawEntry(name, law, gains, options, form, spec)
+    return LawEntry(name, law, gains, options, form, spec, targets)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from starhold.laws.modes import Modes, mode_laws
+from starhold.algebra.structure import leaves
+from starhold.laws.modes import Modes
+from starhold.loop.modes import loop_of_mode
 from starhold.studies.body import Issued
 from starhold.studies.flight import Begun
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from starhold.certification.certify import Wanted
     from starhold.laws.catalogue import Law
     from starhold.loop.closed_loop import ClosedLoop
+    from starhold.parts.part import Fitted
     from starhold.simulation.lane import Recording
 
 
@@ -50,12 +52,6 @@ def modes_flown(law: Law, run: Recording) -> tuple[Begun, ...]:
     return tuple(Begun(law.module.modes[one.mode - 1].name, one.first * period) for one in stretches(run))
 
 
-def loop_of_mode(loop: ClosedLoop, place: int) -> ClosedLoop:
-    """The loop of the law of one mode, counted from 0, as if that flew alone."""
-    _, law, gains = mode_laws(loop.law, loop.gains)[place]
-    return replace(loop, law=law, gains=gains, events=())
-
-
 def certify_modes(loop: ClosedLoop, name: str, wanted: Wanted) -> list[Issued]:
     """The certificates of the law of each mode, and of each switch whose next mode is known to converge."""
     from starhold.certification.certify import certify
@@ -70,19 +66,27 @@ def certify_modes(loop: ClosedLoop, name: str, wanted: Wanted) -> list[Issued]:
     for place, (mode, _, switches) in enumerate(module.parts(loop.gains)):
         for switch, (_, _, *levels) in switches:
             own = loop_of_mode(loop, switch.to)
-            rate, angle = _ends(dict(zip(switch.tests, levels, strict=True)), own)
+            before = loop_of_mode(loop, place)
+            rate, angle = _ends(dict(zip(switch.tests, levels, strict=True)), before.target, own.target)
             certificate = hand_over(own, f"{name}: {mode.name} to {module.modes[switch.to].name}", rate, angle)
             if certificate is not None:
                 found.append(Issued(certificate, own, mode=switch.to + 1, before=place + 1))
     return found
 
 
-def _ends(levels: dict[str, float], loop: ClosedLoop) -> tuple[float | None, float | None]:
-    """Rate and angle, relative to the target, up to which the tests of a switch hold; None for no bound."""
-    rates = [levels.get("rate_below")]
-    if loop.target.part.flag("STILL"):
-        rates.append(levels.get("body_rate_below"))
-    return min((rate for rate in rates if rate is not None), default=None), levels.get("angle_below")
+def _ends(levels: dict[str, float], before: Fitted, target: Fitted) -> tuple[float | None, float | None]:
+    """Rate and angle, relative to the target of the next mode, up to which the tests of a switch hold; None for no bound."""
+    still, same = target.part.flag("STILL"), _same(before, target)
+    rates = [levels.get("rate_below")] if same or (still and before.part.flag("STILL")) else []
+    rates += [levels.get("body_rate_below")] if still else []
+    bounds = [rate for rate in rates if rate is not None]
+    return min(bounds, default=None), levels.get("angle_below") if same else None
+
+
+def _same(one: Fitted, other: Fitted) -> bool:
+    """Whether two targets are one, those of histories where they are the same table."""
+    pairs = [*leaves(one.params)], [*leaves(other.params)]
+    return one is other or (one.part == other.part and len(pairs[0]) == len(pairs[1]) and all(map(np.array_equal, *pairs)))
 
 
 def mode_departures(issued: Issued, run: Recording) -> dict[str, tuple[Departure, ...]]:

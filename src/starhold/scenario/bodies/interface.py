@@ -8,7 +8,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
+from starhold.errors import InputError
 from starhold.laws.catalogue import Law
+from starhold.parts.part import Fitted
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
@@ -83,6 +85,11 @@ class Body(Protocol):
         """The inputs of a law's design form, with what they leave to the scenario; `own` is the law's validated table.
         ValueError where the scenario cannot give it."""
         return spec
+
+    def target(self, scenario: Scenario, given: Any, context: Any, key: str) -> Fitted:
+        """The target that the raw table of a mode gives, called `key` in errors; for None that of the scenario. InputError
+        where it gives none."""
+        raise InputError(scenario.where, key, "a target", "none, for this body has no attitude")
 
     def options(self, scenario: Scenario, own: Any, gains: Any, key: str) -> Any:
         """The options that a law's validated table, called `key` in errors, or the scenario for all laws gives beside the

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from starhold.laws.catalogue import Law, catalogue
 from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.part import Fitted
 from starhold.scenario.bodies.interface import Body, Moved
 from starhold.scenario.bodies.rigid_body.building import build, check_events
 from starhold.scenario.bodies.rigid_body.craft import Made, make
 from starhold.scenario.bodies.rigid_body.dials import KNOWN, TRUE, changes, dials, moved
 from starhold.scenario.bodies.rigid_body.lanes import derive, refused
-from starhold.scenario.bodies.rigid_body.start import told_to_design
+from starhold.scenario.bodies.rigid_body.start import mode_target, told_to_design
 from starhold.scenario.bodies.rigid_body.tables import AttitudeLawTable, RigidBodyTable
 
 if TYPE_CHECKING:
@@ -64,6 +65,9 @@ class RigidBody(Body):
 
     def complete(self, scenario: Scenario, law: Law, spec: Any, own: AttitudeLawTable) -> Any:
         return law.complete(spec, lambda: told_to_design(scenario, own.quaternion_sign))
+
+    def target(self, scenario: Scenario, given: Any, context: Any, key: str) -> Fitted:
+        return mode_target(scenario, given, context, key)
 
     def options(self, scenario: Scenario, own: AttitudeLawTable, gains: Any, key: str) -> Options:
         return Options(own.quaternion_sign, own.hysteresis_width, own.fault_action)

@@ -8,6 +8,7 @@ import numpy as np
 
 from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop
+from starhold.loop.modes import join_targets
 from starhold.parts.catalogue import find, fit
 from starhold.parts.effectors.wheels import State as Rotors
 from starhold.parts.part import Fitted
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
     """The closed loop of one law on the scenario's spacecraft."""
     table, parts = scenario.table, parts_of(scenario)
+    flown = (join_targets(entry.targets), *parts[1:]) if entry.targets else parts
     body = table.spacecraft
     return ClosedLoop(
         craft=scenario.craft,
@@ -31,14 +33,14 @@ def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
         start=start_of(scenario, parts[0]),
         period=table.simulation.control_period,
         substeps=table.simulation.substeps,
-        parts=parts,
+        parts=flown,
         limit="none" if np.isinf(body.torque_limit) else body.limit,
         command_limit=None if wheels_of(scenario) is None else body.torque_limit,
         sign_policy=entry.options.quaternion_sign,
         hysteresis_width=entry.options.hysteresis_width,
         seed=table.simulation.seed,
         run=table.simulation.run,
-        events=make_events(scenario, entry, parts) if table.fault else (),
+        events=make_events(scenario, entry, flown) if table.fault else (),
     )
 
 

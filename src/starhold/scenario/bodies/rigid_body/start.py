@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -23,7 +23,9 @@ from starhold.parts.targets import history
 from starhold.scenario.bodies.rigid_body.craft import torque_limit, wheels_of
 from starhold.scenario.bodies.rigid_body.history import read_history
 from starhold.scenario.bodies.rigid_body.rotors import start_momenta
-from starhold.scenario.bodies.rigid_body.tables import Pointing
+from starhold.scenario.bodies.rigid_body.tables import Pointing, TargetTable
+from starhold.scenario.checking import show, validate
+from starhold.scenario.parts import read_part
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -43,7 +45,7 @@ def unit_of(given: Quaternion) -> Quaternion:
 
 def target_of(scenario: Scenario) -> Fitted:
     """The target of the scenario: its [[part]] with this role, or what [target] says."""
-    table, simulation = scenario.table.target, scenario.table.simulation
+    table = scenario.table.target
     own = next((fitted for fitted in scenario.parts if fitted.part.role == "target"), None)
     if own is not None:
         if "target" in scenario.table.model_fields_set:
@@ -54,28 +56,51 @@ def target_of(scenario: Scenario) -> Fitted:
             # The start may be relative to it, before the parts are tried together.
             raise InputError(scenario.where, f"part {own.called}", "", str(error)) from None
         return own
+    return _told(scenario, table, "target")
+
+
+def mode_target(scenario: Scenario, given: Any, units: Any, key: str) -> Fitted:
+    """The target that the raw table of a mode gives, as [target] or as a [[part]] of this role; for None the scenario's."""
+    if given is None:
+        return target_of(scenario)
+    if not isinstance(given, dict):
+        raise InputError(scenario.where, key, show(given), 'a table, such as { mode = "orbital" } or { type = "a target" }')
+    if "type" in given:
+        found = read_part(cast(dict[str, Any], given), "rigid-body", scenario.folder, scenario.where, key, units)
+        if found.part.role != "target":
+            raise InputError(scenario.where, f"{key}.type", f"{found.part.name}, of the role {found.part.role}", "a target")
+        return found
+    table = validate(TargetTable, given, scenario.where, key)
+    if table.mode == "orbital" and scenario.table.orbit is None:
+        raise InputError(scenario.where, f"{key}.mode", show("orbital"), "another mode without an [orbit] table")
+    return _told(scenario, table, key)
+
+
+def _told(scenario: Scenario, table: TargetTable, key: str) -> Fitted:
+    """The target that a table gives."""
+    simulation = scenario.table.simulation
     if table.mode == "orbital":
         return fit("target", "orbital")
     if table.mode == "inertial":
         return fit("target", "inertial", _attitude(table))
     samples = np.arange(simulation.steps + 1) * simulation.control_period
     last = simulation.steps * simulation.control_period
-    rows = _history(scenario, lambda times, rows: history.tabulate(times, rows, samples))
-    return fit("target", "history", rows, _history(scenario, lambda times, rows: history.knots_of(times, rows, last)))
+    rows = _history(scenario, table, key, lambda times, rows: history.tabulate(times, rows, samples))
+    return fit("target", "history", rows, _history(scenario, table, key, lambda times, rows: history.knots_of(times, rows, last)))
 
 
-def _history(scenario: Scenario, use: Callable[..., Any]) -> Any:
+def _history(scenario: Scenario, table: TargetTable, key: str, use: Callable[..., Any]) -> Any:
     """The result of `use` on the times and attitudes in the file of a history. InputError where it cannot be used."""
-    path = scenario.folder / str(scenario.table.target.file)
+    path = scenario.folder / str(table.file)
     allowed = "a CSV file of columns time,q0,q1,q2,q3 (in another order if named), unit quaternions, times that increase"
     if path.suffix.lower() == ".aem":
         allowed = "a CCSDS attitude ephemeris message of one segment, unit quaternions, epochs that increase"
     try:
         return use(*read_history(path))
     except OSError as error:
-        raise InputError(scenario.where, "target.file", f"{path}: {error.strerror}", allowed) from None
+        raise InputError(scenario.where, f"{key}.file", f"{path}: {error.strerror}", allowed) from None
     except ValueError as error:
-        raise InputError(scenario.where, "target.file", f"{path}: {error}", allowed) from None
+        raise InputError(scenario.where, f"{key}.file", f"{path}: {error}", allowed) from None
 
 
 def start_of(scenario: Scenario, goal: Fitted, attitude: Any = None, rate: Any = None) -> State:

@@ -1,0 +1,79 @@
+"""A law of modes in a loop: each mode may have its own target, and its law can fly alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from starhold.algebra.scalar import absolute, less, where
+from starhold.laws.modes import mode_laws
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.contract import Card
+from starhold.parts.part import Fitted, Part
+from starhold.parts.roles import Goal
+
+
+@dataclass(frozen=True)
+class ModeTargets:
+    """The module of the target that is that of the mode which commands; `goal` is told the mode, counted from 0."""
+
+    parts: tuple[Part, ...]
+    ROLE = "target"
+    BY_MODE = True
+
+    @property
+    def CARD(self) -> Card:
+        """The targets of all modes."""
+        names = ", ".join(part.name for part in self.parts)
+        return Card("Targets of modes", names, ("definition",), ())
+
+    @property
+    def NEEDS(self) -> tuple[str, ...]:
+        """What any of them needs."""
+        return tuple(dict.fromkeys(need for part in self.parts for need in part.needs))
+
+    @property
+    def STILL(self) -> bool:
+        """Whether none of them turns."""
+        return all(part.flag("STILL") for part in self.parts)
+
+    @property
+    def FOLLOWS(self) -> bool:
+        """Whether one of them is continued from the attitude before."""
+        return any(part.flag("FOLLOWS") for part in self.parts)
+
+    def prepare(self, params: tuple[Any, ...], period: float) -> tuple[Any, ...]:
+        """Their parameters as equations take them."""
+        return tuple(Fitted(part, own).prepared(period) for part, own in zip(self.parts, params, strict=True))
+
+    def goal(self, params: tuple[Any, ...], state: Any, step: Any, before: Any, mode: Any) -> Goal:
+        """The goal of the mode that commands."""
+        goals = [part.module.goal(own, state, step, before) for part, own in zip(self.parts, params, strict=True)]
+        found = goals[0]
+        for place, goal in enumerate(goals[1:], 1):
+            here = less(absolute(mode - float(place)), 0.5)
+            found = Goal(
+                *(
+                    tuple(where(here, x, y) for x, y in zip(own, other, strict=True))
+                    for own, other in zip(goal, found, strict=True)
+                )
+            )
+        return found
+
+
+def join_targets(targets: Sequence[Fitted]) -> Fitted:
+    """The target of a loop whose modes have these, one each."""
+    module: Any = ModeTargets(tuple(target.part for target in targets))
+    return Fitted(Part("targets-of-modes", module), tuple(target.params for target in targets))
+
+
+def loop_of_mode(loop: ClosedLoop, place: int) -> ClosedLoop:
+    """The loop of the law of one mode, counted from 0, as if that flew alone towards its target."""
+    _, law, gains = mode_laws(loop.law, loop.gains)[place]
+    alone, target = replace(loop, law=law, gains=gains, events=()), loop.target
+    if not target.part.flag("BY_MODE"):
+        return alone
+    module: Any = target.part.module
+    own = Fitted(module.parts[place], target.params[place])
+    return replace(alone, parts=tuple(own if fitted is target else fitted for fitted in alone.parts))
