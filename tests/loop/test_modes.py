@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 
 from starhold.algebra.structure import flatten
-from starhold.laws.modes import mode_laws
 from starhold.loop.kernels import fly_plainly
+from starhold.loop.modes import loop_of_mode
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
 from starhold.simulation.lane import fly, recorded
@@ -62,19 +62,13 @@ def flown(loop, steps=600):
     return rows, carry
 
 
-def alone(loop, mode):
-    """The loop of one mode's law."""
-    _, law, gains = mode_laws(loop.law, loop.gains)[mode]
-    return replace(loop, law=law, gains=gains)
-
-
 def test_modes_fly_as_their_laws_one_after_another_from_the_switch():
     loop = loop_of()
     both, _ = flown(loop)
     switch = int(np.argmax(both["mode"][0] > 1.5))
     assert 50 < switch < 500 and (both["mode"][0][switch:] == 2.0).all()
-    first, carry = flown(alone(loop, 0), switch)
-    second = alone(loop, 1)
+    first, carry = flown(loop_of_mode(loop, 0), switch)
+    second = loop_of_mode(loop, 1)
     # The quaternion's sign goes on where it was, as h is carried.
     then, _ = flown(replace(second, start=carry.state), 600 - switch)
     for name in ("attitude", "rate", "command"):
@@ -108,3 +102,40 @@ def test_a_dwell_is_counted_without_breaks_and_a_switch_leads_back():
     assert run["mode"][0].tolist() == wanted
     assert wanted.count(2.0) > 10 and (1.0, 2.0) in pairwise(wanted) and (2.0, 1.0) in pairwise(wanted)
 
+
+
+SUN = """
+[[law.mode]]
+name = "sun"
+type = "lyapunov"
+k_rate = 0.006
+k_attitude = 0.0008
+target = { mode = "inertial", angles = ["40 deg", "10 deg", "0 deg"] }
+until = { after = "20 s" }
+[[law.mode]]
+name = "nadir"
+type = "lyapunov"
+k_rate = 0.006
+k_attitude = 0.0008
+target = { mode = "orbital" }
+"""
+ORBIT = BASE.replace("[initial]", '[orbit]\naltitude = "500 km"\ninclination = "97 deg"\n[initial]')
+
+
+def test_modes_with_targets_of_their_own_fly_as_their_laws_towards_them():
+    loop = loop_of(SUN, ORBIT)
+    both, carry = flown(loop)
+    assert both["mode"][0].tolist() == [1.0] * 200 + [2.0] * 401
+    first, ended = flown(loop_of_mode(loop, 0), 200)
+    second = replace(loop_of_mode(loop, 1), start=ended.state)
+    assert (second.target.part.name, loop_of_mode(loop, 0).target.part.name) == ("orbital", "inertial")
+    then, _ = flown(second, 400)
+    # The quaternion of a target that follows may begin with the other sign, which the shorter way does not tell.
+    for name in ("attitude", "rate", "command", "rate_error"):
+        joined = np.concatenate([first[name][:, :200], then[name]], axis=1)
+        assert joined.tobytes() == both[name].tobytes(), name
+    assert np.array(flatten(fly_plainly(loop, 600))).tobytes() == np.array(flatten(carry)).tobytes()
+    starts = [loop.start._replace(rate=tuple(factor * w for w in loop.start.rate)) for factor in (1.0, 0.3)]
+    many = simulate_many(loop, starts * 3, 300)
+    for lane, start in enumerate(starts * 3):
+        assert many.states[:, lane].tolist() == flatten(fly(replace(loop, start=start), 300)[1].state)
