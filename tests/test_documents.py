@@ -284,6 +284,18 @@ def test_example_of_parts_flies(tmp_path):
     assert abs(float(run["complementary_filter_gyro_bias"][-1, 0]) - 1.75e-4) < 5e-5
 
 
+def test_mission_of_the_page_about_modes_flies():
+    (example,) = blocks("docs/modes.md", "toml")
+    scenario = sh.scenario(tomllib.loads(example))
+    (flight,) = sh.compare(scenario)
+    assert [one.mode for one in flight.modes] == ["detumble", "sun", "nadir"]
+    assert flight.metrics["settling_time"] is not None
+    assert [c.name for c in flight.certificates if c.outcome == "proved"][3:5] == [
+        "mission: detumble to sun",
+        "mission: sun to nadir",
+    ]
+
+
 BASE = {
     "name": "base",
     "spacecraft": {"inertia": [2.0, 3.0, 4.0], "torque_limit": 0.1},

@@ -7,6 +7,7 @@ from typing import Any
 
 from generators.tables import table
 from starhold.scenario.json_schema import json_schema
+from starhold.scenario.modes import Condition, ModeTable
 
 HEAD = """# Scenario keys
 
@@ -23,6 +24,8 @@ BODIES = {
     "body": "A body of your own",
 }
 """What a file is about, by the table that says so."""
+MODES = """A `[[law]]` of `type = "modes"` has two or more `[[law.mode]]` tables, which hold the gains of their laws too;
+[Modes](modes.md) tells what they mean."""
 APART = ("law", "part")
 LONGEST = 60
 """Characters of a default that is shown."""
@@ -45,6 +48,10 @@ def page() -> str:
             many = item.get("type") == "array" or any(x.get("type") == "array" for x in item.get("anyOf", ()))
             head = f"[[{key}]]" if many else f"[{key}]"
             lines += _table(head, name, known, seen)
+    lines += ["## Modes", "", MODES, ""]
+    for head, model in (("[[law.mode]]", ModeTable), ("until, back", Condition)):
+        told = model.model_json_schema()
+        lines += [f"### `{head}`", "", " ".join(told["description"].split()), "", *keys_of(told), ""]
     return "\n".join(lines)
 
 

@@ -42,8 +42,12 @@ def handed(modes, text=BASE):
 
 def test_each_mode_is_certified_as_its_law_alone_is():
     found = issued(DETUMBLE + POINT)
-    alone = parse(BASE.partition("[[law]]")[0] + "[[law]]" + POINT.partition("]]")[2].replace(
-        'name = "point"', 'quaternion_sign = "shortest"'), "alone.toml")
+    alone = parse(
+        BASE.partition("[[law]]")[0]
+        + "[[law]]"
+        + POINT.partition("]]")[2].replace('name = "point"', 'quaternion_sign = "shortest"'),
+        "alone.toml",
+    )
     own = STUDY.certify(alone, alone.laws[0], build(alone, alone.laws[0]))[0].certificate
     of_mode = found["mission: point"].certificate
     assert of_mode.outcome == "proved"

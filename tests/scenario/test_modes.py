@@ -8,11 +8,32 @@ import pytest
 from starhold.campaign.values import value_at
 from starhold.errors import InputError
 from starhold.laws.modes import mode_laws
+from starhold.loop.modes import loop_of_mode
 from starhold.scenario.building import build
 from starhold.scenario.json_schema import json_schema
 from starhold.scenario.reading import parse
 from tests.loop.test_modes import BASE, DETUMBLE, POINT
 
+TURNED = """
+from typing import NamedTuple
+from starhold.parts.contract import Card
+from starhold.parts.roles import Goal
+
+CARD = Card(title="Turned", summary="q_RN = constant", sources=("mine",), assumptions=())
+ROLE = "target"
+
+
+class Params(NamedTuple):
+    pass
+
+
+def goal(params, state, step, before):
+    return Goal((0.6, 0.0, 0.8, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def examples():
+    return [Params()]
+"""
 TEXT = BASE + DETUMBLE + POINT + 'back = { rate_above = "5 deg/s" }\n'
 
 
@@ -24,14 +45,14 @@ def read(text):
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ('type = "pd"', 'type = "pdd"', "law[1].mode[1].type: found \"pdd\"; did you mean pd?"),
+        ('type = "pd"', 'type = "pdd"', 'law[1].mode[1].type: found "pdd"; did you mean pd?'),
         ("k_rate = 0.02", "k_rat = 0.02", "law[1].mode[1].k_rat: found an unknown key; did you mean k_rate?"),
         ("rate_below =", "speed_below =", "law[1].mode[1].until.speed_below: found an unknown key"),
         ('rate_below = "0.5 deg/s", dwell', "dwell", "law[1].mode[1].until"),
         (DETUMBLE[DETUMBLE.index("until") :], "", "law[1].mode[1].until: found nothing; allowed: a condition"),
-        ('name = "point"', 'name = "detumble"', "law[1].mode[2].name: found \"detumble\"; allowed: a name that no other mode"),
+        ('name = "point"', 'name = "detumble"', 'law[1].mode[2].name: found "detumble"; allowed: a name that no other mode'),
         ('name = "point"\n', "", "law[1].mode[2].name: found nothing; allowed: this key is required"),
-        ("back = { ", 'back = { to = "pint", ', "law[1].mode[2].back.to: found \"pint\"; allowed: one of detumble"),
+        ("back = { ", 'back = { to = "pint", ', 'law[1].mode[2].back.to: found "pint"; allowed: one of detumble'),
         ("back = { ", 'until = { after = "9 s" }\nback = { ', "law[1].mode[2].until.to: found nothing"),
         ("until = {", "back = { after = 5 }\nuntil = {", "law[1].mode[1].back.to: found nothing"),
         ('"0.5 deg/s"', '"0.5 deg"', "law[1].mode[1].until.rate_below"),
@@ -55,8 +76,39 @@ def test_a_fault_is_told_in_one_line(old, new, told):
 def test_a_mode_that_nothing_leads_to_is_refused():
     third = POINT.replace('"point"', '"rest"')
     text = BASE + DETUMBLE.replace("dwell", 'to = "rest", dwell') + POINT + "until = { after = 5 }" + third
-    with pytest.raises(InputError, match=r'mode\[2\]: found "point"; allowed: a mode that a condition of another one leads to'):
+    with pytest.raises(
+        InputError, match=r'mode\[2\]: found "point"; allowed: a mode that a condition of another one leads to'
+    ):
         read(text)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ('{ mode = "orbital" }', 'mode[2].target.mode: found "orbital"; allowed: another mode without an [orbit] table'),
+        ('{ type = "inertial" }', "mode[2].target.type"),
+        ('{ type = "constant-torque", torque = [0, 0, 0] }', "of the role environment; allowed: a target"),
+        ('{ mood = "inertial" }', "mode[2].target.mood: found an unknown key"),
+        ('"nadir"', 'mode[2].target: found "nadir"; allowed: a table'),
+    ],
+)
+def test_a_target_that_a_mode_cannot_have_is_told_in_one_line(given, told):
+    with pytest.raises(InputError) as caught:
+        read(TEXT + f"target = {given}\n")
+    assert told in str(caught.value)
+
+
+def test_a_mode_takes_a_target_from_a_file(tmp_path):
+    (tmp_path / "turned.py").write_text(TURNED)
+    text = TEXT + 'target = { file = "turned.py" }\n'
+    scenario = parse(text, "mission.toml", tmp_path)
+    loop = build(scenario, scenario.laws[0])
+    assert loop_of_mode(loop, 0).target.part.name == "inertial"
+    assert loop_of_mode(loop, 1).target.part.name == "turned"
+    (tmp_path / "turned.py").write_text(TURNED.replace("return Goal", "return 1 / 0, Goal"))
+    broken = parse(text, "mission.toml", tmp_path)
+    with pytest.raises(InputError, match=r"turned\.py"):
+        build(broken, broken.laws[0])
 
 
 def test_a_mode_changes_by_its_key_and_designs_its_gains():

@@ -39,7 +39,18 @@ from starhold.checker.subject import LoopSubject, read_subject
 FORMAT = "starhold certificate 2"
 FORMER = ("starhold certificate 1", "starhold invariant certificate 1")
 """Formats of earlier versions, whose keys had other names."""
-ENDS = ("convergence", "region", "torque-limit", "wheels", "inertia", "disturbance", "sliding", "circle", "equilibrium", "hand-over")
+ENDS = (
+    "convergence",
+    "region",
+    "torque-limit",
+    "wheels",
+    "inertia",
+    "disturbance",
+    "sliding",
+    "circle",
+    "equilibrium",
+    "hand-over",
+)
 """Kinds of claims about where the motion ends, one of which a certificate that counts as proved must hold."""
 BITS = 192
 """Precision of balls: enough that they are far narrower than the margins of a certificate."""

@@ -117,9 +117,7 @@ class Modes:
 
     def remember(self, gains: Any, craft: Any, period: float) -> Memory:
         """The memory at the start: the first mode."""
-        own, fresh = (
-            tuple(mode.law.remember(its, craft, period) for mode, its, _ in self.parts(gains)) for _ in range(2)
-        )
+        own, fresh = (tuple(mode.law.remember(its, craft, period) for mode, its, _ in self.parts(gains)) for _ in range(2))
         slots = max(len(mode.switches) for mode in self.modes)
         return Memory(0.0, -1.0, (0.0,) * slots, own, fresh)
 
@@ -256,7 +254,9 @@ def _numbers(switch: Switch) -> list[Field]:
 
 def _own(mode: Mode) -> list[Field]:
     """The gains of a mode's law, and its switches' numbers."""
-    switched = [Field(f"{s.key}.{item.name}", item.gain, item.required, item.default) for s in mode.switches for item in _numbers(s)]
+    switched = [
+        Field(f"{s.key}.{item.name}", item.gain, item.required, item.default) for s in mode.switches for item in _numbers(s)
+    ]
     return [*mode.law.fields(), *switched]
 
 

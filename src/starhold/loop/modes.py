@@ -65,7 +65,9 @@ class ModeTargets:
 def join_targets(targets: Sequence[Fitted]) -> Fitted:
     """The target of a loop whose modes have these, one each."""
     module: Any = ModeTargets(tuple(target.part for target in targets))
-    return Fitted(Part("targets-of-modes", module), tuple(target.params for target in targets))
+    # One from a file is tried out as parts from files are.
+    file = next((target.part.file for target in targets if target.part.file is not None), None)
+    return Fitted(Part("targets-of-modes", module, file), tuple(target.params for target in targets))
 
 
 def loop_of_mode(loop: ClosedLoop, place: int) -> ClosedLoop:

@@ -14,7 +14,19 @@ from starhold.analysis.metrics import stays_within
 from starhold.analysis.rigid_body import DECADES, acceleration, error_angle
 from starhold.parts.bodies import rigid_body
 from starhold.parts.effectors import wheels
-from starhold.report.plots import OFF_SCALE, Curve, Mark, Panel, Plot, near, positive, recorded_plots, sound, thin, thin_times
+from starhold.report.plots import (
+    OFF_SCALE,
+    Curve,
+    Mark,
+    Panel,
+    Plot,
+    near,
+    positive,
+    recorded_plots,
+    sound,
+    thin,
+    thin_times,
+)
 from starhold.scenario.bodies.rigid_body.craft import torque_limit, wheels_of
 from starhold.scenario.bodies.rigid_body.faults import fault_times
 

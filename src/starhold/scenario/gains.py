@@ -25,16 +25,19 @@ class Read(NamedTuple):
     """Of a law of modes that have targets of their own, one each."""
 
 
-def read_gains(data: Any, scenario: Scenario, context: Any, key: str, base: type[LawTable] | None = None) -> Read:
+def read_gains(
+    data: Any, scenario: Scenario, context: Any, key: str, base: type[LawTable] | None = None, shared: Any = None
+) -> Read:
     """The law of a raw table, called `key` in errors, for a scenario that as yet has none. base: what such tables have
-    beside the gains, by default that of the body."""
+    beside the gains, by default that of the body; shared: the table, read already, that holds a body's own keys in its
+    place."""
     body, where, craft = scenario.hooks, scenario.where, scenario.craft
     found, law, form = pick_law(data, body.laws(), body.name, scenario.folder, where, key)
     extra = ["file", *(["form"] if law.forms else [])]
     own = validate(law_model(law, form, base or body.law_table), found, where, key, extra, context)
     values = [getattr(own, item.name) for item in law.fields(form)]
     with refusing(law, where, key):
-        spec = None if form is None else body.complete(scenario, law, law.forms[form](*values), own)
+        spec = None if form is None else body.complete(scenario, law, law.forms[form](*values), shared or own)
     gains = make_gains(law, values, spec, craft, where, key)
     if not scenario.allow_unstable:
         refuse_unstable(lambda: law.check(gains, craft), where, key)

@@ -30,7 +30,11 @@ def _file_schema(body: Body) -> dict[str, Any]:
     if body.modes:
         table = modes_model(base).model_json_schema()
         known.update(table.pop("$defs", {}))
-        table["properties"]["mode"] = {"type": "array", "minItems": 2, "items": {"anyOf": _law_schemas(body, ModeTable, known)}}
+        table["properties"]["mode"] = {
+            "type": "array",
+            "minItems": 2,
+            "items": {"anyOf": _law_schemas(body, ModeTable, known)},
+        }
         table["required"] = ["type", "mode"]
         tables.append(table)
     schema["properties"]["law"] = {"type": "array", "minItems": 1, "items": {"anyOf": tables}}

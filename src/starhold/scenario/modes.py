@@ -54,7 +54,9 @@ class ModeTable(LawTable):
 
     name: Annotated[Name, Field(description="how switches, recordings and certificates call it")]
     target: Annotated[
-        Any, WithJsonSchema({"type": "object"}), Field(description="as [target], or a [[part]] of this role; [target] if absent")
+        Any,
+        WithJsonSchema({"type": "object"}),
+        Field(description="as [target], or a [[part]] of this role; [target] if absent"),
     ] = None
     until: Annotated[Condition | None, Field(description="when the next mode begins")] = None
     back: Annotated[Condition | None, Field(description="when the mode before begins again")] = None
@@ -87,7 +89,7 @@ def read_modes(data: Any, scenario: Scenario, context: Any, key: str) -> Read:
         place = f"{key}.mode[{number}]"
         if not isinstance(one, dict):
             raise InputError(where, place, show(one), "a [[law.mode]] table")
-        reads.append(read_gains(one, scenario, context, place, ModeTable))
+        reads.append(read_gains(one, scenario, context, place, ModeTable, table))
     modes, gains = _joined([read.table for read in reads], reads, where, key)
     law = make_law(tuple(modes))
     return Read(law, None, table, None, law.gains(*gains), _targets(reads, scenario, context, key))
@@ -134,7 +136,9 @@ def _to(given: str | None, names: list[str], place: int, beside: int, where: str
     """The mode that a condition leads to."""
     if given is None:
         if not 0 <= beside < len(names):
-            raise InputError(where, f"{key}.to", "nothing", f"the name of a mode, for none is {'after' if beside else 'before'} it")
+            raise InputError(
+                where, f"{key}.to", "nothing", f"the name of a mode, for none is {'after' if beside else 'before'} it"
+            )
         return beside
     others = [name for name in names if name != names[place]]
     if given not in others:

@@ -42,7 +42,8 @@ def stretches(run: Recording) -> list[Stretch]:
     places = np.flatnonzero(np.r_[True, (np.diff(modes) != 0.0) | (np.diff(begun) != 0)])
     starts = [max(0, int(begun[place])) for place in places]
     return [
-        Stretch(int(modes[place]), first, last) for place, first, last in zip(places, starts, [*starts[1:], None], strict=True)
+        Stretch(int(modes[place]), first, last)
+        for place, first, last in zip(places, starts, [*starts[1:], None], strict=True)
     ]
 
 

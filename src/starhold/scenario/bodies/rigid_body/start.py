@@ -65,10 +65,10 @@ def mode_target(scenario: Scenario, given: Any, units: Any, key: str) -> Fitted:
         return target_of(scenario)
     if not isinstance(given, dict):
         raise InputError(scenario.where, key, show(given), 'a table, such as { mode = "orbital" } or { type = "a target" }')
-    if "type" in given:
+    if "type" in given or ("file" in given and "mode" not in given):
         found = read_part(cast(dict[str, Any], given), "rigid-body", scenario.folder, scenario.where, key, units)
         if found.part.role != "target":
-            raise InputError(scenario.where, f"{key}.type", f"{found.part.name}, of the role {found.part.role}", "a target")
+            raise InputError(scenario.where, key, f"{found.part.name}, of the role {found.part.role}", "a target")
         return found
     table = validate(TargetTable, given, scenario.where, key)
     if table.mode == "orbital" and scenario.table.orbit is None:
@@ -86,7 +86,9 @@ def _told(scenario: Scenario, table: TargetTable, key: str) -> Fitted:
     samples = np.arange(simulation.steps + 1) * simulation.control_period
     last = simulation.steps * simulation.control_period
     rows = _history(scenario, table, key, lambda times, rows: history.tabulate(times, rows, samples))
-    return fit("target", "history", rows, _history(scenario, table, key, lambda times, rows: history.knots_of(times, rows, last)))
+    return fit(
+        "target", "history", rows, _history(scenario, table, key, lambda times, rows: history.knots_of(times, rows, last))
+    )
 
 
 def _history(scenario: Scenario, table: TargetTable, key: str, use: Callable[..., Any]) -> Any:
