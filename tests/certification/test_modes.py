@@ -116,5 +116,5 @@ def test_a_flight_leaves_the_claims_of_a_mode_when_that_ends():
     run = flight.recording
     switch = float(run["time"][np.argmax(run["mode"] > 1.5)])
     assert ("another mode begins", switch) in [(one.how, one.time) for one in flight.left(0, "convergence")]
-    assert flight.left(1, "convergence") == () and flight.left(2, "hand-over") == ()
+    assert (flight.left(1, "convergence"), flight.left(2, "hand-over")) == ((), ())
     assert loop_of_mode(loop, 1).law.name == "lyapunov"

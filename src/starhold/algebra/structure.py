@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import reduce
 from typing import Any, TypeVar, cast
 
+from starhold.algebra.scalar import Truth, where
 from starhold.algebra.structured import Buffer
 from starhold.algebra.vector import diagonal
 
@@ -42,6 +43,17 @@ def mapped(value: Any, leaf: Callable[[Any], Any]) -> Any:
 def rebuild(like: Any, parts: Sequence[Any]) -> Any:
     """Return a tuple or NamedTuple like this one of other parts."""
     return type(like)(*parts) if hasattr(like, "_fields") else tuple(parts)
+
+
+def chosen(truth: Truth, one: _State, other: _State) -> _State:
+    """Return one state where the truth holds, else the other, number by number; buffers are those of the other."""
+
+    def choose(a: Any, b: Any) -> Any:
+        if isinstance(a, tuple):
+            return rebuild(a, [choose(x, y) for x, y in zip(cast(tuple[Any, ...], a), b, strict=True)])
+        return b if isinstance(a, Buffer) else where(truth, a, b)
+
+    return choose(one, other)
 
 
 def flatten(state: Any) -> list[float]:

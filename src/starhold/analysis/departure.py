@@ -76,7 +76,8 @@ def departures(
 ) -> dict[str, tuple[Departure, ...]]:
     """Tell for each proved kind of claim about motions how a run leaves it, in order of time; empty where it does not.
 
-    loop: what the certificate speaks of, flown from control step `first` until it changes at `last` (None: it does not), as `change` tells.
+    loop: what the certificate speaks of, flown from control step `first` until it changes at `last` (None: it does not),
+    as `change` tells.
     That torque is held between samples counts only where it is refuted that it may be.
     """
     span = Span(loop, run, first, last)

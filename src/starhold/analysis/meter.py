@@ -130,11 +130,6 @@ def outside(then: Any, square: Any, bound: Any, now: Any) -> Any:
     return where(less_equal(square, bound), then, now)
 
 
-def chosen(condition: Any, a: Any, b: Any) -> Any:
-    """A vector, number by number the one or the other."""
-    return tuple(where(condition, x, y) for x, y in zip(a, b, strict=True))
-
-
 def is_on_limit(command: Any, limit: Any, kind: str) -> Any:
     """Whether a command is on its limit, as `on_limit` tells of samples; never where there is none."""
     size = sqrt(dot(command, command)) if kind == "norm" else most(command)

@@ -13,7 +13,7 @@ import numpy as np
 from starhold.algebra.quaternion import to_reference, vector_part
 from starhold.algebra.rotation import rotation_vector
 from starhold.algebra.scalar import absolute, both, either, less, less_equal, maximum, minimum, sqrt, where
-from starhold.algebra.structure import places
+from starhold.algebra.structure import chosen, places
 from starhold.algebra.vector import ZERO, Vector, dot, scale, subtract
 from starhold.algebra.words import number_of
 from starhold.analysis.meter import (
@@ -22,7 +22,6 @@ from starhold.analysis.meter import (
     Meter,
     Metrics,
     Window,
-    chosen,
     is_on_limit,
     largest_since,
     most,

@@ -26,8 +26,8 @@ WIDEST = 3.0
 
 def hand_over(loop: ClosedLoop, name: str, rate: float | None, angle: float | None) -> Certificate | None:
     """The certificate of the loop of the law that takes over, where the other one ends with rates relative to this one's
-    target of up to `rate` (rad/s) and angles to it of up to `angle` (rad); None for any. None where no V shows from where the
-    motions of this loop end on target, or where that is not everywhere and nothing bounds the rate."""
+    target of up to `rate` (rad/s) and angles to it of up to `angle` (rad); None for any. None where no V shows from
+    where the motions of this loop end on target, or where that is not everywhere and nothing bounds the rate."""
     if loop.remembers or loop.law.lyapunov is None or not (loop.wheels is None or gives_what_is_asked(loop.wheels)):
         return None
     subject = make_subject(loop, bounded_torque(loop), None)

@@ -15,7 +15,7 @@ from typing import Annotated, Any, NamedTuple
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import half_angle_sine
 from starhold.algebra.scalar import Scalar, Truth, absolute, both, less, less_equal, maximum, opposite, where
-from starhold.algebra.structure import buffers, rebuild
+from starhold.algebra.structure import buffers, chosen
 from starhold.algebra.structured import Buffer, repeat, when
 from starhold.algebra.vector import ZERO, norm
 from starhold.laws.catalogue import Law
@@ -84,7 +84,7 @@ class Modes:
     modes: tuple[Mode, ...]
 
     @property
-    def CARD(self) -> Card:
+    def CARD(self) -> Card:  # noqa: N802
         """The law's card; the modes' laws are even only together."""
         laws = [mode.law for mode in self.modes]
         return Card(
@@ -97,7 +97,7 @@ class Modes:
         )
 
     @property
-    def Gains(self) -> Any:
+    def Gains(self) -> Any:  # noqa: N802
         """The class of the gains: those of all modes, one after the other, each followed by its switches' numbers."""
         return _gains_of(self)
 
@@ -237,13 +237,7 @@ def _renewed(begins: Truth, kept: Any, fresh: Any) -> Any:
             repeat(own.size, put)
 
         when(begins, copy)
-    return _chosen(begins, fresh, kept)
-
-
-def _chosen(truth: Truth, one: Any, other: Any) -> Any:
-    if isinstance(one, tuple):
-        return rebuild(one, [_chosen(truth, a, b) for a, b in zip(one, other, strict=True)])  # pyright: ignore
-    return other if isinstance(one, Buffer) else where(truth, one, other)
+    return chosen(begins, fresh, kept)
 
 
 def _numbers(switch: Switch) -> list[Field]:

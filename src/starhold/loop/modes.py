@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from starhold.algebra.scalar import absolute, less, where
+from starhold.algebra.scalar import absolute, less
+from starhold.algebra.structure import chosen
 from starhold.laws.modes import mode_laws
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import Card
@@ -23,23 +24,23 @@ class ModeTargets:
     BY_MODE = True
 
     @property
-    def CARD(self) -> Card:
+    def CARD(self) -> Card:  # noqa: N802
         """The targets of all modes."""
         names = ", ".join(part.name for part in self.parts)
         return Card("Targets of modes", names, ("definition",), ())
 
     @property
-    def NEEDS(self) -> tuple[str, ...]:
+    def NEEDS(self) -> tuple[str, ...]:  # noqa: N802
         """What any of them needs."""
         return tuple(dict.fromkeys(need for part in self.parts for need in part.needs))
 
     @property
-    def STILL(self) -> bool:
+    def STILL(self) -> bool:  # noqa: N802
         """Whether none of them turns."""
         return all(part.flag("STILL") for part in self.parts)
 
     @property
-    def FOLLOWS(self) -> bool:
+    def FOLLOWS(self) -> bool:  # noqa: N802
         """Whether one of them is continued from the attitude before."""
         return any(part.flag("FOLLOWS") for part in self.parts)
 
@@ -52,13 +53,7 @@ class ModeTargets:
         goals = [part.module.goal(own, state, step, before) for part, own in zip(self.parts, params, strict=True)]
         found = goals[0]
         for place, goal in enumerate(goals[1:], 1):
-            here = less(absolute(mode - float(place)), 0.5)
-            found = Goal(
-                *(
-                    tuple(where(here, x, y) for x, y in zip(own, other, strict=True))
-                    for own, other in zip(goal, found, strict=True)
-                )
-            )
+            found = chosen(less(absolute(mode - float(place)), 0.5), goal, found)
         return found
 
 

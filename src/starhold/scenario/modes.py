@@ -42,7 +42,10 @@ class _Condition(Table):
 
 
 _LEVELS: dict[str, Any] = {test: (Annotated[float | None, *quantity(level_of(test))], None) for test in TESTS}
-Condition: Any = create_model("Condition", __base__=_Condition, __doc__=_Condition.__doc__, **_LEVELS)
+if TYPE_CHECKING:
+    Condition = _Condition
+else:
+    Condition = create_model("Condition", __base__=_Condition, __doc__=_Condition.__doc__, **_LEVELS)
 
 
 CONDITIONS = ("until", "back")
@@ -52,7 +55,7 @@ CONDITIONS = ("until", "back")
 class ModeTable(LawTable):
     """The keys of every mode's table beside its law's own gains."""
 
-    name: Annotated[Name, Field(description="how switches, recordings and certificates call it")]
+    name: Annotated[Name, Field(description="how switches, recordings and certificates call it")]  # pyright: ignore
     target: Annotated[
         Any,
         WithJsonSchema({"type": "object"}),
@@ -65,8 +68,8 @@ class ModeTable(LawTable):
 @cache
 def modes_model(base: type[LawTable]) -> type[LawTable]:
     """The table of a law of modes, but for its modes; base: what a body's tables of laws have."""
-    made: Any = create_model("Modes", __base__=base, __doc__="A law for each mode.", type=(Literal[NAME], NAME))
-    return made
+    entries: dict[str, Any] = {"type": (Literal[NAME], NAME)}
+    return create_model("Modes", __base__=base, __doc__="A law for each mode.", **entries)
 
 
 def has_modes(data: Any, body: Body) -> bool:
@@ -75,8 +78,8 @@ def has_modes(data: Any, body: Body) -> bool:
 
 
 def read_modes(data: Any, scenario: Scenario, context: Any, key: str) -> Read:
-    """The law of a raw table with [[law.mode]] tables, called `key` in errors. InputError for the first mode that is wrong, or
-    that none leads to."""
+    """The law of a raw table with [[law.mode]] tables, called `key` in errors. InputError for the first mode that is wrong,
+    or that none leads to."""
     where = scenario.where
     rest = {name: value for name, value in data.items() if name != "mode"}
     table = validate(modes_model(scenario.hooks.law_table), rest, where, key, ["mode"], context)

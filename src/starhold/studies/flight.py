@@ -68,8 +68,9 @@ class Flight:
         return self.departures[certificate].get(kind, ()) if self.departures else ()
 
     def results(self) -> dict[str, Any]:
-        """The content of a summary: the metrics and, of a law of modes, when each begins, of a certified law, each claim with its outcome, the time (s) from
-        which on this flight is not what it speaks of (None: it is throughout), and what happens then and later."""
+        """The content of a summary: the metrics, when modes begin and, of a certified law, each claim with its outcome, the
+        time (s) from which on this flight is not what it speaks of (None: it is throughout), and what happens then and
+        later."""
         claims: list[dict[str, Any]] = []
         for number, certificate in enumerate(self.certificates):
             for claim in certificate.claims:
