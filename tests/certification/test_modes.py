@@ -14,7 +14,7 @@ from starhold.scenario.reading import parse
 from starhold.studies.bodies.rigid_body import STUDY
 from starhold.studies.compare import fly_law, prove
 from starhold.studies.modes import loop_of_mode
-from tests.loop.test_modes import BASE, DETUMBLE
+from tests.missions import BASE, DETUMBLE
 
 POINT = """
 [[law.mode]]

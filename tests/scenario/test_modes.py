@@ -12,7 +12,7 @@ from starhold.loop.modes import loop_of_mode
 from starhold.scenario.building import build
 from starhold.scenario.json_schema import json_schema
 from starhold.scenario.reading import parse
-from tests.loop.test_modes import BASE, DETUMBLE, POINT
+from tests.missions import BASE, DETUMBLE, POINT
 
 TURNED = """
 from typing import NamedTuple

@@ -31,7 +31,7 @@ class ModeTargets:
 
     @property
     def NEEDS(self) -> tuple[str, ...]:  # noqa: N802
-        """What any of them needs."""
+        """Parts that any of them needs."""
         return tuple(dict.fromkeys(need for part in self.parts for need in part.needs))
 
     @property

@@ -71,7 +71,8 @@ def make_equations(parts: Composition) -> Step:
         return target.module.goal(setup.target, state, step, carry.memories.followed, *mode)
 
     def observed(carry, step, key, craft, setup):
-        """What shows the law a measurement towards a goal, with what sensors and estimator keep of it; and the goal."""
+        """A function that shows the law a measurement towards a goal, with what sensors and estimator keep of it; and the
+        goal."""
         state, memories = carry.state, carry.memories
         goal = goal_of(carry, state, step, setup)
         readings, kept = SimpleNamespace(), []
