@@ -106,3 +106,40 @@ def test_modes_with_targets_of_their_own_fly_as_their_laws_towards_them():
     many = simulate_many(loop, starts * 3, 300)
     for lane, start in enumerate(starts * 3):
         assert many.states[:, lane].tolist() == flatten(fly(replace(loop, start=start), 300)[1].state)
+
+
+PREDICTIVE = """
+[[law.mode]]
+name = "hold"
+type = "mpc"
+q_attitude = 0.2
+q_rate = 0.2
+r = 50.0
+horizon = 4
+until = { after = "2 s", to = "turn" }
+"""
+TURN = """
+[[law.mode]]
+name = "turn"
+type = "pd"
+k_rate = 0.006
+k_attitude = 0.0008
+until = { after = "1 s", to = "hold" }
+"""
+
+
+def test_a_law_whose_memory_holds_buffers_begins_anew_each_time():
+    loop = loop_of(TURN + PREDICTIVE)
+    both, carry = flown(loop, 60)
+    assert both["mode"][0].tolist() == [1.0] * 10 + [2.0] * 20 + [1.0] * 10 + [2.0] * 20 + [1.0]
+    state, done = loop.start, []
+    for mode, steps in ((0, 10), (1, 20), (0, 10), (1, 20)):
+        own, ended = flown(replace(loop_of_mode(loop, mode), start=state), steps)
+        done.append(own["command"][:, :steps])
+        state = ended.state
+    assert np.concatenate(done, axis=1).tobytes() == both["command"][:, :60].tobytes()
+    starts = [loop.start._replace(rate=tuple(factor * w for w in loop.start.rate)) for factor in (1.0, 0.3)]
+    many = simulate_many(loop, starts * 3, 60)
+    for lane, start in enumerate(starts * 3):
+        assert many.states[:, lane].tolist() == flatten(fly(replace(loop, start=start), 60)[1].state)
+    assert flatten(fly_plainly(loop, 60).state) == flatten(carry.state)
