@@ -108,14 +108,42 @@ def test_modes_with_targets_of_their_own_fly_as_their_laws_towards_them():
         assert many.states[:, lane].tolist() == flatten(fly(replace(loop, start=start), 300)[1].state)
 
 
-PREDICTIVE = """
+DELAYED = """
+from typing import Annotated, Any, NamedTuple
+from starhold.algebra.structured import Buffer
+from starhold.algebra.vector import scale
+from starhold.laws.interface import Card, Gain
+
+CARD = Card(title="Delayed", summary="u = -k w, some calls ago", sources=("mine",), assumptions=("slow",), claims="none")
+
+
+class Gains(NamedTuple):
+    k: Annotated[float, Gain("N m s", above=0.0)]
+
+
+class Memory(NamedTuple):
+    past: Any
+    sum: float
+
+
+def remember(gains, craft, period):
+    return Memory(Buffer([1e-4, 2e-4, 3e-4]), 0.0)
+
+
+def torque(measurement, gains, craft, memory):
+    first, past = memory.past[0], memory.past
+    past[0], past[1], past[2] = past[1], past[2], -gains.k * measurement.rate[0]
+    return (first, -gains.k * memory.sum, 0.0), Memory(past, memory.sum + measurement.rate[1])
+
+
+def examples():
+    return [Gains(0.01)]
+"""
+HOLD = """
 [[law.mode]]
 name = "hold"
-type = "mpc"
-q_attitude = 0.2
-q_rate = 0.2
-r = 50.0
-horizon = 4
+file = "delayed.py"
+k = 0.001
 until = { after = "2 s", to = "turn" }
 """
 TURN = """
@@ -128,8 +156,10 @@ until = { after = "1 s", to = "hold" }
 """
 
 
-def test_a_law_whose_memory_holds_buffers_begins_anew_each_time():
-    loop = loop_of(TURN + PREDICTIVE)
+def test_a_memory_and_its_buffers_begin_anew_each_time(tmp_path):
+    (tmp_path / "delayed.py").write_text(DELAYED)
+    scenario = parse(BASE + TURN + HOLD, "mission.toml", tmp_path)
+    loop = build(scenario, scenario.laws[0])
     both, carry = flown(loop, 60)
     assert both["mode"][0].tolist() == [1.0] * 10 + [2.0] * 20 + [1.0] * 10 + [2.0] * 20 + [1.0]
     state, done = loop.start, []
