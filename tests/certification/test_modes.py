@@ -2,10 +2,12 @@
 
 import json
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
+from starhold.algebra.vector import ZERO
 from starhold.certification.certificate import write
 from starhold.checker import check_file, passed
 from starhold.laws.interface import Measurement
@@ -89,7 +91,9 @@ def test_corners_of_what_is_handed_over_have_a_v_below_the_level():
         axis, spin = random.normal(size=(2, 3))
         axis, spin = axis / np.linalg.norm(axis), spin / np.linalg.norm(spin) * claim.numbers["rate"]
         half = 0.5 * claim.numbers["angle"]
-        told = Measurement((math.cos(half), *(math.sin(half) * axis)), tuple(spin), tuple(spin), *[(0.0, 0.0, 0.0)] * 4, 0.1)
+        turn: Any = (math.cos(half), *(math.sin(half) * axis))
+        rate: Any = tuple(spin)
+        told = Measurement(turn, rate, rate, ZERO, ZERO, ZERO, ZERO, 0.1)
         assert loop.law.lyapunov(told, loop.gains, loop.craft) <= claim.numbers["start"]
 
 

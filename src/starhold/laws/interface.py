@@ -4,7 +4,8 @@ A law file holds `CARD`, `class Gains(NamedTuple)`, the equation
 `torque(measurement, gains, craft, memory) -> (torque, memory)` and `examples()`. It may add
 `lyapunov(measurement, gains, craft)`, design forms (`FORMS` with `design(craft, spec)`, and `complete(spec, start)` for
 inputs that the scenario gives), `check(gains, craft)` that refuses what cannot be stable, and
-`remember(gains, craft, period)` for a memory that is not empty.
+`remember(gains, craft, period)` for a memory that is not empty, and `record(memory, period)` for what is recorded of that,
+a NamedTuple whose fields are annotated with `Quantity`.
 """
 
 from __future__ import annotations
