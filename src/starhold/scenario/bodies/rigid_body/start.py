@@ -50,13 +50,18 @@ def target_of(scenario: Scenario) -> Fitted:
     if own is not None:
         if "target" in scenario.table.model_fields_set:
             raise InputError(scenario.where, f"part {own.called}", "a second target, beside [target]", "one target")
-        try:
-            own.prepared(simulation.control_period)
-        except ValueError as error:
-            # The start may be relative to it, before the parts are tried together.
-            raise InputError(scenario.where, f"part {own.called}", "", str(error)) from None
-        return own
+        return _tried(scenario, own, f"part {own.called}")
     return _told(scenario, table, "target")
+
+
+def _tried(scenario: Scenario, target: Fitted, key: str) -> Fitted:
+    """The target itself; InputError for numbers that it refuses, for a start may be relative to it before all parts are
+    tried together."""
+    try:
+        target.prepared(scenario.table.simulation.control_period)
+    except ValueError as error:
+        raise InputError(scenario.where, key, "", str(error)) from None
+    return target
 
 
 def mode_target(scenario: Scenario, given: Any, units: Any, key: str) -> Fitted:
@@ -69,7 +74,7 @@ def mode_target(scenario: Scenario, given: Any, units: Any, key: str) -> Fitted:
         found = read_part(cast(dict[str, Any], given), "rigid-body", scenario.folder, scenario.where, key, units)
         if found.part.role != "target":
             raise InputError(scenario.where, key, f"{found.part.name}, of the role {found.part.role}", "a target")
-        return found
+        return _tried(scenario, found, key)
     table = validate(TargetTable, given, scenario.where, key)
     if table.mode == "orbital" and scenario.table.orbit is None:
         raise InputError(scenario.where, f"{key}.mode", show("orbital"), "another mode without an [orbit] table")
