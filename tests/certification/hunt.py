@@ -173,7 +173,7 @@ def fault_in(text, folder, flights=2_000):
         loop = build(scenario, entry)
     except InputError:
         return ""
-    for certificate, now, _ in certify_law(scenario, entry, loop):
+    for certificate, now, *_ in certify_law(scenario, entry, loop):
         start_inside(certificate, now)
         for claim in certificate.claims:
             sentence(claim, certificate.subject)
