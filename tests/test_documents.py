@@ -284,8 +284,26 @@ def test_example_of_parts_flies(tmp_path):
     assert abs(float(run["complementary_filter_gyro_bias"][-1, 0]) - 1.75e-4) < 5e-5
 
 
+WITH_EFFECTORS = """
+[wheels]
+layout = "pyramid"
+inertia = 2.2e-5
+torque_limit = 0.002
+momentum_limit = 0.015
+[[part]]
+type = "magnetometer"
+[[part]]
+type = "magnetorquers"
+dipole_limit = 0.2
+[[part]]
+type = "magnetic-unloading"
+dipole_limit = 0.2
+gain = 1e-3
+"""
+
+
 def test_mission_of_the_page_about_modes_flies():
-    (example,) = blocks("docs/modes.md", "toml")
+    example, rods = blocks("docs/modes.md", "toml")
     scenario = sh.scenario(tomllib.loads(example))
     (flight,) = sh.compare(scenario)
     assert [one.mode for one in flight.modes] == ["detumble", "sun", "nadir"]
@@ -294,6 +312,10 @@ def test_mission_of_the_page_about_modes_flies():
         "mission: detumble to sun",
         "mission: sun to nadir",
     ]
+    # Those with effectors of their own fly on a spacecraft that has them.
+    with_effectors = tomllib.loads(example.partition("[[law.mode]]")[0] + WITH_EFFECTORS + rods)
+    (flight,) = sh.compare(sh.scenario(with_effectors).with_({"simulation.duration": 60}))
+    assert [one.mode for one in flight.modes] == ["detumble"]
 
 
 BASE = {

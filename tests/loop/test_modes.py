@@ -173,3 +173,65 @@ def test_a_memory_and_its_buffers_begin_anew_each_time(tmp_path):
     for lane, start in enumerate(starts * 3):
         assert many.states[:, lane].tolist() == flatten(fly(replace(loop, start=start), 60)[1].state)
     assert flatten(fly_plainly(loop, 60).state) == flatten(carry.state)
+
+
+RODS_THEN_WHEELS = """
+[[law.mode]]
+name = "detumble"
+type = "b-dot"
+k = 1e-3
+effectors = ["magnetorquers"]
+until = { after = "20 s" }
+[[law.mode]]
+name = "point"
+type = "lyapunov"
+k_rate = 0.006
+k_attitude = 0.0008
+effectors = ["wheels", "magnetic-unloading"]
+"""
+CUBESAT = ORBIT.replace(
+    "[simulation]",
+    """[wheels]
+layout = "pyramid"
+inertia = 2.2e-5
+torque_limit = "2 mN m"
+momentum = "2 mN m s"
+momentum_limit = "15 mN m s"
+viscous = 1e-8
+[[part]]
+type = "magnetometer"
+[[part]]
+type = "magnetorquers"
+dipole_limit = "0.2 A m^2"
+[[part]]
+type = "magnetic-unloading"
+gain = 1e-3
+dipole_limit = "0.2 A m^2"
+[simulation]""",
+).replace("torque_limit = 0.002\n", "")
+
+
+def test_effectors_that_a_mode_does_without_rest_in_it():
+    loop = loop_of(RODS_THEN_WHEELS, CUBESAT)
+    both, carry = flown(loop)
+    first = flown(loop_of_mode(loop, 0), 200)[0]
+    for name in ("attitude", "rate", "command", "magnetic_dipole", "wheel_momentum"):
+        assert both[name][:, :200].tobytes() == first[name][:, :200].tobytes(), name
+    dipole, unloading = (np.abs(both[name]).max(axis=0) for name in ("magnetic_dipole", "unloading_dipole"))
+    assert (both["mode"][0] == 1.0).sum() == 200
+    # The first sample of a mode shows what it begins with; B-dot needs a second reading before it acts.
+    assert (dipole[2:200] > 0.0).all()
+    assert (dipole[201:] == 0.0).all()
+    assert (unloading[:200] == 0.0).all()
+    assert (unloading[201:] > 0.0).all()
+    asked = np.abs(both["wheel_command"]).max(axis=0)
+    assert (asked[:200] == 0.0).all()
+    assert (asked[201:] > 0.0).all()
+    # Rotors that are asked for nothing coast down by their friction.
+    assert (np.abs(np.diff(both["wheel_momentum"][:, :200], axis=1)) > 0.0).all()
+    assert np.array(flatten(fly_plainly(loop, 600))).tobytes() == np.array(flatten(carry)).tobytes()
+    starts = [loop.start._replace(rate=tuple(factor * w for w in loop.start.rate)) for factor in (1.0, 0.3)]
+    many = simulate_many(loop, starts * 3, 300)
+    for lane, start in enumerate(starts * 3):
+        alone = fly(replace(loop, start=start), 300)[1]
+        assert many.states[:, lane].tolist() == flatten((alone.state, alone.effectors))

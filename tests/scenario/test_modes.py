@@ -137,3 +137,48 @@ def test_the_schema_takes_modes():
     for old, new in (("rate_below", "speed_below"), ('name = "point"\n', ""), ("k_rate = 0.02", "k_rat = 0.02")):
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate(tomllib.loads(TEXT.replace(old, new)), schema)
+
+
+RODS = """
+[orbit]
+altitude = "500 km"
+inclination = "97 deg"
+[[part]]
+type = "magnetometer"
+[[part]]
+type = "magnetorquers"
+dipole_limit = 0.2
+[[part]]
+type = "thrusters"
+torque = 0.01
+lever = 0.1
+[[law]]"""
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "told"),
+    [
+        (
+            '["magnetorquers"]',
+            '["thrusters", "magnetorquers"]',
+            "point: effectors: found magnetorquers and thrusters, which",
+        ),
+        ('["magnetorquers"]', None, "point: effectors: found magnetorquers and thrusters, which both take the command"),
+        ('["magnetorquer"]', '["thrusters"]', 'detumble: effectors: found "magnetorquer"; did you mean magnetorquers?'),
+        ("[]", '["thrusters"]', "detumble: effectors: found none that takes the command; allowed: one of magnetorquers, t"),
+        ('"thrusters"', None, "law[1].mode[1].effectors: found"),
+    ],
+)
+def test_each_mode_has_one_effector_for_its_command(first, second, told):
+    lines = [f"effectors = {given}\n" if given else "" for given in (first, second)]
+    text = BASE.replace("[[law]]", RODS) + DETUMBLE + lines[0] + POINT + lines[1]
+    with pytest.raises(InputError) as caught:
+        read(text)
+    assert told in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_without_modes_two_effectors_for_a_command_are_refused_with_what_helps():
+    text = BASE.replace("[[law]]", RODS).partition('type = "modes"')[0] + 'type = "pd"\nk_rate = 0.01\nk_attitude = 0.001\n'
+    with pytest.raises(InputError, match=r'a second effector for the command.* type "modes" whose modes say which'):
+        read(text)

@@ -110,6 +110,9 @@ def linearise(loop: ClosedLoop, delay: float = 0.0) -> Linear:
         raise LinearityError(f"a delay between 0 and {MOST_HELD} control periods is wanted, not {delay:g} s")
     if not loop.aims:
         raise LinearityError("the body has no attitude")
+    for one in (loop.law, *(f.part for f in loop.used("effector") if f.part.flag("ACTS"))):
+        if one.reads:
+            raise LinearityError(f"{one.name} takes the {_told(one.reads)} too, not attitude and rate alone")
     left_out: list[str] = []
     still = _at_rest(loop, left_out)
     with np.errstate(all="ignore"):
@@ -123,6 +126,10 @@ def linearise(loop: ClosedLoop, delay: float = 0.0) -> Linear:
     return Linear(plant, continuous, sampled(plant, loop.period, delay), law, delay, tuple(left_out))
 
 
+def _told(readings: tuple[str, ...]) -> str:
+    return " and the ".join(name.replace("_", " ") for name in readings)
+
+
 def _at_rest(loop: ClosedLoop, left_out: list[str]) -> ClosedLoop:
     """The loop at rest on target, in inertial axes that are those of the target, so that the error there is exactly zero;
     names what was taken from it."""
@@ -132,6 +139,7 @@ def _at_rest(loop: ClosedLoop, left_out: list[str]) -> ClosedLoop:
     for role in ("sensor", "estimator"):
         left_out += [f"{role} {fitted.called}" for fitted in loop.used(role)]
     gone = [f for f in loop.used("environment") if f.part.hook("torque") is not None and not f.part.flag("MODELLED")]
+    gone += [f for f in loop.used("effector") if f.part.reads]
     rated = [f for f in loop.used("actuator") if f.part.name == "rate-limit"]
     left_out += [fitted.called for fitted in (*gone, *rated)]
     if loop.events:

@@ -14,7 +14,7 @@ from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import half_angle_sine
-from starhold.algebra.scalar import Scalar, Truth, absolute, both, less, less_equal, maximum, opposite, where
+from starhold.algebra.scalar import Scalar, Truth, absolute, both, either, less, less_equal, maximum, opposite, where
 from starhold.algebra.structure import buffers, chosen
 from starhold.algebra.structured import Buffer, repeat, when
 from starhold.algebra.vector import ZERO, norm
@@ -52,11 +52,13 @@ class Switch(NamedTuple):
 
 
 class Mode(NamedTuple):
-    """A mode has a name, a law and switches to others, the later before the earlier where both are due."""
+    """A mode has a name, a law, switches to others, the later before the earlier where both are due, and the names of the
+    effectors that work in it (None: all)."""
 
     name: str
     law: Law
     switches: tuple[Switch, ...]
+    effectors: tuple[str, ...] | None = None
 
 
 class Memory(NamedTuple):
@@ -160,6 +162,15 @@ class Modes:
     def torque(self, told: Measurement, gains: Any, craft: Any, memory: Memory) -> tuple[Any, Memory]:
         """The torque (N m, body) of the mode that is due."""
         return self.command(told, gains, craft, self.decide(told, gains, memory))
+
+    def rests(self, effector: str, memory: Memory) -> Truth | None:
+        """Whether an effector of this name rests in the mode that commands; None for one that works in all."""
+        found: Truth | None = None
+        for place, mode in enumerate(self.modes):
+            if mode.effectors is not None and effector not in mode.effectors:
+                here = _is(memory.mode, place)
+                found = here if found is None else either(found, here)
+        return found
 
     def record(self, memory: Memory, period: Scalar) -> Sample:
         """The recorded quantities."""

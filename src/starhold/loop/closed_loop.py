@@ -309,6 +309,11 @@ def is_recorded(sensor: Part) -> bool:
     return getattr(sensor.module, "RECORDED", True)
 
 
+def can_rest(effector: Part) -> bool:
+    """Whether an effector may rest while a mode flies without it: one that takes the command, or that acts from outside."""
+    return effector.flag("ACTS") or effector.flag("OUTSIDE")
+
+
 def _first(kind: Any, part: Part, state: Any) -> Any:
     """A reading or an estimate before the first: what is so called of the state, else what the part says."""
     own = getattr(part.module, "FIRST", {})

@@ -8,8 +8,9 @@ from typing import Any
 
 from starhold.algebra.scalar import absolute, less
 from starhold.algebra.structure import chosen
+from starhold.algebra.vector import ZERO
 from starhold.laws.modes import mode_laws
-from starhold.loop.closed_loop import ClosedLoop
+from starhold.loop.closed_loop import ClosedLoop, can_rest
 from starhold.parts.contract import Card
 from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import Goal
@@ -65,12 +66,40 @@ def join_targets(targets: Sequence[Fitted]) -> Fitted:
     return Fitted(Part("targets-of-modes", module, file), tuple(target.params for target in targets))
 
 
+@dataclass(frozen=True)
+class Resting:
+    """The module of an effector that is given no torque to make, while a mode flies without it."""
+
+    module: Any
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        found = getattr(self.module, name)
+        if name == "command":
+            return lambda applied, params: found(ZERO, params)
+        if name == "switch":
+            return lambda own, wanted, *more: found(own, ZERO, *more)
+        return found
+
+
 def loop_of_mode(loop: ClosedLoop, place: int) -> ClosedLoop:
-    """The loop of the law of one mode, counted from 0, as if that flew alone towards its target."""
+    """The loop of the law of one mode, counted from 0, as if that flew alone towards its target with the effectors that work
+    in it."""
     _, law, gains = mode_laws(loop.law, loop.gains)[place]
     alone, target = replace(loop, law=law, gains=gains, events=()), loop.target
-    if not target.part.flag("BY_MODE"):
+    if target.part.flag("BY_MODE"):
+        module: Any = target.part.module
+        own = Fitted(module.parts[place], target.params[place])
+        alone = replace(alone, parts=tuple(own if fitted is target else fitted for fitted in alone.parts))
+    working = loop.law.module.modes[place].effectors
+    if working is None:
         return alone
-    module: Any = target.part.module
-    own = Fitted(module.parts[place], target.params[place])
-    return replace(alone, parts=tuple(own if fitted is target else fitted for fitted in alone.parts))
+    found: list[Fitted] = []
+    for fitted in alone.parts:
+        if not can_rest(fitted.part) or fitted.part.name in working:
+            found.append(fitted)
+        elif fitted.part.flag("ACTS"):
+            module = Resting(fitted.part.module)
+            found.append(replace(fitted, part=Part(f"resting-{fitted.part.name}", module, fitted.part.file)))
+    return replace(alone, parts=tuple(found))

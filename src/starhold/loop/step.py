@@ -10,10 +10,10 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 from starhold.algebra.scalar import both, less, opposite, side, where
-from starhold.algebra.structure import move
+from starhold.algebra.structure import chosen, move
 from starhold.algebra.vector import ZERO, add
 from starhold.algebra.words import number_of, word_of
-from starhold.loop.closed_loop import Carry, Composition, is_recorded
+from starhold.loop.closed_loop import Carry, Composition, can_rest, is_recorded
 from starhold.parts.actuators.limits import LIMITS
 from starhold.parts.part import Part
 from starhold.parts.random import RANGE, Dice
@@ -137,7 +137,7 @@ def make_equations(parts: Composition) -> Step:
             if actuator.hook("command") is not None:
                 passed = actuator.module.command(passed, params)
         effectors = tuple(
-            e.module.switch(own, passed, told, carry.state, params, step) if e.hook("switch") is not None else own
+            switched(e, own, passed, told, carry.state, params, step, memory) if e.hook("switch") is not None else own
             for e, own, params in zip(parts.effectors, carry.effectors, setup.effectors, strict=True)
         )
         state = carry.state if named.dynamic else carry.state._replace(**{body.COMMAND: passed})
@@ -149,6 +149,17 @@ def make_equations(parts: Composition) -> Step:
         ]
         memories = memories._replace(environments=tuple(environments))
         return Carry(state, effectors, carry.actuators, memory, memories, h, passed, carry.lost_at)
+
+    def switched(effector, own, wanted, told, state, params, step, memory):
+        """The own state of an effector as a control step begins; of one that rests in the present mode that for no command,
+        or, where it takes none, the state in which it begins."""
+        rests = named.rests(effector, memory)
+        switch = effector.module.switch
+        if rests is None:
+            return switch(own, wanted, told, state, params, step)
+        if effector.flag("ACTS"):
+            return switch(own, chosen(rests, ZERO, wanted), told, state, params, step)
+        return chosen(rests, effector.module.remember(params), switch(own, wanted, told, state, params, step))
 
     def outside(kind, state, craft, memories, setup):
         """The sum of what environments give of a kind."""
@@ -163,7 +174,7 @@ def make_equations(parts: Composition) -> Step:
         applied = getattr(state, body.COMMAND)
         commands = begun.commands
         if commands is None:
-            commands = tuple(_commands(applied, effectors, setup))
+            commands = tuple(_commands(applied, effectors, setup, carry.memory))
         reactions, inertias = [], []
         for effector, own, command, params in zip(parts.effectors, effectors, commands, setup.effectors, strict=True):
             reactions.append(effector.module.reaction(own, command, state, params))
@@ -185,12 +196,13 @@ def make_equations(parts: Composition) -> Step:
         )
         return (rates, own_rates, output_rates)
 
-    def _commands(applied, effectors, setup):
+    def _commands(applied, effectors, setup, memory):
         for effector, own, params in zip(parts.effectors, effectors, setup.effectors, strict=True):
             if effector.hook("pulse") is not None:
                 yield effector.module.pulse(own, setup.substep, params)
             elif effector.flag("ACTS") and effector.hook("switch") is None:
-                yield effector.module.command(applied, params)
+                rests = named.rests(effector, memory)
+                yield effector.module.command(applied if rests is None else chosen(rests, ZERO, applied), params)
             else:
                 yield ()
 
@@ -214,7 +226,7 @@ def make_equations(parts: Composition) -> Step:
         """One substep."""
         applied = getattr(carry.state, body.COMMAND)
         # A command that is held is shared out once.
-        commands = tuple(_commands(applied, carry.effectors, setup)) if not named.dynamic else None
+        commands = tuple(_commands(applied, carry.effectors, setup, carry.memory)) if not named.dynamic else None
         begun = _Begun(commands, applied, carry.actuators)
         state, effectors, outputs = advance(
             (carry.state, carry.effectors, carry.actuators), setup.substep, begun, carry, craft, setup
@@ -230,7 +242,7 @@ def make_equations(parts: Composition) -> Step:
     def sample(carry, step, setup):
         state = carry.state
         applied = getattr(state, body.COMMAND)
-        commands = tuple(_commands(applied, carry.effectors, setup))
+        commands = tuple(_commands(applied, carry.effectors, setup, carry.memory))
         users = list(zip(parts.effectors, carry.effectors, commands, setup.effectors, strict=True))
         given = total(e.module.applied(own, command, state, p) for e, own, command, p in users if e.flag("ACTS"))
         own = body.sample(state, goal_of(carry, state, step, setup), applied if given is None else given, carry.command)
@@ -272,8 +284,13 @@ class _Named:
         self.dynamic_places = [k for k, part in enumerate(parts.actuators) if part.hook("rates") is not None]
         self.dynamic = [parts.actuators[k] for k in self.dynamic_places]
         self.acting = any(effector.flag("ACTS") for effector in parts.effectors)
+        self.rests_by_law = parts.law.hook("rests")
         ranges = _ranges([*parts.environments, *parts.sensors])
         self.environments, self.sensors = ranges[: len(environments)], ranges[len(environments) :]
+
+    def rests(self, effector: Part, memory: Any) -> Any:
+        """Whether an effector rests in the mode that commands; None for one that never does."""
+        return self.rests_by_law(effector.name, memory) if self.rests_by_law is not None and can_rest(effector) else None
 
 
 def _ranges(parts: list[Part]) -> list[int]:

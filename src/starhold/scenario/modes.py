@@ -61,6 +61,10 @@ class ModeTable(LawTable):
         WithJsonSchema({"type": "object"}),
         Field(description="as [target], or a [[part]] of this role; [target] if absent"),
     ] = None
+    effectors: Annotated[
+        tuple[str, ...] | None,
+        Field(description="those that work, of all that take commands or act from outside; all if absent"),
+    ] = None
     until: Annotated[Condition | None, Field(description="when the next mode begins")] = None
     back: Annotated[Condition | None, Field(description="when the mode before begins again")] = None
 
@@ -127,7 +131,7 @@ def _joined(tables: Sequence[Any], reads: Sequence[Read], where: str, key: str) 
             reached.add(to)
             switches.append(Switch(way, to, condition.tests))
             gains += [condition.after, condition.dwell, *(getattr(condition, test) for test in condition.tests)]
-        modes.append(Mode(table.name, read.law, tuple(switches)))
+        modes.append(Mode(table.name, read.law, tuple(switches), table.effectors))
     unreached = next((place for place in range(len(names)) if place not in reached), None)
     if unreached is not None:
         allowed = "a mode that a condition of another one leads to"

@@ -15,7 +15,8 @@ from starhold.algebra.quantity import quantities
 from starhold.algebra.structured import Buffer
 from starhold.algebra.vector import ZERO
 from starhold.errors import InputError
-from starhold.loop.closed_loop import ClosedLoop, is_recorded
+from starhold.laws.modes import Modes
+from starhold.loop.closed_loop import ClosedLoop, can_rest, is_recorded
 from starhold.loop.step import make_equations
 from starhold.parts.catalogue import PACKAGES, as_part, from_file, parts, read_module, role_of, told
 from starhold.parts.part import Fitted, Part
@@ -154,9 +155,7 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
         found = loop.used(role)
         if len(found) > 1:
             raise InputError(where, _key(found[1]), f"a second {role}, beside {found[0].called}", most)
-    acting = [f for f in loop.used("effector") if f.part.flag("ACTS")]
-    if len(acting) > 1:
-        raise InputError(where, _key(acting[1]), f"a second effector for the command, beside {acting[0].called}", "one")
+    _check_effectors(loop, where)
     readings: dict[str, str] = {}
     for sensor in loop.used("sensor"):
         for name in sensor.part.module.Reading._fields:
@@ -175,13 +174,40 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
             if need not in readings:
                 raise InputError(where, key, f"no {need}, which {one.name} needs", f"a sensor that measures {need}")
     late = next((f for f in loop.used("actuator") if f.part.hook("rates") is not None), None)
-    if late is not None and acting and acting[0].part.hook("switch") is not None:
-        allowed = f"none before {acting[0].called}, which takes the command at control instants alone"
+    switched = next((f for f in _acting(loop) if f.part.hook("switch") is not None), None)
+    if late is not None and switched is not None:
+        allowed = f"none before {switched.called}, which takes the command at control instants alone"
         raise InputError(where, _key(late), "an actuator whose output moves between control instants", allowed)
     if loop.used("effector") and "rate" not in loop.body.module.State._fields:
         raise InputError(
             where, _key(loop.used("effector")[0]), f"an effector on the body {loop.body.name}", "a body that turns"
         )
+
+
+def _acting(loop: ClosedLoop) -> list[Fitted]:
+    """The effectors that take the command, in one mode or another."""
+    return [f for f in loop.used("effector") if f.part.flag("ACTS")]
+
+
+def _check_effectors(loop: ClosedLoop, where: str) -> None:
+    """InputError where not one effector takes the command, of those that a mode has where the law is made of modes."""
+    acting, known = _acting(loop), [f.part.name for f in loop.used("effector") if can_rest(f.part)]
+    module: Any = loop.law.module
+    if not isinstance(module, Modes):
+        if len(acting) > 1:
+            found = f"a second effector for the command, beside {acting[0].called}"
+            raise InputError(where, _key(acting[1]), found, 'one, or a law of type "modes" whose modes say which')
+        return
+    for mode in module.modes:
+        key = f"law {loop.law.name}, mode {mode.name}: effectors"
+        for name in mode.effectors or ():
+            if name not in known:
+                raise InputError(where, key, show(name), nearest(name, known) if known else "no effector is there to name")
+        working = [f.called for f in acting if mode.effectors is None or f.part.name in mode.effectors]
+        if len(working) > 1:
+            raise InputError(where, key, f"{' and '.join(working)}, which both take the command", "one of them")
+        if acting and not working:
+            raise InputError(where, key, "none that takes the command", f"one of {', '.join(f.part.name for f in acting)}")
 
 
 def _key(fitted: Fitted) -> str:
