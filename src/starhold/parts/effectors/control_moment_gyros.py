@@ -1,0 +1,391 @@
+"""Control-moment gyros whose rotors change their speed too: how a wanted torque is steered, what gimbals and rotors do, what
+the body feels.
+
+Each unit has a gimbal about an axis g fixed in the body, and in it a rotor about s, which turns with the gimbal; t = g x s.
+With h the momentum of the rotor relative to the body about s, Js, Jt, Jg the moments of gimbal and rotor together about s, t
+and g, Jr the rotor's about s, w_s and w_t the body's rate about s and t, p = h + (Js - Jt) w_s, and x the gimbal's angle,
+
+    h' = rotor motor - Jr (s.w' + w_t x'),        Jg (x'' + g.w') = gimbal motor + p w_t
+
+hold exactly, and the body feels -(rotor motor) s - x' b - (gimbal motor + p w_t) g with b = p t + (Js - Jr - Jt) w_t s.
+
+Gimbal rates and rotor torques, each as a share y of its limit, are steered to give the wanted torque with the least sum of
+y^2 of the gimbals and y^2 / weight of the rotors. The weight is small but next to singularities of the gimbals: there, where
+no gimbal has torque in some direction, the rotors' axes have it."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+
+from starhold.algebra.circular import cosine_sine
+from starhold.algebra.quantity import Quantity
+from starhold.algebra.scalar import Scalar, clip, maximum
+from starhold.algebra.several import each
+from starhold.algebra.vector import (
+    IDENTITY,
+    ZERO,
+    Matrix,
+    Vector,
+    add,
+    apply,
+    combine,
+    cross,
+    determinant,
+    dot,
+    most,
+    scale,
+    solve,
+    subtract,
+)
+from starhold.parts.contract import Card, Parameter
+from starhold.parts.craft import vector
+from starhold.parts.effectors.wheels import Numbers, Wheels, available
+
+CARD = Card(
+    title="Control-moment gyros",
+    summary="-sum (h x' t + motor s) = torque with least gimbal rates x' and, next to singularities, rotor torques",
+    sources=(
+        "Feedback Control Law for Variable Speed Control Moment Gyros (1998)",
+        "Analytical Mechanics of Space Systems (2018): variable-speed control moment gyros",
+    ),
+    assumptions=(
+        "balanced rotors, rigid bearings without friction",
+        "the craft's inertia is that of the whole with every gimbal at angle zero and rotors that stand still in it",
+        "steering knows the body's rate, angles and speeds without error, and acts all the time",
+        "the gimbals' servo makes up for the moment that the turning body has on them, within the motors' limits",
+        "no null motion: rotors are not brought back to their speeds, nor gimbals turned away from singularities",
+        "gravity acts on the craft as if every gimbal were at angle zero",
+    ),
+)
+ROLE = "effector"
+ACTS = True
+COLUMNS = (
+    *(f"{what}_{axis}" for what in ("gimbal", "spin") for axis in "xyz"),
+    "rotor_inertia",
+    "about_spin",
+    "about_transverse",
+    "about_gimbal",
+    "gimbal_rate_limit",
+    "gimbal_torque_limit",
+    "rotor_torque_limit",
+    "momentum_limit",
+    "angle",
+    "momentum",
+)
+PERPENDICULAR = 1e-6
+"""Cosine of the angle from which axes do not count as perpendicular."""
+FLOOR = 1e-12
+"""What keeps the steering finite where neither gimbals nor rotors have torque in some direction, as a share of the mean
+square torque."""
+
+
+class Params(NamedTuple):
+    """A row for each unit, and how it is steered."""
+
+    units: Annotated[
+        tuple[tuple[float, ...], ...],
+        Parameter(
+            "1, 1, kg m^2, rad/s, N m, N m, N m s, rad, N m s",
+            columns=COLUMNS,
+            text="direction of the gimbal; of the spin axis at gimbal angle zero; moment of the rotor about it; moments of "
+            "gimbal and rotor together about spin, transverse and gimbal axis; largest gimbal rate that is asked for (0: "
+            "held fast); largest torques of the gimbal's and the rotor's motor (0: a rotor that nothing drives); largest "
+            "momentum of the rotor relative to the body; gimbal angle and that momentum at the start",
+        ),
+    ]
+    bandwidth: Annotated[float, Parameter("1/s", above=0.0, text="at which gimbal rates follow what is asked for")] = 10.0
+    rotor_weight: Annotated[
+        float, Parameter("1", at_least=0.0, text="of the rotors' torques beside gimbal rates, at a singularity")
+    ] = 1.0
+    singularity: Annotated[
+        float,
+        Parameter("1", above=0.0, text="determinant of the gimbals' torques, 1 at its best, at which that weight is a 16th"),
+    ] = 0.1
+    damping: Annotated[
+        float,
+        Parameter("1", at_least=0.0, text="at a singularity, of gimbal rates at the cost of torque; for undriven rotors"),
+    ] = 0.0
+
+
+class Unit(NamedTuple):
+    """A unit as equations take it: unit axes of the gimbal, and spin and transverse ones at angle zero; the rotor's moment,
+    the moments of the unit about spin, transverse and gimbal axis (kg m2), and that about the gimbal inverted; limits of the
+    gimbal's rate (rad/s) and motor (N m)."""
+
+    gimbal: Vector
+    spin: Vector
+    transverse: Vector
+    rotor_inertia: Scalar
+    about_spin: Scalar
+    about_transverse: Scalar
+    about_gimbal: Scalar
+    inverse: Scalar
+    rate_limit: Scalar
+    torque_limit: Scalar
+
+
+class Prepared(NamedTuple):
+    """The units, their rotors with the limits of these, the state at the start, the mean square torque of the gimbals about
+    an axis at their largest rate (N2 m2) and the inverse of its cube, and how they are steered."""
+
+    units: tuple[Unit, ...]
+    rotors: Wheels
+    start: State
+    square: Scalar
+    cube: Scalar
+    bandwidth: Scalar
+    rotor_weight: Scalar
+    singularity: Scalar
+    damping: Scalar
+
+
+class State(NamedTuple):
+    """The angle (rad) and rate (rad/s) of each gimbal, and the momentum of each rotor relative to the body (N m s)."""
+
+    angle: Numbers
+    rate: Numbers
+    momentum: Numbers
+
+
+class Sample(NamedTuple):
+    """The quantities that are recorded of the units."""
+
+    gimbal_angle: Annotated[Numbers, Quantity("rad", "angle of each gimbal", "gyro")]
+    gimbal_rate: Annotated[Numbers, Quantity("rad/s", "rate of each gimbal", "gyro")]
+    gimbal_rate_command: Annotated[Numbers, Quantity("rad/s", "rate asked of each gimbal", "gyro")]
+    gimbal_torque: Annotated[Numbers, Quantity("N m", "torque of each gimbal's motor", "gyro")]
+    rotor_momentum: Annotated[Numbers, Quantity("N m s", "momentum of each rotor relative to the body", "gyro")]
+    rotor_torque: Annotated[Numbers, Quantity("N m", "torque of each rotor's motor", "gyro")]
+    gimbal_determinant: Annotated[
+        float, Quantity("1", "determinant of the gimbals' torques: 0 at a singularity, 1 at its best with the first momenta")
+    ]
+
+
+class Turned(NamedTuple):
+    """A unit where it is: its spin and transverse axes, the body's rate about these (rad/s), what the body feels less for a
+    unit of gimbal rate (N m s), and the moment of the turning body on the gimbal (N m)."""
+
+    unit: Unit
+    spin: Vector
+    transverse: Vector
+    across: Scalar
+    column: Vector
+    load: Scalar
+
+
+def prepare(params: Params, period: float) -> Prepared:
+    """The numbers that equations take. ValueError for units that cannot be, or that do not act about three axes."""
+    units: list[Unit] = []
+    reach, squares = np.zeros((3, 3)), 0.0
+    for number, row in enumerate(params.units, 1):
+        unit = _unit(number, row)
+        *_, torque_limit, momentum_limit, _, held = row
+        if not (torque_limit >= 0.0 and momentum_limit > 0.0 and abs(held) <= momentum_limit):
+            raise ValueError(
+                f"the rotor of unit {number} needs a torque limit of at least 0, a momentum limit above 0, and a momentum "
+                "within it"
+            )
+        if unit.rate_limit * held:
+            reach += np.eye(3) - np.outer(unit.gimbal, unit.gimbal)
+        if torque_limit:
+            reach += np.outer(unit.spin, unit.spin)
+        squares += (unit.rate_limit * held) ** 2 / 3.0
+        units.append(unit)
+    if not squares:
+        raise ValueError("there is no unit with momentum in a gimbal that turns")
+    if np.linalg.eigvalsh(reach)[0] < PERPENDICULAR:
+        raise ValueError("the units give no torque about some axis: two gimbals that are not parallel are needed")
+    *_, torques, momenta, angles, held = zip(*params.units, strict=True)
+    none = (0.0,) * len(units)
+    rotors = Wheels(
+        tuple(unit.spin for unit in units), tuple(unit.rotor_inertia for unit in units), torques, momenta, none, none, ()
+    )
+    return Prepared(tuple(units), rotors, State(angles, none, held), squares, squares**-3, *params[1:])
+
+
+def _unit(number: int, row: tuple[float, ...]) -> Unit:
+    gimbal, spin = np.array(row[:6]).reshape(2, 3)
+    rotor, about_spin, about_transverse, about_gimbal, rate_limit, torque_limit = row[6:12]
+    for name, axis in (("gimbal", gimbal), ("spin axis", spin)):
+        if not axis.any():
+            raise ValueError(f"the {name} of unit {number} has no direction")
+    g, s = gimbal / np.linalg.norm(gimbal), spin / np.linalg.norm(spin)
+    if abs(g @ s) > PERPENDICULAR:
+        raise ValueError(f"the spin axis of unit {number} is not perpendicular to its gimbal")
+    if not (0.0 < rotor <= about_spin and about_transverse > 0.0 and about_gimbal > 0.0):
+        raise ValueError(f"unit {number} needs moments of inertia above 0, of the rotor at most about_spin")
+    if not (rate_limit >= 0.0 and torque_limit > 0.0):
+        raise ValueError(f"the gimbal of unit {number} needs a rate limit of at least 0 and a torque limit above 0")
+    t = np.cross(g, s)
+    t /= np.linalg.norm(t)
+    axes = vector(g), vector(np.cross(t, g)), vector(t)
+    return Unit(*axes, rotor, about_spin, about_transverse, about_gimbal, 1.0 / about_gimbal, rate_limit, torque_limit)
+
+
+def remember(params: Prepared) -> State:
+    """The state at the start: gimbals at rest at their angles."""
+    return params.start
+
+
+def command(applied: Vector, params: Prepared) -> Vector:
+    """The wanted torque on the body (N m): how it is steered depends on where the gimbals are."""
+    return applied
+
+
+def turned(own: State, rate: Vector, params: Prepared) -> tuple[Turned, ...]:
+    """The units where they are, on a body that turns at this rate (rad/s)."""
+    return each(_turned, (params.units, own.angle, own.momentum), rate)
+
+
+def _turned(unit: Unit, angle: Scalar, held: Scalar, rate: Vector) -> Turned:
+    cosine, sine = cosine_sine(angle * (0.5 / math.pi))
+    spin = add(scale(cosine, unit.spin), scale(sine, unit.transverse))
+    transverse = subtract(scale(cosine, unit.transverse), scale(sine, unit.spin))
+    across = dot(transverse, rate)
+    carried = held + (unit.about_spin - unit.about_transverse) * dot(spin, rate)
+    frame = unit.about_spin - unit.rotor_inertia - unit.about_transverse
+    column = add(scale(carried, transverse), scale(frame * across, spin))
+    return Turned(unit, spin, transverse, across, column, carried * across)
+
+
+class Steered(NamedTuple):
+    """What is asked of each gimbal (rad/s) and rotor (N m), and the determinant of the gimbals' torques."""
+
+    rate: Numbers
+    torque: Numbers
+    determinant: Scalar
+
+
+def steer(units: tuple[Turned, ...], wanted: Vector, params: Prepared) -> Steered:
+    """Gimbal rates (rad/s) and rotor torques (N m) that together give the body this torque (N m); where one would be beyond
+    its limit all are reduced alike, so that the torque keeps its line."""
+    turning = tuple(scale(one.unit.rate_limit, one.column) for one in units)
+    driving = tuple(scale(limit, one.spin) for limit, one in zip(params.rotors.torque_limit, units, strict=True))
+    by_gimbals = _gram(turning)
+    size = determinant(by_gimbals) * params.cube
+    # A power of a fraction in place of the published exponential: a loop with it has a slope that can be read off.
+    share = params.singularity / (params.singularity + maximum(size, 0.0))
+    share = share * share
+    share = share * share
+    weight, kept = params.rotor_weight * share, params.square * (params.damping * share + FLOOR)
+    together = combine(1.0, combine(1.0, by_gimbals, weight, _gram(driving)), kept, IDENTITY)
+    way = solve(together, scale(-1.0, wanted))
+    rates, torques = each(dot, (turning,), way), tuple(weight * dot(one, way) for one in driving)
+    within = 1.0 / maximum(1.0, most((*rates, *torques)))
+    return Steered(
+        tuple(within * y * one.unit.rate_limit for y, one in zip(rates, units, strict=True)),
+        tuple(within * y * limit for y, limit in zip(torques, params.rotors.torque_limit, strict=True)),
+        size,
+    )
+
+
+def _gram(columns: tuple[Vector, ...]) -> Matrix:
+    """The sum of a a^T."""
+
+    def row(axis: int) -> Vector:
+        found = ZERO
+        for one in columns:
+            found = add(found, scale(one[axis], one))
+        return found
+
+    return (row(0), row(1), row(2))
+
+
+def motors(own: State, units: tuple[Turned, ...], wanted: Vector, params: Prepared) -> tuple[Numbers, Numbers]:
+    """The torques of the gimbals' motors and of the rotors' motors (N m)."""
+    asked = steer(units, wanted, params)
+    gimbals = each(_servo, (units, own.rate, asked.rate), params.bandwidth)
+    return gimbals, each(clip, (asked.torque, available(asked.torque, own.momentum, params.rotors)))
+
+
+def _servo(one: Turned, rate: Scalar, asked: Scalar, bandwidth: Scalar) -> Scalar:
+    unit = one.unit
+    return clip(unit.about_gimbal * bandwidth * (asked - rate) - one.load, unit.torque_limit)
+
+
+def applied(own: State, command: Vector, body: Any, params: Prepared) -> Vector:
+    """The torque that gimbals and motors give the body (N m), what goes with its angular acceleration left out."""
+    units = turned(own, body.rate, params)
+    found = ZERO
+    for one, rate, gimbal, rotor in zip(units, own.rate, *motors(own, units, command, params), strict=True):
+        felt = add(scale(rate, one.column), scale(gimbal + one.load, one.unit.gimbal))
+        found = subtract(found, add(scale(rotor, one.spin), felt))
+    return found
+
+
+def reaction(own: State, command: Vector, body: Any, params: Prepared) -> Vector:
+    """The torque of the units on the body (N m)."""
+    carried = add(momentum(own, params), apply(inertia_change(own, params), body.rate))
+    return subtract(applied(own, command, body, params), cross(body.rate, carried))
+
+
+def inertia(own: State, params: Prepared) -> Matrix:
+    """The inertia that the body's angular acceleration meets besides the body's own (kg m2): rotors and gimbals turn on
+    about their own axes."""
+    found = inertia_change(own, params)
+    for one in turned(own, ZERO, params):
+        unit = one.unit
+        found = combine(1.0, found, -unit.rotor_inertia, _gram((one.spin,)))
+        found = combine(1.0, found, -unit.about_gimbal, _gram((unit.gimbal,)))
+    return found
+
+
+def inertia_change(own: State, params: Prepared) -> Matrix:
+    """How much more inertia the whole has than with the gimbals at angle zero (kg m2)."""
+    found: Matrix = (ZERO, ZERO, ZERO)
+    for one in turned(own, ZERO, params):
+        more = combine(1.0, _gram((one.spin,)), -1.0, _gram((one.unit.spin,)))
+        found = combine(1.0, found, one.unit.about_spin - one.unit.about_transverse, more)
+    return found
+
+
+def rates(own: State, command: Vector, body: Any, acceleration: Vector, params: Prepared) -> State:
+    """d(angles, rates, momenta)/dt."""
+    units = turned(own, body.rate, params)
+    columns = (units, own.rate, *motors(own, units, command, params))
+    return State(own.rate, each(_speeding, columns, acceleration), each(_spinning, columns, acceleration))
+
+
+def _speeding(one: Turned, rate: Scalar, gimbal: Scalar, rotor: Scalar, acceleration: Vector) -> Scalar:
+    return (gimbal + one.load) * one.unit.inverse - dot(one.unit.gimbal, acceleration)
+
+
+def _spinning(one: Turned, rate: Scalar, gimbal: Scalar, rotor: Scalar, acceleration: Vector) -> Scalar:
+    return rotor - one.unit.rotor_inertia * (dot(one.spin, acceleration) + one.across * rate)
+
+
+def momentum(own: State, params: Prepared) -> Vector:
+    """The units' angular momentum relative to the body (N m s)."""
+    found = ZERO
+    for one, rate, held in zip(turned(own, ZERO, params), own.rate, own.momentum, strict=True):
+        turning = scale(one.unit.about_gimbal * rate, one.unit.gimbal)
+        found = add(found, add(scale(held, one.spin), turning))
+    return found
+
+
+def record(own: State, command: Vector, body: Any, params: Prepared) -> Sample:
+    """The recorded quantities."""
+    units = turned(own, body.rate, params)
+    gimbals, rotors = motors(own, units, command, params)
+    asked = steer(units, command, params)
+    return Sample(own.angle, own.rate, asked.rate, gimbals, own.momentum, rotors, asked.determinant)
+
+
+def fastest(params: Params) -> float:
+    """The fastest rate (1/s) at which a gimbal comes to the rate that is asked for."""
+    return params.bandwidth
+
+
+def examples() -> list[Params]:
+    """Four variable-speed units in a pyramid, and four whose rotors nothing drives."""
+    flat, up = math.sqrt(2.0 / 3.0), math.sqrt(1.0 / 3.0)
+    around = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
+    unit = (8e-4, 1e-3, 6e-4, 8e-4, 1.0, 0.2)
+
+    def pyramid(*rest: float) -> tuple[tuple[float, ...], ...]:
+        return tuple((flat * x, flat * y, up, -y, x, 0.0, *unit, *rest) for x, y in around)
+
+    return [Params(pyramid(0.01, 0.6, 0.2, 0.4)), Params(pyramid(0.0, 0.6, 0.0, 0.4), damping=0.01)]
