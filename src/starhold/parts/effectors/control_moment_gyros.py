@@ -92,7 +92,7 @@ class Params(NamedTuple):
             columns=COLUMNS,
             text="direction of the gimbal; of the spin axis at gimbal angle zero; moment of the rotor about it; moments of "
             "gimbal and rotor together about spin, transverse and gimbal axis; largest gimbal rate that is asked for (0: "
-            "held fast); largest torques of the gimbal's and the rotor's motor (0: a rotor that nothing drives); largest "
+            "none); largest torques of the gimbal's and the rotor's motor (0: a rotor that nothing drives); largest "
             "momentum of the rotor relative to the body; gimbal angle and that momentum at the start",
         ),
     ]
@@ -159,14 +159,12 @@ class Sample(NamedTuple):
     gimbal_torque: Annotated[Numbers, Quantity("N m", "torque of each gimbal's motor", "gyro")]
     rotor_momentum: Annotated[Numbers, Quantity("N m s", "momentum of each rotor relative to the body", "gyro")]
     rotor_torque: Annotated[Numbers, Quantity("N m", "torque of each rotor's motor", "gyro")]
-    gimbal_determinant: Annotated[
-        float, Quantity("1", "determinant of the gimbals' torques: 0 at a singularity, 1 at its best with the first momenta")
-    ]
+    gimbal_determinant: Annotated[float, Quantity("1", "of the gimbals' torques, 0 at a singularity")]
 
 
 class Turned(NamedTuple):
-    """A unit where it is: its spin and transverse axes, the body's rate about these (rad/s), what the body feels less for a
-    unit of gimbal rate (N m s), and the moment of the turning body on the gimbal (N m)."""
+    """A unit where it is: its spin and transverse axes, the body's rate about the second (rad/s), the torque that the body
+    loses for a unit of gimbal rate (N m s), and the moment of the turning body on the gimbal (N m)."""
 
     unit: Unit
     spin: Vector
@@ -252,7 +250,7 @@ def _turned(unit: Unit, angle: Scalar, held: Scalar, rate: Vector) -> Turned:
 
 
 class Steered(NamedTuple):
-    """What is asked of each gimbal (rad/s) and rotor (N m), and the determinant of the gimbals' torques."""
+    """Gimbal rates (rad/s) and rotor torques (N m) that are asked for, and the determinant of the gimbals' torques."""
 
     rate: Numbers
     torque: Numbers
