@@ -17,8 +17,7 @@ from starhold.scenario.reading import parse
 INERTIA = np.array([0.05, 0.065, 0.025])
 CRAFT = make_craft(INERTIA)
 EPOCH = (2026.0, 3.0, 5.0, 6.0, 30.0, 0.0)
-TIME = f"epoch = {list(EPOCH)}\n"
-PARTS = f'[[part]]\ntype = "magnetometer"\n{TIME}[[part]]\ntype = "magnetorquers"\ndipole_limit = 5.0\n{TIME}'
+PARTS = '[[part]]\ntype = "magnetometer"\n[[part]]\ntype = "magnetorquers"\ndipole_limit = 5.0\n'
 ORBIT = 5677.0
 """s, of the scenario."""
 
@@ -32,6 +31,7 @@ inertia = [0.05, 0.065, 0.025]
 [orbit]
 position = ["6878 km", 0, 0]
 velocity = [0, "-1.017 km/s", "7.544 km/s"]
+epoch = {list(EPOCH)}
 [initial]
 angles = {angles}
 rate = {rate}

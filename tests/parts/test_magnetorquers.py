@@ -16,7 +16,6 @@ from starhold.parts.effectors.magnetorquers import dipole_for, within
 from starhold.scenario.reading import parse
 
 INERTIA = np.array([0.05, 0.065, 0.025])
-EPOCH = (2026.0, 3.0, 5.0, 6.0, 30.0, 0.0)
 CRAFT = """
 name = "own"
 [spacecraft]
@@ -25,6 +24,7 @@ torque_limit = "2 mN m"
 [orbit]
 position = ["6878 km", 0, 0]
 velocity = [0, "-1.017 km/s", "7.544 km/s"]
+epoch = "2026-03-05T06:30:00Z"
 [initial]
 angles = ["20 deg", "-10 deg", "30 deg"]
 rate = [0.02, -0.03, 0.025]
@@ -41,10 +41,9 @@ momentum_limit = "15 mN m s"
 momentum = "4 mN m s"
 """
 AXES = np.array(pyramid())
-TIME = f"epoch = {list(EPOCH)}\n"
-METER = '[[part]]\ntype = "magnetometer"\n' + TIME
-RODS = '[[part]]\ntype = "magnetorquers"\ndipole_limit = 0.2\n' + TIME
-UNLOADING = '[[part]]\ntype = "magnetic-unloading"\ndipole_limit = 0.3\n' + TIME
+METER = '[[part]]\ntype = "magnetometer"\n'
+RODS = '[[part]]\ntype = "magnetorquers"\ndipole_limit = 0.2\n'
+UNLOADING = '[[part]]\ntype = "magnetic-unloading"\ndipole_limit = 0.3\n'
 PD = '[[law]]\ntype = "pd"\nk_rate = 4e-4\nk_attitude = 2e-6\n'
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from starhold.campaign.distributions import Numbers
 from starhold.campaign.values import Place, accepted, width_at
+from starhold.parts.epoch import EPOCH, date_of
 from starhold.scenario.checking import show
 from starhold.scenario.reading import Scenario
 
@@ -41,6 +42,8 @@ class KeyReading:
             raise place.refuse("distribution", show(kind), "choice, for the key holds a word")
         if place.whole and kind not in ("uniform", "choice"):
             raise place.refuse("distribution", show(kind), "uniform or choice, for the key holds a whole number")
+        if place.gain == EPOCH and kind != "choice":
+            raise place.refuse("distribution", show(kind), "choice, for the key holds a date")
         if relative and (place.wordy or place.whole):
             raise place.refuse("relative", "true", "false, for the key holds a word or a whole number")
         if relative and (value is None or not np.isfinite(value).all() or not np.any(value)):
@@ -92,6 +95,11 @@ class KeyReading:
 
     def read(self, raw: Any, name: str, held: bool = True) -> Numbers:
         """The numbers that a raw value means, which errors call by a name; `held` as of `numbers`."""
+        if self.place.gain == EPOCH and isinstance(raw, str):
+            try:
+                raw = list(date_of(raw))
+            except ValueError as error:
+                raise self.place.refuse(name, show(raw), str(error)) from None
         read = width_at(self.place, raw, name, self.unit)
         if held:
             accepted(self.scenario, self.place, (read * self.place.value if self.relative else read).tolist(), name)

@@ -26,6 +26,7 @@ from starhold.scenario.parts import part_model
 from starhold.scenario.quantity import declared, reader
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.scenario.schema import law_model
+from starhold.scenario.shared import refuse_own
 from starhold.scenario.tables import Table
 
 SHARED = ("name", "description", "campaign", "simulation", "certify")
@@ -237,26 +238,27 @@ def _is_table(model: type[Any], name: str | int) -> bool:
 
 def _of_array(scenario: Scenario, path: tuple[str | int, ...]) -> _Held:
     """The table of a law or a part that a path leads to."""
-    array, after = str(path[0]), path[1:]
+    array, after, shared = str(path[0]), path[1:], tuple(scenario.table.SHARED)
     if len(after) < 2:
         raise _no("a whole table", f"a key of one, such as {array}.NAME.KEY")
     if array == "part":
         fitted: Fitted = _numbered(scenario.parts, array, after)
-        return part_model(fitted.part), lambda name: getattr(fitted.params, name, None), after[1:]
+        refuse_own({str(after[1]): None}, fitted.part.fields(), shared, "", "")
+        return part_model(fitted.part, shared), lambda name: getattr(fitted.params, name, None), after[1:]
     entry: LawEntry = _numbered(scenario.laws, array, after)
     names = [item.name for item in entry.law.fields(entry.form)]
     if after[1] == "mode" and mode_laws(entry.law, entry.gains):
-        return _of_mode(entry, dict(zip(names, entry.gains, strict=True)), after[2:])
+        return _of_mode(entry, dict(zip(names, entry.gains, strict=True)), after[2:], shared)
     numbers = dict(zip(names, entry.gains if entry.form is None else entry.spec, strict=True))
-    model = law_model(entry.law, entry.form, scenario.hooks.law_table)
+    model = law_model(entry.law, entry.form, scenario.hooks.law_table, shared)
     return model, lambda name: numbers[name] if name in numbers else getattr(entry.options, name, None), after[1:]
 
 
-def _of_mode(entry: LawEntry, numbers: dict[str, Any], after: tuple[str | int, ...]) -> _Held:
+def _of_mode(entry: LawEntry, numbers: dict[str, Any], after: tuple[str | int, ...], shared: tuple[str, ...]) -> _Held:
     """The table of a mode, or of a condition of it, that a path leads to."""
     laws = [law for _, law, _ in mode_laws(entry.law, entry.gains)]
     law, way = _numbered(laws, "mode", after or ("",)), after[1:]
-    model, begun = law_model(law, None, ModeTable), f"mode[{int(after[0]) + 1}]."
+    model, begun = law_model(law, None, ModeTable, shared), f"mode[{int(after[0]) + 1}]."
     if way and way[0] in CONDITIONS:
         model, begun, way = Condition, f"{begun}{way[0]}.", way[1:]
     if not way:

@@ -28,6 +28,7 @@ from starhold.scenario.bodies import bodies
 from starhold.scenario.bodies.any_body import tables_of
 from starhold.scenario.checking import nearest
 from starhold.scenario.parts import ROLES, part_model, read_parts
+from starhold.scenario.shared import shared_values
 from starhold.scenario.writing import part_table
 from starhold.simulation.lane import fly, label, recorded
 from starhold.studies.body import body_module
@@ -122,14 +123,15 @@ def survives_toml(part: Part) -> None:
     for params in part.examples():
         table = part_table(part, params)
         body = part.body or "rigid-body"
-        read = read_parts([table], body, Path(), part.name)[0].params
+        shared = shared_values(part.fields(), params, {i.gain.shared for i in part.fields() if i.name not in table})
+        read = read_parts([table], body, Path(), part.name, shared)[0].params
         require(read == params, f"{params} becomes {read} on the way through TOML")
         try:
-            read_parts([table | {"no_such_key": 1}], body, Path(), part.name)
+            read_parts([table | {"no_such_key": 1}], body, Path(), part.name, shared)
         except InputError:
             continue
         raise InputError(part.name, "", "an unknown key is accepted", "only the part's own keys")
-    require(bool(part_model(part).model_json_schema()["properties"]), "its table has no JSON Schema")
+    require(bool(part_model(part, ()).model_json_schema()["properties"]), "its table has no JSON Schema")
 
 
 def keeps_units(part: Part) -> None:

@@ -66,6 +66,9 @@ class Parameter:
     """Of a table: the names of its columns. It is given as rows, or as the name of a CSV file of them."""
     dimension: Literal["", "length", "velocity", "acceleration", "time", "rate"] = ""
     """What a scaled number is one of: a file may then give a string with a unit of it too."""
+    shared: str = ""
+    """The key of a scenario, "orbit.epoch", that gives the number to all parts that declare so, in place of keys of their
+    own tables; scenarios of bodies that lack it leave it to those."""
 
     def check(self, value: Any) -> Any:
         """Convert a value to the form that equations take; ValueError says what is allowed."""

@@ -6,7 +6,8 @@ Within a flight they rest.
 
 from __future__ import annotations
 
-from datetime import datetime, timedelta
+from collections.abc import Sequence
+from datetime import UTC, date, datetime, timedelta
 from typing import TypeAlias
 
 from starhold.algebra.scalar import Scalar
@@ -15,32 +16,58 @@ from starhold.parts.contract import Parameter
 
 Date: TypeAlias = tuple[float, float, float, float, float, float]
 """Year, month, day, hour, minute and second of Universal Time."""
-EPOCH = Parameter(shape=(6,), spread=False, text="when the flight begins, UTC: year, month, day, hour, minute, second")
-"""How parts declare it, in the same words."""
+EPOCH = Parameter(
+    shape=(6,),
+    spread=False,
+    text="when the flight begins, UTC: year, month, day, hour, minute, second; a scenario's [orbit] tells it",
+    shared="orbit.epoch",
+)
+"""How parts declare it, in the same words; a scenario gives it to all of them."""
 START: Date = (2026.0, 1.0, 1.0, 0.0, 0.0, 0.0)
-"""The epoch of a part that is given none."""
+"""The epoch of a flight that is given none."""
+WRITTEN = 'a date as "2026-03-20T12:00:00Z", or as whole year, month, day, hour, minute and a second below 60, UTC'
+"""How an epoch may be written."""
 DAY = 86400.0
 SIDEREAL = 360.98564736629 / 360.0
 """Turns of the Earth in a day of Universal Time."""
 _J2000 = datetime(2000, 1, 1, 12)
 
 
+def date_of(given: str | date | Sequence[float]) -> Date:
+    """The epoch that is written in ISO 8601 or told by the standard library, in UTC unless it says another offset, or by six
+    numbers. ValueError for what is no date."""
+    try:
+        told = datetime.fromisoformat(given.strip()) if isinstance(given, str) else given
+        if not isinstance(told, date):
+            found: Date = EPOCH.check(told)
+            days_of(found)
+            return found
+        begun = told if isinstance(told, datetime) else datetime(told.year, told.month, told.day)
+        begun = begun.astimezone(UTC) if begun.tzinfo else begun
+    except (ValueError, OverflowError):
+        raise ValueError(WRITTEN) from None
+    *whole, second = begun.year, begun.month, begun.day, begun.hour, begun.minute, begun.second + 1e-6 * begun.microsecond
+    year, month, day, hour, minute = map(float, whole)
+    return year, month, day, hour, minute, second
+
+
 def days_of(epoch: Date) -> float:
     """The days since J2000, 2000 January 1 at noon. ValueError for what is no date."""
-    *date, second = epoch
-    if any(number != int(number) for number in date) or not 0.0 <= second < 60.0:
+    *whole, second = epoch
+    if any(number != int(number) for number in whole) or not 0.0 <= second < 60.0:
         raise ValueError(
-            f"the epoch is a whole year, month, day, hour and minute, and a second below 60, not {_told(epoch)}"
+            f"the epoch is a whole year, month, day, hour and minute, and a second below 60, not {date_text(epoch)}"
         )
     try:
-        year, month, day, hour, minute = (int(number) for number in date)
+        year, month, day, hour, minute = (int(number) for number in whole)
         begun = datetime(year, month, day, hour, minute)
-    except ValueError as error:
-        raise ValueError(f"the epoch {_told(epoch)} is no date: {error}") from None
+    except (ValueError, OverflowError) as error:
+        raise ValueError(f"the epoch {date_text(epoch)} is no date: {error}") from None
     return ((begun - _J2000) + timedelta(seconds=second)) / timedelta(days=1)
 
 
-def _told(epoch: Date) -> str:
+def date_text(epoch: Date) -> str:
+    """The epoch as errors tell it."""
     return f"[{', '.join(f'{number:g}' for number in epoch)}]"
 
 

@@ -10,7 +10,7 @@ from starhold.algebra.circular import cosine_sine
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.scalar import sqrt as root
 from starhold.algebra.vector import Vector, dot, scale
-from starhold.parts.epoch import Date, days_of, sidereal, spun, turned
+from starhold.parts.epoch import Date, date_text, days_of, sidereal, spun, turned
 
 SOURCE = "International Geomagnetic Reference Field, 14th generation (2024)"
 """For the cards of parts that take it."""
@@ -115,7 +115,7 @@ def _known(epoch: Date) -> float:
     """The days since J2000. ValueError for an epoch that is no date, or beyond the coefficients."""
     days = days_of(epoch)
     if not FIRST <= days <= LAST:
-        raise ValueError(f"the magnetic field is known from 2025 to 2030, not in {epoch[0]:g}")
+        raise ValueError(f"the magnetic field is known from 2025 to 2030, not at the epoch {date_text(epoch)}")
     return days
 
 

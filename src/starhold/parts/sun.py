@@ -9,7 +9,7 @@ from starhold.algebra.circular import cosine_sine
 from starhold.algebra.rotation import rotation_vector
 from starhold.algebra.scalar import Scalar, clip, less, maximum, sqrt, where
 from starhold.algebra.vector import Vector, dot
-from starhold.parts.epoch import DAY, Date, days_of
+from starhold.parts.epoch import DAY, Date, date_text, days_of
 from starhold.parts.orbit import BODIES
 
 SOURCES = ("The Astronomical Almanac: low-precision formulas for the Sun",)
@@ -50,7 +50,7 @@ def prepared(epoch: Date) -> Numbers:
     """
     days = days_of(epoch)
     if not 1950.0 <= epoch[0] <= 2050.0:
-        raise ValueError(f"the Sun's place is known from 1950 to 2050, not in {epoch[0]:g}")
+        raise ValueError(f"the Sun's place is known from 1950 to 2050, not at the epoch {date_text(epoch)}")
     longitude, anomaly = (((at_j2000 + daily * days) / 360.0) % 1.0 for at_j2000, daily in (_LONGITUDE, _ANOMALY))
     slope = radians(23.439 - 4e-7 * days)
     return Numbers(longitude, anomaly, cos(slope), sin(slope))

@@ -8,6 +8,7 @@ import re
 import tomllib
 from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import contextmanager
+from datetime import date, time
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -57,7 +58,16 @@ def read_toml(text: str, where: str) -> dict[str, Any]:
         # Python says so of integers that are too long to convert.
         raise InputError(where, "", "a number of thousands of digits", f"at most {MOST_DIGITS} digits") from None
     _check_sizes(tables, where)
-    return tables
+    return _in_words(tables)
+
+
+def _in_words(value: Any) -> Any:
+    """The value with TOML's own dates and times as strings, which keys of an epoch take and others refuse by their rules."""
+    if isinstance(value, dict):
+        return {name: _in_words(item) for name, item in cast(dict[str, Any], value).items()}
+    if isinstance(value, list):
+        return [_in_words(item) for item in cast(list[Any], value)]
+    return value.isoformat() if isinstance(value, date | time) else value
 
 
 def _check_sizes(tables: dict[str, Any], where: str) -> None:

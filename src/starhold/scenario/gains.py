@@ -8,6 +8,7 @@ from starhold.laws.catalogue import Law
 from starhold.parts.part import Fitted
 from starhold.scenario.checking import make_gains, pick_law, refuse_unstable, refusing, validate
 from starhold.scenario.schema import LawTable, law_model
+from starhold.scenario.shared import refuse_own, values_of
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -26,18 +27,20 @@ class Read(NamedTuple):
 
 
 def read_gains(
-    data: Any, scenario: Scenario, context: Any, key: str, base: type[LawTable] | None = None, shared: Any = None
+    data: Any, scenario: Scenario, context: Any, key: str, base: type[LawTable] | None = None, whole: Any = None
 ) -> Read:
     """The law of a raw table, called `key` in errors, for a scenario that as yet has none. base: what such tables have
-    beside the gains, by default that of the body; shared: the table, read already, that holds a body's own keys in its
+    beside the gains, by default that of the body; whole: the table, read already, that holds a body's own keys in its
     place."""
     body, where, craft = scenario.hooks, scenario.where, scenario.craft
     found, law, form = pick_law(data, body.laws(), body.name, scenario.folder, where, key)
+    declared, shared = law.fields(form), scenario.table.shared
+    refuse_own(found, declared, shared, where, key)
     extra = ["file", *(["form"] if law.forms else [])]
-    own = validate(law_model(law, form, base or body.law_table), found, where, key, extra, context)
-    values = [getattr(own, item.name) for item in law.fields(form)]
+    own = validate(law_model(law, form, base or body.law_table, tuple(shared)), found, where, key, extra, context)
+    values = list(values_of(declared, own, shared).values())
     with refusing(law, where, key):
-        spec = None if form is None else body.complete(scenario, law, law.forms[form](*values), shared or own)
+        spec = None if form is None else body.complete(scenario, law, law.forms[form](*values), whole or own)
     gains = make_gains(law, values, spec, craft, where, key)
     if not scenario.allow_unstable:
         refuse_unstable(lambda: law.check(gains, craft), where, key)

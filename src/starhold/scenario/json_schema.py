@@ -38,7 +38,7 @@ def _file_schema(body: Body) -> dict[str, Any]:
         table["required"] = ["type", "mode"]
         tables.append(table)
     schema["properties"]["law"] = {"type": "array", "minItems": 1, "items": {"anyOf": tables}}
-    schema["properties"]["part"] = {"type": "array", "items": {"anyOf": part_schemas(body.name)}}
+    schema["properties"]["part"] = {"type": "array", "items": {"anyOf": part_schemas(body.name, tuple(body.tables.SHARED))}}
     schema["required"].append("law")
     return schema
 
@@ -47,7 +47,9 @@ def _law_schemas(body: Body, base: type[LawTable], known: dict[str, Any]) -> lis
     """JSON Schemas of the tables of all laws for a body, and of one from a file, with what `base` has beside the gains;
     their definitions go to the known ones."""
     tables: list[dict[str, Any]] = []
-    for model in (law_model(law, form, base) for law in body.laws().values() for form in (None, *law.forms)):
+    for model in (
+        law_model(law, form, base, tuple(body.tables.SHARED)) for law in body.laws().values() for form in (None, *law.forms)
+    ):
         table = model.model_json_schema()
         known.update(table.pop("$defs", {}))
         # TOML tables name their type, though pydantic has a default for it.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
+from datetime import date
 from pathlib import Path
 from typing import Any, cast
 
@@ -22,8 +23,8 @@ _PART = re.compile(r"([^.\[\]]+)(?:\[(\d+)\])?")
 
 def make_scenario(tables: Mapping[str, Any], folder: str | Path = ".", allow_unstable: bool = False) -> Scenario:
     """The scenario of tables as a file would hold them, {"name": "mine", "spacecraft": {"inertia": [2, 3, 4]}, ..., "law":
-    [{"type": "pd", ...}]}: strings, numbers, truths, lists and tables; tuples and NumPy arrays count as lists, and what is
-    None as left out. `folder`: what file names in it are relative to. InputError says what is wrong, as of a file. A
+    [{"type": "pd", ...}]}: strings, numbers, truths, dates, lists and tables; tuples and NumPy arrays count as lists, and
+    what is None as left out. `folder`: what file names in it are relative to. InputError says what is wrong, as of a file. A
     scenario's `with_` gives others like it, and its `text` is the file."""
     written = plain(tables, WHERE, "")
     return read_tables(written, toml_text(written), WHERE, Path(folder), allow_unstable)
@@ -109,6 +110,8 @@ def plain(value: Any, where: str, key: str) -> Any:
         return value
     if isinstance(value, Path):
         return str(value)
+    if isinstance(value, date):
+        return value.isoformat()
     if isinstance(value, Mapping):
         found: dict[str, Any] = {}
         for name, item in cast(Mapping[Any, Any], value).items():
@@ -120,4 +123,4 @@ def plain(value: Any, where: str, key: str) -> Any:
     if isinstance(value, list | tuple):
         items = list(cast(Sequence[Any], value))
         return [plain(item, where, f"{key}[{n}]") for n, item in enumerate(items, 1) if item is not None]
-    raise InputError(where, key, show(value), "numbers, strings, truths, and lists and tables of them")
+    raise InputError(where, key, show(value), "numbers, strings, truths, dates, and lists and tables of them")

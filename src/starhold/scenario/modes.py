@@ -96,7 +96,7 @@ def read_modes(data: Any, scenario: Scenario, context: Any, key: str) -> Read:
         place = f"{key}.mode[{number}]"
         if not isinstance(one, dict):
             raise InputError(where, place, show(one), "a [[law.mode]] table")
-        reads.append(read_gains(one, scenario, context, place, ModeTable, table))
+        reads.append(read_gains(one, scenario, context, place, ModeTable, whole=table))
     modes, gains = _joined([read.table for read in reads], reads, where, key)
     law = make_law(tuple(modes))
     return Read(law, None, table, None, law.gains(*gains), _targets(reads, scenario, context, key))

@@ -6,14 +6,15 @@ import math
 import warnings
 from typing import Annotated, Any
 
-from pydantic import model_validator
+from pydantic import BeforeValidator, WithJsonSchema, model_validator
 
 from starhold.algebra.vector import Vector, cross, norm
 from starhold.laws.interface import Gain
 from starhold.parts.craft import EARTH
+from starhold.parts.epoch import EPOCH, START, date_of
 from starhold.parts.orbit import BODIES, NEWTON, Elements, body_of, from_elements, lowest, meets_at
-from starhold.scenario.quantity import quantity
-from starhold.scenario.tables import Table, at_key
+from starhold.scenario.quantity import quantity, reader
+from starhold.scenario.tables import Table, at_key, refuse
 
 DENSEST = 1e6
 """Mean density (kg/m3) of what is closer to a centre of attraction than a craft can be; planets have less than 6000."""
@@ -37,6 +38,26 @@ def check_gravity(key: str, gravity: float) -> None:
         raise at_key(key, f'm^3/s^2; that of the {meant} is "{gravity:.10g} km^3/s^2"', gravity)
 
 
+def _read_epoch(given: Any) -> Any:
+    try:
+        return date_of(given if isinstance(given, str) else reader(EPOCH)(given))
+    except ValueError as error:
+        raise refuse(str(error)) from None
+
+
+EPOCH_KEY = (
+    BeforeValidator(_read_epoch),
+    WithJsonSchema(
+        {
+            "anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "number"}, "minItems": 6, "maxItems": 6}],
+            "description": "when the flight begins, for all parts that know the Sun or the turn of the Earth: date and time "
+            f"in ISO 8601, or year, month, day, hour, minute, second; {START[0]:.0f} January 1 if absent (UTC)",
+        }
+    ),
+    EPOCH,
+)
+
+
 class Orbit(Table):
     """Where the spacecraft starts, by position and velocity or by the elements of its orbit; without this table it floats in
     free space."""
@@ -58,6 +79,8 @@ class Orbit(Table):
     radius: Annotated[
         float | None, *quantity(Gain("m", above=0.0, text="of the central body; known of the Sun, the planets and the Moon"))
     ] = None
+
+    epoch: Annotated[Any, *EPOCH_KEY] = None
 
     @property
     def surface(self) -> float | None:

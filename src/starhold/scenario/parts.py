@@ -3,6 +3,7 @@ package."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -23,6 +24,7 @@ from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import Goal
 from starhold.scenario.checking import free_name, nearest, show, try_law, validate
 from starhold.scenario.schema import columns
+from starhold.scenario.shared import own_fields, refuse_own, values_of
 from starhold.scenario.tables import Name, Table, check_name
 
 ROLES = tuple(role for role in PACKAGES if role != "body")
@@ -44,16 +46,19 @@ def installed() -> dict[str, Part]:
 
 
 @cache
-def part_model(part: Part) -> type[Any]:
-    """The table of a part."""
-    entries: dict[str, Any] = {"type": (Literal[part.name], part.name), **columns(part.fields())}
+def part_model(part: Part, shared: tuple[str, ...]) -> type[Any]:
+    """The table of a part; shared: keys of the scenario that give parameters in its place."""
+    entries: dict[str, Any] = {"type": (Literal[part.name], part.name), **columns(own_fields(part.fields(), shared))}
     title = part.name.replace("-", " ").title().replace(" ", "")
     return create_model(title, __base__=PartTable, __doc__=part.card.summary, **entries)
 
 
-def read_parts(tables: Any, body: str, folder: Path, where: str, units: Any = None) -> tuple[Fitted, ...]:
-    """The parts of the [[part]] tables of a file, for a body; file names in them are relative to a folder; units: of a body
-    whose numbers are scaled. InputError for the first that is wrong in itself; `check_fit` looks at all of them together."""
+def read_parts(
+    tables: Any, body: str, folder: Path, where: str, shared: Mapping[str, Any], units: Any = None
+) -> tuple[Fitted, ...]:
+    """The parts of the [[part]] tables of a file, for a body; file names in them are relative to a folder; shared: the
+    values that the file gives to all parts; units: of a body whose numbers are scaled. InputError for the first that is
+    wrong in itself; `check_fit` looks at all of them together."""
     if tables is None:
         return ()
     if not isinstance(tables, list):
@@ -63,26 +68,29 @@ def read_parts(tables: Any, body: str, folder: Path, where: str, units: Any = No
         key = f"part[{number}]"
         if not isinstance(data, dict):
             raise InputError(where, key, show(data), "a [[part]] table")
-        read = read_part(cast(dict[str, Any], data), body, folder, where, key, units)
+        read = read_part(cast(dict[str, Any], data), body, folder, where, key, shared, units)
         taken = {fitted.name for fitted in found}
         found.append(replace(read, name=free_name(read.name or None, read.part.name, taken, where, key)))
     return tuple(found)
 
 
-def read_part(table: dict[str, Any], body: str, folder: Path, where: str, key: str, units: Any = None) -> Fitted:
+def read_part(
+    table: dict[str, Any], body: str, folder: Path, where: str, key: str, shared: Mapping[str, Any], units: Any = None
+) -> Fitted:
     """The part of a raw table, called `key` in errors, under the name that this gives, if any."""
     part = _in_file(table, folder, where, key) if "file" in table else _of_type(table, where, key)
     if part.body not in ("", body):
         raise InputError(where, key, f"{part.name}, for the body {part.body}", f"a part for {body}")
     table = {name: value for name, value in table.items() if name != "file"} | {"type": part.name}
     table = with_rows(part, table, folder, where, key)
-    read = validate(part_model(part), table, where, key, ["file"], units)
-    return Fitted(part, params_of(part, read), read.name or "")
+    refuse_own(table, part.fields(), shared, where, key)
+    read = validate(part_model(part, tuple(shared)), table, where, key, ["file"], units)
+    return Fitted(part, params_of(part, read, shared), read.name or "")
 
 
-def params_of(part: Part, read: Any) -> Any:
-    """The parameters of a part from its validated table."""
-    values = {item.name: getattr(read, item.name) for item in part.fields()}
+def params_of(part: Part, read: Any, shared: Mapping[str, Any]) -> Any:
+    """The parameters of a part from its validated table, and from the values that the scenario gives to all parts."""
+    values = values_of(part.fields(), read, shared)
     return part.params(**{name: value for name, value in values.items() if value is not None})
 
 
@@ -326,9 +334,10 @@ def _alike(one: Any, other: Any, still: bool = False) -> bool:
     return not isinstance(other, tuple) and isinstance(one, (int, float, Buffer)) and not isinstance(one, bool)
 
 
-def part_schemas(body: str) -> list[dict[str, Any]]:
-    """JSON Schemas of the [[part]] tables of a body: one for each installed part, and one for a part from a file."""
-    found = [part_model(part).model_json_schema() for part in installed().values() if part.body in ("", body)]
+def part_schemas(body: str, shared: tuple[str, ...]) -> list[dict[str, Any]]:
+    """JSON Schemas of the [[part]] tables of a body: one for each installed part, and one for a part from a file; shared:
+    keys of its scenarios that give parameters to all parts."""
+    found = [part_model(part, shared).model_json_schema() for part in installed().values() if part.body in ("", body)]
     for table in found:
         table["required"] = sorted({"type", *table.get("required", [])})
     file = {"type": "string", "description": "a Python file that holds a part, relative to this one; it is run"}

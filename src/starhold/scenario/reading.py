@@ -165,7 +165,7 @@ def read_tables(data: Mapping[str, Any], text: str, where: str, folder: Path, al
     context = body.context(data, where)
     rest = {key: value for key, value in data.items() if key not in APART}
     table = validate(body.tables, rest, where, "", extra=APART, context=context)
-    parts = read_parts(data.get("part"), body.name, folder, where, context)
+    parts = read_parts(data.get("part"), body.name, folder, where, table.shared, context)
     scenario = Scenario(body, table, (), text, where, folder, allow_unstable, parts)
     _ = scenario.made
     entries: list[LawEntry] = []

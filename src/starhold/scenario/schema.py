@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from functools import cache
+from collections.abc import Iterable, Mapping
+from functools import cache, reduce
+from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, create_model, model_validator
@@ -15,6 +16,7 @@ from starhold.laws.interface import Gain
 from starhold.scenario.campaign import CampaignTable
 from starhold.scenario.checking import MOST_SUBSTEPS
 from starhold.scenario.quantity import any_quantity, quantity
+from starhold.scenario.shared import own_fields
 from starhold.scenario.tables import Name, Table, at_key
 
 APART = ("law", "part")
@@ -29,6 +31,14 @@ class ScenarioTable(Table):
     name: Annotated[Name, Field(description="how results and folders are called")]
     description: Annotated[str, Field(description="a sentence for the report")] = ""
     campaign: CampaignTable | None = None
+    SHARED: ClassVar[Mapping[str, Any]] = MappingProxyType({})
+    """The keys that give a number to all parts that declare it as `shared`, with what a scenario without them gives."""
+
+    @property
+    def shared(self) -> dict[str, Any]:
+        """The values of the shared keys."""
+        found = {key: reduce(lambda table, name: getattr(table, name, None), key.split("."), self) for key in self.SHARED}
+        return {key: self.SHARED[key] if value is None else value for key, value in found.items()}
 
 
 class LawTable(Table):
@@ -100,10 +110,13 @@ def columns(declared: Iterable[Parameter]) -> dict[str, Any]:
 
 
 @cache
-def law_model(law: Law, form: str | None, base: type[LawTable]) -> Any:
-    """The table of a law, or of one of its design forms; `base` has what tables of such laws share."""
+def law_model(law: Law, form: str | None, base: type[LawTable], shared: tuple[str, ...]) -> Any:
+    """The table of a law, or of one of its design forms; `base` has what tables of such laws share; shared: keys of the
+    scenario that give gains in its place."""
     entries: dict[str, Any] = {"type": (Literal[law.name], law.name)}
     if form is not None:
         entries["form"] = (Literal[form], form)
     title = law.name.replace("-", " ").title().replace(" ", "") + (form or "").title()
-    return create_model(title, __base__=base, __doc__=law.card.summary, **entries, **columns(law.fields(form)))
+    return create_model(
+        title, __base__=base, __doc__=law.card.summary, **entries, **columns(own_fields(law.fields(form), shared))
+    )

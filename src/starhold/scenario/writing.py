@@ -5,14 +5,18 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
+from functools import reduce
 from typing import Any
 
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law
 from starhold.parts.catalogue import telling
+from starhold.parts.contract import Field
 from starhold.parts.part import Part
-from starhold.scenario.bodies import body_for
+from starhold.scenario.bodies import bodies, body_for
+from starhold.scenario.checking import read_toml
+from starhold.scenario.shared import shared_values
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -53,10 +57,11 @@ def _value(value: Any) -> str:
 
 
 def law_table(law: Law, gains: Any) -> str:
-    """A [[law]] table with these gains, exact: floats are written so that they read back as the same numbers."""
+    """A [[law]] table with these gains, exact: floats are written so that they read back as the same numbers; without what
+    the scenario gives to all parts."""
     which = f'type = "{law.name}"' if law.file is None else f"file = {json.dumps(str(law.file))}"
     lines = ["[[law]]", which]
-    for item, value in zip(law.fields(), gains, strict=True):
+    for item, value in _own(law.fields(), gains, body_for(law).tables.SHARED):
         shown = item.gain.choices[value] if item.gain.choices else value
         # JSON's strings, integers, finite floats and arrays are TOML's too.
         lines.append(f"{item.name} = {json.dumps(shown, allow_nan=False)}")
@@ -66,17 +71,29 @@ def law_table(law: Law, gains: Any) -> str:
 def scenario_with(law: Law, gains: Any) -> str:
     """A small scenario of the body that a law is for, which holds this law alone, and the sensors that it reads."""
     body, sensors = body_for(law), telling(law.reads)
-    text = body.example + (body.orbit if any("two-body" in sensor.part.needs for sensor in sensors) else "")
+    given = shared_values(law.fields(), gains, body.tables.SHARED)
+    orbits = bool(given) or any("two-body" in sensor.part.needs for sensor in sensors)
+    tables = read_toml(body.example + (body.orbit if orbits else ""), law.name)
+    for key, value in given.items():
+        *path, name = key.split(".")
+        reduce(lambda table, inner: table.setdefault(inner, {}), path, tables)[name] = list(value)
+    text = toml_text(tables)
     if sensors:
         text += toml_text({"part": [part_table(sensor.part, sensor.params) for sensor in sensors]})
     return text + law_table(law, gains)
 
 
 def part_table(part: Part, params: Any) -> dict[str, Any]:
-    """A [[part]] table with these parameters, infinite ones left out."""
+    """A [[part]] table with these parameters, without infinite ones and what the scenario gives to all parts."""
     table: dict[str, Any] = {"type": part.name} if part.file is None else {"file": str(part.file)}
-    for item, value in zip(part.fields(), params, strict=True):
+    body = bodies().get(part.body or "rigid-body")
+    for item, value in _own(part.fields(), params, body.tables.SHARED if body else ()):
         if isinstance(value, float) and not math.isfinite(value):
             continue
         table[item.name] = item.gain.choices[int(value)] if item.gain.choices else json.loads(json.dumps(value))
     return table
+
+
+def _own(declared: list[Field], values: Iterable[Any], shared: Collection[str]) -> list[tuple[Field, Any]]:
+    """The parameters, with their values, that a table of their own gives."""
+    return [(item, value) for item, value in zip(declared, values, strict=True) if item.gain.shared not in shared]

@@ -107,7 +107,7 @@ class AnyBody(Body):
         return Context(where, self.folder)
 
     def make(self, table: Any, where: str) -> Made:
-        params = params_of(self.part, table.body) if _params(self.part) else contract.NoParams()
+        params = params_of(self.part, table.body, {}) if _params(self.part) else contract.NoParams()
         make = self.part.hook("make")
         try:
             return Made(params, params if make is None else make(params))

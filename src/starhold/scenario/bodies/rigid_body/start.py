@@ -71,7 +71,8 @@ def mode_target(scenario: Scenario, given: Any, units: Any, key: str) -> Fitted:
     if not isinstance(given, dict):
         raise InputError(scenario.where, key, show(given), 'a table, such as { mode = "orbital" } or { type = "a target" }')
     if "type" in given or ("file" in given and "mode" not in given):
-        found = read_part(cast(dict[str, Any], given), "rigid-body", scenario.folder, scenario.where, key, units)
+        table, shared = cast(dict[str, Any], given), scenario.table.shared
+        found = read_part(table, "rigid-body", scenario.folder, scenario.where, key, shared, units)
         if found.part.role != "target":
             raise InputError(scenario.where, key, f"{found.part.name}, of the role {found.part.role}", "a target")
         return _tried(scenario, found, key)

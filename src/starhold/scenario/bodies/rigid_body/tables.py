@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import BeforeValidator, Field, model_validator
 
 from starhold.laws.interface import Gain
 from starhold.parts.craft import check_inertia
+from starhold.parts.epoch import START
 from starhold.scenario.bodies.rigid_body.budget import BudgetTable
 from starhold.scenario.bodies.rigid_body.transient import TransientTable
 from starhold.scenario.orbit import Orbit
@@ -254,6 +256,7 @@ class RigidBodyTable(ScenarioTable):
     wheels: WheelsTable | None = None
     wheel: list[WheelTable] = Field(default_factory=list[WheelTable])
     fault: list[FaultTable] = Field(default_factory=list[FaultTable])
+    SHARED = MappingProxyType({"orbit.epoch": START})
 
     @model_validator(mode="after")
     def _wheels_have_axes(self) -> RigidBodyTable:
