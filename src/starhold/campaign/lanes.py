@@ -70,11 +70,14 @@ class Lanes:
         self.moved: dict[str, set[int]] = {}
         self._varied: list[Flat] = []
         more = plan.columns(0, min(TRIES, plan.runs))
+        # Of few values the first runs may all have the same, which shows nothing of what the others move.
+        probes = {*range(min(plan.runs, PROBES))}
         for dispersion in plan.dispersions:
-            self.moved[", ".join(dispersion.keys)] = self._moved_by(dispersion, more)
+            others = self._others(dispersion, more)
+            self.moved[", ".join(dispersion.keys)] = self._moved_by(dispersion, more, others)
+            probes.update(others)
         fixed = not any(_FORM in places for places in self.moved.values())
-        probes = np.arange(min(plan.runs, PROBES))
-        self.at_once = fixed and self._agrees(plan.columns(0, len(probes)), probes)
+        self.at_once = fixed and self._agrees(_some(more, sorted(probes)), np.array(sorted(probes)))
         self.flown = self._read_back()
 
     def exact(self, columns: Columns) -> Flat:
@@ -117,12 +120,18 @@ class Lanes:
             lot = self._apart([flats[place] for place in places], runs[places])
             yield lot, np.array(places), self._told(lot)
 
-    def _moved_by(self, dispersion: Dispersion, more: Columns) -> set[int]:
-        """The places of numbers that differ where the values of one dispersion alone do; more: columns of the first runs."""
+    def _others(self, dispersion: Dispersion, more: Columns) -> list[int]:
+        """Two of the first runs at the most, of which `more` has the columns, in which a value of the dispersion is not that
+        of the very first."""
         names = dispersion.columns
-        others = [run for run in range(self.plan.runs)[:TRIES] if any(more[n][run] != self.first[n][0] for n in names)]
+        return [run for run in range(self.plan.runs)[:TRIES] if any(more[n][run] != self.first[n][0] for n in names)][:2]
+
+    def _moved_by(self, dispersion: Dispersion, more: Columns, others: Sequence[int]) -> set[int]:
+        """The places of numbers that differ where the values of one dispersion alone do, as in these other runs; more:
+        columns of the first runs."""
+        names = dispersion.columns
         found: set[int] = set()
-        for run in others[:2]:
+        for run in others:
             flat = self.exact({**self.first, **{name: more[name][run : run + 1] for name in names}})
             self._varied.append(flat)
             if flat.form != self.base.form:
