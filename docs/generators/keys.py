@@ -115,7 +115,7 @@ def _allowed(item: dict[str, Any]) -> str:
         return ", ".join(f"`{word}`" for word in item["enum"])
     if "anyOf" in item:
         # A string may stand in the place of every number, with a unit.
-        kinds = [_allowed(x) for x in item["anyOf"] if x.get("type") != "null"]
+        kinds = [x.get("description") or _allowed(x) for x in item["anyOf"] if x.get("type") != "null"]
         kinds = [k for n, k in enumerate(kinds) if k not in kinds[:n]]
         numbers = any("number" in k for k in kinds)
         return " or ".join(k for k in kinds if not (numbers and k == "text"))

@@ -79,7 +79,7 @@ def test_arrays_tuples_paths_and_none_are_taken(tmp_path):
         ({"name.first": 1}, "name.first: found a value that is no table"),
         ({"spacecraft..inertia": 1}, "not a key"),
         ({3: 1}, "a key that is no string"),
-        ({"spacecraft.inertia": {1, 2}}, "allowed: numbers, strings, truths, and lists and tables of them"),
+        ({"spacecraft.inertia": {1, 2}}, "allowed: numbers, strings, truths, dates, and lists and tables of them"),
         ({"initial": {3: 1}}, "the key 3"),
         ({"law": None}, "law: found no law"),
         ({"simulation": None}, "simulation: found nothing; allowed: this key is required"),

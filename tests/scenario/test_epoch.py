@@ -1,5 +1,6 @@
 """One epoch for a whole flight: how it is written, which parts get it, and that their own tables do not have it."""
 
+import re
 from dataclasses import replace
 from datetime import UTC, date, datetime, timedelta, timezone
 
@@ -11,13 +12,14 @@ from starhold.campaign.values import value_at
 from starhold.errors import InputError
 from starhold.parts.catalogue import PACKAGES, parts
 from starhold.parts.epoch import EPOCH, START, date_of
+from starhold.report.page_parts import settings
 from starhold.scenario.json_schema import json_schema
 from starhold.scenario.making import make_scenario
 from starhold.scenario.parts import part_schemas
 from starhold.scenario.reading import parse
 from starhold.simulation.lane import fly
-from starhold.studio.editing import check, choices, words
 from starhold.studies.compare import build
+from starhold.studio.editing import check, choices, words
 
 NOON = (2026.0, 3.0, 20.0, 12.0, 0.0, 0.0)
 CRAFT = """
@@ -151,7 +153,9 @@ def test_the_flight_is_that_of_parts_made_by_hand_with_the_epoch():
     loop, other = build(read, read.laws[0]), build(scenario(), scenario().laws[0])
     assert set(epochs(scenario()).values()) == {START}
     by_hand = tuple(
-        replace(fitted, params=fitted.params._replace(epoch=NOON)) if "epoch" in getattr(fitted.params, "_fields", ()) else fitted
+        replace(fitted, params=fitted.params._replace(epoch=NOON))
+        if "epoch" in getattr(fitted.params, "_fields", ())
+        else fitted
         for fitted in other.parts
     )
     samples = [fly(one, 40)[0] for one in (loop, replace(other, parts=by_hand), other)]
@@ -302,7 +306,12 @@ radius = 1.0
 
 def test_with_changes_it_for_all_and_writes_what_reads_back():
     read = scenario("2026-03-20T12:00:00Z", law=MODES)
-    for value in ([2027, 1, 2, 3, 4, 5], "2027-01-02T03:04:05Z", datetime(2027, 1, 2, 3, 4, 5), np.array([2027, 1, 2, 3, 4, 5])):
+    for value in (
+        [2027, 1, 2, 3, 4, 5],
+        "2027-01-02T03:04:05Z",
+        datetime(2027, 1, 2, 3, 4, 5),
+        np.array([2027, 1, 2, 3, 4, 5]),
+    ):
         other = read.with_({"orbit.epoch": value})
         assert set(epochs(other).values()) == {(2027.0, 1.0, 2.0, 3.0, 4.0, 5.0)}
         assert epochs(parse(other.text, "again")) == epochs(other)
@@ -330,7 +339,10 @@ def test_a_campaign_chooses_among_dates_and_draws_no_others():
     assert value_at(read, "orbit.epoch") == (2026.0, 3.0, 20.0, 0.0, 0.0, 0.0)
     over = {"orbit.epoch": {"distribution": "choice", "values": ["2026-03-20T12:00:00Z", [2026, 6, 21, 0, 0, 0]]}}
     for bad, told in (
-        ({"distribution": "normal", "sigma": 1}, r"distribution: found \"normal\"; allowed: choice, for the key holds a date"),
+        (
+            {"distribution": "normal", "sigma": 1},
+            r"distribution: found \"normal\"; allowed: choice, for the key holds a date",
+        ),
         ({"distribution": "choice", "values": ["noon", "2026-01-01"]}, r"values\[1\]: found \"noon\"; allowed: a date as"),
     ):
         with pytest.raises(InputError, match=told):
@@ -357,3 +369,19 @@ def test_schemas_and_the_studio_know_the_one_place():
     text = CRAFT + ORBIT + tables["magnetometer"] + PD
     assert "error" not in check(text, "my.toml", ".")
     assert check(text.replace('"magnetometer"', '"magnetometer"\nepoch = 5'), "my.toml", ".")["key"] == "part[1].epoch"
+
+
+def _epochs_told(scenario):
+    """The rows of the page's settings that hold an epoch, each with its table."""
+    page = settings(scenario, "Settings")
+    return re.findall(r"<h3>([^<]*)</h3>(?:(?!</section>).)*<td>epoch</td><td>([^<]*)</td>", page)
+
+
+def test_the_page_tells_the_epoch_once_and_where_it_is_the_default():
+    assert _epochs_told(scenario("2026-03-20T12:00:00Z")) == [("orbit", "[2026, 3, 20, 12, 0, 0]")]
+    assert _epochs_told(scenario()) == [("orbit", "[2026, 1, 1, 0, 0, 0], by default")]
+    assert _epochs_told(scenario(parts="", law=MODES)) == [("orbit", "[2026, 1, 1, 0, 0, 0], by default")]
+    assert _epochs_told(scenario(parts="")) == []
+    # In free space there is no table to tell it.
+    free = parse(f'{CRAFT}[[part]]\ntype = "sun"\n{PD}', "my.toml")
+    assert _epochs_told(free) == [("target sun", "[2026, 1, 1, 0, 0, 0]")]

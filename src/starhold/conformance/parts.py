@@ -123,7 +123,9 @@ def survives_toml(part: Part) -> None:
     for params in part.examples():
         table = part_table(part, params)
         body = part.body or "rigid-body"
-        shared = shared_values(part.fields(), params, {i.gain.shared for i in part.fields() if i.name not in table})
+        shared = shared_values(
+            part.fields(), params, {i.gain.shared for i in part.fields() if i.gain.shared and i.name not in table}
+        )
         read = read_parts([table], body, Path(), part.name, shared)[0].params
         require(read == params, f"{params} becomes {read} on the way through TOML")
         try:

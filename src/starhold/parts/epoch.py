@@ -19,7 +19,7 @@ Date: TypeAlias = tuple[float, float, float, float, float, float]
 EPOCH = Parameter(
     shape=(6,),
     spread=False,
-    text="when the flight begins, UTC: year, month, day, hour, minute, second; a scenario's [orbit] tells it",
+    text="when the flight begins, UTC: year, month, day, hour, minute, second; scenarios give it by epoch in [orbit]",
     shared="orbit.epoch",
 )
 """How parts declare it, in the same words; a scenario gives it to all of them."""

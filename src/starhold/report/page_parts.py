@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from html import escape
 from importlib import metadata, resources
 from typing import TYPE_CHECKING, Any
@@ -237,32 +237,49 @@ def settings(scenario: Scenario, title: str) -> str:
     from pydantic import BaseModel
 
     parts: list[str] = []
+    shared = {key: scenario.table.shared[key] for key in _taken(scenario)}
     for name in type(scenario.table).model_fields:
         table = getattr(scenario.table, name)
         # What a campaign draws is not flown here.
         if isinstance(table, BaseModel) and name != "campaign":
-            parts.append(_table(name, table))
-    parts += [_part(fitted) for fitted in scenario.parts]
+            parts.append(_table(name, table, shared))
+        elif table is None:
+            # Told with each part where the table is not there.
+            shared = {key: value for key, value in shared.items() if not key.startswith(f"{name}.")}
+    parts += [_part(fitted, shared) for fitted in scenario.parts]
     return f'<h2>{title}</h2>\n<div class="columns">{"".join(parts)}</div>'
 
 
-def _table(name: str, table: Any) -> str:
-    """One table of the scenario with the descriptions its schema holds; keys without a value are left out."""
+def _taken(scenario: Scenario) -> set[str]:
+    """The keys that give parameters to the parts and laws of a scenario, targets of modes among them."""
+    fitted = [*scenario.parts, *(target for entry in scenario.laws for target in entry.targets)]
+    declared = [item for one in fitted if not one.part.table for item in one.part.fields()]
+    declared += [item for entry in scenario.laws for item in entry.law.fields(entry.form)]
+    return {item.gain.shared for item in declared} & {*scenario.table.shared}
+
+
+def _table(name: str, table: Any, shared: Mapping[str, Any]) -> str:
+    """One table of the scenario with the descriptions its schema holds; keys without a value are left out, but for those
+    with a default that parts take."""
     properties = type(table).model_json_schema()["properties"]
     rows: list[str] = []
     for key in type(table).model_fields:
-        value = getattr(table, key)
+        value, given = getattr(table, key), ""
+        if value is None and f"{name}.{key}" in shared:
+            value, given = shared[f"{name}.{key}"], ", by default"
         if value is not None:
             meaning = str(properties.get(key, {}).get("description", "")).replace("^2", "²").replace("^3", "³")
-            rows.append(f"<tr><td>{escape(key)}</td><td>{escape(_value(value))}</td><td>{escape(meaning)}</td></tr>")
+            rows.append(f"<tr><td>{escape(key)}</td><td>{escape(_value(value) + given)}</td><td>{escape(meaning)}</td></tr>")
     title = name.replace("_", " ")
     return f'<section><h3>{escape(title)}</h3><table class="text"><tbody>{"".join(rows)}</tbody></table></section>'
 
 
-def _part(fitted: Fitted) -> str:
-    """The parameters of a part, with their units and meanings."""
+def _part(fitted: Fitted, shared: Collection[str]) -> str:
+    """The parameters of a part, with their units and meanings; without those that these keys of the scenario give."""
     rows: list[str] = []
     for item, value in zip(fitted.part.fields(), fitted.params, strict=True):
+        if item.gain.shared in shared:
+            continue
         told = item.gain.choices[value] if item.gain.choices else _value(value)
         unit = "" if item.gain.unit == "1" or item.gain.choices else f" {item.gain.unit}"
         rows.append(f"<tr><td>{escape(item.name)}</td><td>{escape(told + unit)}</td><td>{escape(item.gain.text)}</td></tr>")

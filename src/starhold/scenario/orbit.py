@@ -49,9 +49,18 @@ EPOCH_KEY = (
     BeforeValidator(_read_epoch),
     WithJsonSchema(
         {
-            "anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "number"}, "minItems": 6, "maxItems": 6}],
-            "description": "when the flight begins, for all parts that know the Sun or the turn of the Earth: date and time "
-            f"in ISO 8601, or year, month, day, hour, minute, second; {START[0]:.0f} January 1 if absent (UTC)",
+            "anyOf": [
+                {"type": "string", "description": "date and time in ISO 8601"},
+                {
+                    "type": "array",
+                    "items": {"type": "number"},
+                    "minItems": 6,
+                    "maxItems": 6,
+                    "description": "year, month, day, hour, minute, second",
+                },
+            ],
+            "description": "when the flight begins, for all parts that know the Sun or the turn of the Earth; "
+            f"{START[0]:.0f} January 1 if absent (UTC)",
         }
     ),
     EPOCH,

@@ -1,4 +1,4 @@
-"""What a scenario tells all its parts and laws at once, such as the epoch: parameters that are declared as `shared`."""
+"""Parameters that a scenario gives to all its parts and laws at once, such as the epoch, are those declared as `shared`."""
 
 from __future__ import annotations
 
