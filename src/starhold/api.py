@@ -221,7 +221,7 @@ def export_aem(
     run: xr.Dataset | str | Path,
     file: str | Path,
     *,
-    epoch: str = "2000-01-01T12:00:00",
+    epoch: str | None = None,
     object_name: str = "SPACECRAFT",
     object_id: str = "0000-000A",
     frame: str = "EME2000",
@@ -229,7 +229,8 @@ def export_aem(
 ) -> Path:
     """Write the attitudes of a run as a CCSDS attitude ephemeris message, and return its path.
 
-    run: what `simulate` returns, a run.nc or the folder of one. epoch: UTC at the start of the run; frame: what its inertial
+    run: what `simulate` returns, a run.nc or the folder of one. epoch: UTC at the start of the run, by default that of the
+    scenario's [orbit], else 2000-01-01T12:00:00; frame: what its inertial
     axes are called. The quaternions turn the frame to the body's axes, scalar last. InputError for a run without
     attitudes, a word that does not fit, and a file that cannot be written."""
     from starhold.export.aem import write_aem
@@ -238,9 +239,10 @@ def export_aem(
     if "attitude" not in flown:
         raise InputError("export aem", "", "a run without attitudes", "one of a rigid body")
     times, attitudes = flown["time"].to_numpy(), flown["attitude"].to_numpy()
+    begun = flown.attrs.get("epoch", "2000-01-01T12:00:00") if epoch is None else epoch
     try:
         write_aem(
-            into, times, attitudes, epoch=epoch, object_name=object_name, object_id=object_id, frame=frame, version=version
+            into, times, attitudes, epoch=begun, object_name=object_name, object_id=object_id, frame=frame, version=version
         )
     except ValueError as error:
         raise InputError("export aem", "", str(error), "what a CCSDS message may hold") from None

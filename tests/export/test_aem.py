@@ -167,6 +167,20 @@ def test_the_command_writes_a_message(tmp_path):
             sh.export_aem(tmp_path / run, tmp_path / file, **dict(options))
 
 
+def test_a_message_begins_at_the_epoch_of_the_orbit(tmp_path):
+    scenario = sh.load("three-laws").with_({"simulation.duration": 2.0})
+    dated = scenario.with_({"orbit.epoch": "2026-12-31T23:59:59.5Z"})
+    sh.simulate(dated, "lyapunov").to_netcdf(tmp_path / "run.nc", engine="h5netcdf")
+    for run, words, epoch in (
+        (sh.simulate(dated, "lyapunov"), {}, "2026-12-31T23:59:59.5"),
+        (tmp_path / "run.nc", {}, "2026-12-31T23:59:59.5"),
+        (tmp_path / "run.nc", {"epoch": "2027-03-04T00:00:00"}, "2027-03-04T00:00:00"),
+        (sh.simulate(scenario, "lyapunov"), {}, "2000-01-01T12:00:00"),
+    ):
+        sh.export_aem(run, tmp_path / "run.aem", **words)
+        assert sh.read_aem(tmp_path / "run.aem").epoch == epoch
+
+
 def test_a_run_is_written_as_parquet(tmp_path):
     pd = pytest.importorskip("pandas")
     pytest.importorskip("pyarrow", reason="pyarrow comes with the campaign extra")

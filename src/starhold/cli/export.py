@@ -47,7 +47,10 @@ def c(
 def aem(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="a run.nc, or the folder of one")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="the message, such as run.aem")],
-    epoch: Annotated[str, typer.Option(help="UTC at the start of the run")] = "2000-01-01T12:00:00",
+    epoch: Annotated[
+        str | None,
+        typer.Option(help="UTC at the start of the run; that of the scenario if absent, else 2000-01-01T12:00:00"),
+    ] = None,
     object_name: Annotated[str, typer.Option("--object", help="name of the spacecraft")] = "SPACECRAFT",
     object_id: Annotated[str, typer.Option("--id", help="its international designator")] = "0000-000A",
     frame: Annotated[str, typer.Option(help="what the inertial axes are called")] = "EME2000",

@@ -53,6 +53,15 @@ def date_of(given: str | date | Sequence[float]) -> Date:
 
 def days_of(epoch: Date) -> float:
     """The days since J2000, 2000 January 1 at noon. ValueError for what is no date."""
+    return (_instant(epoch) - _J2000) / timedelta(days=1)
+
+
+def iso_text(epoch: Date) -> str:
+    """The date in ISO 8601, UTC, to the microsecond, such as "2026-03-20T12:00:00". ValueError for what is no date."""
+    return _instant(epoch).isoformat()
+
+
+def _instant(epoch: Date) -> datetime:
     *whole, second = epoch
     if any(number != int(number) for number in whole) or not 0.0 <= second < 60.0:
         raise ValueError(
@@ -60,10 +69,9 @@ def days_of(epoch: Date) -> float:
         )
     try:
         year, month, day, hour, minute = (int(number) for number in whole)
-        begun = datetime(year, month, day, hour, minute)
+        return datetime(year, month, day, hour, minute) + timedelta(seconds=second)
     except (ValueError, OverflowError) as error:
         raise ValueError(f"the epoch {date_text(epoch)} is no date: {error}") from None
-    return ((begun - _J2000) + timedelta(seconds=second)) / timedelta(days=1)
 
 
 def date_text(epoch: Date) -> str:

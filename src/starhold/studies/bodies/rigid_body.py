@@ -15,6 +15,7 @@ from starhold.loop.kernels import make_step
 from starhold.parts.bodies.rigid_body import kinetic_energy
 from starhold.parts.craft import tensor
 from starhold.parts.effectors.wheels import gives_what_is_asked
+from starhold.parts.epoch import iso_text
 from starhold.parts.quaternion_sign import SIGN_POLICIES
 from starhold.simulation.lane import fly, label
 from starhold.studies.body import NO_CONES, BodyStudy, Cones, Issued, Values
@@ -42,6 +43,8 @@ class RigidBodyStudy:
         told = {f"settling_{name}": getattr(settling, name) for name in ("attitude_tolerance", "rate_tolerance")}
         if transient is not None:
             told |= {f"transient_{name}": getattr(transient, name) for name in TRANSIENT}
+        if scenario.table.orbit is not None and scenario.table.orbit.epoch is not None:
+            told["epoch"] = iso_text(scenario.table.orbit.epoch)
         run = label(loop, samples, carry, scenario.table.simulation.record_every)
         return replace(run, attrs=run.attrs | told | {"seed": scenario.table.simulation.seed})
 
