@@ -2,8 +2,8 @@
 
 First the models alone, under Basilisk's own feedback on the true state: both fly the same equations, and the script stops
 where they do not end in the same state. Then everything at once: starhold with gyro, star tracker, Kalman filter and noise;
-Basilisk with its own sensors and their noise, but without a filter, for it has none of that kind, so that it does less. Step,
-integrator and what is held for a control period are the same; the wheel that is lost costs nothing and is left out.
+Basilisk with its own sensors and their noise, but without a filter, for it has none of that kind, so that it does less.
+Step, integrator and what is held for a control period are the same; the wheel that is lost costs nothing and is left out.
 
 Last, what a step of starhold is made of: the operations by which it grows with each part.
 
