@@ -126,6 +126,12 @@ def with_numbers(loop: ClosedLoop, name: str, **numbers: Any) -> ClosedLoop:
     return replace(loop, parts=changed(loop.parts), events=tuple(e._replace(parts=changed(e.parts)) for e in loop.events))
 
 
+def as_in_basilisk(loop: ClosedLoop) -> ClosedLoop:
+    """A loop without what Basilisk has otherwise: its magnetometer draws other numbers, so there is no noise, and its torque
+    bars are cut off at their limit each on its own."""
+    return with_numbers(with_numbers(loop, "magnetometer", noise=0.0), "magnetic-unloading", limited=1)
+
+
 class Vehicle(NamedTuple):
     """A spacecraft in Basilisk. fly(steps) flies so many control steps more; Basilisk holds `kept` by bare pointers."""
 

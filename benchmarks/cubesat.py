@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 import peak
-from basilisk_cubesat import POINTING, in_basilisk, under, with_numbers, without
+from basilisk_cubesat import POINTING, as_in_basilisk, in_basilisk, under, without
 from common import gap, header, interleaved, show
 from starhold.algebra.structure import flatten
 from starhold.laws.pd import Gains
@@ -47,7 +47,7 @@ def main() -> None:
     # Basilisk's feedback on Rodrigues parameters with the same stiffness near the target.
     gains = Gains(whole.gains.k_rate, 2.0 * whole.gains.k_attitude)
     everything = under(whole, POINTING, gains)
-    models = with_numbers(without(everything, *FILTERED), "magnetometer", noise=0.0)
+    models = as_in_basilisk(without(everything, *FILTERED))
     check(models)
     problems = {"models": (models, models), "everything": (everything, without(everything, "estimator"))}
     tasks: dict[str, Callable[[], Any]] = {}
