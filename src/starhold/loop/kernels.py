@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.scalar import less
-from starhold.algebra.structure import buffers, flatten, leaves, mapped, move, unflatten
+from starhold.algebra.structure import buffers, flatten, leaves, mapped, move, rebuild, unflatten
 from starhold.algebra.structured import Buffer, at, repeat
 from starhold.algebra.words import whole_word, word_add, word_of
 from starhold.loop.closed_loop import ClosedLoop, Composition, Phase
@@ -58,14 +58,28 @@ def make_step(parts: Composition) -> Step:
 
 
 def form(value: Any) -> Any:
-    """Equal for arguments that one kernel serves: their structure and what is constant in them."""
+    """Equal for arguments that one kernel serves: their structure, what is constant in them, and which of the numbers that
+    parts have in common are equal."""
+    return _form(value, {})
+
+
+def _form(value: Any, known: dict[str, int]) -> Any:
     if isinstance(value, tuple):
-        return (type(value), *(form(part) for part in value))  # pyright: ignore
+        shared = _in_common(value)  # pyright: ignore
+        equal = () if shared is None else (known.setdefault(shared, len(known)),)
+        return (type(value), *equal, *(_form(part, known) for part in value))  # pyright: ignore
     if isinstance(value, Buffer):
         return ("buffer", value.size)
     if isinstance(value, np.ndarray):
         return "lanes"
     return "number" if isinstance(value, float) else (type(value), value)
+
+
+def _in_common(value: tuple[Any, ...]) -> str | None:
+    """Equal for equal numbers that parts have in common, bit by bit; None for any others, and where lanes differ."""
+    if not getattr(value, "IN_COMMON", False) or not all(isinstance(leaf, float) for leaf in leaves(value)):
+        return None
+    return repr(value)
 
 
 def fly_plainly(loop: ClosedLoop, steps: int, run: int | None = None) -> Any:
@@ -106,7 +120,23 @@ class Arguments:
                 return Buffer(tables, offset - value.size, value.size)
             return value
 
-        return mapped(self.values, leaf)
+        met: dict[str, Any] = {}
+
+        def part(value: Any) -> Any:
+            if not isinstance(value, tuple):
+                return None if value is None else leaf(value)
+            shared = _in_common(value)  # pyright: ignore
+            if shared in met:
+                # What a second part computes of them is a common subexpression.
+                for _ in leaves(value):
+                    next(places["shared"])
+                return met[shared]
+            made = rebuild(value, [part(x) for x in value])  # pyright: ignore
+            if shared is not None:
+                met[shared] = made
+            return made
+
+        return part(self.values)
 
     def rows(self, lanes: int) -> Array:
         """The numbers that differ between lanes, (numbers, lanes)."""
@@ -164,7 +194,7 @@ _KERNELS: dict[Any, Kernel] = {}
 
 def make_kernel(kind: Callable[..., Program], parts: Composition, width: int, *arguments: Any) -> Kernel:
     """The kernel of a program kind(step, *arguments); one serves all arguments of the same form."""
-    key = (kind, parts, width, *map(form, arguments))
+    key = (kind, parts, width, form(arguments))
     if key not in _KERNELS:
         _KERNELS[key] = Kernel(kind(make_step(parts), *arguments), width)
     return _KERNELS[key]

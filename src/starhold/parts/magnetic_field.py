@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import factorial, sqrt
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from starhold.algebra.circular import cosine_sine
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.scalar import sqrt as root
 from starhold.algebra.vector import Vector, dot, scale
+from starhold.algebra.words import number_of
 from starhold.parts.epoch import Date, date_text, days_of, sidereal, spun, turned
 
 SOURCE = "International Geomagnetic Reference Field, 14th generation (2024)"
@@ -73,16 +74,20 @@ ROWS: tuple[Row, ...] = (
 
 
 class Numbers(NamedTuple):
-    """The equation takes for each order the coefficients of cosine and sine (T), by degree, scaled for its recursion, and
-    the turns of the Earth at the start."""
+    """The equation takes for each order the coefficients of cosine and sine (T), by degree, scaled for its recursion, the
+    turns of the Earth at the start, and the control period (s)."""
 
     cosines: tuple[tuple[Scalar, ...], ...]
     sines: tuple[tuple[Scalar, ...], ...]
     turn: Scalar
+    period: Scalar
+
+    IN_COMMON = True  # pyright: ignore
 
 
-def prepared(epoch: Date, rows: tuple[Row, ...] = ROWS) -> Numbers:
-    """The numbers of the field for a flight that begins at an epoch (UTC), within which the coefficients rest.
+def prepared(epoch: Date, period: float = 1.0, rows: tuple[Row, ...] = ROWS) -> Numbers:
+    """The numbers of the field for a flight that begins at an epoch (UTC), within which the coefficients rest. period: of
+    the control (s), for `field_at`.
 
     ValueError for an epoch that is no date, or not from 2025 to 2030.
     """
@@ -94,7 +99,7 @@ def prepared(epoch: Date, rows: tuple[Row, ...] = ROWS) -> Numbers:
         size = 1e-9 * sqrt((2.0 if m else 1.0) * factorial(n - m) / factorial(n + m)) / factorial(n - m)
         found[m][n - max(m, 1)] = (size * g, size * h)
     cosines, sines = (tuple(tuple(pair[k] for pair in order) for order in found) for k in (0, 1))
-    return Numbers(cosines, sines, sidereal(days))
+    return Numbers(cosines, sines, sidereal(days), period)
 
 
 def strongest(epoch: Date) -> float:
@@ -131,6 +136,12 @@ def field(position: Vector, time: Scalar, params: Numbers) -> Vector:
     centre."""
     cosine, sine = cosine_sine(turned(params.turn, time))
     return spun(earth_fixed(spun(position, cosine, -sine), params), cosine, sine)
+
+
+def field_at(position: Vector, step: Any, params: Numbers) -> Vector:
+    """The magnetic field (T) at a position (m) as a control step begins, both in inertial axes. All parts that ask for it at
+    one place cost a kernel the field once."""
+    return field(position, number_of(step) * params.period, params)
 
 
 def earth_fixed(position: Vector, params: Numbers) -> Vector:

@@ -7,7 +7,6 @@ from typing import Annotated, Any, NamedTuple
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import ZERO, Vector, scale, subtract
-from starhold.algebra.words import number_of
 from starhold.parts import magnetic_field
 from starhold.parts.contract import Card, Parameter
 from starhold.parts.effectors import magnetorquers
@@ -43,15 +42,14 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """The gain (1/s), the largest dipoles (A m2), how they are limited, the momentum that stays (N m s), the field, and the
-    control period (s)."""
+    """The gain (1/s), the largest dipoles (A m2), how they are limited, the momentum that stays (N m s), and the
+    field."""
 
     gain: Scalar
     dipole_limit: Vector
     limited: int
     momentum: Vector
     field: magnetic_field.Numbers
-    period: Scalar
 
 
 class Sample(NamedTuple):
@@ -63,14 +61,14 @@ class Sample(NamedTuple):
 
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for an epoch that the field is not known at."""
-    return Numbers(*params[:4], magnetic_field.prepared(params.epoch), period)
+    return Numbers(*params[:4], magnetic_field.prepared(params.epoch, period))
 
 
 def switch(own: State, wanted: Vector, told: Any, state: Any, params: Numbers, step: int) -> State:
     """The dipole for the wheels' momentum in the measured field, and the field that is there."""
     torque = scale(-params.gain, subtract(told.wheel_momentum, params.momentum))
     dipole = within(dipole_for(torque, told.magnetic_field), params.dipole_limit, params.limited)
-    return State(dipole, magnetic_field.field(state.position, number_of(step) * params.period, params.field))
+    return State(dipole, magnetic_field.field_at(state.position, step, params.field))
 
 
 remember, reaction, rates, momentum = (

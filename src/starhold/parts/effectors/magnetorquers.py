@@ -9,7 +9,6 @@ from starhold.algebra.quaternion import to_body
 from starhold.algebra.scalar import Scalar, absolute, clip, divide, less, maximum, where
 from starhold.algebra.several import each
 from starhold.algebra.vector import ZERO, Vector, cross, dot, scale
-from starhold.algebra.words import number_of
 from starhold.parts import magnetic_field
 from starhold.parts.contract import Card, Parameter
 from starhold.parts.epoch import EPOCH, START, Date
@@ -46,12 +45,11 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """The largest dipoles (A m2), how they are limited, the field, and the control period (s)."""
+    """The largest dipoles (A m2), how they are limited, and the field."""
 
     dipole_limit: Vector
     limited: int
     field: magnetic_field.Numbers
-    period: Scalar
 
 
 class State(NamedTuple):
@@ -69,7 +67,7 @@ class Sample(NamedTuple):
 
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for an epoch that the field is not known at."""
-    return Numbers(params.dipole_limit, params.limited, magnetic_field.prepared(params.epoch), period)
+    return Numbers(params.dipole_limit, params.limited, magnetic_field.prepared(params.epoch, period))
 
 
 def remember(params: Any) -> State:
@@ -80,7 +78,7 @@ def remember(params: Any) -> State:
 def switch(own: State, wanted: Vector, told: Any, state: Any, params: Numbers, step: int) -> State:
     """The dipole for a wanted torque (N m) in the measured field, and the field that is there."""
     dipole = within(dipole_for(wanted, told.magnetic_field), params.dipole_limit, params.limited)
-    return State(dipole, magnetic_field.field(state.position, number_of(step) * params.period, params.field))
+    return State(dipole, magnetic_field.field_at(state.position, step, params.field))
 
 
 def dipole_for(torque: Vector, field: Vector) -> Vector:

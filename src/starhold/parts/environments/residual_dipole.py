@@ -5,9 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quaternion import to_body
-from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import ZERO, Vector, cross, norm
-from starhold.algebra.words import number_of
 from starhold.parts import magnetic_field
 from starhold.parts.contract import Card, Parameter
 from starhold.parts.craft import Craft
@@ -36,16 +34,15 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """The dipole, the field, and the control period (s)."""
+    """The dipole and the field."""
 
     dipole: Vector
     field: magnetic_field.Numbers
-    period: Scalar
 
 
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for an epoch that the field is not known at."""
-    return Numbers(params.dipole, magnetic_field.prepared(params.epoch), period)
+    return Numbers(params.dipole, magnetic_field.prepared(params.epoch, period))
 
 
 def remember(params: Numbers) -> Vector:
@@ -55,7 +52,7 @@ def remember(params: Numbers) -> Vector:
 
 def update(memory: Vector, state: Any, params: Numbers, dice: Dice, step: int) -> Vector:
     """The field where the control step begins (T, inertial axes)."""
-    return magnetic_field.field(state.position, number_of(step) * params.period, params.field)
+    return magnetic_field.field_at(state.position, step, params.field)
 
 
 def torque(state: Any, params: Numbers, craft: Craft, memory: Vector) -> Vector:

@@ -8,7 +8,6 @@ from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import to_body
 from starhold.algebra.scalar import Scalar, where
 from starhold.algebra.vector import ZERO, Vector, add, scale
-from starhold.algebra.words import number_of
 from starhold.parts import magnetic_field
 from starhold.parts.contract import Card, Parameter
 from starhold.parts.epoch import EPOCH, START, Date
@@ -42,13 +41,12 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """Deviation and bias (T), the scale factor, the field, the control period (s), and the outage (control steps)."""
+    """Deviation and bias (T), the scale factor, the field, and the outage (control steps)."""
 
     noise: Scalar
     bias: Vector
     factor: Scalar
     field: magnetic_field.Numbers
-    period: Scalar
     outage: Window
 
 
@@ -61,8 +59,8 @@ class Reading(NamedTuple):
 
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for an epoch that the field is not known at, and for a bad outage."""
-    field, outage = magnetic_field.prepared(params.epoch), in_steps(params.outage, period)
-    return Numbers(params.noise, params.bias, 1.0 + params.scale_error, field, period, outage)
+    field, outage = magnetic_field.prepared(params.epoch, period), in_steps(params.outage, period)
+    return Numbers(params.noise, params.bias, 1.0 + params.scale_error, field, outage)
 
 
 def remember(params: Numbers, state: Any) -> Vector:
@@ -72,7 +70,7 @@ def remember(params: Numbers, state: Any) -> Vector:
 
 def measure(state: Any, memory: Vector, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Vector]:
     """The field at this control step, or in an outage the last one before it."""
-    true = magnetic_field.field(state.position, number_of(step) * params.period, params.field)
+    true = magnetic_field.field_at(state.position, step, params.field)
     shown = add(add(scale(params.factor, to_body(state.attitude, true)), params.bias), dice.vector(0, params.noise))
     out = is_out(step, params.outage)
     held: Any = tuple(where(out, old, new) for old, new in zip(memory, shown, strict=True))
