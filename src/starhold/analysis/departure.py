@@ -147,7 +147,7 @@ def _bounded(span: Span) -> list[Departure]:
 
 
 def _absent(assumption: str, span: Span) -> list[Departure]:
-    return span.always(f"the loop has the {assumption.removeprefix(WITHOUT)}")
+    return span.always(f"{HAS}{assumption.removeprefix(WITHOUT)}")
 
 
 def _cancelled(span: Span) -> list[Departure]:
@@ -167,6 +167,8 @@ def _met(assumption: str, span: Span) -> list[Departure]:
     return _absent(assumption, span) if assumption.startswith(WITHOUT) else MET[assumption](span)
 
 
+HAS = "the loop has the "
+"""Begins the words for a part that a claim leaves out, role and name."""
 MET: Mapping[str, Callable[[Span], list[Departure]]] = {
     "rigid body": _kept,
     "inertia exactly as given": _kept,

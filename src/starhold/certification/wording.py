@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from typing import Any, cast
 
@@ -94,9 +94,20 @@ def _unlimited(claim: Claim, subject: Mapping[str, Any]) -> str:
     """The parts and limits that a claim takes away from the loop; empty where it has none."""
     absent = [text.removeprefix(WITHOUT) for text in claim.assumptions if text.startswith(WITHOUT)]
     # What a loop has and a claim leaves out decides what the claim is worth.
-    *most, last = [f"the {name}" for name in absent] or [""]
-    away = f"without {', '.join(most)} and {last}, " if most else f"without {last}, " if last else ""
-    return away + _unbounded(claim, subject)
+    return (f"without {enumerated(absent)}, " if absent else "") + _unbounded(claim, subject)
+
+
+def enumerated(names: Sequence[str]) -> str:
+    """Parts, each as role and name, for reading: "the sensors gyro and star-tracker and the estimator mekf"."""
+    roles: dict[str, list[str]] = {}
+    for role, _, name in (text.partition(" ") for text in names):
+        roles.setdefault(role, []).append(name)
+    return listed([f"the {role}{'s' * (len(own) > 1)} {listed(own)}" for role, own in roles.items()])
+
+
+def listed(words: Sequence[str]) -> str:
+    """Some things in a row, as a sentence has them."""
+    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
 def _unbounded(claim: Claim, subject: Mapping[str, Any]) -> str:

@@ -99,7 +99,7 @@ def loop_of_mode(loop: ClosedLoop, place: int) -> ClosedLoop:
     for fitted in alone.parts:
         if not can_rest(fitted.part) or fitted.part.name in working:
             found.append(fitted)
-        elif fitted.part.flag("ACTS"):
+        elif not fitted.part.flag("OUTSIDE"):
             module = Resting(fitted.part.module)
             found.append(replace(fitted, part=Part(f"resting-{fitted.part.name}", module, fitted.part.file)))
     return replace(alone, parts=tuple(found))

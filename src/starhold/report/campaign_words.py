@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from starhold.campaign.verdicts import percent
+from starhold.certification.wording import listed
 from starhold.report.campaign_units import INDEPENDENT, Wording, count_text, counted, few_percent
-from starhold.report.text import listed
 
 if TYPE_CHECKING:
     from starhold.campaign.results import CampaignResult, LawResult

@@ -7,16 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from starhold.analysis.departure import HAS
+from starhold.certification.wording import enumerated, listed
+
 if TYPE_CHECKING:
     from starhold.studies.flight import Flight
 
 ROUNDING = 1e-13
 """Share of a matrix's largest entry below which another is taken for what rounding left."""
-
-
-def listed(parts: Sequence[str]) -> str:
-    """Some things in a row, as a sentence has them."""
-    return " and ".join(filter(None, (", ".join(parts[:-1]), parts[-1])))
 
 
 def number_text(value: Any, digits: int = 6) -> str:
@@ -50,8 +48,15 @@ def value_text(value: Any, unit: str) -> str:
 def left_text(flight: Flight, certificate: int, kind: str) -> str:
     """How a flight leaves a claim of one of its certificates, for reading; empty where it does not."""
     left, moment = flight.left(certificate, kind), flight.metric_set.moment
-    groups = {time: listed([one.how for one in left if one.time == time]) for time in (one.time for one in left)}
+    groups = {time: _how([one.how for one in left if one.time == time]) for time in (one.time for one in left)}
     return "; ".join(f"{'from the start' if time == 0.0 else f'at {moment(time, 4)}'} {how}" for time, how in groups.items())
+
+
+def _how(departures: Sequence[str]) -> str:
+    """Departures at one time in a row, the parts that the loop has told together."""
+    parts = [text.removeprefix(HAS) for text in departures if text.startswith(HAS)]
+    others = [text for text in departures if not text.startswith(HAS)]
+    return listed([*([HAS.removesuffix("the ") + enumerated(parts)] if parts else []), *others])
 
 
 def lost_text(flight: Flight, digits: int = 6) -> str:
