@@ -2,6 +2,7 @@ import mpmath
 import numpy as np
 
 from starhold.algebra.circular import cosine_sine, nearest
+from starhold.algebra.dual import Dual, differentiate
 
 
 def test_cosine_and_sine_against_mpmath():
@@ -25,3 +26,10 @@ def test_quarters_are_exact():
 def test_rounding_as_python_does():
     for x in (0.5, 1.5, 2.5, -0.5, -1.5, 0.49999999999999994, 7.3, -123456.7):
         assert nearest(x) == round(x)
+
+
+def test_their_slopes_are_those_of_cosine_and_sine():
+    for x in (-3.3, 0.1, 0.37, 12.6):
+        slopes = differentiate(lambda x=x: cosine_sine(Dual(x, np.array([1.0]))), 1)  # pyright: ignore
+        cosine, sine = cosine_sine(x)
+        assert np.allclose(slopes[:, 0], [-2 * np.pi * sine, 2 * np.pi * cosine], rtol=1e-13)

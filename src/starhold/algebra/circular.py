@@ -5,6 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 from math import factorial, tau
 
+from starhold.algebra.dual import Dual
 from starhold.algebra.scalar import Scalar, absolute, less, side, where
 
 _SHIFT = 1.5 * 2.0**52
@@ -16,6 +17,8 @@ _SINE = tuple(float(Fraction((-1) ** n, factorial(2 * n + 1))) for n in range(8)
 
 def nearest(x: Scalar) -> Scalar:
     """Return the whole number nearest to x, the even one of two; |x| is below 2^51."""
+    # The slope of the sum is not that of the rounding: none.
+    x = x.value if isinstance(x, Dual) else x
     return (x + _SHIFT) - _SHIFT
 
 

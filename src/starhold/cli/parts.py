@@ -104,6 +104,7 @@ def _print_roles(groups: dict[str, Iterable[Part]]) -> None:
 
 def print_part(part: Part) -> None:
     """The card of a part, its parameters and what it records."""
+    from rich.markup import escape
     from rich.table import Table
 
     from starhold.algebra.quantity import quantities
@@ -129,6 +130,6 @@ def print_part(part: Part) -> None:
             table.add_column(head)
         for kind in kinds:
             for name, told in quantities(kind).items():
-                table.add_row(name, told.unit, told.text)
+                table.add_row(*map(escape, (name, told.unit, told.text)))
         console.print()
         console.print(table)

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
@@ -136,7 +137,8 @@ def print_design(design: Design, law: Law) -> None:
             table.add_column(head, overflow="fold")
         for item in items:
             value = values[item.name]
-            table.add_row(item.name, value if isinstance(value, str) else number_text(value), item.gain.unit, item.gain.text)
+            shown = value if isinstance(value, str) else number_text(value)
+            table.add_row(*map(escape, (item.name, shown, item.gain.unit, item.gain.text)))
         console.print(table)
     # Digits, not decimals: entries of P may be far apart in size.
     digits: Any = {"float_kind": lambda number: f"{number:12.6g}", "complex_kind": lambda number: f"{number:.6g}"}
@@ -152,7 +154,7 @@ def print_laws(group: str, known: Mapping[str, Law]) -> None:
     for head in (group, "claims", "summary"):
         table.add_column(head)
     for law in known.values():
-        table.add_row(law.name, law.card.claims, law.card.summary)
+        table.add_row(*map(escape, (law.name, law.card.claims, law.card.summary)))
     console.print(table)
 
 
@@ -192,7 +194,7 @@ def print_fields(title: str, fields: Iterable[Field]) -> None:
         default = (
             "required" if item.required else str(item.gain.choices[item.default] if item.gain.choices else item.default)
         )
-        table.add_row(item.name, item.gain.unit, allowed, default, item.gain.text)
+        table.add_row(*map(escape, (item.name, item.gain.unit, allowed, default, item.gain.text)))
     console.print(table)
 
 
