@@ -14,8 +14,9 @@ from starhold.analysis.rigid_body import MEASURES, METRICS
 from starhold.parts.craft import check_inertia
 from starhold.report.bodies.rigid_body import _box
 from starhold.report.page import render, write_page
+from starhold.report.page_parts import settings
 from starhold.scenario.building import build
-from starhold.scenario.reading import parse
+from starhold.scenario.reading import load, parse
 from starhold.simulation.lane import Recording, fly, label
 from tests.report import flown
 from tests.report.reader import Reader
@@ -210,3 +211,16 @@ def test_the_outline_has_the_inertia_of_a_uniform_box(inertia: Any) -> None:
 def test_a_flat_body_has_an_outline() -> None:
     size, _ = _box((1.0, 1.0, 2.0))
     assert size.min() == pytest.approx(0.095)
+
+
+def test_settings_tell_what_flies() -> None:
+    plain = settings(load("cubesat-slew"), "Settings")
+    assert "<h3>target</h3>" in plain
+    assert "requirement" not in plain
+    own = load("cubesat-slew").with_(
+        {"target": None, "part": [{"type": "sun"}], "budget": {"requirement": {"ape": "0.1 deg"}}}
+    )
+    shown = settings(own, "Settings")
+    assert "<td>requirement.ape</td><td>0.00174533</td>" in shown
+    assert "<h3>target</h3>" not in shown
+    assert "<h3>target sun</h3>" in shown

@@ -240,8 +240,9 @@ def settings(scenario: Scenario, title: str) -> str:
     shared = {key: scenario.table.shared[key] for key in _taken(scenario)}
     for name in type(scenario.table).model_fields:
         table = getattr(scenario.table, name)
-        # What a campaign draws is not flown here.
-        if isinstance(table, BaseModel) and name != "campaign":
+        # What a campaign draws is not flown here, nor a target beside one that is a part.
+        own = any(fitted.part.role == name for fitted in scenario.parts)
+        if isinstance(table, BaseModel) and name != "campaign" and not own:
             parts.append(_table(name, table, shared))
         elif table is None:
             # Told with each part where the table is not there.
@@ -261,15 +262,20 @@ def _taken(scenario: Scenario) -> set[str]:
 def _table(name: str, table: Any, shared: Mapping[str, Any]) -> str:
     """One table of the scenario with the descriptions its schema holds; keys without a value are left out, but for those
     with a default that parts take."""
+    from pydantic import BaseModel
+
     properties = type(table).model_json_schema()["properties"]
     rows: list[str] = []
     for key in type(table).model_fields:
         value, given = getattr(table, key), ""
         if value is None and f"{name}.{key}" in shared:
             value, given = shared[f"{name}.{key}"], ", by default"
-        if value is not None:
+        if isinstance(value, BaseModel):
+            inner = {f"{key}.{one}": getattr(value, one) for one in type(value).model_fields}
+            rows += [_row(one, _value(found), "") for one, found in inner.items() if found is not None]
+        elif value is not None:
             meaning = str(properties.get(key, {}).get("description", "")).replace("^2", "²").replace("^3", "³")
-            rows.append(f"<tr><td>{escape(key)}</td><td>{escape(_value(value) + given)}</td><td>{escape(meaning)}</td></tr>")
+            rows.append(_row(key, _value(value) + given, meaning))
     title = name.replace("_", " ")
     return f'<section><h3>{escape(title)}</h3><table class="text"><tbody>{"".join(rows)}</tbody></table></section>'
 
@@ -282,9 +288,13 @@ def _part(fitted: Fitted, shared: Collection[str]) -> str:
             continue
         told = item.gain.choices[value] if item.gain.choices else _value(value)
         unit = "" if item.gain.unit == "1" or item.gain.choices else f" {item.gain.unit}"
-        rows.append(f"<tr><td>{escape(item.name)}</td><td>{escape(told + unit)}</td><td>{escape(item.gain.text)}</td></tr>")
+        rows.append(_row(item.name, told + unit, item.gain.text))
     title = f"{fitted.part.role} {fitted.called}"
     return f'<section><h3>{escape(title)}</h3><table class="text"><tbody>{"".join(rows)}</tbody></table></section>'
+
+
+def _row(*cells: str) -> str:
+    return f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
 
 
 def _value(value: Any) -> str:
