@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 from starhold.algebra.circular import cosine_sine
 from starhold.algebra.rotation import rotation_vector
-from starhold.algebra.scalar import Scalar, clip, less, maximum, sqrt, where
+from starhold.algebra.scalar import Scalar, both, clip, less, maximum, sqrt, where
+from starhold.algebra.structured import when
 from starhold.algebra.vector import Vector, dot
 from starhold.parts.epoch import DAY, Date, date_text, days_of
 from starhold.parts.orbit import BODIES
@@ -73,21 +74,33 @@ def in_view(position: Vector, seen: Sun) -> Scalar:
     the share by less than 0.4 %.
     """
     square = dot(position, position)
+    # As the attraction of the Earth has it, so that a kernel computes it once.
+    inverse = sqrt(1.0 / square)
     # Of the angle between the Sun and the Earth's centre, and of the Earth's angular radius, cosine and sine.
-    toward = -dot(position, seen.direction) / sqrt(square)
+    toward = -inverse * dot(position, seen.direction)
     across = sqrt(maximum(1.0 - toward * toward, 0.0))
-    half = EARTH / sqrt(square)
+    half = EARTH * inverse
     open_sky = sqrt(maximum(1.0 - half * half, 0.0))
     # How far the Sun's centre stands above the edge, in radii of its disc: angles that small are their sines.
     height = (across * open_sky - toward * half) * (seen.distance * (UNIT / RADIUS))
     # The Sun's direction is that from the Earth's centre.
-    height = height - across * sqrt(square) / RADIUS
+    height = height - (1.0 / RADIUS) * across * (square * inverse)
     # Where the Sun is on the other side the sine of the distance from the edge means nothing.
     height = where(less(toward, 0.0), 1.0, clip(height, 1.0))
+
+    def cut(_: Scalar) -> tuple[Scalar]:
+        return (_of_disc(height),)
+
+    # A branch, for the edge is seldom seen.
+    (share,) = when(both(less(height, 1.0), less(-1.0, height)), cut, 0.0)
+    return where(less(height, 1.0), share, 1.0)
+
+
+def _of_disc(height: Scalar) -> Scalar:
+    """The share of a disc above a straight edge, of the height of its centre above it in radii, from -1 to 1."""
     cosine = sqrt(maximum(1.0 - height * height, 0.0))
     arc = 0.5 * rotation_vector((cosine, height, 0.0, 0.0))[0]
-    share = 0.5 + (1.0 / pi) * (arc + height * cosine)
-    return where(less(height, 1.0), where(less(-1.0, height), share, 0.0), 1.0)
+    return 0.5 + (1.0 / pi) * (arc + height * cosine)
 
 
 def pressure(seen: Sun) -> Scalar:

@@ -7,9 +7,9 @@ from typing import Annotated, Any, NamedTuple, TypeAlias
 
 from starhold.algebra.exponential import exponential
 from starhold.algebra.quaternion import to_body
-from starhold.algebra.scalar import Scalar, maximum
+from starhold.algebra.scalar import Scalar, maximum, sqrt
 from starhold.algebra.several import weighted
-from starhold.algebra.vector import Vector, cross, dot, norm, scale, subtract, unit
+from starhold.algebra.vector import Vector, cross, dot, scale, subtract, unit
 from starhold.parts.contract import Card, Parameter
 from starhold.parts.craft import Craft
 from starhold.parts.epoch import DAY, SIDEREAL
@@ -95,7 +95,10 @@ def update(memory: Memory, state: Any, params: Numbers, dice: Dice, step: int) -
     position = state.position
     wind = (-params.turn * position[1], params.turn * position[0], 0.0)
     through = subtract(state.velocity, wind)
-    thinned = exponential((params.distance - norm(position)) / params.scale_height)
+    square = dot(position, position)
+    # As the attraction of the Earth has it, so that a kernel computes it once.
+    distance = square * sqrt(1.0 / square)
+    thinned = exponential((params.distance - distance) * (1.0 / params.scale_height))
     return Memory(unit(through), params.density * thinned * dot(through, through))
 
 

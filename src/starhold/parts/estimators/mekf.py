@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple, cast
 
 from starhold.algebra.cosines import from_quaternion
 from starhold.algebra.quantity import Quantity
-from starhold.algebra.quaternion import Quaternion, multiply, normalise, relative, vector_part
+from starhold.algebra.quaternion import Quaternion, multiply, normalise, relative, renormalise, vector_part
 from starhold.algebra.rotation import short_turn
 from starhold.algebra.scalar import Scalar, Truth, both, less, side, sqrt, where
 from starhold.algebra.structure import rebuild
@@ -168,7 +168,7 @@ def propagated(memory: Memory, rate: Vector, params: Numbers, period: Scalar) ->
         product(mixed, transpose(drift)),
     )
     return memory._replace(
-        attitude=normalise(multiply(memory.attitude, turn)),
+        attitude=renormalise(multiply(memory.attitude, turn)),
         turn=symmetric(combine(1.0, spread, params.turned, IDENTITY)),
         mixed=combine(1.0, mixed, params.mixed, IDENTITY),
         walk=combine(1.0, memory.walk, params.walked, IDENTITY),
