@@ -12,6 +12,7 @@ from starhold.algebra.quaternion import Quaternion, multiply, normalise, relativ
 from starhold.algebra.rotation import short_turn
 from starhold.algebra.scalar import Scalar, Truth, both, less, side, sqrt, where
 from starhold.algebra.structure import rebuild
+from starhold.algebra.structured import when
 from starhold.algebra.vector import (
     IDENTITY,
     ZERO,
@@ -133,26 +134,30 @@ def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, perio
     foretold = propagated(memory, readings.rate, params, period)
     start: Any = remember(params, None)._replace(attitude=measured)
     before: Memory = chosen(begun, foretold, start)
+
+    def correct(before: Memory) -> tuple[Memory]:
+        return (corrected(before, measured, params),)
+
+    # The first attitude has been taken as it is.
+    (after,) = when(both(new, begun), correct, before)
+    after = after._replace(rate=readings.rate, begun=where(new, 1.0, memory.begun))
+    rate = subtract(readings.rate, after.bias)
+    return Estimate(after.attitude, rate, after.bias, deviations(after.turn), deviations(after.walk)), after
+
+
+def corrected(before: Memory, measured: Quaternion, params: Numbers) -> Memory:
+    """The estimate with what a new attitude tells."""
     error = relative(before.attitude, measured)
     turn = scale(2.0 * side(error[0]), vector_part(error))
-    # The first attitude has been taken as it is.
-    weight = where(both(new, begun), 1.0, 0.0)
     sure = inverse(summed(before.turn, params.tracker))
-    gain = product(before.turn, weighted(weight, sure))
-    mixed_gain = product(transpose(before.mixed), weighted(weight, sure))
-    attitude = normalise(multiply(before.attitude, (1.0, *scale(0.5, apply(gain, turn)))))
-    bias = add(before.bias, apply(mixed_gain, turn))
-    after = Memory(
-        attitude,
-        bias,
-        readings.rate,
-        symmetric(combine(1.0, before.turn, -1.0, product(gain, before.turn))),
-        combine(1.0, before.mixed, -1.0, product(gain, before.mixed)),
-        symmetric(combine(1.0, before.walk, -1.0, product(mixed_gain, before.mixed))),
-        where(new, 1.0, memory.begun),
+    gain, mixed_gain = product(before.turn, sure), product(transpose(before.mixed), sure)
+    return before._replace(
+        attitude=normalise(multiply(before.attitude, (1.0, *scale(0.5, apply(gain, turn))))),
+        bias=add(before.bias, apply(mixed_gain, turn)),
+        turn=symmetric(combine(1.0, before.turn, -1.0, product(gain, before.turn))),
+        mixed=combine(1.0, before.mixed, -1.0, product(gain, before.mixed)),
+        walk=symmetric(combine(1.0, before.walk, -1.0, product(mixed_gain, before.mixed))),
     )
-    found = Estimate(attitude, subtract(readings.rate, bias), bias, deviations(after.turn), deviations(after.walk))
-    return found, after
 
 
 def propagated(memory: Memory, rate: Vector, params: Numbers, period: Scalar) -> Memory:
@@ -186,11 +191,6 @@ def chosen(condition: Truth, one: Any, other: Any) -> Any:
 def summed(a: Matrix, b: Matrix) -> Matrix:
     """Return a + b."""
     return combine(1.0, a, 1.0, b)
-
-
-def weighted(c: Scalar, a: Matrix) -> Matrix:
-    """Return c a."""
-    return (scale(c, a[0]), scale(c, a[1]), scale(c, a[2]))
 
 
 def symmetric(a: Matrix) -> Matrix:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, NamedTuple
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import Quaternion, multiply, normalise
 from starhold.algebra.scalar import Scalar, both, less, opposite, where
+from starhold.algebra.structured import when
 from starhold.algebra.vector import Vector, add, dot, scale, subtract
 from starhold.parts.contract import Card, Parameter
 from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
@@ -95,12 +96,15 @@ def remember(params: Numbers, state: Any) -> Memory:
 def measure(state: Any, memory: Memory, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Memory]:
     """The last update, a new one where it is due."""
     seen = memory.waiting[-1] if params.late else state.attitude
-    angles = dice.vector(0, 1.0)
-    along = scale(dot(angles, params.boresight), params.boresight)
-    error = add(scale(0.5 * params.cross, subtract(angles, along)), scale(0.5 * params.roll, along))
-    fresh = normalise(multiply(seen, (1.0, *error)))
     due = both(less(memory.left, 0.5), opposite(is_out(step, params.outage)))
-    shown: Any = tuple(where(due, new, old) for new, old in zip(fresh, memory.shown, strict=True))
+
+    def fresh(_: Quaternion) -> tuple[Quaternion]:
+        angles = dice.vector(0, 1.0)
+        along = scale(dot(angles, params.boresight), params.boresight)
+        error = add(scale(0.5 * params.cross, subtract(angles, along)), scale(0.5 * params.roll, along))
+        return (normalise(multiply(seen, (1.0, *error))),)
+
+    (shown,) = when(due, fresh, memory.shown)
     waiting = (state.attitude, *memory.waiting[:-1]) if params.late else ()
     left = where(due, params.every - 1.0, memory.left - 1.0)
     return Reading(shown, where(due, 1.0, 0.0)), Memory(shown, waiting, left)
