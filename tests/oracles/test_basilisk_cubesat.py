@@ -22,12 +22,12 @@ from functools import cache
 import numpy as np
 import pytest
 
+from starhold.algebra.quaternion import relative
 from starhold.laws.pd import Gains
 from starhold.scenario.building import build
 from starhold.scenario.reading import load
 from starhold.simulation.lane import fly, label
 from tests.export.flown import need
-from tests.parts.test_parts_against_oracles import angles
 
 pytest.importorskip("Basilisk", reason="Basilisk comes with the test extra where it has a wheel")
 
@@ -152,7 +152,8 @@ def test_noise_of_basilisk_s_own_sensors_moves_the_craft_as_much():
 
     def shaken(attitudes):
         """The deviation (rad) about each body axis once settled."""
-        return np.sqrt(np.mean(angles(quiet, np.array(attitudes))[settled // every :] ** 2, axis=0))
+        turns = [relative(tuple(a), tuple(b))[1:] for a, b in zip(quiet, attitudes, strict=True)]
+        return np.sqrt(np.mean((2.0 * np.array(turns[settled // every :])) ** 2, axis=0))
 
     ours = np.log([shaken(recorded(loop, steps, run)["attitude"][::every]) for run in range(runs)])
     vehicle = in_basilisk(loop, FlightCode(loop))

@@ -83,6 +83,7 @@ class Numbers(NamedTuple):
     period: Scalar
 
     IN_COMMON = True  # pyright: ignore
+    """Kernels take equal numbers of this kind for one argument."""
 
 
 def prepared(epoch: Date, period: float = 1.0, rows: tuple[Row, ...] = ROWS) -> Numbers:
