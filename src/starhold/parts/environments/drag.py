@@ -14,7 +14,7 @@ from starhold.parts.contract import Card, Parameter
 from starhold.parts.craft import Craft
 from starhold.parts.epoch import DAY, SIDEREAL
 from starhold.parts.orbit import BODIES
-from starhold.parts.plates import BOX, COLUMNS, TEXT, Plates, plates_of
+from starhold.parts.plates import BOX, COLUMNS, TEXT, plates_of
 from starhold.parts.random import Dice
 
 CARD = Card(
@@ -54,10 +54,11 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """The plates, the coefficient of drag, half the density (kg/m3) at a distance (m) from the Earth's centre, the scale
-    height (m), and the rate of the air (rad/s)."""
+    """For each plate its normal, and its area times its centre (m3); the coefficient of drag, half the density (kg/m3) at a
+    distance (m) from the Earth's centre, the scale height (m), and the rate of the air (rad/s)."""
 
-    plates: Plates
+    normals: tuple[Vector, ...]
+    arms: tuple[Vector, ...]
     coefficient: Scalar
     density: Scalar
     distance: Scalar
@@ -75,8 +76,10 @@ class Memory(NamedTuple):
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for a plate without direction."""
     reference = BODIES["Earth"].radius + params.height
+    areas, normals, centres = plates_of(params.plates)
     return Numbers(
-        plates_of(params.plates),
+        normals,
+        tuple(map(scale, areas, centres)),
         params.coefficient,
         0.5 * params.density,
         reference,
@@ -106,11 +109,8 @@ def torque(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector:
     """Torque on the body (N m, body axes)."""
     course = to_body(state.attitude, memory.course)
     # All forces are against the course.
-    _, normals, centres = params.plates
-    shown = tuple(
-        area * maximum(dot(normal, course), 0.0) for area, normal in zip(params.plates.areas, normals, strict=True)
-    )
-    return scale(params.coefficient * memory.pressure, cross(course, weighted(shown, centres)))
+    shown = tuple(maximum(dot(normal, course), 0.0) for normal in params.normals)
+    return scale(params.coefficient * memory.pressure, cross(course, weighted(shown, params.arms)))
 
 
 def examples() -> list[Params]:

@@ -13,7 +13,7 @@ from starhold.parts import sun
 from starhold.parts.contract import Card, Parameter
 from starhold.parts.craft import Craft
 from starhold.parts.epoch import EPOCH, START, Date
-from starhold.parts.plates import BOX, COLUMNS, TEXT, Plates, plates_of
+from starhold.parts.plates import BOX, COLUMNS, TEXT, plates_of
 from starhold.parts.random import Dice
 
 CARD = Card(
@@ -50,13 +50,13 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """The plates, for each the part of the force towards the Sun and twice the shares of the part along the normal, the Sun,
-    and the control period (s)."""
+    """For each plate its normal, and the arms (m3) of what it takes up, mirrors and scatters: area and share times the
+    centre, or times centre x normal; the Sun, and the control period (s)."""
 
-    plates: Plates
-    absorbed: tuple[Scalar, ...]
-    specular: tuple[Scalar, ...]
-    diffuse: tuple[Scalar, ...]
+    normals: tuple[Vector, ...]
+    taken: tuple[Vector, ...]
+    mirrored: tuple[Vector, ...]
+    scattered: tuple[Vector, ...]
     sun: sun.Numbers
     period: Scalar
 
@@ -74,11 +74,13 @@ def prepare(params: Params, period: float) -> Numbers:
     for number, (specular, diffuse) in enumerate(shares, 1):
         if not (specular >= 0.0 and diffuse >= 0.0 and specular + diffuse <= 1.0):
             raise ValueError(f"plate {number} needs shares of reflected light from 0 to 1 in all")
+    areas, normals, centres = plates_of(params.plates)
+    across = [scale(area, cross(*pair)) for area, *pair in zip(areas, centres, normals, strict=True)]
     return Numbers(
-        plates_of(params.plates),
-        tuple(1.0 - specular for specular, _ in shares),
-        tuple(2.0 * specular for specular, _ in shares),
-        tuple(2.0 / 3.0 * diffuse for _, diffuse in shares),
+        normals,
+        tuple(scale(area * (1.0 - s), centre) for area, centre, (s, _) in zip(areas, centres, shares, strict=True)),
+        tuple(scale(2.0 * s, arm) for arm, (s, _) in zip(across, shares, strict=True)),
+        tuple(scale(2.0 / 3.0 * d, arm) for arm, (_, d) in zip(across, shares, strict=True)),
         sun.prepared(params.epoch),
         period,
     )
@@ -98,27 +100,17 @@ def update(memory: Memory, state: Any, params: Numbers, dice: Dice, step: int) -
 def torque(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector:
     """Torque on the body (N m, body axes)."""
     toward = to_body(state.attitude, memory.direction)
-    areas, normals, centres = params.plates
-    cosines = tuple(maximum(dot(normal, toward), 0.0) for normal in normals)
-    lit = tuple(area * cosine for area, cosine in zip(areas, cosines, strict=True))
-    pushed = weighted(tuple(a * b for a, b in zip(lit, params.absorbed, strict=True)), centres)
-    along = (
-        scale(size * (specular * cosine + diffuse), cross(centre, normal))
-        for size, cosine, specular, diffuse, centre, normal in zip(
-            lit, cosines, params.specular, params.diffuse, centres, normals, strict=True
-        )
-    )
-    total = cross(pushed, toward)
-    for part in along:
-        total = add(total, part)
-    return scale(-memory.pressure, total)
+    cosines = tuple(maximum(dot(normal, toward), 0.0) for normal in params.normals)
+    squares = tuple(cosine * cosine for cosine in cosines)
+    along = weighted((*squares, *cosines), (*params.mirrored, *params.scattered))
+    return scale(-memory.pressure, add(cross(weighted(cosines, params.taken), toward), along))
 
 
 def bound(params: Params) -> float:
     """The largest norm that it has (N m): every plate seen square on, at the perihelion."""
     numbers = prepare(params, 1.0)
-    sizes = zip(*numbers.plates[::2], numbers.absorbed, numbers.specular, numbers.diffuse, strict=True)
-    return sun.STRONGEST * sum(a * norm(centre) * (absorbed + s + d) for a, centre, absorbed, s, d in sizes)
+    arms = (*numbers.taken, *numbers.mirrored, *numbers.scattered)
+    return sun.STRONGEST * sum(norm(arm) for arm in arms)
 
 
 def examples() -> list[Params]:
