@@ -11,7 +11,8 @@ starhold exports of the law, its filter and its target. What is left between the
 * residual dipole, 3e-12: the field's file and its epoch are rounded;
 * wheels, oblateness, gravity gradient, 3e-15: quaternions and Rodrigues parameters are cut off otherwise.
 
-In these runs the hub is so heavy that air and light do not push it: starhold has their torques alone.
+In these runs the hub is so heavy that air and light do not push it: starhold has their torques alone. Of 12 kg it would be
+26 m and 4e-6 rad away after an orbit.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ pytest.importorskip("Basilisk", reason="Basilisk comes with the test extra where
 from basilisk_cubesat import POINTING, FlightCode, as_in_basilisk, errors_of, in_basilisk, under, with_numbers, without
 from common import gap
 
-ATTITUDE, MOMENTUM = 1e-7, 1e-7
+ATTITUDE, MOMENTUM = 5e-8, 5e-8
 """Largest differences of all models together: rad and N m s, of rotors that hold some 1e-3."""
 ALONE = {
     "residual-dipole": 1e-11,
@@ -46,9 +47,10 @@ ALONE = {
 }
 """Largest difference of attitude (rad) with each model alone; without any of them 1e-13."""
 STEPS = 1200
-GAINS = Gains(0.0175, 0.0029)
-"""Of Basilisk's own feedback: those of the scenario's law."""
 SCENARIO = load("cubesat-nadir")
+LAW = build(SCENARIO, SCENARIO.pick("lyapunov")).gains
+GAINS = Gains(LAW.k_rate, 2.0 * LAW.k_attitude)
+"""Of Basilisk's own feedback, as stiff near the target: Rodrigues parameters are half of the quaternion's vector part."""
 
 
 def whole(name):
@@ -123,7 +125,7 @@ def test_each_model_alone_and_missing(name):
     attitude, _ = differ((name,), name)
     assert attitude < ALONE[name]
     attitude, momentum = differ((), *(set(ALONE) - {name}))
-    assert max(attitude / ATTITUDE, momentum / MOMENTUM) > 8.0, (attitude, momentum)
+    assert max(attitude / ATTITUDE, momentum / MOMENTUM) > 5.0, (attitude, momentum)
 
 
 def test_drag_differs_by_the_course_that_starhold_holds():
