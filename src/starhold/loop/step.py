@@ -13,6 +13,7 @@ from starhold.algebra.scalar import both, less, opposite, side, where
 from starhold.algebra.structure import chosen, move
 from starhold.algebra.vector import ZERO, add
 from starhold.algebra.words import number_of, word_of
+from starhold.laws.modes import Modes
 from starhold.loop.closed_loop import Carry, Composition, can_rest, is_recorded
 from starhold.parts.actuators.limits import LIMITS
 from starhold.parts.part import Part
@@ -284,13 +285,14 @@ class _Named:
         self.dynamic_places = [k for k, part in enumerate(parts.actuators) if part.hook("rates") is not None]
         self.dynamic = [parts.actuators[k] for k in self.dynamic_places]
         self.acting = any(effector.flag("ACTS") for effector in parts.effectors)
-        self.rests_by_law = parts.law.hook("rests")
+        module: Any = parts.law.module
+        self.modes = module if isinstance(module, Modes) else None
         ranges = _ranges([*parts.environments, *parts.sensors])
         self.environments, self.sensors = ranges[: len(environments)], ranges[len(environments) :]
 
     def rests(self, effector: Part, memory: Any) -> Any:
         """Whether an effector rests in the mode that commands; None for one that never does."""
-        return self.rests_by_law(effector.name, memory) if self.rests_by_law is not None and can_rest(effector) else None
+        return self.modes.rests(effector.name, memory) if self.modes is not None and can_rest(effector) else None
 
 
 def _ranges(parts: list[Part]) -> list[int]:
