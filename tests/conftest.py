@@ -2,6 +2,7 @@
 
 import os
 import re
+import sys
 from functools import cache
 from pathlib import Path
 
@@ -11,10 +12,27 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 from hypothesis import settings
 
+# Where modules are not to be kept once compiled, each process that a test starts would compile all of starhold anew.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
 settings.register_profile("starhold", deadline=None, derandomize=True)
 settings.load_profile("starhold")
 
 ROOT = Path(__file__).parents[1]
+LONGEST = (
+    "cli",
+    "textbook",
+    "every machine",
+    "campaign engines",
+    "built-in sets",
+    "tests/laws/test_conformance.py",
+    "tests/certification/test_region.py",
+    "tests/campaign/test_campaign.py",
+    "tests/parts/test_conformance_of_parts.py",
+    "tests/certification/test_station_checker.py",
+)
+"""Units that take longest: begun first, so that no worker is left with one at the end."""
 
 
 @cache
@@ -35,5 +53,11 @@ def pytest_xdist_make_scheduler(config, log):
     class Units(LoadGroupScheduling):
         def _split_scope(self, nodeid):
             return unit_of(nodeid.split("::")[0])
+
+        def _assign_work_unit(self, node):
+            longest = next((unit for unit in LONGEST if unit in self.workqueue), None)
+            if longest is not None:
+                self.workqueue.move_to_end(longest, last=False)
+            super()._assign_work_unit(node)
 
     return Units(config, log)

@@ -59,10 +59,7 @@ def operation(takes: str, gives: str, **meanings: Any) -> Callable[[_Function], 
 
         @wraps(function)
         def read(*values: Any) -> Any:
-            for value in values:
-                if type(value) not in _PLAIN:
-                    return _read(entry, values)
-            return function(*values)
+            return function(*values) if _PLAIN.issuperset(map(type, values)) else _read(entry, values)
 
         return cast(_Function, read)
 

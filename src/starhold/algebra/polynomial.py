@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import Any, ClassVar, TypeAlias
 
 from flint import arb, fmpq
@@ -182,8 +183,9 @@ class Condition:
     positive: Polynomial
     reader: ClassVar[str] = "polynomial"
 
+    @cached_property
     def key(self) -> tuple[Any, ...]:
-        """Return a key that is equal for equal polynomials."""
+        """A key that is equal for equal polynomials."""
         return tuple(sorted((m, str(c)) for m, c in self.positive.terms.items()))
 
 
@@ -274,13 +276,16 @@ def _merged(
     a: tuple[tuple[Condition, bool], ...], b: tuple[tuple[Condition, bool], ...]
 ) -> tuple[tuple[Condition, bool], ...] | None:
     """Return both sets of conditions, None where they contradict one another."""
-    held = {condition.key(): (condition, truth) for condition, truth in a}
+    held = {condition.key: (condition, truth) for condition, truth in a}
     for condition, truth in b:
-        if held.setdefault(condition.key(), (condition, truth))[1] != truth:
+        if held.setdefault(condition.key, (condition, truth))[1] != truth:
             return None
     positive = [condition.positive for condition, truth in held.values() if truth]
     for place, one in enumerate(positive):
         for other in positive[place + 1 :]:
+            # The sum can be a number only where both have the same monomials but for the constant.
+            if (one.terms.keys() ^ other.terms.keys()) - {()}:
+                continue
             total = (one + other).value
             # Two quantities whose sum is not positive cannot both be.
             if total is not None and total <= 0:

@@ -274,7 +274,7 @@ def _function(motion: Motion) -> Polynomial:
 
 
 def _key(truths: Any) -> tuple[Any, ...]:
-    return tuple(sorted((condition.key(), truth) for condition, truth in truths))
+    return tuple(sorted((condition.key, truth) for condition, truth in truths))
 
 
 def _own(slope: Polynomial) -> Polynomial:

@@ -240,19 +240,22 @@ class Bound:
         self.rate, self.attitude, self.mixed = arb(load.rate), arb(load.attitude).sqrt(), 2 * arb(load.mixed)
         self.square = arb(load.gyroscopic.most) ** 2
         self.axes = [arb(turned[j][j]).sqrt() for j in range(3)]
+        self.lines = [(arb(slope), arb(offset)) for slope, offset in load.lines]
+        self.rest = [[(powers, attitude, arb(size)) for powers, attitude, size in terms] for terms in load.rest]
 
     def between(self, first: Any, last: Any) -> arb:
         """An enclosure of an upper bound for t between two rationals."""
         energy = (2 * (self.level - arb(first))).nonnegative_part().sqrt()
         linear, turned = self.potential.sizes(first, last)
-        moving = energy * (self.rate + self.mixed * energy + self.square * energy**2).sqrt()
-        for slope, offset in self.load.lines:
-            moving = moving.min(arb(slope) * energy**2 + arb(offset))
+        square = energy**2
+        moving = energy * (self.rate + self.mixed * energy + self.square * square).sqrt()
+        for slope, offset in self.lines:
+            moving = moving.min(slope * square + offset)
         squares = arb(0)
-        for terms in self.load.rest:
+        for terms in self.rest:
             total = arb(0)
             for powers, attitude, size in terms:
-                term = arb(size) * turned**attitude
+                term = size * turned**attitude
                 for axis, power in zip(self.axes, powers, strict=True):
                     term = term * (axis * energy) ** power
                 total = total + term

@@ -19,6 +19,7 @@ p = 4 with c2 = g = m = 0 leaves W^2 f1 alone.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -171,6 +172,7 @@ def _scaled(shape: Shape, beta: Intervals, sides: Sides) -> tuple[Intervals, Int
     return v, w2 * f1 + along * f2 + l2 * f3, (f1, f2, f3)
 
 
+@lru_cache(maxsize=256)
 def _largest(a: Any, beta: Any, cover: str) -> tuple[Shape, float] | None:
     """The shape with the largest set, and the largest level (1/s2) that is shown of it."""
     shapes = SHAPES if cover == "as_published" else (ENERGY,)

@@ -7,7 +7,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.signal import tf2ss
 
 from starhold.analysis.linear import (
     COMMAND,
@@ -97,6 +96,9 @@ def _delayed(plant: System, delay: float, control: Any) -> System:
     """The plant behind a Pade approximant of the delay of each command."""
     if delay == 0.0:
         return plant
+    # Loading it takes half a second, which runs without a delay are spared.
+    from scipy.signal import tf2ss
+
     a, b, c, d = (np.kron(np.eye(3), part) for part in tf2ss(*control.pade(delay, ORDER)))
     act, push = plant.take(COMMAND), plant.take(DISTURBANCE)
     size, more = len(plant.states), len(a)
