@@ -199,6 +199,21 @@ def test_what_no_body_has_is_said(browser: Browser, page: Path) -> None:
     assert not browser.ask('moved.has("law.lyapunov.k_rate")')
 
 
+def test_axes_hold_a_motion_that_dies_out_and_one_that_never_is(browser: Browser, page: Path) -> None:
+    browser.open(page)
+
+    def span(log: bool, values: str) -> Any:
+        return browser.ask(
+            f"span({{order: [0], levels: [], log: {str(log).lower()}}}, {{lost: new Set(), plot: {{}}}}, "
+            f"{{series: [{{}}], data: [[0, 1], {values}]}})"
+        )
+
+    low, high = span(True, "[60, 1e-31]")
+    assert high == pytest.approx(100.0)
+    assert 1e-15 < low < 1e-13
+    assert span(False, "[0, 0]") == [-1, 1]
+
+
 def test_the_page_is_small(page: Path) -> None:
     assert page.stat().st_size < MOST / 4
 

@@ -44,7 +44,10 @@ function span(panel, chart, u) {
     high = Math.max(high, level);
   }
   if (low > high) return panel.log ? [0.1, 1] : [0, 1];
+  // Below this share of the largest there is rounding, and more decades than there is room for.
+  if (panel.log) low = Math.max(low, 1e-15 * high);
   if (panel.log) return [10 ** Math.floor(Math.log10(low) - 1e-9), 10 ** Math.ceil(Math.log10(high) + 1e-9)];
+  if (low === high) return [low - 1, high + 1];
   return uPlot.rangeNum(chart.plot.split ? 0 : low, high, 0.08, true);
 }
 
