@@ -119,7 +119,8 @@ class Effector(Protocol):
     """A mechanism that moves with the body and shares its momentum. None knows another: each adds its reaction, and inertia
     if it has to, and gets the body's angular acceleration for its own rates. With `ACTS` it takes the command of the law.
     One that decides at control instants alone, or without the law, has `switch`; `OUTSIDE`: whether its torque comes from
-    outside, as of a field or of mass that is expelled, and not from momentum of its own."""
+    outside, as of a field or of mass that is expelled, and not from momentum of its own. In a mode that does without it, one
+    with `ACTS` gets no command, and one that is `OUTSIDE` alone the state in which it starts."""
 
     ACTS: bool
     OUTSIDE: bool
