@@ -16,17 +16,13 @@ true state, or `FlightCode`, the C that starhold exports of a loop, filter and t
 
 from __future__ import annotations
 
-import ctypes
-import os
-import subprocess
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
-from Basilisk.architecture import messaging, sysModel
+from Basilisk.architecture import messaging
 from Basilisk.fswAlgorithms import (
     attTrackingError,
     dipoleMapping,
@@ -63,23 +59,16 @@ from Basilisk.utilities import (
     simIncludeRW,
 )
 
-from common import as_law, as_quaternion, state_in_basilisk
-from starhold.algebra.quaternion import multiply, relative, vector_part
-from starhold.algebra.structure import flatten
-from starhold.algebra.vector import Vector, add, apply, cross, scale
-from starhold.export.code import make_code
-from starhold.export.source import texts
-from starhold.laws.catalogue import Law
-from starhold.laws.interface import Measurement, NoMemory
+from basilisk_software import FlightCode, FlightModule
+from common import state_in_basilisk
 from starhold.laws.pd import Gains
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts import magnetic_field, sun
 from starhold.parts.bodies.rigid_body import State
-from starhold.parts.craft import Craft, tensor, total_inertia
+from starhold.parts.craft import tensor, total_inertia
 from starhold.parts.environments.drag import TURN
 from starhold.parts.epoch import SIDEREAL, START, days_of
 from starhold.parts.orbit import BODIES
-from starhold.parts.part import Fitted
 
 HEAVY = 1e9
 """The hub's mass (kg). starhold's drag and sunlight turn a craft and do not push it; they do not push this one either."""
@@ -89,47 +78,6 @@ LOST = 1e-300
 """The torque limit of a lost wheel (N m), for Basilisk takes zero for none."""
 FROM_HILL = ((0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0))
 """The axes of starhold's orbital frame in Hill's, whose first is away from the Earth and whose third is along the normal."""
-
-
-def pointing(seen: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
-    """u = -K sigma - P w + w_abs x (J w_abs + H) + J w_target': Basilisk's `mrpFeedback`, sigma = q/(1 + q0)."""
-    q = seen.attitude
-    feedback = add(scale(-gains.k_attitude / (1.0 + q[0]), vector_part(q)), scale(-gains.k_rate, seen.rate))
-    momentum = add(apply(craft.inertia, seen.body_rate), seen.wheel_momentum)
-    model = add(cross(seen.body_rate, momentum), apply(craft.inertia, seen.target_acceleration))
-    return add(feedback, model), memory
-
-
-POINTING = as_law("pointing", pointing)
-
-
-def without(loop: ClosedLoop, *words: str) -> ClosedLoop:
-    """A loop without the parts of these roles or names, also in what its events change it to."""
-
-    def less(parts: tuple[Fitted, ...]) -> tuple[Fitted, ...]:
-        return replace(loop, parts=parts).without(*words).parts
-
-    return replace(loop, parts=less(loop.parts), events=tuple(e._replace(parts=less(e.parts)) for e in loop.events))
-
-
-def under(loop: ClosedLoop, law: Law, gains: Any) -> ClosedLoop:
-    """A loop under another law throughout."""
-    return replace(loop, law=law, gains=gains, events=tuple(event._replace(gains=gains) for event in loop.events))
-
-
-def with_numbers(loop: ClosedLoop, name: str, **numbers: Any) -> ClosedLoop:
-    """A loop with other numbers of one of its parts throughout."""
-
-    def changed(parts: tuple[Fitted, ...]) -> tuple[Fitted, ...]:
-        return tuple(replace(f, params=f.params._replace(**numbers)) if f.part.name == name else f for f in parts)
-
-    return replace(loop, parts=changed(loop.parts), events=tuple(e._replace(parts=changed(e.parts)) for e in loop.events))
-
-
-def as_in_basilisk(loop: ClosedLoop) -> ClosedLoop:
-    """A loop without what Basilisk has otherwise: its magnetometer draws other numbers, so there is no noise, and its torque
-    bars are cut off at their limit each on its own."""
-    return with_numbers(with_numbers(loop, "magnetometer", noise=0.0), "magnetic-unloading", limited=1)
 
 
 class Vehicle(NamedTuple):
@@ -148,46 +96,6 @@ class Vehicle(NamedTuple):
         """The absolute momenta of its rotors about their axes (N m s)."""
         rate = np.array(self.state().rate)
         return np.array([w.Js * (w.Omega + float(np.ravel(w.gsHat_B) @ rate)) for w in self.wheels])
-
-
-class Errors(NamedTuple):
-    """What sensors of starhold told wrong in a flight, control step by control step: rates (steps, 3; rad/s), turns from the
-    true attitude (steps, 4), and whether an attitude was new (steps,)."""
-
-    rate: Any
-    attitude: Any
-    new: Any
-
-
-def errors_of(run: Any) -> Errors:
-    """The errors of a recording of every control step."""
-    turns = [relative(tuple(a), tuple(b)) for a, b in zip(run["attitude"], run["star_tracker_attitude"], strict=True)]
-    return Errors(run["gyro_rate"] - run["rate"], np.array(turns), run["star_tracker_attitude_is_new"])
-
-
-class FlightCode:
-    """The C that starhold exports of a loop's law, compiled. errors: of its sensors; with none it has Basilisk's sensors."""
-
-    def __init__(self, loop: ClosedLoop, errors: Errors | None = None) -> None:
-        self.errors = errors
-        code = make_code(loop, "flight")
-        text = texts(code, "in Basilisk", "flight")
-        with TemporaryDirectory() as folder:
-            Path(folder, "flight.h").write_text(text.header, encoding="utf-8")
-            Path(folder, "flight.c").write_text(text.source, encoding="utf-8")
-            flags = ["-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC", "-o", f"{folder}/flight.so"]
-            subprocess.run([os.environ.get("CC", "cc"), *flags, f"{folder}/flight.c", "-lm"], check=True)
-            self.library = ctypes.CDLL(f"{folder}/flight.so")
-        self.names = [member.name for member in code.members(2)]
-        self.state = (ctypes.c_double * max(1, len(flatten(code.flight.start))))()
-        self.library.flight_init(self.state)
-
-    def __call__(self, told: dict[str, Any]) -> list[float]:
-        """The torque asked for (N m, body axes)."""
-        given = np.concatenate([np.ravel(told[name]) for name in self.names])
-        command = (ctypes.c_double * 3)()
-        self.library.flight_step(self.state, (ctypes.c_double * len(given))(*given), command)
-        return list(command)
 
 
 def epoch_of(loop: ClosedLoop) -> Any:
@@ -450,7 +358,7 @@ class _Builder:
     def exported_software(self) -> Any:
         """starhold's flight code, in a module in Python."""
         assert isinstance(self.software, FlightCode)
-        return self.add(_Module(self, self.software)).command
+        return self.add(FlightModule(self, self.software)).command
 
     def wheel_drives(self, torque: Any) -> Any:
         """The wheels and what shares a torque out among them."""
@@ -519,41 +427,3 @@ class _Builder:
 
 def _unit(v: Any) -> list[float]:
     return (np.array(v) / np.linalg.norm(v)).tolist()
-
-
-class _Module(sysModel.SysModel):
-    """Calls starhold's flight code with what sensors tell."""
-
-    def __init__(self, of: _Builder, software: FlightCode) -> None:
-        super().__init__()
-        self.of, self.software = of, software
-        self.command = messaging.CmdTorqueBodyMsg()
-        self.last, self.step = np.array(of.loop.start.attitude), 0
-
-    def Reset(self, CurrentSimNanos: int) -> None:  # noqa: N802 Basilisk calls it by this name
-        pass
-
-    def UpdateState(self, CurrentSimNanos: int) -> None:  # noqa: N802
-        reached = self.of.body.scStateOutMsg.read()
-        rate = np.array(reached.omega_BN_B)
-        attitude, measured, new = self.measured(np.array(as_quaternion(reached.sigma_BN)), rate)
-        # Rodrigues parameters do not tell which of the two quaternions they are.
-        self.last = attitude if attitude @ self.last >= 0.0 else -attitude
-        speeds = self.of.effector.rwSpeedOutMsg.read().wheelSpeeds
-        momenta = [w.Js * (speed + np.ravel(w.gsHat_B) @ rate) for w, speed in zip(self.of.wheels, speeds, strict=False)]
-        told = {"attitude": self.last, "rate": measured, "position": reached.r_BN_N, "velocity": reached.v_BN_N}
-        payload = messaging.CmdTorqueBodyMsgPayload()
-        payload.torqueRequestBody = self.software(told | {"attitude_is_new": new, "wheels": momenta})
-        self.command.write(payload, CurrentSimNanos, self.moduleID)
-        self.step += 1
-
-    def measured(self, attitude: Any, rate: Any) -> tuple[Any, Any, float]:
-        """Attitude and rate as they are measured, and whether the attitude is a new one."""
-        errors, k = self.software.errors, self.step
-        if errors is not None:
-            turned = multiply(tuple(attitude.tolist()), tuple(errors.attitude[k].tolist()))
-            return np.array(turned), rate + errors.rate[k], errors.new[k]
-        every = max(1, round(self.of.params("star-tracker").interval / self.of.loop.period))
-        # Before its second update the sensor shows nothing.
-        shown = self.of.imu.sensorOutMsg.read().AngVelPlatform if k else rate
-        return np.array(self.of.tracker.sensorOutMsg.read().qInrtl2Case), shown, float(k % every == 0)

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 
 import peak
-from basilisk_cubesat import POINTING, as_in_basilisk, in_basilisk, under, without
+from basilisk_cubesat import in_basilisk
+from basilisk_software import POINTING, as_in_basilisk, under, without
 from common import gap, header, interleaved, show
 from starhold.algebra.structure import flatten
 from starhold.laws.pd import Gains

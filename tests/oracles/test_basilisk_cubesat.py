@@ -32,7 +32,8 @@ from tests.export.flown import need
 
 pytest.importorskip("Basilisk", reason="Basilisk comes with the test extra where it has a wheel")
 
-from basilisk_cubesat import POINTING, FlightCode, as_in_basilisk, errors_of, in_basilisk, under, with_numbers, without
+from basilisk_cubesat import in_basilisk
+from basilisk_software import POINTING, FlightCode, as_in_basilisk, errors_of, under, with_numbers, without
 from common import gap
 
 ATTITUDE, MOMENTUM = 5e-8, 5e-8
