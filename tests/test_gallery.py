@@ -20,6 +20,8 @@ TOLERANCE = 12.0
 @pytest.fixture
 def quiet_plots():
     with mpl.rc_context({"backend": "agg"}):
+        # Libraries that other tests import change what plots look like.
+        mpl.rcdefaults()
         yield
         mpl.pyplot.close("all")
 

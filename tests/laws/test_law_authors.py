@@ -61,10 +61,9 @@ def test_its_laws_show_every_keyword_of_a_gain(folder):
     assert set(FILES) == {"my_law.py", "filtered_pid.py", "hold_point.py"}
     gains = [item.gain for name in FILES for item in gains_of(find_law(str(folder / name)).gains)]
     for keyword in dataclass_fields(Gain):
-        # Rows of a file are for other parts, such as `torque-table`.
-        assert keyword.name == "columns" or any(getattr(gain, keyword.name) != keyword.default for gain in gains), (
-            keyword.name
-        )
+        # Rows of a file, and what a whole flight shares, are for other parts, such as `torque-table`.
+        shown = any(getattr(gain, keyword.name) != keyword.default for gain in gains)
+        assert shown or keyword.name in ("columns", "shared"), keyword.name
 
 
 @pytest.mark.parametrize("name", FILES)
