@@ -31,6 +31,8 @@ LAWS = {
     "pd": ("geostationary", "pd"),
     "l2": ("l2-circle", "smooth"),
     "l2_nonlinear": ("l2-nonlinear", "full model"),
+    "b_dot": ("cubesat-detumble", "b-dot"),
+    "mission": ("cubesat-mission", "mission"),
 }
 """Names in C: built-in scenario and law."""
 

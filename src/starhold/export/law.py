@@ -49,7 +49,7 @@ class FlightLaw:
     start: Any
     inputs: Any
     given: tuple[str, ...]
-    """Readings that an estimator is given."""
+    """Readings that an estimator or the law is given."""
     command: Any
     """The class of the command."""
 
@@ -102,18 +102,21 @@ def flight_law(loop: ClosedLoop) -> FlightLaw:
         part = parts.environments[place]
         if part.hook("update") or buffers((setup.environments[place],)) or carry.memories.environments[place] != NoMemory():
             raise _no_form(part.name, "a modelled torque that is a function of the state")
-    acting = [place for place, part in enumerate(parts.effectors) if part.flag("ACTS")]
+    # Those that decide at control instants have drives of their own, which the command goes to.
+    acting = [k for k, part in enumerate(parts.effectors) if part.flag("ACTS") and part.hook("switch") is None]
     if len(acting) > 1:
         raise _no_form(", ".join(parts.effectors[place].name for place in acting), "one effector that takes the command")
     module = parts.body.module
     fields = {name: getattr(loop.start, name) for name in loop.start._fields if name != module.COMMAND}
     notes = {name: UNITS.get(name) or quantities(module.Sample).get(name) for name in fields}
     given: tuple[str, ...] = ()
-    if parts.estimator is not None:
+    if parts.estimator is not None or parts.law.reads:
         readings, shown = {}, {}
         for part, memory, params in zip(parts.sensors, carry.memories.sensors, setup.sensors, strict=True):
-            first = part.module.measure(loop.start, memory, params, _Still(), 0)[0]
-            readings.update(first._asdict())
+            first = part.module.measure(loop.start, memory, params, _Still(), 0)[0]._asdict()
+            # Without an estimator attitude and rate are told as they are.
+            taken = [name for name in first if parts.estimator is not None or name in parts.law.reads]
+            readings.update({name: first[name] for name in taken})
             shown.update(quantities(part.module.Reading))
         fields.update(readings)
         notes.update({name: one for name, one in shown.items() if notes.get(name) is None or name not in UNITS})

@@ -99,6 +99,11 @@ class Modes:
         )
 
     @property
+    def READS(self) -> tuple[str, ...]:  # noqa: N802
+        """The readings that any of them needs."""
+        return tuple(dict.fromkeys(name for mode in self.modes for name in mode.law.reads))
+
+    @property
     def Gains(self) -> Any:  # noqa: N802
         """The class of the gains: those of all modes, one after the other, each followed by its switches' numbers."""
         return _gains_of(self)

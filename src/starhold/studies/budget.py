@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -30,6 +30,7 @@ from starhold.analysis.pointing import (
     root_sum_square,
 )
 from starhold.errors import InputError
+from starhold.laws.modes import Modes, make_law
 from starhold.loop.closed_loop import Composition
 from starhold.loop.kernels import Observer, numbers_of
 from starhold.parts.contract import Parameter
@@ -171,7 +172,8 @@ def study(
         notice(done, len(names), name)
         away = [source for source in found if name not in (source.name, TOGETHER)]
         changes = {key: value for source in away for key, value in source.without.items()}
-        loop = build(scenario.with_(changes), entry)
+        gone = {f.part.name for f in scenario.parts if changes.get(f"part.{f.called}", ...) is None}
+        loop = build(scenario.with_(changes), _without_effectors(entry, gone))
         flown.append(_flown(scenario, loop, entry, clock, name))
     notice(len(names), len(names), "")
     largest = max(float(np.linalg.norm(errors, axis=-1).max()) for errors, _ in flown)
@@ -187,6 +189,16 @@ def study(
     wanted = scenario.table.budget.requirement.model_dump()
     required = {index.upper(): most for index, most in wanted.items() if most is not None}
     return Budget(scenario.name, entry.name, clock.settings, tuple(rows), required)
+
+
+def _without_effectors(entry: LawEntry, gone: Collection[str]) -> LawEntry:
+    """A law whose modes, if it has any, do not name effectors that are away."""
+    module: Any = entry.law.module
+    if not isinstance(module, Modes):
+        return entry
+    left = [mode.effectors and tuple(name for name in mode.effectors if name not in gone) for mode in module.modes]
+    modes = tuple(mode._replace(effectors=own) for mode, own in zip(module.modes, left, strict=True))
+    return replace(entry, law=make_law(modes))
 
 
 def sources(scenario: Scenario) -> tuple[Source, ...]:
