@@ -278,3 +278,13 @@ def test_python_interface_mirrors_the_commands(short):
         sh.simulate(scenario, law="nobody")
     with pytest.raises(AttributeError):
         _ = sh.no_such_thing
+
+
+def test_meanings_keep_what_stands_in_brackets(tmp_path):
+    """Tables name scenario tables, such as [settling], which are no markup."""
+    done = starhold("laws", "lyapunov", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "that of [settling] if absent" in done.stdout
+    part = starhold("parts", "magnetorquers", cwd=tmp_path)
+    assert part.returncode == 0, part.stderr
+    assert "[orbit]" in part.stdout
