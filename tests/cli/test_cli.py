@@ -154,8 +154,7 @@ def test_lists(tmp_path):
     for name in catalogue():
         assert name in listed
         assert "key" in starhold("laws", name, cwd=tmp_path).stdout
-    # Brackets are no markup.
-    assert "that of [settling] if absent" in starhold("laws", "sliding", cwd=tmp_path).stdout
+    assert "[[law.mode]]" in starhold("laws", "modes", cwd=tmp_path).stdout
     assert "cubesat-slew" in starhold("scenarios", cwd=tmp_path).stdout
     assert starhold("scenarios", "three-laws", cwd=tmp_path).stdout == builtin_text("three-laws")
     assert starhold("--version", cwd=tmp_path).stdout.startswith("starhold ")

@@ -10,6 +10,7 @@ from starhold.errors import InputError
 from starhold.laws.modes import mode_laws
 from starhold.loop.modes import loop_of_mode
 from starhold.scenario.building import build
+from starhold.scenario.designing import design
 from starhold.scenario.json_schema import json_schema
 from starhold.scenario.reading import parse
 from tests.missions import BASE, DETUMBLE, POINT
@@ -182,3 +183,16 @@ def test_without_modes_two_effectors_for_a_command_are_refused_with_what_helps()
     text = BASE.replace("[[law]]", RODS).partition('type = "modes"')[0] + 'type = "pd"\nk_rate = 0.01\nk_attitude = 0.001\n'
     with pytest.raises(InputError, match=r'a second effector for the command.* type "modes" whose modes say which'):
         read(text)
+
+
+def test_a_mode_that_lacks_a_reading_is_told_which_sensor_has_it():
+    modes = DETUMBLE.replace('type = "pd"\nk_rate = 0.02\nk_attitude = 1e-6', 'type = "b-dot"\nk = 1e-3') + POINT
+    with pytest.raises(
+        InputError, match=r"no magnetic_field, .* a sensor that measures magnetic_field, such as magnetometer"
+    ):
+        read(BASE + modes)
+
+
+def test_forms_of_modes_are_not_designed_alone():
+    with pytest.raises(InputError, match="modes alone, whose forms are not told"):
+        design(read(TEXT)[0])

@@ -190,9 +190,10 @@ app.command("check-law", help="The old name of check-part.")(parts.check_part)
 @app.command()
 def laws(name: Annotated[str | None, typer.Argument(help="show this law's card and gains; or a file's")] = None) -> None:
     """List the control laws, or describe one."""
-    from starhold.cli.show import print_law, print_laws
+    from starhold.cli.show import print_law, print_laws, print_modes
     from starhold.conformance.suite import find_law
     from starhold.laws.catalogue import catalogue
+    from starhold.laws.modes import NAME as MODES
     from starhold.parts.catalogue import parts as installed
     from starhold.scenario.checking import nearest
 
@@ -203,8 +204,10 @@ def laws(name: Annotated[str | None, typer.Argument(help="show this law's card a
             print_laws(body, group)
     elif name.endswith(".py"):
         print_law(find_law(name))
+    elif name == MODES:
+        print_modes()
     elif name not in known:
-        raise InputError("laws", "", name, nearest(name, list(known)))
+        raise InputError("laws", "", name, nearest(name, [*known, MODES]))
     else:
         print_law(known[name])
 

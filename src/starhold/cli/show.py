@@ -115,6 +115,11 @@ def print_table(flights: Sequence[Flight]) -> None:
             f"Ranked by {', then '.join(metric_set.headings(results))}; [bold green]*[/bold green] best of its kind.",
             highlight=False,
         )
+    for flight in flights:
+        if flight.modes:
+            first, *later = flight.modes
+            told = "".join(f", {one.mode} from {metric_set.moment(one.time, 6)}" for one in later)
+            console.print(escape(f"Modes of {flight.name}: {first.mode}{told}."), highlight=False)
 
 
 def _cell(text: str, best: bool) -> str:
@@ -156,6 +161,14 @@ def print_laws(group: str, known: Mapping[str, Law]) -> None:
     for law in known.values():
         table.add_row(*map(escape, (law.name, law.card.claims, law.card.summary)))
     console.print(table)
+
+
+def print_modes() -> None:
+    """Say what a law of modes is."""
+    console.print(
+        "modes: a law made of laws, each in a [[law.mode]] table with the condition on which the next one", markup=False
+    )
+    console.print("begins. starhold new my.toml --from cubesat-mission shows one.", markup=False, highlight=False)
 
 
 def print_wheels(units: Mapping[str, WheelUnit]) -> None:

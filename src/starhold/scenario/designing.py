@@ -10,6 +10,7 @@ import numpy as np
 
 from starhold.errors import InputError
 from starhold.laws.interface import Field
+from starhold.laws.modes import Modes
 from starhold.scenario.reading import LawEntry, Scenario
 
 
@@ -41,8 +42,13 @@ def design(scenario: Scenario, law: str | None = None) -> list[Design]:
     designed = [_design(scenario, entry, entry.form) for entry in entries if entry.form is not None]
     if not designed:
         allowed = 'at least one [[law]] with a form, such as type = "lqr", form = "II"'
-        raise InputError(scenario.where, "law" if law is None else f"law {law}", "no form", allowed)
+        found = "modes alone, whose forms are not told" if any(_has_modes(entry) for entry in entries) else "no form"
+        raise InputError(scenario.where, "law" if law is None else f"law {law}", found, allowed)
     return designed
+
+
+def _has_modes(entry: LawEntry) -> bool:
+    return isinstance(entry.law.module, Modes)
 
 
 def _design(scenario: Scenario, entry: LawEntry, form: str) -> Design:

@@ -175,12 +175,12 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
         estimates = one.part.role == "estimator"
         for need in one.part.needs:
             if need not in (readings if estimates else there):
-                allowed = f"a sensor that measures {need}" if estimates else f"the part {need}"
+                allowed = _measuring(need) if estimates else f"the part {need}"
                 raise InputError(where, _key(one), f"no {need}, which {one.called} needs", allowed)
     for one, key in (*((f.part, _key(f)) for f in fitted), (loop.law, f"law {loop.law.name}")):
         for need in one.reads:
             if need not in readings:
-                raise InputError(where, key, f"no {need}, which {one.name} needs", f"a sensor that measures {need}")
+                raise InputError(where, key, f"no {need}, which {one.name} needs", _measuring(need))
     late = next((f for f in loop.used("actuator") if f.part.hook("rates") is not None), None)
     switched = next((f for f in _acting(loop) if f.part.hook("switch") is not None), None)
     if late is not None and switched is not None:
@@ -190,6 +190,12 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
         raise InputError(
             where, _key(loop.used("effector")[0]), f"an effector on the body {loop.body.name}", "a body that turns"
         )
+
+
+def _measuring(reading: str) -> str:
+    """A sensor of a reading, with the installed ones that there are."""
+    known = [name for name, part in parts("sensor").items() if reading in part.module.Reading._fields and not part.table]
+    return f"a sensor that measures {reading}{', such as ' * bool(known)}{' or '.join(known)}"
 
 
 def _acting(loop: ClosedLoop) -> list[Fitted]:
