@@ -29,6 +29,15 @@ def flown(loop, steps=600):
     return rows, carry
 
 
+def same_in_every_lane(loop, steps, factors=(1.0, 0.3)):
+    """Each of many lanes, whose rates at the start are so many times as large, ends as its own flight, bit for bit."""
+    starts = [loop.start._replace(rate=tuple(factor * w for w in loop.start.rate)) for factor in factors]
+    many = simulate_many(loop, starts * 3, steps)
+    for lane, start in enumerate(starts * 3):
+        alone = fly(replace(loop, start=start), steps)[1]
+        assert many.states[:, lane].tolist() == flatten((alone.state, alone.effectors))
+
+
 def test_modes_fly_as_their_laws_one_after_another_from_the_switch():
     loop = loop_of()
     both, _ = flown(loop)
@@ -50,11 +59,8 @@ def test_one_lane_many_lanes_and_plain_python_agree_bit_for_bit():
     # There and back again.
     assert {(1.0, 2.0), (2.0, 1.0)} <= set(pairwise(run["mode"][0].tolist()))
     plain = fly_plainly(loop, 400)
-    starts = [loop.start._replace(rate=tuple(factor * w for w in loop.start.rate)) for factor in (1.0, 3.0, 0.05)]
-    many = simulate_many(loop, starts * 3, 400)
     assert np.array(flatten(plain)).tobytes() == np.array(flatten(carry)).tobytes()
-    for lane, start in enumerate(starts * 3):
-        assert many.states[:, lane].tolist() == flatten(fly(replace(loop, start=start), 400)[1].state)
+    same_in_every_lane(loop, 400, (1.0, 3.0, 0.05))
 
 
 def test_a_dwell_is_counted_without_breaks_and_a_switch_leads_back():
@@ -102,10 +108,7 @@ def test_modes_with_targets_of_their_own_fly_as_their_laws_towards_them():
         joined = np.concatenate([first[name][:, :200], then[name]], axis=1)
         assert joined.tobytes() == both[name].tobytes(), name
     assert np.array(flatten(fly_plainly(loop, 600))).tobytes() == np.array(flatten(carry)).tobytes()
-    starts = [loop.start._replace(rate=tuple(factor * w for w in loop.start.rate)) for factor in (1.0, 0.3)]
-    many = simulate_many(loop, starts * 3, 300)
-    for lane, start in enumerate(starts * 3):
-        assert many.states[:, lane].tolist() == flatten(fly(replace(loop, start=start), 300)[1].state)
+    same_in_every_lane(loop, 300)
 
 
 DELAYED = """
@@ -168,10 +171,7 @@ def test_a_memory_and_its_buffers_begin_anew_each_time(tmp_path):
         done.append(own["command"][:, :steps])
         state = ended.state
     assert np.concatenate(done, axis=1).tobytes() == both["command"][:, :60].tobytes()
-    starts = [loop.start._replace(rate=tuple(factor * w for w in loop.start.rate)) for factor in (1.0, 0.3)]
-    many = simulate_many(loop, starts * 3, 60)
-    for lane, start in enumerate(starts * 3):
-        assert many.states[:, lane].tolist() == flatten(fly(replace(loop, start=start), 60)[1].state)
+    same_in_every_lane(loop, 60)
     assert flatten(fly_plainly(loop, 60).state) == flatten(carry.state)
 
 
@@ -230,8 +230,4 @@ def test_effectors_that_a_mode_does_without_rest_in_it():
     # Rotors that are asked for nothing coast down by their friction.
     assert (np.abs(np.diff(both["wheel_momentum"][:, :200], axis=1)) > 0.0).all()
     assert np.array(flatten(fly_plainly(loop, 600))).tobytes() == np.array(flatten(carry)).tobytes()
-    starts = [loop.start._replace(rate=tuple(factor * w for w in loop.start.rate)) for factor in (1.0, 0.3)]
-    many = simulate_many(loop, starts * 3, 300)
-    for lane, start in enumerate(starts * 3):
-        alone = fly(replace(loop, start=start), 300)[1]
-        assert many.states[:, lane].tolist() == flatten((alone.state, alone.effectors))
+    same_in_every_lane(loop, 300)

@@ -165,10 +165,8 @@ def print_laws(group: str, known: Mapping[str, Law]) -> None:
 
 def print_modes() -> None:
     """Say what a law of modes is."""
-    console.print(
-        "modes: a law made of laws, each in a [[law.mode]] table with the condition on which the next one", markup=False
-    )
-    console.print("begins. starhold new my.toml --from cubesat-mission shows one.", markup=False, highlight=False)
+    told = "modes: a law made of laws, each in a [[law.mode]] table with the condition on which the next one begins."
+    console.print(f"{told} starhold new my.toml --from cubesat-mission shows one.", markup=False, highlight=False)
 
 
 def print_wheels(units: Mapping[str, WheelUnit]) -> None:

@@ -31,7 +31,7 @@ TEXTS = {
     "wheel_momentum": "the norm of the wheels' momentum",
 }
 TESTS = tuple(f"{name}_{side}" for name in UNITS for side in ("below", "above"))
-"""What a condition may ask for, beside time: a norm that the law is told below or above a level."""
+"""A condition may ask for these, beside time: a norm that the law is told below or above a level."""
 AFTER = Gain("s", at_least=0.0, text="once the mode has flown so long")
 DWELL = Gain("s", at_least=0.0, text="and all of it has held so long, without a break")
 
@@ -59,6 +59,10 @@ class Mode(NamedTuple):
     law: Law
     switches: tuple[Switch, ...]
     effectors: tuple[str, ...] | None = None
+
+    def has(self, effector: str) -> bool:
+        """Whether an effector of this name, of those that may rest, works in the mode."""
+        return self.effectors is None or effector in self.effectors
 
 
 class Memory(NamedTuple):
@@ -172,7 +176,7 @@ class Modes:
         """Whether an effector of this name rests in the mode that commands; None for one that works in all."""
         found: Truth | None = None
         for place, mode in enumerate(self.modes):
-            if mode.effectors is not None and effector not in mode.effectors:
+            if not mode.has(effector):
                 here = _is(memory.mode, place)
                 found = here if found is None else either(found, here)
         return found

@@ -92,12 +92,10 @@ def loop_of_mode(loop: ClosedLoop, place: int) -> ClosedLoop:
         module: Any = target.part.module
         own = Fitted(module.parts[place], target.params[place])
         alone = replace(alone, parts=tuple(own if fitted is target else fitted for fitted in alone.parts))
-    working = loop.law.module.modes[place].effectors
-    if working is None:
-        return alone
+    mode = loop.law.module.modes[place]
     found: list[Fitted] = []
     for fitted in alone.parts:
-        if not can_rest(fitted.part) or fitted.part.name in working:
+        if not can_rest(fitted.part) or mode.has(fitted.part.name):
             found.append(fitted)
         elif not fitted.part.flag("OUTSIDE"):
             module = Resting(fitted.part.module)

@@ -11,6 +11,7 @@ import numpy as np
 from starhold.analysis.pointing import MEANINGS
 from starhold.files import atomic_write
 from starhold.report.colours import COLOURS
+from starhold.report.figures import plain
 from starhold.studies.budget import COMBINED, LOOP, TOGETHER
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 DPI = 110
 UNITS = (("deg", math.radians(1.0)), ("arcsec", math.radians(1.0 / 3600.0)), ("mas", math.radians(1.0 / 3.6e6)))
 LEAST = 0.1
-"""Of the largest level, in the unit that it is told in."""
+"""The largest level is no less in the unit that it is told in."""
 SMALL = 1e-4
 """Levels below this share of the largest of their panel are told as nothing."""
 ACROSS = 4
@@ -86,12 +87,9 @@ def draw(budget: Budget, path: Path) -> Path:
             axis.annotate(number, (value, place), **beside, fontsize=7.5, color="0.2", bbox=behind)
         axis.set_xlabel(f"{index}, {unit}", fontsize=9)
         axis.set_title(MEANINGS[index].partition(":")[0], fontsize=8, color="0.25", loc="left", pad=3)
-        axis.grid(True, axis="x", color="0.9", linewidth=0.6)
+        plain(axis, "x")
         axis.set_axisbelow(True)
-        axis.tick_params(labelsize=8.5)
         axis.tick_params(axis="y", length=0.0)
-        for side in ("top", "right"):
-            axis.spines[side].set_visible(False)
     for row in grid:
         row[0].set_yticks(np.arange(len(shown)), [_short(name) for name in shown], parse_math=False)
         row[0].set_ylim(len(shown) - 0.5, -0.5)

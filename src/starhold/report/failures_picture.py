@@ -11,6 +11,7 @@ import numpy as np
 
 from starhold.files import atomic_write
 from starhold.report.colours import COLOURS
+from starhold.report.figures import plain
 from starhold.studies.failures import Failure
 
 DPI = 110
@@ -58,12 +59,9 @@ def draw(found: Sequence[Failure], path: Path, title: str) -> Path:
             missing = "not flown" if failure.refused else missing
             _mark(axis, place, failure, values[place], number, missing)
         axis.set_xlabel(name, fontsize=9)
-        axis.grid(True, axis="x", color="0.9", linewidth=0.6)
+        plain(axis, "x")
         axis.set_axisbelow(True)
-        axis.tick_params(labelsize=8.5)
         axis.tick_params(axis="y", length=0.0)
-        for side in ("top", "right"):
-            axis.spines[side].set_visible(False)
     # Two directions take more room than the first panel has; the others have nothing to show beside them.
     grid[0][0].set_zorder(1)
     grid[0][0].set_yticks(places, [failure.name for failure in found])

@@ -99,9 +99,9 @@ def blank(
     return figure, axes
 
 
-def plain(axis: Any) -> None:
-    """Axes with a light grid and no frame above and beside."""
-    axis.grid(True, color="0.9", linewidth=0.6)
+def plain(axis: Any, lines: str = "both") -> None:
+    """Axes with a light grid, of lines along both or at the values of "x" alone, and no frame above and beside."""
+    axis.grid(True, axis=lines, color="0.9", linewidth=0.6)
     axis.tick_params(labelsize=8.5)
     for side in ("top", "right"):
         axis.spines[side].set_visible(False)

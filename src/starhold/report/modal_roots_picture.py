@@ -11,6 +11,7 @@ import numpy as np
 from starhold.analysis.roots import Best, TwoPieceFit
 from starhold.files import atomic_write
 from starhold.report.colours import COLOURS
+from starhold.report.figures import plain
 from starhold.studies.modal_roots import Study
 
 DPI = 110
@@ -76,11 +77,8 @@ def draw(found: Study, path: Path, title: str) -> Path:
         borderpad=0.0,
     )
     for axis in axes:
-        axis.grid(True, color="0.9", linewidth=0.6)
+        plain(axis)
         axis.set_axisbelow(True)
-        axis.tick_params(labelsize=8.5)
-        for side in ("top", "right"):
-            axis.spines[side].set_visible(False)
     # No software entry, lest equal figures differ between releases.
     with atomic_write(path) as hidden:
         figure.savefig(hidden, metadata={"Software": None}, pil_kwargs={"compress_level": 3})

@@ -23,7 +23,7 @@ class Read(NamedTuple):
     spec: Any
     gains: Any
     targets: tuple[Fitted, ...] = ()
-    """Of a law of modes that have targets of their own, one each."""
+    """The targets of a law's modes where these have their own, one each."""
 
 
 def read_gains(

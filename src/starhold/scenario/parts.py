@@ -217,7 +217,7 @@ def _check_effectors(loop: ClosedLoop, where: str) -> None:
         for name in mode.effectors or ():
             if name not in known:
                 raise InputError(where, key, show(name), nearest(name, known) if known else "no effector is there to name")
-        working = [f.called for f in acting if mode.effectors is None or f.part.name in mode.effectors]
+        working = [f.called for f in acting if mode.has(f.part.name)]
         if len(working) > 1:
             raise InputError(where, key, f"{' and '.join(working)}, which both take the command", "one of them")
         if acting and not working:

@@ -45,7 +45,7 @@ class LawEntry:
     spec: Any = None
     """The design form that gave the gains, and its inputs; None where the file gives the gains themselves."""
     targets: tuple[Fitted, ...] = ()
-    """Of a law of modes that have targets of their own, one each."""
+    """The targets of a law's modes where these have their own, one each."""
 
     def __repr__(self) -> str:
         return f"<law {self.name}: {self.law.name}, {self.gains}>"

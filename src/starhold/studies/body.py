@@ -31,7 +31,7 @@ class Issued(NamedTuple):
     loop: Any
     step: int = 0
     mode: int | None = None
-    """Of a flight of modes the one that it speaks of, counted from 1."""
+    """The mode that it speaks of, in a flight of modes, counted from 1."""
     before: int | None = None
     """The mode before, of a certificate about how that hands over."""
 

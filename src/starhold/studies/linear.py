@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
 
 ORDER = 4
-"""Of the Pade approximant that stands for a delay in continuous time."""
+"""The Pade approximant that stands for a delay in continuous time has this order."""
 
 
 @dataclass(frozen=True)

@@ -78,7 +78,7 @@ COLUMNS = (
 PERPENDICULAR = 1e-6
 """Cosine of the angle from which axes do not count as perpendicular."""
 FLOOR = 1e-12
-"""What keeps the steering finite where neither gimbals nor rotors have torque in some direction, as a share of the mean
+"""This keeps the steering finite where neither gimbals nor rotors have torque in some direction, as a share of the mean
 square torque."""
 
 
