@@ -16,7 +16,7 @@ import typer
 import starhold as sh
 from generate import PAGES
 from generators import formulas
-from starhold.analysis.rigid_body_meter import EXTRAS, UNITS
+from starhold.analysis.rigid_body import EXTRAS, make_meter
 from starhold.campaign.requirements import CONE, LOST
 from starhold.campaign.sampling import SAMPLINGS
 from starhold.campaign.sequence import runs_to_meet
@@ -102,7 +102,8 @@ def test_campaigns_page_names_every_distribution_and_metric(acceptance):
     text = (ROOT / "docs" / "campaigns.md").read_text(encoding="utf-8")
     for name in (*DISTRIBUTIONS, *SAMPLINGS):
         assert f"| `{name}` |" in text
-    for metric in (*UNITS, *EXTRAS, "peak_wheel_momentum", LOST, CONE):
+    metrics = make_meter(1, 1.0, "axis", (1.0, 1.0), wheels=True).table
+    for metric in (*metrics, *EXTRAS, LOST, CONE):
         assert f"`{metric}" in text
 
 

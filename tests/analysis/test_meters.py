@@ -1,4 +1,4 @@
-"""What is noted along many flights is what recordings of every control step are measured to be."""
+"""What is noted inside kernels, and of recordings, is what NumPy makes of whole recordings."""
 
 import itertools
 import math
@@ -11,7 +11,10 @@ from hypothesis import strategies as st
 
 from starhold.algebra.rotation import rotation_vector
 from starhold.algebra.structure import flatten, unflatten
-from starhold.analysis.rigid_body_meter import EXTRAS, Cone
+from starhold.analysis.any_body import measure as measure_any
+from starhold.analysis.libration_point import goal_of
+from starhold.analysis.rigid_body import EXTRAS, Cone
+from starhold.parts.bodies.libration_point import Units
 from starhold.scenario.building import build
 from starhold.scenario.reading import load
 from starhold.simulation.lane import fly
@@ -19,6 +22,7 @@ from starhold.simulation.lanes import Crew, carry_columns
 from starhold.simulation.metered import begin_metered
 from starhold.studies.body import study_of
 from starhold.studies.compare import name_samples
+from tests.analysis.by_numpy import of_any_body, of_libration_point, of_rigid_body
 
 SHORT = {
     "three-laws": ("lyapunov", {"simulation.duration": 700.0}),
@@ -28,6 +32,13 @@ SHORT = {
     "l2-circle": (None, {}),
     "l2-equilibrium": (None, {}),
 }
+LOST = {
+    "simulation.control_period": 15.0,
+    "simulation.substeps": 1,
+    "simulation.duration": 6e3,
+    "spacecraft.torque_limit": None,
+}
+"""With a torque held for so long the motion is lost after three samples."""
 CONE = Cone((0.0, 0.6, 0.8), (1.0, 0.0, 0.0))
 
 
@@ -53,10 +64,19 @@ def test_metrics_are_those_of_recordings(name):
     meter = study.meter(scenario, loop, loop.gains, *((EXTRAS, {"cone": CONE}) if loop.aims else ()))
     begun = starts(loop, 20)
     carries, rows = carry_columns(loop, begun), [window.row for window in meter.windows.values()]
-    phases = loop.phases(steps)
+    phases, observers = loop.phases(steps), meter.observers(loop.composition())
     with Crew(2) as crew:
         flown = begin_metered(
-            loop, carries, phases, 5, meter.observers, meter.begun(20), meter.cuts(), meter.marks[-1], rows, crew
+            loop,
+            carries,
+            phases,
+            5,
+            observers,
+            meter.begun(20),
+            meter.cuts(),
+            meter.marks[-1],
+            rows,
+            crew,
         )()
     assert (flown.ends[-1] < 0.0).all()
     found = meter.metrics(flown.notes, flown.windows, flown.ends[-1])
@@ -65,7 +85,8 @@ def test_metrics_are_those_of_recordings(name):
     for lane in (0, 7, 19):
         own = replace(loop, start=unflatten(begun[:size, lane], loop.start))
         run = name_samples(scenario, own, *fly(own, steps, run=5 + lane))
-        want = study.metrics_of(run)
+        want = by_numpy(scenario, loop.gains, run)
+        agree(study.metrics_of(run), want)
         shared = set(want) & set(found)
         assert len(shared) >= 6
         for metric in shared:
@@ -79,6 +100,55 @@ def test_metrics_are_those_of_recordings(name):
             windows = np.sqrt(flown.windows[:, list(meter.windows).index("torque"), lane])
             ends = [0, *meter.cuts()[:-1], steps + 1]
             assert windows == pytest.approx([peak[a:b].max() for a, b in itertools.pairwise(ends)], rel=1e-14)
+
+
+def by_numpy(scenario, gains, run):
+    """The metrics of a run as NumPy takes them."""
+    attrs, settling = run.attrs, scenario.table.settling
+    if scenario.body == "rigid-body":
+        return of_rigid_body(run, settling.attitude_tolerance, settling.rate_tolerance)
+    units = Units(attrs["length_unit_m"], attrs["rate_unit_rad_per_s"])
+    return of_libration_point(run, units, goal_of(gains), settling.tolerance)
+
+
+def agree(found, want):
+    """The same metrics, of the same type, but for what rounding makes of them."""
+    assert set(found) == set(want)
+    for metric, value in want.items():
+        assert type(found[metric]) is type(value), metric
+        if isinstance(value, float):
+            np.testing.assert_allclose(found[metric], value, rtol=1e-11, atol=1e-15, err_msg=metric)
+        else:
+            assert found[metric] == value, metric
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("three-laws", {"simulation.record_every": 7}),
+        ("three-laws", {"simulation.duration": 3.0}),
+        # Too short to settle for good, and on the limit.
+        ("three-laws", {"simulation.duration": 60.0, "settling.attitude_tolerance": 0.4, "settling.rate_tolerance": 0.4}),
+        ("three-laws", LOST),
+        ("wheels-orbital", {"simulation.record_every": 4}),
+        ("l2-circle", {"simulation.record_every": 5}),
+        ("l2-equilibrium", {}),
+    ],
+)
+def test_metrics_of_recordings(name, changes):
+    scenario = load(name).with_(changes)
+    for entry in scenario.laws[:2]:
+        loop, timing = build(scenario, entry), scenario.table.simulation
+        run = name_samples(scenario, loop, *fly(loop, timing.steps, timing.record_every))
+        assert ("diverged_at" in run.attrs) == (changes is LOST)
+        agree(study_of(scenario.body).metrics_of(run), by_numpy(scenario, entry.gains, run))
+
+
+def test_recordings_of_a_body_that_is_not_known():
+    scenario = load("l2-circle")
+    loop, timing = build(scenario, scenario.laws[0]), scenario.table.simulation
+    run = name_samples(scenario, loop, *fly(loop, timing.steps, timing.record_every))
+    agree(measure_any(run), of_any_body(run))
 
 
 def turned(q, axis):

@@ -149,9 +149,9 @@ def test_curves_over_time_are_in_si() -> None:
 
 
 def recording(position: np.ndarray, control: np.ndarray, **attrs: object) -> Recording:
-    """A run of three samples a unit of time apart."""
+    """A run of samples a unit of time apart."""
     arrays = {"time": np.arange(len(position), dtype=float), "position": position, "control": control, "command": control}
-    return Recording(arrays, {"control_limit": 2.0, "limit": "norm", **attrs})
+    return Recording(arrays, {"control_period": 1.0, "record_every": 1, "control_limit": 2.0, "limit": "norm", **attrs})
 
 
 def test_metrics_of_a_run_made_by_hand() -> None:

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from functools import cache
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from starhold.analysis.metrics import LAST
+from starhold.algebra.quantity import Quantity, quantities
+from starhold.algebra.scalar import less, maximum, sqrt, where
+from starhold.algebra.structure import flatten, leaves, places
+from starhold.algebra.vector import most
+from starhold.analysis.meter import Meter, Metric, Window, tail_start
 from starhold.analysis.ranking import Measure, MetricSet
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.loop.kernels import make_step
 
 if TYPE_CHECKING:
     from starhold.simulation.lane import Recording
@@ -16,25 +24,44 @@ COMMAND = "command"
 """The recorded quantity that a law asks for."""
 
 
+class Noted(NamedTuple):
+    """Notes on a lane: of the command the peak of its components and the sum of its norm; of a window the largest square of
+    the length of each recorded quantity."""
+
+    peak: float
+    total: float
+    windows: tuple[float, ...]
+
+
+def make_meter(recorded: Mapping[str, Quantity], steps: int, period: float, clock: str) -> Meter:
+    """The meter of these recorded quantities, for flights of so many steps of a period, or for samples at such intervals;
+    clock: the unit of time."""
+    first = Noted(0.0, 0.0, (0.0,) * len(recorded))
+    rows = places(first)
+    windows, table = dict[str, Window](), dict[str, Metric]()
+    for row, (name, quantity) in zip(rows.windows, recorded.items(), strict=True):
+        windows[name] = Window(row, np.sqrt, quantity.text, quantity.unit)
+        table[f"final_{name}"] = Metric(quantity.unit, "root", (row,), since="tail", final=True)
+        if name == COMMAND:
+            table["peak_command"] = Metric(quantity.unit, "number", (rows.peak,))
+            table["effort"] = Metric(f"{quantity.unit} {clock}", "number", (rows.total,), (period,))
+    note = _note(tuple(recorded))
+    return Meter(first, float(steps), (note, note), table, windows, steps, period, (tail_start(steps),))
+
+
 def measure(run: Recording) -> dict[str, Any]:
     """Metrics of a run: for each recorded quantity its largest norm in the last quarter, and of the command the peak of its
     components and the integral of its norm. What is final is None for a motion that was lost, at `diverged_at`."""
-    lost = run.attrs.get("diverged_at")
-    found: dict[str, Any] = {"diverged_at": lost, "cut_off": []}
-    for name in _recorded(run):
-        size = np.linalg.norm(np.reshape(run[name], (len(run[name]), -1)), axis=1)
-        found[f"final_{name}"] = None if lost is not None else float(size[int(len(size) * (1.0 - LAST)) :].max())
-        if name == COMMAND:
-            found["peak_command"] = float(np.abs(run[name]).max())
-            found["effort"] = float(np.sum(size[:-1] * np.diff(run["time"])))
-    return found
+    period = run.attrs["control_period"] * run.attrs["record_every"]
+    meter = make_meter(_measured(run), len(run["time"]) - 1, period, run.time_unit)
+    # Nothing here is about a limit.
+    return meter.of_recording(run, np.inf)
 
 
 def metric_set(run: Recording) -> MetricSet:
     """The metrics that `measure` gives of such runs; laws are ranked by their effort."""
     measures: dict[str, Measure] = {}
-    for name in _recorded(run):
-        unit, meaning, _ = run.columns[name]
+    for name, (unit, meaning, _) in _measured(run).items():
         said = f"largest norm in the last quarter; {meaning}"
         measures[f"final_{name}"] = Measure(f"final {name.replace('_', ' ')}", _shown(unit), said)
         if name == COMMAND:
@@ -43,10 +70,44 @@ def metric_set(run: Recording) -> MetricSet:
     return MetricSet(measures, ("effort",) if "effort" in measures else (), run.time_unit)
 
 
-def _recorded(run: Recording) -> list[str]:
+def _measured(run: Recording) -> dict[str, Quantity]:
+    return _with_size({name: quantity for name, quantity in run.columns.items() if name in run.arrays})
+
+
+def recorded_of(loop: ClosedLoop) -> dict[str, Quantity]:
+    """The recorded quantities of the body and of effectors by name, but for those whose length says nothing."""
+    own, records, _, _ = make_step(loop.composition()).sample(loop.carry(), 0, loop.setup())
+    return _with_size({name: one for part in reversed((own, *records)) for name, one in quantities(type(part)).items()})
+
+
+def _with_size(recorded: Mapping[str, Quantity]) -> dict[str, Quantity]:
     # Of quaternions the norm says nothing.
-    return [name for name, told in run.columns.items() if name in run.arrays and told.dimension != "quaternion"]
+    return {name: quantity for name, quantity in recorded.items() if quantity.dimension != "quaternion"}
 
 
 def _shown(unit: str) -> str:
     return "" if unit == "1" else unit
+
+
+@cache
+def _note(names: tuple[str, ...]) -> Any:
+    """The equation of the notes; one function for loops that one kernel flies."""
+
+    def note(seen: Noted, quantities: Mapping[str, Any], now: Any, limit: Any, last: Any) -> Noted:
+        squares = {name: _square(quantities[name]) for name in names}
+        peak, total = seen.peak, seen.total
+        if COMMAND in squares:
+            peak = maximum(peak, most(tuple(leaves((quantities[COMMAND],)))))
+            total = total + where(less(now, last), sqrt(squares[COMMAND]), 0.0)
+        windows = tuple(maximum(then, squares[name]) for then, name in zip(seen.windows, names, strict=True))
+        return Noted(peak, total, windows)
+
+    return note
+
+
+def _square(value: Any) -> Any:
+    numbers: list[Any] = flatten((value,))
+    found = numbers[0] * numbers[0]
+    for number in numbers[1:]:
+        found = found + number * number
+    return found

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.vector import ZERO, Vector
-from starhold.analysis.metrics import LAST, limit_share, stays_within, too_late
+from starhold.algebra.scalar import absolute, less, maximum, minimum, sqrt, where
+from starhold.algebra.structure import places
+from starhold.algebra.vector import ZERO, Vector, dot, subtract
+from starhold.analysis.meter import INSTANT, Meter, Metric, Window, is_on_limit, middle, outside, tail_start
+from starhold.analysis.metrics import LAST
 from starhold.analysis.ranking import Measure, MetricSet
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from starhold.parts.bodies.libration_point import Units
     from starhold.simulation.lane import Recording
 
@@ -78,48 +84,118 @@ MEASURES: dict[str, Measure] = {
 METRICS = MetricSet(MEASURES, ("deviation", "settling_time", "effort_per_year"), "days", DAY)
 
 
+class Goal(NamedTuple):
+    """The numbers of the notes, scaled: the radius of the circle or the place of rest, the distance that counts as near, and
+    the last instant."""
+
+    radius: float
+    place: Vector
+    near: float
+    last: float
+
+
+class Noted(NamedTuple):
+    """Notes on a lane: the last instant not near; sums of the control's norm and of
+    instants on the limit; the least and the largest radius since the middle; and of a window the largest square of the
+    distance, error of the radius, |x|, and square of the control."""
+
+    outside: float
+    total: float
+    limited: float
+    radius_least: float
+    radius_most: float
+    window_away: float
+    window_off: float
+    window_x: float
+    window_control: float
+
+
+def make_meter(
+    steps: int, period: float, limit: str, units: Units, goal: CircleGoal | EquilibriumGoal, tolerance: float
+) -> Meter:
+    """The meter of flights of so many steps of a period (scaled), or of samples at such intervals, in SI.
+
+    limit: how the control is limited; tolerance: scaled distance that counts as near.
+    """
+    circle = isinstance(goal, CircleGoal)
+    given = Goal(*((goal.radius, ZERO) if circle else (0.0, goal.place)), tolerance, float(steps))
+    first = Noted(-1.0, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, 0.0, 0.0)
+    half, tail, rows = middle(steps), tail_start(steps), places(first)
+    length, push = units.length, units.acceleration
+    windows = {
+        "distance": Window(rows.window_away, lambda x: np.sqrt(x) * length, "distance from what is held", "m"),
+        "off_circle": Window(rows.window_off, lambda x: x * length, "error of the distance from the X axis", "m"),
+        "x": Window(rows.window_x, lambda x: x * length, "distance from the plane of the circle or rest", "m"),
+        "control": Window(rows.window_control, lambda x: np.sqrt(x) * push, "norm of the control", "m/s^2"),
+    }
+    table = {
+        # A quarter, for these motions go to and fro slowly.
+        "settling_time": Metric("s", INSTANT, (rows.outside,), (period * units.time,), kept=LAST),
+        **(_of_circle(rows, length) if circle else _of_place(rows, length)),
+        "largest_x": Metric("m", "number", (rows.window_x,), (length,), since="half", final=True),
+        "limit_share": Metric("1", "number", (rows.limited,), over=("samples", 1.0)),
+        "peak_control": Metric("m/s^2", "root", (rows.window_control,), (push,), since="start"),
+        "effort": Metric("m/s", "number", (rows.total,), (period * units.velocity,)),
+    }
+    flown = steps * period * units.time
+    yearly = (period * units.velocity, YEAR / flown if flown > 0.0 else math.nan)
+    table["effort_per_year"] = Metric("m/s", "number", (rows.total,), yearly)
+    # What is noted late, the radius, is asked of circles alone, which have no later mark.
+    marks = (half,) if circle else (half, tail)
+    early, late = (_note(limit, circle, since) for since in (False, True))
+    return Meter(first, given, (early, late), table, windows, steps, period * units.time, marks)
+
+
+def _of_circle(rows: Any, length: float) -> dict[str, Metric]:
+    return {
+        "deviation": Metric("m", "number", (rows.window_off,), (length,), since="half", final=True),
+        "deviation_overall": Metric("m", "number", (rows.window_off,), (length,), since="start", final=True),
+        "radius_least": Metric("m", "number", (rows.radius_least,), (length,), final=True),
+        "radius_most": Metric("m", "number", (rows.radius_most,), (length,), final=True),
+    }
+
+
+def _of_place(rows: Any, length: float) -> dict[str, Metric]:
+    return {"final_distance": Metric("m", "root", (rows.window_away,), (length,), since="tail", final=True)}
+
+
 def measure(run: Recording, units: Units, goal: CircleGoal | EquilibriumGoal, tolerance: float) -> dict[str, Any]:
     """Metrics of a run as `simulate` gives it; `tolerance` (scaled) is the distance that counts as near. Times that
     are never reached are None, as are all final values of a motion that was lost; `diverged_at` (s) is None for one that
     was not; `cut_off` names a time that is None because it lies within the last quarter of the run."""
-    position, control = run["position"], run["control"]
-    lost = run.attrs.get("diverged_at")
-    away = goal.distance(position)
-    settled = None if lost is not None else stays_within(away, tolerance)
-    # A quarter, for these motions go to and fro slowly.
-    cut_off = settled is not None and too_late(settled, len(away), LAST)
-    settled = None if cut_off else settled
-    half = slice(len(away) // 2, None)
-
-    def kept(value: Any, worth: float = units.length) -> float | None:
-        return None if lost is not None else float(value) * worth
-
-    found: dict[str, Any] = {
-        "diverged_at": None if lost is None else lost * units.time,
-        "cut_off": ["settling_time"] if cut_off else [],
-        "settling_time": None if settled is None else float(run["time"][settled]) * units.time,
-    }
-    if isinstance(goal, CircleGoal):
-        radius = np.hypot(position[:, 1], position[:, 2])
-        off = np.abs(radius - goal.radius)
-        found |= {
-            "deviation": kept(off[half].max()),
-            "deviation_overall": kept(off.max()),
-            "radius_least": kept(radius[half].min()),
-            "radius_most": kept(radius[half].max()),
-        }
-    else:
-        found["final_distance"] = kept(away[int(len(away) * (1.0 - LAST)) :].max())
-    size = np.linalg.norm(control, axis=1)
     limit, kind = float(run.attrs["control_limit"]), run.attrs["limit"]
-    most = float((np.abs(control).max(axis=1) if kind == "axis" else size).max())
-    effort = float(np.sum(size[:-1] * np.diff(run["time"]))) * units.velocity
-    flown = float(run["time"][-1]) * units.time
-    return found | {
-        "largest_x": kept(np.abs(position[half, 0]).max()),
-        "limit_share": limit_share(run["command"], limit, kind),
-        "peak_control": float(size.max()) * units.acceleration,
-        "peak_ratio": most / limit if math.isfinite(limit) else None,
-        "effort": effort,
-        "effort_per_year": effort * YEAR / flown if flown > 0.0 else None,
-    }
+    period = run.attrs["control_period"] * run.attrs["record_every"]
+    found = make_meter(len(run["time"]) - 1, period, kind, units, goal, tolerance).of_recording(run, limit)
+    lost, control = found["diverged_at"], run["control"]
+    size = np.abs(control).max(axis=1) if kind == "axis" else np.linalg.norm(control, axis=1)
+    ratio = float(size.max()) / limit if math.isfinite(limit) else None
+    return found | {"diverged_at": None if lost is None else lost * units.time, "peak_ratio": ratio}
+
+
+@cache
+def _note(limit: str, circle: bool, late: bool) -> Any:
+    """The equation of the notes, before the middle or, as throughout a recording, from it on; one function for loops that
+    one kernel flies."""
+
+    def note(seen: Noted, quantities: Mapping[str, Any], now: Any, most_command: Any, goal: Goal) -> Noted:
+        position, control, command = quantities["position"], quantities["control"], quantities["command"]
+        x, y, z = position
+        radius = sqrt(y * y + z * z)
+        off = radius - goal.radius
+        apart = subtract(position, goal.place)
+        away = off * off + x * x if circle else dot(apart, apart)
+        square = dot(control, control)
+        bound = is_on_limit(command, most_command, limit)
+        return Noted(
+            outside(seen.outside, away, goal.near * goal.near, now),
+            seen.total + where(less(now, goal.last), sqrt(square), 0.0),
+            seen.limited + where(bound, 1.0, 0.0),
+            minimum(seen.radius_least, radius) if late else seen.radius_least,
+            maximum(seen.radius_most, radius) if late else seen.radius_most,
+            maximum(seen.window_away, away),
+            maximum(seen.window_off, absolute(off)),
+            maximum(seen.window_x, absolute(x)),
+            maximum(seen.window_control, square),
+        )
+
+    return note

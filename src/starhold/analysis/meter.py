@@ -1,33 +1,46 @@
-"""Metrics of many flights at once, noted along the way inside the kernel: no samples are kept.
+"""Metrics of flights: notes that an equation takes at each control instant, and what is made of them at the end.
 
-A meter sees every control instant of a run from the first to the last, as a recording of every control step does, and its
-metrics are those of such a recording.
+The same notes are taken inside a kernel, of many flights at once of which no samples are kept, and of a recording, whose
+samples are the instants. What makes a metric of the notes is a row of a table, which the report's page reads too.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeAlias
+from functools import cache
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.scalar import less, less_equal, sqrt, where
-from starhold.algebra.structure import flatten, unflatten
+from starhold.algebra.structure import flatten
 from starhold.algebra.vector import dot, most
+from starhold.algebra.words import number_of
 from starhold.analysis.metrics import ALMOST, KEPT, LAST
 from starhold.loop.closed_loop import Composition
-from starhold.loop.kernels import Observer, make_step
+from starhold.loop.kernels import Arguments, Kernel, Observer, form, make_step, over_samples
+from starhold.trace.program import Program
+
+if TYPE_CHECKING:
+    from starhold.simulation.lane import Recording
 
 Array: TypeAlias = NDArray[np.float64]
 Metrics: TypeAlias = dict[str, Array]
 """Metrics by name, (lanes,), NaN where one has no value."""
+Columns: TypeAlias = tuple[tuple[str, tuple[int, ...]], ...]
+"""Recorded quantities by name, with the shape of a sample: () or (components,)."""
+Note: TypeAlias = Callable[[Any, Mapping[str, Any], Any, Any, Any], Any]
+"""An equation: note(noted, quantities, instant, limit, numbers) -> noted. `quantities` are the recorded ones by name."""
 
 
 WINDOWS = 40
 """Windows of time that envelopes have, more or less."""
+PIECE = 2**16
+"""Samples of a recording that are copied and noted at once."""
 
 
 class Window(NamedTuple):
@@ -40,29 +53,68 @@ class Window(NamedTuple):
     unit: str
 
 
-class Flown(NamedTuple):
-    """The notes of lanes: at the end, with an array (lanes,) in place of each number, and by its name each
-    window's quantity (windows, lanes), as it was noted."""
+class Metric(NamedTuple):
+    """A metric in its unit is made of the noted numbers at `rows` as `kind` says, multiplied by `times` in order.
 
-    end: Any
-    windows: Mapping[str, Array]
+    over: the count of instants it is a mean over, "samples" or "tail" (changes between those of the last quarter), with a
+    factor; since: the rows are of windows, and the largest counts from here on, "start", "half" or "tail"; final: it says
+    how a flight ends, so that one whose motion is lost has none; kept: the share of the flight, at its end, in which nothing
+    counts as settled.
+    """
+
+    unit: str
+    kind: str
+    rows: tuple[int, ...]
+    times: tuple[float, ...] = ()
+    over: tuple[str, float] | None = None
+    since: str | None = None
+    final: bool = False
+    kept: float = KEPT
+
+
+INSTANT = "instant"
+KINDS: Mapping[str, Callable[..., Array]] = {
+    "number": lambda x: x,
+    "root": np.sqrt,
+    # Of the square of the sine of half the angle.
+    "angle": lambda x: 2.0 * np.arcsin(np.sqrt(np.minimum(x, 1.0))),
+    # Of the square of the distance between the ends of two unit vectors.
+    "apart": lambda x: 2.0 * np.arcsin(0.5 * np.sqrt(x)),
+    # Of two vectors.
+    "distance": lambda *x: np.sqrt(sum((a - b) ** 2 for a, b in zip(x[:3], x[3:], strict=True))),
+    # Of the first turn, and of the share of it beyond the target; a start on target has none.
+    "overshoot": lambda a, b, c, x: np.where(a**2 + b**2 + c**2 < 1e-18, 0.0, np.maximum(x, 0.0)),
+    # From which on values stay within their bounds, of the last instants outside (-1: never).
+    INSTANT: lambda *x: np.maximum.reduce(x) + 1.0,
+}
+"""What is made of noted numbers (lanes,). `report/assets/flight.js` makes the same of one flight."""
 
 
 @dataclass(frozen=True)
 class Meter:
-    """The notes to be taken of lanes, and what they come to. first: before a flight; observers: before the last of `marks`
-    and from it on; finish(flown): metrics; units: those of the metrics; windows: quantities of envelopes by name; steps:
-    control steps of a flight, of `instant` seconds each (or of the body's own unit of time, where that is unknown); marks:
-    instants at which windows end, in order."""
+    """The notes to be taken of flights, and the metrics made of them. first: before a flight; numbers: arguments of the
+    notes; notes: the equation before the last of `marks`, and from it on; table: metrics by name; windows: quantities of
+    envelopes by name; steps: control steps of a flight, of `instant` seconds each (or of the body's own unit of time, where
+    that is unknown); marks: instants at which windows end, in order."""
 
     first: Any
-    observers: tuple[Observer, Observer]
-    finish: Callable[[Flown], Metrics]
-    units: Mapping[str, str]
+    numbers: Any
+    notes: tuple[Note, Note]
+    table: Mapping[str, Metric]
     windows: Mapping[str, Window]
     steps: int
     instant: float
     marks: tuple[int, ...]
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the metrics by name."""
+        return {name: metric.unit for name, metric in self.table.items()}
+
+    def observers(self, parts: Composition) -> tuple[Observer, Observer]:
+        """What takes the notes inside a kernel of these parts: before the last of `marks`, and from it on."""
+        early, late = (Observer(_observing(note, parts), self.first, self.numbers) for note in self.notes)
+        return early, late
 
     def begun(self, lanes: int) -> Array:
         """The notes of lanes before they fly, (numbers, lanes)."""
@@ -76,13 +128,98 @@ class Meter:
         """Metrics of lanes from what is noted of them, (numbers, lanes), of windows (windows, quantities, lanes), and the
         control step at which each was lost (lanes,), -1 for those that were not, whose `diverged_at` is NaN. All others of a
         lost motion are."""
-        named = {name: windows[:, place] for place, name in enumerate(self.windows)}
-        with np.errstate(invalid="ignore", over="ignore"):
-            found = self.finish(Flown(unflatten(list(noted), self.first), named))
         kept = lost < 0.0
-        return {"diverged_at": np.where(kept, np.nan, lost * self.instant)} | {
-            name: np.where(kept, values, np.nan) for name, values in found.items()
-        }
+        found = {"diverged_at": np.where(kept, np.nan, lost * self.instant)}
+        for name, metric in self.table.items():
+            values = self._values(metric, noted, windows, self.cuts())
+            if metric.kind == INSTANT:
+                values = np.where((values <= self.steps) & ~self._late(metric, values), values, np.nan)
+            found[name] = np.where(kept, self._scaled(metric, values), np.nan)
+        return found
+
+    def of_recording(self, run: Recording, limit: float) -> dict[str, Any]:
+        """Metrics of a recording whose samples are the instants. Those without a value are None; `cut_off` names the times
+        that come too late to count, `diverged_at` is the time at which the motion was lost."""
+        lost, ends = run.attrs.get("diverged_at"), [*self.marks, self.steps + 1]
+        noted, windows = self._replayed(run, limit, ends)
+        found: dict[str, Any] = {"diverged_at": lost, "cut_off": []}
+        for name, metric in self.table.items():
+            values = self._values(metric, noted, windows, ends)
+            there = lost is None or not (metric.final or metric.kind == INSTANT)
+            if there and metric.kind == INSTANT:
+                there = bool(values[0] <= self.steps)
+                if there and self._late(metric, values)[0]:
+                    found["cut_off"].append(name)
+                    there = False
+            value = float(self._scaled(metric, values)[0])
+            value = int(value) if there and metric.kind == INSTANT and metric.unit == "1" else value
+            found[name] = value if there and not math.isnan(value) else None
+        return found
+
+    def program(self, columns: Columns, limit: float) -> Program:
+        """The notes from the last of `marks` on, of samples with these columns, recorded; see `over_samples`."""
+        return over_samples(self.notes[1], self.first, (self.numbers, limit), columns)
+
+    def _late(self, metric: Metric, instants: Array) -> NDArray[np.bool_]:
+        return instants > (1.0 - metric.kept) * self.steps
+
+    def _values(self, metric: Metric, noted: Array, windows: Array, ends: Sequence[int]) -> Array:
+        """What the metric's kind makes of the notes (lanes,); `ends` are those of the windows."""
+        if metric.since is None:
+            given = [noted[row] for row in metric.rows]
+        else:
+            mark = {"start": 0, "half": middle(self.steps), "tail": tail_start(self.steps)}[metric.since]
+            rows, later = [window.row for window in self.windows.values()], [end > mark for end in ends]
+            given = [windows[later, rows.index(row)].max(axis=0) for row in metric.rows]
+        with np.errstate(invalid="ignore", over="ignore"):
+            return KINDS[metric.kind](*given)
+
+    def _scaled(self, metric: Metric, values: Array) -> Array:
+        for factor in metric.times:
+            values = values * factor
+        if metric.over is None:
+            return values
+        count = self.steps + 1 if metric.over[0] == "samples" else max(self.steps - tail_start(self.steps), 1)
+        return values / (count * metric.over[1])
+
+    def _replayed(self, run: Recording, limit: float, ends: Sequence[int]) -> tuple[Array, Array]:
+        """What is noted of a recording, (numbers, 1), and in windows, (windows, quantities, 1)."""
+        columns = tuple((name, values.shape[1:]) for name, values in run.arrays.items() if name != "time")
+        kernels = [_replay(note, self.first, (self.numbers, limit), columns) for note in self.notes]
+        shared = Arguments(self.numbers, limit).shared
+        rows = [window.row for window in self.windows.values()]
+        noted, found, done = self.begun(1), np.empty((len(ends), len(rows), 1)), 0
+        for window, end in enumerate(ends):
+            while done < end:
+                last = min(end, done + PIECE)
+                record = np.column_stack([run[name][done:last] for name, _ in columns])
+                memories = {"record": record, "noted": noted, "shared": shared, "own": shared, "tables": shared}
+                kernels[done >= self.marks[-1]](memories, done, last - done)
+                done = last
+            found[window] = noted[rows]
+            noted[rows] = 0.0
+        return noted, found
+
+
+_KERNELS: dict[Any, Kernel] = {}
+
+
+def _replay(note: Note, first: Any, numbers: tuple[Any, float], columns: Columns) -> Kernel:
+    key = note, form((first, numbers)), columns
+    if key not in _KERNELS:
+        _KERNELS[key] = Kernel(over_samples(note, first, numbers, columns), 1)
+    return _KERNELS[key]
+
+
+@cache
+def _observing(note: Note, parts: Composition) -> Callable[..., Any]:
+    """The `note` of an `Observer`; one function for loops that one kernel flies."""
+    read = sampled(parts)
+
+    def observe(seen: Any, decided: Any, carry: Any, step: Any, setup: Any, numbers: Any) -> Any:
+        return note(seen, read(decided, step, setup), number_of(step), setup.limit, numbers)
+
+    return observe
 
 
 def sampled(parts: Composition) -> Callable[..., dict[str, Any]]:
@@ -107,22 +244,14 @@ def window_ends(steps: int, marks: Sequence[int]) -> list[int]:
     return sorted(found - {0})
 
 
-def largest_since(mark: int, values: Array, cuts: Sequence[int]) -> Array:
-    """The largest, from an instant on at which a window ends, of what was noted in windows (windows, lanes)."""
-    return values[[cut > mark for cut in cuts]].max(axis=0)
-
-
 def tail_start(steps: int) -> int:
     """The first instant of the last quarter of a run."""
     return int((steps + 1) * (1.0 - LAST))
 
 
-def within_since(last_outside: Array, steps: int, kept: float = KEPT) -> Array:
-    """The instant from which on values stay within a bound, from that at which they were last outside (-1: never); NaN
-    where they are outside at the end, or come to stay only in the last share of the run, as `stays_within` and `too_late`
-    tell of samples."""
-    since = last_outside + 1.0
-    return np.where((since > steps) | (since > (1.0 - kept) * steps), np.nan, since)
+def middle(steps: int) -> int:
+    """The first instant of the second half of a run."""
+    return (steps + 1) // 2
 
 
 def outside(then: Any, square: Any, bound: Any, now: Any) -> Any:

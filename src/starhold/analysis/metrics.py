@@ -28,11 +28,6 @@ def too_late(index: float, count: int, kept: float = KEPT) -> bool:
     return index > (1.0 - kept) * (count - 1)
 
 
-def limit_share(u: NDArray[np.float64], limit: float, kind: str) -> float:
-    """Share of the samples (n, 3) that are on their limit."""
-    return float(on_limit(u, limit, kind).mean())
-
-
 def on_limit(u: NDArray[np.float64], limit: float, kind: str) -> NDArray[np.bool_]:
     """Tell which samples (n, components) are on their limit; none where there is none."""
     if kind == "none" or not np.isfinite(limit):

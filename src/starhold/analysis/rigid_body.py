@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.analysis.metrics import ALMOST, LAST, on_limit, stays_within, too_late
+from starhold.algebra.quaternion import to_reference, vector_part
+from starhold.algebra.rotation import rotation_vector
+from starhold.algebra.scalar import absolute, both, either, less, less_equal, maximum, minimum, sqrt, where
+from starhold.algebra.structure import chosen, places
+from starhold.algebra.vector import ZERO, Vector, dot, most, scale, subtract
+from starhold.analysis.meter import INSTANT, KINDS, Meter, Metric, Window, is_on_limit, outside, tail_start
+from starhold.analysis.metrics import ALMOST
 from starhold.analysis.ranking import Measure, MetricSet
 
 if TYPE_CHECKING:
@@ -15,6 +26,11 @@ if TYPE_CHECKING:
 
 DECADES = range(1, 7)
 """The k of the accuracies 10^-k whose iterations are counted."""
+EXTRAS = ("overshoot", "iterations")
+"""Metrics that cost more than others in a kernel, and are noted there where they are asked for."""
+OF_CAMPAIGNS = ("peak_rate", "drift", "peak_wheel_momentum")
+"""Metrics that a recorded run is not given: its page draws them."""
+WHEEL = ("wheel_momentum", "wheel_command", "wheel_available")
 
 MEASURES: dict[str, Measure] = {
     "settling_time": Measure(
@@ -55,62 +71,208 @@ def acceleration(run: Recording) -> NDArray[np.float64]:
     return np.concatenate([mean, mean[-1:]]) if len(mean) else np.zeros_like(rate)
 
 
+class Cone(NamedTuple):
+    """A body axis (unit, body axes) that is to stay away from a direction (unit, inertial axes)."""
+
+    axis: Vector
+    direction: Vector
+
+
+class Bounds(NamedTuple):
+    """The numbers of the notes: squares of the sine of half the attitude tolerance and of the rate tolerance ((rad/s)^2);
+    the instant at which the last quarter begins, and the last; cones."""
+
+    angle: float
+    rate: float
+    tail: float
+    last: float
+    cones: tuple[Cone, ...]
+
+
+class Turning(NamedTuple):
+    """Notes on overshoot: the first error as a rotation vector, whether the target was crossed, and the largest turn
+    beyond it as a share of the first."""
+
+    first: Vector
+    crossed: float
+    beyond: float
+
+
+class Noted(NamedTuple):
+    """Notes on a lane: the last instants outside the tolerances; peaks of torque (component), of rate (square) and of wheel
+    momentum; sums of the torque's norm, of instants on the limit and, in the last quarter, of changes of torque; there the
+    first and the last error, and the last torque; squares of the least distances of axes from the middles of cones; what
+    extras need; and of a window the largest squares of half the angle's sine, of the rate error and of the torque."""
+
+    attitude_outside: float
+    rate_outside: float
+    peak_torque: float
+    peak_rate_square: float
+    peak_wheel_momentum: float
+    torque_sum: float
+    limited: float
+    chatter_sum: float
+    first_error: Vector
+    error: Vector
+    torque: Vector
+    cones: tuple[float, ...]
+    turning: Turning | tuple[()]
+    attitude_levels: tuple[float, ...]
+    rate_levels: tuple[float, ...]
+    window_angle: float
+    window_rate: float
+    window_torque: float
+
+
+def make_meter(
+    steps: int,
+    period: float,
+    limit: str,
+    tolerances: tuple[float, float],
+    extras: Sequence[str] = (),
+    cones: Mapping[str, Cone] = MappingProxyType({}),
+    *,
+    every: int = 1,
+    still: bool = False,
+    wheels: bool = False,
+) -> Meter:
+    """The meter of flights of so many steps of a period (s), or of samples at such intervals.
+
+    limit: how the command is limited; tolerances: of the attitude (rad) and of the rate (rad/s); extras: those of EXTRAS
+    that are to be noted; cones: by the names of their metrics; every: control steps in a period; still: the target is at
+    rest; wheels: the body has some.
+    """
+    iterations, turns = "iterations" in extras, "overshoot" in extras
+    levels = (-1.0,) * len(DECADES) if iterations else ()
+    turning = Turning(ZERO, 0.0, 0.0) if turns else ()
+    begun: Any = (-1.0, -1.0, *(0.0,) * 6, ZERO, ZERO, ZERO, (4.0,) * len(cones), turning, levels, levels, 0.0, 0.0, 0.0)
+    first, tail = Noted(*begun), tail_start(steps)
+    angle = math.sin(0.5 * min(tolerances[0], math.pi)) ** 2
+    bounds = Bounds(angle, tolerances[1] ** 2, float(tail), float(steps), tuple(cones.values()))
+    rows: Any = places(first)
+    windows = {
+        "attitude_error": Window(rows.window_angle, KINDS["angle"], "angle to the target", "rad"),
+        "rate_error": Window(rows.window_rate, np.sqrt, "rate relative to the target", "rad/s"),
+        "torque": Window(rows.window_torque, np.sqrt, "norm of the torque applied", "N m"),
+    }
+    early, late = (_note(limit, still, stage, turns, iterations) for stage in (False, True))
+    table = _table(rows, period, every, wheels) | {
+        name: Metric("rad", "apart", (row,)) for name, row in zip(cones, rows.cones, strict=True)
+    }
+    return Meter(first, bounds, (early, late), table, windows, steps, period, (tail,))
+
+
+def _table(rows: Any, period: float, every: int, wheels: bool) -> dict[str, Metric]:
+    """The metrics of notes that lie at these rows."""
+    last = rows.attitude_outside, rows.rate_outside
+    table = {
+        "settling_time": Metric("s", INSTANT, last, (period,)),
+        "attitude_settling_time": Metric("s", INSTANT, last[:1], (period,)),
+        "rate_settling_time": Metric("s", INSTANT, last[1:], (period,)),
+    }
+    for k, *own in zip(DECADES, rows.attitude_levels, rows.rate_levels, strict=False):
+        for prefix, row in zip(("", "rate_"), own, strict=True):
+            table[f"{prefix}iterations_1e-{k}"] = Metric("1", INSTANT, (row,), (float(every),))
+    if rows.turning:
+        table["overshoot"] = Metric("1", "overshoot", (*rows.turning.first, rows.turning.beyond))
+    table |= {
+        "peak_torque": Metric("N m", "number", (rows.peak_torque,)),
+        "peak_torque_norm": Metric("N m", "root", (rows.window_torque,), since="start"),
+        "peak_rate": Metric("rad/s", "root", (rows.peak_rate_square,)),
+        "effort": Metric("N m s", "number", (rows.torque_sum,), (period,)),
+        "limit_share": Metric("1", "number", (rows.limited,), over=("samples", 1.0)),
+        "chatter": Metric("N m", "number", (rows.chatter_sum,), over=("tail", 1.0)),
+        "final_attitude_error": Metric("rad", "angle", (rows.window_angle,), since="tail", final=True),
+        "final_rate_error": Metric("rad/s", "root", (rows.window_rate,), since="tail", final=True),
+        # Twice the difference of q0 times the vector part is that of the sines of the angles.
+        "drift": Metric("rad/s", "distance", (*rows.error, *rows.first_error), (2.0,), ("tail", period), final=True),
+    }
+    return table | ({"peak_wheel_momentum": Metric("N m s", "number", (rows.peak_wheel_momentum,))} if wheels else {})
+
+
+def recorded_meter(
+    steps: int, period: float, every: int, limit: str, attitude_tolerance: float, rate_tolerance: float
+) -> Meter:
+    """The meter of a recording of so many samples but one, at intervals of `every` control periods (s)."""
+    meter = make_meter(steps, period * every, limit, (attitude_tolerance, rate_tolerance), EXTRAS, every=every)
+    table = {name: metric for name, metric in meter.table.items() if name not in OF_CAMPAIGNS}
+    # What is noted in the last quarter alone is not looked at before: one kernel does for all samples.
+    return replace(meter, table=table, notes=(meter.notes[1],) * 2)
+
+
 def measure(run: Recording, attitude_tolerance: float, rate_tolerance: float) -> dict[str, Any]:
     """Metrics of a run as `label` gives it. Times that are never reached are None, as are all final values and times of
     a run that diverged; `diverged_at` (s) is None for one that did not. So are times within the last tenth of the run, whose
     names `cut_off` lists."""
-    times = run["time"]
-    q, w, u = (run[name] for name in ("attitude_error", "rate_error", "torque"))
-    angle, speed = error_angle(q), np.linalg.norm(w, axis=1)
-    lost = run.attrs.get("diverged_at")
-    turned, slowed = stays_within(angle, attitude_tolerance), stays_within(speed, rate_tolerance)
-    both = None if turned is None or slowed is None else max(turned, slowed)
-    reached = {"settling_time": both, "attitude_settling_time": turned, "rate_settling_time": slowed}
-    steps, deviation = int(run.attrs["record_every"]), np.linalg.norm(q[:, 1:], axis=1)
-    for k in DECADES:
-        for name, values in (("", deviation), ("rate_", speed)):
-            reached[f"{name}iterations_1e-{k}"] = stays_within(values, 10.0**-k)
-    if lost is not None:
-        reached = dict.fromkeys(reached)
-    cut_off = [name for name, index in reached.items() if index is not None and too_late(index, len(times))]
-    reached |= dict.fromkeys(cut_off)
-    tail = slice(int(len(times) * (1.0 - LAST)), None)
-    return {
-        "diverged_at": lost,
-        "cut_off": cut_off,
-        **{
-            name: None if index is None else index * steps if "iterations" in name else float(times[index])
-            for name, index in reached.items()
-        },
-        "overshoot": _overshoot(q),
-        "peak_torque": float(np.abs(u).max()),
-        "peak_torque_norm": float(np.linalg.norm(u, axis=1).max()),
-        "effort": float(np.sum(np.linalg.norm(u[:-1], axis=1) * np.diff(times))),
-        "limit_share": _limit_share(run),
-        "chatter": float(np.linalg.norm(np.diff(u[tail], axis=0), axis=1).mean()) if len(u[tail]) > 1 else 0.0,
-        "final_attitude_error": None if lost is not None else float(angle[tail].max()),
-        "final_rate_error": None if lost is not None else float(speed[tail].max()),
-    }
+    attrs = run.attrs
+    given = attrs["control_period"], int(attrs["record_every"]), attrs["limit"]
+    meter = recorded_meter(len(run["time"]) - 1, *given, attitude_tolerance, rate_tolerance)
+    return meter.of_recording(run, float(attrs["torque_limit"]))
 
 
-def _overshoot(q: NDArray[np.float64]) -> float:
-    """Largest turn against the direction of the first error, as a share of that error; 0 for a start on target."""
-    turn = np.where(q[:, :1] < 0.0, -1.0, 1.0) * q[:, 1:]
-    vectors = turn * (error_angle(q) / np.maximum(np.linalg.norm(turn, axis=1), 1e-300))[:, None]
-    start = float(np.linalg.norm(vectors[0]))
-    if start < 1e-9:
-        return 0.0
-    along = vectors @ vectors[0] / start**2
-    # A body that starts near a half turn may pass it first; what counts is what follows the first crossing of the target.
-    crossed = np.flatnonzero(np.abs(along) < 0.5)
-    return max(0.0, float(-along[crossed[0] :].min())) if crossed.size else 0.0
+@cache
+def _note(limit: str, still: bool, late: bool, overshoot: bool, iterations: bool) -> Any:
+    """The equation of the notes, before the last quarter or in it; one function for loops that one kernel flies."""
+
+    def note(seen: Noted, quantities: Mapping[str, Any], now: Any, most_command: Any, bounds: Bounds) -> Noted:
+        q, torque, command = (quantities[name] for name in ("attitude_error", "torque", "command"))
+        # Of a target at rest the rate error is the rate; the arithmetic on its zeros is spared here, as in `observe`.
+        rate = quantities["rate" if still else "rate_error"]
+        angle_square = q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
+        rate_square, torque_square = dot(rate, rate), dot(torque, torque)
+        size, chatter, tail = sqrt(torque_square), seen.chatter_sum, (seen.first_error, seen.error, seen.torque)
+        if late:
+            chatters, error = less(bounds.tail, now), scale(q[0], vector_part(q))
+            tail = (chosen(chatters, seen.first_error, error), error, torque)
+            change = subtract(torque, seen.torque)
+            size = where(less(now, bounds.last), size, 0.0)
+            chatter = chatter + where(chatters, sqrt(dot(change, change)), 0.0)
+        bound, peak_wheel = is_on_limit(command, most_command, limit), seen.peak_wheel_momentum
+        # A motor is on its limit where it is asked for all that it can give: less as its momentum fills up, nothing once
+        # it is lost.
+        for momentum, wanted, there in zip(*(quantities.get(name, ()) for name in WHEEL), strict=True):
+            peak_wheel, wanted = maximum(peak_wheel, absolute(momentum)), absolute(wanted)
+            bound = either(bound, both(less(0.0, wanted), less_equal(there * ALMOST, wanted)))
+        return Noted(
+            outside(seen.attitude_outside, angle_square, bounds.angle, now),
+            outside(seen.rate_outside, rate_square, bounds.rate, now),
+            maximum(seen.peak_torque, most(torque)),
+            maximum(seen.peak_rate_square, dot(quantities["rate"], quantities["rate"])),
+            peak_wheel,
+            seen.torque_sum + size,
+            seen.limited + where(bound, 1.0, 0.0),
+            chatter,
+            *tail,
+            tuple(
+                _nearest(least, cone, quantities["attitude"]) for least, cone in zip(seen.cones, bounds.cones, strict=True)
+            ),
+            _turned(seen.turning, q, now) if overshoot else (),
+            _levels(seen.attitude_levels, angle_square, now) if iterations else (),
+            _levels(seen.rate_levels, rate_square, now) if iterations else (),
+            maximum(seen.window_angle, angle_square),
+            maximum(seen.window_rate, rate_square),
+            maximum(seen.window_torque, torque_square),
+        )
+
+    return note
 
 
-def _limit_share(run: Recording) -> float:
-    """Share of the samples in which the command, which an actuator may lag behind, is on its limit, or a wheel's motor is
-    asked for all that it can give: less as its momentum fills up, and nothing once it is lost."""
-    bound = on_limit(run["command"], run.attrs["torque_limit"], run.attrs["limit"])
-    if "wheel_command" in run.arrays:
-        asked = np.abs(run["wheel_command"])
-        bound |= ((asked > 0.0) & (asked >= run["wheel_available"] * ALMOST)).any(axis=1)
-    return float(bound.mean())
+def _nearest(least: Any, cone: Cone, attitude: Any) -> Any:
+    """The square of the least distance between the ends of the axis and of the direction."""
+    apart = subtract(to_reference(attitude, cone.axis), cone.direction)
+    return minimum(least, dot(apart, apart))
+
+
+def _turned(seen: Any, q: Any, now: Any) -> Turning:
+    """Notes on overshoot. A body that starts near a half turn may pass it first: what counts follows the first crossing of
+    the target."""
+    turn, begins = rotation_vector(q), less(now, 0.5)
+    first = chosen(begins, turn, seen.first)
+    along = dot(turn, first) / maximum(dot(first, first), 1e-300)
+    crossed = where(less(absolute(along), 0.5), 1.0, seen.crossed)
+    return Turning(first, crossed, where(less(0.5, crossed), maximum(seen.beyond, -along), seen.beyond))
+
+
+def _levels(seen: tuple[Any, ...], square: Any, now: Any) -> tuple[Any, ...]:
+    """The last instants at which a square was above those of 10^-k."""
+    return tuple(outside(then, square, 10.0 ** (-2 * k), now) for then, k in zip(seen, DECADES, strict=True))

@@ -190,7 +190,7 @@ class Job:
             lot.carries,
             lot.phases,
             int(runs[0]) if along else runs,
-            meter.observers,
+            meter.observers(lot.loop.composition()),
             meter.begun(lanes),
             meter.cuts(),
             meter.marks[-1],

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.analysis.rigid_body_meter import EXTRAS, Cone
+from starhold.analysis.rigid_body import EXTRAS, Cone
 from starhold.errors import InputError
 from starhold.scenario.campaign import RequirementTable
 from starhold.scenario.checking import nearest, show

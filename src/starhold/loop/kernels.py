@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from starhold.algebra.scalar import less
 from starhold.algebra.structure import buffers, flatten, leaves, mapped, move, rebuild, unflatten
 from starhold.algebra.structured import Buffer, at, repeat
-from starhold.algebra.words import whole_word, word_add, word_of
+from starhold.algebra.words import number_of, whole_word, word_add, word_of
 from starhold.loop.closed_loop import ClosedLoop, Composition, Phase
 from starhold.loop.step import Step, make_equations
 from starhold.trace.machine import load, word
@@ -277,6 +277,32 @@ def _propagated(step: Step, carry: Any, craft: Any, setup: Any, substeps: int) -
     if substeps == 1:
         return step.propagate(carry, craft, setup)
     return repeat(substeps, lambda _, carry: (step.propagate(carry, craft, setup),), carry)[0]
+
+
+def over_samples(
+    note: Callable[..., Any], first: Any, numbers: tuple[Any, Any], columns: tuple[tuple[str, tuple[int, ...]], ...]
+) -> Program:
+    """The notes of a recording, recorded: of `count` samples in `record`, the instants from `first` on, kept in `noted`.
+
+    note(noted, quantities, instant, limit, numbers) -> noted; first: the shape of what is noted; numbers: those of the
+    notes, and the limit; columns: the recorded quantities with their shapes, () or (components,), in order.
+    """
+    recorder = Recorder()
+    with recorder.recording():
+        record, noted = recorder.memory("record"), recorder.memory("noted", writable=True)
+        begin, count = recorder.input("first", "index"), recorder.input("count", "index")
+        given, limit = Arguments(*numbers).bound(recorder, 0)
+        width = sum(shape[0] if shape else 1 for _, shape in columns)
+
+        def turn(k: Any, seen: Any) -> Any:
+            place, quantities = k * width, dict[str, Any]()
+            for name, shape in columns:
+                numbers = tuple(record[place + i] for i in range(shape[0] if shape else 1))
+                quantities[name], place = numbers if shape else numbers[0], place + len(numbers)
+            return (note(seen, quantities, number_of(begin + k), limit, given),)
+
+        _put(noted, 0, repeat(count, turn, _state(first, noted, 0))[0])
+    return recorder.program("note", "Takes notes of samples.")
 
 
 def replay(step: Step, carry: Any, numbers: Numbers) -> Program:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from starhold.algebra.structure import flatten
+from starhold.analysis.rigid_body import recorded_meter
 from starhold.certification.standing import standing
 from starhold.report.colours import colour
 from starhold.studies.reflight import Reflight, Reflown, reflight
@@ -50,12 +52,11 @@ def living_data(scenario: Scenario, flights: Sequence[Flight], sampling: Samplin
         "dials": [_dial(made, key) for key in keys],
         "linked": dict(scenario.hooks.linked),
         "file": [piece._asdict() for piece in made.pieces],
-        "laws": {str(numbers[law.name]): _law(law) for law in laws},
+        "laws": {str(numbers[law.name]): _law(law) | _measured(law, flights[numbers[law.name]], table) for law in laws},
         "grounded": {str(numbers[name]): why for name, why in made.grounded.items() if name in numbers},
         "every": table.simulation.record_every,
         "factor": sampling.factor,
         "early": None if sampling.early is None else dict(zip(("samples", "factor"), sampling.early, strict=True)),
-        "tolerances": [table.settling.attitude_tolerance, table.settling.rate_tolerance],
         "transient": None if transient is None else {"angle_end": transient.angle_end, "rate_end": transient.rate_end},
         "claims": _claims(flights, {law.name: law for law in laws}),
         "ranking": _ranking(flights),
@@ -95,6 +96,22 @@ def _law(law: Reflown) -> dict[str, Any]:
         "run": [law.run >> 32, law.run & 0xFFFFFFFF],
         "period": law.period,
     }
+
+
+def _measured(law: Reflown, flight: Flight, table: Any) -> dict[str, Any]:
+    """What the page measures a law's flights by; numbers that depend on the flight's length, or are moved, are named."""
+    run, settling = flight.recording, table.settling
+    every, limit = table.simulation.record_every, run.attrs["limit"]
+    meter = recorded_meter(0, law.period, every, limit, settling.attitude_tolerance, settling.rate_tolerance)
+    program = meter.program(tuple((name, values.shape[1:]) for name, values in run.arrays.items() if name != "time"), 0.0)
+    known = {
+        "memories": [memory.name for memory in program.memories],
+        "first": flatten(meter.first),
+        "numbers": [*flatten(meter.numbers._replace(tail="tail", last="last")), "limit"],
+        "windows": [window.row for window in meter.windows.values()],
+        "table": {name: metric._asdict() for name, metric in meter.table.items()},
+    }
+    return {"note": _script(program), "meter": known}
 
 
 def _script(program: Program) -> dict[str, str]:

@@ -1,5 +1,5 @@
 // Flies one law again, and measures and thins what was flown: a worker's whole program, but for the law's own functions,
-// `fly` and `derive`, and `law`, what the page knows of it. The numbers are those that Python gives, bit for bit.
+// `fly`, `derive` and `note`, and `law`, what the page knows of it. The numbers are those that Python gives, bit for bit.
 "use strict";
 
 const { sqrt, abs, max, min, atan2, asin, floor, ceil } = Math;
@@ -126,89 +126,50 @@ function unwrapped(values) {
   return values.map((value, k) => (k && abs(value - values[k - 1]) > 180 ? NaN : value));
 }
 
-// --- metrics, as `starhold.analysis.rigid_body.measure` and `transient.against_limits` take them of a recording ---
+// --- metrics: notes by the equation of `starhold.analysis.rigid_body`, and what its table makes of them ---
 
-const LAST = 0.25, ALMOST = 1 - 1e-9, KEPT = 0.1;
+const LAST = 0.25, KEPT = 0.1;
+
+// As `KINDS` of `starhold.analysis.meter`.
+const kinds = {
+  number: (x) => x,
+  root: sqrt,
+  angle: (x) => 2 * asin(sqrt(min(x, 1))),
+  overshoot: (a, b, c, x) => (a * a + b * b + c * c < 1e-18 ? 0 : max(x, 0)),
+  instant: (...last) => max(...last) + 1,
+};
+
+// What is noted of the first samples, and of those of the last quarter with windows begun anew.
+function notes(n, tail, limit) {
+  const { first, numbers, memories, windows } = law.meter;
+  const told = { tail, last: n - 1, limit: limit === null ? Infinity : limit };
+  const shared = Float64Array.from(numbers, (x) => (typeof x === "string" ? told[x] : x));
+  const noted = Float64Array.from(first);
+  return [[0, tail], [tail, n]].map(([begin, end]) => {
+    windows.forEach((row) => { noted[row] = 0; });
+    const given = { record: record.subarray(begin * width), noted, shared, own: none, tables: none };
+    note(...memories.map((name) => given[name]), begin, end - begin);
+    return noted.slice();
+  });
+}
 
 function metrics(n, lost, asked) {
-  const tail = floor(n * (1 - LAST));
-  const [error, rate, torque, command] = ["attitude_error", "rate_error", "torque", "command"].map((name) => at(name));
-  const outside = {};
-  const levels = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
-  const attitude = new Int32Array(6).fill(-1), speeds = new Int32Array(6).fill(-1);
-  let turned = -1, slowed = -1, peak = 0, peakNorm = 0, effort = 0, limited = 0, chatter = 0, lastAngle = 0, lastSpeed = 0;
-  let fx = 0, fy = 0, fz = 0, start = 0, crossed = false, beyond = 0;
-  const size = asked.limit;
-  const wheels = column.wheel_command;
-  for (let k = 0; k < n; k++) {
-    const row = k * width;
-    const deviation = norm3(k, error + 1), speed = norm3(k, rate), q0 = record[row + error];
-    const angle = 2 * atan2(deviation, abs(q0));
-    if (!(angle <= asked.tolerances[0])) turned = k;
-    if (!(speed <= asked.tolerances[1])) slowed = k;
-    for (let d = 0; d < 6; d++) {
-      if (!(deviation <= levels[d])) attitude[d] = k;
-      if (!(speed <= levels[d])) speeds[d] = k;
+  const tail = floor(n * (1 - LAST)), counts = { samples: n, tail: max(n - 1 - tail, 1) };
+  const [before, after] = notes(n, tail, asked.limit);
+  const found = { diverged_at: lost < 0 ? null : lost * law.period, cut_off: [] };
+  for (const [name, { kind, rows, times, over, since, final }] of Object.entries(law.meter.table)) {
+    let value = kinds[kind](...rows.map((row) => (since === "start" ? max(before[row], after[row]) : after[row])));
+    const instant = kind === "instant";
+    const late = instant && value > (1 - KEPT) * (n - 1);
+    if ((lost >= 0 && (final || instant)) || late) {
+      if (lost < 0 && value < n) found.cut_off.push(name);
+      found[name] = null;
+      continue;
     }
-    const push = norm3(k, torque);
-    for (let i = 0; i < 3; i++) peak = max(peak, abs(record[row + torque + i]));
-    peakNorm = max(peakNorm, push);
-    if (k < n - 1) effort += push * ((k + 1) * tick - k * tick);
-    let bound = false;
-    if (asked.kind !== "none" && size !== null) {
-      const most = asked.kind === "norm" ? norm3(k, command)
-        : max(abs(record[row + command]), abs(record[row + command + 1]), abs(record[row + command + 2]));
-      bound = most >= size * ALMOST;
-    }
-    if (wheels) {
-      for (let w = 0; w < wheels[1]; w++) {
-        const want = abs(record[row + wheels[0] + w]);
-        if (want > 0 && want >= record[row + column.wheel_available[0] + w] * ALMOST) bound = true;
-      }
-    }
-    if (bound) limited++;
-    if (k >= tail) {
-      lastAngle = max(lastAngle, angle);
-      lastSpeed = max(lastSpeed, speed);
-      if (k > tail) {
-        const p = row + torque;
-        const x = record[p] - record[p - width], y = record[p + 1] - record[p + 1 - width], z = record[p + 2] - record[p + 2 - width];
-        chatter += sqrt(x * x + y * y + z * z);
-      }
-    }
-    const share = (q0 < 0 ? -1 : 1) * angle / max(deviation, 1e-300);
-    const vx = record[row + error + 1] * share, vy = record[row + error + 2] * share, vz = record[row + error + 3] * share;
-    if (k === 0) {
-      [fx, fy, fz] = [vx, vy, vz];
-      start = sqrt(vx * vx + vy * vy + vz * vz);
-    }
-    if (start >= 1e-9) {
-      const along = (vx * fx + vy * fy + vz * fz) / (start * start);
-      crossed = crossed || abs(along) < 0.5;
-      if (crossed) beyond = max(beyond, -along);
-    }
+    for (const factor of times) value *= factor;
+    found[name] = over ? value / (counts[over[0]] * over[1]) : value;
   }
-  const whole = lost < 0;
-  const since = (last) => (whole && last + 1 < n ? last + 1 : null);
-  const reached = {
-    settling_time: since(max(turned, slowed)), attitude_settling_time: since(turned), rate_settling_time: since(slowed),
-  };
-  levels.forEach((_, d) => {
-    reached[`iterations_1e-${d + 1}`] = since(attitude[d]);
-    reached[`rate_iterations_1e-${d + 1}`] = since(speeds[d]);
-  });
-  const late = (index) => index > (1 - KEPT) * (n - 1);
-  const cut = Object.keys(reached).filter((name) => reached[name] !== null && late(reached[name]));
-  for (const [name, index] of Object.entries(reached)) {
-    if (cut.includes(name) || index === null) outside[name] = null;
-    else outside[name] = name.includes("iterations") ? index * every : index * tick;
-  }
-  const found = {
-    diverged_at: whole ? null : lost * law.period, cut_off: cut, ...outside, overshoot: beyond, peak_torque: peak,
-    peak_torque_norm: peakNorm, effort, limit_share: limited / n, chatter: n - tail > 1 ? chatter / (n - tail - 1) : 0,
-    final_attitude_error: whole ? lastAngle : null, final_rate_error: whole ? lastSpeed : null,
-  };
-  return asked.transient ? { ...found, ...againstLimits(n, whole, asked.transient, cut) } : found;
+  return asked.transient ? { ...found, ...againstLimits(n, lost < 0, asked.transient, found.cut_off) } : found;
 }
 
 function againstLimits(n, whole, table, cut) {

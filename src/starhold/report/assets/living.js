@@ -22,10 +22,10 @@ const lawOf = (number) => report.laws[number].name;
 // --- the laws' workers ---
 
 const sources = new Map(Object.entries(living.laws).map(([number, law]) => {
-  const { fly, derive, ...told } = law;
+  const { fly, derive, note, ...told } = law;
   const program = ({ text, name }) => `(() => {\n${text}\nreturn ${name};\n})()`;
   return [Number(number), `"use strict";\nconst law = ${JSON.stringify({ ...told, every: living.every })};\n`
-    + `const fly = ${program(fly)};\nconst derive = ${derive ? program(derive) : "null"};\n${document.getElementById("flight").textContent}`];
+    + `const fly = ${program(fly)};\nconst derive = ${derive ? program(derive) : "null"};\nconst note = ${program(note)};\n${document.getElementById("flight").textContent}`];
 }));
 const crews = new Map();
 const state = { asked: 0, flown: 0, arrived: [], results: new Map(), wanted: false };
@@ -66,8 +66,8 @@ function request(number) {
     number: ++state.asked, values: flatten(law.follows.map(valueOf)),
     plots: Object.fromEntries(sight.map((chart) => [chart.plot.name, chart.plot.panels.map((panel) => panel.source)])),
     early: early ? living.early.samples : null, factor: early ? living.early.factor : living.factor,
-    frames: report.scene.places, tolerances: living.tolerances, transient: living.transient,
-    kind: rows.limit.kind, limit: moved.has("spacecraft.torque_limit") ? moved.get("spacecraft.torque_limit") : rows.limit.size,
+    frames: report.scene.places, transient: living.transient,
+    limit: moved.has("spacecraft.torque_limit") ? moved.get("spacecraft.torque_limit") : rows.limit.size,
   };
 }
 

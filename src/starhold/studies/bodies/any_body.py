@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, final
 
-from starhold.analysis.any_body import measure, metric_set
+from starhold.analysis.any_body import make_meter, measure, metric_set, recorded_of
 from starhold.certification.certificate import Certificate
 from starhold.simulation.lane import label
 from starhold.studies.body import NO_CONES, BodyStudy, Cones, Issued, Values, nothing_more
@@ -30,10 +30,9 @@ class AnyBodyStudy:
         return measure(run)
 
     def meter(self, scenario: Scenario, loop: Any, gains: Any, extras: Sequence[str] = (), cones: Cones = NO_CONES) -> Meter:
-        from starhold.analysis.any_body_meter import make_meter
-
         nothing_more(extras, cones)
-        return make_meter(loop, scenario.table.simulation.steps)
+        clock = getattr(loop.body.module, "TIME_UNIT", "s")
+        return make_meter(recorded_of(loop), scenario.table.simulation.steps, loop.period, clock)
 
     def metric_set(self, run: Recording) -> MetricSet:
         return metric_set(run)

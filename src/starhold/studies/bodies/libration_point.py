@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, final
 
-from starhold.analysis.libration_point import METRICS, CircleGoal, EquilibriumGoal, goal_of, measure
+from starhold.analysis.libration_point import METRICS, CircleGoal, EquilibriumGoal, goal_of, make_meter, measure
 from starhold.parts.bodies.libration_point import Units
 from starhold.parts.craft import vector
 from starhold.simulation.lane import label
@@ -49,11 +49,10 @@ class LibrationPointStudy:
         extras: Sequence[str] = (),
         cones: Cones = NO_CONES,
     ) -> Meter:
-        from starhold.analysis.libration_point_meter import make_meter
-
         nothing_more(extras, cones)
         units, tolerance = scenario.table.libration.units, scenario.table.settling.tolerance
-        return make_meter(loop, scenario.table.simulation.steps, units, goal_of(gains), tolerance)
+        steps = scenario.table.simulation.steps
+        return make_meter(steps, loop.period, loop.limit, units, goal_of(gains), tolerance)
 
     def metric_set(self, run: Recording) -> MetricSet:
         return METRICS

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast, final
 
 import numpy as np
 
-from starhold.analysis.rigid_body import METRICS, measure
+from starhold.analysis.rigid_body import EXTRAS, METRICS, make_meter, measure
 from starhold.analysis.transient import Limits, against_limits
 from starhold.laws.modes import mode_laws
 from starhold.loop.kernels import make_step
@@ -64,14 +64,14 @@ class RigidBodyStudy:
         extras: Sequence[str] = (),
         cones: Cones = NO_CONES,
     ) -> Meter:
-        from starhold.analysis.rigid_body_meter import EXTRAS, make_meter
-
         for extra in extras:
             if extra not in EXTRAS:
                 raise ValueError(f"{' or '.join(EXTRAS)}, not {extra}")
         settling = scenario.table.settling
         tolerances = settling.attitude_tolerance, settling.rate_tolerance
-        return make_meter(loop, scenario.table.simulation.steps, *tolerances, cones, extras)
+        steps, still = scenario.table.simulation.steps, loop.target.part.flag("STILL")
+        wheels = bool(loop.rotors)
+        return make_meter(steps, loop.period, loop.limit, tolerances, extras, cones, still=still, wheels=wheels)
 
     def metric_set(self, run: Recording) -> MetricSet:
         return METRICS
