@@ -9,15 +9,18 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet -c const
 demo: $(VENV)/.run
 	$(BIN)/starhold compare three-laws -o demo --force
 
-test: check
-	$(BIN)/python -m pytest -n 2 --dist loadgroup
+# The linters, of which one takes as long as a third of the tests, run beside them.
+test: $(VENV)/.test
+	@$(MAKE) --no-print-directory check > $(VENV)/check.log 2>&1 & check=$$!; \
+	$(BIN)/python -m pytest -n 2 --dist loadfile; tests=$$?; \
+	wait $$check; check=$$?; cat $(VENV)/check.log; exit $$((tests + check))
 
 # A part of the tests for the time between two changes: under a minute.
 test-fast: $(VENV)/.test
-	$(BIN)/python -m pytest -n 2 --dist loadgroup -q tests/algebra tests/analysis tests/loop tests/parts tests/synthesis tests/scenario --ignore tests/parts/test_wheels.py --ignore tests/parts/test_one_file.py --ignore tests/parts/test_parts_against_oracles.py
+	$(BIN)/python -m pytest -n 2 --dist loadfile -q tests/algebra tests/analysis tests/loop tests/parts tests/synthesis tests/scenario --ignore tests/parts/test_wheels.py --ignore tests/parts/test_one_file.py --ignore tests/parts/test_parts_against_oracles.py
 
 test-all: check
-	$(BIN)/python -m pytest -n 2 --dist loadgroup -m ""
+	STARHOLD_TESTS=whole $(BIN)/python -m pytest -n 2 --dist loadfile -m ""
 
 check: $(VENV)/.test
 	$(BIN)/ruff check .

@@ -81,7 +81,7 @@ def test_campaigns_page_runs(acceptance, capsys):
         assert len(told["result"].query(sql)) in range(1, 10)
 
 
-@pytest.mark.xdist_group("campaign engines")
+@pytest.mark.slow
 def test_script_with_workers_of_the_campaigns_page_runs(acceptance):
     *_, script = blocks("docs/campaigns.md", "python")
     Path("script.py").write_text(script, encoding="utf-8")

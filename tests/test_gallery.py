@@ -9,6 +9,7 @@ import pytest
 from matplotlib.testing.compare import compare_images
 
 from generators.gallery import SCRIPTS
+from tests.tiers import leading
 
 ROOT = Path(__file__).parents[1]
 PARTS = {"leak", "rate_damping"}
@@ -26,7 +27,7 @@ def quiet_plots():
         mpl.pyplot.close("all")
 
 
-@pytest.mark.parametrize("name", SCRIPTS)
+@pytest.mark.parametrize("name", leading(SCRIPTS, 2))
 def test_script_draws_its_picture(name, tmp_path, monkeypatch, quiet_plots):
     picture = tmp_path / f"{name}.png"
     monkeypatch.setattr(sys, "argv", [f"{name}.py", str(picture)])

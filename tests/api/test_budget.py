@@ -18,7 +18,6 @@ from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.studies.budget import COMBINED, LOOP, TOGETHER, sources
 from tests.running import starhold
 
-pytestmark = pytest.mark.xdist_group("budget")
 PERIOD, INERTIA, K_RATE, K_ATTITUDE = 0.5, (2.0, 3.0, 4.0), 0.4, 0.2
 NOISE = {"torque noise": 2e-5, "attitude noise": 2e-4, "rate noise": 1e-4}
 LINEAR = {

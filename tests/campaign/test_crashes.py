@@ -19,8 +19,6 @@ from starhold.errors import InputError
 from tests.campaign.cluster import cluster, start
 from tests.campaign.toy import Toy, fly, manifest, missing
 
-pytestmark = pytest.mark.xdist_group("campaign engines")
-
 
 @pytest.fixture
 def store(tmp_path):
@@ -128,6 +126,7 @@ def test_a_killed_driver_leaves_what_can_be_resumed(tmp_path, expected, engine):
     assert fly(store) == expected
 
 
+@pytest.mark.slow
 def test_an_interrupt_while_workers_start_ends_all_of_them_quietly(tmp_path):
     """As the keyboard sends it: to the workers too."""
     folder = tmp_path / "campaign"

@@ -15,8 +15,6 @@ from starhold.errors import InputError
 from tests.campaign.cluster import cluster
 from tests.campaign.toy import LAWS, Toy, fly, manifest, missing
 
-pytestmark = pytest.mark.xdist_group("campaign engines")
-
 
 @pytest.fixture
 def store(tmp_path):

@@ -17,7 +17,6 @@ import starhold as sh
 from starhold.campaign.campaign import CHUNK
 from tests.campaign.flown import ASKED, OVER, SMALL
 
-pytestmark = pytest.mark.xdist_group("campaign engines")
 COMMAND = [sys.executable, "-m", "starhold", "campaign", "long.toml", "--law", "pd", "--no-search", "-o"]
 RUNS, BLOCK = 2 * CHUNK + 3000, CHUNK
 """Three blocks, half a second each or more."""
@@ -77,6 +76,7 @@ def resumed(place, name, *words):
     return digest(place / name), said
 
 
+@pytest.mark.slow
 def test_a_killed_driver_is_resumed_to_the_same_digest(place, expected):
     child = start(place, "killed", "--threads", "1")
     wait_for_chunks(child, place / "killed", 1)
@@ -98,6 +98,7 @@ def test_a_killed_driver_is_resumed_to_the_same_digest(place, expected):
     )
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_told_and_resumed_to_the_same_digest(place, expected):
     """The manifest has room, a block of runs has none."""
 

@@ -22,7 +22,6 @@ from starhold.trace.calling import Compiled
 from tests.certification.loops import certified, textbook
 
 # Together: each worker would make the certificates of the textbook loops for itself.
-pytestmark = pytest.mark.xdist_group("textbook")
 
 LOOPS = textbook()
 NAMES = sorted(name for name in LOOPS if not name.startswith("sliding"))

@@ -16,7 +16,6 @@ from tests.certification.loops import FULL, LOPSIDED, PRINCIPAL, loop_of, textbo
 from tests.making import ORBITAL, aimed
 
 # Together: each worker would make the certificates of the textbook loops for itself.
-pytestmark = pytest.mark.xdist_group("textbook")
 
 LOOPS = textbook()
 NAMES = sorted(LOOPS)

@@ -19,7 +19,6 @@ from tests.certification.edits import content_at, edited, reasons
 from tests.certification.loops import FULL, loop_of
 
 # Together: each worker would make the certificates of the textbook loops for itself.
-pytestmark = pytest.mark.xdist_group("textbook")
 
 
 def test_unknown_keys_fail_everywhere(made):

@@ -15,7 +15,6 @@ from tests.certification.edits import alone, claims_of, content_at, edited, repl
 from tests.certification.loops import loop_of, textbook
 
 # Together: each worker would make the certificates of the textbook loops for itself.
-pytestmark = pytest.mark.xdist_group("textbook")
 
 UP, DOWN = 1.0 + 1e-4, 1.0 - 1e-4
 

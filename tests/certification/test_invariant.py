@@ -251,7 +251,6 @@ def test_what_does_not_escape_is_not_shown_to():
 # --- the examples that come with it ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.xdist_group("built-in sets")
 @pytest.mark.parametrize("name", builtin_names())
 def test_examples_are_proved(name):
     _, certificate = proved(name)
@@ -292,7 +291,6 @@ def test_a_python_function_is_a_system():
         System.of(("x", "y"), lambda x, y: (y,))
 
 
-@pytest.mark.xdist_group("built-in sets")
 def test_words_bound_numbers_from_the_right_side():
     found = proved("saturated-axis")[1].claims[0]
     assert "99.7 % of the true region's 12" in size(found.numbers)

@@ -17,7 +17,6 @@ VDP = (
 
 
 # Together with all that needs the proofs of the built-in problems, which take long.
-pytestmark = pytest.mark.xdist_group("built-in sets")
 
 
 def sextic(x):

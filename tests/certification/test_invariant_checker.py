@@ -30,7 +30,6 @@ V = {V}
 {more}
 """
 # Together with all that needs the proofs of the built-in problems, which take long.
-pytestmark = pytest.mark.xdist_group("built-in sets")
 
 ORIGIN = "equilibrium = { x = 0, y = 0 }"
 ROUND = '"x**2 + y**2"'

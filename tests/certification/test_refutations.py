@@ -21,7 +21,6 @@ from tests.certification.loops import FULL, LOPSIDED, PRINCIPAL, UNEVEN, certifi
 from tests.making import ORBITAL
 
 # Together: each worker would make all refutations and proofs for itself.
-pytestmark = pytest.mark.xdist_group("textbook")
 
 SKEWED = ((0.01, 0.02, 0.0), (0.02, 0.01, 0.0), (0.0, 0.0, 0.01))
 CASES = {

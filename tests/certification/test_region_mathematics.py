@@ -19,6 +19,7 @@ from starhold.parts.bodies.rigid_body import angular_acceleration
 from starhold.parts.craft import tensor
 from tests.certification.loops import random_craft
 from tests.certification.regions import BETTER, PLAIN, A, B, by_formula, file, read, region
+from tests.tiers import fewer
 
 UNIT = some.floats(-1.0, 1.0)
 
@@ -79,7 +80,7 @@ def test_every_state_of_the_set_is_in_a_box(monkeypatch):
         (slow, slow_room, slow_box), (fast, fast_room, fast_box) = asked
         random = np.random.default_rng(5)
         kinds = set()
-        for _ in range(4000):
+        for _ in range(fewer(4000)):
             u, w, x = 2.0 * random.random() ** random.choice([1, 8]), 9.0 * random.random(), 2.0 * random.random() - 1.0
             V, slope = by_formula(A, B, witness, u, w, x)
             if c < V:

@@ -24,7 +24,6 @@ from starhold.trace.calling import Compiled
 from tests.certification.loops import free, tensor, textbook
 
 # Together: each worker would make the certificates of the textbook loops for itself.
-pytestmark = pytest.mark.xdist_group("textbook")
 
 LOOPS = textbook()
 STEPS = 1500

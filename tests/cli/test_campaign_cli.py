@@ -13,7 +13,6 @@ import pytest
 from starhold.campaign import engines
 from tests.running import starhold
 
-pytestmark = pytest.mark.xdist_group("cli")
 SMALL = """
 name = "small"
 

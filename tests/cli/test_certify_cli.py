@@ -7,8 +7,6 @@ import pytest
 from tests.running import starhold
 from tests.small import CRAFT, MPC, PD, WEAK
 
-pytestmark = pytest.mark.xdist_group("cli")
-
 
 @pytest.fixture(scope="module")
 def proved(tmp_path_factory):

@@ -27,7 +27,6 @@ def short(tmp_path):
     return tmp_path
 
 
-@pytest.mark.xdist_group("cli")
 def test_compare_writes_everything_and_prints_the_table(short):
     done = starhold("compare", "short.toml", "-o", "out", cwd=short)
     assert done.returncode == 0, done.stderr
@@ -59,7 +58,6 @@ def test_compare_writes_everything_and_prints_the_table(short):
     assert (out / "mine.txt").read_text() == "keep"
 
 
-@pytest.mark.xdist_group("cli")
 def test_run_flies_the_law_that_is_asked_for(short):
     done = starhold("run", "short.toml", "--law", "sliding", cwd=short)
     assert done.returncode == 0, done.stderr
@@ -71,7 +69,6 @@ def test_run_flies_the_law_that_is_asked_for(short):
     assert "did you mean sliding?" in wrong.stderr
 
 
-@pytest.mark.xdist_group("cli")
 def test_a_motion_that_is_lost_is_said_so(short):
     text = SHORT.replace("k_rate = 0.09", "k_rate = 900").replace('torque_limit = "0.01 N m"', "")
     (short / "wild.toml").write_text(text)
@@ -84,7 +81,6 @@ def test_a_motion_that_is_lost_is_said_so(short):
     assert "diverged" in (short / "wild" / "report.html").read_text()
 
 
-@pytest.mark.xdist_group("cli")
 def test_a_craft_that_is_lost_at_once_is_said_so(short):
     (short / "spinning.toml").write_text(SHORT.replace("rate = [0.04", "rate = [100.04"))
     done = starhold("compare", "spinning.toml", "-o", "spinning", "--no-certify", cwd=short)
@@ -93,7 +89,6 @@ def test_a_craft_that_is_lost_at_once_is_said_so(short):
     assert not (short / "spinning" / "certificate.json").exists()
 
 
-@pytest.mark.xdist_group("cli")
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -126,7 +121,6 @@ def test_user_errors_are_one_line_and_exit_code_2(words, said, short):
     assert "Traceback" not in done.stderr + done.stdout
 
 
-@pytest.mark.xdist_group("cli")
 def test_new_writes_a_file_that_runs(tmp_path):
     assert starhold("new", "my.toml", "--schema", cwd=tmp_path).returncode == 0
     assert (tmp_path / "my.toml").read_text().startswith("#:schema ./starhold.schema.json")
@@ -135,7 +129,6 @@ def test_new_writes_a_file_that_runs(tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.xdist_group("cli")
 def test_design_prints_gains_and_what_they_are_judged_by(short):
     text = SHORT.split("[[law]]")[0] + '[[law]]\ntype = "lqr"\nform = "II"\nq = [1, 1, 1, 0.2, 0.2, 0.2]\nr = 50\n'
     (short / "lqr.toml").write_text(text)
@@ -148,7 +141,6 @@ def test_design_prints_gains_and_what_they_are_judged_by(short):
     assert "form" in none.stderr
 
 
-@pytest.mark.xdist_group("cli")
 def test_lists(tmp_path):
     listed = starhold("laws", cwd=tmp_path).stdout
     for name in catalogue():
@@ -161,7 +153,6 @@ def test_lists(tmp_path):
     assert json.loads(starhold("schema", cwd=tmp_path).stdout)["type"] == "object"
 
 
-@pytest.mark.xdist_group("cli")
 def test_check_law_passes_a_good_law_and_fails_a_bad_one(tmp_path):
     text = Path(catalogue()["pd"].module.__file__).read_text()
     (tmp_path / "my_pd.py").write_text(text)
@@ -186,7 +177,6 @@ sys.stdin.read()
 """
 
 
-@pytest.mark.xdist_group("cli")
 def test_a_folder_that_another_process_writes_is_refused_until_that_ends(tmp_path):
     words = [sys.executable, "-c", HOLDER]
     holder = subprocess.Popen(words, cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
@@ -206,7 +196,6 @@ def test_a_folder_that_another_process_writes_is_refused_until_that_ends(tmp_pat
     assert not list((tmp_path / "shared").iterdir())
 
 
-@pytest.mark.xdist_group("cli")
 def test_warnings_and_failures_of_the_system_are_single_lines(short):
     falling = SHORT.replace("velocity = [0, 7550, 0]", "velocity = [0, 6000, 0]")
     (short / "falling.toml").write_text(falling)
@@ -240,7 +229,6 @@ def test_what_the_system_refuses_is_one_line(failure, said, monkeypatch, capsys)
     assert error.count("\n") == 1
 
 
-@pytest.mark.xdist_group("cli")
 def test_interrupt_leaves_no_half_written_file(short):
     (short / "long.toml").write_text(SHORT.replace("duration = 20.0", "duration = 20000000.0\nrecord_every = 10000"))
     child = subprocess.Popen(

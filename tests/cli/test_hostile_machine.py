@@ -10,8 +10,8 @@ import time
 import pytest
 
 from tests.cli.short import SHORT
+from tests.tiers import leading
 
-pytestmark = pytest.mark.xdist_group("cli")
 COMMAND = [sys.executable, "-m", "starhold"]
 
 
@@ -25,9 +25,9 @@ def folder(tmp_path):
     return tmp_path
 
 
-@pytest.mark.parametrize("most", [0, 50_000, 150_000])
+@pytest.mark.parametrize("most", leading([150_000, 0, 50_000]))
 def test_a_disk_that_is_full_is_told_in_one_line(folder, most):
-    """The first holds nothing, the second a part of run.nc, the third that and the pictures, but not the page."""
+    """The first holds run.nc and the pictures, but not the page, the second nothing, the third a part of run.nc."""
 
     def limited():
         resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))

@@ -9,8 +9,6 @@ from starhold.certification.invariant import enclosure
 from starhold.certification.invariant.problem import FORMAT
 from tests.running import starhold
 
-pytestmark = pytest.mark.xdist_group("cli")
-
 FILE = """
 name = "mine"
 variables = ["x", "y"]

@@ -20,7 +20,6 @@ def folder(tmp_path):
     return tmp_path
 
 
-@pytest.mark.xdist_group("landing")
 def test_modal_roots_writes_a_table_and_a_picture_and_prints_a_law_to_paste(folder):
     done = starhold("modal-roots", "coarse.toml", "-o", "out", cwd=folder)
     assert done.returncode == 0, done.stderr
@@ -39,7 +38,6 @@ def test_modal_roots_writes_a_table_and_a_picture_and_prints_a_law_to_paste(fold
     assert len((folder / "out" / "modal-roots.csv").read_text().splitlines()) == 4
 
 
-@pytest.mark.xdist_group("landing")
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -57,7 +55,6 @@ def test_user_errors_are_one_line_and_exit_code_2(words, said, folder):
     assert "Traceback" not in done.stderr + done.stdout
 
 
-@pytest.mark.xdist_group("landing")
 def test_a_run_shows_its_transient_against_the_limits(folder):
     done = starhold("run", "landing", "--law", "rounded", "-o", "out", cwd=folder)
     assert done.returncode == 0, done.stderr

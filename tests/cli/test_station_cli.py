@@ -18,7 +18,6 @@ def short(tmp_path):
     return tmp_path
 
 
-@pytest.mark.xdist_group("cli")
 def test_compare_writes_everything_and_prints_the_table(short):
     done = starhold("compare", "short.toml", "-o", "out", cwd=short)
     assert done.returncode == 0, done.stderr
@@ -46,7 +45,6 @@ def test_compare_writes_everything_and_prints_the_table(short):
     assert starhold("compare", "short.toml", "-o", "out", cwd=short).returncode == 2
 
 
-@pytest.mark.xdist_group("cli")
 def test_run_flies_one_law_and_tells_a_lost_one_by_its_exit_code(short):
     done = starhold("run", "short.toml", "--law", "deficit 5", "-o", "one", cwd=short)
     assert done.returncode == 0, done.stderr
@@ -58,7 +56,6 @@ def test_run_flies_one_law_and_tells_a_lost_one_by_its_exit_code(short):
     assert "did you mean deficit" in wrong.stderr
 
 
-@pytest.mark.xdist_group("cli")
 @pytest.mark.parametrize("command", ["failures", "modal-roots"])
 def test_commands_for_bodies_that_turn_say_so(command, short):
     done = starhold(command, "short.toml", cwd=short)
@@ -67,7 +64,6 @@ def test_commands_for_bodies_that_turn_say_so(command, short):
     assert done.stderr.count("\n") == 1
 
 
-@pytest.mark.xdist_group("cli")
 def test_certifies_and_checks(short):
     done = starhold("certify", "short.toml", "-o", "sure", cwd=short)
     assert done.returncode == 3, done.stderr
@@ -83,7 +79,6 @@ def test_certifies_and_checks(short):
     assert "99.89 %" in rest.stdout
 
 
-@pytest.mark.xdist_group("cli")
 def test_lists_design_and_new(short):
     listed = starhold("laws", cwd=short).stdout
     assert all(name in listed for name in catalogue("libration-point"))

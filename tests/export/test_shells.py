@@ -17,6 +17,7 @@ from starhold.export.vectors import vectors
 from starhold.laws.catalogue import catalogue
 from starhold.simulation.lane import fly
 from tests.export.flown import code_of, need
+from tests.tiers import leading
 
 ATTITUDE = 1e-7
 """Largest difference (rad) over an orbit: Basilisk integrates Rodrigues parameters, starhold quaternions."""
@@ -69,7 +70,7 @@ def test_basilisk_refuses_what_no_message_tells_of():
         shell_files(code_of("lyapunov"), ["simulink"])
 
 
-@pytest.mark.parametrize("name", ["wheel", "lyapunov"])
+@pytest.mark.parametrize("name", leading(["wheel", "lyapunov"]))
 def test_fmu_gives_the_same_bits(name, tmp_path):
     need("cmake", "cc")
     fmpy = pytest.importorskip("fmpy", reason="fmpy comes with the export extra")

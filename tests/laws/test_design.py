@@ -84,7 +84,6 @@ def test_figures_that_overflow_are_one_line(file, monkeypatch):
         sh.design(file)
 
 
-@pytest.mark.xdist_group("cli")
 def test_the_command_prints_what_the_function_returns(file):
     def told(*words):
         return starhold("design", file.name, *words, cwd=file.parent)

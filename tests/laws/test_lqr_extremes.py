@@ -18,6 +18,7 @@ from starhold.laws import lqr
 from starhold.parts.craft import make_craft, tensor
 from starhold.synthesis.riccati import linear_modes, solve_riccati
 from starhold.synthesis.weights import BALANCES, kappa
+from tests.tiers import fewer
 
 CLOSE = 1e-9
 
@@ -102,7 +103,7 @@ def assert_optimal(inertia, q, r, gains):
 
 def test_form_ii_equals_the_numerical_solution_on_every_axis():
     random = np.random.default_rng(2024)
-    for _ in range(1000):
+    for _ in range(fewer(1000)):
         moments, r = moments_of(random), weights_of(random, 3)
         q = np.r_[weights_of(random, 3), weights_of(random, 3)]
         gains = lqr.design(make_craft(moments), lqr.FormII(tuple(q), tuple(r)))
@@ -114,7 +115,7 @@ def test_form_ii_equals_the_numerical_solution_on_every_axis():
 @pytest.mark.usefixtures("precise")
 def test_form_iii_is_optimal_for_its_weights_turned_into_the_body():
     random, refused = np.random.default_rng(1), 0
-    for _ in range(600):
+    for _ in range(fewer(600)):
         turn = turn_of(random)
         craft = make_craft(turn * moments_of(random) @ turn.T)
         inertia, r = tensor(craft.inertia), weights_of(random, 3)
@@ -137,13 +138,13 @@ def test_form_iii_is_optimal_for_its_weights_turned_into_the_body():
         zero = exact(np.zeros((3, 3)))
         rate, attitude, cost = (axes * exact(np.diag(part)) * axes.transpose() for part in (q[:3], q[3:], r))
         assert_optimal(inertia, blocks([[rate, zero], [zero, attitude]]), cost, gains)
-    assert 60 < refused < 400
+    assert fewer(60) < refused < fewer(400)
 
 
 @pytest.mark.usefixtures("precise")
 def test_form_i_is_optimal_for_any_weight_of_the_torque():
     random = np.random.default_rng(2)
-    for _ in range(400):
+    for _ in range(fewer(400)):
         turn, other = turn_of(random), turn_of(random)
         craft = make_craft(turn * moments_of(random) @ turn.T)
         a, b = 10.0 ** random.uniform(-8, 4, size=2)
@@ -192,7 +193,7 @@ def determinant(m):
 @pytest.mark.usefixtures("precise")
 def test_numeric_form_is_optimal_for_any_weights():
     random = np.random.default_rng(4)
-    for coupling in np.repeat([0.0, 0.5, 0.999], 12):
+    for coupling in np.repeat([0.0, 0.5, 0.999], fewer(12)):
         turns = [turn_of(random) for _ in range(5)]
         craft = make_craft(turns[0] * moments_of(random) @ turns[0].T)
         rate, attitude, cost = (turn * weights_of(random, 3, 11) @ turn.T for turn in turns[1:4])

@@ -182,7 +182,6 @@ def test_weights_from_python_are_checked_too(spec, said):
         lqr.design(make_craft([2.0, 3.0, 4.0]), spec)
 
 
-@pytest.mark.xdist_group("cli")
 @pytest.mark.parametrize("command", ["design", "run"])
 def test_the_command_line_says_one_line(tmp_path, command):
     (tmp_path / "wide.toml").write_text(HEAD + law(form='"II"', q="[1, 1e13, 1, 1, 1, 1]", r=1))

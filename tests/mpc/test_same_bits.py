@@ -16,6 +16,7 @@ from starhold.laws.predictive.solver import PATIENCE
 from starhold.trace.program import Memory
 from tests.mpc.programs import Program
 from tests.mpc.setting import CRAFTS, WEIGHTS, fresh
+from tests.tiers import leading
 from tests.trace.machines import Job, Subject, column, on_c, on_lanes, on_node, same
 
 LANES, BUDGET = 8, 100
@@ -100,7 +101,7 @@ def jumping_rows(seed: int) -> Any:
     return rows
 
 
-@pytest.mark.parametrize(("shape", "limit"), [("principal", "axis"), ("full", "norm"), ("full", "none")])
+@pytest.mark.parametrize(("shape", "limit"), leading([("full", "norm"), ("principal", "axis"), ("full", "none")]))
 def test_law(shape: str, limit: str):
     craft = CRAFTS[shape]
     gains = mpc.Gains(*WEIGHTS[:2], (0.5, 0.5, 0.5), horizon=6, limit=mpc.LIMITS.index(limit))

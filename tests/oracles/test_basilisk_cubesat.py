@@ -35,6 +35,7 @@ pytest.importorskip("Basilisk", reason="Basilisk comes with the test extra where
 from basilisk_cubesat import in_basilisk
 from basilisk_software import POINTING, FlightCode, as_in_basilisk, errors_of, under, with_numbers, without
 from common import gap
+from tests.tiers import leading
 
 ATTITUDE, MOMENTUM = 5e-8, 5e-8
 """Largest differences of all models together: rad and N m s, of rotors that hold some 1e-3."""
@@ -90,7 +91,7 @@ def differ(known, *flown):
     return apart(vehicle, *end(*known))
 
 
-@pytest.mark.parametrize("name", [entry.name for entry in SCENARIO.laws])
+@pytest.mark.parametrize("name", leading([entry.name for entry in SCENARIO.laws]))
 def test_the_scenario_flies_alike(name):
     """With all models, the filter, noise of gyro and star tracker, and the wheel that is lost and then not counted on."""
     need("cc")

@@ -112,6 +112,7 @@ def test_a_slew_keeps_the_angular_momentum_of_the_whole():
     assert np.ptp(run["gimbal_angle"], axis=0).min() > 0.2
 
 
+@pytest.mark.slow
 def test_what_motors_do_is_what_the_energy_grows_by(monkeypatch):
     gimbals, rotors = (1e-4, -8e-5, -1.2e-4, 6e-5), (2e-3, -1e-3, 1.5e-3, -2e-3)
 
@@ -250,6 +251,7 @@ def caught(torque, **limits):
     return flown(replace(loop, start=loop.start._replace(attitude=(0.9, 0.0, 0.0, math.sqrt(0.19)))), 100)
 
 
+@pytest.mark.slow
 def test_rotors_turn_a_craft_whose_gimbals_are_caught_in_a_singularity():
     driven, idle = caught(0.02), caught(0.0)
     assert driven["gimbal_determinant"].max() < 1e-6

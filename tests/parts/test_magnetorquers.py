@@ -108,6 +108,7 @@ def test_a_dipole_gives_what_lies_across_the_field_and_no_more_than_it_can():
 LAW = '[[law]]\ntype = "lyapunov"\nk_rate = 0.01\nk_attitude = 0.002\n'
 
 
+@pytest.mark.slow
 def test_wheels_are_unloaded_by_what_comes_from_outside():
     text = CRAFT.replace("duration = 400", "duration = 6000")
     plain = sh.simulate(parse(text + WHEELS + LAW, "own"))

@@ -92,7 +92,7 @@ def most_likely(attitudes, rates, new):
     return guess[-1], biases[-1], covariance[np.ix_(last, last)]
 
 
-@pytest.mark.parametrize("steps", [1, 19, 26])
+@pytest.mark.parametrize("steps", [1, 19, pytest.param(26, marks=pytest.mark.slow)])
 def test_estimate_is_the_most_likely_one(steps):
     # The last one filters what all readings up to now say: a smoother's last state. Among the ends some have a new attitude.
     attitudes, rates, new = flight(steps, seed=steps)

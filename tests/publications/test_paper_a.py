@@ -49,6 +49,7 @@ def test_gravity_torque_is_the_largest_over_all_directions():
     assert measures.gravity_torque(Desk("A")).value[1] == pytest.approx(torque.max(), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_verdicts_are_those_recorded():
     made = reproduce("A")
     assert made.changed == []

@@ -103,7 +103,6 @@ def verdict(desk, row):
     return judge(measure_of("D", row)(desk, **row.given), row.printed, row.tolerance)
 
 
-@pytest.mark.xdist_group("paper_d")
 @pytest.mark.parametrize("row", [row for row in PAPER.rows if row.by not in SEARCHES], ids=lambda row: row.name)
 def test_verdicts(desk, row):
     assert verdict(desk, row) == row.verdict

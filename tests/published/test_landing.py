@@ -29,7 +29,6 @@ def found():
     return study(scenario, pick_modal(scenario, None))
 
 
-@pytest.mark.xdist_group("landing")
 @pytest.mark.parametrize("name", ["fit", "rounded"])
 def test_the_published_turn(flights, name):
     seen = flights[name]
@@ -39,7 +38,6 @@ def test_the_published_turn(flights, name):
     assert seen["limits_kept"]
 
 
-@pytest.mark.xdist_group("landing")
 def test_the_search_for_this_very_start_beats_the_fit(flights):
     assert flights["searched"]["transient_time"] < flights["fit"]["transient_time"] - 1.2
     assert flights["searched"]["limits_kept"]
@@ -56,7 +54,6 @@ def test_the_fit_gives_the_published_root_at_the_angle_of_the_start():
     assert entry.gains.phi_0[0] == pytest.approx(-0.428, abs=5e-4)
 
 
-@pytest.mark.xdist_group("landing")
 def test_hard_limits_give_the_published_fit_at_every_angle(found):
     assert np.degrees(found.angles) == pytest.approx(np.arange(10.0, 181.0, 5.0))
     off = np.abs(found.published.errors(found.angles, found.roots))
@@ -66,7 +63,6 @@ def test_hard_limits_give_the_published_fit_at_every_angle(found):
         assert by_angle[angle] == pytest.approx(root, rel=3e-3)
 
 
-@pytest.mark.xdist_group("landing")
 def test_the_acceleration_decides_below_85_degrees_and_the_rate_above(found):
     for item in found.found:
         seen = item.hard.transient
@@ -75,7 +71,6 @@ def test_the_acceleration_decides_below_85_degrees_and_the_rate_above(found):
         assert tight[0 if item.angle < math.radians(86.0) else 1] > 0.997
 
 
-@pytest.mark.xdist_group("landing")
 def test_the_next_faster_root_breaks_a_limit(found):
     scenario = load("landing-limits")
     problem = problem_of(scenario, scenario.laws[0])
@@ -85,20 +80,17 @@ def test_the_next_faster_root_breaks_a_limit(found):
         assert not faster.keeps(LIMITS)
 
 
-@pytest.mark.xdist_group("landing")
 def test_the_own_fit_is_no_worse_than_the_published_one(found):
     own, published = (np.abs(pieces.errors(found.angles, found.roots)) for pieces in (found.own, found.published))
     assert np.sqrt(np.mean(own**2)) < 0.8 * np.sqrt(np.mean(published**2))
     assert own.max() < published.max()
 
 
-@pytest.mark.xdist_group("landing")
 def test_tolerances_buy_five_to_twelve_per_cent(found):
     gains = [1.0 - item.eased.time / item.hard.time for item in found.found]
     assert 0.05 < min(gains) < max(gains) < 0.12
 
 
-@pytest.mark.xdist_group("landing")
 def test_what_is_printed_is_read_back(found, tmp_path):
     text = builtin_text("landing-limits")
     scenario = parse(text[: text.index("[[law]]")] + "\n".join(law_lines(found.own, found.b)), "pasted")

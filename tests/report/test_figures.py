@@ -41,6 +41,7 @@ def test_every_figure_is_drawn_with_every_law(tmp_path: Path) -> None:
             assert (np.abs(picture.astype(int) - wanted).max(axis=2) < 12).sum() > 20, (path.name, number)
 
 
+@pytest.mark.slow
 def test_equal_flights_give_equal_files(tmp_path: Path) -> None:
     folders = [tmp_path / "a", tmp_path / "b"]
     for folder in folders:

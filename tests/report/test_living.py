@@ -25,9 +25,6 @@ from tests.browser import Browser
 from tests.report import flown
 from tests.trace.machines import need
 
-# One browser for all.
-pytestmark = pytest.mark.xdist_group("browser")
-
 MOST = 6e6
 """Bytes that a page may have."""
 DESKTOP, PHONE = (1400, 900), (390, 844)

@@ -10,6 +10,7 @@ from PIL import Image
 
 from starhold.report.stability_map import LINE, draw_map, stability_map
 from starhold.synthesis.stability_degree import boundary, optimum
+from tests.tiers import leading
 
 GIVEN = [
     ((1.0, 1.5, 2.0), 0.5, 0.3, 2.0),
@@ -26,7 +27,7 @@ def pixels(path: Path) -> np.ndarray:
         return np.asarray(image.convert("RGB")).astype(int)
 
 
-@pytest.mark.parametrize("given", GIVEN)
+@pytest.mark.parametrize("given", leading([(given,) for given in GIVEN]))
 def test_map_line_and_optimum_are_drawn(tmp_path: Path, given: tuple[tuple[float, ...], float, float, float]) -> None:
     path = draw_map(tmp_path / "map.png", *given)
     assert list(tmp_path.iterdir()) == [path]

@@ -8,11 +8,12 @@ from starhold.errors import InputError
 from starhold.scenario.building import build
 from starhold.scenario.reading import load
 from tests.scenario.mutants import mutant
+from tests.tiers import leading
 
 EACH = 60
 
 
-@pytest.mark.parametrize("block", range(5))
+@pytest.mark.parametrize("block", leading(range(5)))
 def test_a_mutant_is_built_or_refused_in_one_line(block, tmp_path):
     said = []
     for seed in range(block * EACH, (block + 1) * EACH):

@@ -24,7 +24,6 @@ from tests.report import flown
 
 pytest.importorskip("uvicorn")
 pytest.importorskip("starlette")
-pytestmark = pytest.mark.xdist_group("browser")
 
 
 class Served(NamedTuple):

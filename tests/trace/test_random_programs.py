@@ -6,13 +6,14 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
+from tests.tiers import fewer
 from tests.trace.machines import MACHINES, agree, need
 from tests.trace.scripts import Script, scripts, subject, values
 
 seeds = st.integers(0, 2**64 - 1)
 # A batch is compiled at once; to make one smaller again and again would take minutes.
 batches = settings(
-    max_examples=5, phases=[Phase.generate], suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
+    max_examples=fewer(5), phases=[Phase.generate], suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
 )
 
 

@@ -45,7 +45,6 @@ def changed(*pairs):
     return parse(text, "here")
 
 
-@pytest.mark.xdist_group("failures")
 def test_a_pyramid_bears_every_single_loss_and_no_double_one(found):
     assert [failure.lost for failure in found] == [(), (1,), (2,), (3,), (4,), *combinations((1, 2, 3, 4), 2)]
     singles, doubles = found[1:5], found[5:]
@@ -64,7 +63,6 @@ def test_a_pyramid_bears_every_single_loss_and_no_double_one(found):
         assert np.linalg.norm(failure.lacking[0]) == pytest.approx(1.0, abs=1e-10)
 
 
-@pytest.mark.xdist_group("failures")
 def test_less_torque_gives_a_smaller_degree_of_stability_and_a_later_settling(found):
     for failure in found[1:5]:
         assert failure.eta_intact == found[0].eta
@@ -75,7 +73,6 @@ def test_less_torque_gives_a_smaller_degree_of_stability_and_a_later_settling(fo
         assert 0.0 < failure.momentum_share < FULL
 
 
-@pytest.mark.xdist_group("failures")
 def test_degree_of_stability_and_gains_are_those_of_a_design_for_the_torque_left(scenario, found):
     entry = scenario.laws[0]
     left = entry.spec._replace(torque=entry.spec.torque * found[1].share)
@@ -85,7 +82,6 @@ def test_degree_of_stability_and_gains_are_those_of_a_design_for_the_torque_left
     assert found[1].gains["k_rate"] == pytest.approx(designed.k_rate, rel=1e-12)
 
 
-@pytest.mark.xdist_group("failures")
 def test_the_directions_are_those_that_the_wheels_name(found):
     wheels = make_wheels(pyramid(), 1e-3, 0.02, 0.4)
     for failure in found[5:]:
@@ -112,7 +108,6 @@ def test_authority_is_what_a_linear_programme_finds_about_the_weakest_axis(found
     assert min(most) == pytest.approx(found[lost].authority, rel=1e-9)
 
 
-@pytest.mark.xdist_group("failures")
 def test_three_orthogonal_wheels_name_the_axis_of_each_loss():
     found = study(*with_first_law(changed(('"pyramid"', '"orthogonal"'))))
     assert len(found) == 1 + 3 + 3
@@ -127,7 +122,6 @@ def with_first_law(scenario):
     return scenario, scenario.laws[0]
 
 
-@pytest.mark.xdist_group("failures")
 def test_six_wheels_bear_double_losses_and_a_law_with_given_gains_keeps_them():
     wheels = "".join(
         f"\n[[wheel]]\naxis = {axis}\n" for axis in ([1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1])
@@ -147,7 +141,6 @@ def test_six_wheels_bear_double_losses_and_a_law_with_given_gains_keeps_them():
         assert failure.settling is not None
 
 
-@pytest.mark.xdist_group("failures")
 def test_the_intact_set_settles_as_in_a_run(scenario, found):
     loop = build(scenario, scenario.laws[0])
     recording = label(loop, *fly(loop, scenario.table.simulation.steps), 1)
@@ -155,13 +148,11 @@ def test_the_intact_set_settles_as_in_a_run(scenario, found):
     assert found[0].settling == measure(recording, limits.attitude_tolerance, limits.rate_tolerance)["settling_time"]
 
 
-@pytest.mark.xdist_group("failures")
 def test_losses_replace_the_faults_of_the_file(found):
     scenario = parse(BUILTIN + "\n[[fault]]\ntime = 20\nwheel = 2\nlost = true\n", "here")
     assert study(scenario, scenario.laws[0])[0] == found[0]
 
 
-@pytest.mark.xdist_group("failures")
 def test_an_extrapolated_time_is_met_in_a_longer_flight():
     """A craft held against gravity gathers momentum; the first orbit foretells, to within one, when a wheel is full."""
     small = (
@@ -202,7 +193,6 @@ def test_directions_lacking():
     assert directions_lacking(np.eye(3)[:2]) == pytest.approx(np.array([[0.0, 0.0, 1.0]]))
 
 
-@pytest.mark.xdist_group("failures")
 def test_the_table_reads_back(scenario, found, tmp_path):
     write_failures(found, scenario.laws[0], tmp_path / "failures.csv")
     rows = list(csv.DictReader((tmp_path / "failures.csv").read_text(encoding="utf-8").splitlines()))
@@ -221,7 +211,6 @@ def test_the_table_reads_back(scenario, found, tmp_path):
             assert row["degree of stability after (1/s)"] == row["k_rate (N m s)"] == row["settling time (s)"] == ""
 
 
-@pytest.mark.xdist_group("failures")
 def test_the_picture_shows_something_and_is_the_same_again(found, tmp_path):
     from matplotlib.image import imread
 
@@ -243,7 +232,6 @@ def test_a_folder_that_holds_results_is_kept_unless_forced(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["other.csv"]
 
 
-@pytest.mark.xdist_group("failures")
 def test_the_command(tmp_path):
     done = starhold("failures", "wheels-orbital", cwd=tmp_path)
     assert done.returncode == 0, done.stderr

@@ -23,6 +23,7 @@ from starhold.simulation.lane import fly, label
 from starhold.simulation.lanes import simulate_many
 from starhold.studies.flight import Flight
 from tests.making import wheels_after
+from tests.tiers import leading
 
 CRAFT = """
 name = "on wheels"
@@ -121,8 +122,8 @@ def test_the_command_is_cut_off_where_the_file_says():
     assert share_on_limit(run) >= at.mean() > 0.0
 
 
-@pytest.mark.parametrize("allocation", ["least-squares", "least-peak"])
-@pytest.mark.parametrize("kind", ["axis", "norm"])
+@pytest.mark.parametrize("allocation", leading(["least-peak", "least-squares"]))
+@pytest.mark.parametrize("kind", leading(["axis", "norm"]))
 def test_mpc_plans_within_the_wheels_torque_and_after_a_loss_within_what_is_left(kind, allocation):
     law = MPC.format(kind=kind) + 'fault_action = "reallocate"\n'
     scenario, loop = made(LOST, law, limit=f'limit = "{kind}"', allocation=allocation)
