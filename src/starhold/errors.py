@@ -2,6 +2,19 @@
 
 from __future__ import annotations
 
+import signal
+
+
+class InterruptedByUserError(BaseException):
+    """Ctrl-C or a request to end, under a name that the command-line library does not turn into an exit code of its own."""
+
+
+def is_interrupt(error: BaseException) -> bool:
+    """Whether an error is the user's wish to end, and no fault of the file in which it was raised. A command has a handler
+    of its own for Ctrl-C, so that a `KeyboardInterrupt` there is the file's."""
+    plain = isinstance(error, KeyboardInterrupt) and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    return plain or isinstance(error, InterruptedByUserError)
+
 
 class InputError(Exception):
     """Something the user wrote is not as it must be: where (file and key), what was found, what is allowed."""

@@ -1,12 +1,15 @@
 """`sh.linearise` and `sh.margins`: systems of python-control, that agree in continuous time and sampled."""
 
 import sys
+import warnings
+from pathlib import Path
 
 import control
 import numpy as np
 import pytest
 
 import starhold as sh
+from starhold.laws import pd
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.07])
@@ -40,6 +43,23 @@ def test_margins_are_a_table():
     found = sh.to_pandas(sh.margins("cubesat-slew", "pd"))
     assert list(found["axis"]) == ["x", "y", "z"]
     assert (found["gain"] > 10.0).all()
+
+
+def test_a_law_that_leaves_an_axis_alone_has_margins_about_the_others(tmp_path):
+    """Gain 0 has no logarithm: neither an error nor a warning comes of it."""
+    text = (Path(pd.__file__).read_text()).replace(
+        "subtract(tracking_torque(measurement, craft), feedback), memory",
+        "(-feedback[0], -feedback[1], 0.0 * feedback[2]), memory",
+    )
+    (tmp_path / "two_axes.py").write_text(text)
+    body = {"name": "axes", "spacecraft": {"inertia": [2, 3, 4]}, "initial": {"attitude": [1, 0, 0, 0]}}
+    law = {"file": "two_axes.py", "k_rate": 0.3, "k_attitude": 0.1}
+    whole = sh.scenario({**body, "simulation": {"duration": 1.0}, "law": [law]}, tmp_path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = sh.margins(whole)
+    assert np.isnan(found[2].crossover)
+    assert found[0].crossover > found[1].crossover > 0.0
 
 
 @pytest.mark.parametrize(

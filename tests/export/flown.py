@@ -96,6 +96,9 @@ def need(*programs: str) -> None:
 @cache
 def loop_of(name: str) -> Any:
     """The loop of a law: of a built-in scenario, or one of those that differ in one choice."""
+    if name == "estimator on [sensor]":
+        noisy = fit("sensor", "gaussian", 1e-4, 1e-5)
+        return choices()["target from a table"].with_parts(noisy, fit("estimator", "complementary-filter", 0.1, 0.01))
     if name == "estimator":
         loop = choices()["target from a table"].without("sensor")
         tracker, gyro = (

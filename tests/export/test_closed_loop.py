@@ -62,8 +62,8 @@ def _nothing(measurement: Any, gains: Any, craft: Any, memory: Any) -> Any:
     return (0.0, 0.0, 0.0), memory
 
 
-LOOPS = ["lyapunov", "sliding", "wheel", "modal", "pd", "l2", "mpc", "estimator", "hysteresis, axis", "orbital target",
-         "target from a table", "pid, example 0, noise", "lqr, example 1, noise"]  # fmt: skip
+LOOPS = ["lyapunov", "sliding", "wheel", "modal", "pd", "l2", "mpc", "estimator", "estimator on [sensor]",
+         "hysteresis, axis", "orbital target", "target from a table", "pid, example 0, noise", "lqr, example 1, noise"]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", LOOPS)

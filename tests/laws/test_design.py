@@ -102,6 +102,9 @@ def test_the_command_prints_what_the_function_returns(file):
                 assert f"{name}: {value:.3g}" in done.stdout
             else:
                 assert all(f"{number:.6g}" in done.stdout for number in np.ravel(value))
+    picture = told("--map", "map.xyz")
+    assert (picture.returncode, picture.stdout, picture.stderr.count("\n")) == (2, "", 1)
+    assert "--map: found map.xyz; allowed: the name of a PNG file" in picture.stderr
     one = told("--law", "classical")
     assert "classical: " in one.stdout
     assert "lqr: " not in one.stdout

@@ -216,7 +216,13 @@ BROKEN = {
     ),
     "shape": (", memory\n", "\n", "torque must return three numbers and the memory"),
     "memory": (", memory\n", ", (1.0,)\n", "the memory that torque returns must be formed as it was given"),
-    "exit": ("CARD = Card(", "raise SystemExit(3)\nCARD = Card(", "SystemExit"),
+    "exit": ("CARD = Card(", "raise SystemExit(3)\nCARD = Card(", "my_law.py, line 10: SystemExit: 3"),
+    "its own kind of end": ("CARD = Card(", "raise type('Own', (BaseException,), {})\nCARD = Card(", "line 10: Own"),
+    "an equation ends the program": (
+        "    return scale(",
+        "    raise SystemExit(0)\n    return scale(",
+        "line 19: SystemExit",
+    ),
     "not a card": ("CARD = Card(", "CARD = dict(", "CARD is not a Card"),
 }
 
@@ -230,6 +236,33 @@ def test_what_is_wrong_in_a_law_file_is_one_line(kind, folder):
         sh.simulate(folder / "own.toml")
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_an_interrupt_in_a_law_file_is_the_users_in_python_and_the_files_under_a_command(folder):
+    """A command has a handler of its own for Ctrl-C, which raises something else."""
+    (folder / "laws" / "my_law.py").write_text(LAW.replace("CARD = Card(", "raise KeyboardInterrupt\nCARD = Card("))
+    with pytest.raises(KeyboardInterrupt):
+        sh.load(folder / "own.toml")
+    done = starhold("run", "own.toml", cwd=folder)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "my_law.py, line 10: KeyboardInterrupt" in done.stderr
+
+
+def test_links_in_a_circle_are_told_in_one_line(folder):
+    (folder / "laws" / "my_law.py").unlink()
+    (folder / "laws" / "my_law.py").symlink_to(folder / "other.py")
+    (folder / "other.py").symlink_to(folder / "laws" / "my_law.py")
+    for words in (("run", "own.toml"), ("check-part", "other.py"), ("laws", "other.py"), ("parts", "other.py")):
+        done = starhold(*words, cwd=folder)
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1), words
+        assert "Too many levels of symbolic links" in done.stderr
+
+
+def test_check_part_tells_the_line_that_fails(folder):
+    text = LAW.replace("gains.p, vector_part", "gains.p / (1.0 + measurement.attitude[0]), vector_part")
+    (folder / "half.py").write_text(text)
+    reasons = [verdict.reason for verdict in examine(find_law(str(folder / "half.py"))) if verdict.outcome == "failed"]
+    assert "half.py, line 19: ZeroDivisionError: float division by zero" in reasons
 
 
 def test_a_file_with_the_name_of_another_law_is_refused_and_the_law_s_own_is_it(folder):

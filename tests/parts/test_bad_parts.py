@@ -125,6 +125,10 @@ BROKEN = {
     "a goal of three": ("target", "Goal(params.attitude, ZERO, ZERO)", "(params.attitude, ZERO, ZERO)", "a Goal of four"),
     "an undeclared record": ("effector", 'Annotated[float, Quantity("sqrt(kg) m", "modal deflection")]', "float",
                              "annotated with a Quantity"),
+    "a reading that is none of the state": ("sensor", "    rate: Annotated", "    spin: Annotated",
+                             'FIRST = {"spin": 0.0}'),
+    "an equation ends the program": ("sensor", "    return Reading(", "    raise SystemExit\n    return Reading(",
+                             "mine.py, line 27: SystemExit"),
     "its start fails": ("effector", "State(params.deflection,", "State(params.deflexion,", "mine.py, line 37: Attr"),
 }  # fmt: skip
 

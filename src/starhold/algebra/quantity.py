@@ -15,6 +15,11 @@ class Quantity(NamedTuple):
 
 
 def quantities(cls: Any) -> dict[str, Quantity]:
-    """Return the quantities of a NamedTuple whose fields are all annotated with one, by name, in order."""
+    """Return the quantities of a NamedTuple whose fields are all annotated with one, by name, in order; TypeError where
+    one is not."""
     hints = get_type_hints(cls, include_extras=True)
-    return {name: next(a for a in get_args(hints[name]) if isinstance(a, Quantity)) for name in cls._fields}
+    known = {name: next((a for a in get_args(hints[name]) if isinstance(a, Quantity)), None) for name in cls._fields}
+    if None in known.values():
+        bare = ", ".join(name for name, quantity in known.items() if quantity is None)
+        raise TypeError(f"{cls.__name__} declares no unit of {bare}: annotate it with Quantity")
+    return {name: quantity for name, quantity in known.items() if quantity is not None}

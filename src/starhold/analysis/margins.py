@@ -78,7 +78,7 @@ def _about(linear: Linear, k: int, found: Response) -> Margins:
     def at(frequency: float) -> complex:
         return complex(_cut(linear, [frequency], [k])[0, 0])
 
-    crossings = _roots(w, np.log(np.abs(L)), lambda f: math.log(abs(at(f))))
+    crossings = _roots(w, _log_size(L), lambda f: float(_log_size(at(f))))
     crossover = max(crossings, default=math.nan)
     if not linear.is_stable:
         return Margins(AXES[k], math.nan, math.nan, math.nan, math.nan, crossover, math.nan)
@@ -95,6 +95,11 @@ def _about(linear: Linear, k: int, found: Response) -> Margins:
         crossover,
         float(np.max(1.0 / np.abs(1.0 + L))),
     )
+
+
+def _log_size(values: Any) -> Any:
+    """The logarithm of the size of numbers, of which some may be 0: a law need not act about every axis."""
+    return np.log(np.maximum(np.abs(values), np.finfo(float).tiny))
 
 
 def _roots(w: Any, values: Any, function: Callable[[float], float]) -> list[float]:

@@ -40,7 +40,7 @@ from starhold.cli.arguments import (
     Unstable,
 )
 from starhold.cli.outlet import Outlet, open_outlets
-from starhold.errors import InputError
+from starhold.errors import InputError, InterruptedByUserError
 
 if TYPE_CHECKING:
     from starhold.studies.flight import Flight
@@ -159,6 +159,8 @@ def design(
     from starhold.scenario import designing
     from starhold.scenario.reading import load
 
+    if map_to is not None and map_to.suffix.lower() != ".png":
+        raise InputError("design", "--map", str(map_to), "the name of a PNG file, such as map.png")
     scenario = load(file, allow_unstable)
     for found in designing.design(scenario, law):
         print_design(found, scenario.pick(found.name).law)
@@ -295,10 +297,6 @@ def _root(version: Annotated[bool, typer.Option("--version", help="print the ver
 
         typer.echo(f"starhold {__version__}")
         raise typer.Exit
-
-
-class InterruptedByUserError(BaseException):
-    """Ctrl-C or a request to end, under a name that the command-line library does not turn into an exit code of its own."""
 
 
 _interrupted = Event()

@@ -6,10 +6,12 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, Literal, NamedTuple
 
 from starhold.algebra.structure import flatten
-from starhold.errors import InputError
+from starhold.errors import InputError, is_interrupt
 from starhold.laws.catalogue import Law
 from starhold.laws.interface import Card, fields
 from starhold.loop.kernels import fly_plainly
+from starhold.parts.catalogue import told
+from starhold.parts.part import Part
 from starhold.simulation.lane import fly
 from starhold.simulation.lanes import simulate_many
 
@@ -33,17 +35,20 @@ class Verdict(NamedTuple):
     reason: str
 
 
-def run(checks: Iterable[Callable[..., None]], law: Any) -> Iterator[Verdict]:
-    """Run checks over a law, in order, going on after failures."""
+def run(checks: Iterable[Callable[..., None]], part: Part) -> Iterator[Verdict]:
+    """Run checks over a part or a law, in order, going on after failures."""
     for check in checks:
         name = (check.__doc__ or check.__name__).splitlines()[0].rstrip(".")
         try:
-            check(law)
+            check(part)
         except NotApplicableError as reason:
             yield Verdict(name, "does not apply", str(reason))
-        except Exception as reason:
-            kind = "" if isinstance(reason, (NonconformityError, InputError)) else f"{type(reason).__name__}: "
-            yield Verdict(name, "failed", kind + str(reason))
+        except (NonconformityError, InputError) as reason:
+            yield Verdict(name, "failed", str(reason))
+        except BaseException as reason:
+            if is_interrupt(reason):
+                raise
+            yield Verdict(name, "failed", told(reason, part.file))
         else:
             yield Verdict(name, "passed", "")
 

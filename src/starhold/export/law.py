@@ -13,7 +13,7 @@ from starhold.algebra.structured import Buffer
 from starhold.algebra.vector import ZERO
 from starhold.errors import InputError
 from starhold.export.rebinding import Rebinder
-from starhold.loop.closed_loop import Carry, ClosedLoop, Composition, Memories
+from starhold.loop.closed_loop import Carry, ClosedLoop, Composition, Memories, is_recorded
 from starhold.loop.step import make_equations
 from starhold.parts.contract import NoMemory
 from starhold.parts.part import Part
@@ -117,7 +117,7 @@ def flight_law(loop: ClosedLoop) -> FlightLaw:
             # Without an estimator attitude and rate are told as they are.
             taken = [name for name in first if parts.estimator is not None or name in parts.law.reads]
             readings.update({name: first[name] for name in taken})
-            shown.update(quantities(part.module.Reading))
+            shown.update(quantities(part.module.Reading) if is_recorded(part) else {})
         fields.update(readings)
         notes.update({name: one for name, one in shown.items() if notes.get(name) is None or name not in UNITS})
         given = tuple(readings)

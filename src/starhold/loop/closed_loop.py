@@ -286,9 +286,9 @@ class ClosedLoop:
             goal.attitude if goal is not None and self.target.part.flag("FOLLOWS") else NoMemory(),
             tuple(f.remembered(own) for f, own in zip(self.used("environment"), setup.environments, strict=True)),
             tuple(f.remembered(own, start) for f, own in zip(sensors, setup.sensors, strict=True)),
-            tuple(_first(f.part.module.Reading, f.part, start) for f in sensors if is_recorded(f.part)),
+            tuple(before_first(f.part, start) for f in sensors if is_recorded(f.part)),
             NoMemory() if estimator is None else estimator.remembered(setup.estimator, start),
-            () if estimator is None else _first(estimator.part.module.Estimate, estimator.part, start),
+            () if estimator is None else before_first(estimator.part, start),
         )
         effectors = tuple(f.remembered(own) for f, own in zip(self.used("effector"), setup.effectors, strict=True))
         followed = sum(f.part.hook("rates") is not None for f in self.used("actuator"))
@@ -314,7 +314,13 @@ def can_rest(effector: Part) -> bool:
     return effector.flag("ACTS") or effector.flag("OUTSIDE")
 
 
-def _first(kind: Any, part: Part, state: Any) -> Any:
-    """A reading or an estimate before the first: what is so called of the state, else what the part says."""
+def before_first(part: Part, state: Any) -> Any:
+    """A sensor's reading or an estimator's estimate before the first: what is so called of the state, else what the part
+    says in `FIRST`. ValueError where it says nothing."""
+    kind: Any = part.module.Estimate if part.role == "estimator" else part.module.Reading
     own = getattr(part.module, "FIRST", {})
+    for name in kind._fields:
+        if not hasattr(state, name) and (not isinstance(own, dict) or name not in own):
+            example = f'FIRST = {{"{name}": 0.0}}'
+            raise ValueError(f"{name} is none of the body's state: say what it is before the first control step, {example}")
     return kind(*(own[name] if name in own else getattr(state, name) for name in kind._fields))

@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import linecache
+import os
 import pkgutil
 import sys
 import warnings
@@ -18,6 +19,7 @@ from traceback import extract_tb
 from types import ModuleType
 from typing import Any, TypeVar
 
+from starhold.errors import is_interrupt
 from starhold.parts.contract import Card
 from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import ROLES
@@ -102,7 +104,9 @@ def installed(package: str, role: str, make: Callable[..., AnyPart]) -> dict[str
     for point in entry_points(group="starhold.parts"):
         try:
             module = _loaded(point)
-        except Exception as error:
+        except BaseException as error:
+            if is_interrupt(error):
+                raise
             # Told with the laws, once.
             if role == "law":
                 _leave_out(point.value, error)
@@ -134,7 +138,7 @@ def role_of(module: ModuleType) -> str | None:
     return getattr(module, "ROLE", "law" if hasattr(module, "Gains") else None)
 
 
-def _leave_out(what: str, error: Exception) -> None:
+def _leave_out(what: str, error: BaseException) -> None:
     warnings.warn(f"the part {what} is left out: {told(error)}", stacklevel=4)
 
 
@@ -178,7 +182,7 @@ def from_file(path: Path, known: Mapping[str, AnyPart], make: Callable[..., AnyP
     ValueError, one line, where the file is none of Python, fails, lacks a part of the contract, or has the name of another
     part that is installed. OSError where it cannot be read.
     """
-    path = path.resolve()
+    path = _real(path)
     same = next((part for part in known.values() if _is_of(part, path)), None)
     if same is not None:
         return same
@@ -190,7 +194,7 @@ def from_file(path: Path, known: Mapping[str, AnyPart], make: Callable[..., AnyP
 
 def read_module(path: Path) -> ModuleType:
     """A file of Python run as a module, again where its text has changed. Errors as of `from_file`."""
-    path = path.resolve()
+    path = _real(path)
     source = path.read_bytes()
     if path.suffix != ".py":
         raise ValueError("a part's file ends in .py")
@@ -206,11 +210,18 @@ def read_module(path: Path) -> ModuleType:
     sys.modules[module.__name__] = module
     try:
         exec(compile(source, str(path), "exec", dont_inherit=True), module.__dict__)
-    except (Exception, SystemExit) as error:
+    except BaseException as error:
         del sys.modules[module.__name__]
+        if is_interrupt(error):
+            raise
         raise ValueError(told(error, path)) from None
     _READ[key] = module
     return module
+
+
+def _real(path: Path) -> Path:
+    """The path without links; one of a loop of links as it is, so that opening it tells what is wrong."""
+    return Path(os.path.realpath(path))
 
 
 def told(error: BaseException, path: Path | None = None) -> str:

@@ -15,7 +15,7 @@ from typing import Any, TypeVar, cast
 from pydantic import BaseModel, ValidationError
 from pydantic_core import PydanticCustomError
 
-from starhold.errors import InputError
+from starhold.errors import InputError, is_interrupt
 from starhold.laws.catalogue import Law, from_file, told
 from starhold.loop.kernels import form, make_step
 from starhold.scenario.tables import check_name
@@ -154,7 +154,9 @@ def refusing(law: Law, where: str, key: str) -> Generator[None]:
         yield
     except InputError:
         raise
-    except Exception as error:
+    except BaseException as error:
+        if is_interrupt(error):
+            raise
         if law.file is not None and type(error) is not ValueError:
             raise InputError(where, key, "", told(error, law.file)) from None
         if not isinstance(error, ValueError):

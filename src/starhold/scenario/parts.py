@@ -15,9 +15,9 @@ from pydantic_core import PydanticCustomError
 from starhold.algebra.quantity import quantities
 from starhold.algebra.structured import Buffer
 from starhold.algebra.vector import ZERO
-from starhold.errors import InputError
+from starhold.errors import InputError, is_interrupt
 from starhold.laws.modes import Modes
-from starhold.loop.closed_loop import ClosedLoop, can_rest, is_recorded
+from starhold.loop.closed_loop import ClosedLoop, before_first, can_rest, is_recorded
 from starhold.loop.step import make_equations
 from starhold.parts.catalogue import PACKAGES, as_part, from_file, parts, read_module, role_of, told
 from starhold.parts.part import Fitted, Part
@@ -232,11 +232,13 @@ def try_parts(loop: ClosedLoop, where: str, key: str) -> None:
     """InputError where a part cannot work with its numbers, or a part's file fails: a control step is flown in plain Python,
     which goes through all of it. `key`: what errors call the law."""
     for fitted in loop.parts:
-        if fitted.part.file is None:
-            try:
+        try:
+            if fitted.part.file is None:
                 fitted.prepared(loop.period)
-            except ValueError as error:
-                raise InputError(where, _key(fitted), "", str(error)) from None
+            elif fitted.part.role == "estimator" or (fitted.part.role == "sensor" and is_recorded(fitted.part)):
+                before_first(fitted.part, loop.start)
+        except ValueError as error:
+            raise InputError(where, _key(fitted), "", str(error)) from None
     if all(fitted.part.file is None for fitted in loop.parts):
         return
     tried = replace(loop, parts=tuple(f if f.part.file is None else _watched(f, loop, where) for f in loop.parts))
@@ -249,7 +251,9 @@ def try_parts(loop: ClosedLoop, where: str, key: str) -> None:
             step.sample(carry, number + 1, setup)
     except InputError:
         raise
-    except Exception:
+    except BaseException as error:
+        if is_interrupt(error):
+            raise
         # The law's own file may be at fault; else what a part gives does not fit where it is taken.
         try_law(loop, where, key)
         guilty = next(f for f in loop.parts if f.part.file is not None)
@@ -278,7 +282,9 @@ class _Watched:
             part = self._fitted.part
             try:
                 found = equation(*given)
-            except Exception as error:
+            except BaseException as error:
+                if is_interrupt(error):
+                    raise
                 raise InputError(self._where, _key(self._fitted), "", told(error, part.file)) from None
             what = self._wrong(part, name, found, given)
             if what:

@@ -15,7 +15,7 @@ from pydantic_core import PydanticCustomError
 
 from starhold.algebra.quantity import quantities
 from starhold.algebra.vector import ZERO
-from starhold.errors import InputError
+from starhold.errors import InputError, is_interrupt
 from starhold.laws.catalogue import Law, catalogue
 from starhold.laws.interface import Gain
 from starhold.loop.closed_loop import ClosedLoop
@@ -111,7 +111,9 @@ class AnyBody(Body):
         make = self.part.hook("make")
         try:
             return Made(params, params if make is None else make(params))
-        except Exception as error:
+        except BaseException as error:
+            if is_interrupt(error):
+                raise
             why = str(error) if type(error) is ValueError else told(error, self.part.file)
             raise InputError(where, MARKER, "", why) from None
 
