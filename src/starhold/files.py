@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import tempfile
@@ -13,6 +14,8 @@ from starhold.errors import InputError
 
 UNFINISHED = ".writing-"
 """How names of folders begin in which files are being written."""
+LARGEST = 2**28
+"""Bytes of a file that is read."""
 _claimed: dict[tuple[int, int], int] = {}
 """Open handles of the folders that this process has claimed, by device and inode."""
 
@@ -47,6 +50,20 @@ def clear_unfinished(folder: Path) -> None:
     """Remove what processes that were killed left half written in a folder and in those in it."""
     for left in (*folder.glob(f"{UNFINISHED}*"), *folder.glob(f"*/{UNFINISHED}*")):
         shutil.rmtree(left, ignore_errors=True)
+
+
+def read_bytes(path: Path) -> bytes:
+    """What a file holds. OSError where it cannot be read or is larger than any that is taken, for a device has no end."""
+    with path.open("rb") as file:
+        found = file.read(LARGEST + 1)
+    if len(found) > LARGEST:
+        raise OSError(errno.EFBIG, f"larger than {LARGEST // 2**20} MiB", str(path))
+    return found
+
+
+def read_text(path: Path) -> str:
+    """The text of a file, in UTF-8. Errors as of `read_bytes`; UnicodeDecodeError where it holds other bytes."""
+    return read_bytes(path).decode("utf-8")
 
 
 @contextmanager

@@ -63,7 +63,8 @@ def _nothing(measurement: Any, gains: Any, craft: Any, memory: Any) -> Any:
 
 
 LOOPS = ["lyapunov", "sliding", "wheel", "modal", "pd", "l2", "mpc", "estimator", "estimator on [sensor]",
-         "hysteresis, axis", "orbital target", "target from a table", "pid, example 0, noise", "lqr, example 1, noise"]  # fmt: skip
+         "hysteresis, axis", "orbital target", "target from a table", "pid, example 0, noise",
+         "lqr, example 1, noise"]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", LOOPS)

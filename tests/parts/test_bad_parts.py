@@ -1,8 +1,12 @@
 """What is wrong with the parts of a scenario is told in one line, with exit code 2."""
 
+import tracemalloc
+
 import pytest
 
+from starhold import files
 from starhold.laws.catalogue import catalogue
+from starhold.parts.contract import Parameter
 from starhold.scenario.writing import law_table
 from tests.parts.files import ACTUATOR, BODY, EFFECTOR, ENVIRONMENT, LAW, PARTS, PD, SENSOR, TARGET, part
 from tests.running import starhold
@@ -162,6 +166,30 @@ def test_a_part_and_a_law_from_files_are_told_apart(tmp_path):
     (tmp_path / "own_law.py").write_text(LAW)
     (tmp_path / "mine.py").write_text(SENSOR.replace("state.rate,", "state.rates,"))
     assert "part mine: mine.py, line 27: AttributeError" in told(tmp_path, BODY + part(MINE + "noise = 0.1\n") + law)
+
+
+ENDLESS = {
+    "a part": part('file = "/dev/zero"\n') + PD,
+    "rows": TABLE.replace("rows.csv", "/dev/zero") + PD,
+    "a law": '[[law]]\nfile = "/dev/zero"\n',
+    "a history": '[target]\nmode = "history"\nfile = "/dev/zero"\n' + PD,
+}
+
+
+@pytest.mark.parametrize("kind", ENDLESS)
+def test_a_file_without_end_is_refused(kind, tmp_path, monkeypatch):
+    monkeypatch.setattr(files, "LARGEST", 2**20)
+    assert "larger than 1 MiB" in told(tmp_path, BODY + ENDLESS[kind])
+
+
+def test_a_long_list_in_place_of_a_matrix_costs_no_memory():
+    """The diagonal matrix of 40 000 numbers would take 12 GB."""
+    tracemalloc.start()
+    with pytest.raises(ValueError, match="a number, 3 numbers or a 3x3 matrix"):
+        Parameter(shape=(3, 3)).check([1.0] * 40_000)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 2**22
 
 
 def test_a_file_named_as_an_installed_part(tmp_path):

@@ -23,6 +23,7 @@ from starhold.campaign.store import Store
 from starhold.campaign.summary import summarise, verdicts_of
 from starhold.campaign.worst import brackets
 from starhold.errors import InputError
+from starhold.files import read_bytes
 from starhold.scenario.building import build
 from starhold.scenario.campaign import CampaignTable
 from starhold.scenario.checking import nearest, read_toml, show
@@ -246,7 +247,7 @@ def _hashes(text: str, where: str, folder: Path) -> dict[str, str]:
         if isinstance(value, str) and value not in found:
             # Many strings are words, and some cannot name a file.
             with suppress(OSError, ValueError):
-                found[value] = hashlib.sha256((folder / value).read_bytes()).hexdigest()
+                found[value] = hashlib.sha256(read_bytes(folder / value)).hexdigest()
         elif isinstance(value, dict):
             for key, item in value.items():
                 if key not in WORDS:

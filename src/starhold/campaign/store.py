@@ -27,7 +27,7 @@ from starhold.campaign.chunk import Chunk, Counts, Extremes, merge
 from starhold.campaign.extras import extra
 from starhold.campaign.manifest import Manifest
 from starhold.errors import InputError
-from starhold.files import atomic_write, claim, clear_unfinished
+from starhold.files import atomic_write, claim, clear_unfinished, read_text
 
 RUNS, TOTALS = "runs", "campaign.json"
 MARKS = (manifests.FILE, TOTALS, RUNS)
@@ -89,7 +89,7 @@ class Store:
         extra("pyarrow")
         path = folder / manifests.FILE
         try:
-            text = path.read_text(encoding="utf-8")
+            text = read_text(path)
         except (OSError, UnicodeDecodeError):
             raise InputError(str(folder), "", f"no {manifests.FILE}", "a folder that a campaign was flown into") from None
         return cls(folder, Manifest.from_json(text, str(path)))

@@ -22,6 +22,7 @@ def studio(
 ) -> None:
     """Serve a page on this machine: edit a scenario, certify, design, fly and compare, and see results beside each other."""
     from starhold.cli.show import console
+    from starhold.files import read_text
     from starhold.scenario.reading import builtin_names, builtin_text, nearest
     from starhold.scenario.template import template_text
 
@@ -35,7 +36,7 @@ def studio(
     elif file is not None:
         path = Path(file)
         try:
-            text = path.read_text(encoding="utf-8")
+            text = read_text(path)
         except (OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or type(error).__name__
             allowed = f"a scenario file, or a built-in scenario: {nearest(file, builtin_names())}"

@@ -17,7 +17,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.files import atomic_write
+from starhold.files import atomic_write, read_text
 
 Version = Literal["1.0", "2.0"]
 BODY = "SC_BODY"
@@ -100,7 +100,7 @@ def write_aem(
 
 def read_aem(path: Path) -> Aem:
     """Read the attitudes of a message of one segment. OSError, or ValueError that names the line and what is wrong."""
-    lines = _Lines(path.read_text(encoding="utf-8"))
+    lines = _Lines(read_text(path))
     version = lines.value("CCSDS_AEM_VERS")
     if version not in ("1.0", "2.0"):
         raise ValueError(f"line {lines.number}: CCSDS_AEM_VERS = {version}, of which 1.0 and 2.0 are read")

@@ -20,6 +20,7 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 from starhold.errors import is_interrupt
+from starhold.files import read_bytes
 from starhold.parts.contract import Card
 from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import ROLES
@@ -195,7 +196,7 @@ def from_file(path: Path, known: Mapping[str, AnyPart], make: Callable[..., AnyP
 def read_module(path: Path) -> ModuleType:
     """A file of Python run as a module, again where its text has changed. Errors as of `from_file`."""
     path = _real(path)
-    source = path.read_bytes()
+    source = read_bytes(path)
     if path.suffix != ".py":
         raise ValueError("a part's file ends in .py")
     key = (path, hashlib.sha256(source).hexdigest())

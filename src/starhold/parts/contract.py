@@ -88,7 +88,11 @@ class Parameter:
         if self.columns:
             return tuple(tuple(row) for row in array.tolist())
         if len(self.shape) == 2 and array.ndim < 2:
-            array = array * np.eye(self.shape[0]) if array.ndim == 0 else np.diag(array)
+            if array.ndim == 0:
+                array = array * np.eye(self.shape[0])
+            elif array.shape == self.shape[:1]:
+                # No longer one, whose square would fill the memory.
+                array = np.diag(array)
         elif array.ndim == 0 and self.shape and self.spread:
             array = np.full(self.shape, float(array))
         if array.shape != self.shape:

@@ -16,6 +16,7 @@ from starhold.algebra.quantity import quantities
 from starhold.algebra.structured import Buffer
 from starhold.algebra.vector import ZERO
 from starhold.errors import InputError, is_interrupt
+from starhold.files import read_text
 from starhold.laws.modes import Modes
 from starhold.loop.closed_loop import ClosedLoop, before_first, can_rest, is_recorded
 from starhold.loop.step import make_equations
@@ -134,7 +135,7 @@ def with_rows(part: Part, table: dict[str, Any], folder: Path, where: str, key: 
         if item.gain.columns and isinstance(given, str):
             allowed = f"a CSV file of {', '.join(item.gain.columns)}, a line of names first or none"
             try:
-                text = (folder / given).read_text(encoding="utf-8")
+                text = read_text(folder / given)
                 lines = [line.split(",") for line in text.splitlines() if line.strip() and not line.startswith("#")]
                 if lines and not _is_number(lines[0][0]):
                     lines = lines[1:]

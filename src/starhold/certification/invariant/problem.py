@@ -20,6 +20,7 @@ from starhold.certification.invariant.system import System, split
 from starhold.certification.invariant.text import MOST_DIGITS, RESERVED, ExpressionError, as_written, read
 from starhold.certification.invariant.theorems import THEOREMS, WantedSet, indicator, prove
 from starhold.errors import InputError
+from starhold.files import read_text
 
 FORMAT = "starhold invariant certificate 2"
 MOST, LARGEST, LONGEST = 6, 1e100, 100
@@ -76,7 +77,7 @@ def load(source: str | Path) -> InvariantProblem:
         file = resources.files("starhold.certification.invariant") / "builtin" / f"{source}.toml"
         return parse(file.read_text(encoding="utf-8"), str(source))
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
     except FileNotFoundError:
         known = _nearest(str(source), builtin_names())
         raise InputError(str(source), "", "no such file", f"a file with a system, or a built-in one: {known}") from None

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.export.aem import OFF_UNIT, read_aem
+from starhold.files import read_text
 
 COLUMNS = ("time", "q0", "q1", "q2", "q3")
 
@@ -25,15 +26,14 @@ def read_history(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return message.times, message.attitudes
     rows: list[list[float]] = []
     order = list(range(len(COLUMNS)))
-    with path.open(encoding="utf-8", newline="") as file:
-        for number, cells in enumerate(csv.reader(file), 1):
-            cells = [cell.strip() for cell in cells]
-            if not any(cells):
-                continue
-            if not rows and _number(cells[0]) is None:
-                order = _order(cells, number)
-                continue
-            rows.append(_numbers(cells, order, number))
+    for number, cells in enumerate(csv.reader(read_text(path).splitlines()), 1):
+        cells = [cell.strip() for cell in cells]
+        if not any(cells):
+            continue
+        if not rows and _number(cells[0]) is None:
+            order = _order(cells, number)
+            continue
+        rows.append(_numbers(cells, order, number))
     if len(rows) < 2:
         raise ValueError(f"{len(rows)} rows of numbers")
     table = np.array(rows)
