@@ -7,6 +7,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from starhold.scenario import units
+from starhold.scenario.reading import builtin_text, parse
 from starhold.scenario.units import LONGEST, to_number
 
 REGISTRY = pint.UnitRegistry(cache_folder=":auto:")
@@ -125,3 +127,12 @@ def test_no_text_ends_in_anything_but_a_number_or_one_line(text, unit):
     assert said.startswith("a ")
     assert "\n" not in said
     assert not math.isnan(value)
+
+
+def test_what_fails_in_the_units_library_is_no_fault_of_the_file(monkeypatch):
+    def fails():
+        raise TypeError("cannot inherit frozen dataclass from a non-frozen one")
+
+    monkeypatch.setattr(units, "unit_registry", fails)
+    with pytest.raises(TypeError, match="frozen dataclass"):
+        parse(builtin_text("three-laws").replace("duration = 2000.0", 'duration = "0.1 h"'), "own.toml")

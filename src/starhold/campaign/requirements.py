@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -98,12 +99,13 @@ def _bound(table: RequirementTable, unit: str, where: str, key: str) -> float:
         raise InputError(where, f"{key}.at_least", show(table.at_least), "the least angle between axis and direction")
     if value is None:
         raise InputError(where, key, "no bound", "at_most or at_least")
+    if not isinstance(value, str | Real):
+        allowed = f"one number, in {shown(unit)} or with its unit"
+        raise InputError(where, f"{key}.{told}", show(value), allowed)
     try:
-        number = to_number(value, unit) if isinstance(value, str) else float(value)
-    except (ValueError, TypeError) as error:
-        allowed = str(error) if isinstance(value, str) else f"one number, in {shown(unit)} or with its unit"
-        raise InputError(where, f"{key}.{told}", show(value), allowed) from None
-    return number
+        return to_number(value, unit) if isinstance(value, str) else float(value)
+    except ValueError as error:
+        raise InputError(where, f"{key}.{told}", show(value), str(error)) from None
 
 
 def _unit(vector: Any) -> Any:

@@ -78,8 +78,8 @@ class Parameter:
             return self.choices.index(value)
         try:
             array = np.asarray(value, dtype=float)
-        except ValueError:
-            # Rows of different lengths.
+        except (ValueError, TypeError):
+            # Rows of different lengths, or what is no number.
             raise ValueError(f"must be {self.describe()}") from None
         if self.columns and (array.ndim != 2 or array.shape[1] != len(self.columns)):
             raise ValueError(f"must be {self.describe()}")

@@ -74,7 +74,7 @@ def reader(gain: Gain) -> Callable[..., Any]:
             checked = gain.check(_to_numbers(value, gain, worth))
             _check_size(checked)
             return checked
-        except (ValueError, TypeError, OverflowError) as error:
+        except (ValueError, OverflowError) as error:
             raise PydanticCustomError("quantity", "{reason}", {"reason": _plain(error)}) from None
 
     return read

@@ -209,8 +209,6 @@ def tables_of(part: Part) -> type[ScenarioTable]:
     try:
         state, params = _state(part), _params(part)
         recorded = quantities(part.module.Sample)
-    except StopIteration:
-        raise ValueError(f"{part.module.__file__}: each field of Sample is annotated with Quantity") from None
     except (AttributeError, NameError, TypeError) as error:
         raise ValueError(f"{part.module.__file__}: {error}") from None
     if part.module.COMMAND not in part.module.State._fields:
