@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 from starhold.algebra.quantity import Quantity
-from starhold.errors import InputError
+from starhold.errors import InputError, shortly
 from starhold.scenario import designing, reading
 from starhold.scenario.making import make_scenario as make_scenario
 from starhold.simulation.lane import Recording
@@ -32,11 +32,13 @@ if TYPE_CHECKING:
     from starhold.studies.modal_roots import Study
 
 
+@shortly
 def load(source: str | Path, allow_unstable: bool = False) -> reading.Scenario:
     """The scenario in a TOML file, or the built-in one of that name. InputError says what is wrong with it."""
     return reading.load(source, allow_unstable)
 
 
+@shortly
 def simulate(
     scenario: reading.Scenario | str | Path,
     law: str | None = None,
@@ -49,6 +51,7 @@ def simulate(
     return studies.record(opened, studies.build(opened, entry), progress).dataset()
 
 
+@shortly
 def metrics(run: xr.Dataset | Flight) -> dict[str, Any]:
     """The numbers that say how well a run went, SI units, None where there is none: of what `simulate` returns or `run.nc`
     holds, by the tolerances of its scenario; of a Flight those that it has. Neither flown nor timed again, so that only a
@@ -66,6 +69,7 @@ def metrics(run: xr.Dataset | Flight) -> dict[str, Any]:
     return studies.metrics_of(Recording(arrays, dict(dataset.attrs), columns))
 
 
+@shortly
 def sweep(
     scenario: reading.Scenario | str | Path,
     changes: Mapping[str, Iterable[Any]] | Iterable[Mapping[str, Any]],
@@ -86,6 +90,7 @@ def sweep(
     return fly_sweep(_opened(scenario), changes, law, threads, progress)
 
 
+@shortly
 def campaign(
     scenario: reading.Scenario | str | Path,
     folder: str | Path | None = None,
@@ -150,6 +155,7 @@ def _temporary() -> str:
     return folder
 
 
+@shortly
 def to_pandas(results: Any) -> DataFrame:
     """Results as a tidy table: a run with a row a sample and a column a component (`rate_x`), flights with a row a law,
     certificates with a row a claim, designs with a row a law, margins with a row an axis. TypeError for anything else."""
@@ -158,12 +164,14 @@ def to_pandas(results: Any) -> DataFrame:
     return table_of(results)
 
 
+@shortly
 def design(scenario: reading.Scenario | str | Path, law: str | None = None) -> list[designing.Design]:
     """The gains that formulas give, with what they can be judged by: every law of a scenario that has a `form`, or the one
     of this name. InputError where there is none."""
     return designing.design(_opened(scenario), law)
 
 
+@shortly
 def certify(scenario: reading.Scenario | str | Path, law: str | None = None) -> list[Certificate]:
     """Prove what can be of every law of a scenario, or of the one of this name, on its spacecraft. Each certificate has an
     `outcome` and `claims` (numbers in SI, of station keeping scaled), and has been tried by ten thousand flights."""
@@ -172,11 +180,13 @@ def certify(scenario: reading.Scenario | str | Path, law: str | None = None) -> 
     return [tried.certificate for tried in certify_scenario(_opened(scenario), law)]
 
 
+@shortly
 def compare(scenario: reading.Scenario | str | Path) -> list[Flight]:
     """Fly every law of a scenario; each Flight has the run (`run`, a Dataset) and its `metrics` (SI)."""
     return studies.compare(_opened(scenario))
 
 
+@shortly
 def export_c(
     scenario: reading.Scenario | str | Path,
     folder: str | Path,
@@ -217,6 +227,7 @@ def export_c(
     return exported
 
 
+@shortly
 def export_aem(
     run: xr.Dataset | str | Path,
     file: str | Path,
@@ -249,6 +260,7 @@ def export_aem(
     return into
 
 
+@shortly
 def read_aem(file: str | Path) -> Aem:
     """Read a CCSDS attitude ephemeris message of one segment: `times` (s, since the first), `attitudes` (scalar first, from
     the reference frame to the body's axes), and what it is about. InputError where it is none."""
@@ -274,6 +286,7 @@ def _read_run(run: xr.Dataset | str | Path) -> xr.Dataset:
         raise InputError(str(path), "", error.strerror or "no netCDF-4 file", "a run.nc, or the folder of one") from None
 
 
+@shortly
 def failures(scenario: reading.Scenario | str | Path, law: str | None = None) -> list[Failure]:
     """Tell what is left of a scenario on wheels after the loss of any one or two of them, under a law, the first if not
     given."""
@@ -283,6 +296,7 @@ def failures(scenario: reading.Scenario | str | Path, law: str | None = None) ->
     return study(opened, opened.laws[0] if law is None else opened.pick(law))
 
 
+@shortly
 def budget(scenario: reading.Scenario | str | Path, law: str | None = None) -> Budget:
     """Tell a law's pointing error by source: the first law if not given, at the times and windows of the [budget] table.
     Each source flies alone, and all together, in as many runs as the table says; `level(source, index)` is in rad, `table()`
@@ -293,6 +307,7 @@ def budget(scenario: reading.Scenario | str | Path, law: str | None = None) -> B
     return study(opened, opened.laws[0] if law is None else opened.pick(law))
 
 
+@shortly
 def linearise(scenario: reading.Scenario | str | Path, law: str | None = None, delay: float = 0.0) -> LinearLoop:
     """The linear loop of a law of a scenario, the first if `law` is None, near rest on target, as systems of python-control:
     `plant`, `law`, `loop` (cut at the command) and `closed` in continuous time, the same in `sampled`, exact for a held
@@ -304,6 +319,7 @@ def linearise(scenario: reading.Scenario | str | Path, law: str | None = None, d
     return systems_of(linear_of(opened, opened.laws[0] if law is None else opened.pick(law), delay))
 
 
+@shortly
 def margins(scenario: reading.Scenario | str | Path, law: str | None = None, delay: float = 0.0) -> list[Margins]:
     """Gain, phase and delay margins of the linear loop about each body axis, the loops about the others closed: see
     `linearise`, of whose sampled loop they are."""
@@ -314,6 +330,7 @@ def margins(scenario: reading.Scenario | str | Path, law: str | None = None, del
     return margins_of(linear_of(opened, opened.laws[0] if law is None else opened.pick(law), delay))
 
 
+@shortly
 def modal_roots(scenario: reading.Scenario | str | Path, law: str | None = None) -> Study:
     """The roots of the modal law that turn fastest within the limits of a scenario's [transient] table, and the fit."""
     from starhold.studies.modal_roots import pick_modal, study
@@ -330,6 +347,7 @@ def _turning(scenario: reading.Scenario | str | Path) -> reading.Scenario:
     return _opened(scenario).about("rigid-body")
 
 
+@shortly
 def reproduce(letter: str) -> Reproduction:
     """Make the figures and numbers of a publication ("A" to "E") again. `rows` has, by name, what is printed, what was found
     and the verdict; `figures` the curves; `changed` the rows whose verdict is another than the one recorded. InputError for
@@ -340,6 +358,7 @@ def reproduce(letter: str) -> Reproduction:
     return make(paper_of(letter))
 
 
+@shortly
 def invariant(problem: InvariantProblem | str | Path) -> Certificate:
     """Prove what can be of invariant sets: of a problem made in Python (`starhold.certification.invariant`), of a TOML
     file, or of the built-in problem of that name. Each claim has an `outcome`, numbers (`level`, the set's size) and

@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Callable
+from functools import wraps
+from typing import ParamSpec, TypeVar
+
+_Given, _Result = ParamSpec("_Given"), TypeVar("_Result")
 
 
 class InterruptedByUserError(BaseException):
@@ -27,6 +32,19 @@ class InputError(Exception):
         hint = allowed if bare else f"allowed: {allowed}"
         joint = "; " if found else ": "
         super().__init__(_one_line(": ".join(part for part in parts if part) + (f"{joint}{hint}" if allowed else "")))
+
+
+def shortly(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
+    """A function of the Python interface: its InputError says where the fault is, so that the frames below add nothing."""
+
+    @wraps(function)
+    def called(*args: _Given.args, **keywords: _Given.kwargs) -> _Result:
+        try:
+            return function(*args, **keywords)
+        except InputError as error:
+            raise error.with_traceback(None) from None
+
+    return called
 
 
 def _one_line(text: str) -> str:

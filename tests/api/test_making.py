@@ -1,5 +1,6 @@
 """Scenarios made in Python and changed by key are what a file would be."""
 
+import math
 import subprocess
 import sys
 import tomllib
@@ -66,16 +67,42 @@ def test_arrays_tuples_paths_and_none_are_taken(tmp_path):
     assert sh.simulate(made).sizes["time"] == 201
 
 
+def test_a_component_of_a_vector_that_the_file_leaves_out():
+    still = sh.load("three-laws").with_({"initial": None})
+    assert still.with_({"initial.rate[2]": "1 deg/s"}).table.initial.rate == (0.0, math.radians(1.0), 0.0)
+    with pytest.raises(
+        sh.InputError, match=r"initial.angles\[2\]: found nothing; allowed: a scenario that has initial.angles"
+    ):
+        still.with_({"initial.angles[2]": "1 deg"})
+
+
+def test_an_input_error_has_no_frames_but_the_callers():
+    """The call, and the frame that tells it in short; its own frames would say nothing about the input."""
+    scenario = sh.load("three-laws")
+    calls = (
+        lambda: sh.load("no-such"),
+        lambda: sh.scenario({}),
+        lambda: scenario.with_({"x": 1}),
+        lambda: sh.campaign(scenario, runs=0),
+        lambda: sh.simulate(scenario, "lyapunow"),
+    )
+    for call in calls:
+        with pytest.raises(sh.InputError) as caught:
+            call()
+        assert len(caught.traceback) <= 4
+        assert caught.value.__suppress_context__
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
         ({"spacecraft.inertai": [1, 1, 1]}, "spacecraft.inertai: found an unknown key; did you mean inertia?"),
         ({"spacecraft.inertia": [1, 1, 9]}, "no body has these principal moments"),
         ({"law.pd.k_rate": -1.0}, "law[1].k_rate: found -1.0; allowed: above 0"),
-        ({"law.form 2.1.k_rate": 1.0}, "law[2].k_rate: found an unknown key"),
+        ({"law.form 2.1.k_rate": 1.0}, "law[2].k_rate: found a gain beside form"),
         ({"law.ppd.k_rate": 1.0}, 'law.ppd.k_rate: found "ppd"; did you mean pd?'),
         ({"law[3].k_rate": 1.0}, "law[3]: found no such table; allowed: 1 to 2"),
-        ({"wheel[1].axis": [1, 0, 0]}, "wheel[1]: found no such table; allowed: no list there"),
+        ({"wheel[1].axis": [1, 0, 0]}, "wheel[1]: found nothing; allowed: a scenario that has wheel"),
         ({"name.first": 1}, "name.first: found a value that is no table"),
         ({"spacecraft..inertia": 1}, "not a key"),
         ({3: 1}, "a key that is no string"),

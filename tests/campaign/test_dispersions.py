@@ -285,6 +285,10 @@ BAD = {
     "negative sigma": ({"initial.rate": normal(sigma=-1)}, ".sigma: found -1; allowed: above 0"),
     "sigma zero": ({"initial.rate": normal(sigma=0)}, ".sigma: found 0; allowed: above 0"),
     "sigma of nothing": ({"initial.rate[1]": normal(sigma=0.1, relative=True)}, "no shares of 0.0"),
+    "shares that are not said to be": (
+        {"spacecraft.torque_limit": normal(sigma="10 %")},
+        '.sigma: found "10 %"; allowed: a quantity in N m; shares of what the file has take relative = true',
+    ),
     "unit of sigma": ({"initial.rate": normal(sigma="1 m")}, ".sigma: found"),
     "low above high": (
         {"initial.rate": uniform(1, 0)},

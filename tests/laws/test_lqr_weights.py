@@ -112,7 +112,7 @@ INDEFINITE = [[1, 2, 0], [2, 1, 0], [0, 0, 1]]
         ({"q": "nan", "r": 1}, "finite"),
         ({"q": 1, "r": "inf"}, "finite"),
         ({"q": 1}, "law[1].r"),
-        ({"q": 1, "r": 1, "balance": '"least"'}, "unknown key"),
+        ({"q": 1, "r": 1, "balance": '"least"'}, 'an input of another form than "numeric"'),
     ],
 )
 def test_numeric_weights_that_are_wrong(entries, said):

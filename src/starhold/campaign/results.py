@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.errors import shortly
+
 if TYPE_CHECKING:
     from pandas import DataFrame
 
@@ -130,12 +132,14 @@ class CampaignResult:
         """A row for each run of each law: `law`, `run`, what was drawn and what flew, metrics, margins."""
         return self.query("SELECT * FROM runs ORDER BY law, run")
 
+    @shortly
     def query(self, sql: str) -> DataFrame:
         """The answer to a SELECT about `runs`. InputError where it cannot be answered."""
         from starhold.campaign.query import query
 
         return query(self.folder, sql)
 
+    @shortly
     def again(self, run: int, law: str | None = None) -> FlownAgain:
         """One run, flown again and recorded. InputError where there is no such run."""
         from starhold.campaign.campaign import fly_again

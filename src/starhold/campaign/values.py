@@ -129,7 +129,11 @@ def width_at(place: Place, raw: Any, name: str = "", unit: str | None = None) ->
         try:
             return read(item, worth)
         except PydanticCustomError as error:
-            raise place.refuse(name, show(item), error.message().removeprefix("must be ")) from None
+            allowed = error.message().removeprefix("must be ")
+            shares = isinstance(item, str) and item.rstrip().endswith(("%", "percent", "ppm")) and unit is None
+            shares = shares and not place.wordy and place.table == place.key
+            hint = "; shares of what the file has take relative = true" if shares else ""
+            raise place.refuse(name, show(item), f"{allowed}{hint}") from None
 
     return np.array(_each(_filled(place, raw, place.shape, name), number), dtype=float)
 

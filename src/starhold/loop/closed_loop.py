@@ -229,9 +229,10 @@ class ClosedLoop:
         return "attitude" in self.body.module.State._fields
 
     @property
-    def fastest(self) -> float:
-        """The fastest rate (1/s) at which a part comes to rest by itself, which the integration must resolve."""
-        return max([0.0, *(fitted.fastest for fitted in (*self.parts, *(f for event in self.events for f in event.parts)))])
+    def fastest(self) -> Fitted | None:
+        """The part that comes to rest by itself, or swings, fastest, which the integration must resolve."""
+        every = (*self.parts, *(fitted for event in self.events for fitted in event.parts))
+        return max((fitted for fitted in every if fitted.fastest > 0.0), key=lambda fitted: fitted.fastest, default=None)
 
     @property
     def remembers(self) -> bool:

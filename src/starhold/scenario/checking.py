@@ -108,7 +108,23 @@ def pick_law(
     if form is not None and (not isinstance(form, str) or form not in law.forms):
         allowed = nearest(str(form), list(law.forms)) if law.forms else f"no form; {law.name} takes its gains"
         raise InputError(where, f"{key}.form", show(form), allowed)
+    for name in table:
+        _refuse_other_way(law, form, name, where, f"{key}.{name}")
     return table, law, form
+
+
+def _refuse_other_way(law: Law, form: str | None, name: str, where: str, key: str) -> None:
+    """InputError for a gain beside a form, and for an input of a form that is not there."""
+    own = {way: {item.name: None for item in law.fields(way)} for way in (None, *law.forms)}
+    if name in own[form]:
+        return
+    if form is not None and name in own[None]:
+        allowed = f"the inputs of the form, {', '.join(own[form])}, or the gains without the form"
+        raise InputError(where, key, f'a gain beside form = "{form}", which computes the gains', allowed)
+    others = [f'"{way}"' for way in law.forms if name in own[way]]
+    if others:
+        found = "an input of a form, and no form" if form is None else f'an input of another form than "{form}"'
+        raise InputError(where, key, found, f"form = {' or '.join(others)} in the same table")
 
 
 def _law_of(table: dict[str, Any], known: Mapping[str, Law], where: str, key: str) -> Law:
@@ -205,15 +221,18 @@ and from 2.8 on it is unstable."""
 
 
 def check_substeps(loop: Any, where: str) -> None:
-    """InputError where the integration cannot follow a lag or friction."""
-    least = loop.period * loop.fastest / RESOLVED * (1.0 - 1e-12)
+    """InputError where the integration cannot follow the fastest of the parts."""
+    fastest = loop.fastest
+    if fastest is None:
+        return
+    least = loop.period * fastest.fastest / RESOLVED * (1.0 - 1e-12)
     if loop.substeps < least:
-        why = "a lag, or a wheel's friction over its inertia, is too fast for longer ones"
+        why = f"a time constant of {1.0 / fastest.fastest:.3g}"
         if not least <= MOST_SUBSTEPS:
-            allowed = f"a longer lag, or less friction over inertia: {least:.3g} substeps a control period are too many"
-            raise InputError(where, "", f"a time constant of {1.0 / loop.fastest:.3g}", allowed)
-        least = math.ceil(least)
-        raise InputError(where, "simulation.substeps", str(loop.substeps), f"at least {least} substeps: {why}")
+            allowed = f"a slower one: {least:.3g} substeps a control period are too many"
+            raise InputError(where, f"part {fastest.called}", why, allowed)
+        allowed = f"at least {math.ceil(least)} substeps, for {fastest.called} has {why}"
+        raise InputError(where, "simulation.substeps", str(loop.substeps), allowed)
 
 
 def validate(
@@ -240,9 +259,9 @@ def _translate(
     key = cut(".".join(part for part in [prefix, *map(_quoted, place[:-1]), *place[-1:]] if part).replace(".[", "["), 200)
     if fault["type"] == "told_at":
         return InputError(where, key, context["found"], context["reason"])
-    found = show(context.get("found", fault.get("input")))
+    found = "nothing" if context.get("found", "") is None else show(context.get("found", fault.get("input")))
     if fault["type"] == "extra_forbidden":
-        known = list(_model_at(model, place[:-1]).model_fields) + (extra if len(place) == 1 else [])
+        known = list({*_model_at(model, place[:-1]).model_fields, *(extra if len(place) == 1 else [])})
         found = "an old name" if RENAMED.get(place[-1]) in known else "an unknown key"
         return InputError(where, key, found, nearest(place[-1], known))
     if fault["type"] == "missing":

@@ -11,7 +11,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from starhold.errors import InputError
+from starhold.errors import InputError, shortly
 from starhold.scenario.checking import nearest, read_toml, show
 from starhold.scenario.reading import Scenario, read_tables
 from starhold.scenario.writing import toml_text
@@ -21,6 +21,7 @@ WHERE = "scenario"
 _PART = re.compile(r"([^.\[\]]+)(?:\[(\d+)\])?")
 
 
+@shortly
 def make_scenario(tables: Mapping[str, Any], folder: str | Path = ".", allow_unstable: bool = False) -> Scenario:
     """The scenario of tables as a file would hold them, {"name": "mine", "spacecraft": {"inertia": [2, 3, 4]}, ..., "law":
     [{"type": "pd", ...}]}: strings, numbers, truths, dates, lists and tables; tuples and NumPy arrays count as lists, and
@@ -48,7 +49,7 @@ def variants(scenario: Scenario, changes: Iterable[Mapping[str, Any]]) -> Iterat
         try:
             other = deepcopy(tables)
             for key, value in change.items():
-                _put(other, path_of(key, names, where), value, where)
+                _put(other, path_of(key, names, where), value, where, scenario.table)
             written = plain(other, where, "")
             yield read_tables(written, toml_text(written), scenario.where, scenario.folder, scenario.allow_unstable)
         except InputError as error:
@@ -78,7 +79,8 @@ def path_of(key: Any, names: Mapping[str, Sequence[str]], where: str) -> list[st
     return path
 
 
-def _put(tables: Any, path: Sequence[str | int], value: Any, where: str) -> None:
+def _put(tables: Any, path: Sequence[str | int], value: Any, where: str, held: Any) -> None:
+    """Put a value into raw tables; held: the validated ones, whose defaults stand for vectors that the file leaves out."""
     here: Any = tables
     seen = ""
     for part, after in zip(path, [*path[1:], None], strict=True):
@@ -86,16 +88,17 @@ def _put(tables: Any, path: Sequence[str | int], value: Any, where: str) -> None
         if isinstance(part, int):
             if not isinstance(here, list) or not 0 <= part < len(cast(list[Any], here)):
                 count = len(cast(list[Any], here)) if isinstance(here, list) else 0
-                raise InputError(
-                    where, f"{seen}[{part + 1}]", "no such table", f"1 to {count}" if count else "no list there"
-                )
+                allowed = f"1 to {count}" if count else f"a scenario that has {seen}, or all of it"
+                raise InputError(where, f"{seen}[{part + 1}]", "no such table" if count else "nothing", allowed)
             seen = f"{seen}[{part + 1}]"
         else:
             seen = f"{seen}.{part}".lstrip(".")
             if not isinstance(here, dict):
                 raise InputError(where, seen, "a value that is no table", "keys of tables")
+            held = getattr(held, part, None)
             if not last:
-                cast(dict[str, Any], here).setdefault(part, [] if isinstance(after, int) else {})
+                known = list(cast(Any, held)) if isinstance(held, tuple) else []
+                cast(dict[str, Any], here).setdefault(part, known if isinstance(after, int) else {})
         if last:
             cast(Any, here)[part] = value
         else:

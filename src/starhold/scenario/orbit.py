@@ -121,7 +121,7 @@ class Orbit(Table):
             allowed = "position and velocity, or either altitude or semi_major_axis, with inclination"
             raise at_key(sizes[-1] if sizes else "position", allowed, getattr(self, sizes[-1]) if sizes else None)
         elif self.inclination is None:
-            raise at_key("inclination", "an angle", None)
+            raise at_key("inclination", "an angle, beside altitude or semi_major_axis", None)
         elif self.altitude is not None and self.eccentricity:
             raise at_key(
                 "eccentricity", "0 with an altitude, which is that of a circle; else a semi_major_axis", self.eccentricity

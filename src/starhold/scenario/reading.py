@@ -9,7 +9,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from starhold.errors import InputError
+from starhold.errors import InputError, shortly
 from starhold.laws.catalogue import Law
 from starhold.parts.part import Fitted
 from starhold.scenario.bodies import body_of
@@ -91,6 +91,7 @@ class Scenario:
         names = ", ".join(entry.name for entry in self.laws)
         return f"<{type(self).__name__} {self.name}: {names}; {self.table.simulation.steps} control steps>"
 
+    @shortly
     def with_(self, changes: Mapping[str, Any]) -> Scenario:
         """The scenario with other values at some keys: {"spacecraft.inertia": [2, 3, 4], "law.pd.k_rate": "0.1 N m s"}; the
         key of a law's or a part's table is its name, or "law[1]" by its place; None takes away what is there. InputError as
@@ -100,6 +101,7 @@ class Scenario:
 
         return changed(self, changes)
 
+    @shortly
     def pick(self, name: str) -> LawEntry:
         """The law of this name; InputError names the nearest when there is none."""
         for entry in self.laws:
