@@ -134,11 +134,11 @@ def _fly(
             ]
         if certify:
             flights = [studies.prove(scenario, *trio) for trio in zip(entries, loops, flights, strict=True)]
+        with painter.paused():
+            flights = [studies.timed(scenario, loop, flight) for loop, flight in zip(loops, flights, strict=True)]
+        print_outcome(flights)
+        page = write_results(scenario, flights, folder)
         unpainted = painter.finish()
-    # Nothing else runs by now.
-    flights = [studies.timed(scenario, loop, flight) for loop, flight in zip(loops, flights, strict=True)]
-    print_outcome(flights)
-    page = write_results(scenario, flights, folder)
     console.print(f"Report: {page}", soft_wrap=True)
     if unpainted is not None:
         raise unpainted
@@ -293,10 +293,14 @@ def _schema_text() -> str:
 @app.callback(invoke_without_command=True)
 def _root(version: Annotated[bool, typer.Option("--version", help="print the version and leave")] = False) -> None:
     if version:
-        from starhold.version import __version__
-
-        typer.echo(f"starhold {__version__}")
+        typer.echo(_version())
         raise typer.Exit
+
+
+def _version() -> str:
+    from starhold.version import __version__
+
+    return f"starhold {__version__}"
 
 
 _interrupted = Event()
@@ -334,6 +338,10 @@ def run_command() -> int:
     warnings.formatwarning = _as_line
     # A command loads much and lives briefly: looking for garbage at every step of that is time lost.
     gc.set_threshold(200_000)
+    if sys.argv[1:] == ["--version"]:
+        # Spared what reading options loads.
+        print(_version())
+        return 0
     try:
         app(standalone_mode=True)
     except SystemExit as ending:

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from contextlib import suppress
-from multiprocessing import get_context
 from pathlib import Path
-from queue import Empty
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -17,6 +14,7 @@ from starhold.cli.arguments import FAILED_CHECK, Force, ReproductionOutput
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from concurrent.futures import Future
 
     from starhold.publications.reproduction import Reproduction
 
@@ -48,6 +46,9 @@ def reproduce(
 
 def _make(letters: list[str], folder: Path, processes: int | None) -> list[Reproduction]:
     """The publications in their order, made by processes of their own."""
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     from starhold.cli.show import console
@@ -77,6 +78,9 @@ def _make(letters: list[str], folder: Path, processes: int | None) -> list[Repro
 
 def _watch(left: set[Future[Any]], told: Any, show: Callable[[str, int, int], None]) -> None:
     """Show how far they are until all are done, or one has failed."""
+    from concurrent.futures import FIRST_COMPLETED, wait
+    from queue import Empty
+
     while left:
         done, left = wait(left, timeout=0.2, return_when=FIRST_COMPLETED)
         with suppress(Empty):

@@ -8,7 +8,8 @@ import pickle
 import signal
 import subprocess
 import sys
-from contextlib import suppress
+from collections.abc import Generator
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from threading import Thread
@@ -31,7 +32,11 @@ class Painter:
         self._sender: Thread | None = None
         self._folder: Path | None = None
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "starhold.report.painter"], stdin=subprocess.PIPE, stderr=subprocess.PIPE
+            # A group of its own, of which half the figures' process is one too.
+            [sys.executable, "-m", "starhold.report.painter"],
+            stdin=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            process_group=0,
         )
 
     def __enter__(self) -> Painter:
@@ -40,11 +45,28 @@ class Painter:
     def __exit__(self, *failure: object) -> None:
         killed = self._process.poll() is None
         if killed:
-            self._process.kill()
+            self._signal("SIGKILL")
         self._sent()
         self._process.communicate()
         if killed and self._folder is not None:
             clear_unfinished(self._folder)
+
+    def _signal(self, name: str) -> None:
+        """Send a signal to all that draw; on a system without groups of processes only its end is asked for."""
+        if hasattr(os, "killpg"):
+            with suppress(ProcessLookupError):
+                os.killpg(self._process.pid, getattr(signal, name))
+        elif name == "SIGKILL":
+            self._process.kill()
+
+    @contextmanager
+    def paused(self) -> Generator[None]:
+        """Let nothing be drawn for a while, so that what is timed has the machine to itself."""
+        self._signal("SIGSTOP")
+        try:
+            yield
+        finally:
+            self._signal("SIGCONT")
 
     def start(self, picture: Picture, folder: Path) -> None:
         """Let it draw into `folder`, which exists."""

@@ -13,7 +13,7 @@ import numpy as np
 from starhold.algebra.quaternion import conjugate, multiply, to_body
 from starhold.analysis.rigid_body import DECADES
 from starhold.parts.craft import EARTH, total_inertia
-from starhold.report import linear_loop, transients
+from starhold.report import transients
 from starhold.report.attitude_plots import ACCURACIES, AttitudePlots, collect, early, steps_within, thinning, until
 from starhold.report.body import BodyReport, PageParts, Sampling
 from starhold.report.colours import colour
@@ -79,6 +79,9 @@ class RigidBodyReport:
         return AttitudePicture(collect(flights, POINTS, scenario), without_runs(flights), scenario.name, transient)
 
     def page(self, flights: Sequence[Flight], scenario: Scenario) -> PageParts:
+        # It needs much of SciPy, which pictures, made before the table is printed, do without.
+        from starhold.report.linear_loop import section
+
         plots, end = collect(flights, PAGE_POINTS, scenario), early(flights)
         scene = _scene(scenario, flights)
         data = {
@@ -101,7 +104,7 @@ class RigidBodyReport:
             measured=transients.section(flights),
             transient=end,
             settings="Spacecraft and settings",
-            units=linear_loop.section(scenario, flights),
+            units=section(scenario, flights),
             scripts=("space.js", "body.js"),
             footer=f"; seed {scenario.table.simulation.seed}",
             sampling=sampling,
