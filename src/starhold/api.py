@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from starhold.analysis.margins import Margins
+    from starhold.analysis.ranking import Metrics
     from starhold.campaign.results import CampaignResult
     from starhold.certification.certificate import Certificate
     from starhold.certification.invariant import InvariantProblem
@@ -52,12 +53,14 @@ def simulate(
 
 
 @shortly
-def metrics(run: xr.Dataset | Flight) -> dict[str, Any]:
-    """The numbers that say how well a run went, SI units, None where there is none: of what `simulate` returns or `run.nc`
-    holds, by the tolerances of its scenario; of a Flight those that it has. Neither flown nor timed again, so that only a
-    Flight tells what the law's calls cost. ValueError for a Dataset that is no run."""
+def metrics(run: xr.Dataset | Flight) -> Metrics:
+    """The numbers that say how well a run went, a dictionary whose `units` has the unit (SI) of each; None where there is
+    none: of what `simulate` returns or `run.nc` holds, by the tolerances of its scenario; of a Flight those that it has.
+    Neither flown nor timed again, so that only a Flight tells what the law's calls cost. ValueError for a Dataset that is no
+    run."""
     if not hasattr(run, "data_vars"):
-        return dict(cast("Flight", run).metrics)
+        flight = cast("Flight", run)
+        return flight.metric_set.measured(flight.metrics)
     dataset = cast("xr.Dataset", run)
     if not {"body", "control_period", "record_every"} <= set(dataset.attrs) or "time" not in dataset:
         raise ValueError("not a run: a Dataset of `simulate`, or of a run.nc, is wanted")
@@ -66,7 +69,8 @@ def metrics(run: xr.Dataset | Flight) -> dict[str, Any]:
         str(name): Quantity(values.attrs["units"], values.attrs["long_name"], *map(str, values.dims[1:]))
         for name, values in dataset.data_vars.items()
     }
-    return studies.metrics_of(Recording(arrays, dict(dataset.attrs), columns))
+    recording = Recording(arrays, dict(dataset.attrs), columns)
+    return studies.metric_set_of(recording).measured(studies.metrics_of(recording))
 
 
 @shortly

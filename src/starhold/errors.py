@@ -5,9 +5,9 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable
 from functools import wraps
-from typing import ParamSpec, TypeVar
+from typing import Any, TypeVar, cast
 
-_Given, _Result = ParamSpec("_Given"), TypeVar("_Result")
+_Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
 class InterruptedByUserError(BaseException):
@@ -34,17 +34,17 @@ class InputError(Exception):
         super().__init__(_one_line(": ".join(part for part in parts if part) + (f"{joint}{hint}" if allowed else "")))
 
 
-def shortly(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
+def shortly(function: _Function) -> _Function:
     """A function of the Python interface: its InputError says where the fault is, so that the frames below add nothing."""
 
     @wraps(function)
-    def called(*args: _Given.args, **keywords: _Given.kwargs) -> _Result:
+    def called(*args: Any, **keywords: Any) -> Any:
         try:
             return function(*args, **keywords)
         except InputError as error:
             raise error.with_traceback(None) from None
 
-    return called
+    return cast(_Function, called)
 
 
 def _one_line(text: str) -> str:

@@ -49,7 +49,7 @@ def test_what_was_flown_is_read_back(result):
     assert (pd_runs["flown.gains.k_rate"] == pd_runs["law.pd.k_rate"]).all()
     assert pd_runs["law.pd.k_rate"].between(1.5, 2.5).all()
     assert (frame["flown.craft.inertia[2]"] == frame["spacecraft.inertia[2]"]).all()
-    assert (frame["flown.setup.sensors[1].rate"] == frame["sensor.rate_noise"]).all()
+    assert (frame["flown.gaussian.rate"] == frame["sensor.rate_noise"]).all()
     attitudes = frame[[f"flown.state.attitude[{k}]" for k in range(1, 5)]].to_numpy()
     assert np.abs(np.linalg.norm(attitudes, axis=1) - 1.0).max() < 1e-15
     both = [group.drop(columns="law").reset_index(drop=True) for _, group in frame.groupby("law")]

@@ -13,7 +13,7 @@ from starhold.algebra.scalar import less, maximum, sqrt, where
 from starhold.algebra.structure import flatten, leaves, places
 from starhold.algebra.vector import most
 from starhold.analysis.meter import Meter, Metric, Window, tail_start
-from starhold.analysis.ranking import Measure, MetricSet
+from starhold.analysis.ranking import COSTS, Measure, MetricSet
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import make_step
 
@@ -52,10 +52,13 @@ def make_meter(recorded: Mapping[str, Quantity], steps: int, period: float, cloc
 def measure(run: Recording) -> dict[str, Any]:
     """Metrics of a run: for each recorded quantity its largest norm in the last quarter, and of the command the peak of its
     components and the integral of its norm. What is final is None for a motion that was lost, at `diverged_at`."""
-    period = run.attrs["control_period"] * run.attrs["record_every"]
-    meter = make_meter(_measured(run), len(run["time"]) - 1, period, run.time_unit)
     # Nothing here is about a limit.
-    return meter.of_recording(run, np.inf)
+    return _meter_of(run).of_recording(run, np.inf)
+
+
+def _meter_of(run: Recording) -> Meter:
+    period = run.attrs["control_period"] * run.attrs["record_every"]
+    return make_meter(_measured(run), len(run["time"]) - 1, period, run.time_unit)
 
 
 def metric_set(run: Recording) -> MetricSet:
@@ -67,7 +70,8 @@ def metric_set(run: Recording) -> MetricSet:
         if name == COMMAND:
             measures["peak_command"] = Measure("peak command", _shown(unit), "largest component of the command")
             measures["effort"] = Measure("effort", f"{unit} {run.time_unit}", "integral of the command's norm over the run")
-    return MetricSet(measures, ("effort",) if "effort" in measures else (), run.time_unit)
+    units = {"diverged_at": run.time_unit, **_meter_of(run).units, **COSTS}
+    return MetricSet(measures, ("effort",) if "effort" in measures else (), run.time_unit, units=units)
 
 
 def _measured(run: Recording) -> dict[str, Quantity]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from starhold.algebra.structure import flatten
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import Arguments, Numbers, make_kernel, numbers_of, replay
+from starhold.simulation.lane import recorded
 
 if TYPE_CHECKING:
     from starhold.simulation.lane import Recording
@@ -45,11 +46,10 @@ def recorded_states(loop: ClosedLoop, recording: Recording) -> NDArray[np.float6
     state)."""
     carry = loop.carry()
     columns = [recording[name][:CALLS] for name in type(carry.state)._fields]
+    own = {name for name, _, _ in recorded(loop)} - {*type(carry.state)._fields}
     for state in carry.effectors:
         for name, value in zip(state._fields, state, strict=True):
-            found = [
-                run for key, run in recording.arrays.items() if key.endswith(name) and key not in type(carry.state)._fields
-            ]
+            found = [run for key, run in recording.arrays.items() if key.endswith(name) and key in own]
             # One that is not recorded stays as it was at the start.
             start = np.tile(flatten((value,)), (len(columns[0]), 1))
             columns.append(np.reshape(found[0][:CALLS], start.shape) if found else start)

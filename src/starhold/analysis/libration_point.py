@@ -14,12 +14,12 @@ from starhold.algebra.structure import places
 from starhold.algebra.vector import ZERO, Vector, dot, subtract
 from starhold.analysis.meter import INSTANT, Meter, Metric, Window, is_on_limit, middle, outside, tail_start
 from starhold.analysis.metrics import LAST
-from starhold.analysis.ranking import Measure, MetricSet
+from starhold.analysis.ranking import COSTS, Measure, MetricSet
+from starhold.parts.bodies.libration_point import Units
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from starhold.parts.bodies.libration_point import Units
     from starhold.simulation.lane import Recording
 
 DAY, YEAR = 86_400.0, 365.25 * 86_400.0
@@ -80,9 +80,6 @@ MEASURES: dict[str, Measure] = {
     "effort_per_year": Measure("delta-v a year", "m/s", "integral of |u|, for a year of 365.25 days"),
 }
 """The metrics a comparison shows; in each, less is better."""
-
-METRICS = MetricSet(MEASURES, ("deviation", "settling_time", "effort_per_year"), "days", DAY)
-
 
 class Goal(NamedTuple):
     """The numbers of the notes, scaled: the radius of the circle or the place of rest, the distance that counts as near, and
@@ -199,3 +196,15 @@ def _note(limit: str, circle: bool, late: bool) -> Any:
         )
 
     return note
+
+
+def _units() -> dict[str, str]:
+    """The metrics with their units, SI."""
+    goals = CircleGoal(0.0, 0.0), EquilibriumGoal(ZERO)
+    found = {"diverged_at": "s", "peak_ratio": "1", **COSTS}
+    for goal in goals:
+        found |= make_meter(0, 1.0, "none", Units(1.0, 1.0), goal, 0.0).units
+    return found
+
+
+METRICS = MetricSet(MEASURES, ("deviation", "settling_time", "effort_per_year"), "days", DAY, _units())

@@ -18,6 +18,9 @@ BELOW = 1e-2
 """The lowest frequency, in parts of that of the slowest pole of the closed loop."""
 
 
+UNITS = {"gain": "1", "less": "1", "phase": "rad", "delay": "s", "crossover": "rad/s", "sensitivity": "1"}
+
+
 class Margins(NamedTuple):
     """These are what the loop about one axis bears before it loses its stability, those about the others being closed.
 
@@ -33,6 +36,11 @@ class Margins(NamedTuple):
     delay: float
     crossover: float
     sensitivity: float
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The units of the numbers, "1" for none."""
+        return UNITS
 
 
 class Response(NamedTuple):

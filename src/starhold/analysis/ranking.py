@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
+COSTS = {
+    **dict.fromkeys(("cost_median", "cost_worst"), "s"),
+    **dict.fromkeys(("solver_calls", "solver_iterations_mean", "solver_iterations_worst", "solver_budget_hits"), "1"),
+}
+"""What is told of a law's calls, with its units."""
 LATE = " †"
 """Stands by the dash of a time that a run is too short for."""
 
@@ -20,6 +25,14 @@ class Measure:
     scale: float = 1.0
 
 
+class Metrics(dict[str, Any]):
+    """The results of a law by name, a dictionary; `units` has the unit of each number, "1" for none."""
+
+    def __init__(self, values: Mapping[str, Any], units: Mapping[str, str]) -> None:
+        super().__init__(values)
+        self.units = dict(units)
+
+
 @dataclass(frozen=True)
 class MetricSet:
     """How results of laws on a body are told: the metrics that are shown, less being better in each; those that laws are
@@ -29,6 +42,12 @@ class MetricSet:
     order: tuple[str, ...]
     clock: str = "s"
     tick: float = 1.0
+    units: Mapping[str, str] = field(default_factory=dict[str, str])
+    """The units of metrics as they are computed, those that are not shown included."""
+
+    def measured(self, row: Mapping[str, Any]) -> Metrics:
+        """The results of a law with the units of all that are numbers."""
+        return Metrics(row, {name: self.units[name] for name in row if name in self.units})
 
     def columns(self, results: Mapping[str, Mapping[str, Any]]) -> list[str]:
         """The metrics that some of the laws have, in order."""

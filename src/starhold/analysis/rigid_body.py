@@ -19,7 +19,7 @@ from starhold.algebra.structure import chosen, places
 from starhold.algebra.vector import ZERO, Vector, dot, most, scale, subtract
 from starhold.analysis.meter import INSTANT, KINDS, Meter, Metric, Window, is_on_limit, outside, tail_start
 from starhold.analysis.metrics import ALMOST
-from starhold.analysis.ranking import Measure, MetricSet
+from starhold.analysis.ranking import COSTS, Measure, MetricSet
 
 if TYPE_CHECKING:
     from starhold.simulation.lane import Recording
@@ -53,9 +53,6 @@ MEASURES: dict[str, Measure] = {
     "cost_worst": Measure("worst call", "ns", "processor time of one call of the law, worst", 1e9),
 }
 """The metrics a comparison shows; in each, less is better."""
-
-METRICS = MetricSet(MEASURES, ("settling_time", "final_attitude_error", "effort"))
-"""Settled before unsettled, then sooner, then more accurate, then more sparing."""
 
 
 def error_angle(q: Any) -> NDArray[np.float64]:
@@ -276,3 +273,20 @@ def _turned(seen: Any, q: Any, now: Any) -> Turning:
 def _levels(seen: tuple[Any, ...], square: Any, now: Any) -> tuple[Any, ...]:
     """The last instants at which a square was above those of 10^-k."""
     return tuple(outside(then, square, 10.0 ** (-2 * k), now) for then, k in zip(seen, DECADES, strict=True))
+
+
+AGAINST_LIMITS = {
+    "transient_time": "s",
+    "rate_limit": "rad/s",
+    **dict.fromkeys(("peak_acceleration", "peak_accelerations", "acceleration_limit"), "rad/s^2"),
+}
+"""What a transient is measured by besides, with its units."""
+UNITS = {
+    "diverged_at": "s",
+    **make_meter(0, 1.0, "none", (0.0, 0.0), EXTRAS, wheels=True).units,
+    **AGAINST_LIMITS,
+    **COSTS,
+}
+"""The metrics with their units, SI."""
+METRICS = MetricSet(MEASURES, ("settling_time", "final_attitude_error", "effort"), units=UNITS)
+"""Settled before unsettled, then sooner, then more accurate, then more sparing."""

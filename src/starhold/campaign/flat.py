@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -65,6 +66,21 @@ def named(value: Any, name: str) -> Iterator[tuple[str, Any]]:
             yield from named(part, own)
     elif isinstance(value, float | np.ndarray):
         yield name, value
+
+
+_OF_PART = re.compile(r"(?:(memories|setup)\.)?(sensor|environment|effector)s\[(\d+)\]")
+_OF_ONE = re.compile(r"(memories|setup)\.(estimator|target)\b")
+
+
+def shown_name(loop: ClosedLoop, name: str) -> str:
+    """The name by which tables call a number: after the part that it is of, with its state or its memory apart from its
+    parameters."""
+
+    def called(where: str | None, fitted: Any) -> str:
+        return fitted.called + {"setup": "", "memories": ".memory"}.get(where or "", ".state")
+
+    name = _OF_PART.sub(lambda m: called(m[1], loop.used(m[2])[int(m[3]) - 1]), name)
+    return _OF_ONE.sub(lambda m: called(m[1], (*loop.used(m[2]), loop.target)[0]), name)
 
 
 def same(a: Array, b: Array) -> bool:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.structure import flatten, mapped
-from starhold.campaign.flat import Flat, named, named_carry, named_phases, same
+from starhold.campaign.flat import Flat, named, named_carry, named_phases, same, shown_name
 from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop, Phase
 from starhold.loop.kernels import Numbers, numbers_of
@@ -222,7 +222,9 @@ class Lanes:
         lanes = len(lot.runs)
         found = dict(zip(named_carry(lot.loop), lot.carries, strict=True)) | dict(named_phases(lot.loop, lot.phases))
         return {
-            f"flown.{name}": np.broadcast_to(np.asarray(found.get(name, np.nan), dtype=float), (lanes,))
+            f"flown.{shown_name(lot.loop, name)}": np.broadcast_to(
+                np.asarray(found.get(name, np.nan), dtype=float), (lanes,)
+            )
             for name in self.flown
         }
 

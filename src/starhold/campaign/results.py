@@ -39,8 +39,8 @@ class Spread:
     missing: int
     mean: float
     quantiles: tuple[float, ...]
-    edges: Array
-    counts: NDArray[np.int64]
+    edges: Array = field(repr=False)
+    counts: NDArray[np.int64] = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -53,12 +53,12 @@ class Envelope:
     name: str
     unit: str
     meaning: str
-    times: Array
-    least: Array
-    low: Array
-    median: Array
-    high: Array
-    most: Array
+    times: Array = field(repr=False)
+    least: Array = field(repr=False)
+    low: Array = field(repr=False)
+    median: Array = field(repr=False)
+    high: Array = field(repr=False)
+    most: Array = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -103,6 +103,10 @@ class LawResult:
     """Sensitivity of metrics, by their names, where the sampling is for that."""
     again: tuple[Again, ...] = ()
     brackets: tuple[Bracket, ...] = ()
+
+    def __repr__(self) -> str:
+        judged = "".join(f"; {verdict.name} {verdict.outcome}" for verdict in self.verdicts)
+        return f"<law {self.law}: {self.failed} of {self.runs} failed, {self.lost} lost{judged}>"
 
 
 @dataclass(frozen=True)

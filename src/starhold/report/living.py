@@ -103,7 +103,7 @@ def _measured(law: Reflown, flight: Flight, table: Any) -> dict[str, Any]:
     run, settling = flight.recording, table.settling
     every, limit = table.simulation.record_every, run.attrs["limit"]
     meter = recorded_meter(0, law.period, every, limit, settling.attitude_tolerance, settling.rate_tolerance)
-    program = meter.program(tuple((name, values.shape[1:]) for name, values in run.arrays.items() if name != "time"), 0.0)
+    program = meter.program(tuple((name, run[name].shape[1:]) for name, _ in law.columns), 0.0)
     known = {
         "memories": [memory.name for memory in program.memories],
         "first": flatten(meter.first),

@@ -14,6 +14,7 @@ from starhold.studies.modes import modes_flown
 from starhold.version import __version__
 
 if TYPE_CHECKING:
+    from starhold.analysis.ranking import MetricSet
     from starhold.scenario.reading import Scenario
 
 Notice: TypeAlias = Callable[[str, int, int], None]
@@ -73,6 +74,11 @@ def name_samples(scenario: Scenario, loop: Any, samples: Any, carry: Any) -> Rec
 def metrics_of(run: Recording) -> dict[str, Any]:
     """The metrics of a recorded run, but for those of the law's calls."""
     return study_of(run.attrs["body"]).metrics_of(run)
+
+
+def metric_set_of(run: Recording) -> MetricSet:
+    """How the metrics of a recorded run are told."""
+    return study_of(run.attrs["body"]).metric_set(run)
 
 
 def compare(scenario: Scenario, notice: Notice | None = None) -> list[Flight]:

@@ -27,27 +27,33 @@ def frame_of(rows: Sequence[dict[str, Any]]) -> DataFrame:
 
 
 def to_pandas(results: Any) -> DataFrame:
-    """A run, or a list of flights, certificates, designs or margins, as a table; see `starhold.to_pandas`."""
+    """A run, or a list of flights, certificates, designs or margins, as a table, with units in its `attrs`; see
+    `starhold.to_pandas`."""
     if hasattr(results, "data_vars"):
         return run_frame(results)
     items = [results] if isinstance(results, Flight | Certificate | Design | Margins) else list(results)
     rows: list[dict[str, Any]] = []
+    units: dict[str, str] = {}
     for item in items:
         if isinstance(item, Flight):
             rows.append({"name": item.name, "law": item.law, **item.metrics})
+            units |= item.metric_set.measured(item.metrics).units
         elif isinstance(item, Certificate):
             rows += [
                 {"name": item.name, "claim": claim.kind, "outcome": claim.outcome, **claim.numbers} for claim in item.claims
             ]
         elif isinstance(item, Margins):
             rows.append(item._asdict())
+            units |= item.units
         elif isinstance(item, Design):
             rows.append({"name": item.name, "law": item.law, "form": item.form, **item.inputs, **item.gains})
         else:
             raise TypeError(
                 f"no table is made of {type(item).__name__}: a run, flights, certificates, designs or margins are wanted"
             )
-    return frame_of(rows)
+    table = frame_of(rows)
+    table.attrs["units"] = units
+    return table
 
 
 def run_frame(run: xr.Dataset) -> DataFrame:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, cast, final
 
 import numpy as np
 
-from starhold.analysis.rigid_body import EXTRAS, METRICS, make_meter, measure
+from starhold.algebra.quantity import Quantity
+from starhold.analysis.rigid_body import EXTRAS, METRICS, error_angle, make_meter, measure
 from starhold.analysis.transient import Limits, against_limits
 from starhold.laws.modes import mode_laws
 from starhold.loop.kernels import make_step
@@ -46,7 +47,10 @@ class RigidBodyStudy:
         if scenario.table.orbit is not None and scenario.table.orbit.epoch is not None:
             told["epoch"] = iso_text(scenario.table.orbit.epoch)
         run = label(loop, samples, carry, scenario.table.simulation.record_every)
-        return replace(run, attrs=run.attrs | told | {"seed": scenario.table.simulation.seed})
+        angle = {"error_angle": error_angle(run["attitude_error"])}
+        meant = {"error_angle": Quantity("rad", "angle to the target")}
+        attrs = run.attrs | told | {"seed": scenario.table.simulation.seed}
+        return replace(run, arrays=run.arrays | angle, columns=run.columns | meant, attrs=attrs)
 
     def metrics_of(self, run: Recording) -> dict[str, Any]:
         told = run.attrs
