@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from starhold.campaign.dispersions import Dispersion
 from starhold.campaign.distributions import Array
+from starhold.campaign.extras import extra
+from starhold.campaign.sensitivity import saltelli_design
 from starhold.errors import InputError
 from starhold.scenario.checking import nearest, show
 
@@ -32,9 +34,9 @@ class Plan:
 
     random: independent, by a counter-based generator of its own for each dispersion, keyed by the seed and its keys, so that
     what is drawn for one key depends on no other. sobol: a scrambled Sobol sequence over all dispersions, best with a power
-    of 2 of runs. latin-hypercube: each uniform falls once into each of as many equal parts as there are runs. morris,
-    saltelli: SALib's designs for elementary effects (Morris 1991), of uniforms from 0 to 1 though `LEVELS` are within,
-    and for Sobol indices with those of pairs (Saltelli 2002).
+    of 2 of runs. latin-hypercube: each uniform falls once into each of as many equal parts as there are runs. morris:
+    SALib's design for elementary effects (Morris 1991), of uniforms from 0 to 1 though `LEVELS` are within. saltelli:
+    crossings of pairs of points for Sobol indices (see `sensitivity.saltelli_design`).
 
     InputError where there is no such sampling, or where the number of runs does not fit its design; `where` names the
     scenario in it.
@@ -65,8 +67,8 @@ class Plan:
         if self.sampling == "morris":
             sizes, rule = [max(2, count), max(2, count) + 1], "from 2 on"
         else:
-            power = max(0, count.bit_length() - 1)
-            sizes, rule = [2**power, 2 ** (power + 1)], "a power of 2"
+            power = max(1, count.bit_length() - 1)
+            sizes, rule = [2**power, 2 ** (power + 1)], "a power of 2 from 2 on"
         if self.runs not in [block * size for size in sizes]:
             near = " or ".join(str(block * size) for size in sizes)
             allowed = f"{near}: {block} times a number, {rule}, for {self.dims} drawn numbers by {self.sampling}"
@@ -185,13 +187,9 @@ def _latin_hypercube(keys: tuple[tuple[int, int], ...], runs: int) -> Array:
 @lru_cache(maxsize=1)
 def _design(sampling: str, dims: int, seed: int, size: int) -> Array:
     """The whole design (runs, dims) of a number of trajectories, or of base points."""
+    if sampling == "saltelli":
+        return saltelli_design(dims, size, _generator(seed))
     problem = {"num_vars": dims, "names": [str(n) for n in range(dims)], "bounds": [[0.0, 1.0]] * dims}
-    if sampling == "morris":
-        from SALib.sample import morris
-
-        levels = morris.sample(problem, size, num_levels=LEVELS, seed=_generator(seed))
-        # At 0 and 1 many distributions are infinite.
-        return (levels * (LEVELS - 1) + 0.5) / LEVELS
-    from SALib.sample import sobol
-
-    return sobol.sample(problem, size, calc_second_order=True, seed=_generator(seed))
+    levels = extra("SALib.sample.morris").sample(problem, size, num_levels=LEVELS, seed=_generator(seed))
+    # At 0 and 1 many distributions are infinite.
+    return (levels * (LEVELS - 1) + 0.5) / LEVELS

@@ -2,9 +2,13 @@
 
 Both need designs of their own, which `sampling` lays out in the unit cube: "morris" one step of one input at a time (M. D.
 Morris, Technometrics 33, 1991; mu* of F. Campolongo et al., Environ. Model. Softw. 22, 2007), "saltelli" two samples and
-their crossings (A. Saltelli et al., Comput. Phys. Commun. 181, 2010). SALib computes the indices. A failed run leaves a
-hole: a Morris design loses the trajectory with it and no more; Sobol's estimators have no answer to it, and filling it in
-would be made up.
+their crossings (A. Saltelli et al., Comput. Phys. Commun. 181, 2010), each taken both ways. A failed run leaves a hole: a
+Morris design loses the trajectory with it and no more; Sobol's estimators have no answer to it, and filling it in would be
+made up.
+
+Points of one Sobol sequence are far from independent: indices from them are much better than a bootstrap over the points
+says. So a design is made of `SCRAMBLINGS` sequences that are scrambled independently, and how the indices change when one
+of them is left out gives the half-widths (the jackknife over groups; A. B. Owen, Monte Carlo theory, 2013, chapter 17).
 """
 
 from __future__ import annotations
@@ -16,12 +20,11 @@ from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-
-from starhold.errors import InputError
+from scipy import special
 
 Array: TypeAlias = NDArray[np.float64]
-RESAMPLES = 200
-"""Of the bootstrap for the half-widths."""
+SCRAMBLINGS = 8
+"""Sobol sequences of a Saltelli design; one for each point where there are fewer points."""
 NO_SALTELLI = "the runs are no Saltelli design of two samples and their crossings"
 STEP_ERROR = 0.05
 """By which a step of a Morris design, as a share of it, may differ from the grid's: ends of the unit interval may be drawn
@@ -88,49 +91,50 @@ class Sobol:
         return f"{self.names[most]} moves it most: {alone} of the variance by itself, {all_in} with others."
 
 
-def problem(names: Sequence[str]) -> dict[str, Any]:
-    """Describe the unit cube of the inputs as SALib has it, for sampling and for analysis alike."""
-    return {"num_vars": len(names), "names": list(names), "bounds": [[0.0, 1.0]] * len(names)}
-
-
-def morris(names: Sequence[str], unit: Array, values: Array, confidence: float = 0.95, seed: int = 0) -> Morris | Refused:
+def morris(names: Sequence[str], unit: Array, values: Array, confidence: float = 0.95) -> Morris | Refused:
     """Compute elementary effects from points of the unit cube (runs, inputs) and the metric's values (runs,), NaN where a
-    run has none; runs in the order of the design. `seed` is that of the bootstrap for the half-widths."""
+    run has none; runs in the order of the design."""
     unit, values, size = np.asarray(unit, float), np.asarray(values, float), len(names) + 1
     if not names or unit.shape != (len(values), len(names)) or not len(values) or len(values) % size:
         return Refused(f"{len(values)} runs are no whole number of trajectories of {size} runs")
     steps = np.diff(unit.reshape(-1, size, len(names)), axis=1)
     step = float(np.abs(steps).max())
     moved = np.abs(steps) > 0.5 * step
-    if not (step > 0.5 and (moved.sum(1) == 1).all() and (moved.sum(2) == 1).all() and _even(steps, moved, step)):
+    # A step is p / (2 (p - 1)) for a grid of p levels, an even number.
+    levels = 2 * round(step / (2.0 * step - 1.0)) if step > 0.5 else 0
+    grid = levels / (2.0 * (levels - 1))
+    one_each = bool((moved.sum(1) == 1).all() and (moved.sum(2) == 1).all())
+    if not (step > 0.5 and one_each and np.abs(np.abs(steps) - grid * moved).max() <= STEP_ERROR * grid):
         return Refused("the runs are no Morris design, in which each step is of one input and each input takes one step")
     there = np.isfinite(values.reshape(-1, size)).all(axis=1)
     flown, kept = there.size, int(there.sum())
     if kept < 2:
         return Refused(f"{kept} of {flown} trajectories have all their values, two are the least")
-    rows = np.repeat(there, size)
-    found = _salib("morris").analyze(
-        problem(names),
-        unit[rows],
-        values[rows],
-        num_resamples=RESAMPLES,
-        conf_level=confidence,
-        # A step is p / (2 (p - 1)) for p levels.
-        num_levels=2 * round(step / (2.0 * step - 1.0)),
-        seed=seed,
+    changes = np.diff(values.reshape(-1, size)[there], axis=1)
+    effects = (changes[:, :, None] * (np.sign(steps) * moved)[there]).sum(1) / grid
+    magnitudes = np.abs(effects)
+    width = special.stdtrit(kept - 1, 0.5 + 0.5 * confidence) * magnitudes.std(0, ddof=1) / math.sqrt(kept)
+    return Morris(
+        tuple(names), effects.mean(0), magnitudes.mean(0), width, effects.std(0, ddof=1), flown, flown - kept, confidence
     )
-    columns = (np.asarray(found[key], dtype=np.float64) for key in ("mu", "mu_star", "mu_star_conf", "sigma"))
-    return Morris(tuple(names), *columns, trajectories=flown, dropped=flown - kept, confidence=confidence)
 
 
-def sobol(names: Sequence[str], unit: Array, values: Array, confidence: float = 0.95, seed: int = 0) -> Sobol | Refused:
-    """Compute Sobol's indices from points of the unit cube (runs, inputs) and the metric's values (runs,), NaN where a run
-    has none; runs in the order of the design, with or without what second-order indices need. `seed` as for `morris`."""
+def saltelli_design(dims: int, size: int, generator: np.random.Generator) -> Array:
+    """Place `size` pairs of points, a power of 2, and the crossings of each pair: (size (2 dims + 2), dims)."""
+    from scipy.stats import qmc
+
+    # Untyped, for newer versions know `seed` only at run time, and older ones nothing else.
+    make: Any = qmc.Sobol
+    groups = min(size, SCRAMBLINGS)
+    pairs = np.vstack([make(2 * dims, scramble=True, seed=generator).random(size // groups) for _ in range(groups)])
+    return _cross(pairs[:, None, :dims], pairs[:, None, dims:]).reshape(-1, dims)
+
+
+def sobol(names: Sequence[str], unit: Array, values: Array, confidence: float = 0.95) -> Sobol | Refused:
+    """Compute Sobol's indices from points of `saltelli_design` (runs, inputs) and the metric's values (runs,), NaN where a
+    run has none; runs in the order of the design."""
     unit, values, count = np.asarray(unit, float), np.asarray(values, float), len(names)
-    if not count or unit.shape != (len(values), count):
-        return Refused(NO_SALTELLI)
-    second_order = next((second for second in (False, True) if _crossed(unit, second)), None)
-    if second_order is None:
+    if not count or unit.shape != (len(values), count) or not _crossed(unit):
         return Refused(NO_SALTELLI)
     missing = int((~np.isfinite(values)).sum())
     if missing:
@@ -138,48 +142,49 @@ def sobol(names: Sequence[str], unit: Array, values: Array, confidence: float = 
         return Refused(f"{have} no value, and Sobol's estimators need all {len(values)}; Morris designs and drivers do not")
     if np.ptp(values) == 0.0:
         return Refused("all runs have the same value")
-    found = _salib("sobol").analyze(
-        problem(names),
-        values,
-        calc_second_order=second_order,
-        num_resamples=RESAMPLES,
-        conf_level=confidence,
-        # Zero would be taken for no seed at all.
-        seed=seed + 1,
-    )
-    columns = (np.asarray(found[key], dtype=np.float64) for key in ("S1", "S1_conf", "ST", "ST_conf"))
-    return Sobol(tuple(names), *columns, confidence=confidence)
+    size = len(values) // (2 * count + 2)
+    groups = min(size, SCRAMBLINGS)
+    if groups < 2:
+        return Refused(f"{size} pair of points, two are the least")
+    blocks = values.reshape(size, -1)
+    first, total = _estimates(blocks)
+    own = np.arange(size) // (size // groups)
+    less = np.array([_estimates(blocks[own != left]) for left in range(groups)])
+    if not np.isfinite(less).all():
+        return Refused("too few runs have another value than the rest")
+    spread = np.sqrt((groups - 1) * less.var(0))
+    width = special.stdtrit(groups - 1, 0.5 + 0.5 * confidence) * spread
+    return Sobol(tuple(names), first, width[0], total, width[1], confidence)
 
 
-def _even(steps: Array, moved: NDArray[np.bool_], step: float) -> bool:
-    """Tell whether all steps are that of a grid with an even number of levels, and nothing else moves."""
-    levels = 2 * round(step / (2.0 * step - 1.0)) if step > 0.5 else 0
-    grid = levels / (2.0 * (levels - 1))
-    return bool(np.abs(np.abs(steps) - grid * moved).max() <= STEP_ERROR * grid)
+def _estimates(blocks: Array) -> tuple[Array, Array]:
+    """Estimate the indices (inputs,) of first order and in total from blocks (points, 2 inputs + 2) of values: the means of
+    the estimators of Saltelli (2010) and of Jansen (Comput. Phys. Commun. 117, 1999) over both ways to cross two points."""
+    count = blocks.shape[1] // 2 - 1
+    ends = blocks[:, [0, -1]]
+    blocks = blocks - blocks.mean()
+    one, other = blocks[:, :1], blocks[:, -1:]
+    there, back = blocks[:, 1 : count + 1] - one, blocks[:, count + 1 : -1] - other
+    variance = ends.var()
+    with np.errstate(invalid="ignore", divide="ignore"):
+        first = 0.5 * (other * there + one * back).mean(0) / variance
+        return first, 0.25 * (there**2 + back**2).mean(0) / variance
 
 
-def _crossed(unit: Array, second_order: bool) -> bool:
-    """Tell whether runs are blocks of a point, the point with each coordinate in turn from another, (the reverse,) and the
+def _crossed(unit: Array) -> bool:
+    """Tell whether runs are blocks of a point, the point with each coordinate in turn from another, the reverse, and the
     other."""
     count = unit.shape[1]
-    size = 2 * count + 2 if second_order else count + 2
-    if not len(unit) or len(unit) % size:
+    if not len(unit) or len(unit) % (2 * count + 2):
         return False
-    blocks = unit.reshape(-1, size, count)
-    one, other = blocks[:, :1], blocks[:, -1:]
-    swap = np.eye(count, dtype=bool)
-    crossed = np.array_equal(blocks[:, 1 : count + 1], np.where(swap, other, one))
-    return crossed and (not second_order or np.array_equal(blocks[:, count + 1 : -1], np.where(swap, one, other)))
+    blocks = unit.reshape(-1, 2 * count + 2, count)
+    return np.array_equal(blocks, _cross(blocks[:, :1], blocks[:, -1:]))
 
 
-def _salib(method: str) -> Any:
-    """Import one of SALib's analyses."""
-    from importlib import import_module
-
-    try:
-        return import_module(f"SALib.analyze.{method}")
-    except ImportError:
-        raise InputError("sensitivity", "SALib", "", "is not installed; starhold[campaign] brings it") from None
+def _cross(one: Array, other: Array) -> Array:
+    """Cross pairs of points, each (pairs, 1, inputs): blocks (pairs, 2 inputs + 2, inputs)."""
+    swap = np.eye(one.shape[2], dtype=bool)
+    return np.concatenate([one, np.where(swap, other, one), np.where(swap, one, other), other], axis=1)
 
 
 def _pm(value: float, width: float) -> str:
