@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from starhold.conformance.bench import sample_loop
-from starhold.conformance.bodies.rigid_body import CHECKS
+from starhold.conformance.bodies.rigid_body import CHECKS, keeps_units
 from starhold.conformance.suite import examine
 from starhold.conformance.verdicts import NotApplicableError
 from starhold.errors import InputError
@@ -61,6 +61,34 @@ def test_broken_law_is_caught(fault, tmp_path):
     law = from_file(path)
     failed = [c.__name__ for c in CHECKS if check in c.__name__ and _fails(law, c)]
     assert failed
+
+
+@pytest.mark.parametrize("slow", [3e-4, 3e-8])
+@pytest.mark.parametrize("unit", ["N m/s", "T"])
+def test_a_gain_that_acts_through_memory_alone_has_its_unit_checked(unit, slow, tmp_path):
+    """An integral that the first call does not see yet, and one that is seen after many calls only."""
+    text = Path(catalogue()["pid"].module.__file__).read_text()
+    for old, new in (
+        ('Gain("N m/s", above', f'Gain("{unit}", above'),
+        ("clip_axes(grown, gains.integral_limit / gains.k_integral)", "grown"),
+        ("scale(gains.k_integral, integral)", "scale(gains.k_integral, memory.integral)"),
+        ("Gains(0.3, 0.03, 3e-4, 2e-3)", f"Gains(0.3, 0.03, {slow}, 2e-3)"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "adaptive.py"
+    path.write_text(text)
+    assert _fails(from_file(path), keeps_units) == (unit == "T")
+
+
+def test_a_gain_that_acts_near_the_target_alone_has_its_unit_checked(tmp_path):
+    path = tmp_path / "layered.py"
+    text = Path(catalogue()["sliding"].module.__file__).read_text()
+    path.write_text(
+        text.replace('boundary_layer: Annotated[float, Gain("rad/s"', 'boundary_layer: Annotated[float, Gain("m"')
+    )
+    assert path.read_text() != text
+    assert _fails(from_file(path), keeps_units)
 
 
 def _fails(law, check):

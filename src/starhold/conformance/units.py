@@ -20,10 +20,10 @@ def rescaled(
     the torque it gives back to N m."""
 
     def scaled(values: Any, units: Any) -> list[Any]:
-        return [_times(value, _factor(unit, factors)) for value, unit in zip(values, units, strict=True)]
+        return [times(value, _factor(unit, factors)) for value, unit in zip(values, units, strict=True)]
 
     gain_units = [None if item.gain.choices or item.gain.whole else item.gain.unit for item in law.fields()]
-    own = [v if unit is None else _times(v, _factor(unit, factors)) for v, unit in zip(gains, gain_units, strict=True)]
+    own = [v if unit is None else times(v, _factor(unit, factors)) for v, unit in zip(gains, gain_units, strict=True)]
     return (
         Measurement(*scaled(measurement, _units(Measurement))),
         law.gains(*own),
@@ -37,8 +37,9 @@ def _units(cls: Any) -> list[str]:
     return [told.unit for told in quantities(cls).values()]
 
 
-def _times(value: Any, factor: float) -> Any:
-    return tuple(_times(part, factor) for part in value) if isinstance(value, tuple) else value * factor
+def times(value: Any, factor: float) -> Any:
+    """A number, or nested tuples of numbers, times a factor."""
+    return tuple(times(part, factor) for part in value) if isinstance(value, tuple) else value * factor
 
 
 def _factor(unit: str, factors: tuple[float, float, float]) -> float:
@@ -57,7 +58,7 @@ def _powers(unit: str) -> tuple[float, float, float]:
 
 def rescale(values: Any, units: Any, factors: tuple[float, float, float]) -> Any:
     """Numbers of these units, one for each field, in another system of units; the same kind of tuple."""
-    parts = [_times(value, _factor(unit, factors)) for value, unit in zip(values, units, strict=True)]
+    parts = [times(value, _factor(unit, factors)) for value, unit in zip(values, units, strict=True)]
     return type(values)(*parts) if hasattr(values, "_fields") else tuple(parts)
 
 
@@ -66,7 +67,7 @@ def rescale_params(part: Part, params: Any, factors: tuple[float, float, float])
     if part.table:
         return params
     found = [
-        value if item.gain.choices or item.gain.whole else _times(value, _factor(item.gain.unit, factors))
+        value if item.gain.choices or item.gain.whole else times(value, _factor(item.gain.unit, factors))
         for item, value in zip(part.fields(), params, strict=True)
     ]
     return type(params)(*found)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import islice, tee
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import derivative, multiply, normalise, stretch, to_reference
 from starhold.algebra.structure import move
@@ -17,7 +19,7 @@ from starhold.analysis.rigid_body import measure
 from starhold.analysis.trial import fly_claims
 from starhold.certification.certify import certify
 from starhold.conformance.bench import CRAFT, call, random_measurements, random_quaternions, sample_loop
-from starhold.conformance.units import rescaled
+from starhold.conformance.units import rescaled, times
 from starhold.conformance.verdicts import (
     STEPS,
     NotApplicableError,
@@ -137,14 +139,62 @@ def survives_toml(law: Law) -> None:
 def keeps_units(law: Law) -> None:
     """The declared units are right: the torque is the same in any system of units."""
     for gains in law.examples():
-        for measurement in random_measurements(5):
-            plain = np.array(call(law, measurement, gains))
-            size = max(float(np.abs(plain).max()), 1e-9)
-            for factors in ((7.0, 1.0, 1.0), (1.0, 3.0, 1.0), (1.0, 1.0, 0.2), (2.0, 0.3, 5.0)):
-                seen2, gains2, craft2, back = rescaled(law, measurement, gains, CRAFT, factors)
-                other = np.array(call(law, seen2, gains2, craft2)) * back
-                error = float(np.abs(other - plain).max()) / size
-                require(error < 1e-6, f"with kg, m, s scaled by {factors} the torque changes by {error:.1e} of itself")
+        plain = _torques(law, gains)
+        calls = len(MOTIONS)
+        for changed in _changed(law, gains):
+            plain, again = tee(plain)
+            calls = max(calls, _first_effect(again, _torques(law, changed)))
+        torques = np.array(list(islice(plain, calls)))
+        size = max(float(np.abs(torques).max()), 1e-9)
+        for system in ((7.0, 1.0, 1.0), (1.0, 3.0, 1.0), (1.0, 1.0, 0.2), (2.0, 0.3, 5.0)):
+            others = np.array(list(islice(_torques(law, gains, system), calls)))
+            error = float(np.abs(others - torques).max()) / size
+            require(error < 1e-6, f"with kg, m, s scaled by {system} the torque changes by {error:.1e} of itself")
+
+
+def _near(seen: Measurement, share: float) -> Measurement:
+    """A motion near the target: this share of another's error and rates."""
+    _, *error = seen.attitude
+    x, y, z, *rates = [share * number for number in (*error, *seen.rate, *seen.body_rate)]
+    return seen._replace(attitude=normalise((1.0, x, y, z)), rate=tuple(rates[:3]), body_rate=tuple(rates[3:]))
+
+
+MOTIONS = (
+    *random_measurements(5),
+    *map(_near, random_measurements(3), (0.1, 1e-2, 1e-3)),
+)
+"""Far from the target, and in boundary layers about it."""
+HOLDS = (1, 4, 16, 64, 256)
+"""Calls in which each motion is shown, round after round, as long as a gain has changed nothing."""
+
+
+def _torques(law: Law, gains: Any, system: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Iterator[NDArray[np.float64]]:
+    """The torques (3,), in N m, of one call after the other in a system of units; the law remembers what it was shown."""
+    memory: Any = None
+    for hold in HOLDS:
+        for motion in MOTIONS:
+            seen, own, craft, back = rescaled(law, motion, gains, CRAFT, system)
+            for _ in range(hold):
+                memory = law.remember(own, craft, seen.period) if memory is None else memory
+                torque, memory = law.command(seen, own, craft, memory)
+                yield np.array(torque) * back
+
+
+def _changed(law: Law, gains: Any) -> Iterator[Any]:
+    """Gains of which one at a time, of those with a unit, is greater by half."""
+    for place, (item, value) in enumerate(zip(law.fields(), gains, strict=True)):
+        if not (item.gain.choices or item.gain.whole):
+            yield law.gains(*gains[:place], times(value, 1.5), *gains[place + 1 :])
+
+
+def _first_effect(torques: Iterator[NDArray[np.float64]], others: Iterator[NDArray[np.float64]]) -> int:
+    """Calls until torques differ by what a wrong unit is sure to show by; 0 where they do not."""
+    size = 1e-9
+    for number, (one, other) in enumerate(zip(torques, others, strict=True), 1):
+        size = max(size, float(np.abs(one).max()))
+        if np.abs(other - one).max() > 1e-4 * size:
+            return number
+    return 0
 
 
 def decreases_lyapunov(law: Law) -> None:
