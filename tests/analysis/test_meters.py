@@ -58,7 +58,21 @@ def starts(loop, lanes):
 @pytest.mark.parametrize("name", SHORT)
 def test_metrics_are_those_of_recordings(name):
     law, changes = SHORT[name]
-    scenario = load(name).with_({"simulation.record_every": 1, **changes})
+    compare_metrics(load(name).with_({"simulation.record_every": 1, **changes}), law)
+
+
+@pytest.mark.parametrize("steps", [1, 2, 3, 4])
+@pytest.mark.parametrize("name", ["three-laws", "l2-circle", "l2-equilibrium"])
+def test_metrics_of_very_short_flights_are_those_of_recordings(name, steps):
+    """The last quarter of up to three steps is the last instant alone."""
+    scenario = load(name)
+    duration = scenario.table.simulation.duration * steps / scenario.table.simulation.steps
+    short = scenario.with_({"simulation.record_every": 1, "simulation.duration": duration})
+    assert short.table.simulation.steps == steps
+    compare_metrics(short, SHORT[name][0])
+
+
+def compare_metrics(scenario, law):
     loop = build(scenario, scenario.pick(law or scenario.laws[0].name))
     study, steps = study_of(scenario.body), scenario.table.simulation.steps
     meter = study.meter(scenario, loop, loop.gains, *((EXTRAS, {"cone": CONE}) if loop.aims else ()))

@@ -235,13 +235,14 @@ def sampled(parts: Composition) -> Callable[..., dict[str, Any]]:
 
 
 def window_ends(steps: int, marks: Sequence[int]) -> list[int]:
-    """The control steps at which windows of a flight end, every mark among them."""
+    """The control steps at which windows of a flight end, every mark among them. The last window holds the last instant too;
+    where that is a mark, it has a window of its own."""
     edges = [0, *marks, steps]
     found: set[int] = set()
     for first, last in itertools.pairwise(edges):
         count = max(1, round(WINDOWS * (last - first) / steps))
         found |= {round(cut) for cut in np.linspace(first, last, count + 1)[1:].tolist()}
-    return sorted(found - {0})
+    return sorted(found - {0}) + [steps + 1] * (steps in marks)
 
 
 def tail_start(steps: int) -> int:

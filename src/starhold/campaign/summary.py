@@ -91,7 +91,7 @@ def _edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _envelopes(store: Store, meter: Meter, law: str) -> Any:
     counts, extremes = store.envelopes(law)
-    name, times = envelopes.NAME, np.array(meter.cuts()) * meter.instant
+    name, times = envelopes.NAME, np.minimum(meter.cuts(), meter.steps) * meter.instant
     return envelopes.read(counts[name], extremes[f"{name}{LEAST}"], extremes[f"{name}{MOST}"], meter.windows, times)
 
 

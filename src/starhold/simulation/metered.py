@@ -47,7 +47,7 @@ def begin_metered(
 
     carries: (numbers, lanes), see `carry_columns`; observers: one before the control step `late` and one from it on; noted:
     notes before the flight (numbers, lanes); cuts: control steps at which windows end, `late` among them unless it is 0, the
-    last at the end of the flight; rows: noted numbers that begin anew in each window, at 0.
+    last, which takes the last instant in, at the end of the flight or after it; rows: noted numbers that begin anew in each window, at 0.
     """
     fleet = Fleet(loop, carries, first_run, widest(len(carries), len(noted)), observers[0], noted)
     for phase in phases:
@@ -65,7 +65,7 @@ def begin_metered(
                 if first < last:
                     fleet.fly(phase, piece, first, last - first, observer)
             done = cut
-            if done == end:
+            if window == len(cuts) - 1:
                 carried = fleet.x[span].copy()
                 fleet.fly(phases[-1], piece, end, 1, observers[1])
                 fleet.x[span] = carried
