@@ -253,9 +253,23 @@ def test_what_is_no_campaign_is_told(tmp_path, content):
         Store.open(tmp_path)
 
 
-def test_a_manifest_changed_by_hand_is_told(store):
+@pytest.mark.parametrize("value", [None, 0, -1, 7.5, "many", [], ["pd"], {}, {"pd": 3}, True, 1e400, "gone"])
+def test_a_manifest_changed_by_hand_is_told(store, value):
     path = store.folder / "manifest.json"
-    path.write_text(path.read_text().replace("0.05", "0.06"))
+    text = path.read_text()
+    written = json.loads(text)
+    for key in written:
+        changed = {name: item for name, item in written.items() if name != key}
+        if value != "gone":
+            changed[key] = value
+        path.write_text(json.dumps(changed))
+        same = json.dumps(changed, sort_keys=True) == json.dumps(written, sort_keys=True)
+        if same or (key == "folder" and value == "many"):
+            assert Store.open(store.folder).manifest.folder == changed["folder"]
+            continue
+        with pytest.raises(InputError, match=r"changed by hand|no manifest"):
+            Store.open(store.folder)
+    path.write_text(text.replace("0.05", "0.06"))
     with pytest.raises(InputError, match="changed by hand"):
         Store.open(store.folder)
 

@@ -82,14 +82,17 @@ class Manifest:
             "allow_unstable": self.allow_unstable,
             "text": self.text,
         }
-        return json.dumps(content, indent=2, allow_nan=False) + "\n"
+        return json.dumps({**content, "seal": _seal(content)}, indent=2, allow_nan=False) + "\n"
 
     @classmethod
     def from_json(cls, text: str, where: str) -> Manifest:
         """The manifest in a text; InputError where it is none, or was changed since it was written."""
         try:
             data = json.loads(text)
-            manifest = cls(
+            # Whatever bears its seal has the types that were written.
+            if data.pop("seal") != _seal(data) or not isinstance(data["folder"], str):
+                raise InputError(where, "", "a file that was changed by hand", "the file as starhold wrote it")
+            return cls(
                 scenario=data["scenario"],
                 text=data["text"],
                 settings=data["campaign"],
@@ -103,12 +106,8 @@ class Manifest:
                 folder=data["folder"],
                 allow_unstable=data["allow_unstable"],
             )
-            whole = data["fingerprint"] == manifest.fingerprint()
-        except (ValueError, KeyError, TypeError, AttributeError):
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             raise InputError(where, "", "no manifest of a campaign", "the file as starhold wrote it") from None
-        if not whole:
-            raise InputError(where, "", "a file that was changed by hand", "the file as starhold wrote it")
-        return manifest
 
     def difference(self, old: Manifest) -> str | None:
         """The first difference from an older manifest that changes results, such as `campaign.seed: 2, was 1`; else None."""
@@ -154,6 +153,12 @@ def difference(new: Any, old: Any, key: str) -> str | None:
     if same > _LONGEST_VALUE // 2:
         mine, theirs = (f"...{text[same - 10 :]}" for text in (mine, theirs))
     return f"{key}: {cut(mine, _LONGEST_VALUE)}, was {cut(theirs, _LONGEST_VALUE)}"
+
+
+def _seal(content: Mapping[str, Any]) -> str:
+    """SHA-256, in hexadecimal, of all that a manifest's file says, but for the folder: a scenario may be moved."""
+    told = {key: value for key, value in content.items() if key != "folder"}
+    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
 
 
 def _tables(text: str) -> dict[str, Any]:
