@@ -4,12 +4,14 @@ import os
 import signal
 import threading
 import time
+from dataclasses import dataclass, replace
 
 import numpy as np
+import psutil
 import pytest
 
 from starhold.campaign import engines
-from starhold.campaign.engines import Scheduler, Threads, Workers, fly_all
+from starhold.campaign.engines import Scheduler, Threads, Workers
 from starhold.campaign.store import Store
 from starhold.errors import InputError
 from tests.campaign.cluster import cluster
@@ -48,9 +50,91 @@ def test_what_a_job_refuses_is_told_as_it_is(store, running, processes):
     assert str(caught.value) == "toy.toml: law.pd: found a gain; allowed: another"
 
 
-def test_a_fault_in_a_job_is_no_user_error(store, running):
+@dataclass(frozen=True)
+class Faulty(Toy):
+    """In a process of its own it goes wrong, from a block on."""
+
+    how: str = ""
+    since: int = 32
+    home: int = os.getpid()
+
+    def fly(self, law, first, count):
+        chunk = super().fly(law, first, count)
+        if os.getpid() == self.home or first < self.since:
+            return chunk
+        if self.how == "raises":
+            raise TypeError("no number\nbut a word")
+        if self.how == "ends":
+            os._exit(3)
+        changes = {
+            "is something else": lambda: "runs",
+            "is of other runs": lambda: super(Faulty, self).fly(law, first + 1, count),
+            "has other columns": lambda: replace(chunk, rows={"run": chunk.rows["run"]}),
+            "is cut": lambda: cut(chunk),
+            "has another bit": lambda: replace(
+                chunk, rows=chunk.rows | {"flown.pd": np.nextafter(chunk.rows["flown.pd"], 9.0)}
+            ),
+        }
+        return changes[self.how]()
+
+
+def cut(chunk):
+    """What no chunk can be, and a pipe delivers."""
+    chunk.rows["settling_time"] = chunk.rows["settling_time"][1:]
+    return chunk
+
+
+FAULTS = {
+    "raises": r"process \d+ on .*: failed in runs 32 to 47 of pd: TypeError: no number; what was flown is kept",
+    "ends": "a block ended all workers that tried it",
+    "is something else": r"process \d+ on .*: found something else than runs 32 to 47 of pd; allowed: what",
+    "is of other runs": "something else than runs 32 to 47 of pd",
+    "has other columns": "something else than runs 32 to 47 of pd",
+    "is cut": "something else than runs 32 to 47 of pd",
+    "has another bit": r"other numbers in run 32 of pd \(flown.pd\)",
+}
+
+
+@pytest.mark.parametrize("how", FAULTS)
+def test_a_worker_that_goes_wrong_is_told_in_one_line(store, how, monkeypatch):
+    monkeypatch.setattr(engines, "_CHECKED", 1.0)
+    with pytest.raises(InputError, match=FAULTS[how]) as caught:
+        fly(store, Workers(1), Faulty(how=how))
+    assert "\n" not in str(caught.value)
+    # What came before is kept, and nothing of what is wrong.
+    assert store.missing("pd")[0] == (32, 16)
+
+
+@pytest.mark.parametrize("how", ["raises", "has another bit"])
+def test_a_worker_of_a_cluster_that_goes_wrong_is_told_in_one_line(store, how, running):
+    with pytest.raises(InputError, match=FAULTS[how].replace("32 to 47", "0 to 15").replace("32", "0")):
+        fly(store, Scheduler(running), Faulty(how=how, since=0))
+    assert store.missing("pd")[0] == (0, 16)
+
+
+def test_a_fault_of_this_process_is_no_user_error(store):
     with pytest.raises(TypeError, match="cannot be interpreted"):
-        fly(store, Scheduler(running), Toy(pause="long"))
+        fly(store, Threads(1), Toy(pause="long"))
+
+
+def test_workers_listen_to_nobody_else(store):
+    """Not to other users of the machine, nor by the network."""
+    here, seen = psutil.Process(), set()
+    before = set(here.children(recursive=True))
+
+    def listening(process):
+        return {one.laddr for one in process.net_connections() if one.status == psutil.CONN_LISTEN}
+
+    held = listening(here)
+
+    def progress(chunk):
+        for process in set(here.children(recursive=True)) - before:
+            seen.add(process)
+            assert not listening(process)
+        assert listening(here) <= held
+
+    fly(store, Workers(2), progress=progress)
+    assert len(seen) >= 2
 
 
 def test_few_blocks_are_under_way_however_many_there_are(tmp_path, running):
@@ -122,19 +206,15 @@ def test_other_versions_are_told(store, running, monkeypatch):
 
 
 def test_a_worker_that_came_later_with_another_version_is_told():
-    refusal = engines._fly(b"", "9.9", "pd", 0, 1)
+    _, refusal = engines._fly(b"", "9.9", "pd", 0, 1)
     assert isinstance(refusal, engines._Refusal)
     assert (refusal.where, refusal.allowed) == ("a worker", "9.9, as here")
 
 
 def test_a_job_that_a_worker_cannot_read_is_told():
-    refusal = engines._fly(b"cnowhere\nnothing\n.", engines.__version__, "pd", 0, 1)
+    _, refusal = engines._fly(b"cnowhere\nnothing\n.", engines.__version__, "pd", 0, 1)
     assert isinstance(refusal, engines._Refusal)
     assert "No module named 'nowhere'" in refusal.allowed
-
-
-def test_nothing_to_fly_starts_nothing(store):
-    fly_all(Toy(), [], store.put, Scheduler("tcp://127.0.0.1:9"))
 
 
 def test_all_laws_have_the_same_runs(store):

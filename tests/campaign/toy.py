@@ -10,7 +10,7 @@ import numpy as np
 
 from starhold.campaign.chunk import Chunk
 from starhold.campaign.digest import digest
-from starhold.campaign.engines import Scheduler, Threads, Workers, fly_all
+from starhold.campaign.engines import Scheduler, Threads, Workers, flying
 from starhold.campaign.manifest import Manifest
 from starhold.campaign.store import Store
 from starhold.errors import InputError
@@ -34,7 +34,8 @@ class Toy:
         return lambda: self.fly(law, first, count)
 
     def fly(self, law, first, count):
-        if self.trail is not None:
+        # A run by itself is one that is flown again, where the campaign is.
+        if self.trail is not None and count > 1:
             with atomic_write(self.trail / f"{law}-{first}") as hidden:
                 hidden.write_text(str(os.getpid()))
         time.sleep(self.pause)
@@ -71,7 +72,12 @@ def missing(store):
 
 def fly(store, engine=Threads(1), job=Toy(), progress=None):  # noqa: B008
     """Fly what is missing; returns the digest."""
-    fly_all(job, missing(store), store.put, engine, progress)
+    left = missing(store)
+    with flying(job, engine, len(left)) as begin:
+        for chunk in begin(left):
+            store.put(chunk)
+            if progress is not None:
+                progress(chunk)
     return digest(store)
 
 

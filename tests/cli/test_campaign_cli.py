@@ -346,6 +346,8 @@ def test_a_scheduler_that_does_not_answer_is_one_line(tmp_path, monkeypatch):
         (tmp_path / "small.toml").write_text(SMALL)
         done = starhold("campaign", "small.toml", "--scheduler", address, "-o", "out", cwd=tmp_path)
     one_line(done, address, "no Dask scheduler answers")
+    # Nothing is left that stands in the way of the next attempt, and nothing is lost that --force would write over.
+    assert not (tmp_path / "out").exists()
     one_line(starhold("campaign", "small.toml", "--scheduler", "nonsense", "-o", "new", cwd=tmp_path), "nonsense")
 
 

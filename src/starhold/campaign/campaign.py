@@ -7,15 +7,14 @@ import os
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from starhold.campaign.chunk import Chunk
 from starhold.campaign.digest import digest
-from starhold.campaign.engines import Engine, Threads, Workers, fly_all
+from starhold.campaign.engines import Block, Engine, Threads, Workers, flying
 from starhold.campaign.job import Job, Source, scenario_of
 from starhold.campaign.manifest import FILE, Manifest
 from starhold.campaign.results import CampaignResult
@@ -112,28 +111,33 @@ def fly_campaign(
         folder=str(scenario.folder.resolve()),
         allow_unstable=scenario.allow_unstable,
     )
-    exists = (folder / FILE).exists()
-    store = (
-        Store.open(folder).resume(manifest) if options.resume and exists else Store.create(folder, manifest, options.force)
-    )
-    for name in laws:
-        store.files(name)
-    for line in store.notices:
-        warnings.warn(line, stacklevel=2)
-    job.progress = notice if isinstance(engine, Threads) else None
-    begun, flown = time.perf_counter(), 0
+    resuming = options.resume and (folder / FILE).exists()
+    with ExitStack() as stack:
+        begin_flying = flying(job, engine, -(-table.runs // manifest.chunk) * len(laws))
+        # Before anything is written or removed: workers that cannot be had leave everything as it is.
+        fly = None if resuming else stack.enter_context(begin_flying)
+        store = Store.open(folder).resume(manifest) if resuming else Store.create(folder, manifest, options.force)
+        missing = [block for name in laws for block in store.missing(name)]
+        for line in store.notices:
+            warnings.warn(line, stacklevel=2)
+        if fly is None and missing:
+            fly = stack.enter_context(begin_flying)
+        job.progress = notice if isinstance(engine, Threads) else None
+        begun, flown = time.perf_counter(), 0
 
-    def arrived(chunk: Chunk) -> None:
-        nonlocal flown
-        flown += chunk.count
-        if notice is not None and job.progress is None:
-            notice(chunk.law, chunk.count)
+        def take(blocks: Sequence[Block]) -> None:
+            nonlocal flown
+            for chunk in fly(list(blocks)) if fly is not None else ():
+                store.put(chunk)
+                flown += chunk.count
+                if notice is not None and job.progress is None:
+                    notice(chunk.law, chunk.count)
 
-    if options.until_decided:
-        runs = _fly_until_decided(store, job, engine, arrived)
-    else:
-        fly_all(job, _blocks(store, notice), store.put, engine, arrived)
-        runs = table.runs
+        if options.until_decided:
+            runs = _fly_until_decided(store, job, take)
+        else:
+            take(list(_blocks(store, notice)))
+            runs = table.runs
     seconds = time.perf_counter() - begun
     results = summarise(store, job, laws, options.until_decided)
     if options.search and job.dispersions and table.requirement:
@@ -197,14 +201,14 @@ def _equal(a: Any, b: Any) -> bool:
     return bool(a == b or (a != a and b != b))
 
 
-def _fly_until_decided(store: Store, job: Job, engine: Engine, arrived: Callable[[Chunk], None]) -> int:
+def _fly_until_decided(store: Store, job: Job, take: Callable[[Sequence[Block]], None]) -> int:
     """Fly on until every requirement of every law is decided, and return the number of runs. Looks are taken at numbers of
     runs that depend on nothing, so that every engine ends at the same one."""
     most, flown = job.table.runs, 0
     while flown < most:
         flown = min(most, max(flown + LOOK, -(-flown * 5 // (4 * LOOK)) * LOOK))
         missing = [(name, first, count) for name in store.manifest.laws for first, count in store.missing(name)]
-        fly_all(job, [block for block in missing if block[1] < flown], store.put, engine, arrived)
+        take([block for block in missing if block[1] < flown])
         verdicts = [verdict for name in store.manifest.laws for verdict in verdicts_of(store, job, name, True, flown)]
         if all(verdict.outcome != "not decided" for verdict in verdicts):
             break

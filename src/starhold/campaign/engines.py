@@ -7,24 +7,26 @@ for each worker are under way at once, so that memory stays bounded for any numb
 from __future__ import annotations
 
 import logging
+import os
 import pkgutil
-import signal
-import threading
+import platform
 import time
 import warnings
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable, Generator, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import islice
-from multiprocessing import resource_tracker
 from queue import Empty, SimpleQueue
-from types import FrameType
-from typing import Any, Protocol, TypeAlias
+from typing import Any, NamedTuple, Protocol, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
 
 from starhold.campaign.chunk import Chunk
 from starhold.campaign.extras import extra
+from starhold.campaign.workers import Team
 from starhold.errors import InputError
 from starhold.simulation.lanes import Crew
 from starhold.version import __version__
@@ -35,6 +37,8 @@ _AHEAD = 2
 """Blocks under way in this process, or for each thread of a worker: one that is flown, and one at hand when it ends."""
 _LOOK = 1.0
 """Seconds between two looks at whether a cluster that returns nothing still lives."""
+_CHECKED = 0.1
+"""The share of the time that may go into flying runs of workers again, beside one of each."""
 _KEPT = "what was flown is kept, --resume goes on from there"
 
 
@@ -55,7 +59,7 @@ class Threads:
 
 @dataclass(frozen=True)
 class Workers:
-    """`count` processes of this machine with one thread each, which listen on the loopback interface alone."""
+    """`count` processes of this machine with one thread each, which nobody but this one can talk to."""
 
     count: int
 
@@ -74,40 +78,95 @@ class Scheduler:
 Engine: TypeAlias = Threads | Workers | Scheduler
 
 
-def fly_all(
-    job: Job,
-    blocks: Iterable[Block],
-    put: Callable[[Chunk], None],
-    engine: Engine,
-    progress: Callable[[Chunk], None] | None = None,
-) -> None:
-    """Fly all blocks, in any order; `put` stores each result as it arrives, then `progress` is told of it.
+Fly: TypeAlias = Callable[[list[Block]], Iterator[Chunk]]
+"""Flies blocks, in any order."""
 
-    InputError where a job raises one; where workers cannot be started or reached, or have other versions of what takes part;
-    and where all of them, or the scheduler, are lost: what was put is whole then, as it is after KeyboardInterrupt.
+
+@contextmanager
+def flying(job: Job, engine: Engine, most: int) -> Generator[Fly]:
+    """Give what flies blocks of a job, `most` at a time or fewer; workers are started or reached before.
+
+    InputError where a job raises one or fails; where workers cannot be started or reached, have other versions of what
+    takes part, or compute other bits; and where all of them, or the scheduler, are lost: what was given is whole then, as
+    it is after KeyboardInterrupt.
     """
-    left = list(blocks)
-
-    def take(chunk: Chunk) -> None:
-        put(chunk)
-        if progress is not None:
-            progress(chunk)
-
-    if not left:
-        return
     if isinstance(engine, Threads):
-        begun = deque[Callable[[], Chunk]]()
         with Crew(engine.count) as crew:
-            for block in left:
-                begun.append(job(*block, crew))
-                if len(begun) == _AHEAD:
-                    take(begun.popleft()())
-            while begun:
-                take(begun.popleft()())
+            yield lambda blocks: _fly_here(job, blocks, crew)
         return
-    with _local(min(engine.count, len(left))) if isinstance(engine, Workers) else _existing(engine) as crew:
-        for chunk in crew.fly(job, left):
-            take(chunk)
+    packed = extra("cloudpickle").dumps(job)
+    if isinstance(engine, Workers):
+        count = min(engine.count, most)
+        with closing(Team(_fly, (packed, __version__), count)) as team:
+            yield lambda blocks: _believed(job, team.fly(blocks), f"{count} workers")
+    else:
+        with _existing(engine) as cluster:
+            yield lambda blocks: _believed(job, cluster.fly(packed, blocks), engine.address)
+
+
+def _fly_here(job: Job, blocks: list[Block], crew: Crew) -> Iterator[Chunk]:
+    begun = deque[Callable[[], Chunk]]()
+    for block in blocks:
+        begun.append(job(*block, crew))
+        if len(begun) == _AHEAD:
+            yield begun.popleft()()
+    while begun:
+        yield begun.popleft()()
+
+
+def _believed(job: Job, results: Iterator[tuple[Block, _Told]], name: str) -> Iterator[Chunk]:
+    """Blocks of workers that return what they should. Of the first block of each worker, and of others as long as that
+    takes little time, the first run is flown here again, to the same bits. InputError where anything is otherwise."""
+    begun, spent, seen = time.monotonic(), 0.0, set[str]()
+    columns: dict[str, dict[str, str]] = {}
+    with Crew(1) as crew:
+        for (law, first, count), (who, result) in results:
+            runs = f"runs {first} to {first + count - 1} of {law}"
+            if isinstance(result, _Refusal):
+                raise InputError(result.where, result.key, result.found, result.allowed)
+            if not _is_chunk(result, law, first, count) or columns.setdefault(law, _kinds(result)) != _kinds(result):
+                raise InputError(name, who, f"something else than {runs}", _KEPT)
+            if who not in seen or spent < _CHECKED * (time.monotonic() - begun):
+                seen.add(who)
+                started = time.monotonic()
+                again = job(law, first, 1, crew)()
+                spent += time.monotonic() - started
+                if told := _differing(result, again):
+                    raise InputError(
+                        name, who, f"other numbers in run {first} of {law} ({told})", f"those of this machine; {_KEPT}"
+                    )
+            yield result
+
+
+def _is_chunk(result: Any, law: str, first: int, count: int) -> bool:
+    if not isinstance(result, Chunk):
+        return False
+    try:
+        # What came through a pipe was not made by its class.
+        return (replace(result).law, result.first, result.count) == (law, first, count)
+    except (ValueError, TypeError, AttributeError):
+        return False
+
+
+def _kinds(chunk: Chunk) -> dict[str, str]:
+    """Kinds of numbers or words by column."""
+    return {name: values.dtype.kind for name, values in chunk.rows.items()}
+
+
+def _differing(chunk: Chunk, again: Chunk) -> str:
+    """Columns in which the first run of a chunk is another than the one that was flown again."""
+    if _kinds(chunk) != _kinds(again):
+        return "which has other columns"
+    pairs = {name: (chunk.rows[name][:1], values[:1]) for name, values in again.rows.items()}
+    found = [name for name, (one, other) in pairs.items() if _bits(one) != _bits(other)]
+    return ", ".join(found[:4])
+
+
+def _bits(values: NDArray[Any]) -> Any:
+    """What must be the same: machines need not agree on the bits of what is no number."""
+    if values.dtype.kind == "f":
+        values = np.where(np.isnan(values), np.nan, values)
+    return values.tolist() if values.dtype.kind in "OU" else values.tobytes()
 
 
 @dataclass(frozen=True)
@@ -126,47 +185,62 @@ def _unpacked(packed: bytes) -> Job:
     return extra("cloudpickle").loads(packed)
 
 
-def _fly(packed: bytes, version: str, law: str, first: int, count: int) -> Chunk | _Refusal:
+class _Told(NamedTuple):
+    """A worker's name, and what it returns for a block."""
+
+    who: str
+    result: Chunk | _Refusal
+
+
+def _fly(packed: bytes, version: str, law: str, first: int, count: int) -> _Told:
     """Fly a block in a worker. version: of starhold in the process that asks."""
+    who = f"process {os.getpid()} on {platform.node()}"
     if version != __version__:
-        return _Refusal("a worker", "", f"starhold {__version__}", f"{version}, as here")
+        return _Told(who, _Refusal("a worker", "", f"starhold {__version__}", f"{version}, as here"))
     try:
         job = _unpacked(packed)
     except ImportError as error:
-        return _Refusal("a worker", "", "", f"cannot read the campaign: {error}; it needs the packages that are here")
+        told = f"cannot read the campaign: {error}; it needs the packages that are here"
+        return _Told(who, _Refusal("a worker", "", "", told))
     try:
         with Crew(1) as crew:
-            return job(law, first, count, crew)()
+            return _Told(who, job(law, first, count, crew)())
     except InputError as error:
-        return _Refusal(error.where, error.key, error.found, error.allowed)
+        return _Told(who, _Refusal(error.where, error.key, error.found, error.allowed))
+    except Exception as error:
+        told = f"failed in runs {first} to {first + count - 1} of {law}: {_in_a_line(error)}; {_KEPT}"
+        return _Told(who, _Refusal("a worker", who, "", told))
+
+
+def _in_a_line(error: BaseException) -> str:
+    lines = f"{error}".splitlines()
+    return f"{type(error).__name__}: {lines[0]}" if lines else type(error).__name__
 
 
 @dataclass(frozen=True)
-class _Crew:
+class _Cluster:
     """A client of a cluster, and how errors call the cluster."""
 
     client: Any
     name: str
     patience: float
 
-    def fly(self, job: Job, blocks: list[Block]) -> Iterator[Chunk]:
-        """The blocks' results as they arrive."""
+    def fly(self, packed: bytes, blocks: list[Block]) -> Iterator[tuple[Block, _Told]]:
+        """Blocks of a pickled job with their results as they arrive."""
         distributed = extra("distributed")
-        packed = extra("cloudpickle").dumps(job)
-        waiting, under_way = iter(blocks), set[Any]()
+        waiting, under_way = iter(blocks), dict[Any, Block]()
         done: SimpleQueue[Any] = SimpleQueue()
         try:
             while True:
                 # Workers of a cluster come and go.
                 for block in islice(waiting, max(0, _AHEAD * max(self._threads(), 1) - len(under_way))):
                     future = self.client.submit(_fly, packed, __version__, *block, pure=False)
-                    under_way.add(future)
+                    under_way[future] = block
                     future.add_done_callback(done.put)
                 if not under_way:
                     return
                 future = self._next(done)
-                under_way.remove(future)
-                yield self._result(future, distributed)
+                yield under_way.pop(future), self._result(future, distributed)
                 future.release()
         finally:
             # Whoever leaves early wants none of these any more.
@@ -189,81 +263,39 @@ class _Crew:
             try:
                 return done.get(timeout=_LOOK)
             except Empty:
-                alone = alone + _LOOK if self._threads() == 0 else 0.0
-                if alone >= self.patience:
-                    raise self._lost(f"no worker for {self.patience:g} s") from None
+                alone = self._still_alone(alone)
 
-    def _result(self, future: Any, distributed: Any) -> Chunk:
+    def _still_alone(self, alone: float) -> float:
+        """Seconds without any worker, after so many and one more look; InputError once there were enough."""
+        alone = alone + _LOOK if self._threads() == 0 else 0.0
+        if alone >= self.patience:
+            raise self._lost(f"no worker for {self.patience:g} s")
+        return alone
+
+    def _result(self, future: Any, distributed: Any) -> _Told:
+        """The result of one that has ended, which is flown again where its worker was lost before it could be had."""
+        alone = 0.0
         try:
-            result = future.result()
+            while True:
+                try:
+                    return _Told(*future.result(timeout=_LOOK))
+                except TimeoutError:
+                    alone = self._still_alone(alone)
+        except InputError:
+            raise
         except distributed.KilledWorker:
             raise self._lost("a block ended all workers that tried it; they may lack memory") from None
-        except (distributed.CancelledError, OSError):
-            if future.status == "error":
-                raise
+        except Exception as error:
+            if future.status == "error" or not isinstance(error, (distributed.CancelledError, OSError)):
+                raise self._lost(f"a worker failed: {_in_a_line(error)}") from error
             raise self._lost("the scheduler does not answer") from None
-        if isinstance(result, _Refusal):
-            raise InputError(result.where, result.key, result.found, result.allowed)
-        return result
 
     def _lost(self, reason: str) -> InputError:
         return InputError(self.name, "", "", f"{reason}; {_KEPT}")
 
 
 @contextmanager
-def _local(count: int) -> Generator[_Crew]:
-    """Processes of this machine, ended with the block."""
-    distributed = extra("distributed")
-    name = f"{count} workers"
-    with _quiet(), ExitStack() as stack:
-        try:
-            with _undisturbed():
-                # Nothing here is ever spilled to the disk or restarted for its memory: what is under way is bounded.
-                cluster = distributed.LocalCluster(
-                    n_workers=count,
-                    threads_per_worker=1,
-                    processes=True,
-                    host="127.0.0.1",
-                    dashboard_address=None,
-                    memory_limit=0,
-                    silence_logs=logging.CRITICAL,
-                )
-                stack.enter_context(cluster)
-        except (RuntimeError, OSError) as error:
-            hint = 'a script needs `if __name__ == "__main__":` before what starts workers'
-            raise InputError(name, "", "", f"cannot be started: {error}; {hint}") from None
-        client = stack.enter_context(distributed.Client(cluster, set_as_default=False, direct_to_workers=True))
-        yield _Crew(client, name, 60.0)
-
-
-@contextmanager
-def _undisturbed() -> Generator[None]:
-    """Hold requests to end back until processes are started: Dask cannot clean up what is half started.
-
-    What is started takes no notice of interrupts from the keyboard: they reach all processes of a terminal, of which this
-    one ends the others.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    asked: list[tuple[int, FrameType | None]] = []
-    held = {number: signal.signal(number, lambda *call: asked.append(call)) for number in (signal.SIGINT, signal.SIGTERM)}
-    # Threads and processes begin with what the thread blocks that starts them; the start of Python's tracker unblocks all.
-    resource_tracker.ensure_running()
-    masked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if hasattr(signal, "pthread_sigmask") else None
-    try:
-        yield
-    finally:
-        if masked is not None:
-            signal.pthread_sigmask(signal.SIG_SETMASK, masked)
-        for number, handler in held.items():
-            signal.signal(number, handler)
-    for number, _ in asked[:1]:
-        signal.raise_signal(number)
-
-
-@contextmanager
-def _existing(engine: Scheduler) -> Generator[_Crew]:
+def _existing(engine: Scheduler) -> Generator[_Cluster]:
     """A cluster that lives on after the block; InputError where it is out of reach, or of other versions."""
     distributed = extra("distributed")
     with _quiet():
@@ -273,29 +305,29 @@ def _existing(engine: Scheduler) -> Generator[_Crew]:
             told = f"{error}".splitlines()[0] if f"{error}" else type(error).__name__
             raise InputError(engine.address, "", "", f"no Dask scheduler answers: {told}") from None
         with client:
-            crew = _Crew(client, engine.address, engine.patience)
-            _check_versions(crew)
-            yield crew
+            cluster = _Cluster(client, engine.address, engine.patience)
+            _check_versions(cluster)
+            yield cluster
 
 
-def _check_versions(crew: _Crew) -> None:
+def _check_versions(cluster: _Cluster) -> None:
     """InputError where a machine of the cluster has no starhold, or other versions of what must be the same everywhere."""
-    end = time.monotonic() + crew.patience
-    while crew._threads() == 0:
+    end = time.monotonic() + cluster.patience
+    while cluster._threads() == 0:
         if time.monotonic() > end:
-            raise InputError(crew.name, "", "", f"no worker for {crew.patience:g} s")
+            raise InputError(cluster.name, "", "", f"no worker for {cluster.patience:g} s")
         time.sleep(0.1)
-    told = crew.client.get_versions()
+    told = cluster.client.get_versions()
     here = _compared(told["client"])
     for machine, versions in [("the scheduler", told["scheduler"]), *told["workers"].items()]:
         for package, version in _compared(versions).items():
             if version != here[package]:
-                raise InputError(crew.name, machine, f"{package} {version}", f"{here[package]}, as here")
-    found = crew.client.run(pkgutil.resolve_name, "starhold.version:__version__", on_error="return")
+                raise InputError(cluster.name, machine, f"{package} {version}", f"{here[package]}, as here")
+    found = cluster.client.run(pkgutil.resolve_name, "starhold.version:__version__", on_error="return")
     for machine, version in found.items():
         if version != __version__:
             shown = f"starhold {version}" if isinstance(version, str) else "no starhold"
-            raise InputError(crew.name, machine, shown, f"{__version__}, as here")
+            raise InputError(cluster.name, machine, shown, f"{__version__}, as here")
 
 
 def _compared(versions: Any) -> dict[str, str]:

@@ -1,0 +1,171 @@
+"""Processes of this machine that fly blocks. Each talks to this one alone, through a pipe that nobody else can open, and
+ends when this one does."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections import Counter, deque
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from multiprocessing import connection, resource_tracker
+from multiprocessing.process import BaseProcess
+from types import FrameType
+from typing import Any
+
+from starhold.errors import InputError
+
+TRIES = 3
+"""Processes that a block may end before it counts as the cause."""
+AHEAD = 2
+"""Blocks that a process has: one that it flies, and one at hand when that ends."""
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""Variables that keep libraries of a process from starting a thread for each core."""
+
+
+@dataclass
+class _Worker:
+    """A process, this end of its pipe, and the blocks that it was given, in order."""
+
+    process: BaseProcess
+    pipe: Any
+    blocks: deque[Any] = field(default_factory=deque[Any])
+    ready: bool = False
+
+
+class Team:
+    """A number of processes that call `work` for blocks, all of them with what it begins with."""
+
+    def __init__(self, work: Callable[..., Any], begun: tuple[Any, ...], count: int) -> None:
+        self._work, self._begun, self._name = work, begun, f"{count} workers"
+        self._workers: list[_Worker] = []
+        try:
+            with _undisturbed():
+                for _ in range(count):
+                    self._start()
+        except BaseException:
+            self.close()
+            raise
+
+    def _start(self) -> None:
+        # Spawned: what a fork would copy are threads in the middle of what they do.
+        context = multiprocessing.get_context("spawn")
+        pipe, other = context.Pipe()
+        process = context.Process(target=_serve, args=(other, self._work, self._begun), daemon=True)
+        kept = {name: os.environ.get(name) for name in ONE_THREAD}
+        os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+        try:
+            process.start()
+        except (OSError, RuntimeError) as error:
+            raise self._cannot_start(str(error)) from None
+        finally:
+            for name, value in kept.items():
+                os.environ.pop(name) if value is None else os.environ.update({name: value})
+            # Held by the process alone, so that its end is seen here.
+            other.close()
+        self._workers.append(_Worker(process, pipe))
+
+    def fly(self, blocks: Iterable[Any]) -> Iterator[tuple[Any, Any]]:
+        """Each block with its result, as they arrive. InputError where processes cannot be started, or where a block ends
+        all that try it."""
+        waiting, deaths = deque(blocks), Counter[Any]()
+        while waiting or any(worker.blocks for worker in self._workers):
+            for worker in self._workers:
+                while worker.ready and waiting and len(worker.blocks) < AHEAD:
+                    worker.blocks.append(waiting.popleft())
+                    self._give(worker)
+            ended: list[_Worker] = []
+            for pipe in connection.wait([worker.pipe for worker in self._workers]):
+                worker = next(one for one in self._workers if one.pipe is pipe)
+                try:
+                    result = worker.pipe.recv()
+                except (EOFError, OSError):
+                    ended.append(worker)
+                    continue
+                if worker.ready:
+                    yield worker.blocks.popleft(), result
+                worker.ready = True
+            for worker in ended:
+                self._replace(worker, deaths)
+                waiting.extendleft(reversed(worker.blocks))
+
+    def _give(self, worker: _Worker) -> None:
+        try:
+            worker.pipe.send(worker.blocks[-1])
+        except OSError:
+            # It has ended, which is seen where its results are waited for.
+            return
+
+    def _replace(self, worker: _Worker, deaths: Counter[Any]) -> None:
+        """Start a process in the place of one that has ended."""
+        self._workers.remove(worker)
+        worker.pipe.close()
+        worker.process.join()
+        if not worker.ready:
+            raise self._cannot_start(f"one ended with code {worker.process.exitcode}")
+        if worker.blocks:
+            deaths[worker.blocks[0]] += 1
+            if deaths[worker.blocks[0]] >= TRIES:
+                raise InputError(self._name, "", "", "a block ended all workers that tried it; they may lack memory")
+        with _undisturbed():
+            self._start()
+
+    def _cannot_start(self, reason: str) -> InputError:
+        hint = 'a script needs `if __name__ == "__main__":` before what starts workers'
+        return InputError(self._name, "", "", f"cannot be started: {reason}; {hint}")
+
+    def close(self) -> None:
+        """End all processes."""
+        for worker in self._workers:
+            worker.pipe.close()
+            worker.process.kill()
+        for worker in self._workers:
+            worker.process.join()
+
+
+def _serve(pipe: Any, work: Callable[..., Any], begun: tuple[Any, ...]) -> None:
+    """Work on blocks from a pipe until it is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    try:
+        pipe.send(None)
+        while True:
+            pipe.send(work(*begun, *pipe.recv()))
+    except (EOFError, OSError):
+        return
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
+
+
+@contextmanager
+def _undisturbed() -> Generator[None]:
+    """Hold requests to end back until processes are started, for one that is half started would complain.
+
+    What is started takes no notice of interrupts from the keyboard: they reach all processes of a terminal, of which this
+    one ends the others.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    asked: list[tuple[int, FrameType | None]] = []
+    held = {number: signal.signal(number, lambda *call: asked.append(call)) for number in (signal.SIGINT, signal.SIGTERM)}
+    # Threads and processes begin with what the thread blocks that starts them; the start of Python's tracker unblocks all.
+    resource_tracker.ensure_running()
+    masked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if hasattr(signal, "pthread_sigmask") else None
+    try:
+        yield
+    finally:
+        if masked is not None:
+            signal.pthread_sigmask(signal.SIG_SETMASK, masked)
+        for number, handler in held.items():
+            signal.signal(number, handler)
+    for number, _ in asked[:1]:
+        signal.raise_signal(number)
