@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -93,16 +94,17 @@ def _follow(job: Job, text: str) -> None:
     complaints: list[str] = []
     listener = threading.Thread(target=lambda: complaints.extend(errors), daemon=True)
     listener.start()
-    try:
-        given.write(text)
-        given.close()
-    except BrokenPipeError:
-        pass
+    with suppress(BrokenPipeError):
+        # Left open: where this process ends, however that happens, the job sees its end and ends too.
+        given.write(json.dumps(text) + "\n")
+        given.flush()
     for line in told:
         if "error" not in job.state:
             job.state = json.loads(line)
     process.wait()
     listener.join()
+    with suppress(BrokenPipeError):
+        given.close()
     if not {"shown", "error"} & job.state.keys():
         job.state = {"error": "".join(complaints[-20:]).strip() or f"ended with code {process.returncode}"}
     job.ended = True

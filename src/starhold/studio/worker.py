@@ -1,10 +1,13 @@
-"""Does one thing that the studio was asked for, in a process of its own: reads a scenario's text from standard input, tells
-its progress and its result as lines of JSON, and leaves its files in a folder."""
+"""Does one thing that the studio was asked for, in a process of its own: reads a scenario's text as a line of JSON from
+standard input, tells its progress and its result as lines of JSON, and leaves its files in a folder. It ends where its
+standard input does."""
 
 from __future__ import annotations
 
 import json
+import os
 import sys
+import threading
 import time
 from collections.abc import Callable
 from html import escape
@@ -138,7 +141,8 @@ KINDS = {"compare": _compare, "certify": _certify, "design": _design, "failures"
 
 def main(kind: str, where: str, beside: str, folder: str) -> None:
     """Do it; the last line tells the file to look at, or what was wrong."""
-    told, text = [0.0], sys.stdin.read()
+    told, text = [0.0], json.loads(sys.stdin.readline())
+    threading.Thread(target=_end_with_studio, daemon=True).start()
 
     def tell(done: int, total: int, what: str) -> None:
         now = time.monotonic()
@@ -151,6 +155,13 @@ def main(kind: str, where: str, beside: str, folder: str) -> None:
         _say({"shown": KINDS[kind](scenario, Path(folder), tell)})
     except InputError as error:
         _say({"error": str(error), "key": error.key})
+
+
+def _end_with_studio() -> None:
+    # Not through sys.stdin, which a thread that waits for it would hold at the end of this process.
+    while os.read(0, 1):
+        pass
+    os._exit(1)
 
 
 def _say(what: dict[str, Any]) -> None:
