@@ -321,6 +321,11 @@ BAD = {
     "unknown law": (SMALL, ["--law", "lqr"], ["law", "lyapunov, pd"]),
     "no TOML": ("campaign = [", [], ["not TOML"]),
     "campaign that is no table": (other("[campaign]\nruns = 24", "campaign = 3"), [], ["campaign"]),
+    "nothing to draw": (
+        SMALL[: SMALL.index("[[campaign")].partition("[campaign")[0] + SMALL[SMALL.index("[[law") :],
+        [],
+        ["campaign", "no [campaign] table"],
+    ),
     "decided by no requirement": (
         SMALL[: SMALL.index("[[campaign")] + SMALL[SMALL.index("[[law") :],
         ["--until-decided"],
@@ -335,6 +340,7 @@ def test_bad_input_is_one_line(tmp_path, case):
     (tmp_path / "small.toml").write_text(text)
     done = starhold("campaign", "small.toml", *words, "-o", "out", cwd=tmp_path)
     one_line(done, *told)
+    assert done.stdout == ""
     assert not (tmp_path / "out").exists()
 
 

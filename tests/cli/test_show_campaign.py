@@ -13,6 +13,7 @@ from rich.console import Console
 from starhold.campaign.verdicts import percent
 from starhold.cli import show_campaign
 from starhold.cli.show_campaign import flying_campaign, print_campaign
+from starhold.errors import InputError
 from starhold.report.campaign_units import figure
 from tests.report.campaign_made import result
 
@@ -75,6 +76,23 @@ def test_a_campaign_without_requirements_or_of_another_body(printed: Any) -> Non
     assert "nothing is required of it" in text
     assert "settling time" in text
     assert "flown" not in text
+
+
+def refused_after(flown: int) -> None:
+    with flying_campaign(["pd"], 10) as notice:
+        if flown:
+            notice("pd", flown)
+        raise InputError("a.toml", "campaign", "nothing", "something")
+
+
+def test_an_error_before_any_run_stands_alone(printed: Any) -> None:
+    def fly(flown: int) -> None:
+        with pytest.raises(InputError):
+            refused_after(flown)
+
+    assert printed(lambda: fly(0)) == ""
+    assert "10 runs of 1 law" not in printed(lambda: fly(0), terminal=True)
+    assert "4/10 runs" in printed(lambda: fly(4))
 
 
 def test_bars_count_runs_and_tell_rate_and_time_left(printed: Any) -> None:

@@ -39,6 +39,7 @@ CHUNK, SMALL = 16384, 512
 LOOK = 1024
 """Runs after which a campaign that ends when all is decided is looked at."""
 
+NO_TABLE = "one with [campaign.over] that says what is drawn, or a number of runs that differ by their noise alone"
 Notice = Callable[[str, int], None]
 """Called with a law and how many more of its runs were flown."""
 
@@ -56,10 +57,11 @@ class Options:
 
 
 def with_campaign(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
-    """The scenario with other entries of its [campaign] table, or with one; None leaves an entry as it is."""
+    """The scenario with other entries of its [campaign] table, or with one; None leaves an entry as it is. InputError where
+    there is none, and nothing is said of what is drawn or how many runs there are."""
     given = {key: value for key, value in changes.items() if value is not None}
-    if scenario.table.campaign is None and not given:
-        given = {"runs": CampaignTable().runs}
+    if scenario.table.campaign is None and not given.keys() & {"runs", "over"}:
+        raise InputError(scenario.where, "campaign", "no [campaign] table", NO_TABLE)
     return scenario.with_({f"campaign.{key}": value for key, value in given.items()}) if given else scenario
 
 

@@ -57,7 +57,8 @@ def campaign(
     scenario = with_campaign(load(file, allow_unstable), {"runs": runs, "seed": seed, "sampling": sampling})
     laws = [entry.name for entry in scenario.laws] if law is None else [scenario.pick(law).name]
     folder = output or Path("results") / f"{scenario.name}-campaign"
-    with flying_campaign(laws, scenario.table.campaign.runs) as notice:
+    table = scenario.table.campaign
+    with flying_campaign(laws, table.runs, bool(table.over)) as notice:
         options = Options(engine, resume, force, until_decided, search)
         result = fly_campaign(scenario, folder, law, options, notice)
     print_campaign(result, scenario.body)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from rich.markup import escape
@@ -14,6 +14,7 @@ from rich.text import Text
 
 from starhold.campaign.verdicts import percent
 from starhold.cli.show import console
+from starhold.errors import InputError
 from starhold.report.campaign_units import (
     DASH,
     Wording,
@@ -47,9 +48,10 @@ class Rate(ProgressColumn):
 
 
 @contextmanager
-def flying_campaign(laws: Sequence[str], runs: int) -> Iterator[Callable[[str, int], None]]:
+def flying_campaign(laws: Sequence[str], runs: int, drawn: bool = True) -> Iterator[Callable[[str, int], None]]:
     """Show a bar for each law, of so many runs, with the rate and the time left; yields what is to be called with a law and
-    how many more of its runs are done, from any thread."""
+    how many more of its runs are done, from any thread. Where an error ends it before any run, nothing of it stays. drawn:
+    whether runs differ in more than their noise."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -58,16 +60,30 @@ def flying_campaign(laws: Sequence[str], runs: int) -> Iterator[Callable[[str, i
         Rate(),
         TimeLeft(),
     )
-    console.print(f"{counted(runs, 'run')} of {counted(len(laws), 'law')}", highlight=False)
-    with Progress(*columns, console=console) as bars:
-        tasks: dict[str, TaskID] = {}
-        for law in laws:
-            tasks[law] = bars.add_task(f"{escape(_plain(law))} (compiling)", total=runs)
+    titles = [f"{counted(runs, 'run')} of {counted(len(laws), 'law')}"]
+    if not drawn:
+        titles[0] += "; nothing is drawn, so they differ by their random numbers alone, if there are any"
+    bars = Progress(*columns, console=console)
+    tasks: dict[str, TaskID] = {}
+    for law in laws:
+        tasks[law] = bars.add_task(f"{escape(_plain(law))} (compiling)", total=runs)
 
-        def notice(law: str, more: int) -> None:
-            bars.update(tasks[law], advance=more, description=escape(_plain(law)))
+    def notice(law: str, more: int) -> None:
+        with suppress(IndexError):
+            console.print(titles.pop(), highlight=False)
+            bars.start()
+        bars.update(tasks[law], advance=more, description=escape(_plain(law)))
 
+    if console.is_terminal:
+        bars.start()
+    try:
         yield notice
+    except InputError:
+        bars.live.transient = bool(titles)
+        raise
+    finally:
+        if bars.live.is_started:
+            bars.stop()
 
 
 def print_campaign(result: CampaignResult, body: str) -> None:

@@ -113,12 +113,11 @@ def _failures(scenario: Scenario, folder: Path, tell: Tell) -> str:
 
 
 def _campaign(scenario: Scenario, folder: Path, tell: Tell) -> str:
-    from starhold.campaign.campaign import Options, fly_campaign
+    from starhold.campaign.campaign import Options, fly_campaign, with_campaign
     from starhold.campaign.engines import engine_of
     from starhold.report.campaign_files import write_campaign
 
-    if scenario.table.campaign is None:
-        raise InputError(scenario.where, "campaign", "no [campaign] table", "what is drawn, and how many runs")
+    scenario = with_campaign(scenario, {})
     total, done = scenario.table.campaign.runs * len(scenario.laws), [0]
 
     def notice(law: str, more: int) -> None:
