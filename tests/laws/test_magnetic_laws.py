@@ -8,11 +8,13 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import starhold as sh
+from starhold.errors import InputError
 from starhold.laws import b_dot, cross_product
 from starhold.laws.interface import Measurement
 from starhold.parts.craft import make_craft
 from starhold.parts.magnetic_field import field, prepared
-from starhold.scenario.reading import parse
+from starhold.scenario.building import build
+from starhold.scenario.reading import builtin_text, parse
 
 INERTIA = np.array([0.05, 0.065, 0.025])
 CRAFT = make_craft(INERTIA)
@@ -141,3 +143,47 @@ def test_no_claim_is_made_of_a_law_that_the_field_steers():
     for law in ('type = "b-dot"\nk = 1e-4\n', 'type = "cross-product"\nk_rate = 1e-4\nk_attitude = 1e-6\n'):
         (certificate,) = sh.certify(parse(text(law, "[0.1, 0, 0]"), "own"))
         assert not any(claim.outcome == "proved" for claim in certificate.claims)
+
+
+WHEELS = """
+[wheels]
+layout = "orthogonal"
+inertia = 2e-5
+torque_limit = "2 mN m"
+momentum_limit = "15 mN m s"
+"""
+MODES = """
+[[law]]
+name = "mission"
+type = "modes"
+[[law.mode]]
+name = "detumble"
+type = "b-dot"
+k = 1e-3
+effectors = ["wheels"]
+until = { after = "20 s" }
+[[law.mode]]
+name = "point"
+type = "pd"
+k_rate = 0.006
+k_attitude = 0.0008
+"""
+
+
+@pytest.mark.parametrize("law", ["b-dot", "cross-product"])
+def test_a_dipole_on_wheels_is_refused(law):
+    """Wheels would only take the momentum over."""
+    given = "k = 1e-3\n" if law == "b-dot" else "k_rate = 2e-4\nk_attitude = 2e-7\n"
+    base = builtin_text("cubesat-detumble")
+    flown = base[: base.index("[[law]]")]
+    own = f'[[law]]\ntype = "{law}"\n{given}'
+    tables = flown.replace('[[part]]\ntype = "magnetorquers"\ndipole_limit = "0.2 A m^2"', WHEELS)
+    assert tables != flown
+    for text_of, where in ((own, f"law {law}"), (MODES, "law modes, mode detumble")):
+        scenario = parse(tables + text_of, "mine.toml")
+        with pytest.raises(InputError, match=f"^mine.toml: {where}: found .* with wheels, which keep the momentum"):
+            build(scenario, scenario.laws[0])
+    # A torque that nothing is said of may come from outside, as that of rods does.
+    for parts in (flown, flown.replace('[[part]]\ntype = "magnetorquers"\ndipole_limit = "0.2 A m^2"', "")):
+        scenario = parse(parts + own, "mine.toml")
+        assert build(scenario, scenario.laws[0]).law.name == law

@@ -81,6 +81,7 @@ MEASURES: dict[str, Measure] = {
 }
 """The metrics a comparison shows; in each, less is better."""
 
+
 class Goal(NamedTuple):
     """The numbers of the notes, scaled: the radius of the circle or the place of rest, the distance that counts as near, and
     the last instant."""

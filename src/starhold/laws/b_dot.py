@@ -24,6 +24,7 @@ CARD = Card(
     quaternion_sign="even",
 )
 READS = ("magnetic_field",)
+FROM_OUTSIDE = True
 
 
 class Gains(NamedTuple):

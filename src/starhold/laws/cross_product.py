@@ -18,6 +18,7 @@ CARD = Card(
     claims="none",
 )
 READS = ("magnetic_field",)
+FROM_OUTSIDE = True
 
 
 class Gains(NamedTuple):

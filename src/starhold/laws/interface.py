@@ -5,7 +5,8 @@ A law file holds `CARD`, `class Gains(NamedTuple)`, the equation
 `lyapunov(measurement, gains, craft)`, design forms (`FORMS` with `design(craft, spec)`, and `complete(spec, start)` for
 inputs that the scenario gives), `check(gains, craft)` that refuses what cannot be stable, and
 `remember(gains, craft, period)` for a memory that is not empty, and `record(memory, period)` for what is recorded of that,
-a NamedTuple whose fields are annotated with `Quantity`.
+a NamedTuple whose fields are annotated with `Quantity`. `FROM_OUTSIDE = True`: the torque has to come from outside the
+spacecraft, as that of magnetorquers does and that of wheels does not.
 """
 
 from __future__ import annotations

@@ -17,6 +17,7 @@ from starhold.algebra.structured import Buffer
 from starhold.algebra.vector import ZERO
 from starhold.errors import InputError, is_interrupt
 from starhold.files import read_text
+from starhold.laws.catalogue import Law
 from starhold.laws.modes import Modes
 from starhold.loop.closed_loop import ClosedLoop, before_first, can_rest, is_recorded
 from starhold.loop.step import make_equations
@@ -212,6 +213,7 @@ def _check_effectors(loop: ClosedLoop, where: str) -> None:
         if len(acting) > 1:
             found = f"a second effector for the command, beside {acting[0].called}"
             raise InputError(where, _key(acting[1]), found, 'one, or a law of type "modes" whose modes say which')
+        _check_outside(loop.law, acting, where, f"law {loop.law.name}")
         return
     for mode in module.modes:
         key = f"law {loop.law.name}, mode {mode.name}: effectors"
@@ -223,6 +225,16 @@ def _check_effectors(loop: ClosedLoop, where: str) -> None:
             raise InputError(where, key, f"{' and '.join(working)}, which both take the command", "one of them")
         if acting and not working:
             raise InputError(where, key, "none that takes the command", f"one of {', '.join(f.part.name for f in acting)}")
+        _check_outside(
+            mode.law, [f for f in acting if mode.has(f.part.name)], where, f"law {loop.law.name}, mode {mode.name}"
+        )
+
+
+def _check_outside(law: Law, acting: list[Fitted], where: str, key: str) -> None:
+    """InputError where a law's torque has to come from outside, and an effector would only shift momentum."""
+    if law.flag("FROM_OUTSIDE") and acting and not acting[0].part.flag("OUTSIDE"):
+        found = f"{law.name} with {acting[0].called}, which keep the momentum that it is to take away"
+        raise InputError(where, key, found, "magnetorquers, another effector that acts from outside, or none")
 
 
 def _key(fitted: Fitted) -> str:
