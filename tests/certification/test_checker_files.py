@@ -2,7 +2,9 @@
 
 import copy
 import json
-from time import process_time
+from functools import partial
+from importlib import import_module
+from time import process_time, thread_time
 
 import pytest
 from flint import fmpq
@@ -11,11 +13,12 @@ from starhold.certification.certificate import write
 from starhold.certification.certify import certify
 from starhold.checker import check, check_file, passed
 from starhold.checker import exact as checking
-from starhold.checker.reading import in_time, limited
+from starhold.checker.exact import in_time, limited
 from starhold.checker.torque import SHAPES, keeps_below
 from starhold.errors import InputError
 from starhold.laws import pd
-from tests.certification.edits import content_at, edited, reasons
+from tests.certification.by_hand import PD, by_hand, converging
+from tests.certification.edits import alone, claims_of, content_at, edited, reasons
 from tests.certification.loops import FULL, loop_of
 
 # Together: each worker would make the certificates of the textbook loops for itself.
@@ -104,6 +107,25 @@ def test_a_check_that_takes_too_long_is_given_up():
     with limited(0.0), limited(60.0), pytest.raises(checking.CheckError):
         in_time()
     in_time()
+
+
+def test_the_limit_of_time_binds_wherever_a_file_can_be_long(made, monkeypatch):
+    count, path = 3000, ("disturbance", "witness", "steps")
+    against = alone(made("pd-0", disturbance=1e-4), "disturbance")
+    steps = claims_of(against)["disturbance"]["witness"]["steps"]
+    history = {"interpolant": "rotation spline", "times": list(range(count)), "attitudes": [[1.0, 0.0, 0.0, 0.0]] * count}
+    history["rates"] = [[0.01, 0.0, 0.0], [-0.01, 0.0, 0.0]] * (count // 2)
+    follows = {"target": "history", "history": history, "target_rate": 0.01 * (1.0 + 1e-9), "target_acceleration": 1.0}
+    axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] * count
+    wheels = {"axes": axes, "least": [[-x / count for x in axis] for axis in axes], "inertia": [1e-3] * (3 * count)}
+    wheels |= {"torque_limit": [None] * (3 * count), "momentum_limit": [None] * (3 * count), "momentum": [0.0] * (3 * count)}
+    wheels |= {"allocation": "least-squares", "total_momentum": 0.0}
+    long = [by_hand("pd", PD, [converging()], **told) for told in (follows, {"wheels": wheels})]
+    monkeypatch.setattr(import_module("starhold.checker.check"), "limited", partial(limited, 0.05))
+    for content in (edited(against, path, steps * 500), *long):
+        begun = thread_time()
+        assert any("takes longer than" in reason for reason in reasons(content))
+        assert thread_time() - begun < 1.0
 
 
 @pytest.mark.parametrize("size", [1e-300, 1e-30, 1e30, 1e104])

@@ -14,8 +14,7 @@ from flint import fmpq
 from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import Polynomial
-from starhold.checker.exact import ONE, ZERO
-from starhold.checker.reading import in_time
+from starhold.checker.exact import ONE, ZERO, in_time
 
 Box: TypeAlias = Mapping[str, tuple[Any, Any]]
 """Ends of each variable's interval, rationals."""

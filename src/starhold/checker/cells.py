@@ -17,8 +17,7 @@ from flint import Ordering, fmpq_mpoly_ctx
 
 from starhold.algebra.polynomial import Polynomial, jointly
 from starhold.checker.covering import Poly, Question, answer
-from starhold.checker.exact import ONE, ZERO, CheckError, demand
-from starhold.checker.reading import in_time
+from starhold.checker.exact import ONE, ZERO, CheckError, demand, in_time
 
 MOST, TERMS = 64, 50_000
 """Cells, and terms that V' may have."""

@@ -14,10 +14,10 @@ import numpy as np
 from flint import ctx
 
 from starhold.checker.claims import CLAIMS
-from starhold.checker.exact import CheckError, Obligation, Verdict, demand
+from starhold.checker.exact import CheckError, Obligation, Verdict, demand, limited
 from starhold.checker.invariant import FORMAT as INVARIANT
 from starhold.checker.invariant import invariant_findings
-from starhold.checker.reading import limited, read_file, shallow
+from starhold.checker.reading import read_file, shallow
 from starhold.checker.refutation import refutation
 from starhold.checker.shapes import (
     CERTIFICATE,

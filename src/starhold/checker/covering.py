@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import Polynomial
 from starhold.checker.bernstein import CLEAR, decided, halves, stacked, steepest
-from starhold.checker.exact import CheckError
-from starhold.checker.reading import in_time
+from starhold.checker.exact import CheckError, in_time
 
 Poly: TypeAlias = Any
 """`fmpq_mpoly`."""

@@ -6,12 +6,15 @@ A matrix is a list of rows of rationals (`fmpq`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import reduce
 from itertools import combinations, zip_longest
 from operator import mul
+from time import thread_time
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -28,6 +31,8 @@ Obligation: TypeAlias = tuple[str, str, Callable[[], str]]
 """Its name, how it is to be shown ("" for numbers that are no obligation of their own), and what shows it: the reason, or a
 CheckError."""
 ZERO, ONE = fmpq(0), fmpq(1)
+SECONDS = 60.0
+"""Processor time for one claim."""
 SHARES = (0.0, *(2.0**k for k in range(-52, 4)))
 """By which share of the largest eigenvalue a guess of one is raised, the first that suffices."""
 
@@ -40,14 +45,36 @@ class NotCheckedError(CheckError):
     """Why the checker's methods neither showed something nor found it false."""
 
 
+_late: ContextVar[float] = ContextVar("late", default=float("inf"))
+
+
+@contextmanager
+def limited(seconds: float = SECONDS) -> Generator[None]:
+    """Give the work within so many seconds of processor time, no more than what it is part of has; `in_time` stops it."""
+    before = _late.set(min(thread_time() + seconds, _late.get()))
+    try:
+        yield
+    finally:
+        _late.reset(before)
+
+
+def in_time() -> None:
+    """A CheckError where the check of a claim takes longer than it may. What all checks are made of calls it: demands, numbers
+    of the file, products and determinants of matrices; only loops without any of these have to call it themselves."""
+    if thread_time() >= _late.get():
+        raise CheckError(f"the check takes longer than {SECONDS:g} s of processor time")
+
+
 def demand(holds: bool, otherwise: str) -> None:
-    """Raise a CheckError unless something holds."""
+    """Raise a CheckError unless something holds, or where time is up."""
     if not holds:
         raise CheckError(otherwise)
+    in_time()
 
 
 def rational(x: Any) -> Any:
     """The exact value of a number of the file."""
+    in_time()
     return fmpq(*Fraction(x).as_integer_ratio())
 
 
@@ -97,7 +124,13 @@ def transpose(a: Rows) -> Rows:
 
 def matmul(a: Rows, b: Rows) -> Rows:
     """The product a b."""
-    return [[sum((x * y for x, y in zip(row, column, strict=True)), ZERO) for column in transpose(b)] for row in a]
+    columns = transpose(b)
+    return [[_product(row, column) for column in columns] for row in a]
+
+
+def _product(a: Sequence[Any], b: Sequence[Any]) -> Any:
+    in_time()
+    return sum((x * y for x, y in zip(a, b, strict=True)), ZERO)
 
 
 def symmetric_part(a: Rows) -> Rows:
@@ -118,6 +151,7 @@ def inverse(a: Rows) -> Rows:
 
 def determinant(a: Rows) -> Any:
     """The exact determinant."""
+    in_time()
     return fmpq_mat(a).det()
 
 

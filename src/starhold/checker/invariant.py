@@ -14,9 +14,9 @@ from flint import fmpq
 from starhold.algebra.scalar import maximum
 from starhold.checker.area import area
 from starhold.checker.cells import polynomial, split
-from starhold.checker.exact import CheckError, NotCheckedError, Verdict, demand, rational
+from starhold.checker.exact import CheckError, NotCheckedError, Verdict, demand, limited, rational
 from starhold.checker.indicator import Indicator
-from starhold.checker.reading import limited, number, read, read_names
+from starhold.checker.reading import number, read, read_names
 from starhold.checker.shapes import CERTIFICATE, CLAIM, OBLIGATION, outcome_of, shaped
 
 FORMAT = "starhold invariant certificate 2"

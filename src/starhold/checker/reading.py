@@ -8,12 +8,9 @@ from __future__ import annotations
 
 import ast
 import json
-from collections.abc import Generator, Iterable, Mapping, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
-from time import thread_time
 from typing import Any, cast
 
 from starhold.algebra.polynomial import Polynomial, pieces
@@ -21,14 +18,11 @@ from starhold.algebra.scalar import absolute, less, maximum, minimum, sign, wher
 from starhold.checker.exact import CheckError, demand
 from starhold.errors import InputError
 
-BYTES, DEEPEST, DIGITS, SECONDS = 2**26, 32, 1_000, 60.0
-"""The largest file; how deep its objects and lists may be in one another; digits of a number; seconds for one claim."""
+BYTES, DEEPEST, DIGITS = 2**26, 32, 1_000
+"""The largest file; how deep its objects and lists may be in one another; digits of a number."""
 LONGEST, PIECES, TERMS, POWER = 2_000, 64, 600, 24
 """Characters of a text, pieces and terms of what it stands for, and powers: what is larger is not read."""
 _ARGUMENTS = {"min": range(2, 9), "max": range(2, 9), "abs": [1], "clip": [2], "sat": [1, 2], "sign": [1], "where": [3]}
-
-
-_late: ContextVar[float] = ContextVar("late", default=float("inf"))
 
 
 def read_file(path: Path | str) -> tuple[Any, list[str]]:
@@ -79,21 +73,6 @@ def _within(part: Any) -> Iterable[Any]:
     return cast(list[Any], part) if isinstance(part, list) else ()
 
 
-@contextmanager
-def limited(seconds: float = SECONDS) -> Generator[None]:
-    """Give the work within so many seconds of processor time, no more than what it is part of has; `in_time` stops it."""
-    before = _late.set(min(thread_time() + seconds, _late.get()))
-    try:
-        yield
-    finally:
-        _late.reset(before)
-
-
-def in_time() -> None:
-    """A CheckError where the check of a claim takes longer than it may. For loops to call."""
-    demand(thread_time() < _late.get(), f"the check takes longer than {SECONDS:g} s of processor time")
-
-
 def read_names(names: Sequence[str], define: Mapping[str, Any]) -> dict[str, Any]:
     """Variables, parameters and what is defined from them, each later one from those before."""
     known: dict[str, Any] = {}
@@ -127,7 +106,6 @@ def number(text: Any) -> Fraction:
 
 def _short(parts: Sequence[Any]) -> None:
     """A CheckError where a coefficient of piecewise polynomials has too many digits."""
-    in_time()
     numbers = (c for part in parts for c in part.value.terms.values())
     short = all(max(int(c.p).bit_length(), int(c.q).bit_length()) < 4 * DIGITS for c in numbers)
     demand(short, f"a number has more than {DIGITS} digits")

@@ -10,8 +10,7 @@ from typing import Any
 
 from flint import arb
 
-from starhold.checker.exact import ONE, ZERO, demand
-from starhold.checker.reading import in_time
+from starhold.checker.exact import ONE, ZERO, demand, in_time
 
 SHAPES = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
 """Powers of |q| and of the rate's bound z, by which the bound of a torque is sorted."""

@@ -86,8 +86,9 @@ def read_wheels(given: Mapping[str, Any]) -> SubjectWheels:
 
 def _check_shares(wheels: SubjectWheels) -> None:
     """That the rows give the torque that is asked for, and with the least sum of squares: -A'(A A')^-1."""
-    axes, rows = ([matrix[k] for k in wheels.working] for matrix in (wheels.axes, wheels.least))
-    lost = [row for k, row in enumerate(wheels.least) if k not in wheels.working]
+    working = wheels.working
+    axes, rows = ([matrix[k] for k in working] for matrix in (wheels.axes, wheels.least))
+    lost = [row for row, limit in zip(wheels.least, wheels.torque_limit, strict=True) if limit == 0]
     demand(not any(x for row in lost for x in row), "a lost wheel takes a share")
     demand(len(axes) >= 3, "fewer than three wheels work")
     given = matmul(transpose(axes), times(-1, rows))
@@ -121,10 +122,11 @@ def keeps_momenta(wheels: SubjectWheels, told: Sequence[Any], J: Rows, P: Rows, 
     stored = matmul([wheels.momentum], wheels.axes)[0]
     fastest = ZERO if target_rate == 0 else greatest(J) * target_rate
     form = matmul(matmul(J, inverse(P)), J)
+    working = set(wheels.working)
     for k, (row, momentum, most, limit) in enumerate(
         zip(wheels.least, wheels.momentum, told, wheels.momentum_limit, strict=True)
     ):
-        if k not in wheels.working:
+        if k not in working:
             demand(abs(momentum) <= most and (limit is None or most <= limit), f"lost wheel {k + 1} holds more")
             continue
         demand(limit is None or most <= FREE * limit, f"wheel {k + 1} may reach its momentum limit")
