@@ -30,7 +30,7 @@ def by_hand(law, gains, claims, **changes):
         "law": law,
         "gains": gains,
         "quaternion_sign": "as_published",
-        "hysteresis_width": 0.5,
+        "hysteresis_width": 0.5 if changes.get("quaternion_sign") == "hysteresis" else None,
         "inertia": [[2.0, 0.1, 0.0], [0.1, 3.0, -0.25], [0.0, -0.25, 4.0]],
         "limit": "axis",
         "torque_limit": None,
@@ -46,10 +46,12 @@ def by_hand(law, gains, claims, **changes):
         "control_period": 0.25,
         "assumed_away": [],
         "wheels": None,
+        "switch": None,
         **changes,
     }
     outcome = "undecided" if [claim["kind"] for claim in claims] == ["sampling"] else "proved"
-    certificate = {"name": law, "outcome": outcome, "subject": subject, "claims": claims}
+    kinds = [claim["kind"] for claim in claims]
+    certificate = {"name": law, "outcome": outcome, "subject": subject, "kinds": kinds, "claims": claims}
     return {"format": "starhold certificate 2", "scenario": "hand", "versions": {}, "certificates": [certificate]}
 
 

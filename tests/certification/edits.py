@@ -16,7 +16,18 @@ def alone(content, kind):
     claim = claims_of(content)[kind]
     # The linear loop alone proves nothing of where the motion ends.
     outcome = "undecided" if (kind, claim["outcome"]) == ("sampling", "proved") else claim["outcome"]
-    return {**content, "certificates": [{**certificate, "outcome": outcome, "claims": [claim]}]}
+    subject = certificate["subject"]
+    if kind not in ("disturbance", "sliding") and "disturbance" in subject:
+        subject = {**subject, "disturbance": 0.0}
+    one = {**certificate, "outcome": outcome, "subject": subject, "claims": [claim]}
+    return with_kinds({**content, "certificates": [one]})
+
+
+def with_kinds(content):
+    """The content with the list of the claims that are there."""
+    for certificate in content["certificates"]:
+        certificate["kinds"] = [claim["kind"] for claim in certificate["claims"]]
+    return content
 
 
 def edited(content, place, value):

@@ -19,7 +19,7 @@ from starhold.laws import l2_equilibrium
 from starhold.laws.catalogue import catalogue
 from starhold.parts.bodies.libration_point import POINTS, PRIMARIES
 from tests.certification.by_hand import by_hand
-from tests.certification.edits import changed, faults, outcomes
+from tests.certification.edits import changed, faults, outcomes, with_kinds
 from tests.certification.equilibria import GAINS, OFF, PLANT, STEEP, STEEPNESS, STRONG, WEAK, loop_of
 from tests.making import point_loop
 
@@ -170,7 +170,7 @@ def test_a_claim_of_the_other_kind_fails(made):
     for one, kind in ((main, "saturated-axis"), (limited, "equilibrium"), (main, "circle"), (limited, "control-limit")):
         renamed = copy.deepcopy(content)
         renamed["certificates"][0]["claims"] = [{**one, "kind": kind}]
-        assert faults(renamed)
+        assert faults(with_kinds(renamed))
     attitude = by_hand("lyapunov", {"k_attitude": 0.1, "k_rate": 0.5}, [main])
     assert "there is no kind of claim equilibrium about such a loop" in faults(attitude).values()
 
@@ -236,7 +236,7 @@ def test_the_limited_axis_of_the_full_problem_is_not_claimed(made):
     content["certificates"][0]["claims"][1]["assumptions"][0] = "motion exactly as modelled"
     content["certificates"][0]["claims"].pop(0)
     content["certificates"][0]["outcome"] = "undecided"
-    assert faults(content) == {("saturated-axis", ""): "the limited control is read for the linear model alone"}
+    assert faults(with_kinds(content)) == {("saturated-axis", ""): "the limited control is read for the linear model alone"}
 
 
 # --- refutations ------------------------------------------------------------------------------------------------------

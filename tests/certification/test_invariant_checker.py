@@ -12,6 +12,7 @@ from starhold.checker.cells import divides, linear, negative_multiple, signed_li
 from starhold.checker.covering import Question, answer
 from starhold.checker.exact import CheckError
 from starhold.checker.reading import read, read_names
+from tests.certification.edits import with_kinds
 from tests.certification.invariants import proved
 from tests.running import starhold
 
@@ -58,7 +59,7 @@ def changed(given, change):
     given = copy.deepcopy(given)
     certificate = given["certificates"][0]
     change(certificate["subject"], certificate["claims"])
-    return given
+    return with_kinds(given)
 
 
 def verdicts(given):

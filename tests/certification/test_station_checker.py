@@ -16,7 +16,7 @@ from starhold.laws.catalogue import catalogue
 from starhold.parts.bodies.libration_point import POINTS, PRIMARIES
 from tests.certification.by_hand import by_hand
 from tests.certification.circles import BACK, BEST, PLANT, RELAY, SOFT, WIDE, loop_of, peak, station
-from tests.certification.edits import changed, faults, outcomes
+from tests.certification.edits import changed, faults, outcomes, with_kinds
 from tests.making import point_loop
 
 CLAIM, NUMBERS = ("certificates", 0, "claims", -1), ("certificates", 0, "claims", -1, "numbers")
@@ -94,7 +94,7 @@ def test_other_laws_are_read_and_claim_no_circle(made):
             other = changed(content, SUBJECT, json.loads(json.dumps(described_station(loop))))
             if law.name != "l2-circle":
                 assert "makes no circle attractive" in " ".join(faults(other).values())
-            other["certificates"][0] |= {"claims": [], "outcome": "undecided"}
+            other["certificates"][0] |= {"claims": [], "kinds": [], "outcome": "undecided"}
             assert {f.verdict for f in check(other)} == {"not claimed"}
 
 
@@ -140,7 +140,7 @@ def test_obligations_and_assumptions_are_those_of_the_claim(made, gains, margin)
     whole = made(gains, margin)
     for told in whole["certificates"][0]["claims"]:
         # One claim is enough to see whether that claim fails.
-        content = changed(whole, ("certificates", 0, "claims"), [told])
+        content = with_kinds(changed(whole, ("certificates", 0, "claims"), [told]))
         # The limit alone proves nothing of where the motion ends.
         content["certificates"][0]["outcome"] = "proved" if told["kind"] == "circle" else "undecided"
         assert faults(content) == {}
@@ -167,7 +167,7 @@ def test_a_claim_of_the_other_kind_fails(made):
     for one, other in ((circle, limit), (limit, circle)):
         renamed = copy.deepcopy(content)
         renamed["certificates"][0]["claims"] = [{**one, "kind": other["kind"]}]
-        assert faults(renamed)
+        assert faults(with_kinds(renamed))
     attitude = by_hand("lyapunov", {"k_attitude": 0.1, "k_rate": 0.5}, [circle])
     assert "there is no kind of claim circle about such a loop" in faults(attitude).values()
 

@@ -111,4 +111,6 @@ def _plain(certificate: Certificate) -> dict[str, Any]:
     claims: list[dict[str, Any]] = []
     for claim in certificate.claims:
         claims.append({"kind": claim.kind, "outcome": claim.outcome, **asdict(claim)})
-    return {"name": certificate.name, "outcome": certificate.outcome, "subject": certificate.subject, "claims": claims}
+    kinds = [claim["kind"] for claim in claims]
+    about = {"outcome": certificate.outcome, "subject": certificate.subject, "kinds": kinds}
+    return {"name": certificate.name, **about, "claims": claims}

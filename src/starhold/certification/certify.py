@@ -62,7 +62,8 @@ def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certific
         claims = [_undecided("convergence", everywhere, subject, str(reason))]
     except (OverflowError, ZeroDivisionError, np.linalg.LinAlgError) as reason:
         claims = [_undecided("convergence", everywhere, subject, f"{APART}: {reason}")]
-    return Certificate(name or loop.law.name, described(subject), named(claims, loop))
+    about = described(subject, [claim.kind for claim in claims])
+    return Certificate(name or loop.law.name, about, named(claims, loop))
 
 
 def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:

@@ -3,6 +3,7 @@ switch, lies in the set from which this one brings the body to rest on target.""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import pi
 from typing import Any
 
@@ -13,8 +14,9 @@ from starhold.algebra.polynomial import UnreadableError, exact
 from starhold.certification.certificate import BALLS, Certificate, Claim
 from starhold.certification.convergence import Basin, Obligations, assumed, converge, reached
 from starhold.certification.matrices import greatest, number
-from starhold.certification.openness import bounded_torque, named
-from starhold.certification.subject import above, below, described, make_subject, upper
+from starhold.certification.openness import READ, named
+from starhold.certification.subject import above, below, described, described_target, make_subject, upper
+from starhold.laws.modes import ENDS
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.effectors.wheels import gives_what_is_asked
 
@@ -24,13 +26,15 @@ WIDEST = 3.0
 """Angles (rad) up to which sines tell them apart."""
 
 
-def hand_over(loop: ClosedLoop, name: str, rate: float | None, angle: float | None) -> Certificate | None:
-    """The certificate of the loop of the law that takes over, where the other one ends with rates relative to this one's
-    target of up to `rate` (rad/s) and angles to it of up to `angle` (rad); None for any. None where no V shows from
-    where the motions of this loop end on target, or where that is not everywhere and nothing bounds the rate."""
+def hand_over(loop: ClosedLoop, before: ClosedLoop, name: str, levels: Mapping[str, float]) -> Certificate | None:
+    """The certificate of the loop of the law that takes over from the loop before. levels: the tests of the switch, in
+    rad/s and rad. None where no V shows from where the motions of this loop end on target, or where that is not everywhere
+    and nothing bounds the rate."""
     if loop.remembers or loop.law.lyapunov is None or not (loop.wheels is None or gives_what_is_asked(loop.wheels)):
         return None
-    subject = make_subject(loop, bounded_torque(loop), None)
+    subject = make_subject(loop)
+    target, last = described_target(loop), described_target(before)
+    rate, angle = _ends(levels, last, target)
     try:
         with np.errstate(all="ignore"):
             basins = [basin for basin in converge(subject)[1:] if basin is not None]
@@ -45,7 +49,19 @@ def hand_over(loop: ClosedLoop, name: str, rate: float | None, angle: float | No
         return None
     share, basin = max(((_share(basin, rate, angle), basin) for basin in basins), key=lambda found: found[0] is not None)
     claim = _claim(basin, rate, angle, share)
-    return Certificate(name, described(subject), named([claim], loop))
+    switch = {"levels": {test: levels[test] for test in ENDS if test in levels}, "before": last, "after": target}
+    return Certificate(name, {**described(subject), "switch": switch}, named([claim], loop))
+
+
+def _ends(levels: Mapping[str, float], before: Any, after: Any) -> tuple[float | None, float | None]:
+    """Rate and angle, relative to the target of the next mode, up to which the tests of a switch hold; None for no bound."""
+    # Of other targets the description does not hold all.
+    same = before == after and after["target"] in READ["target"]
+    still = after["target"] == "inertial"
+    rates = [levels.get("rate_below")] if same or (still and before["target"] == "inertial") else []
+    rates += [levels.get("body_rate_below")] if still else []
+    bounds = [rate for rate in rates if rate is not None]
+    return min(bounds, default=None), levels.get("angle_below") if same else None
 
 
 def _claim(basin: Basin, rate: float | None, angle: float | None, share: float | None) -> Claim:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -76,8 +77,9 @@ def make_subject(loop: ClosedLoop, disturbance: float = 0.0, momentum: float | N
     return Subject(loop, exact(disturbance), axes, norm, rate, acceleration, total)
 
 
-def described(subject: Subject) -> dict[str, Any]:
-    """The subject as plain numbers and names, all that a checker needs to build it again."""
+def described(subject: Subject, kinds: Collection[str] = ()) -> dict[str, Any]:
+    """The subject as plain numbers and names, all that a checker needs to build it again; what no claim of these kinds is
+    about is left out."""
     loop = subject.loop
     limit = loop.craft.torque_limit
     orbit = {
@@ -85,28 +87,37 @@ def described(subject: Subject) -> dict[str, Any]:
         "velocity": list(loop.start.velocity),
         "gravitational_parameter": loop.craft.gravity,
     }
-    knots = followed(loop)
+    target = described_target(loop)
     return {
         "law": loop.law.name,
         "gains": described_gains(loop.law, loop.gains),
         "quaternion_sign": loop.sign_policy,
-        "hysteresis_width": loop.hysteresis_width,
+        "hysteresis_width": loop.hysteresis_width if loop.sign_policy == "hysteresis" else None,
         "inertia": tensor(loop.craft.inertia).tolist(),
         "limit": loop.limit,
         "torque_limit": _finite(limit),
         "orbit": orbit if loop.has("two-body") else None,
         "gravity_gradient": loop.has("gravity-gradient"),
-        "target": loop.target.part.name,
-        "history": None if knots is None else {"interpolant": SPLINE} | {n: x.tolist() for n, x in knots._asdict().items()},
+        "target": target["target"],
+        "history": target["history"],
         "target_rate": above(subject.target_rate),
         "target_acceleration": above(subject.target_acceleration),
         "modelled_torque": [above(m) for m in subject.modelled],
         "modelled_torque_norm": above(subject.modelled_norm),
-        "disturbance": number(subject.disturbance),
+        "disturbance": number(subject.disturbance) if {"disturbance", "sliding"} & {*kinds} else 0.0,
         "control_period": loop.period,
         "assumed_away": assumed_away(loop),
         "wheels": None if loop.wheels is None else _described_wheels(subject, loop.wheels),
+        "switch": None,
     }
+
+
+def described_target(loop: ClosedLoop) -> dict[str, Any]:
+    """The target by its name, with its attitude if it rests and the knots that it follows if it has any."""
+    name, knots = loop.target.part.name, followed(loop)
+    history = None if knots is None else {"interpolant": SPLINE} | {n: x.tolist() for n, x in knots._asdict().items()}
+    attitude = list(loop.target.params.attitude) if name == "inertial" else None
+    return {"target": name, "attitude": attitude, "history": history}
 
 
 def followed(loop: ClosedLoop) -> Knots | None:

@@ -1,4 +1,6 @@
-"""The independent checker of certificates: it shares no code with the certifier, and reads the claims anew."""
+"""The independent checker of certificates. It shares with the certifier the equations of laws and parts, which claims are
+about, and the arithmetic of `algebra`; what it derives, bounds and proves is its own. A test of its imports keeps it so.
+"""
 
 from starhold.checker.check import Finding, check, check_file, passed
 

@@ -1,5 +1,4 @@
-"""Bounds of the size of {V <= level}, by parts of the box that are surely inside or outside of it. Nothing here is shared
-with the certifier."""
+"""Bounds of the size of {V <= level}, by parts of the box that are surely inside or outside of it."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Signs of polynomials over boxes by their Bernstein coefficients: no polynomial exceeds the largest of them, and those of
 half a box follow from those of the whole by averages. Coefficients are whole numbers that are only ever rounded up, so that
-what is found negative is. Nothing here is shared with the certifier.
+what is found negative is.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 """A piecewise system with a function V, as the checker sees it: closed cells on which all is a polynomial, and the ways to
-look at them: on surfaces by elimination, about an equilibrium in pyramids. Nothing here is shared with the certifier.
+look at them: on surfaces by elimination, about an equilibrium in pyramids.
 
 A pyramid has its top at the equilibrium x0 and its base on a side of the box: x = x0 + r (base - x0), 0 <= r <= 1. All of
 them fill the box. What vanishes at x0 has a power of r as a factor there; without it its sign is the same for r > 0, and may

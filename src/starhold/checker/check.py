@@ -20,7 +20,6 @@ from starhold.checker.invariant import invariant_findings
 from starhold.checker.reading import read_file, shallow
 from starhold.checker.refutation import refutation
 from starhold.checker.shapes import (
-    CERTIFICATE,
     CLAIM,
     FILE,
     HOWS,
@@ -30,6 +29,7 @@ from starhold.checker.shapes import (
     SUBJECT,
     UNKNOWN_BODY,
     WITNESS,
+    certificate_shaped,
     outcome_of,
     shaped,
 )
@@ -52,6 +52,8 @@ ENDS = (
     "hand-over",
 )
 """Kinds of claims about where the motion ends, one of which a certificate that counts as proved must hold."""
+READ_BY = {"disturbance": {"disturbance", "sliding"}, "switch": {"hand-over"}}
+"""What a subject may hold only beside a claim of one of these kinds, the only ones that are about it."""
 BITS = 192
 """Precision of balls: enough that they are far narrower than the margins of a certificate."""
 
@@ -135,13 +137,13 @@ def _guarded(work: Callable[[], Any]) -> tuple[Any, str]:
 
 
 def _of_unknown_body(given: Any) -> None:
-    shaped(given, CERTIFICATE, "the certificate")
+    certificate_shaped(given)
     shaped(given["subject"], UNKNOWN_BODY, "the subject")
     demand(not given["claims"] and given["outcome"] == "undecided", "it claims what is not known of this body")
 
 
 def _subject(given: Any) -> LoopSubject | StationSubject:
-    shaped(given, CERTIFICATE, "the certificate")
+    certificate_shaped(given)
     station = "plant" in given["subject"]
     shaped(given["subject"], STATION if station else SUBJECT, "the subject")
     outcomes = [claim.get("outcome") for claim in given["claims"]]
@@ -151,6 +153,8 @@ def _subject(given: Any) -> LoopSubject | StationSubject:
         follows = "undecided"
     demand(given["outcome"] == follows, "the outcome does not follow from the claims")
     demand(len(set(kinds)) == len(kinds), "two claims are of one kind")
+    for name, readers in READ_BY.items():
+        demand(bool(given["subject"].get(name)) <= bool(readers & set(kinds)), f"no claim is about the {name}")
     return (read_station if station else read_subject)(given["subject"])
 
 

@@ -1,5 +1,4 @@
-"""The loop of a law that makes a circle attractive, read off the law's and the model's equations. Nothing here is shared
-with the certifier.
+"""The loop of a law that makes a circle attractive, read off the law's and the model's equations.
 
 Variables: x1..x3 position, v1..v3 velocity, t2 and t3 what the damping takes off the control. What the damping is needs a
 square root, which polynomials have not: there the equations are read in symbols, for all numbers at once.

@@ -1,4 +1,4 @@
-"""The obligations of each kind of claim, and how the checker verifies them. Nothing here is shared with the certifier."""
+"""The obligations of each kind of claim, and how the checker verifies them."""
 
 from __future__ import annotations
 
@@ -98,13 +98,16 @@ def convergence(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
 
 
 def hand_over(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
-    """Motions from {V <= start} come to rest on target, and the set holds all states with rates and angles up to those
-    told (None: any)."""
+    """Motions from {V <= start} come to rest on target, and the set holds all states with which the mode before may end."""
     region, numbers = claimed(subject, claim), claim["numbers"]
     rate, angle, part = (optional(x) for x in (numbers["rate"], numbers["angle"], claim["witness"]["attitude_level"]))
 
     def inside() -> str:
-        everything = numbers["everything"]
+        everything, switch = numbers["everything"], subject.switch
+        if switch is None:
+            raise CheckError("there is no switch")
+        for name, most, level in zip(("rate", "angle"), (rate, angle), switch, strict=True):
+            demand(most is None or (level is not None and most >= level), f"the switch lets the {name} be larger")
         demand(everything == (region.level is None) == (region.start is None), "only without a level it is everything")
         if everything:
             return "every state is in it"

@@ -1,7 +1,7 @@
 """Whether something holds all over a box, by Bernstein coefficients of its parts: shown, false at an exact state, or open.
 
 A part is done where one of the `rooms` is surely negative, or where all goals of one of the `options` are met: of each goal
-one of its polynomials is surely positive, or is so where a room is not negative. Nothing here is shared with the certifier.
+one of its polynomials is surely positive, or is so where a room is not negative.
 """
 
 from __future__ import annotations

@@ -1,5 +1,4 @@
-"""Where motions end that a torque from outside, bounded in norm, keeps from equilibrium. Nothing here is shared with the
-certifier."""
+"""Bounds where motions end that a torque from outside, bounded in norm, keeps from equilibrium."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 """The loop of a law with an equilibrium beside a libration point, read off the law's and the models' equations, and its X
-axis under a limited control. Nothing here is shared with the certifier.
+axis under a limited control.
 
 Along X with the others at rest, x'' = p x - clip(k x + c x', U). With s = sqrt(p), S = x + x'/s, K = c/s, D = (k - s c)/p,
 b = U/p and time in units of 1/s this is

@@ -1,4 +1,4 @@
-"""The set of a V that is the same at q and -q, V = w.Pw/2 + q.Nq. Nothing here is shared with the certifier."""
+"""The set of a V that is the same at q and -q, V = w.Pw/2 + q.Nq."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 """Exact matrices and polynomials, derivatives, and bounds that only round away from what they bound, by which the checker
-decides. Nothing here is shared with the certifier.
+decides.
 
 A matrix is a list of rows of rationals (`fmpq`).
 """
@@ -59,8 +59,9 @@ def limited(seconds: float = SECONDS) -> Generator[None]:
 
 
 def in_time() -> None:
-    """A CheckError where the check of a claim takes longer than it may. What all checks are made of calls it: demands, numbers
-    of the file, products and determinants of matrices; only loops without any of these have to call it themselves."""
+    """A CheckError where the check of a claim takes longer than it may. What all checks are made of calls it: demands,
+    numbers of the file, products and determinants of matrices. Only loops without any of these have to call it themselves.
+    """
     if thread_time() >= _late.get():
         raise CheckError(f"the check takes longer than {SECONDS:g} s of processor time")
 

@@ -1,4 +1,4 @@
-"""The parts of V, of its derivative and of the cross term that proofs rest on. Nothing here is shared with the certifier."""
+"""The parts of V, of its derivative and of the cross term that proofs rest on."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A bound of what is quadratic in the rate. Nothing here is shared with the certifier."""
+"""A bound of what is quadratic in the rate."""
 
 from __future__ import annotations
 

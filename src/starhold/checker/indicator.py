@@ -1,5 +1,5 @@
 """Shows anew what a certificate of an invariant set has to hold: V' < 0 on {0 < V <= level} and what goes with it, by
-Bernstein coefficients on charts of the box. Nothing here is shared with the certifier, whose method is intervals.
+Bernstein coefficients on charts of the box.
 """
 
 from __future__ import annotations

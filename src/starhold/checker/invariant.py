@@ -17,7 +17,7 @@ from starhold.checker.cells import polynomial, split
 from starhold.checker.exact import CheckError, NotCheckedError, Verdict, demand, limited, rational
 from starhold.checker.indicator import Indicator
 from starhold.checker.reading import number, read, read_names
-from starhold.checker.shapes import CERTIFICATE, CLAIM, OBLIGATION, outcome_of, shaped
+from starhold.checker.shapes import CLAIM, OBLIGATION, certificate_shaped, outcome_of, shaped
 
 FORMAT = "starhold invariant certificate 2"
 THEOREMS = ("stable", "attracts", "region", "unstable", "intersection")
@@ -75,7 +75,7 @@ def invariant_findings(given: Any) -> Iterator[Told]:
 
 
 def _shape(given: Any) -> str:
-    shaped(given, CERTIFICATE, "the certificate")
+    certificate_shaped(given)
     demand(len(given["claims"]) > 0, "there are no claims")
     demand(given["outcome"] == outcome_of([c.get("outcome") for c in given["claims"]]), "the outcome does not follow")
     allowed = {"variables", "parameters", "define", "rates", "V", "equilibrium", "escape", "squares"}

@@ -1,5 +1,5 @@
 """The closed loop a certificate speaks of, as its checker reads it: from the law's and the models' own equations, in exact
-polynomials, for the inertia that is given or for every one near it. Nothing here is shared with the certifier.
+polynomials, for the inertia that is given or for every one near it.
 
 Variables: q0..q3 error attitude, w1..w3 rate relative to the target, r and a the target's rate and acceleration, e the
 torque the models know, m one that nobody knows, t what the actuators give, h the momentum of the whole, wheels included

@@ -1,5 +1,4 @@
-"""A set that motions under the law `modal` do not leave and in which they come to rest on target. Nothing here is shared
-with the certifier.
+"""A set that motions under the law `modal` do not leave and in which they come to rest on target.
 
 In units of the root, with alpha = -a, y = |w|2/alpha2, s = w.q/alpha, u = 1 - q0, l2 = |q|2 = u (2 - u), s2 <= y l2:
 

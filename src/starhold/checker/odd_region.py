@@ -1,4 +1,4 @@
-"""The set of a V that is not the same at q and -q, V = w.Pw/2 + s (1 - q0). Nothing here is shared with the certifier."""
+"""The set of a V that is not the same at q and -q, V = w.Pw/2 + s (1 - q0)."""
 
 from __future__ import annotations
 

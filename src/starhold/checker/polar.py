@@ -1,5 +1,4 @@
-"""That a control stays within its limit on a level set round a circle, in the plane x = x' = 0. Nothing here is shared with
-the certifier.
+"""Shows that a control stays within its limit on a level set round a circle, in the plane x = x' = 0.
 
 In polar coordinates (y, z) = r (c, s), with c and s cosine and sine of the phase, and with the errors (f2, f3) along and
 across that direction, a and b, V knows no phase, and each axis of the control is C c + S s with C and S polynomials in r, a,

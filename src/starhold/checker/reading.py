@@ -1,7 +1,7 @@
 """The checker's own reading: of a file, and of a system that a certificate of an invariant set is about, texts to piecewise
 polynomials. What is larger than the limits below is refused, with its line.
 
-Only what stands here is read, nothing is run. Numbers stand for what is written. Nothing is shared with the certifier.
+Only what stands here is read, nothing is run. Numbers stand for what is written.
 """
 
 from __future__ import annotations

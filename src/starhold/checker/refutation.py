@@ -1,4 +1,4 @@
-"""That what is said to refute a claim does. Nothing here is shared with the certifier.
+"""Shows that what is said to refute a claim does.
 
 A refutation names the obligation that is false and has all that shows it, nothing else: a state of the set that is claimed,
 of the law's own V, at the loop's own limit. What is told of it beside must be what is found there.

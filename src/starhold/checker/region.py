@@ -1,5 +1,5 @@
-"""A set that motions do not leave and in which they come to rest on target: what does not depend on whether V is even in q.
-Nothing here is shared with the certifier."""
+"""A set that motions do not leave and in which they come to rest on target: what does not depend on whether V is even
+in q."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""The shape of a certificate file: the keys of each object, and what each may hold. Nothing here is shared with the
-certifier."""
+"""The shape of a certificate file: the keys of each object, and what each may hold."""
 
 from __future__ import annotations
 
@@ -8,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 from starhold.checker.exact import demand
+from starhold.laws.modes import ENDS
 
 Test: TypeAlias = Callable[[Any], bool]
 
@@ -18,6 +18,13 @@ def shaped(given: Any, shape: Mapping[str, Test], where: str) -> None:
     demand(set(given) == set(shape), f"{where} has not the keys {', '.join(shape) or '(none)'}")
     for key, test in shape.items():
         demand(test(given[key]), f"{where} has something else than it may under {key}")
+
+
+def certificate_shaped(given: Any) -> None:
+    """That a certificate has the keys of one, and exactly the claims whose kinds it lists."""
+    shaped(given, CERTIFICATE, "the certificate")
+    kinds = [claim.get("kind") for claim in given["claims"]]
+    demand(given["kinds"] == kinds, f"the claims are not those listed: {', '.join(given['kinds']) or '(none)'}")
 
 
 def outcome_of(parts: Sequence[Any]) -> str:
@@ -91,6 +98,7 @@ CERTIFICATE: dict[str, Test] = {
     "name": lambda x: _text(x) and len(x) <= 1_000,
     "outcome": _OUTCOME,
     "subject": _object,
+    "kinds": _list(_text),
     "claims": _list(_object),
 }
 CLAIM: dict[str, Test] = {
@@ -139,11 +147,21 @@ _HISTORY: dict[str, Test] = {
     "attitudes": _list(_list(_number, 4)),
     "rates": _list(_VECTOR),
 }
+_TARGET: dict[str, Test] = {
+    "target": _text,
+    "attitude": _or_none(_list(_number, 4)),
+    "history": _or_none(_within(_HISTORY)),
+}
+_SWITCH: dict[str, Test] = {
+    "levels": lambda x: _object(x) and set(x) <= set(ENDS) and all(map(_number, x.values())),
+    "before": _within(_TARGET),
+    "after": _within(_TARGET),
+}
 SUBJECT: dict[str, Test] = {
     "law": _text,
     "gains": lambda x: _object(x) and all(map(_gain, x.values())),
     "quaternion_sign": _one("as_published", "shortest", "hysteresis"),
-    "hysteresis_width": _number,
+    "hysteresis_width": _MAYBE,
     "inertia": _list(_VECTOR, 3),
     "limit": _one("axis", "norm", "none"),
     "torque_limit": _MAYBE,
@@ -159,6 +177,7 @@ SUBJECT: dict[str, Test] = {
     "control_period": _number,
     "assumed_away": _list(_text),
     "wheels": _or_none(_within(_WHEELS)),
+    "switch": _or_none(_within(_SWITCH)),
 }
 UNKNOWN_BODY: dict[str, Test] = {"body": _text, "law": _text}
 """The subject where nothing is known of the body."""

@@ -1,5 +1,4 @@
-"""How fast a target moves that follows the rotation spline through the knots in a certificate. Nothing here is shared with
-the certifier.
+"""How fast a target moves that follows the rotation spline through the knots in a certificate.
 
 From a knot the attitude is q exp(phi), phi(s) = a s + b s2 + c s3 for s from 0 to 1. The rate is W = sum over n of
 (-1)^n/(n+1)! (phi x)^n phi', at points exact but for balls. In between, h apart, a vector is no longer than at the ends and

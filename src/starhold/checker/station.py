@@ -1,5 +1,4 @@
-"""Certificates about loops that keep a craft near a libration point: their subject, their claims, and what refutes these.
-Nothing here is shared with the certifier."""
+"""Certificates about loops that keep a craft near a libration point: their subject, their claims, and what refutes these."""
 
 from __future__ import annotations
 

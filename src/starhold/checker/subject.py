@@ -1,5 +1,5 @@
 """The subject of a certificate, as its checker reads it: numbers at their exact values, and bounds that must hold over the
-whole orbit. Nothing here is shared with the certifier.
+whole orbit.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from flint import arb
+from flint import arb, fmpq
 
 from starhold.algebra.polynomial import Monomial, Polynomial, constants
 from starhold.algebra.vector import cross, dot, scale, subtract
@@ -37,6 +37,9 @@ from starhold.laws.catalogue import Law, catalogue
 from starhold.parts.craft import EARTH, Craft, check_inertia, compact
 from starhold.parts.environments.gravity_gradient import gravity_gradient
 
+ROUNDING = fmpq(1, 2**49)
+"""Share by which a law's comparison of a rate or an angle with a level is off at most."""
+
 
 def named(letter: str, first: int = 1) -> tuple[str, ...]:
     """The three variables of a vector, or the four of a quaternion."""
@@ -51,7 +54,8 @@ def variables(names: Sequence[str]) -> Any:
 @dataclass(frozen=True)
 class LoopSubject:
     """The subject of a certificate, its numbers exact; `memory` is what the law starts with, `whole` the inertia with that
-    of rotors about their axes, `perigee` the orbit's where the gravity gradient is felt."""
+    of rotors about their axes, `perigee` the orbit's where the gravity gradient is felt, `switch` the rate and the angle up
+    to which another mode hands over (None: any)."""
 
     law: Law
     gains: Any
@@ -72,6 +76,7 @@ class LoopSubject:
     period: Any
     wheels: SubjectWheels | None
     perigee: Any | None
+    switch: tuple[Any | None, Any | None] | None
 
 
 def read_subject(given: Mapping[str, Any]) -> LoopSubject:
@@ -95,8 +100,11 @@ def read_subject(given: Mapping[str, Any]) -> LoopSubject:
     limited = math.inf if limit is None else float(limit)
     craft = Craft(compact(tensor), compact(np.linalg.inv(tensor)), limited, float(gravity))
     demand(given["control_period"] > 0, "the control period is not positive")
-    for name in ("target_rate", "target_acceleration", "modelled_torque_norm", "disturbance", "hysteresis_width"):
+    for name in ("target_rate", "target_acceleration", "modelled_torque_norm", "disturbance"):
         demand(given[name] >= 0, f"{name} is negative")
+    width = given["hysteresis_width"]
+    demand((width is not None) == (given["quaternion_sign"] == "hysteresis"), "a width is for a hysteresis")
+    demand(width is None or width >= 0, "hysteresis_width is negative")
     memory = law.remember(gains, craft, given["control_period"])
     perigee = _check_bounds(given, whole)
     exact = {name: rational(given[name]) for name in ("target_rate", "target_acceleration", "disturbance")}
@@ -105,7 +113,7 @@ def read_subject(given: Mapping[str, Any]) -> LoopSubject:
         gains=constants(gains),
         memory=memory,
         sign_policy=given["quaternion_sign"],
-        width=rational(given["hysteresis_width"]),
+        width=rational(width or 0),
         inertia=inertia,
         whole=whole,
         limit=given["limit"],
@@ -117,8 +125,27 @@ def read_subject(given: Mapping[str, Any]) -> LoopSubject:
         period=rational(given["control_period"]),
         wheels=wheels,
         perigee=perigee,
+        switch=None if given["switch"] is None else _handed_over(given),
         **exact,
     )
+
+
+def _handed_over(given: Mapping[str, Any]) -> tuple[Any | None, Any | None]:
+    """Bounds of the rate and the angle, relative to the target, with which the mode before ends by the tests of its switch,
+    as rounding may pass them; None for no bound."""
+    switch = given["switch"]
+    before, after = switch["before"], switch["after"]
+    demand(all(after[key] == given[key] for key in ("target", "history")), "the switch is to another target")
+    inertial = [target["target"] == "inertial" for target in (before, after)]
+    demand(inertial == [target["attitude"] is not None for target in (before, after)], "an attitude is for a target at rest")
+    levels = {test: rational(level) for test, level in switch["levels"].items()}
+    demand(all(level > 0 for level in levels.values()), "a level of the switch is not positive")
+    relative = before == after or all(inertial)
+    rates = [*([levels.get("rate_below")] if relative else ()), *([levels.get("body_rate_below")] if inertial[1] else ())]
+    # Sines do not tell angles near half a turn apart.
+    angle = levels.get("angle_below") if before == after else None
+    angle = None if angle is None or angle > 3 else angle * (1 + ROUNDING)
+    return min((rate * (1 + ROUNDING) for rate in rates if rate is not None), default=None), angle
 
 
 def gradient(whole: Rows) -> Any:

@@ -1,5 +1,4 @@
-"""That a law with a surface reaches it against torque from outside, and ends on target or near it. Nothing here is shared
-with the certifier."""
+"""Shows that a law with a surface reaches it against torque from outside, and ends on target or near it."""
 
 from __future__ import annotations
 

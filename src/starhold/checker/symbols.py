@@ -1,5 +1,5 @@
 """The loop near a libration point in symbols, for all states and all numbers of the loop at once: what equations with square
-roots, which polynomials have not, are compared in. Nothing here is shared with the certifier."""
+roots, which polynomials have not, are compared in."""
 
 from __future__ import annotations
 

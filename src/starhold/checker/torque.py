@@ -1,5 +1,4 @@
-"""That a law keeps its torque, or what wheels have of it, within a limit, on a level set of V or everywhere. Nothing here is
-shared with the certifier."""
+"""Shows that a law keeps its torque, or what wheels have of it, within a limit, on a level set of V or everywhere."""
 
 from __future__ import annotations
 
@@ -37,6 +36,8 @@ def keeps_within(region: Region[Any], limit: Any, each_axis: bool, shift: Any | 
     """Whether each axis of the torque, or its norm, keeps within a limit on the region's level set (without one, and for a
     law of several pieces: everywhere). `shift`, `weight`: what bounds the part of the norm that is quadratic in the rate."""
     loop = region.loop
+    plainly = each_axis or region.level is None or len(loop.pieces) > 1
+    demand(not plainly or shift is None is weight, "a shift or a weight is for the norm of one piece of the law")
     if region.level is None or len(loop.pieces) > 1:
         return all(
             _everywhere(loop, found, list(torque.values()), limit, each_axis)

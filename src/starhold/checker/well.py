@@ -1,5 +1,5 @@
 """Bounds on a level set of V by branch and bound: products of attitude and rate as functions of the part of V that the
-attitude holds. Nothing here is shared with the certifier.
+attitude holds.
 """
 
 from __future__ import annotations

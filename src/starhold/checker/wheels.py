@@ -1,4 +1,4 @@
-"""The wheels of a subject, and how far their momenta go. Nothing here is shared with the certifier."""
+"""The wheels of a subject, and how far their momenta go."""
 
 from __future__ import annotations
 

@@ -32,6 +32,8 @@ TEXTS = {
 }
 TESTS = tuple(f"{name}_{side}" for name in UNITS for side in ("below", "above"))
 """A condition may ask for these, beside time: a norm that the law is told below or above a level."""
+ENDS = ("rate_below", "body_rate_below", "angle_below")
+"""The tests that bound where a mode ends."""
 AFTER = Gain("s", at_least=0.0, text="once the mode has flown so long")
 DWELL = Gain("s", at_least=0.0, text="and all of it has held so long, without a break")
 

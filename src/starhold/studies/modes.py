@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from starhold.algebra.structure import leaves
 from starhold.laws.modes import Modes
 from starhold.loop.modes import loop_of_mode
 from starhold.studies.body import Issued
@@ -17,7 +16,6 @@ if TYPE_CHECKING:
     from starhold.certification.certify import Wanted
     from starhold.laws.catalogue import Law
     from starhold.loop.closed_loop import ClosedLoop
-    from starhold.parts.part import Fitted
     from starhold.simulation.lane import Recording
 
 
@@ -66,28 +64,11 @@ def certify_modes(loop: ClosedLoop, name: str, wanted: Wanted) -> list[Issued]:
         found.append(Issued(certify(own, f"{name}: {mode.name}", wanted), own, mode=place + 1))
     for place, (mode, _, switches) in enumerate(module.parts(loop.gains)):
         for switch, (_, _, *levels) in switches:
-            own = loop_of_mode(loop, switch.to)
-            before = loop_of_mode(loop, place)
-            rate, angle = _ends(dict(zip(switch.tests, levels, strict=True)), before.target, own.target)
-            certificate = hand_over(own, f"{name}: {mode.name} to {module.modes[switch.to].name}", rate, angle)
+            own, title = loop_of_mode(loop, switch.to), f"{name}: {mode.name} to {module.modes[switch.to].name}"
+            certificate = hand_over(own, loop_of_mode(loop, place), title, dict(zip(switch.tests, levels, strict=True)))
             if certificate is not None:
                 found.append(Issued(certificate, own, mode=switch.to + 1, before=place + 1))
     return found
-
-
-def _ends(levels: dict[str, float], before: Fitted, target: Fitted) -> tuple[float | None, float | None]:
-    """Rate and angle, relative to the target of the next mode, up to which the tests of a switch hold; None for no bound."""
-    still, same = target.part.flag("STILL"), _same(before, target)
-    rates = [levels.get("rate_below")] if same or (still and before.part.flag("STILL")) else []
-    rates += [levels.get("body_rate_below")] if still else []
-    bounds = [rate for rate in rates if rate is not None]
-    return min(bounds, default=None), levels.get("angle_below") if same else None
-
-
-def _same(one: Fitted, other: Fitted) -> bool:
-    """Whether two targets are one, those of histories where they are the same table."""
-    pairs = [*leaves(one.params)], [*leaves(other.params)]
-    return one is other or (one.part == other.part and len(pairs[0]) == len(pairs[1]) and all(map(np.array_equal, *pairs)))
 
 
 def mode_departures(issued: Issued, run: Recording) -> dict[str, tuple[Departure, ...]]:
