@@ -13,7 +13,7 @@ from starhold.algebra.intervals import Intervals
 from starhold.algebra.polynomial import Polynomial, constants, exact
 from starhold.algebra.vector import Matrix, Vector
 from starhold.certification.matrices import Rows, greatest, inverse, least, matrix_of, number, plus, rows, times
-from starhold.certification.openness import assumed_away
+from starhold.certification.openness import READ, assumed_away
 from starhold.certification.spline import spline_bounds
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law
@@ -88,6 +88,8 @@ def described(subject: Subject, kinds: Collection[str] = ()) -> dict[str, Any]:
         "gravitational_parameter": loop.craft.gravity,
     }
     target = described_target(loop)
+    # Claims leave other targets out by name, and are about one at rest.
+    name = target["target"] if target["target"] in READ["target"] else "inertial"
     return {
         "law": loop.law.name,
         "gains": described_gains(loop.law, loop.gains),
@@ -98,7 +100,7 @@ def described(subject: Subject, kinds: Collection[str] = ()) -> dict[str, Any]:
         "torque_limit": _finite(limit),
         "orbit": orbit if loop.has("two-body") else None,
         "gravity_gradient": loop.has("gravity-gradient"),
-        "target": target["target"],
+        "target": name,
         "history": target["history"],
         "target_rate": above(subject.target_rate),
         "target_acceleration": above(subject.target_acceleration),
@@ -113,8 +115,10 @@ def described(subject: Subject, kinds: Collection[str] = ()) -> dict[str, Any]:
 
 
 def described_target(loop: ClosedLoop) -> dict[str, Any]:
-    """The target by its name, with its attitude if it rests and the knots that it follows if it has any."""
-    name, knots = loop.target.part.name, followed(loop)
+    """The target by its name, with its attitude if it rests and the knots that it follows if it has any; one that claims
+    leave out as they name it."""
+    part, knots = loop.target.part, followed(loop)
+    name = part.name if part.name in READ["target"] and part.file is None else f"{part.role} {loop.target.called}"
     history = None if knots is None else {"interpolant": SPLINE} | {n: x.tolist() for n, x in knots._asdict().items()}
     attitude = list(loop.target.params.attitude) if name == "inertial" else None
     return {"target": name, "attitude": attitude, "history": history}

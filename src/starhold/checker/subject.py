@@ -135,15 +135,18 @@ def _handed_over(given: Mapping[str, Any]) -> tuple[Any | None, Any | None]:
     as rounding may pass them; None for no bound."""
     switch = given["switch"]
     before, after = switch["before"], switch["after"]
-    demand(all(after[key] == given[key] for key in ("target", "history")), "the switch is to another target")
+    # Of a target that claims leave out nothing is known.
+    known = after["target"] not in given["assumed_away"]
+    demand(not known or all(after[key] == given[key] for key in ("target", "history")), "the switch is to another target")
     inertial = [target["target"] == "inertial" for target in (before, after)]
     demand(inertial == [target["attitude"] is not None for target in (before, after)], "an attitude is for a target at rest")
     levels = {test: rational(level) for test, level in switch["levels"].items()}
     demand(all(level > 0 for level in levels.values()), "a level of the switch is not positive")
-    relative = before == after or all(inertial)
+    same = known and before == after
+    relative = same or all(inertial)
     rates = [*([levels.get("rate_below")] if relative else ()), *([levels.get("body_rate_below")] if inertial[1] else ())]
     # Sines do not tell angles near half a turn apart.
-    angle = levels.get("angle_below") if before == after else None
+    angle = levels.get("angle_below") if same else None
     angle = None if angle is None or angle > 3 else angle * (1 + ROUNDING)
     return min((rate * (1 + ROUNDING) for rate in rates if rate is not None), default=None), angle
 
