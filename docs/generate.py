@@ -1,5 +1,5 @@
 """Writes the pages that tell what is in the code: commands, the Python interface, keys of scenarios, laws, parts; and the
-tables of the pages for authors. A test says that they are as the code is."""
+tables of the pages for authors and of that on what is not claimed. A test says that they are as the code is."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PAGES = {
     "parts.md": parts.page_of_parts,
     "publications.md": publications.page,
 }
-FILLED = ("law-authors.md", "part-authors.md")
+FILLED = ("law-authors.md", "not-claimed.md", "part-authors.md")
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ import starhold as sh
 from generate import PAGES
 from generators import formulas
 from starhold.analysis.rigid_body import EXTRAS, make_meter
+from starhold.analysis.trial import FLIGHTS
 from starhold.campaign.requirements import CONE, LOST
 from starhold.campaign.sampling import SAMPLINGS
 from starhold.campaign.sequence import runs_to_meet
@@ -239,6 +240,42 @@ def test_a_formula_that_is_not_the_law_is_not_found():
     wrong = (read.torque[0] + formulas.Q[1], *read.torque[1:])
     assert not read.formula(wrong).found
     assert read.formula(read.torque).found
+
+
+def test_laws_are_printed_without_conditions_that_hold_anyway(generated):
+    page = generated("laws.md")
+    assert not [text for text in ("ITE", r"\tilde{\infty}", "not printed here") if text in page]
+    assert r"\begin{cases} - \frac{u_{\max}}{c_{5}} & \text{for}\: c_{5} > 0 \\0 & \text{otherwise} \end{cases}" in page
+    assert r"- J\left(2 \lambda^{2} q - 2 \lambda \omega + c p\right)" in page
+
+
+def test_counts_of_the_paper_are_those_of_the_code():
+    numbers = [
+        "no",
+        "one",
+        "two",
+        "three",
+        "four",
+        "five",
+        "six",
+        "seven",
+        "eight",
+        "nine",
+        "ten",
+        "eleven",
+        "twelve",
+        "thirteen",
+        "fourteen",
+        "fifteen",
+        "sixteen",
+    ]
+    paper = " ".join((ROOT / "paper" / "paper.md").read_text(encoding="utf-8").split())
+    assert f"{numbers[len(catalogue())].capitalize()} attitude laws are included" in paper
+    assert f"and {numbers[len(catalogue('libration-point'))]} that hold a craft" in paper
+    assert (FLIGHTS, "ten thousand flights each" in paper) == (10_000, True)
+    ratios = (ROOT / "docs" / "comparison.md").read_text(encoding="utf-8")
+    for ratio in re.findall(r"\d+ to \d+ times", paper):
+        assert ratio in ratios
 
 
 def test_page_of_parts_has_every_part(generated):

@@ -12,7 +12,7 @@ import starhold as sh
 from generators.authors import filled
 from starhold.conformance.parts import examine_part, find_part
 from starhold.parts import roles
-from starhold.parts.catalogue import DEMANDED, EITHER, PACKAGES
+from starhold.parts.catalogue import DEMANDED, EITHER, PACKAGES, parts
 from starhold.parts.contract import Card, Parameter
 from starhold.parts.random import RANGE, Dice
 
@@ -29,6 +29,13 @@ def folder(tmp_path, monkeypatch):
         (tmp_path / name).write_text(text, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+def test_the_limits_of_all_models_are_written_from_their_cards():
+    page = (ROOT / "docs" / "not-claimed.md").read_text(encoding="utf-8")
+    assert filled(page) == page, "docs/not-claimed.md is not what the code says; write it anew: python docs/generate.py"
+    for role, name in (("environment", "drag"), ("sensor", "star-tracker"), ("effector", "wheels")):
+        assert all(text in page for text in parts(role)[name].card.assumptions)
 
 
 def test_its_tables_are_written_from_the_code():

@@ -1,4 +1,4 @@
-"""The tables on the pages for authors of laws and of other parts."""
+"""The tables on the pages for authors of laws and of other parts, and on the one about what is not claimed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from starhold.laws.interface import Card, Gain, Measurement, Start
 from starhold.laws.point import PointMeasurement
 from starhold.parts import roles
 from starhold.parts.bodies.libration_point import Libration
-from starhold.parts.catalogue import DEMANDED, EITHER, PACKAGES
+from starhold.parts.catalogue import DEMANDED, EITHER, PACKAGES, parts
 from starhold.parts.contract import Card as PartCard
 from starhold.parts.contract import Parameter
 from starhold.parts.craft import Craft
@@ -95,6 +95,17 @@ def _start_table() -> str:
     )
 
 
+def limits_table() -> str:
+    """What each part but laws assumes or leaves out, by its card."""
+    rows = [
+        [role, f"`{name}`", "; ".join(part.card.assumptions)]
+        for role in PACKAGES
+        for name, part in parts(role).items()
+        if part.card.assumptions
+    ]
+    return table(["role", "part", "assumes or leaves out"], rows)
+
+
 TABLES = {
     "card": lambda: attributes_table(Card),
     "measurement": lambda: fields_table(Measurement),
@@ -111,6 +122,7 @@ TABLES = {
     "part card": lambda: attributes_table(PartCard),
     "parameter": lambda: attributes_table(Parameter),
     "roles": roles_text,
+    "limits of models": limits_table,
     "dice": lambda: methods_table(Dice),
 }
 MARK = re.compile(r"(<!-- written by docs/generate.py: (.*?) -->\n).*?(<!-- end -->)", re.DOTALL)

@@ -13,7 +13,7 @@ from typing import Any
 import sympy
 
 from starhold.algebra.scalar import absolute, clip, sign, sqrt
-from starhold.algebra.vector import add, apply, cross, dot, scale, times
+from starhold.algebra.vector import add, apply, cross, dot, scale, subtract, times
 from starhold.laws.catalogue import Law
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.laws.point import PointMeasurement
@@ -236,6 +236,8 @@ def rigid_body(law: Law) -> list[str]:
             "The torque is that of rods in the measured field; the formula above is of their dipole and of what it gives.",
             "",
         ]
+    if hasattr(law.module, "single_root"):
+        return single_root(law)
     read = Read(law)
     if any(sympy.count_ops(c) > MOST_TO_SORT for c in read.torque):
         return components(law)
@@ -257,6 +259,38 @@ def rigid_body(law: Law) -> list[str]:
     if read.assumed:
         lines += [f"With {', '.join(read.assumed)}.", ""]
     return lines
+
+
+def single_root(law: Law) -> list[str]:
+    """Lines about the torque of a law that places one root a, where it does: by the vector p with p + q x p = w."""
+    a, b = sympy.symbols(r"\lambda b", real=True)
+    reciprocal = 1 / (1 + dot(Q, Q))  # type: ignore[arg-type]
+    p = scale(reciprocal, add(add(W, cross(W, Q)), scale(dot(Q, W), Q)))  # type: ignore[arg-type]
+    turned = dot(Q, W)  # type: ignore[arg-type]
+    share = (4 * a * b - sympy.Rational(1, 2)) * turned - b * Q0 * dot(W, W) + (4 * a * a * b - 2 * a) * (Q0 - 1)  # type: ignore[arg-type]
+    feedback = add(add(scale(2 * a * a, Q), scale(-2 * a, W)), scale(share, p))  # type: ignore[arg-type]
+    model = add(cross(ABSOLUTE, add(apply(INERTIA, ABSOLUTE), MOMENTUM)), apply(INERTIA, ACCELERATION))  # type: ignore[arg-type]
+    shown: Any = subtract(subtract(model, OUTSIDE), apply(INERTIA, feedback))  # type: ignore[arg-type]
+    read = Read(law)
+    torque, _ = law.command(read.measurement, law.gains((a, a, a), (a, a, a), b), read.craft, read.memory)
+    if any(sympy.cancel(exact(u - v)) != 0 for u, v in zip(torque, shown, strict=True)):
+        return components(law)
+    return [
+        displayed(
+            r"u = \Omega \times J \Omega + \Omega \times H + J a - M"
+            r" - J\left(2 \lambda^{2} q - 2 \lambda \omega + c p\right)"
+        ),
+        "",
+        displayed(r"p = \frac{\omega - q \times \omega + \left(q \cdot \omega\right) q}{1 + |q|^{2}}"),
+        "",
+        displayed(
+            r"c = \left(4 \lambda b - \tfrac{1}{2}\right) q \cdot \omega - b\, q_0 |\omega|^{2}"
+            r" + \left(4 \lambda^{2} b - 2 \lambda\right) \left(q_0 - 1\right)"
+        ),
+        "",
+        r"With `phi_0` = `phi_1` = $\lambda E$.",
+        "",
+    ]
 
 
 def potential(law: Law, read: Read, torque: Formula) -> list[str]:
@@ -315,9 +349,23 @@ def _plain(item: Any) -> Any:
     return (one, one, one) if item.gain.shape else one
 
 
+def _settled(value: Any) -> Any:
+    """An expression by cases without the conditions that hold already where they stand."""
+
+    def plain(condition: Any, yes: Any, no: Any) -> Any:
+        return sympy.Or(sympy.And(condition, yes), sympy.And(sympy.Not(condition), no))
+
+    def cases(*pairs: Any) -> Any:
+        return sympy.Piecewise(*((case.xreplace({condition: sympy.true}), condition) for case, condition in pairs))
+
+    return sympy.sympify(value).replace(sympy.ITE, plain).replace(sympy.Piecewise, cases)
+
+
 def _shared(values: tuple[Any, ...], letter: str) -> list[str]:
     """The components of a vector, with what they share named; or how long they are."""
-    shared, reduced = sympy.cse([exact(v) for v in values], symbols=(sympy.Symbol(f"c_{{{n}}}") for n in range(1, 1000)))
+    shared, reduced = sympy.cse(
+        [exact(_settled(v)) for v in values], symbols=(sympy.Symbol(f"c_{{{n}}}") for n in range(1, 1000))
+    )
     if sum(sympy.count_ops(v) for _, v in shared) + sum(map(sympy.count_ops, reduced)) > MOST_OPERATIONS:
         count = sum(sympy.count_ops(v) for _, v in shared) + sum(map(sympy.count_ops, reduced))
         return [f"The components take {count} operations, with what they share named; they are not printed here.", ""]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 from dataclasses import replace
 from functools import cache
@@ -16,7 +17,7 @@ from starhold.analysis.departure import LOST, MET, departures, fed_back
 from starhold.certification.certificate import BESIDE, Certificate, Claim, Obligation, write
 from starhold.certification.certify import certify
 from starhold.certification.wording import HEADINGS, sentence
-from starhold.checker import check_file, passed
+from starhold.checker import check, check_file, passed
 from starhold.checker.check import ENDS
 from starhold.checker.claims import CLAIMS
 from starhold.parts.quaternion_sign import SIGN_POLICIES
@@ -83,6 +84,26 @@ def test_the_first_time_on_the_limit_ends_a_claim_about_unlimited_torque():
     told = next(claim for claim in flight.results()["claims"] if claim["claim"] == "convergence")
     assert (told["outcome"], told["left_at"]) == ("proved", left["convergence"][0].time)
     assert json.loads(json.dumps(told)) == told
+
+
+def test_a_law_that_keeps_within_its_limit_assumes_no_unlimited_torque(tmp_path):
+    """It flies on the limit, and what is proved of it is proved of that flight too."""
+    text = BASE.replace("gravity_gradient = true", "gravity_gradient = false").replace("[0.04, 0.03", "[0.4, 0.03")
+    text = text.replace("attitude = [0, 1, 1, 1]", "attitude = [0, 1, 0, 0]")
+    _, certificate, flight, left = flown(text + LAW.replace("lyapunov", "pd") + 'limit = "axis"\n')
+    assert np.abs(flight.recording["command"]).max() >= 0.01 * (1.0 - 1e-12)
+    assert left == dict.fromkeys(("convergence", "torque-limit", "inertia"), ())
+    for claim in certificate.claims:
+        assert "torque not limited" not in claim.assumptions
+        assert "unlimited" not in sentence(claim, certificate.subject)
+    write([certificate], "mine", tmp_path / "certificate.json")
+    assert passed(check_file(tmp_path / "certificate.json"))
+    # Where the limit is none that the law keeps within, the checker asks for the assumption.
+    content = json.loads((tmp_path / "certificate.json").read_text(encoding="utf-8"))
+    for limit in ("norm", "none"):
+        other = copy.deepcopy(content)
+        other["certificates"][0]["subject"]["limit"] = limit
+        assert "the law may ask for more torque than its limit" in {finding.reason for finding in check(other)}
 
 
 @pytest.mark.parametrize(

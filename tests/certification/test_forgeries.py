@@ -105,7 +105,9 @@ def survivors(content, random, share):
             # One claim is enough to see whether that claim fails.
             one = alone(content, kind) if inside or "subject" in path else content
             place = (*path[:3], 0, *path[4:]) if inside else path
-            if new != content_at(one, place) and not is_true(path, kind, content_at(one, place), new) and passed(check(changed(one, place, new))):
+            there = content_at(one, place)
+            forgery = new != there and not is_true(path, kind, there, new)
+            if forgery and passed(check(changed(one, place, new))):
                 found.append((kind, path[2:], old, new))
     return found, count
 

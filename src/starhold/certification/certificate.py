@@ -21,6 +21,7 @@ FILE = "certificate.json"
 Outcome = Literal["proved", "refuted", "undecided"]
 EXACT, BALLS, LASALLE = "exact identity", "ball arithmetic", "LaSalle"
 EXACT_SIGN = "exact inequality"
+UNLIMITED = "torque not limited"
 WHEELS = "neither torque nor wheels limited, wheels without friction"
 """Claims about loops with wheels assume this in place of torque that is not limited."""
 

@@ -13,7 +13,7 @@ from starhold.certification.certificate import EXACT, Certificate, Claim, Obliga
 from starhold.certification.convergence import assumed, converge
 from starhold.certification.disturbance import disturbance
 from starhold.certification.inertia import inertia_box, told
-from starhold.certification.limits import torque_limit
+from starhold.certification.limits import needed, torque_limit
 from starhold.certification.motion import Motion
 from starhold.certification.openness import bounded_torque, named
 from starhold.certification.region import region
@@ -81,6 +81,7 @@ def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:
             claims.extend(_unshown(subject, wanted))
         sampled = sampling(Motion(subject))
         claims.extend([] if sampled is None else [sampled])
+        claims = needed(claims, Motion(subject)) if loop.law.lyapunov is not None else claims
     return claims
 
 

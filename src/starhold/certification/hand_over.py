@@ -13,6 +13,7 @@ from flint import arb
 from starhold.algebra.polynomial import UnreadableError, exact
 from starhold.certification.certificate import BALLS, Certificate, Claim
 from starhold.certification.convergence import Basin, Obligations, assumed, converge, reached
+from starhold.certification.limits import needed
 from starhold.certification.matrices import greatest, number
 from starhold.certification.openness import READ, named
 from starhold.certification.subject import above, below, described, described_target, make_subject, upper
@@ -50,7 +51,7 @@ def hand_over(loop: ClosedLoop, before: ClosedLoop, name: str, levels: Mapping[s
     share, basin = max(((_share(basin, rate, angle), basin) for basin in basins), key=lambda found: found[0] is not None)
     claim = _claim(basin, rate, angle, share)
     switch = {"levels": {test: levels[test] for test in ENDS if test in levels}, "before": last, "after": target}
-    return Certificate(name, {**described(subject), "switch": switch}, named([claim], loop))
+    return Certificate(name, {**described(subject), "switch": switch}, named(needed([claim], basin.motion), loop))
 
 
 def _ends(levels: Mapping[str, float], before: Any, after: Any) -> tuple[float | None, float | None]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -11,7 +11,7 @@ from flint import arb, fmpq
 from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import Polynomial, exact, jointly
-from starhold.certification.certificate import BALLS, Claim, Obligation
+from starhold.certification.certificate import BALLS, UNLIMITED, Claim, Obligation
 from starhold.certification.convergence import Basin, assumed, reached
 from starhold.certification.frame import contents
 from starhold.certification.gyroscopic import GyroscopicTorque, gyroscopic_torque, is_gyroscopic
@@ -28,7 +28,7 @@ from starhold.certification.matrices import (
     times,
     transpose,
 )
-from starhold.certification.motion import ATTITUDE, AXES, RATE, Truths
+from starhold.certification.motion import ATTITUDE, AXES, RATE, Motion, Truths
 from starhold.certification.refutation import rational_turn, state_evidence
 from starhold.certification.subject import above, upper
 
@@ -99,6 +99,16 @@ def torque_limit(basin: Basin, turn: float | None = None) -> Claim | None:
     if within(basin, carried, level):
         return claim(level, True)
     return claim(level, False, _overload(basin, parts, start, exact(limit), kind) or {"reason": "not shown"})
+
+
+def needed(claims: Sequence[Claim], motion: Motion) -> list[Claim]:
+    """The claims without the assumption that torque is not limited, where the law itself never asks for more than its
+    limit."""
+    limit, kind = motion.subject.loop.craft.torque_limit, motion.subject.loop.limit
+    pieces = jointly(motion.torque) if kind != "none" and np.isfinite(limit) else []
+    if len(pieces) < 2 or not _everywhere(pieces, exact(limit), kind):
+        return [*claims]
+    return [replace(c, assumptions=tuple(text for text in c.assumptions if text != UNLIMITED)) for c in claims]
 
 
 def told_set(basin: Basin, level: Any | None, turn: float | None) -> dict[str, Any]:

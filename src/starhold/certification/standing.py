@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Set
 from dataclasses import dataclass
 
-from starhold.certification.certificate import WHEELS, Claim
-
-UNLIMITED = "torque not limited"
+from starhold.certification.certificate import UNLIMITED, WHEELS, Claim
 
 
 @dataclass(frozen=True)

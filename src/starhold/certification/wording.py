@@ -143,9 +143,10 @@ def _rests(turn: float, subject: Mapping[str, Any], more: bool) -> str:
     """States at rest turned up to an angle; an attitude has two quaternions, of which the other is turned by 360° less."""
     if turn < math.pi:
         return f"rest at up to {angle(turn, more)}"
-    width = subject["hysteresis_width"]
-    behind = 2.0 * math.pi if width is None else 2.0 * math.acos(-min(width, 1.0)) * (1.0 + 1e-15)
-    if _even(subject) or turn >= (math.pi if subject["quaternion_sign"] == "shortest" else behind):
+    most = {"shortest": math.pi}
+    if subject["quaternion_sign"] == "hysteresis":
+        most["hysteresis"] = 2.0 * math.acos(-min(subject["hysteresis_width"], 1.0)) * (1.0 + 1e-15)
+    if _even(subject) or turn >= most.get(subject["quaternion_sign"], 2.0 * math.pi):
         return "rest at every attitude"
     return (
         f"rest at every attitude told by the shorter of its quaternions, and by the longer up to {angle(turn, more)} of 360°"

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from flint import ctx
 
-from starhold.checker.claims import CLAIMS
+from starhold.checker.claims import CLAIMS, UNLIMITED
 from starhold.checker.exact import CheckError, Obligation, Verdict, demand, limited
 from starhold.checker.invariant import FORMAT as INVARIANT
 from starhold.checker.invariant import invariant_findings
@@ -35,6 +35,7 @@ from starhold.checker.shapes import (
 )
 from starhold.checker.station import STATION_CLAIMS, StationSubject, read_station, station_refutation
 from starhold.checker.subject import LoopSubject, read_subject
+from starhold.checker.torque import never_beyond
 
 FORMAT = "starhold certificate 2"
 FORMER = ("starhold certificate 1", "starhold invariant certificate 1")
@@ -190,7 +191,11 @@ def _obliges(subject: LoopSubject | StationSubject, claim: Any) -> tuple[list[st
         return about.assumptions(subject), partial(about.proofs, subject, claim)
     kind, wheels = CLAIMS[claim["kind"]], subject.wheels is not None
     demand(kind.wheels is None or kind.wheels == wheels, f"such a claim is {'not ' if wheels else ''}for loops with wheels")
-    return kind.assumptions(claim["numbers"], wheels), partial(kind.proofs, subject, claim)
+    assumed = kind.assumptions(claim["numbers"], wheels)
+    if UNLIMITED in assumed and UNLIMITED not in claim["assumptions"]:
+        demand(never_beyond(subject), "the law may ask for more torque than its limit")
+        assumed = [text for text in assumed if text != UNLIMITED]
+    return assumed, partial(kind.proofs, subject, claim)
 
 
 def _verdict(proof: Obligation) -> tuple[str, Verdict, str]:

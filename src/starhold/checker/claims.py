@@ -54,7 +54,7 @@ class Kind:
         """The assumptions of a claim with these numbers, about a loop with or without wheels."""
         unlimited = numbers.get("tolerance", 0) is None
         kept = [told for told in self.assumed if not (unlimited and told == self.untold)]
-        return [_FREE if told == _UNLIMITED else told for told in (*kept, *self.beside)] if wheels else kept
+        return [_FREE if told == UNLIMITED else told for told in (*kept, *self.beside)] if wheels else kept
 
 
 def _region(loop: ExactLoop, level: Any | None, start: Any | None, witness: Numbers) -> OddRegion | EvenRegion:
@@ -292,13 +292,13 @@ def region(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
     return ModalRegion(subject, claim["numbers"], claim["witness"]).proofs()
 
 
-_UNLIMITED, _FREE = "torque not limited", "neither torque nor wheels limited, wheels without friction"
+UNLIMITED, _FREE = "torque not limited", "neither torque nor wheels limited, wheels without friction"
 _BASE = (
     "rigid body",
     "inertia exactly as given",
     "exact measurement and ideal actuators",
     "torque applied continuously",
-    _UNLIMITED,
+    UNLIMITED,
     "no torque from outside but what the law cancels",
 )
 _BOX = "inertia within the tolerance"
@@ -311,9 +311,9 @@ def _instead(old: str, *new: str) -> tuple[str, ...]:
 CLAIMS: dict[str, Kind] = {
     "convergence": Kind(_BASE, convergence),
     "hand-over": Kind(_BASE, hand_over),
-    "torque-limit": Kind(_instead(_UNLIMITED), torque_limit, wheels=False),
+    "torque-limit": Kind(_instead(UNLIMITED), torque_limit, wheels=False),
     "wheels": Kind(
-        _instead(_UNLIMITED, "wheels without friction", "total momentum at most as told"), wheels_limits, wheels=True
+        _instead(UNLIMITED, "wheels without friction", "total momentum at most as told"), wheels_limits, wheels=True
     ),
     # What a law cancels of a torque that depends on the inertia is not what another inertia feels.
     "inertia": Kind((_BASE[0], _BOX, *_BASE[2:5], "no torque from outside", "target at rest"), inertia, _BOX),

@@ -26,7 +26,7 @@ from starhold.checker.exact import (
 from starhold.checker.gyroscopic import gyroscopic_bound
 from starhold.checker.loop import RATE, TURN, ExactLoop, W, letters
 from starhold.checker.region import Region
-from starhold.checker.subject import quadratic
+from starhold.checker.subject import LoopSubject, quadratic
 from starhold.checker.well import SHAPES, keeps_below
 
 __all__ = ["SHAPES", "bounded", "keeps_below", "keeps_within"]
@@ -39,15 +39,25 @@ def keeps_within(region: Region[Any], limit: Any, each_axis: bool, shift: Any | 
     plainly = each_axis or region.level is None or len(loop.pieces) > 1
     demand(not plainly or shift is None is weight, "a shift or a weight is for the norm of one piece of the law")
     if region.level is None or len(loop.pieces) > 1:
-        return all(
-            _everywhere(loop, found, list(torque.values()), limit, each_axis)
-            for truths, torque in loop.pieces
-            if (found := intervals(truths, W)) is not None
-        )
+        return _in_every_state(loop, limit, each_axis)
     parts = list(loop.pieces[0][1].values())
     if each_axis:
         return all(bounded(region, [part], limit) for part in parts)
     return bounded(region, parts, limit, shift, weight)
+
+
+def never_beyond(subject: LoopSubject) -> bool:
+    """Whether the law keeps its torque within the loop's limit in every state."""
+    limit, each_axis = subject.torque_limit, subject.limit == "axis"
+    return limit is not None and subject.limit != "none" and _in_every_state(ExactLoop(subject), limit, each_axis)
+
+
+def _in_every_state(loop: ExactLoop, limit: Any, each_axis: bool) -> bool:
+    return all(
+        _everywhere(loop, found, list(torque.values()), limit, each_axis)
+        for truths, torque in loop.pieces
+        if (found := intervals(truths, W)) is not None
+    )
 
 
 def bounded(
