@@ -134,6 +134,13 @@ def test_command_line_compares_it_and_checks_its_certificate(folder):
     assert "there is no law my-law" in bare.stdout
     checked = starhold("check", "out/certificate.json", "--law-file", "laws/my_law.py", cwd=folder)
     assert checked.returncode == 0, checked.stdout
+    assert "starhold check certificate.json --law-file my_law.py</code>" in (folder / "out" / "report.html").read_text()
+    # What is printed can be run as it stands.
+    proved = starhold("certify", "own.toml", "-o", "proved", cwd=folder)
+    assert proved.returncode == 0, proved.stderr
+    command = proved.stdout.rpartition("Re-check it: starhold ")[2].split()
+    assert command[2] == "--law-file"
+    assert starhold(*command, cwd=folder).returncode == 0
     assert "stiffness" in starhold("laws", "laws/my_law.py", cwd=folder).stdout
     (folder / "point.toml").write_text(POINT + '[[law]]\nfile = "laws/point.py"\nk = 30.0\nd = 9.0\n')
     held = starhold("compare", "point.toml", "-o", "held", cwd=folder)

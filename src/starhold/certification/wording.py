@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Mapping, Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+from pathlib import Path
 from typing import Any, cast
 
-from starhold.certification.certificate import WHEELS, Certificate, Claim, Obligation
+from starhold.certification.certificate import FILE, WHEELS, Certificate, Claim, Obligation
 from starhold.certification.openness import WITHOUT
-from starhold.laws.catalogue import known_law
+from starhold.laws.catalogue import file_of, known_law
 
 HEADINGS = {
     "convergence": "converges",
@@ -361,6 +363,16 @@ def brief(certificate: Certificate) -> str:
     """All that is proved, in one line."""
     proved = [sentence(c, certificate.subject) for c in certificate.claims if c.outcome == "proved"]
     return "; ".join(proved) or "nothing is proved"
+
+
+def recheck(certificates: Sequence[Certificate], path: Path | None = None) -> str:
+    """The command that checks a file of certificates again, with the files of the laws that it speaks of; without a path
+    all files by their names alone, for a page or a header that is moved."""
+    files = dict.fromkeys(file_of(str(one.subject.get("law"))) for one in certificates)
+    named = [(file if path else file.name) for file in files if file is not None]
+    return shlex.join(
+        ["starhold", "check", str(path or FILE), *(word for file in named for word in ("--law-file", str(file)))]
+    )
 
 
 def methods(claim: Claim) -> str:

@@ -21,6 +21,7 @@ def certify(
 
     Exit code 0: all that is claimed is proved; 3: something is refuted, with the state that does; 4: not decided.
     """
+    from starhold.certification.wording import recheck
     from starhold.cli.show import console
     from starhold.cli.show_certificates import print_certificate
     from starhold.report.results import open_folder, write_proofs
@@ -34,7 +35,7 @@ def certify(
         print_certificate(found)
     certificates = [found.certificate for found in tried]
     path = write_proofs(certificates, scenario.name, folder)
-    console.print(f"Certificate: {path}. Re-check it: starhold check {path}", soft_wrap=True)
+    console.print(f"Certificate: {path}. Re-check it: {recheck(certificates, path)}", soft_wrap=True)
     outcomes = {certificate.outcome for certificate in certificates}
     if outcomes != {"proved"}:
         raise typer.Exit(REFUTED if "refuted" in outcomes else UNDECIDED)

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from starhold.certification.certificate import FILE, Certificate
-from starhold.certification.wording import HEADINGS, evidence, sentence, unclaimed
+from starhold.certification.wording import HEADINGS, evidence, recheck, sentence, unclaimed
 
 
 class Proof(NamedTuple):
     """The certificate's file and the digest of that (both empty for none), its outcome, a line for each claim, what they
-    assume, and why nobody should fly the law unread (empty where all is proved)."""
+    assume, why nobody should fly the law unread (empty where all is proved), and the command that checks it again."""
 
     file: str
     digest: str
@@ -19,6 +19,7 @@ class Proof(NamedTuple):
     claims: tuple[str, ...]
     assumptions: tuple[str, ...]
     warning: str
+    recheck: str = ""
 
 
 UNPROVED = Proof("", "", "", (), (), "NO CERTIFICATE. Nothing was proved of this law, because nobody asked for it.")
@@ -45,4 +46,4 @@ def proof_of(certificates: Sequence[Certificate], digest: str) -> Proof:
     outcome = next((one for one in ("refuted", "undecided") if one in outcomes), "proved")
     if outcome != "proved" and not wrong:
         wrong.append("NOT DECIDED where the motion ends: no claim is made of it.")
-    return Proof(FILE, digest, outcome, tuple(claims), tuple(assumed), "\n".join(wrong))
+    return Proof(FILE, digest, outcome, tuple(claims), tuple(assumed), "\n".join(wrong), recheck(certificates))

@@ -128,7 +128,7 @@ def _banner(code: Code, scenario: str, law: str, proof: Proof) -> list[str]:
         found += ["", f"Certificate: {proof.file}, sha256 {proof.digest}: {proof.outcome}", "Claims:"]
         found += [f"  {line}" for line in proof.claims]
         found += [f"These claims assume: {'; '.join(proof.assumptions)}."] if proof.assumptions else []
-        found += [f"Check it independently: starhold check {proof.file}"]
+        found += [f"Check it independently: {proof.recheck}"]
     return comment("\n".join(found))
 
 

@@ -150,6 +150,12 @@ def known_law(name: str) -> Law | None:
     return found if found is None or found.body == "rigid-body" else None
 
 
+def file_of(name: str) -> Path | None:
+    """The file that the law of this name was last read from; None for a law that is installed."""
+    law = None if name in _installed() else _FROM_FILES.get(name)
+    return None if law is None else law.file
+
+
 def from_file(path: Path, known: Mapping[str, Law] | None = None) -> Law:
     """The law in a file, which is run for it. `known`: the laws that are installed, of which it may be one. Errors as of
     `parts.catalogue.from_file`."""

@@ -7,7 +7,7 @@ from html import escape
 from typing import Any
 
 from starhold.certification.certificate import FILE, Claim, Obligation
-from starhold.certification.wording import HEADINGS, OBLIGATIONS, evidence, methods, sentence, unclaimed
+from starhold.certification.wording import HEADINGS, OBLIGATIONS, evidence, methods, recheck, sentence, unclaimed
 from starhold.report.colours import colour
 from starhold.report.text import left_text, number_text
 from starhold.studies.flight import Flight
@@ -20,7 +20,7 @@ NOTE = (
     "flight on this page does not, the page says so and from when on. Of torque held between samples it does so only where "
     "that is refuted. "
 )
-RECHECK = f"The proofs are in {FILE} beside this page; <code>starhold check {FILE}</code> goes through them again."
+RECHECK = f"The proofs are in {FILE} beside this page; <code>%s</code> goes through them again."
 
 SYMBOLS = {
     "start": ("V at the start, at most", ""),
@@ -62,7 +62,8 @@ def section(flights: Sequence[Flight]) -> str:
     told = [_law(flight, number, i) for number, flight in enumerate(flights) for i in range(len(flight.certificates))]
     if not told:
         return ""
-    return f'<h2>What is proved</h2>\n<p class="note">{NOTE}{RECHECK}</p>\n<div class="laws">{"".join(told)}</div>'
+    command = escape(recheck([certificate for flight in flights for certificate in flight.certificates]))
+    return f'<h2>What is proved</h2>\n<p class="note">{NOTE}{RECHECK % command}</p>\n<div class="laws">{"".join(told)}</div>'
 
 
 def _law(flight: Flight, number: int, place: int) -> str:
