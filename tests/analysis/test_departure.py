@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from starhold.algebra.scalar import side
-from starhold.analysis.departure import LOST, MET, departures, fed_back
+from starhold.analysis.departure import CHANGES, LOST, MET, departures, fed_back
 from starhold.certification.certificate import BESIDE, Certificate, Claim, Obligation, write
 from starhold.certification.certify import certify
 from starhold.certification.wording import HEADINGS, sentence
@@ -29,6 +29,8 @@ from starhold.studies import compare
 from starhold.studies.bodies.rigid_body import start_inside
 from starhold.studies.certificates import certify_scenario
 from starhold.studies.compare import fly_law, prove
+from tests.missions import BASE as MISSION
+from tests.missions import DETUMBLE, POINT
 
 BASE = builtin_text("three-laws").split("[[law]]")[0].replace("duration = 2000.0", "duration = 60.0")
 LAW = '\n[[law]]\ntype = "lyapunov"\nk_rate = 0.09\nk_attitude = 0.009\n'
@@ -110,9 +112,13 @@ def test_a_law_that_keeps_within_its_limit_assumes_no_unlimited_torque(tmp_path)
     ("old", "new", "how"),
     [
         ("[sensor]", "", None),
-        ("torque_limit", 'actuator_lag = "0.5 s"\ntorque_limit', "the actuators lag"),
-        ("gravity_gradient = true", "gravity_gradient = true\ntorque_noise = 1e-5", "a random torque acts"),
-        ("[simulation]", "[sensor]\nrate_noise = 1e-5\n[simulation]", "the sensors are noisy"),
+        ("torque_limit", 'actuator_lag = "0.5 s"\ntorque_limit', "the loop has the actuator lag"),
+        (
+            "gravity_gradient = true",
+            "gravity_gradient = true\ntorque_noise = 1e-5",
+            "the loop has the environment random-torque",
+        ),
+        ("[simulation]", "[sensor]\nrate_noise = 1e-5\n[simulation]", "the loop has the sensor gaussian"),
     ],
 )
 def test_what_acts_all_the_time_is_told_from_the_start(old, new, how):
@@ -198,14 +204,82 @@ def test_a_fault_ends_the_claims_of_the_first_certificate():
         scenario.text.replace('duration = "10 min"', "duration = 30.0")
         + '\n[[fault]]\ntime = 10\nwheel = 2\nlost = true\naction = "both"\n'
     )
+    flight = proved_flight(text)
+    assert len(flight.certificates) == 2
+    first, second = (left["convergence"] for left in flight.departures)
+    assert first[-1] == (10.0, CHANGES)
+    assert all(one.time >= 10.0 for one in second)
+
+
+def proved_flight(text):
+    """The flight of the first law of a scenario, with what it leaves."""
     scenario = parse(text, "here")
     entry = scenario.laws[0]
     loop = build(scenario, entry)
-    flight = prove(scenario, entry, loop, fly_law(scenario, entry, loop))
-    assert len(flight.certificates) == 2
-    first, second = (left["convergence"] for left in flight.departures)
-    assert (first[-1].time, first[-1].how) == (10.0, "what flies, or what the law knows of it, changes")
-    assert all(one.time >= 10.0 for one in second)
+    return prove(scenario, entry, loop, fly_law(scenario, entry, loop))
+
+
+LOST_WHEEL = '\n[[fault]]\ntime = {time}\nwheel = 2\nlost = true\naction = "none"\n'
+
+
+def test_a_fault_at_the_very_start_that_the_law_does_not_know_of_ends_its_claims_there():
+    text = load("wheels-orbital").text.replace('duration = "10 min"', "duration = 2.0")
+    flight = proved_flight(text + LOST_WHEEL.format(time=0))
+    (left,) = flight.departures
+    assert all((0.0, CHANGES) in departed for departed in left.values())
+    assert left
+
+
+def test_a_fault_ends_the_claims_of_the_mode_that_flies_and_of_all_that_follow():
+    wheels = '[wheels]\nlayout = "pyramid"\ninertia = 2.2e-5\ntorque_limit = 0.002\nmomentum_limit = 0.015\n'
+    text = MISSION.replace("torque_limit = 0.002\n", "").replace("[initial]", f"{wheels}[initial]") + DETUMBLE
+    text += POINT.replace('"pid"', '"lyapunov"').partition("k_integral")[0]
+    text = text.replace('until = { rate_below = "0.5 deg/s", dwell = "2 s" }', 'until = { after = "10 s" }')
+    text = text.replace('quaternion_sign = "shortest"\n', "")
+
+    def left(time):
+        flight = proved_flight(text + (LOST_WHEEL.format(time=time) if time else ""))
+        assert [begun.time for begun in flight.modes] == [0.0, pytest.approx(10.0, abs=0.15)]
+        kinds = ("convergence", "convergence", "hand-over")
+        found = [flight.left(number, kind) for number, kind in enumerate(kinds)]
+        return [[one.time for one in departed if one.how == CHANGES] for departed in found]
+
+    assert left(None) == [[], [], []]
+    assert left(20) == [[], [20.0], [20.0]]
+    before, *after = left(5)
+    assert before == [5.0]
+    assert after == [[pytest.approx(10.0, abs=0.15)]] * 2
+
+
+def test_a_law_that_switches_at_rest_leaves_its_claim_where_its_torque_is_held():
+    """Each held switch turns the body by more than the surface is wide: with these gains it ends 50 deg off its target."""
+    text = quiet(BASE, **{"[2.0, 3.0, 4.0]": "[399.0, 377.0, 377.0]", 'torque_limit = "0.01 N m"': ""})
+    law = '[[law]]\ntype = "sliding"\nsurface_gain = 0.015\nswitching_gain = 59.0\nboundary_layer = {}\n'
+    flight = proved_flight(text + law.format(0.0))
+    certificate = flight.certificates[0]
+    assert [(c.kind, c.outcome) for c in certificate.claims] == [("sliding", "proved"), ("sampling", "undecided")]
+    assert flight.departures[0]["sliding"][0] == (
+        0.0,
+        "the torque is held for 0.1 s, with which it is not shown to be stable",
+    )
+    assert np.degrees(flight.metrics["final_attitude_error"]) > 10.0
+    # Of a layer that is wide enough the held torque is proved to do.
+    calm = proved_flight(text + law.format(0.05))
+    assert calm.certificates[0].claim("sampling").outcome == "proved"
+    assert calm.departures[0]["sliding"] == ()
+
+
+def test_a_hand_over_is_left_where_the_next_mode_holds_its_torque_for_too_long():
+    text = MISSION.replace("control_period = 0.1", "control_period = 5.0") + DETUMBLE.replace("0.02", "0.005")
+    text = text.replace('rate_below = "0.5 deg/s", dwell = "2 s"', 'after = "10 s"')
+    text += POINT.replace('"pid"', '"pd"').partition("k_integral")[0].replace("0.006", "0.03")
+    flight = proved_flight(text.replace('quaternion_sign = "shortest"\n', ""))
+    handed = flight.certificates[2]
+    assert {c.kind: c.outcome for c in handed.claims} == {"hand-over": "proved", "sampling": "refuted"}
+    assert flight.left(2, "hand-over")[0] == (
+        10.0,
+        "the torque is held for 5 s, with which not even the linear loop is stable",
+    )
 
 
 @given(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=60), st.floats(0.05, 0.9))
@@ -240,6 +314,18 @@ def test_a_lost_flight_first_leaves_the_claim_that_it_ends_on_the_circle(deficit
     assert "This flight leaves the claim" in section([deficit])
     (circle,) = (claim for claim in deficit.results()["claims"] if claim["claim"] == "circle")
     assert circle["left_at"] == left[0].time
+
+
+def test_a_flight_on_its_control_limit_leaves_the_claim_that_it_ends_at_the_equilibrium():
+    text = (
+        load("l2-equilibrium").text.partition("[[law]]")[0] + "[[law]]\n" + load("l2-equilibrium").text.split("[[law]]\n")[3]
+    )
+    flight = proved_flight(text)
+    run, left = flight.recording, flight.departures[0]["equilibrium"]
+    assert flight.certificates[0].claim("equilibrium").outcome == "proved"
+    on = np.abs(run["command"]).max(axis=1) >= build(parse(text, "here"), parse(text, "here").laws[0]).cutoff()
+    assert left[0].how == "the control reaches its limit"
+    assert left[0].time == pytest.approx(run["time"][np.argmax(on)] * run.attrs["time_unit_s"])
 
 
 def test_no_limit_no_word_of_it():

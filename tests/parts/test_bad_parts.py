@@ -15,6 +15,22 @@ POINT = 'name = "own"\n[libration]\n[initial]\nposition = [0.0, 0.5, 0.1]\n[simu
 CIRCLE = law_table(catalogue("libration-point")["l2-circle"], catalogue("libration-point")["l2-circle"].examples()[0])
 GYRO, FILTER = part('type = "gyro"\n'), part('type = "complementary-filter"\nattitude_gain = 0.1\nbias_gain = 0.01\n')
 TRACKER = part('type = "star-tracker"\ncross = 1e-5\nroll = 1e-4\n')
+MARS = "[orbit]\nposition = [3.8e6, 0, 0]\nvelocity = [0, 3.4e3, 0]\ngravitational_parameter = 4.2828375816e13\n"
+MODES = """[[law]]
+type = "modes"
+[[law.mode]]
+name = "slow"
+type = "pd"
+k_rate = 0.1
+k_attitude = 0.01
+until = { after = "5 s" }
+[[law.mode]]
+name = "sun"
+type = "pd"
+k_rate = 0.9
+k_attitude = 0.09
+target = { type = "sun" }
+"""
 MINE = 'file = "mine.py"\n'
 TABLE = part('type = "torque-table"\ntable = "rows.csv"\n')
 
@@ -45,6 +61,21 @@ COMPOSED = {
         POINT + part('type = "constant-torque"\ntorque = [0, 0, 1e-5]\n') + CIRCLE,
         "part[1]: found constant-torque, for the body rigid-body",
         "a part for libration-point",
+    ),
+    "a part that is about the Earth elsewhere": (
+        BODY + MARS + part('type = "residual-dipole"\ndipole = [0, 0, 0.01]\n') + PD,
+        "part residual-dipole: found an orbit about Mars",
+        "one about Earth",
+    ),
+    "a target that is about the Earth elsewhere": (
+        BODY + MARS + part('type = "sun"\n') + PD,
+        "part sun: found an orbit about Mars",
+        "one about Earth",
+    ),
+    "a mode's target that is about the Earth elsewhere": (
+        BODY + MARS + MODES,
+        "found an orbit about Mars",
+        "one about Earth",
     ),
     "an unknown type": (BODY + part('type = "gyroo"\n') + PD, 'part[1].type: found "gyroo"', "did you mean gyro?"),
     "no type": (BODY + part("noise = 1\n") + PD, "part[1].type: found nothing", "or a file"),

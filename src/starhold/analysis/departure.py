@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from starhold.simulation.lane import Recording
 
 Array: TypeAlias = NDArray[np.float64]
+CHANGES = "what flies, or what the law knows of it, changes"
 LOST = "the simulation loses the motion"
 """Which no proof speaks of: it is too fast for the integration, or farther away than a scenario follows it."""
 
@@ -72,29 +73,34 @@ def departures(
     run: Recording,
     first: int = 0,
     last: int | None = None,
-    change: str = "what flies, or what the law knows of it, changes",
+    change: str = CHANGES,
 ) -> dict[str, tuple[Departure, ...]]:
     """Tell for each proved kind of claim about motions how a run leaves it, in order of time; empty where it does not.
 
     loop: what the certificate speaks of, flown from control step `first` until it changes at `last` (None: it does not),
     as `change` tells.
-    That torque is held between samples counts only where it is refuted that it may be.
+    That torque is held between samples counts unless it is proved that it may be.
     """
     span = Span(loop, run, first, last)
-    if not len(span["time"]):
-        return {}
-    sampled = certificate.claim("sampling")
     common = [] if span.changes is None else [Departure(span.changes, change)]
-    if sampled is not None and sampled.outcome == "refuted":
-        common += span.always(f"the torque is held for {loop.period:g} s, with which not even the linear loop is stable")
+    if not len(span["time"]):
+        return {claim.kind: tuple(common) for claim in _left(certificate)}
+    held = {"refuted": "with which not even the linear loop is stable", "proved": ""}
+    sampled = certificate.claim("sampling")
+    why = held.get("" if sampled is None else sampled.outcome, "with which it is not shown to be stable")
+    common += span.always(f"the torque is held for {loop.period:g} s, {why}", bool(why))
     if run.attrs.get("diverged_at") is not None:
         common.append(Departure(run.attrs["diverged_at"], LOST))
     found: dict[str, tuple[Departure, ...]] = {}
-    for claim in certificate.claims:
-        if claim.outcome == "proved" and claim.kind != "sampling":
-            own = [one for assumed in claim.assumptions for one in _met(assumed, span)]
-            found[claim.kind] = tuple(sorted({*common, *own, *_set(claim, span)}))
+    for claim in _left(certificate):
+        own = [one for assumed in claim.assumptions for one in _met(assumed, span)]
+        found[claim.kind] = tuple(sorted({*common, *own, *_set(claim, span)}))
     return found
+
+
+def _left(certificate: Certificate) -> list[Claim]:
+    """Return the claims that a flight can leave: those about motions that are proved."""
+    return [claim for claim in certificate.claims if claim.outcome == "proved" and claim.kind != "sampling"]
 
 
 # --- assumptions ------------------------------------------------------------------------------------------------------
@@ -102,17 +108,6 @@ def departures(
 
 def _kept(span: Span) -> list[Departure]:
     return []
-
-
-def _exact(span: Span) -> list[Departure]:
-    loop = span.loop
-    noisy, lag, slow = loop.find("gaussian"), loop.find("lag"), loop.has("rate-limit")
-    slow = slow or (lag is not None and math.isfinite(lag.params.rate_limit))
-    return [
-        *span.always("the sensors are noisy", noisy is not None and any(noisy.params)),
-        *span.always("the actuators lag", lag is not None),
-        *span.always("the torque's rate is limited", slow),
-    ]
 
 
 def _unlimited(span: Span) -> list[Departure]:
@@ -135,28 +130,17 @@ def _friction(span: Span) -> list[Departure]:
     return span.always("the wheels have friction", any((*wheels.viscous, *wheels.coulomb)))
 
 
-def _random(span: Span) -> list[Departure]:
-    found = span.loop.find("random-torque")
-    return span.always("a random torque acts", found is not None and found.params.deviation > 0.0)
-
-
-def _bounded(span: Span) -> list[Departure]:
-    """Torques that claims against disturbances take in by their bounds, and others assume not to act."""
-    entering = [f for f in span.loop.used("environment") if f.part.hook("bound") is not None]
-    return [one for f in entering for one in span.always(f"the torque {f.called} acts")]
-
-
 def _absent(assumption: str, span: Span) -> list[Departure]:
     return span.always(f"{HAS}{assumption.removeprefix(WITHOUT)}")
 
 
 def _cancelled(span: Span) -> list[Departure]:
     gravity = span.loop.has("gravity-gradient") and not cancels(span.loop)
-    return [*_random(span), *_bounded(span), *span.always("the law does not cancel the gravity gradient", gravity)]
+    return span.always("the law does not cancel the gravity gradient", gravity)
 
 
 def _alone(span: Span) -> list[Departure]:
-    return [*_random(span), *_bounded(span), *span.always("the gravity gradient acts", span.loop.has("gravity-gradient"))]
+    return span.always("the gravity gradient acts", span.loop.has("gravity-gradient"))
 
 
 def _still(span: Span) -> list[Departure]:
@@ -174,7 +158,8 @@ MET: Mapping[str, Callable[[Span], list[Departure]]] = {
     "inertia exactly as given": _kept,
     "inertia within the tolerance": _kept,
     "torque applied continuously": _kept,
-    "exact measurement and ideal actuators": _exact,
+    # What keeps measurement and actuators from being so is a part, which is left out by name.
+    "exact measurement and ideal actuators": _kept,
     "torque not limited": _unlimited,
     WHEELS: _wheels_unlimited,
     "wheels without friction": _friction,
@@ -182,12 +167,12 @@ MET: Mapping[str, Callable[[Span], list[Departure]]] = {
     "total momentum at most as told": _kept,
     "no torque from outside but what the law cancels": _cancelled,
     "no torque from outside": _alone,
-    "torque from outside bounded in norm": _random,
-    "torque from outside bounded on each axis": _random,
+    "torque from outside bounded in norm": _kept,
+    "torque from outside bounded on each axis": _kept,
     "target at rest": _still,
 }
-"""For each assumption of a claim about motions how a flight departs from it. The first four a simulation meets, but for what
-`departures` says of held torque and of changes."""
+"""For each assumption of a claim about motions how a flight departs from it. Those that are `_kept` a simulation meets, but
+for what `departures` says of held torque and of changes."""
 
 
 def cancels(loop: ClosedLoop) -> bool:

@@ -10,11 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.analysis.departure import LOST, Departure
+from starhold.analysis.departure import HAS, LOST, Departure
 from starhold.analysis.metrics import on_limit
 from starhold.analysis.trial import FLIGHTS, LEGS, BrokenClaimError, Trial
 from starhold.analysis.trial import SLACK as RISE
-from starhold.certification.station_terms import lag_of
+from starhold.certification.circle import IN_PLANE
+from starhold.certification.equilibrium import CLEAR, HELD
+from starhold.certification.openness import WITHOUT
+from starhold.certification.station_terms import COMMON, FULL, LINEAR, UNLIMITED
 from starhold.laws import l2_circle
 from starhold.laws.point import PointMeasurement
 from starhold.parts.bodies.libration_point import ROWS
@@ -29,6 +32,8 @@ SLACK = 1e-6
 """The integration moves V, scaled distances and velocities by so much in a motion along a border."""
 PERIOD = 1e-4
 """Control that is renewed so often counts as continuous (scaled)."""
+MET = (LINEAR, FULL, *COMMON, CLEAR, IN_PLANE)
+"""Assumptions that a flight meets, but for where `outside` or the simulation ends it."""
 FLOOR = 1e-6
 """Share of V at the centre of the circle: what the held control makes of zero."""
 
@@ -42,12 +47,10 @@ def departures(certificate: Certificate, loop: ClosedLoop, run: Recording, unit:
 
     at = run.attrs.get("diverged_at")
     common = [] if at is None else [Departure(at * unit, LOST)]
-    if lag_of(loop) > 0.0:
-        common.append(Departure(0.0, "the control lags"))
     found: dict[str, tuple[Departure, ...]] = {}
     for claim in certificate.claims:
         if claim.outcome == "proved":
-            own = [one for held, how in _conditions(claim, loop, run) for one in first(held, how)]
+            own = [one for held, how in _unmet(claim, loop, run["command"]) for one in first(held, how)]
             left = outside(claim, loop, run["position"].T, run["velocity"].T, SLACK)
             sets = first(left, "it leaves the set")
             if len(left) and left[0]:
@@ -56,14 +59,19 @@ def departures(certificate: Certificate, loop: ClosedLoop, run: Recording, unit:
     return found
 
 
-def _conditions(claim: Claim, loop: ClosedLoop, run: Recording) -> list[tuple[Any, str]]:
-    """The samples (n,) that a claim assumes not to be, beside lag and its set, each with its sentence."""
-    command, limit, kind = run["command"], loop.cutoff(), loop.limit
-    if claim.kind in ("circle", "rest"):
-        return [(on_limit(command, limit, kind), "the control reaches its limit")]
-    if claim.kind == "saturated-axis" and kind != "none":
-        return [(on_limit(command[:, 1:], limit, "axis"), "the control along Y or Z reaches its limit")]
-    return []
+def _unmet(claim: Claim, loop: ClosedLoop, command: NDArray[np.float64]) -> list[tuple[Any, str]]:
+    """The samples (n,) at which an assumption of a claim is not met, beside its set, each with its sentence."""
+    found: list[tuple[Any, str]] = []
+    for assumed in claim.assumptions:
+        if assumed.startswith(WITHOUT):
+            found.append((np.ones(len(command), dtype=bool), f"{HAS}{assumed.removeprefix(WITHOUT)}"))
+        elif assumed == UNLIMITED:
+            found.append((on_limit(command, loop.cutoff(), loop.limit), "the control reaches its limit"))
+        elif assumed == HELD:
+            found.append((on_limit(command[:, 1:], loop.cutoff(), loop.limit), "the control along Y or Z reaches its limit"))
+        elif assumed not in MET:
+            raise KeyError(assumed)
+    return found
 
 
 def outside(

@@ -13,7 +13,7 @@ from starhold.campaign.distributions import Choice, Rotations, Shell, TruncatedN
 from starhold.campaign.job import scenario_of
 from starhold.campaign.requirements import LOST, Requirement
 from starhold.campaign.results import Bracket, LawResult
-from starhold.certification.openness import TOLD, assumed_away
+from starhold.certification.openness import assumed_away
 from starhold.files import atomic_write
 from starhold.scenario.building import build
 from starhold.simulation.lanes import Crew
@@ -160,7 +160,7 @@ def proved_of(job: Job, law: str, requirement: Requirement) -> tuple[float | Non
     keys = {key for dispersion in job.dispersions for key in dispersion.keys}
     if place is None or not all(key.startswith("initial.") for key in keys):
         return None, ""
-    if assumed_away(loop) or any(loop.has(name) for name in TOLD):
+    if assumed_away(loop):
         return None, ""
     fastest = _fastest(job, scenario)
     for issued in study_of(scenario.body).certify(scenario, entry, loop):

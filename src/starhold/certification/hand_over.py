@@ -16,6 +16,7 @@ from starhold.certification.convergence import Basin, Obligations, assumed, conv
 from starhold.certification.limits import needed
 from starhold.certification.matrices import greatest, number
 from starhold.certification.openness import READ, named
+from starhold.certification.sampling import sampling
 from starhold.certification.subject import above, below, described, described_target, make_subject, upper
 from starhold.laws.modes import ENDS
 from starhold.loop.closed_loop import ClosedLoop
@@ -49,9 +50,10 @@ def hand_over(loop: ClosedLoop, before: ClosedLoop, name: str, levels: Mapping[s
     if rate is None and all(basin.start is not None for basin in basins):
         return None
     share, basin = max(((_share(basin, rate, angle), basin) for basin in basins), key=lambda found: found[0] is not None)
-    claim = _claim(basin, rate, angle, share)
+    sampled = sampling(basin.motion)
+    claims = needed([_claim(basin, rate, angle, share)], basin.motion) + ([] if sampled is None else [sampled])
     switch = {"levels": {test: levels[test] for test in ENDS if test in levels}, "before": last, "after": target}
-    return Certificate(name, {**described(subject), "switch": switch}, named(needed([claim], basin.motion), loop))
+    return Certificate(name, {**described(subject), "switch": switch}, named(claims, loop))
 
 
 def _ends(levels: Mapping[str, float], before: Any, after: Any) -> tuple[float | None, float | None]:

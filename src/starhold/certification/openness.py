@@ -1,4 +1,4 @@
-"""The parts of a loop that no claim is about: claims assume them away by name, or take their torque in by its bound."""
+"""What a loop is made of and a claim is not about: each claim leaves it out by name, computed from the loop's parts."""
 
 from __future__ import annotations
 
@@ -7,15 +7,17 @@ from typing import Any
 
 from starhold.certification.certificate import Claim
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.part import Fitted
+from starhold.parts.orbit import body_of, lowest
+from starhold.parts.part import Fitted, Part
 
 READ = {
     "environment": ("two-body", "gravity-gradient", "linear-gravity", "three-body-gravity"),
     "effector": ("wheels",),
     "target": ("inertial", "orbital", "history"),
 }
-"""Parts that claims are about, by role. What other assumptions speak of already is in TOLD."""
-TOLD = ("random-torque", "gaussian", "lag", "rate-limit")
+"""The parts that theorems take in, by role; what a claim takes of their torques and motions its other assumptions say."""
+BOUNDED = ("disturbance",)
+"""Kinds of claims that take in torques from outside by their bounds."""
 WITHOUT = "without the "
 """Begins the assumption that a part is not there."""
 
@@ -23,30 +25,52 @@ WITHOUT = "without the "
 def bounded_torque(loop: ClosedLoop) -> float:
     """The norm (N m) that the torques from outside which declare a bound have together. They enter claims against
     disturbances, which only laws that declare a V have."""
-    return sum((_bound(f) for f in loop.used("environment") if _enters(loop, f)), 0.0)
+    return sum((_bound(f) for f in loop.parts if _enters(loop, f)), 0.0)
 
 
 def assumed_away(loop: ClosedLoop) -> list[str]:
     """The parts of a loop that no claim is about, as role and name."""
-    found: list[str] = []
-    for fitted in loop.parts:
-        part = fitted.part
-        if part.name in (*READ.get(part.role, ()), *TOLD) and part.file is None:
-            continue
-        if part.role != "environment" or not _enters(loop, fitted):
-            found.append(f"{part.role} {fitted.called}")
-    return found
+    return [_called(f) for f in loop.parts if not (_is_read(f) or _enters(loop, f))]
+
+
+def bounded_away(loop: ClosedLoop) -> list[str]:
+    """The torques that only claims of the kinds `BOUNDED` take in, as role and name."""
+    return [_called(f) for f in loop.parts if _enters(loop, f)]
 
 
 def named(claims: list[Claim], loop: ClosedLoop) -> tuple[Claim, ...]:
     """The claims with an assumption for each part that they are not about."""
-    more = tuple(f"{WITHOUT}{name}" for name in assumed_away(loop))
-    return tuple(replace(claim, assumptions=(*claim.assumptions, *more)) for claim in claims)
+    always, unless_bounded = assumed_away(loop), bounded_away(loop)
+
+    def more(kind: str) -> tuple[str, ...]:
+        absent = always if kind in BOUNDED else [*always, *unless_bounded]
+        return tuple(f"{WITHOUT}{name}" for name in absent)
+
+    return tuple(replace(claim, assumptions=(*claim.assumptions, *more(claim.kind))) for claim in claims)
+
+
+def _called(fitted: Fitted) -> str:
+    return f"{fitted.part.role} {fitted.called}"
+
+
+def _is_read(fitted: Fitted) -> bool:
+    return fitted.part.name in READ.get(fitted.part.role, ()) and fitted.part.file is None
 
 
 def _enters(loop: ClosedLoop, fitted: Fitted) -> bool:
     part = fitted.part
-    return part.hook("bound") is not None and part.hook("torque") is not None and loop.law.lyapunov is not None
+    bounded = part.role == "environment" and part.hook("bound") is not None and part.hook("torque") is not None
+    return bounded and loop.law.lyapunov is not None and _holds(loop, part)
+
+
+def _holds(loop: ClosedLoop, part: Part) -> bool:
+    """Whether all of the orbit lies where the part's bound holds."""
+    if part.about and body_of(loop.craft.gravity) != part.about:
+        return False
+    if not part.bound_from:
+        return True
+    # A little more, for floats tell how low the orbit comes.
+    return lowest(loop.start.position, loop.start.velocity, loop.craft.gravity) >= part.bound_from * (1.0 + 1e-9)
 
 
 def _bound(fitted: Fitted) -> float:

@@ -22,7 +22,7 @@ from starhold.certification.matrices import (
     times,
     transpose,
 )
-from starhold.certification.motion import Motion
+from starhold.certification.motion import Motion, ShapeError
 from starhold.certification.subject import above
 
 ASSUMPTIONS = (
@@ -42,32 +42,33 @@ MOST_BITS = 1_000
 
 
 def sampling(motion: Motion) -> Claim | None:
-    """The claim for the loop's own period, and the longest period; None for a law not linear around the equilibrium."""
-    try:
-        rate, attitude = motion.linear()
-    except ArithmeticError:
-        return None
+    """The claim for the loop's own period, and the longest period; undecided for a law that switches at rest on target, None
+    for another that is not linear there."""
     loop = motion.subject.loop
     assumptions = ASSUMPTIONS
     if loop.wheels is not None:
         assumptions = (*(WHEELS if a == "torque not limited" else a for a in ASSUMPTIONS), STILL_WHEELS)
     J, period = motion.subject.inertia, exact(loop.period)
+
+    def undecided(reason: str) -> Claim:
+        numbers = {"period": number(period), "longest": None, "every_shorter": False}
+        found = Obligation("stable at the period", ROOTS, "undecided", {"reason": reason})
+        return Claim("sampling", numbers, {}, assumptions, (found,))
+
+    try:
+        rate, attitude = motion.linear()
+    except ShapeError as reason:
+        return undecided(str(reason))
+    except ArithmeticError:
+        return None
     if _bits(stepped(J, rate, attitude, period)) > MOST_BITS:
-        numbers: dict[str, Any] = {"period": number(period), "longest": None, "every_shorter": False}
-        reason = f"{APART} for certified roots"
-        return Claim(
-            "sampling",
-            numbers,
-            {},
-            assumptions,
-            (Obligation("stable at the period", ROOTS, "undecided", {"reason": reason}),),
-        )
+        return undecided(f"{APART} for certified roots")
     roots = sampled_roots(J, rate, attitude, period)
     values = sorted(
         (complex(number(r.real), number(r.imag)) for r, n in roots for _ in range(n)), key=lambda z: (-abs(z), z.imag)
     )
     radius, stable = _radius(roots)
-    numbers = {
+    numbers: dict[str, Any] = {
         "period": number(period),
         "radius": radius,
         "eigenvalues": [[z.real, z.imag] for z in values],

@@ -116,7 +116,7 @@ def _certificate(given: Mapping[str, Any]) -> Iterator[Finding]:
         return
     for claim in given["claims"]:
         kind = str(claim.get("kind", ""))
-        proofs, fault = _guarded(partial(_claim, subject, given["subject"]["assumed_away"], claim))
+        proofs, fault = _guarded(partial(_claim, subject, _absent(given["subject"], claim), claim))
         if proofs is None:
             yield Finding(name, kind, "", "fails", fault)
             continue
@@ -159,6 +159,12 @@ def _subject(given: Any) -> LoopSubject | StationSubject:
     return (read_station if station else read_subject)(given["subject"])
 
 
+def _absent(subject: Mapping[str, Any], claim: Any) -> list[str]:
+    """The parts of the loop that a claim is not about; torques with a bound are among them where it is not about such."""
+    bounded = [] if claim.get("kind") == "disturbance" else subject.get("bounded_away", [])
+    return [*subject["assumed_away"], *bounded]
+
+
 def _claim(subject: LoopSubject | StationSubject, absent: Sequence[str], claim: Any) -> list[tuple[str, Verdict, str]]:
     """Verdict and reason for each obligation of a claim."""
     shaped(claim, CLAIM, "the claim")
@@ -169,7 +175,7 @@ def _claim(subject: LoopSubject | StationSubject, absent: Sequence[str], claim: 
     outcomes = [obligation["outcome"] for obligation in claim["obligations"]]
     demand(claim["outcome"] == outcome_of(outcomes), "the outcome does not follow from the obligations")
     told, proofs = _obliges(subject, claim)
-    # What the loop has beside what claims are about is left out by name, in all of them.
+    # What the loop has beside what the claim is about is left out by name.
     told = [*told, *(f"without the {name}" for name in absent)]
     demand(claim["assumptions"] == told, "the assumptions are not those of such a claim")
     if claim["outcome"] != "proved":

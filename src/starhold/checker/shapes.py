@@ -176,6 +176,7 @@ SUBJECT: dict[str, Test] = {
     "disturbance": _number,
     "control_period": _number,
     "assumed_away": _list(_text),
+    "bounded_away": _list(_text),
     "wheels": _or_none(_within(_WHEELS)),
     "switch": _or_none(_within(_SWITCH)),
 }

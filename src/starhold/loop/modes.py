@@ -36,6 +36,11 @@ class ModeTargets:
         return tuple(dict.fromkeys(need for part in self.parts for need in part.needs))
 
     @property
+    def ABOUT(self) -> str:  # noqa: N802
+        """The one body that their orbit may be about, where one of them says so."""
+        return next((part.about for part in self.parts if part.about), "")
+
+    @property
     def STILL(self) -> bool:  # noqa: N802
         """Whether none of them turns."""
         return all(part.flag("STILL") for part in self.parts)

@@ -47,6 +47,16 @@ class Part:
         return getattr(self.module, "NEEDS", ())
 
     @property
+    def about(self) -> str:
+        """The one body, by its name among `parts.orbit.BODIES`, that its orbit may be about; "" for any."""
+        return getattr(self.module, "ABOUT", "")
+
+    @property
+    def bound_from(self) -> float:
+        """The distance (m) from the centre of attraction from which on its `bound` holds, 0 for everywhere."""
+        return getattr(self.module, "BOUND_FROM", 0.0)
+
+    @property
     def reads(self) -> tuple[str, ...]:
         """Readings, by name, that a law or an effector with `switch` cannot do without."""
         return getattr(self.module, "READS", ())

@@ -22,6 +22,7 @@ from starhold.laws.modes import Modes
 from starhold.loop.closed_loop import ClosedLoop, before_first, can_rest, is_recorded
 from starhold.loop.step import make_equations
 from starhold.parts.catalogue import PACKAGES, as_part, from_file, parts, read_module, role_of, told
+from starhold.parts.orbit import body_of
 from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import Goal
 from starhold.scenario.checking import free_name, nearest, show, try_law, validate
@@ -179,6 +180,10 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
             if need not in (readings if estimates else there):
                 allowed = _measuring(need) if estimates else f"the part {need}"
                 raise InputError(where, _key(one), f"no {need}, which {one.called} needs", allowed)
+        about = one.part.about
+        if about and body_of(loop.craft.gravity) != about:
+            found = f"an orbit about {body_of(loop.craft.gravity) or 'an unknown body'}"
+            raise InputError(where, _key(one), found, f"one about {about}, of which it is a model")
     for one, key in (*((f.part, _key(f)) for f in fitted), (loop.law, f"law {loop.law.name}")):
         for need in one.reads:
             if need not in readings:

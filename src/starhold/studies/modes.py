@@ -71,9 +71,16 @@ def certify_modes(loop: ClosedLoop, name: str, wanted: Wanted) -> list[Issued]:
     return found
 
 
-def mode_departures(issued: Issued, run: Recording) -> dict[str, tuple[Departure, ...]]:
-    """How a run leaves the proved claims about a mode, or about the hand-over to it, while that mode flies."""
-    from starhold.analysis.departure import Departure, departures
+def same_numbers(one: Any, other: Any) -> bool:
+    """Whether two nested states hold the same numbers."""
+    pairs = [*leaves(one)], [*leaves(other)]
+    return len(pairs[0]) == len(pairs[1]) and all(map(np.array_equal, *pairs))
+
+
+def mode_departures(issued: Issued, run: Recording, fault: int | None) -> dict[str, tuple[Departure, ...]]:
+    """How a run leaves the proved claims about a mode, or about the hand-over to it, while that mode flies. fault: the
+    control step of the first one (None: there is none), after which no certificate speaks of any mode."""
+    from starhold.analysis.departure import CHANGES, Departure, departures
 
     flown = stretches(run)
     befores = [None, *(one.mode for one in flown)]
@@ -87,6 +94,9 @@ def mode_departures(issued: Issued, run: Recording) -> dict[str, tuple[Departure
         return {claim.kind: (never,) for claim in issued.certificate.claims if claim.outcome == "proved"}
     found: dict[str, set[Departure]] = {}
     for one in own:
-        for kind, left in departures(issued.certificate, issued.loop, run, one.first, one.last, NEXT).items():
+        last, change = one.last, NEXT
+        if fault is not None and (last is None or fault < last):
+            last, change = max(fault, one.first), CHANGES
+        for kind, left in departures(issued.certificate, issued.loop, run, one.first, last, change).items():
             found.setdefault(kind, set()).update(left)
     return {kind: tuple(sorted(left)) for kind, left in found.items()}

@@ -26,6 +26,7 @@ CARD = Card(
 ROLE = "effector"
 OUTSIDE = True
 NEEDS = ("two-body", "wheels")
+ABOUT = "Earth"
 READS = ("magnetic_field",)
 
 

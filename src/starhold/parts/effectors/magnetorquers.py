@@ -27,6 +27,7 @@ CARD = Card(
 ROLE = "effector"
 ACTS = OUTSIDE = True
 NEEDS = ("two-body",)
+ABOUT = "Earth"
 READS = ("magnetic_field",)
 LIMIT = Parameter("A m^2", above=0.0, shape=(3,), text="largest dipole along each body axis")
 LIMITED = Parameter(

@@ -34,6 +34,7 @@ CARD = Card(
 )
 ROLE = "environment"
 NEEDS = ("two-body",)
+ABOUT = "Earth"
 Row: TypeAlias = tuple[float, float, float, float, float, float, float]
 TURN = tau * SIDEREAL / DAY
 """The Earth's rate (rad/s)."""

@@ -24,6 +24,8 @@ CARD = Card(
 )
 ROLE = "environment"
 NEEDS = ("two-body",)
+ABOUT = "Earth"
+BOUND_FROM = magnetic_field.RADIUS
 
 
 class Params(NamedTuple):
@@ -61,7 +63,7 @@ def torque(state: Any, params: Numbers, craft: Craft, memory: Vector) -> Vector:
 
 
 def bound(params: Params) -> float:
-    """The largest norm that it has (N m) wherever the distance from the Earth's centre is at least 6371.2 km."""
+    """The largest norm that it has (N m) at distances from `BOUND_FROM` on, where the field is nowhere stronger."""
     return norm(params.dipole) * magnetic_field.strongest(params.epoch)
 
 

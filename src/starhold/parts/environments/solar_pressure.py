@@ -32,6 +32,7 @@ CARD = Card(
 )
 ROLE = "environment"
 NEEDS = ("two-body",)
+ABOUT = "Earth"
 Row: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
 
 
@@ -107,7 +108,7 @@ def torque(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector:
 
 
 def bound(params: Params) -> float:
-    """The largest norm that it has (N m): every plate seen square on, at the perihelion."""
+    """The largest norm that it has (N m) anywhere: every plate seen square on, at the perihelion."""
     numbers = prepare(params, 1.0)
     arms = (*numbers.taken, *numbers.mirrored, *numbers.scattered)
     return sun.STRONGEST * sum(norm(arm) for arm in arms)

@@ -77,7 +77,7 @@ def torque(state: Any, params: Numbers, craft: Craft, memory: Vector) -> Vector:
 
 
 def bound(params: Params) -> float:
-    """The largest norm that it has (N m)."""
+    """The largest norm that it has (N m), anywhere: along a straight line the norm is largest at an end."""
     return max(math.hypot(*row[1:]) for row in params.table)
 
 

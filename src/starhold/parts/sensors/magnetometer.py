@@ -27,6 +27,7 @@ CARD = Card(
 )
 ROLE = "sensor"
 NEEDS = ("two-body",)
+ABOUT = "Earth"
 FIRST = {"magnetic_field": ZERO, "magnetic_field_is_new": 0.0}
 
 

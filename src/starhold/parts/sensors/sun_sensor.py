@@ -29,6 +29,7 @@ CARD = Card(
 )
 ROLE = "sensor"
 NEEDS = ("two-body",)
+ABOUT = "Earth"
 FIRST = {"sun": ZERO, "sun_is_seen": 0.0}
 
 

@@ -38,6 +38,7 @@ CARD = Card(
 )
 ROLE = "target"
 NEEDS = ("two-body",)
+ABOUT = "Earth"
 FOLLOWS = True
 SPIN = math.tau * SIDEREAL / DAY
 """The rate of the Earth (rad/s)."""

@@ -21,6 +21,7 @@ CARD = Card(
     assumptions=(*sun.ASSUMPTIONS, "in the Earth's shadow too"),
 )
 ROLE = "target"
+ABOUT = "Earth"
 FOLLOWS = True
 
 

@@ -36,6 +36,7 @@ CARD = Card(
 )
 ROLE = "target"
 NEEDS = ("two-body",)
+ABOUT = "Earth"
 FOLLOWS = True
 
 

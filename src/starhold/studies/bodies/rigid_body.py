@@ -20,7 +20,7 @@ from starhold.parts.epoch import iso_text
 from starhold.parts.quaternion_sign import SIGN_POLICIES
 from starhold.simulation.lane import fly, label
 from starhold.studies.body import NO_CONES, BodyStudy, Cones, Issued, Values
-from starhold.studies.modes import certify_modes, mode_departures
+from starhold.studies.modes import certify_modes, mode_departures, same_numbers
 
 if TYPE_CHECKING:
     from starhold.analysis.departure import Departure
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from starhold.analysis.ranking import MetricSet
     from starhold.analysis.trial import Trial
     from starhold.certification.certificate import Certificate
-    from starhold.loop.closed_loop import ClosedLoop
+    from starhold.loop.closed_loop import ClosedLoop, Event
     from starhold.scenario.reading import LawEntry, Scenario
     from starhold.simulation.lane import Recording
 
@@ -98,12 +98,12 @@ class RigidBodyStudy:
     def departures(self, issued: Issued, loop: ClosedLoop, run: Recording) -> dict[str, tuple[Departure, ...]]:
         from starhold.analysis.departure import departures
 
+        # A certificate ends where the loop changes next; of events at one step the last decides.
+        latest = {event.step: event for event in loop.events if event.step * loop.period <= float(run["time"][-1])}
         if issued.mode is not None:
-            return mode_departures(issued, run)
-        # A certificate ends where the loop changes next.
-        last = min((event.step for event in loop.events if event.step > issued.step), default=None)
-        within = last is not None and last * loop.period <= float(run["time"][-1])
-        return departures(issued.certificate, issued.loop, run, issued.step, last if within else None)
+            return mode_departures(issued, run, min(latest, default=None))
+        last = min((step for step, event in latest.items() if _differs(event, issued)), default=None)
+        return departures(issued.certificate, issued.loop, run, issued.step, last)
 
     def fly_claims(self, issued: Issued) -> Trial | None:
         from starhold.analysis.trial import fly_claims
@@ -115,6 +115,17 @@ class RigidBodyStudy:
 
 
 STUDY: BodyStudy = RigidBodyStudy()
+
+
+def _differs(event: Event, issued: Issued) -> bool:
+    """Whether from an event on another loop flies, or is known to the law, than a certificate speaks of."""
+    if event.step != issued.step or issued.step:
+        return event.step > issued.step
+    # A fault at the very start, of which the law knows or does not.
+    own = issued.loop
+    pairs = zip(event.parts, own.parts, strict=True)
+    same = same_numbers((event.craft, event.nominal, event.gains), (own.craft, own.craft, own.gains))
+    return not (same and all(same_numbers(one.params, other.params) for one, other in pairs))
 
 
 def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[Issued]:

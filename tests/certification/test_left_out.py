@@ -1,0 +1,159 @@
+"""Every claim leaves out by name what its loop has and its theorem does not take in."""
+
+import json
+from dataclasses import replace
+from functools import cache
+
+import pytest
+
+from starhold.analysis.libration_point_claims import MET
+from starhold.certification.certificate import write
+from starhold.certification.certify import certify
+from starhold.certification.equilibrium import HELD
+from starhold.certification.openness import bounded_torque, named
+from starhold.certification.station import certify_station
+from starhold.certification.station_terms import UNLIMITED
+from starhold.certification.wording import sentence
+from starhold.checker import check_file, passed
+from starhold.checker.check import check
+from starhold.checker.station import STATION_CLAIMS, StationSubject
+from starhold.laws import modal
+from starhold.parts.catalogue import PACKAGES, fit, parts
+from starhold.parts.craft import make_craft
+from starhold.parts.part import Fitted
+from starhold.scenario.building import build
+from starhold.scenario.reading import builtin_text, parse
+from tests.certification import circles, equilibria
+from tests.certification.loops import FULL, certified, loop_of, textbook
+
+# Together: each worker would make the certificates of the textbook loops for itself.
+pytestmark = pytest.mark.xdist_group("textbook")
+
+LAWS = ("pd-0", "lyapunov-0", "lqr-I", "lqr-II", "lqr-III", "lqr-numeric", "matrix-pd-inertial", "sliding-0", "wheel-0")
+TAKEN = {"two-body", "gravity-gradient", "linear-gravity", "three-body-gravity", "wheels", "inertial", "orbital", "history"}
+"""The parts that the theorems in docs/certificates.md take in."""
+MARS = 4.2828375816e13
+
+
+def others(body):
+    """Every installed part for a body that no theorem takes in, with its first example."""
+    found = [part for role in set(PACKAGES) - {"body"} for part in parts(role).values() if part.body in ("", body)]
+    return [Fitted(part, part.examples()[0]) for part in found if part.name not in TAKEN]
+
+
+@cache
+def made(name):
+    """A loop of a law and its certificate."""
+    if name == "modal":
+        loop = loop_of("modal", modal.examples()[0])
+        return loop, certify(loop, name)
+    return textbook()[name], certified(name, disturbance=1e-4)
+
+
+@pytest.mark.parametrize("name", [*LAWS, pytest.param("modal", marks=pytest.mark.slow)])
+def test_every_part_is_named_in_every_claim_that_does_not_take_it_in(name):
+    loop, certificate = made(name)
+    assert any(claim.outcome == "proved" for claim in certificate.claims)
+    found = others("rigid-body")
+    assert {"lag", "rate-limit", "gaussian", "random-torque", "constant-torque", "torque-table"} <= {
+        f.part.name for f in found
+    }
+    for fitted in found:
+        composed = loop.with_parts(fitted)
+        enters = loop.law.lyapunov is not None and fitted.part.hook("bound") is not None
+        assert (bounded_torque(composed) > 0.0) == enters, fitted.called
+        for claim, plain in zip(named(list(certificate.claims), composed), certificate.claims, strict=True):
+            told = f"without the {fitted.part.role} {fitted.called}"
+            assert (told in claim.assumptions) != (enters and claim.kind == "disturbance"), (claim.kind, fitted.called)
+            assert [text for text in claim.assumptions if text != told] == list(plain.assumptions)
+
+
+@pytest.mark.parametrize("name", ["pd-0", "sliding-1"])
+def test_a_loop_of_all_parts_at_once_passes_the_checker(name, tmp_path):
+    loop = textbook()[name].without("target")
+    every = [f for f in others("rigid-body") if f.part.role != "target"]
+    certificate = certify(loop.with_parts(*every), name)
+    path = tmp_path / "certificate.json"
+    write([certificate], name, path)
+    assert passed(check_file(path)), [f for f in check_file(path) if f.verdict == "fails"]
+    for claim in certificate.claims:
+        assert len([text for text in claim.assumptions if text.startswith("without the ")]) >= len(every) - 4
+    path.write_text(path.read_text().replace('"without the actuator lag"', '"without the actuator log"', 1))
+    assert not passed(check_file(path))
+
+
+def test_the_checker_wants_a_bounded_torque_named_but_where_it_is_taken_in(tmp_path):
+    loop = textbook()["pd-0"].with_parts(fit("environment", "constant-torque", (1e-6, 0.0, 0.0)))
+    certificate = certify(loop)
+    told = "without the environment constant-torque"
+    assert {claim.kind: told in claim.assumptions for claim in certificate.claims} == {
+        claim.kind: claim.kind != "disturbance" for claim in certificate.claims
+    }
+    assert certificate.claim("disturbance").outcome == "proved"
+    path = tmp_path / "certificate.json"
+    write([certificate], "here", path)
+    assert passed(check_file(path))
+    content = json.loads(path.read_text())
+    content["certificates"][0]["claims"][0]["assumptions"].remove(told)
+    assert not passed(check(content))
+    content = json.loads(path.read_text())
+    content["certificates"][0]["subject"]["bounded_away"] = []
+    assert not passed(check(content))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("torque_limit", 'actuator_lag = "20 s"\ntorque_limit', "without the actuator lag, the linear loop is stable"),
+        ("[simulation]", "[sensor]\nrate_noise = 1e-5\n[simulation]", "without the sensor gaussian, the linear loop"),
+        ("gravity_gradient", "torque_noise = 1e-5\ngravity_gradient", "without the environment random-torque, the linear"),
+    ],
+)
+def test_a_margin_of_sampling_says_what_it_does_without(old, new, told):
+    base = builtin_text("three-laws").split("[[law]]")[0].replace(old, new, 1)
+    scenario = parse(base + '[[law]]\ntype = "lyapunov"\nk_rate = 0.09\nk_attitude = 0.009\n', "here")
+    certificate = certify(build(scenario, scenario.laws[0]))
+    assert sentence(certificate.claim("sampling"), certificate.subject).startswith(told)
+
+
+@pytest.mark.parametrize("loop", [circles.loop_of(), equilibria.loop_of(limit=4.0)])
+def test_parts_of_a_loop_near_a_libration_point_are_named_too(loop):
+    found = others("libration-point")
+    assert "lag" in {f.part.name for f in found}
+    certificate = certify_station(loop.with_parts(*found))
+    assert certificate.outcome == "proved"
+    for claim in certificate.claims:
+        assert {f"without the {f.part.role} {f.called}" for f in found} < set(claim.assumptions)
+
+
+def test_every_assumption_near_a_libration_point_is_looked_at():
+    told = {
+        text
+        for full in (False, True)
+        for kind in STATION_CLAIMS.values()
+        for text in kind.assumptions(StationSubject(None, None, None, full, "axis", 1.0))  # type: ignore[arg-type]
+    }
+    assert told == {*MET, UNLIMITED, HELD}
+
+
+# --- where a bound holds ----------------------------------------------------------------------------------------------
+
+
+def magnetic(position=(7e6, 0.0, 0.0), velocity=(0.0, 7.5e3, 0.0), gravity=None):
+    """A loop of a craft with a residual dipole."""
+    loop = textbook()["pd-0"].with_parts(fit("environment", "residual-dipole", (0.01, 0.0, 0.02)))
+    given = {} if gravity is None else {"gravity": gravity}
+    craft = make_craft(FULL.inertia, torque_limit=0.05, **given)
+    return replace(loop, craft=craft, start=loop.start._replace(position=position, velocity=velocity))
+
+
+def test_a_bound_enters_only_where_it_holds():
+    """About another body, or with a perigee of less than 6371.2 km, the part is left out by name."""
+    speed = (2.0 * 3.986004418e14 * (1.0 / 7e6 - 1.0 / (7e6 + 6.37e6))) ** 0.5
+    outside = magnetic(velocity=(0.0, speed, 0.0)), magnetic((3.6e6, 0.0, 0.0), (0.0, 3.4e3, 0.0), MARS)
+    assert bounded_torque(magnetic()) > 0.0
+    assert bounded_torque(magnetic(velocity=(0.0, speed * 1.001, 0.0))) > 0.0
+    for loop in outside:
+        assert bounded_torque(loop) == 0.0
+        (claim,) = named([certified("pd-0").claim("disturbance") or certified("pd-0").claims[0]], loop)
+        assert "without the environment residual-dipole" in claim.assumptions
