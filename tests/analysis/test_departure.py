@@ -195,7 +195,21 @@ def test_torque_held_for_too_long_ends_every_claim_about_the_motion():
 def test_a_craft_too_fast_to_be_followed_leaves_even_a_claim_about_every_state():
     _, _, flight, left = flown(BASE.replace("rate = [0.04", "rate = [100.04") + LAW)
     assert flight.lost == 0.0
-    assert left["convergence"] == ((0.0, LOST),)
+    assert left["convergence"] == ((0.0, "the body turns by more than a radian while the torque is held"), (0.0, LOST))
+
+
+def test_a_body_that_turns_far_while_its_torque_is_held_leaves_even_a_claim_about_every_state():
+    """Continuous torque brings it to rest; held torque, which the linear loop allows, keeps it at 2.3 turns a second."""
+    text = quiet(
+        BASE, **{"[2.0, 3.0, 4.0]": "[1.1, 3.0, 4.0]", "control_period = 0.1": "control_period = 0.5\nsubsteps = 40"}
+    )
+    text = text.replace("rate = [0, 0, 0]", "rate = [6, -5, 14]").replace('torque_limit = "0.01 N m"', "")
+    flight = proved_flight(text + LAW.replace("0.09", "0.96").replace("0.009", "0.15"))
+    assert {claim.kind: claim.outcome for claim in flight.certificates[0].claims} == dict.fromkeys(
+        ("convergence", "inertia", "sampling"), "proved"
+    )
+    assert flight.departures[0]["convergence"][0] == (0.0, "the body turns by more than a radian while the torque is held")
+    assert np.linalg.norm(flight.recording["rate"][-1]) > 10.0
 
 
 def test_a_fault_ends_the_claims_of_the_first_certificate():

@@ -52,7 +52,7 @@ def random_scenario(random, folder):
     steps = int(random.integers(4, 400))
     lines += [
         "[initial]",
-        f"attitude = {numbers(random.normal(size=4))}",
+        f"attitude = {numbers(unit(random))}",
         f"rate = {numbers(size(1e-5, 0.3) * random.normal(size=3))}",
     ]
     mode = some("inertial", "orbital" if orbit else "inertial", "history")
@@ -61,12 +61,12 @@ def random_scenario(random, folder):
         write_history(random, folder / "history.csv", steps * period)
         lines.append('file = "history.csv"')
     elif mode == "inertial" and maybe(0.5):
-        lines.append(f"attitude = {numbers(random.normal(size=4))}")
+        lines.append(f"attitude = {numbers(unit(random))}")
     if maybe(0.4):
         lines += ["[wheels]", f'layout = "{some("orthogonal", "pyramid", "nasa-standard")}"']
         lines += [f"inertia = {size(1e-5, 1e-2) * scale:.6g}", f"momentum = {some(0.0, size(1e-5, 1e-2) * scale):.6g}"]
-        lines += [f"torque_limit = {size(1e-4, 1e-1) * scale:.6g}"] if maybe(0.8) else []
-        lines += [f"momentum_limit = {size(1e-3, 1.0) * scale:.6g}"] if maybe(0.7) else []
+        lines += [f"torque_limit = {size(1e-4, 1e-1) * scale:.6g}" if maybe(0.8) else "torque_limit = 1e9"]
+        lines += [f"momentum_limit = {size(1e-3, 1.0) * scale:.6g}" if maybe(0.7) else "momentum_limit = 1e9"]
         lines += [f"viscous = {size(1e-8, 1e-4) * scale:.6g}"] if maybe(0.2) else []
         lines += ['allocation = "least-peak"'] if maybe(0.15) else []
     lines += ["[simulation]", f"duration = {steps * period!r}", f"control_period = {period!r}"]
@@ -78,6 +78,12 @@ def random_scenario(random, folder):
     lines += [f"momentum = {some(0.0, size(1e-4, 1.0) * scale):.6g}"] if maybe(0.2) else []
     lines += random_law(random, some, size, numbers, J, scale)
     return "\n".join(lines) + "\n"
+
+
+def unit(random):
+    """A quaternion of length 1, uniform."""
+    found = random.normal(size=4)
+    return found / np.linalg.norm(found)
 
 
 def random_inertia(random, scale):

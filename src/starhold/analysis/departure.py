@@ -89,6 +89,9 @@ def departures(
     sampled = certificate.claim("sampling")
     why = held.get("" if sampled is None else sampled.outcome, "with which it is not shown to be stable")
     common += span.always(f"the torque is held for {loop.period:g} s, {why}", bool(why))
+    # What is proved of held torque is proved of the linear loop, near rest.
+    turned = np.linalg.norm(span["rate"], axis=1) * loop.period
+    common += span.first(turned >= 1.0, "the body turns by more than a radian while the torque is held")
     if run.attrs.get("diverged_at") is not None:
         common.append(Departure(run.attrs["diverged_at"], LOST))
     found: dict[str, tuple[Departure, ...]] = {}

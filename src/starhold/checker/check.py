@@ -161,7 +161,7 @@ def _subject(given: Any) -> LoopSubject | StationSubject:
 
 def _absent(subject: Mapping[str, Any], claim: Any) -> list[str]:
     """The parts of the loop that a claim is not about; torques with a bound are among them where it is not about such."""
-    bounded = [] if claim.get("kind") == "disturbance" else subject.get("bounded_away", [])
+    bounded: list[str] = [] if claim.get("kind") == "disturbance" else subject.get("bounded_away", [])
     return [*subject["assumed_away"], *bounded]
 
 

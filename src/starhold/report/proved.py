@@ -17,8 +17,8 @@ NOTE = (
     "in ball arithmetic, which carries a bound of its own error. No claim rests on samples or on flights. Refuted: "
     "something that the proof needs is false at the state shown; the argument then fails, and the law itself may or may "
     "not. Undecided: neither was shown. A claim speaks of motions that meet its assumptions, listed inside; where the "
-    "flight on this page does not, the page says so and from when on. Of torque held between samples it does so only where "
-    "that is refuted. "
+    "flight on this page does not, the page says so and from when on. Of torque held between samples it does so unless that "
+    "is proved to be stable. "
 )
 RECHECK = f"The proofs are in {FILE} beside this page; <code>%s</code> goes through them again."
 
