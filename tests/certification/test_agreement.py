@@ -59,7 +59,10 @@ def test_what_cannot_be_shown_is_undecided_for_the_checker_too(law, wheels, tmp_
     wanted = Wanted(rate=math.inf, slew_angle=1.0, inertia_tolerance=0.1)
     gains = catalogue()[law].examples()[0]
     certificate = certify(rotors(law, gains) if wheels else free(loop_of(law, gains)), law, wanted)
-    assert [claim.outcome for claim in certificate.claims].count("undecided") == 3
+    # The first example of `sliding` switches at rest on target, where nothing is shown of held torque.
+    undecided = {claim.kind for claim in certificate.claims if claim.outcome == "undecided"}
+    assert len(undecided) == 3 + ("sampling" in undecided)
+    assert ("sampling" in undecided) == (law == "sliding")
     assert passed(checked(certificate, tmp_path))
 
 

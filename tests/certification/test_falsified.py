@@ -113,7 +113,7 @@ def test_switching_torque_below_the_gravity_gradient():
 
 def test_switching_torque_below_the_disturbance():
     loop = loop_of("sliding", sliding.Gains((0.08, 0.08, 0.08), (5e-3, 5e-3, 5e-3)))
-    assert certify(loop).outcome == "proved"
+    assert certify(loop).claim("sliding").outcome == "proved"
     assert refutation(certify(loop, "", Wanted(disturbance=0.01)), "sliding")["torque"] > 5e-3
 
 
