@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import json
 import math
+import re
+from dataclasses import replace
 
 import numpy as np
 
 from starhold.analysis.trial import fly_claims
 from starhold.certification.certificate import write
+from starhold.certification.certify import certify
 from starhold.certification.wording import evidence, sentence
 from starhold.checker import check_file, passed
 from starhold.errors import InputError
 from starhold.parts.craft import check_inertia
 from starhold.scenario.building import build
-from starhold.scenario.reading import load
+from starhold.scenario.reading import load, parse
 from starhold.studies.bodies.rigid_body import certify_law, start_inside
+from starhold.studies.compare import fly_law, prove
 
 EARTH, RADIUS = 3.986e14, 6.4e6
 
@@ -167,6 +171,53 @@ def random_law(random, some, size, numbers, J, scale):
         lines += [f"k_rate = {d:.6g}", f"k_attitude = {some(numbers([k] * 3), numbers(k * spread))}"]
         lines += [f"compensation = {some(1.0, 1.0, 0.0, random.uniform()):.4g}"]
     return lines
+
+
+PARTS = (
+    '[[part]]\ntype = "lag"\nlag = {:.6g}\n',
+    '[[part]]\ntype = "random-torque"\ndeviation = {:.6g}\n',
+    '[[part]]\ntype = "constant-torque"\ntorque = [{:.6g}, 0.0, 0.0]\n',
+    '[[fault]]\ntime = {:.6g}\ninertia = [1.0, 1.1, 1.2]\naction = "none"\n',
+    '[[fault]]\ntime = {:.6g}\nwheel = 1\nlost = true\naction = "none"\n',
+)
+"""What a flight may have besides: claims are to leave it out by name, take it in, or end where it acts."""
+DECAYS = 30.0
+"""Time constants of the slowest root of the sampled loop after which a flight has come to its end."""
+
+
+def contradicted(text, random, folder):
+    """Which proved claim a long flight of a scenario contradicts though it keeps to all that the claim assumes; "" for none.
+    Some of `PARTS` are added at random."""
+    # Few flights would meet the assumptions otherwise.
+    text = re.sub(r"(gravity_gradient = ).*", r"\1false", re.sub(r"(?s)torque_limit = .*?\nlimit = .*?\n", "", text))
+    text += "".join(more.format(10.0 ** random.uniform(-4.0, 1.0)) for more in PARTS if random.uniform() < 0.15)
+    try:
+        scenario = parse(text, "hunted.toml", folder)
+        entry = scenario.laws[0]
+        loop = build(scenario, entry)
+        sampled = certify(replace(loop, events=())).claim("sampling")
+        steps = -DECAYS / math.log(sampled.numbers["radius"]) if sampled and sampled.outcome == "proved" else 400.0
+        if scenario.table.target.mode != "history":
+            scenario = scenario.with_({"simulation.duration": math.ceil(min(steps, 1e5)) * loop.period})
+            loop = build(scenario, entry)
+    except InputError:
+        return ""
+    flight = prove(scenario, entry, loop, fly_law(scenario, entry, loop))
+    run, ended = flight.recording, len(flight.recording["time"]) > min(steps, 1e5)
+    angle, rate = np.linalg.norm(run["attitude_error"][:, 1:], axis=1), np.linalg.norm(run["rate_error"], axis=1)
+    for place, certificate in enumerate(flight.certificates):
+        for claim in certificate.claims:
+            told = claim.numbers
+            if claim.outcome != "proved" or claim.kind == "sampling" or flight.left(place, claim.kind) or place:
+                continue
+            if claim.kind == "torque-limit" and np.abs(run["command"]).max() > told["limit"] * (1.0 + 1e-12):
+                return f"{claim.kind}: a torque of {np.abs(run['command']).max():g} N m"
+            if ended and steps < 1e5:
+                bound = told.get("angle", 0.0), told.get("rate", 0.0) if "angle" in told else 0.0
+                found = 2.0 * math.asin(min(1.0, angle[-1])), rate[-1]
+                if found[0] > bound[0] + 1e-3 or found[1] > bound[1] + 1e-3 * max(rate.max(), 1e-3):
+                    return f"{claim.kind}: it ends {found[0]:g} rad and {found[1]:g} rad/s from the target"
+    return ""
 
 
 def fault_in(text, folder, flights=2_000):

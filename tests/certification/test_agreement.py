@@ -23,7 +23,7 @@ from starhold.checker import exact as checking
 from starhold.laws import pd, wheel
 from starhold.laws.catalogue import catalogue
 from starhold.parts.craft import make_craft
-from tests.certification.hunt import fault_in, random_scenario
+from tests.certification.hunt import contradicted, fault_in, random_scenario
 from tests.certification.loops import free, loop_of, rotors
 
 
@@ -48,6 +48,15 @@ def test_many_random_scenarios(first, tmp_path):
     for seed in range(first, first + 50):
         text = random_scenario(np.random.default_rng(seed), tmp_path)
         assert fault_in(text, tmp_path) == "", text
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(0, 80, 20))
+def test_no_flight_contradicts_what_is_proved_of_flights_like_it(first, tmp_path):
+    for seed in range(first, first + 20):
+        random = np.random.default_rng(seed)
+        text = random_scenario(random, tmp_path)
+        assert contradicted(text, random, tmp_path) == "", seed
 
 
 # --- what is asked of laws without V --------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""What a loop is made of and a claim is not about: each claim leaves it out by name, computed from the loop's parts."""
+"""Each claim leaves out by name the parts of its loop that it is not about: the list is computed from what the loop has."""
 
 from __future__ import annotations
 

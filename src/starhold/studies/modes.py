@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from starhold.algebra.structure import leaves
 from starhold.laws.modes import Modes
 from starhold.loop.modes import loop_of_mode
 from starhold.studies.body import Issued
