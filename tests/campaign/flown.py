@@ -17,7 +17,7 @@ SMALL = {
 OVER = {
     "initial.attitude": {"distribution": "rotations"},
     "initial.rate": {"distribution": "shell", "low": "0.5 deg/s", "high": "4 deg/s"},
-    "spacecraft.inertia": {"distribution": "normal", "sigma": "3 %", "relative": True, "known": True},
+    "spacecraft.inertia": {"distribution": "normal", "sigma": "3 %", "relative": True, "judged_apart": True},
     "sensor.rate_noise": {"distribution": "log-normal", "sigma": 0.4},
     "law.pd.k_rate": {"distribution": "uniform", "low": 1.5, "high": 2.5},
 }

@@ -160,10 +160,10 @@ def normal(**more):
 
 
 def test_shares_are_of_what_the_file_has():
-    found = one(NOISE, spacecraft__inertia=normal(sigma=0.05, relative=True, known=True))
+    found = one(NOISE, spacecraft__inertia=normal(sigma=0.05, relative=True, judged_apart=True))
     drawn = found.draw(random(3))
     assert found.columns == ("spacecraft.inertia[1]", "spacecraft.inertia[2]", "spacecraft.inertia[3]")
-    assert (found.known, found.nominal, found.shape) == (True, (2.0, 3.0, 4.0), (3,))
+    assert (found.judged_apart, found.nominal, found.shape) == (True, (2.0, 3.0, 4.0), (3,))
     assert drawn.mean(axis=1) == pytest.approx([2.0, 3.0, 4.0], rel=0.01)
     assert drawn.std(axis=1) == pytest.approx([0.1, 0.15, 0.2], rel=0.03)
     together = one(NOISE, spacecraft__inertia=normal(sigma=0.05, relative=True, together=True))

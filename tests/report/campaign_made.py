@@ -10,8 +10,9 @@ import numpy as np
 
 from starhold.campaign.drivers import find_drivers
 from starhold.campaign.requirements import Requirement
-from starhold.campaign.results import QUANTILES, Again, Bracket, CampaignResult, Envelope, LawResult, Spread
+from starhold.campaign.results import Again, Bracket, CampaignResult, Envelope, LawResult, Spread
 from starhold.campaign.sensitivity import Morris, Refused, Sobol
+from starhold.campaign.summary import spreads_of
 from starhold.campaign.verdicts import judge
 
 UNITS = {
@@ -80,14 +81,7 @@ def _metrics(runs: int, number: int) -> dict[str, Any]:
 
 def spread(metric: str, values: Any) -> Spread:
     """The distribution of a metric's values."""
-    there = values[~np.isnan(values)]
-    wide = len(there) and there.min() > 0.0 and there.max() > 100.0 * there.min()
-    ends = (there.min(), there.max()) if len(there) else (0.0, 0.0)
-    edges = np.geomspace(*ends, 61) if wide else np.linspace(*ends, 61)
-    quantiles = tuple(float(x) for x in np.quantile(there, QUANTILES)) if len(there) else (np.nan,) * len(QUANTILES)
-    counts = np.histogram(there, edges)[0] if ends[1] > ends[0] else np.zeros(60, np.int64)
-    mean = float(there.mean()) if len(there) else np.nan
-    return Spread(metric, UNITS[metric], len(values), len(values) - len(there), mean, quantiles, edges, counts)
+    return spreads_of(metric, UNITS[metric], [values])[0]
 
 
 def _envelopes(number: int) -> tuple[Envelope, ...]:

@@ -198,12 +198,23 @@ def test_histograms_account_for_all_runs() -> None:
 def test_histograms_of_one_value_and_of_none() -> None:
     one = result(names=("lyapunov",))
     same, none = spread("effort", np.full(50, 2.0)), spread("settling_time", np.full(50, np.nan))
-    same = replace(same, counts=np.array([50] + [0] * 59))
-    made = replace(one, laws=(replace(one.laws[0], spreads=(same, none)),))
-    (plot,) = histograms(made, words(made))
-    assert plot["title"] == "effort"
-    assert plot["curves"][0]["edges"][0] < 2.0 < plot["curves"][0]["edges"][-1]
+    never = spread("limit_share", np.zeros(48))
+    made = replace(one, laws=(replace(one.laws[0], spreads=(same, none, never)),))
+    for plot, title, value in zip(histograms(made, words(made)), ("effort", "on limit"), (2.0, 0.0), strict=True):
+        assert plot["title"] == title
+        (curve,) = plot["curves"]
+        assert 0.5 * (curve["edges"][0] + curve["edges"][1]) == pytest.approx(value)
+        assert curve["values"] == [100.0]
     assert "—" in page(made).words
+
+
+@pytest.mark.parametrize(("runs", "bars"), [(1, 1), (48, 6), (2500, 50), (10_000, 60)])
+def test_a_histogram_has_no_more_bars_than_its_runs_can_fill(runs: int, bars: int) -> None:
+    values = np.linspace(1.0, 2.0, runs)
+    assert len(spread("effort", values).counts) == bars
+    # All but one alike.
+    most = np.where(np.arange(runs) == 0, 3.0, 0.0)
+    assert spread("effort", most).counts[0] == max(runs - 1, 1)
 
 
 def test_wide_ranges_are_drawn_on_logarithmic_scales() -> None:

@@ -133,7 +133,7 @@ def _told(readings: tuple[str, ...]) -> str:
 def _at_rest(loop: ClosedLoop, left_out: list[str]) -> ClosedLoop:
     """The loop at rest on target, in inertial axes that are those of the target, so that the error there is exactly zero;
     names what was taken from it."""
-    counted = loop.law.counters(loop.law.remember(loop.gains, loop.craft, loop.period))
+    counted = loop.law.counters(loop.law.remember(loop.gains, loop.known, loop.period))
     if counted is not None or buffers(loop.carry().memory):
         raise LinearityError(f"the law {loop.law.name} iterates, and has no derivative")
     for role in ("sensor", "estimator"):
@@ -195,7 +195,7 @@ def _matrices(loop: ClosedLoop) -> tuple[System, System]:
         return found + _filled(driven, carry.actuators) + (list(rates[4]) if lags else [])
 
     def decided() -> list[Any]:
-        after = step.update(now, 0, loop.seed, loop.gains, loop.craft, setup)
+        after = step.update(now, 0, loop.seed, loop.gains, loop.known, setup)
         return [*after.command, *flatten((after.memory,))]
 
     try:

@@ -270,12 +270,17 @@ WORDS = ("name", "description", "type", "campaign")
 """Keys of what names no file."""
 
 
+_SAID = {"judged_apart": "known before flight", "known_to_law": "known to the law"}
+"""What is said of a dispersion beside its distribution."""
+
+
 def in_words(dispersion: Dispersion, table: CampaignTable) -> str:
     """A dispersion as the file has it, in one line."""
-    given = table.over[dispersion.places[0].table].model_dump(exclude_defaults=True, exclude={"distribution", "known"})
+    given = table.over[dispersion.places[0].table].model_dump(exclude_defaults=True, exclude={"distribution", *_SAID})
     told = [f"{name} {_brief(value)}" if value is not True else name for name, value in given.items()]
-    known = ["known before flight"] if dispersion.known else []
-    return ", ".join([table.over[dispersion.places[0].table].distribution, *told, *known])
+    told += [words for name, words in _SAID.items() if getattr(dispersion, name)]
+    told += ["not known to the law"] if dispersion.nominal_tables and not dispersion.known_to_law else []
+    return ", ".join([table.over[dispersion.places[0].table].distribution, *told])
 
 
 def _brief(value: Any) -> str:

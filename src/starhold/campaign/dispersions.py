@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
 import numpy as np
@@ -27,7 +27,7 @@ from starhold.campaign.distributions import (
 from starhold.campaign.key_reading import SYMMETRIC, KeyReading, components, word
 from starhold.campaign.values import Place, accepted, locate, width_at
 from starhold.scenario.campaign import DispersionTable, read_over
-from starhold.scenario.checking import show
+from starhold.scenario.checking import read_toml, show
 from starhold.scenario.making import plain
 from starhold.scenario.reading import Scenario
 
@@ -43,8 +43,10 @@ class Dispersion:
     shape: tuple[int, ...]
     """The key has this shape: () a number or a word, (n,) a vector or a diagonal, (n, n) a matrix. Several keys hold a
     number each."""
-    known: bool
-    """Whether the values are known before flight."""
+    judged_apart: bool
+    """Whether the values are known before flight, so that runs of like values are judged by themselves."""
+    known_to_law: bool
+    """Whether laws are told the values, and designed for them."""
     distribution: Distribution
     nominal: tuple[Any, ...]
     """The numbers or the word that the file has, for each column; NaN where it has none."""
@@ -52,6 +54,8 @@ class Dispersion:
     """Each key is found there, with its bounds."""
     scale: Numbers | None = None
     """Numbers drawn as shares are shares of these, one for each column; None where they are no shares."""
+    nominal_tables: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    """The tables that stand in [nominal] beside the values, as laws are to take the file's own for true."""
 
     @property
     def dims(self) -> int:
@@ -72,16 +76,10 @@ class Dispersion:
     def draw(self, u: Array) -> NDArray[Any]:
         """Values (columns, n), numbers or words, for uniforms u (dims, n) strictly between 0 and 1. InputError where a key
         refuses a number."""
-        # Contiguous, so that the same machine code computes every cut of the same numbers.
-        found = self.distribution.draw(np.ascontiguousarray(u, dtype=np.float64))
-        if self.scale is not None:
-            found = np.array(self.scale)[:, None] * found
-        if not self.wordy and found.size:
-            self._check(found)
-        return found
-
-    def _check(self, found: Array) -> None:
-        """Numbers beyond the bounds of a key are no craft's: a distribution that has them is no model of it."""
+        found = self._drawn(u)
+        if self.wordy or not found.size:
+            return found
+        # Numbers beyond the bounds of a key are no craft's: a distribution that has them is no model of it.
         for place, numbers in zip(self.places, np.split(found, len(self.places)), strict=True):
             for extreme in (float(numbers.min()), float(numbers.max())):
                 try:
@@ -89,6 +87,24 @@ class Dispersion:
                 except ValueError as error:
                     allowed = f"{str(error).removeprefix('must be ')}; a truncated-normal or uniform one keeps bounds"
                     raise place.refuse("", f"a draw of {extreme:g}", allowed) from None
+        return found
+
+    def _drawn(self, u: Array) -> NDArray[Any]:
+        # Contiguous, so that the same machine code computes every cut of the same numbers.
+        found = self.distribution.draw(np.ascontiguousarray(u, dtype=np.float64))
+        return found if self.scale is None else np.array(self.scale)[:, None] * found
+
+    def possible(self, u: Array) -> NDArray[np.bool_]:
+        """Which of the draws (n,) for uniforms u (dims, n) their keys take, as far as bounds of each number tell."""
+        kept = np.ones(u.shape[1], dtype=bool)
+        if self.wordy:
+            return kept
+        for place, numbers in zip(self.places, np.split(self._drawn(u), len(self.places)), strict=True):
+            least, most, bounds = numbers.min(axis=0), numbers.max(axis=0), place.bounds
+            kept &= least > (-np.inf if bounds.above is None else bounds.above)
+            kept &= least >= (-np.inf if bounds.at_least is None else bounds.at_least)
+            kept &= most <= (np.inf if bounds.at_most is None else bounds.at_most)
+        return kept
 
     def arrays(self, columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
         """The values by key, each (n, *shape), of columns (n,): the whole of symmetric matrices."""
@@ -174,12 +190,38 @@ def _made(readings: Sequence[KeyReading], distribution: Distribution, scaled: bo
         keys=tuple(reading.place.key for reading in readings),
         columns=tuple(name for reading in readings for name in reading.columns),
         shape=readings[0].place.shape,
-        known=readings[0].table.known,
+        judged_apart=readings[0].table.judged_apart,
+        known_to_law=readings[0].table.known_to_law,
         distribution=distribution,
         nominal=nominal,
         places=tuple(reading.place for reading in readings),
         scale=nominal if scaled else None,
+        nominal_tables=_nominal_tables(readings),
     )
+
+
+def _nominal_tables(readings: Sequence[KeyReading]) -> dict[str, Any]:
+    """The raw tables for [nominal]: of what laws take the craft for or are designed with, and are not told. InputError for
+    `known_to_law` of what they cannot know, or not otherwise."""
+    scenario, table = readings[0].scenario, readings[0].table
+    tables, body = read_toml(scenario.text, scenario.where), scenario.hooks
+    found: dict[str, Any] = {}
+    for reading in readings:
+        key, name = reading.place.key, str(reading.place.path[0])
+        modelled = name in body.modelled or (name in body.designed and _designs(tables) and key not in scenario.table.shared)
+        if name == body.marker and not modelled and not table.known_to_law:
+            raise reading.place.refuse("known_to_law", "false", "true, for laws of this body know the numbers of this table")
+        if table.known_to_law and not modelled and name != body.marker:
+            raise reading.place.refuse("known_to_law", "true", "false, for no law is told it or designed with it")
+        given = scenario.table.nominal
+        if modelled and (name in given or not table.known_to_law):
+            found[name] = given.get(name, tables.get(name, {}))
+    return found
+
+
+def _designs(tables: Mapping[str, Any]) -> bool:
+    """Whether a law, or that of a mode, has a design form."""
+    return any("form" in one for law in tables["law"] for one in (law, *law.get("mode", ())))
 
 
 def _read_components(reading: KeyReading) -> Distribution:

@@ -162,11 +162,12 @@ class Job:
         crew: Crew,
         take: Callable[[Metrics, Any], None] = lambda metrics, windows: None,
         progress: Progress | None = None,
+        refused: NDArray[np.bool_] | None = None,
     ) -> Callable[[], Metrics]:
         """Begin to fly runs of a law. What is returned waits for their metrics and the numbers read back, (lanes,), by name.
         columns: what was drawn; runs: their numbers, which number their random ones; take: called with metrics and windows
-        of each lot."""
-        under_way = [(at, told, self._begin(lot, crew)) for lot, at, told in self.lanes(law).lots(columns, runs)]
+        of each lot; refused: as `Lanes.lots` takes it, without numbers for lanes marked there."""
+        under_way = [(at, told, self._begin(lot, crew)) for lot, at, told in self.lanes(law).lots(columns, runs, refused)]
 
         def finish() -> Metrics:
             found: Metrics = {}

@@ -99,26 +99,52 @@ class Lanes:
                 where = f"{self.scenario.where}, run {run}"
                 raise InputError(where, error.key, error.found, error.allowed) from None
 
-    def lots(self, columns: Columns, runs: NDArray[np.int64]) -> Iterator[tuple[Lot, NDArray[np.int64], dict[str, Array]]]:
+    def _tried(self, columns: Columns, place: int, run: int) -> Flat | None:
+        """The numbers of one of these runs; None where its scenario is refused."""
+        try:
+            return next(self._each(_one(columns, place), [run]))
+        except InputError:
+            return None
+
+    def lots(
+        self, columns: Columns, runs: NDArray[np.int64], refused: NDArray[np.bool_] | None = None
+    ) -> Iterator[tuple[Lot, NDArray[np.int64], dict[str, Array]]]:
         """The lanes of runs of these numbers (lanes,), drawn as the columns say, in lots: with the place of each of their
-        lanes among all, and the numbers read back. InputError where a run's scenario is refused."""
-        refused = self.scenario.hooks.refused(self.scenario, self._by_key(columns))
-        if refused is not None and refused.any():
-            place = int(np.flatnonzero(refused)[0])
-            next(self._each(_one(columns, place), [runs[place]]))
-        # A look at two of them, for what no probe showed.
-        looked = sorted({0, len(runs) // 2})
-        if self.at_once and self._agrees(_some(columns, looked), runs[looked]):
-            lot = self._together(columns, runs)
-            yield lot, np.arange(len(runs)), self._told(lot)
+        lanes among all, and the numbers read back. InputError where a run's scenario is refused; where `refused` (lanes,) is
+        given such lanes are left out, and marked there."""
+        impossible = self.scenario.hooks.refused(self.scenario, self._by_key(columns))
+        if impossible is not None and impossible.any():
+            if refused is None:
+                place = int(np.flatnonzero(impossible)[0])
+                next(self._each(_one(columns, place), [runs[place]]))
+            else:
+                refused |= impossible
+        left = np.arange(len(runs)) if refused is None else np.flatnonzero(~refused)
+        if not len(left):
             return
-        flats = list(self._each(columns, runs.tolist()))
+        # A look at two of them, for what no probe showed.
+        looked = left[sorted({0, len(left) // 2})]
+        if self.at_once and self._agrees(_some(columns, looked), runs[looked], refused is None):
+            lot = self._together(_some(columns, left), runs[left])
+            yield lot, left, self._told(lot)
+            return
+        if refused is None:
+            flats = dict(enumerate(self._each(columns, runs.tolist())))
+        else:
+            tried = {place: self._tried(columns, place, int(runs[place])) for place in left.tolist()}
+            flats = {place: flat for place, flat in tried.items() if flat is not None}
+            refused[[place for place in tried if place not in flats]] = True
         groups: dict[Any, list[int]] = {}
-        for place, flat in enumerate(flats):
+        for place, flat in flats.items():
             groups.setdefault(flat.form, []).append(place)
         for places in groups.values():
             lot = self._apart([flats[place] for place in places], runs[places])
             yield lot, np.array(places), self._told(lot)
+
+    def moves(self, name: str) -> bool:
+        """Whether a dispersion moves a number of this name, or more than numbers."""
+        places = set[int]().union(*self.moved.values())
+        return _FORM in places or not places.isdisjoint(self.base.places(name))
 
     def _others(self, dispersion: Dispersion, more: Columns) -> list[int]:
         """Two of the first runs at the most, of which `more` has the columns, in which a value of the dispersion is not that
@@ -142,14 +168,17 @@ class Lanes:
         # What differs in none of them may differ in another.
         return found if others else {_FORM}
 
-    def _agrees(self, columns: Columns, runs: NDArray[np.int64]) -> bool:
-        """Whether the numbers of these runs, made at once, are those of each one's own scenario."""
+    def _agrees(self, columns: Columns, runs: NDArray[np.int64], strict: bool = True) -> bool:
+        """Whether the numbers of these runs, made at once, are those of each one's own scenario. InputError where one is
+        refused; where that is not strict, they do not agree."""
         try:
             found = _table(self._together(columns, runs))
         except (ValueError, TypeError):
             return False
-        for lane, flat in enumerate(self._each(columns, runs.tolist())):
-            if flat.form != self.base.form or not same(flat.numbers, found[:, lane]):
+        pairs = enumerate(runs.tolist())
+        flats = self._each(columns, runs.tolist()) if strict else (self._tried(columns, *pair) for pair in pairs)
+        for lane, flat in enumerate(flats):
+            if flat is None or flat.form != self.base.form or not same(flat.numbers, found[:, lane]):
                 return False
         return True
 
@@ -256,8 +285,8 @@ def _table(lot: Lot) -> Array:
     return np.array([*lot.carries, *(np.broadcast_to(np.asarray(value), (lanes,)) for value in rest)])
 
 
-def _some(columns: Columns, places: Sequence[int]) -> dict[str, NDArray[Any]]:
-    return {name: values[list(places)] for name, values in columns.items()}
+def _some(columns: Columns, places: Sequence[int] | NDArray[np.int64]) -> dict[str, NDArray[Any]]:
+    return {name: values[np.asarray(places)] for name, values in columns.items()}
 
 
 def _one(columns: Columns, place: int) -> dict[str, NDArray[Any]]:

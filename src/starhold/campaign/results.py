@@ -26,6 +26,9 @@ Array: TypeAlias = NDArray[np.float64]
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 """Of a metric's distribution: least, 5 %, quarter, median, three quarters, 95 %, largest."""
 
+ROUNDING = 1e-12
+"""Share of a bound that the rounding of a flight may be beyond it."""
+
 
 @dataclass(frozen=True)
 class Spread:
@@ -74,8 +77,8 @@ class Again:
 class Bracket:
     """How bad a metric gets: *flown <= true <= proved*, or the other way round where `at_most` is false and less is worse.
     flown: the worst that the runs and a search over the dispersions' box have flown, with the scenario file of that run
-    (NaN: a run without the metric, which is worse than any number); proved: the bound of a certificate, with its assumption;
-    None where nothing is proved of the metric."""
+    (NaN: a run without the metric, which is worse than any number); proved: a bound of the very same quantity in these very
+    flights, with what it rests on; None where nothing is proved of the metric."""
 
     metric: str
     unit: str
@@ -85,6 +88,14 @@ class Bracket:
     proved: float | None
     assumption: str
     at_most: bool = True
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether a flight is beyond what is proved, by more than rounding: a fault of starhold."""
+        if self.proved is None:
+            return False
+        room = ROUNDING * abs(self.proved)
+        return self.flown > self.proved + room if self.at_most else self.flown < self.proved - room
 
 
 @dataclass(frozen=True)
@@ -131,6 +142,11 @@ class CampaignResult:
         """Whether every requirement is met by every law; None where some are not decided and none is missed."""
         outcomes = {verdict.outcome for law in self.laws for verdict in law.verdicts}
         return False if "missed" in outcomes else None if "not decided" in outcomes else True
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether a flight contradicts what is proved, which is a fault of starhold."""
+        return any(bracket.contradicted for law in self.laws for bracket in law.brackets)
 
     def frame(self) -> DataFrame:
         """A row for each run of each law: `law`, `run`, what was drawn and what flew, metrics, margins."""

@@ -4,7 +4,7 @@ draws them."""
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -18,6 +18,7 @@ from starhold.campaign.extras import extra
 from starhold.campaign.sensitivity import saltelli_design
 from starhold.errors import InputError
 from starhold.scenario.checking import nearest, show
+from starhold.scenario.making import path_of
 
 SAMPLINGS = ("random", "sobol", "latin-hypercube", "morris", "saltelli")
 LEVELS = 4
@@ -132,18 +133,29 @@ class Plan:
     def values(self, unit: Array) -> dict[str, NDArray[Any]]:
         """The values by column, each (n,), for uniforms (dims, n). InputError where a key refuses one."""
         found: dict[str, NDArray[Any]] = {}
+        for dispersion, own in self._each(unit):
+            found |= dict(zip(dispersion.columns, dispersion.draw(own), strict=True))
+        return found
+
+    def possible(self, unit: Array) -> NDArray[np.bool_]:
+        """For which of the uniforms (dims, n) no key refuses its value by its bounds."""
+        return np.logical_and.reduce([dispersion.possible(own) for dispersion, own in self._each(unit)])
+
+    def _each(self, unit: Array) -> Iterator[tuple[Dispersion, Array]]:
         begun = 0
         for dispersion in self.dispersions:
-            drawn = dispersion.draw(unit[begun : begun + dispersion.dims])
-            found |= dict(zip(dispersion.columns, drawn, strict=True))
+            yield dispersion, unit[begun : begun + dispersion.dims]
             begun += dispersion.dims
-        return found
 
     def change(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """The change by which `Scenario.with_` gives the scenario of one run, from its values by column."""
-        found: dict[str, Any] = {}
+        nominal = {name: table for one in self.dispersions for name, table in one.nominal_tables.items()}
+        found: dict[str, Any] = {f"nominal.{name}": table for name, table in nominal.items()}
         for dispersion in self.dispersions:
-            found |= dispersion.change(values)
+            own = dispersion.change(values)
+            found |= own
+            if dispersion.known_to_law or not dispersion.nominal_tables:
+                found |= {f"nominal.{key}": value for key, value in own.items() if path_of(key, {}, "")[0] in nominal}
         return found
 
 

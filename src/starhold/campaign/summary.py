@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from starhold.analysis.meter import Meter
 from starhold.campaign import envelopes, sensitivity
 from starhold.campaign.chunk import LEAST, MOST
+from starhold.campaign.dispersions import Dispersion
 from starhold.campaign.distributions import Rotations, Shell
 from starhold.campaign.drivers import Drivers, find_drivers
 from starhold.campaign.job import Job
@@ -22,7 +24,8 @@ from starhold.campaign.store import Store
 from starhold.campaign.verdicts import Verdict, judge
 
 BARS, WIDE = 60, 100.0
-"""Of a histogram; and how many times the least the largest of a metric is that is shown on a logarithmic scale."""
+"""Of a histogram, at the most; and how many times the least the largest of a metric is that is shown on a logarithmic
+scale."""
 MOST_DRIVEN = 200_000
 """Runs, the first ones, that drivers are looked for among."""
 KINDS: Mapping[str, Any] = {"morris": sensitivity.morris, "saltelli": sensitivity.sobol}
@@ -39,7 +42,7 @@ def summarise(store: Store, job: Job, laws: Sequence[str], until_decided: bool =
     for name, unit in units.items():
         # All laws at once, for histograms that stand side by side.
         found = {law: next(columns[law]) for law in laws if name in job.meter(law).units}
-        for law, spread in zip(found, _spreads(name, unit, list(found.values())), strict=True):
+        for law, spread in zip(found, spreads_of(name, unit, list(found.values())), strict=True):
             spreads[law][name] = spread
     return tuple(_summary(store, job, law, spreads[law], until_decided) for law in laws)
 
@@ -63,10 +66,11 @@ def _summary(store: Store, job: Job, law: str, spreads: Mapping[str, Spread], un
     )
 
 
-def _spreads(name: str, unit: str, values: Sequence[NDArray[np.float64]]) -> list[Spread]:
+def spreads_of(name: str, unit: str, values: Sequence[NDArray[np.float64]]) -> list[Spread]:
     """The distributions of a metric of some laws, with the same bins."""
     there = [column[~np.isnan(column)] for column in values]
-    edges = _edges(np.concatenate(there))
+    # About as many bars as runs in each.
+    edges = _edges(np.concatenate(there), min(BARS, math.isqrt(max(map(len, there)) or 1)))
     return [_spread(name, unit, own, len(column), edges) for own, column in zip(there, values, strict=True)]
 
 
@@ -77,16 +81,21 @@ def _spread(name: str, unit: str, there: NDArray[np.float64], runs: int, edges: 
     return Spread(name, unit, runs, runs - len(there), mean, quantiles, edges, counts)
 
 
-def _edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The edges of the bins, equal on a logarithmic scale where the values span decades. What is far away from nearly all
-    others is counted in the end bins, so that it does not squeeze them."""
+def _edges(values: NDArray[np.float64], bars: int) -> NDArray[np.float64]:
+    """The edges of the bins, equal on a logarithmic scale where the values span decades; a single one about a value that all
+    have. What is far away from nearly all others is counted in the end bins, so that it does not squeeze them."""
     if not len(values):
         return np.zeros(0)
     least, low, high, most = np.quantile(values, [0.0, 0.005, 0.995, 1.0]).tolist()
+    if least == most:
+        side = 0.01 * abs(most) or 0.01
+        return np.array([most - side, most + side])
+    if low == high:
+        low, high = least, most
     if least > 0.0 and high > WIDE * low:
-        return np.geomspace(max(least, low / 3.0), min(most, 3.0 * high), BARS + 1)
+        return np.geomspace(max(least, low / 3.0), min(most, 3.0 * high), bars + 1)
     reach = 0.5 * (high - low)
-    return np.linspace(max(least, low - reach), min(most, high + reach), BARS + 1)
+    return np.linspace(max(least, low - reach), min(most, high + reach), bars + 1)
 
 
 def _envelopes(store: Store, meter: Meter, law: str) -> Any:
@@ -101,7 +110,7 @@ def verdicts_of(store: Store, job: Job, law: str, until_decided: bool, runs: int
 
 
 def _verdict(store: Store, job: Job, law: str, requirement: Requirement, until_decided: bool, runs: int | None) -> Verdict:
-    known = [name for dispersion in job.dispersions if dispersion.known for name in dispersion.columns]
+    known = [name for dispersion in job.dispersions if dispersion.judged_apart for name in dispersion.columns]
     margin = f"margin.{requirement.name}"
     columns = {name: values[:runs] for name, values in store.columns([margin, *known], law).items()}
     return judge(
@@ -112,7 +121,17 @@ def _verdict(store: Store, job: Job, law: str, requirement: Requirement, until_d
         columns,
         independent=job.table.sampling == "random",
         until_decided=until_decided,
+        knowledge=_knowledge(job.dispersions),
     )
+
+
+def _knowledge(dispersions: Sequence[Dispersion]) -> str:
+    """A sentence on which drawn values the law is told; none where it is told no number of its craft in any case."""
+    found: list[str] = []
+    for told, words in ((False, "supposes the file's own"), (True, "is told each drawn")):
+        keys = [key for one in dispersions for key in one.keys if one.known_to_law == told and (told or one.nominal_tables)]
+        found += [f"{words} {' and '.join(keys)}"] if keys else []
+    return f"The law {', and '.join(found)}." if found else ""
 
 
 def _drivers(

@@ -143,6 +143,8 @@ class Verdict:
     worst_part: Part | None
     independent: bool
     until_decided: bool
+    knowledge: str = ""
+    """A sentence on what laws know of the draws."""
 
     @property
     def observed(self) -> float:
@@ -154,7 +156,7 @@ class Verdict:
         flown = f"{self.failures} of {self.runs} runs miss it ({percent(self.observed)} keep it, {percent(self.share)} must)"
         if self.lower is None or self.upper is None:
             told = f"{self.name}: {flown}. The draws are not independent of each other, so no confidence can be given"
-            return told + "; random sampling gives one."
+            return f"{told}; random sampling gives one. {self.knowledge}".rstrip()
         least, most = f"at least {percent(self.lower)}", f"at most {percent(self.upper)}"
         both = self.lower <= 1.0 - self.share < self.upper
         bound = f"{least} and {most}" if both else least if self.lower > 1.0 - self.share else most
@@ -169,7 +171,7 @@ class Verdict:
             about = "about " if self.parts else ""
             told += f". It would be met after {about}{self.more} more runs without a failure"
         stopped = ", whenever the campaign was stopped" if self.until_decided else ""
-        return f"{told}. This holds for independent draws from the stated dispersions{stopped}."
+        return f"{told}. This holds for independent draws from the stated dispersions{stopped}. {self.knowledge}".rstrip()
 
 
 def judge(
@@ -182,6 +184,7 @@ def judge(
     independent: bool = True,
     until_decided: bool = False,
     run: NDArray[np.int64] | None = None,
+    knowledge: str = "",
 ) -> Verdict:
     """Judge a requirement by its margins (n,), n > 0, of the runs numbered `run` (n,), or else 0 to n - 1.
 
@@ -235,6 +238,7 @@ def judge(
         worst_part=worst,
         independent=independent,
         until_decided=until_decided,
+        knowledge=knowledge,
     )
 
 

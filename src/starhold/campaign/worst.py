@@ -1,10 +1,11 @@
-"""The worst of a metric over the box of the dispersions: looked for by an optimiser whose population flies side by side."""
+"""The worst of a metric over the box of the dispersions: looked for by flights side by side, from many starts."""
 
 from __future__ import annotations
 
+import math
 import re
 from itertools import count
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,28 +14,40 @@ from starhold.campaign.distributions import Choice, Rotations, Shell, TruncatedN
 from starhold.campaign.job import scenario_of
 from starhold.campaign.requirements import LOST, Requirement
 from starhold.campaign.results import Bracket, LawResult
-from starhold.certification.openness import assumed_away
 from starhold.files import atomic_write
-from starhold.scenario.building import build
 from starhold.simulation.lanes import Crew
-from starhold.studies.body import study_of
 
 if TYPE_CHECKING:
     from starhold.campaign.job import Job
     from starhold.campaign.store import Store
-    from starhold.scenario.reading import Scenario
 
 Array = NDArray[np.float64]
 TAIL = 0.00135
 """What the box leaves out on each side of a distribution without bounds: what lies beyond three sigma of a normal one."""
 EDGE = 1e-12
 """What it leaves out of one with bounds, whose ends are not drawn."""
-POPULATION, GENERATIONS = 256, 24
-"""Of the optimiser; one generation flies side by side."""
-FEW = 64, 8
-"""The same where each lane is made by itself."""
-NONE = 1e100
-"""Stands for the badness of a run without the metric: lost, or never settled. Nothing is worse, and its square is finite."""
+
+
+class Effort(NamedTuple):
+    """How much the search flies: points that are spread over the box, the best of them that it goes on from, flights side by
+    side in a round, and rounds."""
+
+    spread: int
+    starts: int
+    lanes: int
+    rounds: int
+
+
+MANY = Effort(2048, 16, 512, 30)
+FEW = Effort(256, 4, 64, 9)
+"""Where the numbers of many runs are made at once, and where each lane's are made by themselves."""
+CORNERS = 0.25
+"""Share of the points that are spread which lie in corners of the box."""
+APART = 0.1
+"""Starts differ by so much of the box along one of its sides at least."""
+FIRST, LONGEST, WIDER, CLOSER = 0.15, 0.3, 1.2, 0.7
+"""Sizes of steps as shares of the box: at first, at the most, and by what they are multiplied after a round that found a
+worse point, and after one that found none."""
 
 
 _ODD = re.compile(r"[^\w.-]+")
@@ -68,44 +81,83 @@ def _bounded(own: Any) -> bool:
     return isinstance(own, Uniform | Choice | Rotations | Shell)
 
 
-def search(job: Job, law: str, requirement: Requirement, threads: int, seed: int = 0) -> Found:
-    """Look for the worst of a requirement's metric over the box, by differential evolution (Storn and Price, 1997), with the
-    random numbers of run 0 in all flights. Ends early where a run has no such value, which is as bad as can be."""
-    from scipy.optimize import differential_evolution
+def search(
+    job: Job, law: str, requirement: Requirement, threads: int, begin: Array | None = None, seed: int = 0
+) -> Found | None:
+    """Look for the worst of a requirement's metric over the box, with the random numbers of run 0 in all flights. begin: a
+    point (dims,) to look around, too. Ends early where a run has no such value, which is as bad as can be; None where no
+    scenario within the box can be flown.
 
+    An evolution strategy from many starts: random steps are flown from each side by side, and the worst of them is kept;
+    the steps adapt their size, and the half of the starts that is less bad is given up after each third of the rounds."""
     side = 1.0 if requirement.at_most else -1.0
-    evaluations, lost = 0, False
+    evaluations = 0
+    sought = np.random.default_rng(seed)
+    effort = MANY if job.lanes(law).at_once else FEW
+    low, high = np.array(box(job)).T
 
     def badness(points: Array) -> Array:
-        nonlocal evaluations, lost
-        points = np.atleast_2d(points.T).T
-        lanes = points.shape[1]
-        evaluations += lanes
-        found = job.measure(law, job.plan.values(points), np.zeros(lanes, dtype=np.int64), crew)()[requirement.column]
-        values = np.where(np.isnan(found), NONE, side * found)
-        lost = lost or bool((values == NONE).any())
-        return -values
+        """The badness of points (n, dims): infinite where a run has no value, minus infinity where no such craft is."""
+        nonlocal evaluations
+        unit = np.ascontiguousarray(points.T)
+        found = np.full(len(points), -np.inf)
+        there = np.flatnonzero(job.plan.possible(unit))
+        refused, runs = np.zeros(len(there), dtype=bool), np.zeros(len(there), dtype=np.int64)
+        measured = job.measure(law, job.plan.values(unit[:, there]), runs, crew, refused=refused)()
+        if refused.all():
+            return found
+        values = side * measured[requirement.column]
+        evaluations += int((~refused).sum())
+        found[there] = np.where(refused, -np.inf, np.where(np.isnan(values), np.inf, values))
+        return found
 
-    limits = np.array(box(job))
-    population, generations = (POPULATION, GENERATIONS) if job.lanes(law).at_once else FEW
-    begin = np.random.default_rng(seed).uniform(limits[:, 0], limits[:, 1], (population, len(limits)))
     with Crew(threads) as crew:
-        result = differential_evolution(
-            badness,
-            limits,
-            init=cast(Any, begin),
-            maxiter=generations,
-            vectorized=True,
-            updating="deferred",
-            polish=False,
-            rng=seed,
-            tol=1e-6,
-            callback=lambda *_, **__: lost,
-        )
-    point = np.asarray(result.x)
-    columns = job.plan.values(point[:, None])
-    value = -float(result.fun)
-    return Found(point, columns, np.nan if value == NONE else side * value, evaluations)
+        points = sought.uniform(low, high, (effort.spread, len(low)))
+        corners = int(CORNERS * effort.spread)
+        points[:corners] = np.where(sought.random((corners, len(low))) < 0.5, low, high)
+        if begin is not None:
+            points[-1] = np.clip(begin, low, high)
+        values = badness(points)
+        kept = _apart(points, values, (high - low) * APART, effort.starts)
+        points, values = points[kept], values[kept]
+        sizes = np.full(len(points), FIRST)
+        for number in range(effort.rounds):
+            if values.max() == np.inf:
+                break
+            if number and number % (effort.rounds // 3) == 0:
+                kept = np.argsort(-values, kind="stable")[: -(-len(points) // 2)]
+                points, values, sizes = points[kept], values[kept], sizes[kept]
+            tried = _stepped(points, sizes, effort.lanes // len(points), low, high, sought)
+            found = badness(tried.reshape(-1, len(low))).reshape(tried.shape[:2])
+            best, rows = found.argmax(axis=1), np.arange(len(points))
+            better = found[rows, best] > values
+            points = np.where(better[:, None], tried[rows, best], points)
+            values = np.maximum(values, found[rows, best])
+            sizes = np.minimum(np.where(better, WIDER, CLOSER) * sizes, LONGEST)
+    worst = int(values.argmax())
+    if values[worst] == -np.inf:
+        return None
+    value = np.nan if values[worst] == np.inf else side * float(values[worst])
+    return Found(points[worst], job.plan.values(points[worst][:, None]), value, evaluations)
+
+
+def _apart(points: Array, values: Array, least: Array, most: int) -> list[int]:
+    """The places of the worst points (n, dims) that differ from each other by the least along some side."""
+    found: list[int] = []
+    for place in np.argsort(-values, kind="stable").tolist():
+        if all((np.abs(points[place] - points[other]) > least).any() for other in found):
+            found.append(place)
+        if len(found) == most:
+            break
+    return found
+
+
+def _stepped(points: Array, sizes: Array, count: int, low: Array, high: Array, sought: np.random.Generator) -> Array:
+    """Points (n, count, dims) that are a random step away from each of these (n, dims), along some sides of the box."""
+    each = (len(points), count, 1)
+    step = sought.normal(size=(len(points), count, len(low))) * sizes[:, None, None] * sought.lognormal(0.0, 0.7, each)
+    step *= sought.random(step.shape) < sought.random(each)
+    return np.clip(points[:, None] + step * (high - low), low, high)
 
 
 def brackets(job: Job, store: Store, result: LawResult, threads: int, taken: set[str]) -> tuple[Bracket, ...]:
@@ -118,17 +170,14 @@ def brackets(job: Job, store: Store, result: LawResult, threads: int, taken: set
             continue
         run, side = worst_runs[requirement.name], 1.0 if requirement.at_most else -1.0
         value, columns = float(store.row(law, run)[requirement.column]), job.plan.columns(run, 1)
-        looked = search(job, law, requirement, threads)
-        if not np.isnan(value) and not side * value >= side * looked.value:
+        looked = search(job, law, requirement, threads, job.plan.unit(run, 1)[:, 0])
+        if looked is not None and not np.isnan(value) and not side * value >= side * looked.value:
             value, columns, run = looked.value, looked.columns, 0
         path = store.folder / _file_name(law, requirement.name, taken)
         with atomic_write(path) as hidden:
             hidden.write_text(scenario_of(job, columns, run).text, encoding="utf-8")
-        proved, assumption = proved_of(job, law, requirement)
-        if proved is not None and side * value > side * proved:
-            # Of what holds in the end alone.
-            assumption = f"{assumption}; flights of this length have not come to their end"
-        told = (requirement.column, requirement.unit, value, path.name, looked.evaluations, proved, assumption)
+        flights = 0 if looked is None else looked.evaluations
+        told = (requirement.column, requirement.unit, value, path.name, flights, *proved_of(job, law, requirement))
         found.append(Bracket(*told, requirement.at_most))
     return tuple(found)
 
@@ -142,55 +191,26 @@ def _file_name(law: str, requirement: str, taken: set[str]) -> str:
     return name
 
 
+_FOLLOWING = ("lag", "rate-limit")
+"""Actuators whose output lies between its own and the command."""
+
+
 def proved_of(job: Job, law: str, requirement: Requirement) -> tuple[float | None, str]:
-    """The bound that is proved of a metric over everything that is drawn, and what it rests on; None where nothing is.
+    """The bound that holds of a metric over everything that is drawn, and what it rests on; None where nothing is proved.
 
-    The torque is bounded by where it is cut off. The end of a flight is, where a certificate bounds it under disturbance
-    from every attitude and from rates as large as any that is drawn, where nothing but the start is drawn, and the loop has
-    no part that certificates leave out."""
-    scenario = job.scenario
-    if scenario.body != "rigid-body" or not requirement.at_most:
+    The torque on the body is bounded by where its command is cut off, where no effector makes the torque from that, no
+    actuator more of it, and no draw moves the limit. The claims of certificates bound no metric: they speak of motions in
+    the end and of torque applied continuously, while flights end and hold their torque for a control period."""
+    lanes = job.lanes(law)
+    loop = lanes.base.loop
+    axes = {"peak_torque": 1.0, "peak_torque_norm": math.sqrt(3.0)}.get(requirement.metric)
+    if axes is None or job.scenario.body != "rigid-body" or not requirement.at_most or loop.limit == "none":
         return None, ""
-    entry = scenario.pick(law)
-    loop = build(scenario, entry)
-    if requirement.metric == "peak_torque" and loop.limit == "axis" and not loop.rotors:
-        fixed = not any("torque_limit" in key for dispersion in job.dispersions for key in dispersion.keys)
-        return (loop.cutoff(), "the actuators cut each component of the torque off there") if fixed else (None, "")
-    place = {"final_attitude_error": "angle", "final_rate_error": "rate"}.get(requirement.metric)
-    keys = {key for dispersion in job.dispersions for key in dispersion.keys}
-    if place is None or not all(key.startswith("initial.") for key in keys):
+    acts = any(fitted.part.flag("ACTS") for fitted in loop.used("effector"))
+    followed = all(fitted.part.name in _FOLLOWING and fitted.part.file is None for fitted in loop.used("actuator"))
+    if acts or not followed or lanes.moves("setup.limit"):
         return None, ""
-    if assumed_away(loop):
-        return None, ""
-    fastest = _fastest(job, scenario)
-    for issued in study_of(scenario.body).certify(scenario, entry, loop):
-        for claim in issued.certificate.claims:
-            told = claim.numbers
-            if claim.kind != "disturbance" or claim.outcome != "proved" or issued.step:
-                continue
-            if told["rate_everywhere"] is not None and fastest <= told["rate_everywhere"]:
-                start = f"from every attitude and rates up to {told['rate_everywhere']:.3g} rad/s"
-                return told[place], "; ".join([f"in the end, {start}", *claim.assumptions])
-    return None, ""
-
-
-def _fastest(job: Job, scenario: Scenario) -> float:
-    """A rate (rad/s) that no start in the box is faster than; infinite where none is known."""
-    fastest = float(np.linalg.norm(scenario.table.initial.rate))
-    if scenario.table.initial.relative_to == "target":
-        return np.inf
-    for dispersion in job.dispersions:
-        if not any(key.startswith("initial.rate") for key in dispersion.keys):
-            continue
-        own = dispersion.distribution
-        if dispersion.keys != ("initial.rate",) or not (isinstance(own, Shell) or dispersion.independent):
-            return np.inf
-        if isinstance(own, Shell):
-            scale = 1.0 if dispersion.scale is None else float(np.abs(dispersion.scale).max())
-            fastest = own.high * scale * (1.0 + 1e-12)
-        else:
-            # Each component grows with its own uniform.
-            tail = EDGE if _bounded(own) else TAIL
-            ends = dispersion.draw(np.array([[tail, 1.0 - tail]] * dispersion.dims))
-            fastest = float(np.linalg.norm(np.abs(ends).max(axis=1))) * (1.0 + 1e-12)
-    return fastest
+    limit = max(phase.setup.limit for phase in loop.phases(lanes.steps))
+    bound = limit * (axes if loop.limit == "axis" else 1.0)
+    cut = "each component" if loop.limit == "axis" else "the norm"
+    return bound, f"the actuators cut {cut} of the torque off at {limit:.6g} N m"

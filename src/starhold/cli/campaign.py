@@ -10,6 +10,7 @@ import typer
 
 from starhold.cli.arguments import (
     DIVERGED,
+    INTERNAL_ERROR,
     REFUTED,
     UNDECIDED,
     CampaignOutput,
@@ -64,6 +65,8 @@ def campaign(
     print_campaign(result, scenario.body)
     page = write_campaign(scenario, result)
     console.print(f"Report: {page}", soft_wrap=True)
+    if result.contradicted:
+        raise typer.Exit(INTERNAL_ERROR)
     if result.met is not True:
         raise typer.Exit(UNDECIDED if result.met is None else REFUTED)
 

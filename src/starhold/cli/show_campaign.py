@@ -16,6 +16,7 @@ from starhold.campaign.verdicts import percent
 from starhold.cli.show import console
 from starhold.errors import InputError
 from starhold.report.campaign_units import (
+    CONTRADICTED,
     DASH,
     Wording,
     bounds_text,
@@ -195,6 +196,8 @@ def _brackets(result: CampaignResult, words: Wording) -> None:
                 proved = f" {order(item)} {with_unit(item.proved, measure)} ({_safe(item.assumption)})"
             told = f"{_safe(measure.heading)} {worst_text(item, measure)}{proved}"
             console.print(f"  {_safe(law.law)}: {told}  [dim]{_safe(item.file)}[/dim]", highlight=False, soft_wrap=True)
+            if item.contradicted:
+                console.print(f"  [bold red]{CONTRADICTED}[/bold red]", highlight=False, soft_wrap=True)
 
 
 def _drivers(law: LawResult) -> None:

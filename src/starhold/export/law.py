@@ -151,7 +151,7 @@ def flight_law(loop: ClosedLoop) -> FlightLaw:
     inputs = _noted("FlightInput", fields, notes)
     told = quantities(module.Sample).get("command", Quantity("", ""))._replace(dimension="")
     command = NamedTuple("FlightCommand", [(module.COMMAND, Annotated[Any, told])])
-    return FlightLaw(loop, composition, Parameters(loop.gains, loop.craft, named), start, inputs, given, command)
+    return FlightLaw(loop, composition, Parameters(loop.gains, loop.known, named), start, inputs, given, command)
 
 
 def _seen(parts: Composition, rebinder: Rebinder) -> Composition:

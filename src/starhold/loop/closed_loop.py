@@ -152,6 +152,13 @@ class ClosedLoop:
     """Which of many runs it flies where nothing else is said: with the seed it fixes the random numbers."""
     events: tuple[Event, ...] = ()
     """What changes during a run, in order of time."""
+    nominal: Any = None
+    """The craft as the law takes it to be; None: as it is."""
+
+    @property
+    def known(self) -> Any:
+        """The craft as the law takes it to be at the start."""
+        return self.craft if self.nominal is None else self.nominal
 
     @property
     def body(self) -> Part:
@@ -237,7 +244,7 @@ class ClosedLoop:
     @property
     def remembers(self) -> bool:
         """Whether the law keeps anything from call to call."""
-        return any(True for _ in leaves(self.law.remember(self.gains, self.craft, self.period)))
+        return any(True for _ in leaves(self.law.remember(self.gains, self.known, self.period)))
 
     def setup(self) -> Setup:
         """The numbers of this loop."""
@@ -261,7 +268,7 @@ class ClosedLoop:
 
     def phases(self, steps: int) -> list[Phase]:
         """A run of so many control steps, cut where something changes."""
-        events = (Event(0, self.parts, self.gains, self.craft, self.craft), *self.events)
+        events = (Event(0, self.parts, self.gains, self.craft, self.known), *self.events)
         # Of one form in all phases, so that one kernel flies them all.
         gains = alike([event.gains for event in events])
         crafts = alike([event.craft for event in events] + [event.nominal for event in events])
@@ -279,7 +286,7 @@ class ClosedLoop:
         """The carry at the start of a trajectory: of the loop, or with another state of the body, gains, nominal model or
         setup."""
         start, setup = self.start if start is None else start, setup or self.setup()
-        memory = self.law.remember(gains or self.gains, nominal or self.craft, self.period)
+        memory = self.law.remember(gains or self.gains, nominal or self.known, self.period)
         goal = self._goal(start, setup) if self.aims else None
         h = () if goal is None else self.body.module.side_of(start, goal)
         sensors, estimator = self.used("sensor"), next(iter(self.used("estimator")), None)

@@ -87,7 +87,7 @@ def fly_plainly(loop: ClosedLoop, steps: int, run: int | None = None) -> Any:
     step, carry, setup = make_step(loop.composition()), loop.carry(), loop.setup()
     key = (loop.seed, loop.run if run is None else run)
     for k in range(steps):
-        carry = step.update(step.check(carry, k, setup), k, key, loop.gains, loop.craft, setup)
+        carry = step.update(step.check(carry, k, setup), k, key, loop.gains, loop.known, setup)
         for _ in range(loop.substeps):
             carry = step.propagate(carry, loop.craft, setup)
     return step.check(carry, steps, setup)

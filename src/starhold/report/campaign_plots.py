@@ -46,7 +46,7 @@ def _drawable(spread: Spread) -> bool:
 
 def _histogram(name: str, metric: str, spreads: dict[int, Spread], result: CampaignResult, words: Wording) -> dict[str, Any]:
     measure = words.measure(metric)
-    edges = {number: _edges(spread) for number, spread in spreads.items()}
+    edges = {number: spread.edges for number, spread in spreads.items()}
     log = all(own[0] > 0.0 for own in edges.values()) and any(map(_geometric, edges.values()))
     first = next(iter(edges.values()))
     same = all(np.array_equal(own, first) for own in edges.values())
@@ -76,14 +76,6 @@ def _histogram(name: str, metric: str, spreads: dict[int, Spread], result: Campa
         "curves": curves,
         "levels": rounded([bound for bound in bounds if _near(bound, low, high, log)]),
     }
-
-
-def _edges(spread: Spread) -> NDArray[np.float64]:
-    """The edges of the bins; of a single value ones that can be seen."""
-    if spread.edges[-1] > spread.edges[0]:
-        return spread.edges
-    side = 0.01 * abs(float(spread.edges[0])) or 0.01
-    return np.linspace(spread.edges[0] - side, spread.edges[-1] + side, len(spread.edges))
 
 
 def _geometric(edges: NDArray[np.float64]) -> bool:

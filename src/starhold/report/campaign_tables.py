@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from starhold.campaign.verdicts import percent
 from starhold.report.campaign_units import (
+    CONTRADICTED,
     DASH,
     Wording,
     bounds_text,
@@ -197,12 +198,12 @@ def brackets(result: CampaignResult, words: Wording) -> str:
     rows = [_bracket(bracket, number, law, words) for number, law in enumerate(result.laws) for bracket in law.brackets]
     if not rows:
         return ""
-    head = ("metric", "law", "flown ≤ true ≤ proved", "flown by", "assuming")
+    head = ("metric", "law", "flown ≤ true ≤ proved", "flown by", "proved by")
     return (
         f"<h2>Worst cases: flown ≤ true ≤ proved</h2>\n{table(head, rows, 'brackets')}\n"
         '<p class="note">The worst flown is that of all runs and of a search over the box of the dispersions: no smaller '
-        "bound can be true. What is proved holds for every flight that meets the assumption. The scenario file flies the "
-        "worst run that was found.</p>"
+        "bound can be true. What is proved holds for every flight over what is drawn. The scenario file flies the worst run "
+        "that was found.</p>"
     )
 
 
@@ -213,6 +214,8 @@ def _bracket(bracket: Bracket, number: int, law: LawResult, words: Wording) -> s
         told += small("nothing is proved of it")
     else:
         told += f" {order(bracket)} <b>{escape(with_unit(bracket.proved, measure))}</b>"
+    if bracket.contradicted:
+        told += f'<span class="outcome refuted">contradicted</span>{small(CONTRADICTED)}'
     tries = f"after {counted(bracket.evaluations, 'flight')} of the search" if bracket.evaluations else ""
     return (
         f'<tr><th scope="row">{escape(measure.heading)}</th><td class="whose">{named(number, law)}</td>'

@@ -102,6 +102,9 @@ def worst_text(bracket: Bracket, measure: Measure) -> str:
     return f"{with_unit(bracket.flown, measure)} {order(bracket)} true"
 
 
+CONTRADICTED = "Contradicted by a flight, which is a fault of starhold: please report it with the scenario file."
+
+
 def order(bracket: Bracket) -> str:
     """The sign between the parts of a bracket, from what is flown to what is proved."""
     return "≤" if bracket.at_most else "≥"

@@ -47,7 +47,12 @@ def raw(text: str) -> tuple[BeforeValidator, WithJsonSchema]:
 class DispersionTable(Table):
     """One key, or several that are drawn together; each table adds its `distribution`."""
 
-    known: Annotated[Flag, Field(description="whether the value is known before flight, as a measured inertia is")] = False
+    judged_apart: Annotated[
+        Flag, Field(description="known before flight, as the day of a launch: runs of like values are judged by themselves")
+    ] = False
+    known_to_law: Annotated[
+        Flag, Field(description="laws are told each drawn value and designed for it; else for what the file has")
+    ] = False
 
 
 class RelativeTable(DispersionTable):

@@ -28,6 +28,7 @@ RENAMED = {
     "layer": "boundary_layer",
     "turn": "slew_angle",
     "stored": "wheel_momentum",
+    "known": "judged_apart",
     "l2-rest": "l2-equilibrium",
 }
 """Old names of keys, laws and built-in scenarios, refused with the new one named where that one is known."""
@@ -188,8 +189,8 @@ def try_law(loop: Any, where: str, key: str) -> None:
         carry, setup = loop.carry(), loop.setup()
         if law.file is None:
             return
-        measurement = make_step(loop.composition()).measure(carry, 0, (0, 0), loop.craft, setup)
-        given = law.command(measurement, loop.gains, loop.craft, carry.memory)
+        measurement = make_step(loop.composition()).measure(carry, 0, (0, 0), loop.known, setup)
+        given = law.command(measurement, loop.gains, loop.known, carry.memory)
         pair = given if isinstance(given, tuple) and len(cast(Any, given)) == 2 else (None, None)
         if not isinstance(pair[0], tuple) or len(cast(Any, pair[0])) != 3:
             raise ValueError(f"{law.file.name}: {law.equation} must return three numbers and the memory, not {show(given)}")

@@ -54,7 +54,7 @@ def _has_modes(entry: LawEntry) -> bool:
 def _design(scenario: Scenario, entry: LawEntry, form: str) -> Design:
     try:
         with np.errstate(all="ignore"):
-            figures = dict(entry.law.explain(scenario.craft, entry.spec))
+            figures = dict(entry.law.explain(scenario.known.craft, entry.spec))
     except ValueError as error:
         raise InputError(scenario.where, f"law {entry.name}", "", f"figures cannot be computed: {error}") from None
     inputs, gains = _named(entry.law.fields(form), entry.spec), _named(entry.law.fields(), entry.gains)
@@ -76,5 +76,5 @@ def map_inputs(scenario: Scenario, law: str | None = None) -> tuple[Any, float, 
     for entry in entries:
         teller = getattr(entry.law.module, "map_inputs", None)
         if teller is not None and entry.form is not None:
-            return teller(scenario.craft, entry.spec)
+            return teller(scenario.known.craft, entry.spec)
     raise InputError(scenario.where, "law", "no degree of stability", 'type = "wheel", form = "degree-of-stability"')

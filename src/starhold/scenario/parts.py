@@ -264,7 +264,7 @@ def try_parts(loop: ClosedLoop, where: str, key: str) -> None:
         # Not of the cache of such steps, for it is flown once.
         step, carry, setup = make_equations(tried.composition()), tried.carry(), tried.setup()
         for number in range(2):
-            carry = step.update(carry, number, (loop.seed, 0), loop.gains, loop.craft, setup)
+            carry = step.update(carry, number, (loop.seed, 0), loop.gains, loop.known, setup)
             carry = step.propagate(carry, loop.craft, setup)
             step.sample(carry, number + 1, setup)
     except InputError:

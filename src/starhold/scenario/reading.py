@@ -66,6 +66,8 @@ class Scenario:
     """Whether gains that a law tells to be unstable are taken."""
     parts: tuple[Fitted, ...] = ()
     """The parts that [[part]] tables give."""
+    supposed: Scenario | None = None
+    """What laws take for true and are designed for, without laws, where [nominal] gives other tables."""
 
     @property
     def name(self) -> str:
@@ -84,8 +86,18 @@ class Scenario:
 
     @property
     def craft(self) -> Any:
-        """The body's numbers, which laws act on."""
+        """The body's numbers, which fly."""
         return self.made.craft
+
+    @property
+    def known(self) -> Scenario:
+        """The scenario as laws take it and are designed for it."""
+        return self.supposed or self
+
+    @property
+    def nominal_craft(self) -> Any:
+        """The body's numbers as laws take them; None where those are the ones that fly."""
+        return None if self.supposed is None else self.supposed.craft
 
     def __repr__(self) -> str:
         names = ", ".join(entry.name for entry in self.laws)
@@ -165,15 +177,38 @@ def read_tables(data: Mapping[str, Any], text: str, where: str, folder: Path, al
     body = body_of(data, where, folder)
     # First of all, for it says what the numbers of the other tables are worth.
     context = body.context(data, where)
-    rest = {key: value for key, value in data.items() if key not in APART}
-    table = validate(body.tables, rest, where, "", extra=APART, context=context)
+    table = _tables(body, data, where, context)
     parts = read_parts(data.get("part"), body.name, folder, where, table.shared, context)
     scenario = Scenario(body, table, (), text, where, folder, allow_unstable, parts)
     _ = scenario.made
+    if table.nominal:
+        scenario = replace(scenario, supposed=_supposed(scenario, data, context))
     entries: list[LawEntry] = []
     for key, item in numbered(data.get("law"), where):
-        entries.append(_read_law(item, scenario, context, key, {entry.name for entry in entries}))
+        entries.append(_read_law(item, scenario.known, context, key, {entry.name for entry in entries}))
     return replace(scenario, laws=tuple(entries))
+
+
+def _tables(body: Body, data: Mapping[str, Any], where: str, context: Any) -> Any:
+    """The raw tables, validated, but for those of laws and parts."""
+    rest = {key: value for key, value in data.items() if key not in APART}
+    return validate(body.tables, rest, where, "", extra=APART, context=context)
+
+
+def _supposed(scenario: Scenario, data: Mapping[str, Any], context: Any) -> Scenario:
+    """The scenario with the tables of [nominal] in place of its own, which laws take for true."""
+    given, known = scenario.table.nominal, [*scenario.hooks.modelled, *scenario.hooks.designed]
+    for name in given:
+        if name not in known:
+            allowed = nearest(name, known) if known else "none, for laws of this body know their craft"
+            raise InputError(scenario.where, f"nominal.{name}", "a table that laws are not designed for", allowed)
+    other = {name: table for name, table in data.items() if name != "nominal"} | given
+    try:
+        supposed = replace(scenario, table=_tables(scenario.hooks, other, scenario.where, context))
+        _ = supposed.made
+    except InputError as error:
+        raise InputError(error.where, f"nominal.{error.key}", error.found, error.allowed) from None
+    return supposed
 
 
 def _read_law(data: Any, scenario: Scenario, context: Any, key: str, taken: set[str]) -> LawEntry:

@@ -31,6 +31,10 @@ class ScenarioTable(Table):
     name: Annotated[Name, Field(description="how results and folders are called")]
     description: Annotated[str, Field(description="a sentence for the report")] = ""
     campaign: CampaignTable | None = None
+    nominal: dict[str, dict[str, Any] | list[dict[str, Any]]] = Field(
+        default={},
+        description="tables that laws take for true and are designed for, in place of the file's own of that name",
+    )
     SHARED: ClassVar[Mapping[str, Any]] = MappingProxyType({})
     """The keys that give a number to all parts that declare it as `shared`, with what a scenario without them gives."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from starhold.errors import InputError
 from starhold.scenario.building import build
 from starhold.studies.body import study_of
 
@@ -25,6 +26,10 @@ class Tried(NamedTuple):
 def certify_scenario(scenario: Scenario, law: str | None = None) -> list[Tried]:
     """Certificates of all laws of a scenario, or of one. Raises `BrokenClaimError` where a flight contradicts one."""
     study, entries = study_of(scenario.body), scenario.laws if law is None else (scenario.pick(law),)
+    if scenario.supposed is not None:
+        raise InputError(
+            scenario.where, "nominal", "laws that take the craft for another one", "no [nominal], to be certified"
+        )
     # All of them before the first proof, so that what is wrong with the last is said at once.
     loops = [build(scenario, entry) for entry in entries]
     issued = [found for entry, loop in zip(entries, loops, strict=True) for found in study.certify(scenario, entry, loop)]

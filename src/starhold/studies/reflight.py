@@ -38,6 +38,7 @@ Values: TypeAlias = dict[str, Any]
 """Numbers, vectors or matrices by the keys of a file."""
 
 FAULTS = "faults change the loop on the way"
+SUPPOSED = "it takes the craft for another one"
 MODES = "its modes have gains of their own, which the page does not move"
 COMPUTED = "it enters numbers that no recorded equation gives, such as a law's matrices"
 ALONE = "no value beside the file's own is allowed"
@@ -126,6 +127,8 @@ def reflight(scenario: Scenario) -> Reflight:
         loop = build(held, entry)
         if loop.events:
             grounded[entry.name] = FAULTS
+        elif loop.nominal is not None:
+            grounded[entry.name] = SUPPOSED
         else:
             own = [
                 key for key in gains if key.startswith(f"law.{entry.name}.") and key[len(entry.name) + 5 :] in _names(entry)

@@ -94,6 +94,7 @@ class AnyBody(Body):
     """One body, as its part declares it."""
 
     marker = MARKER
+    modelled = (MARKER,)
     law_table = LawTable
 
     def __init__(self, part: Part, folder: Path = Path()) -> None:
@@ -126,6 +127,7 @@ class AnyBody(Body):
         timing, limit = table.simulation, table.control.limit
         return ClosedLoop(
             craft=scenario.craft,
+            nominal=scenario.nominal_craft,
             law=entry.law,
             gains=entry.gains,
             start=module.State(**values, **{module.COMMAND: ZERO}),

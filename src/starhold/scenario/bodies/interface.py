@@ -57,6 +57,10 @@ class Body(Protocol):
     """Keys of `dials` whose value is that of another key until they are moved themselves."""
     orbit: str = ""
     """The table that it has besides where a part needs an orbit."""
+    modelled: tuple[str, ...] = ()
+    """The tables whose numbers laws take the craft for."""
+    designed: tuple[str, ...] = ()
+    """Those whose numbers besides give gains to laws with a design form."""
 
     @property
     def template(self) -> str:

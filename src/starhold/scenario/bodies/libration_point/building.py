@@ -28,6 +28,7 @@ def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
     surfaces = (fit("actuator", "lag", entry.options.lag),) if entry.options.lag > 0.0 else ()
     return ClosedLoop(
         craft=plant,
+        nominal=scenario.nominal_craft,
         law=entry.law,
         gains=entry.gains,
         start=_start(scenario, entry),
@@ -49,7 +50,7 @@ def check_start(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> None:
             scenario.where, "initial.position", f"a start {away:.6g} away", f"less than lost_beyond, {loop.far:.6g}"
         )
     measurement = PointMeasurement(loop.start.position, loop.start.velocity, loop.period, entry.options.limit)
-    command, _ = loop.law.command(measurement, entry.gains, loop.craft, loop.carry().memory)
+    command, _ = loop.law.command(measurement, entry.gains, loop.known, loop.carry().memory)
     if not is_finite(dot(command, command)):
         allowed = "a limit, margin or deficit: this law takes as much control as there is"
         raise InputError(scenario.where, f"law {entry.name}", "no limit of the control", allowed)

@@ -56,6 +56,8 @@ class RigidBody(Body):
     modes = True
     linked = MappingProxyType({TRUE: KNOWN})
     orbit = ORBIT
+    modelled = ("spacecraft", "wheels", "wheel")
+    designed = ("initial", "orbit")
 
     def laws(self) -> Mapping[str, Law]:
         return catalogue()

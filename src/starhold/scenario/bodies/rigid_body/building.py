@@ -28,6 +28,7 @@ def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
     body = table.spacecraft
     return ClosedLoop(
         craft=scenario.craft,
+        nominal=scenario.nominal_craft,
         law=entry.law,
         gains=entry.gains,
         start=start_of(scenario, parts[0]),

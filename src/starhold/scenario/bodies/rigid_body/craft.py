@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from starhold.errors import InputError
 from starhold.parts.craft import Craft, compact, inverse, make_craft
@@ -32,9 +32,12 @@ def make(table: RigidBodyTable, where: str) -> Made:
 
 
 def wheels_of(scenario: Scenario) -> Wheels | None:
-    """The reaction wheels of a scenario, None for a craft without."""
-    made: Any = scenario.made
-    return made.wheels
+    """The reaction wheels of a scenario, None for a craft without. A torque is shared out among them as laws suppose them
+    to be."""
+    made, supposed = (cast(Made, one.made).wheels for one in (scenario, scenario.known))
+    if made is supposed or made is None or supposed is None or len(made.axes) != len(supposed.axes):
+        return made
+    return made._replace(least=supposed.least)
 
 
 def craft_with(scenario: Scenario, inertia: Any) -> Craft:

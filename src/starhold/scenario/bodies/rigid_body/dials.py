@@ -29,9 +29,10 @@ LIMIT, ATTITUDE, RATE = "spacecraft.torque_limit", "initial.attitude", "initial.
 
 def dials(scenario: Scenario) -> dict[str, Any]:
     """The keys that may be moved, with their numbers; an attitude given by angles comes as a quaternion, and a limit that
-    is infinite not at all. With faults nothing may: what they change is not told by equations."""
+    is infinite not at all. With faults nothing may, nor where laws suppose another craft: what that changes is not told by
+    equations."""
     table = scenario.table
-    if table.fault:
+    if table.fault or table.nominal:
         return {}
     inertia = compact(table.spacecraft.inertia)
     found: dict[str, Any] = {KNOWN: inertia, TRUE: inertia}

@@ -45,10 +45,10 @@ def make_events(scenario: Scenario, entry: LawEntry, parts: tuple[Fitted, ...]) 
         moments.append((fault.time, False, place))
         if action_on(fault, entry) != "none":
             moments.append((fault.time + fault.delay, True, place))
-    now = Event(0, parts, entry.gains, scenario.craft, scenario.craft)
+    now = Event(0, parts, entry.gains, scenario.craft, scenario.known.craft)
     wheels = wheels_of(scenario)
     begun = 0.0 if wheels is None else authority(wheels)
-    share, learnt, limit = 1.0, (0.0, 0), scenario.craft.torque_limit
+    share, learnt, limit = 1.0, (0.0, 0), scenario.known.craft.torque_limit
     events: list[Event] = []
     for time, diagnosed, place in sorted(moments):
         fault = table.fault[place - 1]

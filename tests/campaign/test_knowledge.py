@@ -1,0 +1,169 @@
+"""What laws know of the numbers that a campaign draws: what the file has, unless they are told each drawn value."""
+
+import re
+
+import pandas as pd
+import pytest
+
+import starhold as sh
+from starhold.campaign import lanes as lane_making
+from starhold.campaign.campaign import begin, with_campaign
+from starhold.errors import InputError
+from starhold.scenario.building import build
+from starhold.studies.body import study_of
+from starhold.studies.compare import compare, record
+from tests.campaign.flown import SMALL, fly
+
+INERTIA = {"distribution": "normal", "sigma": "4 %", "relative": True}
+LIMIT = {"distribution": "uniform", "low": 0.05, "high": 0.2}
+LYAPUNOV = SMALL["law"][1]
+DESIGNED = {"type": "lqr", "form": "II", "q": 1.0, "r": 0.5}
+
+
+def short(laws=(LYAPUNOV,), **changes):
+    """Ten seconds from a turn at rest."""
+    simulation = SMALL["simulation"] | {"duration": 10.0}
+    return sh.scenario(
+        SMALL | {"initial": {"attitude": [0.9, 0.1, -0.3, 0.2]}, "simulation": simulation, "law": [*laws]} | changes
+    )
+
+
+def measured(scenario):
+    """The metrics of a scenario's first law, from a recording of every control step."""
+    return study_of(scenario.body).metrics_of(record(scenario, build(scenario, scenario.laws[0])))
+
+
+def drawn(row, key="spacecraft.inertia"):
+    return [row[f"{key}[{k}]"] for k in (1, 2, 3)]
+
+
+@pytest.mark.parametrize("told", [False, True])
+def test_a_drawn_inertia_is_not_told_to_the_law_unless_it_is_said(told):
+    """Against what needs no campaign: a fault at the start that nobody notices, or another craft."""
+    scenario = short()
+    found = fly(scenario=scenario, over={"spacecraft.inertia": INERTIA | {"known_to_law": told}}, requirement=[], runs=12)
+    efforts = []
+    for _, row in found.frame().iterrows():
+        inertia = drawn(row)
+        unnoticed = {"fault": [{"time": 0.0, "inertia": inertia, "action": "none"}]}
+        other = scenario.with_({"spacecraft.inertia": inertia} if told else unnoticed)
+        efforts.append(measured(other.with_({"simulation.run": int(row["run"])}))["effort"])
+    assert found.frame()["effort"].to_numpy() == pytest.approx(efforts, rel=1e-12)
+
+
+def test_what_is_known_makes_a_difference():
+    over = {"spacecraft.inertia": INERTIA}
+    efforts = [
+        fly(scenario=short(), over={"spacecraft.inertia": INERTIA | {"known_to_law": told}}, requirement=[], runs=8).frame()[
+            "effort"
+        ]
+        for told in (False, True)
+    ]
+    assert (efforts[0] != efforts[1]).all()
+    frame = fly(scenario=short(), over=over, requirement=[], runs=8).frame()
+    assert (frame["effort"] == efforts[0]).all()
+    assert (frame["flown.craft.inertia[1]"] == frame["spacecraft.inertia[1]"]).all()
+
+
+CASES = {
+    "form": (
+        (DESIGNED, LYAPUNOV),
+        {},
+        {"spacecraft.inertia": INERTIA, "initial.rate": {"distribution": "normal", "sigma": 0.01}},
+    ),
+    "limit": ((LYAPUNOV,), {}, {"spacecraft.torque_limit": LIMIT, "spacecraft.inertia": INERTIA | {"known_to_law": True}}),
+    "fault": (
+        (LYAPUNOV,),
+        {"fault": [{"time": 4.0, "inertia": [2.2, 3.1, 4.4], "delay": 1.0, "action": "reallocate"}]},
+        {"spacecraft.inertia": INERTIA},
+    ),
+    "wheels": (
+        ({"type": "wheel", "k_rate": 1.5, "k_attitude": 0.6},),
+        {
+            "wheels": {"inertia": 1e-3, "torque_limit": 0.2, "momentum_limit": 4.0},
+            "wheel": [{"axis": axis} for axis in ([1, 0, 0], [0, 1, 0], [0, 0, 1])],
+        },
+        {"wheel[2].axis[1]": {"distribution": "normal", "sigma": 0.02}, "wheels.inertia": INERTIA},
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_runs_are_those_of_their_own_scenarios_however_they_are_made(case, monkeypatch):
+    laws, tables, over = CASES[case]
+    scenario = short(laws, **tables)
+    found = fly(scenario=scenario, over=over, requirement=[], runs=10)
+    for law in found.laws:
+        assert found.again(7, law.law).differs == ()
+    monkeypatch.setattr(lane_making.Lanes, "_agrees", lambda *_: False)
+    pd.testing.assert_frame_equal(found.frame(), fly(scenario=scenario, over=over, requirement=[], runs=10).frame())
+
+
+def test_gains_stay_designed_for_the_nominal_craft():
+    scenario = short((DESIGNED,))
+    for told in (False, True):
+        over = {"spacecraft.inertia": INERTIA | {"known_to_law": told}}
+        found = fly(scenario=scenario, over=over, requirement=[], runs=5)
+        again = found.again(3).scenario
+        own = build(again, again.laws[0])
+        nominal = build(scenario, scenario.laws[0])
+        assert (own.gains == nominal.gains) != told
+        assert (own.known.inertia == nominal.craft.inertia) != told
+        assert own.craft.inertia == pytest.approx(drawn(found.frame().iloc[3]), rel=1e-15)
+
+
+def test_a_torque_is_shared_out_among_wheels_as_they_are_supposed_to_be():
+    laws, tables, over = CASES["wheels"]
+    scenario = short(laws, **tables)
+    again = fly(scenario=scenario, over=over, requirement=[], runs=3).again(2).scenario
+    own, nominal = (build(one, one.laws[0]).wheels for one in (again, scenario))
+    assert own.axes != nominal.axes
+    assert own.least == nominal.least
+
+
+def test_the_verdict_says_what_the_law_knows():
+    asked = [{"metric": "effort", "at_most": 9, "share": 0.5}]
+    over = {"spacecraft.inertia": INERTIA, "spacecraft.torque_limit": LIMIT | {"known_to_law": True}}
+    (law,) = fly(scenario=short(), over=over, requirement=asked, runs=5).laws
+    told = law.verdicts[0].sentence()
+    assert told.endswith(
+        "The law supposes the file's own spacecraft.inertia, and is told each drawn spacecraft.torque_limit."
+    )
+    rate = {"initial.rate": {"distribution": "normal", "sigma": 0.01}}
+    (law,) = fly(scenario=short(), over=rate, requirement=asked, runs=5).laws
+    assert "The law" not in law.verdicts[0].sentence()
+
+
+@pytest.mark.parametrize(
+    ("over", "told"),
+    [
+        ({"spacecraft.inertia": INERTIA | {"known": True}}, "known: found an old name; allowed: judged_apart, its new name"),
+        ({"sensor.rate_noise": LIMIT | {"known_to_law": True}}, "false, for no law is told it"),
+        ({"law.lyapunov.k_rate": LIMIT | {"known_to_law": True}}, "false, for no law is told it"),
+        ({"initial.rate[1]": LIMIT | {"known_to_law": True}}, "false, for no law is told it"),
+    ],
+)
+def test_what_no_law_can_know_and_the_old_name_are_refused(over, told):
+    with pytest.raises(InputError, match=re.escape(told)):
+        begin(with_campaign(short(initial={"rate": [0.01, 0.0, 0.0]}), {"over": over, "runs": 3}), ["lyapunov"])
+
+
+def test_a_scenario_may_say_what_its_laws_suppose():
+    supposed = short().with_({"nominal": {"spacecraft": {"inertia": [2.5, 3.0, 4.0], "torque_limit": 0.3}}})
+    own = build(supposed, supposed.laws[0])
+    assert (own.craft.inertia, own.known.inertia) == ((2.0, 3.0, 4.0), (2.5, 3.0, 4.0))
+    unnoticed = short().with_(
+        {"spacecraft.inertia": [2.5, 3.0, 4.0], "fault": [{"time": 0.0, "inertia": [2.0, 3.0, 4.0], "action": "none"}]}
+    )
+    assert measured(supposed)["effort"] == measured(unnoticed)["effort"]
+    assert compare(supposed)[0].certificates == ()
+    with pytest.raises(InputError, match=r"nominal: found laws that take the craft for another one"):
+        sh.certify(supposed)
+    with pytest.raises(InputError, match=r"nominal.sensor: found a table that laws are not designed for"):
+        supposed.with_({"nominal.sensor": {"rate_noise": 0.1}})
+    with pytest.raises(InputError, match=r"nominal.spacecraft.inertia: found nothing"):
+        supposed.with_({"nominal.spacecraft": {"torque_limit": 0.1}})
+    # A campaign over it leaves what the file says of the law's knowledge.
+    found = fly(scenario=supposed, over={"spacecraft.inertia": INERTIA}, requirement=[], runs=3)
+    again = found.again(1).scenario
+    assert build(again, again.laws[0]).known.inertia == (2.5, 3.0, 4.0)

@@ -1,0 +1,150 @@
+"""The search for the worst, and brackets: flown <= searched <= proved of one and the same quantity."""
+
+import math
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import starhold as sh
+from starhold.campaign import worst
+from starhold.campaign.campaign import begin, with_campaign
+from starhold.cli.arguments import INTERNAL_ERROR
+from starhold.parts.catalogue import parts
+from starhold.parts.part import Fitted
+from starhold.simulation.lanes import Crew
+from tests.campaign.flown import SMALL, fly
+from tests.missions import BASE, DETUMBLE, POINT
+from tests.running import starhold
+
+RATE = {"initial.rate": {"distribution": "shell", "high": "2 deg/s"}}
+LIMITED = {"distribution": "uniform", "low": 0.1, "high": 0.2}
+PEAK = {"metric": "peak_torque", "at_most": 1, "share": 0.5}
+
+
+@pytest.fixture
+def brief(monkeypatch):
+    """A search that flies little."""
+    monkeypatch.setattr(worst, "MANY", worst.Effort(32, 4, 16, 3))
+    monkeypatch.setattr(worst, "FEW", worst.Effort(4, 2, 4, 3))
+
+
+def short(**changes):
+    """Four seconds of one law."""
+    simulation = SMALL["simulation"] | {"duration": 4.0}
+    return sh.scenario(SMALL | {"simulation": simulation, "law": SMALL["law"][:1]} | changes)
+
+
+def job_of(scenario, over, metric="effort", **changes):
+    asked = [{"metric": metric, "at_most": 1, "share": 0.5} | changes]
+    name = scenario.laws[0].name
+    job = begin(with_campaign(scenario, {"over": over, "requirement": asked, "runs": 16}), [name])
+    return job, name, job.requirements(name)[0]
+
+
+def proved(scenario, over=RATE, metric="peak_torque"):
+    return worst.proved_of(*job_of(scenario, over, metric))[0]
+
+
+def test_the_torque_is_bounded_by_the_limit_that_acts_on_the_body():
+    assert proved(short()) == 0.3
+    assert proved(short(), metric="peak_torque_norm") == pytest.approx(0.3 * math.sqrt(3.0))
+    norm = short().with_({"spacecraft.limit": "norm"})
+    assert proved(norm) == proved(norm, metric="peak_torque_norm") == 0.3
+    assert proved(short().with_({"spacecraft.actuator_lag": 0.5, "spacecraft.torque_rate_limit": 0.2})) == 0.3
+    assert proved(short().with_({"spacecraft.limit": "none"})) is None
+    for key, drawn in (
+        ("spacecraft.torque_limit", LIMITED),
+        ("spacecraft.limit", {"distribution": "choice", "values": ["axis", "none"]}),
+    ):
+        assert proved(short(), {key: drawn}) is None
+
+
+def test_nothing_is_proved_of_what_effectors_make_of_a_command():
+    acting = [part for part in parts("effector").values() if part.flag("ACTS")]
+    assert len(acting) > 3
+    loop = job_of(short(), RATE)[0].lanes("pd").base.loop
+    assert not loop.used("effector")
+    for part in acting:
+        job, *asked = job_of(short(), RATE, "peak_torque")
+        lanes = job.lanes("pd")
+        lanes.base = replace(lanes.base, loop=replace(loop, parts=(*loop.parts, Fitted(part, part.examples()[0]))))
+        assert worst.proved_of(job, *asked) == (None, "")
+
+
+def test_claims_about_motions_in_the_end_bound_no_flight():
+    """Such a claim is proved of this loop, and some of its flights are far from their end."""
+    tables = tomllib.loads(BASE + DETUMBLE + POINT)
+    slow = short(
+        simulation=SMALL["simulation"] | {"duration": 4.0}, certify={"disturbance": 1e-4}, sensor={}, environment={}
+    )
+    claims = sh.certify(slow)[0].claims
+    assert any(claim.kind == "disturbance" and claim.outcome == "proved" for claim in claims)
+    for metric in ("final_attitude_error", "final_rate_error"):
+        for scenario in (slow, sh.scenario(tables)):
+            assert proved(scenario, metric=metric) is None
+
+
+def test_a_flight_beyond_what_is_proved_is_told_as_a_fault_of_starhold(tmp_path, monkeypatch, brief):
+    monkeypatch.setattr(worst, "proved_of", lambda *_: (1e-9, "a wrong theorem"))
+    found = fly(tmp_path / "c", scenario=short(), over=RATE, requirement=[PEAK], runs=4, search=True)
+    assert found.contradicted
+    assert found.laws[0].brackets[0].assumption == "a wrong theorem"
+    (tmp_path / "s.toml").write_text(with_campaign(short(), {"over": RATE, "requirement": [PEAK], "runs": 4}).text)
+    told = starhold("campaign", "s.toml", "-o", "d", "--threads", "1", cwd=tmp_path)
+    assert told.returncode == INTERNAL_ERROR
+    assert "fault of starhold" in " ".join(told.stdout.split())
+    assert "fault of starhold" in (tmp_path / "d" / "report.html").read_text()
+
+
+def test_rounding_contradicts_nothing():
+    bracket = fly(scenario=short(), over=RATE, requirement=[PEAK], runs=2, search=False).laws[0]
+    assert bracket.brackets == ()
+    one = worst.Bracket("peak_torque", "N m", 0.1 * (1 + 1e-15), "", 0, 0.1, "")
+    assert not one.contradicted
+    assert replace(one, flown=0.1001).contradicted
+    assert replace(one, at_most=False, flown=0.0999).contradicted
+    assert not replace(one, flown=math.nan).contradicted
+
+
+def test_what_cannot_be_is_worst_in_no_sense(tmp_path, brief):
+    """Within three sigma lie inertias that no body has, and noises below nothing; the few runs draw none of them."""
+    over = {
+        "spacecraft.inertia": {"distribution": "normal", "sigma": "9 %", "relative": True},
+        "sensor.rate_noise": {"distribution": "normal", "sigma": 4e-5},
+    }
+    for _ in range(2):
+        asked = [{"metric": "effort", "at_most": 9, "share": 0.5}]
+        found = fly(tmp_path / "c", scenario=short(), over=over, requirement=asked, runs=6, search=True, resume=True)
+    (bracket,) = found.laws[0].brackets
+    own = sh.load(found.folder / bracket.file)
+    moments = np.sort(np.diagonal(own.table.spacecraft.inertia))
+    assert moments[2] <= moments[0] + moments[1]
+    assert 0 < bracket.evaluations < 32 + 3 * 16
+
+
+def test_what_only_reading_refuses_is_left_out_too(brief):
+    """Each lane is made by itself, and one starts in the ground."""
+    orbit = {"position": ["6600 km", 0, 0], "velocity": [0, "7.8 km/s", 0], "radius": "6378 km"}
+    over = {"orbit.position[1]": {"distribution": "uniform", "low": "6500 km", "high": "6700 km"}}
+    job, name, _ = job_of(short(orbit=orbit, environment={"gravity_gradient": True}), over)
+    columns = {"orbit.position[1]": np.array([6.6e6, 6.3e6, 6.65e6])}
+    refused = np.zeros(3, dtype=bool)
+    with Crew(1) as crew:
+        found = job.measure(name, columns, np.zeros(3, dtype=np.int64), crew, refused=refused)()
+    assert refused.tolist() == [False, True, False]
+    assert np.isnan(found["effort"]).tolist() == refused.tolist()
+
+
+def test_the_search_finds_worse_than_many_flights_at_random():
+    """The worst of it and of twenty thousand random flights of the same box."""
+    over = {"initial.attitude": {"distribution": "rotations"}, "initial.rate": {"distribution": "shell", "high": "4 deg/s"}}
+    job, name, asked = job_of(short(sensor={}, environment={}), over)
+    found = [worst.search(job, name, asked, 1, seed=seed) for seed in (0, 1)]
+    low, high = np.array(worst.box(job)).T
+    unit = np.random.default_rng(5).uniform(low, high, (20_000, len(low))).T
+    with Crew(1) as crew:
+        others = job.measure(name, job.plan.values(unit), np.zeros(20_000, dtype=np.int64), crew)()["effort"]
+    assert found[0].value == pytest.approx(found[1].value, rel=2e-3)
+    assert min(one.value for one in found) > others.max()
