@@ -1,5 +1,6 @@
 """The search for the worst, and brackets: flown <= searched <= proved of one and the same quantity."""
 
+import contextlib
 import math
 import tomllib
 from dataclasses import replace
@@ -11,10 +12,15 @@ import starhold as sh
 from starhold.campaign import worst
 from starhold.campaign.campaign import begin, with_campaign
 from starhold.cli.arguments import INTERNAL_ERROR
+from starhold.errors import InputError
 from starhold.parts.catalogue import parts
 from starhold.parts.part import Fitted
+from starhold.scenario.building import build
+from starhold.scenario.writing import part_table
 from starhold.simulation.lanes import Crew
+from starhold.studies.compare import record
 from tests.campaign.flown import SMALL, fly
+from tests.certification.hunt import random_inertia
 from tests.missions import BASE, DETUMBLE, POINT
 from tests.running import starhold
 
@@ -148,3 +154,108 @@ def test_the_search_finds_worse_than_many_flights_at_random():
         others = job.measure(name, job.plan.values(unit), np.zeros(20_000, dtype=np.int64), crew)()["effort"]
     assert found[0].value == pytest.approx(found[1].value, rel=2e-3)
     assert min(one.value for one in found) > others.max()
+
+
+def random_mission(random):
+    """The tables of a scenario with a campaign, all at random: any effector, modes, faults, limits below what disturbs."""
+
+    def some(*choices):
+        return choices[int(random.integers(len(choices)))]
+
+    inertia = random_inertia(random, 10.0 ** random.uniform(-2, 2))
+    scale = float(np.trace(inertia)) / 3.0
+    effectors = parts("effector")
+    name = some(*[None] * 8, "wheels", "both", *effectors)
+    magnetic = name in ("magnetorquers", "magnetic-unloading", "both")
+    craft = {"inertia": inertia.tolist(), "limit": some("axis", "norm", "axis", "axis", "none")}
+    craft |= {"torque_limit": scale * 10.0 ** random.uniform(-4, -1)} if random.uniform() < 0.9 else {}
+    lags = [{"actuator_lag": 0.3}, {"torque_rate_limit": 1e-2 * scale}, {"actuator_lag": 0.5, "torque_rate_limit": scale}]
+    craft |= some({}, *lags) if name != "thrusters" and not magnetic else {}
+    tables = {
+        "name": "hunted",
+        "spacecraft": craft,
+        "initial": {"attitude": random.normal(size=4), "rate": 0.05 * random.normal(size=3)},
+    }
+    tables["initial"]["attitude"] /= np.linalg.norm(tables["initial"]["attitude"])
+    tables["initial"]["relative_to"] = some("inertial", "target")
+    period = some(0.1, 0.5, 2.0)
+    tables["simulation"] = {
+        "duration": 60 * period,
+        "control_period": period,
+        "substeps": 20,
+        "seed": int(random.integers(99)),
+    }
+    if magnetic or random.uniform() < 0.3:
+        tables["orbit"] = {"position": [7e6, 0, 0], "velocity": [0, 4e3, 6.4e3]}
+        tables["target"] = {"mode": some("inertial", "orbital")}
+    fitted = [] if name in (None, "wheels") else [effectors["magnetorquers" if name == "both" else name]]
+    if name in ("wheels", "magnetic-unloading", "both"):
+        tables["wheels"] = {"layout": some("orthogonal", "pyramid"), "inertia": 1e-6 * scale, "torque_limit": 1e-2 * scale}
+        tables["wheels"] |= {"momentum_limit": scale, "viscous": some(0.0, 1e-4 * scale)}
+    tables["part"] = [part_table(part, some(*part.examples())) for part in fitted]
+    tables["part"] += [{"type": "magnetometer", "noise": 1e-9}] if magnetic else []
+    if random.uniform() < 0.3:
+        push = {
+            "type": "constant-torque",
+            "torque": (scale * 10.0 ** random.uniform(-5, -1) * random.normal(size=3)).tolist(),
+        }
+        tables["part"].append(push)
+    if random.uniform() < 0.4:
+        fault = {"time": 20 * period, "action": "none"}
+        struck = {"wheel": 1, "lost": True} if "wheels" in tables else {"inertia": (1.3 * inertia).tolist()}
+        tables["fault"] = [fault | struck]
+    gains = {
+        "k_rate": scale * random.uniform(0.05, 0.5) / period,
+        "k_attitude": scale * random.uniform(0.01, 0.1) / period**2,
+    }
+    law = {"type": some("pd", "lyapunov"), **gains, "quaternion_sign": "shortest"}
+    if name == "both" or random.uniform() < 0.3:
+        modes = [
+            law | {"name": "first", "until": {"after": 15 * period}},
+            law | {"name": "then", "type": "pd", "k_rate": gains["k_rate"] / 2},
+        ]
+        if name == "both":
+            modes[0]["effectors"], modes[1]["effectors"] = ["magnetorquers"], ["wheels"]
+        law = {"type": "modes", "mode": [{k: v for k, v in mode.items() if k != "quaternion_sign"} for mode in modes]}
+    tables["law"] = [law | {"name": "flown"}]
+    small = {"distribution": "uniform", "low": 0.97, "high": 1.03, "relative": True}
+    drawn = {
+        "initial.attitude": {"distribution": "rotations"},
+        "initial.rate": {"distribution": "shell", "high": 0.1},
+        "spacecraft.inertia": small | {"known_to_law": some(True, False), "together": True},
+        "spacecraft.torque_limit": small,
+        "spacecraft.limit": {"distribution": "choice", "values": ["axis", "norm", "none"]},
+        "fault[1].time": {"distribution": "uniform", "low": 5 * period, "high": 40 * period},
+        "law.flown.k_rate": small,
+        "wheels.viscous": {"distribution": "uniform", "low": 0.0, "high": 1e-4 * scale},
+    }
+    absent = {"fault[1].time": "fault" not in tables, "wheels.viscous": "wheels" not in tables}
+    absent |= {"law.flown.k_rate": "mode" in law, "spacecraft.torque_limit": "torque_limit" not in craft}
+    possible = [key for key in drawn if not absent.get(key)]
+    over = {key: drawn[key] for key in random.choice(possible, int(random.integers(1, 4)), replace=False)}
+    metrics = ["peak_torque", "peak_torque_norm", some("final_attitude_error", "final_rate_error", "effort", "peak_rate")]
+    asked = [{"metric": metric, some(*["at_most"] * 5, "at_least"): 1.0, "share": 0.5} for metric in metrics]
+    return tables | {"campaign": {"runs": 12, "over": over, "requirement": asked}}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(300))
+def test_no_flight_of_random_campaigns_is_beyond_its_bracket(seed, tmp_path, brief):
+    """Flown <= searched <= proved, and the file of the worst flies it, measured by a recording of every control step."""
+    random, found = np.random.default_rng(seed), None
+    while found is None:
+        # Drawn again where a scenario cannot be.
+        with contextlib.suppress(InputError):
+            found = sh.campaign(sh.scenario(random_mission(random)), tmp_path / "c", threads=1, force=True)
+    frame = found.frame()
+    for bracket in found.laws[0].brackets:
+        values, side = frame[bracket.metric].to_numpy(), 1.0 if bracket.at_most else -1.0
+        assert math.isnan(bracket.flown) or not np.isnan(values).any()
+        assert math.isnan(bracket.flown) or side * bracket.flown >= (side * values).max()
+        assert not bracket.contradicted
+        own = sh.load(found.folder / bracket.file).with_({"simulation.record_every": 1})
+        recording = record(own, build(own, own.laws[0]))
+        if "torque" in bracket.metric and not math.isnan(bracket.flown):
+            torque = np.linalg.norm(recording["torque"], axis=1, ord=2 if "norm" in bracket.metric else np.inf).max()
+            assert torque == pytest.approx(bracket.flown, rel=1e-12)
+            assert bracket.proved is None or torque <= bracket.proved * (1.0 + 1e-12)
