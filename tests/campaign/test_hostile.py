@@ -55,7 +55,7 @@ def test_columns_of_metrics_and_of_requirements_stay_apart(tmp_path):
     assert frame["run"].tolist() == list(range(12))
 
 
-def test_each_worst_run_has_a_file_of_its_own(tmp_path):
+def test_each_worst_run_has_a_file_of_its_own(tmp_path, brief):
     long = "ü" * 100
     asked = [{"name": name, "metric": "effort", "at_most": bound} for name, bound in (("a b", 3), ("a-b", 2), (long, 1))]
     found = campaign(tmp_path / "c", short(law=laws(long, "pd")), requirement=asked, search=True, runs=2)
@@ -65,7 +65,7 @@ def test_each_worst_run_has_a_file_of_its_own(tmp_path):
     assert sorted(path.name for path in found.folder.glob("worst-*")) == sorted(files)
 
 
-def test_a_metric_that_no_run_has_is_searched_without_a_warning(tmp_path):
+def test_a_metric_that_no_run_has_is_searched_without_a_warning(tmp_path, brief):
     asked = [{"metric": "settling_time", "at_most": 1}]
     found = campaign(tmp_path / "c", requirement=asked, search=True, over={"initial.rate": uniform(1.0, 2.0)})
     assert math.isnan(found.laws[0].brackets[0].flown)

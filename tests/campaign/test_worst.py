@@ -29,13 +29,6 @@ LIMITED = {"distribution": "uniform", "low": 0.1, "high": 0.2}
 PEAK = {"metric": "peak_torque", "at_most": 1, "share": 0.5}
 
 
-@pytest.fixture
-def brief(monkeypatch):
-    """A search that flies little."""
-    monkeypatch.setattr(worst, "MANY", worst.Effort(32, 4, 16, 3))
-    monkeypatch.setattr(worst, "FEW", worst.Effort(4, 2, 4, 3))
-
-
 def short(**changes):
     """Four seconds of one law."""
     simulation = SMALL["simulation"] | {"duration": 4.0}
