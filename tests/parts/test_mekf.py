@@ -8,9 +8,9 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from starhold.algebra.quaternion import relative, vector_part
+from starhold.algebra.quaternion import multiply, relative, vector_part
 from starhold.algebra.scalar import side
-from starhold.algebra.structure import places
+from starhold.algebra.structure import flatten, places
 from starhold.algebra.vector import scale, subtract
 from starhold.conformance.bench import CRAFT
 from starhold.loop.kernels import Observer, numbers_of
@@ -54,42 +54,55 @@ def flight(steps, seed):
 
 
 def most_likely(attitudes, rates, new):
-    """The attitudes and biases of greatest likelihood given all readings, by nonlinear least squares over all of them, and
-    the covariance of the last six numbers: attitude (rad, body axes) and bias."""
+    """The attitude, bias and noise of the gyro's reading at the last step, of greatest likelihood given all readings, by
+    nonlinear least squares over all of them, and the covariance of these nine numbers."""
     steps = len(rates)
     measured = Rotation.from_quat(attitudes, scalar_first=True)
     axis = np.array(PARAMS.boresight)
-    walk = PARAMS.bias_walk**2 / 3600.0
-    turned, mixed = PARAMS.noise**2 * PERIOD + walk * PERIOD**3 / 3.0, -0.5 * walk * PERIOD**2
-    noise = np.kron([[turned, mixed], [mixed, walk * PERIOD]], np.eye(3))
-    process = np.linalg.inv(np.linalg.cholesky(noise))
     tracker = np.linalg.inv(PARAMS.cross * np.eye(3) + (PARAMS.roll - PARAMS.cross) * np.outer(axis, axis))
+    deviation, walk = PARAMS.noise / math.sqrt(PERIOD), PARAMS.bias_walk * math.sqrt(PERIOD / 3600.0)
     # From a guess that the gyro carries on.
-    means = 0.5 * (rates[1:] + rates[:-1])
     guess = [measured[0]]
-    for mean in means:
+    for mean in 0.5 * (rates[1:] + rates[:-1]):
         guess.append(guess[-1] * Rotation.from_rotvec(PERIOD * mean))
     guess = Rotation.concatenate(guess)
 
+    def noises(turns, biases, first):
+        """The noise of each reading: between two the body turns by the mean of both, less bias and noise."""
+        turned = (turns[:-1].inv() * turns[1:]).as_rotvec() / PERIOD
+        clean = rates - biases
+        found = [first]
+        for means, turn in zip(clean[1:] + clean[:-1], turned, strict=True):
+            found.append(means - 2.0 * turn - found[-1])
+        return np.array(found)
+
     def residuals(x):
-        errors, biases = x.reshape(2, steps, 3)
+        errors, biases = x[3:].reshape(2, steps, 3)
         turns = guess * Rotation.from_rotvec(errors)
         seen = (turns.inv() * measured).as_rotvec()[new] @ tracker.T
-        ahead = turns[:-1] * Rotation.from_rotvec(PERIOD * (means - biases[:-1]))
-        steps_off = np.hstack([(ahead.inv() * turns[1:]).as_rotvec(), np.diff(biases, axis=0)]) @ process.T
-        return np.concatenate([seen.ravel(), steps_off.ravel(), biases[0] / PARAMS.bias])
+        noise = noises(turns, biases, x[:3]) / deviation
+        parts = [seen, noise, np.diff(biases, axis=0) / walk, biases[:1] / PARAMS.bias]
+        return np.concatenate([part.ravel() for part in parts])
 
     # The covariance is that in the axes of the attitudes found, so these are the guess in the end.
-    scales = np.repeat([1e-4, 1e-3], 3 * steps)
-    biases = np.zeros((steps, 3))
+    scales = np.repeat([1e-4, 1e-4, 1e-3], [3, 3 * steps, 3 * steps])
+    x = np.zeros(len(scales))
+    jacobian = np.zeros((0, len(x)))
     for _ in range(2):
-        begin = np.concatenate([np.zeros(3 * steps), biases.ravel()])
-        found = least_squares(residuals, begin, x_scale=scales, xtol=1e-13, ftol=1e-13)
-        errors, biases = found.x.reshape(2, steps, 3)
-        guess = guess * Rotation.from_rotvec(errors)
-    covariance = np.linalg.inv(found.jac.T @ found.jac)
-    last = [*range(3 * steps - 3, 3 * steps), *range(6 * steps - 3, 6 * steps)]
-    return guess[-1], biases[-1], covariance[np.ix_(last, last)]
+        x[3 : 3 * steps + 3] = 0.0
+        found = least_squares(residuals, x, x_scale=scales, xtol=1e-13, ftol=1e-13)
+        x, jacobian = found.x, found.jac
+        guess = guess * Rotation.from_rotvec(x[3 : 3 * steps + 3].reshape(steps, 3))
+    first, biases = x[:3], x[3 * steps + 3 :].reshape(steps, 3)
+    # The last noise as a sum of the others', small changes of attitude taken for vectors.
+    last = np.zeros((9, len(x)))
+    last[:3, 3 * steps : 3 * steps + 3] = last[3:6, -3:] = np.eye(3)
+    noise = noises(guess, biases, first)[-1]
+    for k, own in enumerate(1e-6 * np.eye(len(x))):
+        errors, others = own[3:].reshape(2, steps, 3)
+        moved = noises(guess * Rotation.from_rotvec(errors), biases + others, first + own[:3])[-1]
+        last[6:, k] = (moved - noise) / 1e-6
+    return guess[-1], biases[-1], noise, last @ np.linalg.inv(jacobian.T @ jacobian) @ last.T
 
 
 @pytest.mark.parametrize("steps", [1, 19, pytest.param(26, marks=pytest.mark.slow)])
@@ -97,17 +110,26 @@ def test_estimate_is_the_most_likely_one(steps):
     # The last one filters what all readings up to now say: a smoother's last state. Among the ends some have a new attitude.
     attitudes, rates, new = flight(steps, seed=steps)
     estimate, memory = filtered(attitudes, rates, new)[-1]
-    turn, bias, covariance = most_likely(attitudes, rates, new)
+    turn, bias, noise, covariance = most_likely(attitudes, rates, new)
     apart = (turn.inv() * Rotation.from_quat(estimate.attitude, scalar_first=True)).as_rotvec()
     deviations = np.sqrt(np.diag(covariance))
     assert np.abs(apart / deviations[:3]).max() < 4e-3
-    assert np.abs((np.array(estimate.gyro_bias) - bias) / deviations[3:]).max() < 4e-3
+    assert np.abs((np.array(estimate.gyro_bias) - bias) / deviations[3:6]).max() < 4e-3
+    of_rate = np.hstack([np.zeros((3, 3)), np.eye(3), np.eye(3)])
+    slack = np.sqrt(np.diag(of_rate @ covariance @ of_rate.T))
+    assert np.abs((np.array(estimate.rate) - (rates[-1] - bias - noise)) / slack).max() < 4e-3
     assert np.array((estimate.attitude_deviation, estimate.gyro_bias_deviation)).ravel() == pytest.approx(
-        deviations, rel=4e-3
+        deviations[:6], rel=4e-3
     )
+    # What is remembered is the attitude less half a period of that noise.
+    ahead = np.eye(6, 9)
+    ahead[:3, 6:] = -0.5 * PERIOD * np.eye(3)
+    kept = Rotation.from_quat(memory.attitude, scalar_first=True)
+    wanted = turn * Rotation.from_rotvec(-0.5 * PERIOD * noise)
+    scaled = np.sqrt(np.diag(ahead @ covariance @ ahead.T))
+    assert np.abs((wanted.inv() * kept).as_rotvec() / scaled[:3]).max() < 4e-3
     blocks = np.block([[np.array(memory.turn), np.array(memory.mixed)], [np.array(memory.mixed).T, np.array(memory.walk)]])
-    scaled = np.outer(deviations, deviations)
-    assert np.abs((blocks - covariance) / scaled).max() < 4e-3
+    assert np.abs((blocks - ahead @ covariance @ ahead.T) / np.outer(scaled, scaled)).max() < 4e-3
 
 
 SCENARIO = f"""
@@ -119,7 +141,7 @@ torque_limit = "1 mN m"
 angles = ["50 deg", "-20 deg", "10 deg"]
 rate = ["2 deg/s", "-3 deg/s", "1 deg/s"]
 [simulation]
-duration = 120.0
+duration = 80.0
 control_period = {PERIOD}
 [[part]]
 type = "gyro"
@@ -130,8 +152,7 @@ type = "star-tracker"
 cross = {PARAMS.cross}
 roll = {PARAMS.roll}
 boresight = [0, 0.6, 0.8]
-interval = 1.0
-outage = [60, 90]
+interval = 2.0
 [[part]]
 type = "mekf"
 noise = {PARAMS.noise}
@@ -140,75 +161,127 @@ bias = {PARAMS.bias}
 cross = {PARAMS.cross}
 roll = {PARAMS.roll}
 boresight = [0, 0.6, 0.8]
+start_deviation = "1 deg"
 [[law]]
 type = "pd"
 k_rate = 0.004
 k_attitude = 0.0008
 """
+ERRORS = ((0.0,) * 3,) * 3
+SQUARE = ((0.0,) * 3,) * 3
 
 
 def noted(notes, decided, carry, step, setup, numbers):
-    """The errors of the estimate at a control instant (attitude in rad, body axes, and bias), and the covariance."""
-    estimate, gyro = decided.memories.estimate, decided.memories.sensors[0]
-    error = relative(estimate.attitude, decided.state.attitude)
-    angles = scale(2.0 * side(error[0]), vector_part(error))
-    memory = decided.memories.estimator
-    return (angles, subtract(gyro, estimate.gyro_bias), memory.turn, memory.mixed, memory.walk)
+    """At a control instant: errors of the estimate (attitude in rad, body axes, and bias) and their deviations; the error
+    of the attitude that is remembered, and its covariance with the bias."""
+    memories = decided.memories
+    estimate, memory, reading = memories.estimate, memories.estimator, memories.readings[0]
+    # The bias of this instant, for what the gyro keeps is that of the next.
+    bias, true = notes[-1], decided.state.attitude
+    noise = subtract(subtract(reading.rate, decided.state.rate), bias)
+    kept = multiply(true, (1.0, *scale(-0.25 * PERIOD, noise)))
+    found = (between(estimate.attitude, true), subtract(bias, estimate.gyro_bias), between(memory.attitude, kept))
+    deviations = (estimate.attitude_deviation, estimate.gyro_bias_deviation)
+    return (found, deviations, memory.turn, memory.mixed, memory.walk, memories.sensors[0])
 
 
-def fly_all(lanes):
-    """Errors (lanes, 6) and the filter's covariances (lanes, 6, 6) in many flights before, at the end of, and after an
-    outage."""
-    scenario = parse(SCENARIO, "kalman")
+def between(one, other):
+    """The rotation vector from an attitude to one near to it."""
+    error = relative(one, other)
+    return scale(2.0 * side(error[0]), vector_part(error))
+
+
+def flown_by_many(outage, lanes, steps):
+    """At each of these control steps: errors (lanes, 6) in many flights and the filter's deviations of them, and the errors
+    of what is remembered with their covariances (lanes, 6, 6)."""
+    scenario = parse(SCENARIO, "kalman").with_({"part.star-tracker.outage": outage})
     loop = build(scenario, scenario.laws[0])
     like = loop.carry()
     rows = places(like)
     columns = np.repeat(np.array(numbers_of(like))[:, None], lanes, axis=1)
     assert [fitted.called for fitted in loop.used("sensor")] == ["gyro", "star-tracker"]
-    # Each gyro has a bias of its own, as the filter expects.
-    columns[list(rows.memories.sensors[0])] = np.random.default_rng(2).normal(scale=PARAMS.bias, size=(3, lanes))
-    square = ((0.0,) * 3,) * 3
-    observer = Observer(noted, ((0.0,) * 3, (0.0,) * 3, square, square, square), ())
-    fleet = Fleet(loop, columns, 0, 8, observer, np.zeros((33, lanes)))
-    (phase,) = loop.phases(240)
-    begun = 0
-    for stop in (119, 180, 239):
+    # Each has a bias of its own, and an attitude near the stated one, as the filter expects.
+    random = np.random.default_rng(2)
+    biases = random.normal(scale=PARAMS.bias, size=(3, lanes))
+    columns[list(rows.memories.sensors[0])] = biases
+    turns = Rotation.from_rotvec(random.normal(scale=math.radians(1.0), size=(lanes, 3)))
+    columns[list(rows.state.attitude)] = turns.as_quat(scalar_first=True).T
+    first = (ERRORS, ERRORS[:2], SQUARE, SQUARE, SQUARE, (0.0,) * 3)
+    begin = np.zeros((len(flatten(first)), lanes))
+    begin[-3:] = biases
+    fleet = Fleet(loop, columns, 0, 8, Observer(noted, first, ()), begin)
+    (phase,) = loop.phases(160)
+    flown = 0
+    for step in steps:
         with Crew(2) as crew:
-            crew.share(lambda piece, begun=begun, stop=stop: fleet.fly(phase, piece, begun, stop - begun), fleet.count)()
-        begun = stop
+            crew.share(lambda piece, flown=flown, step=step: fleet.fly(phase, piece, flown, step + 1 - flown), fleet.count)()
+        flown = step + 1
         notes = fleet.notes().T
-        turn, mixed, walk = notes[:, 6:].reshape(lanes, 3, 3, 3).swapaxes(0, 1)
-        # The bias that a gyro keeps is that of the next control step.
-        walk = walk + PARAMS.bias_walk**2 / 3600.0 * PERIOD * np.eye(3)
-        yield notes[:, :6], np.block([[turn, mixed], [mixed.swapaxes(1, 2), walk]])
+        turn, mixed, walk = notes[:, 15:42].reshape(lanes, 3, 3, 3).swapaxes(0, 1)
+        covariance = np.block([[turn, mixed], [mixed.swapaxes(1, 2), walk]])
+        yield notes[:, :6], notes[:, 9:15], notes[:, [6, 7, 8, 3, 4, 5]], covariance
 
 
-def test_errors_are_within_three_deviations_in_997_of_1000_flights():
-    lanes = 10_000
+LANES = 10_000
+
+
+@pytest.mark.parametrize(
+    ("outage", "steps"),
+    [
+        # A second and a half after an update, at it, and in between; at the end of thirty seconds on the gyro, and after.
+        ((30.0, 60.0), (55, 56, 57, 58, 119, 144)),
+        # Before the first attitude, at it, and after it.
+        ((0.0, 10.0), (0, 1, 19, 20, 21, 22)),
+    ],
+)
+def test_errors_are_as_large_as_the_filter_says(outage, steps):
     sizes = []
-    for errors, covariances in fly_all(lanes):
-        deviations = np.sqrt(np.einsum("lii->li", covariances))
-        inside = (np.abs(errors) < 3.0 * deviations).mean(axis=0)
-        # Of 10 000 flights the share scatters by 0.0005.
-        assert (np.abs(inside - 0.9973) < 0.002).all(), inside
-        # All six together: chi-square of six degrees of freedom, whose mean over the flights scatters by 0.035.
-        squares = np.einsum("li,lij,lj->l", errors, np.linalg.inv(covariances), errors)
-        assert abs(squares.mean() - 6.0) < 0.15
+    for errors, deviations, kept, covariances in flown_by_many(outage, LANES, steps):
         sizes.append(deviations[:, :3].mean())
-    # Thirty seconds on the gyro alone.
-    assert sizes[1] > 2.0 * sizes[0] > 1.5 * sizes[2]
+        inside = (np.abs(errors) < 3.0 * deviations).mean(axis=0)
+        # Of 10 000 flights the share scatters by 0.0005, the mean square by 0.014.
+        assert (np.abs(inside - 0.9973) < 0.002).all(), inside
+        squares = ((errors / deviations) ** 2).mean(axis=0)
+        assert (np.abs(squares - 1.0) < 0.05).all(), squares
+        # All six together: chi-square of six degrees of freedom, whose mean over the flights scatters by 0.035.
+        together = np.einsum("li,lij,lj->l", kept, np.linalg.inv(covariances), kept).mean()
+        assert abs(together - 6.0) < 0.12
+    if outage[0] > 0.0:
+        assert sizes[4] > 2.0 * sizes[3] > 1.5 * sizes[5]
 
 
 def test_first_attitude_is_taken_and_counted_once():
     attitudes, rates, _ = flight(3, seed=8)
-    (first, _), (second, memory), _ = filtered(attitudes, rates, [False, True, False])
-    assert Rotation.from_quat(first.attitude, scalar_first=True).approx_equal(
-        Rotation.from_quat(attitudes[0], scalar_first=True), 1e-12
-    )
+    _, (second, memory), _ = filtered(attitudes, rates, [False, True, False])
     assert np.abs(np.array(second.attitude) - attitudes[1]).max() < 1e-15
-    assert np.abs(np.subtract(memory.turn, mekf.prepare(PARAMS, PERIOD).tracker)).max() < 1e-20
+    tracker = np.array(mekf.prepare(PARAMS, PERIOD).tracker)
+    assert np.array(second.attitude_deviation) ** 2 == pytest.approx(np.diag(tracker), rel=1e-12)
+    # With half a period of the gyro's noise, whose variance over a period is that of a second times it.
+    assert np.abs(memory.turn - tracker - 0.25 * PARAMS.noise**2 * PERIOD * np.eye(3)).max() < 1e-20
+
+
+def test_before_the_first_attitude_the_gyro_carries_the_stated_start_on():
+    """What a sensor shows meanwhile counts for nothing."""
+    attitudes, rates, _ = flight(9, seed=8)
+    params = PARAMS._replace(start=(0.9, 0.0, 1.2, 0.0), start_deviation=0.02)
+    one, other = (filtered(shown, rates, [False] * 9, params) for shown in (attitudes, attitudes[::-1]))
+    assert [estimate for estimate, _ in one] == [estimate for estimate, _ in other]
+    turn = Rotation.from_quat([0.6, 0.0, 0.8, 0.0], scalar_first=True)
+    for k, (estimate, _) in enumerate(one):
+        turn = turn * Rotation.from_rotvec(0.5 * PERIOD * (rates[k - 1] + rates[k])) if k else turn
+        assert (turn.inv() * Rotation.from_quat(estimate.attitude, scalar_first=True)).magnitude() < 1e-9
+        # Nearly all that grows is the bias's: error times time.
+        wanted = math.hypot(0.02, PARAMS.bias * PERIOD * k)
+        assert estimate.attitude_deviation == pytest.approx((wanted,) * 3, rel=2e-3)
+
+
+def test_deviation_of_an_unknown_attitude():
+    turns = Rotation.random(20_000, rng=np.random.default_rng(4)).as_rotvec()
+    assert mekf.Params._field_defaults["start_deviation"] == pytest.approx(np.sqrt((turns**2).mean()), rel=0.01)
 
 
 def test_bad_numbers():
     with pytest.raises(ValueError, match="boresight"):
         mekf.prepare(PARAMS._replace(boresight=(0.0, 0.0, 0.0)), PERIOD)
+    with pytest.raises(ValueError, match="quaternion of length 1"):
+        mekf.prepare(PARAMS._replace(start=(0.0, 0.0, 0.0, 0.0)), PERIOD)

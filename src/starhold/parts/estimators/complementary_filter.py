@@ -6,17 +6,22 @@ from __future__ import annotations
 from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quantity import Quantity
-from starhold.algebra.quaternion import Quaternion, multiply, normalise, relative, vector_part
-from starhold.algebra.scalar import Scalar, less, side, where
+from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise, relative, vector_part
+from starhold.algebra.scalar import Scalar, both, less, opposite, side, where
 from starhold.algebra.vector import ZERO, Vector, scale, subtract
 from starhold.parts.contract import Card, Parameter
 from starhold.parts.craft import Craft
+from starhold.parts.stated_attitude import START, unit_quaternion
 
 CARD = Card(
     title="Complementary filter",
     summary="q' = q (w_m - b)/2 + attitude_gain e, b' = -bias_gain e, e from each new attitude",
     sources=("Nonlinear Complementary Filters on the Special Orthogonal Group (2008)",),
-    assumptions=("attitudes come without delay", "the bias changes slowly"),
+    assumptions=(
+        "attitudes come without delay",
+        "the bias changes slowly",
+        "the first attitude measured takes the place of the one stated for the start",
+    ),
 )
 ROLE = "estimator"
 NEEDS = ("attitude", "rate")
@@ -30,6 +35,7 @@ class Params(NamedTuple):
         float, Parameter("1", above=0.0, at_most=1.0, text="share of an attitude's error put right at once")
     ]
     bias_gain: Annotated[float, Parameter("1/s", at_least=0.0, text="rate of the bias for a radian of error")]
+    start: Annotated[Quaternion, START] = NO_TURN
 
 
 class Estimate(NamedTuple):
@@ -48,9 +54,14 @@ class Memory(NamedTuple):
     begun: Scalar
 
 
+def prepare(params: Params, period: float) -> Params:
+    """The parameters with the start as a unit quaternion. ValueError for one that is none."""
+    return params._replace(start=unit_quaternion(params.start))
+
+
 def remember(params: Params, state: Any) -> Memory:
-    """Nothing is known before the first attitude."""
-    return Memory((1.0, 0.0, 0.0, 0.0), ZERO, 0.0)
+    """What is stated for the start."""
+    return Memory(params.start, ZERO, 0.0)
 
 
 def estimate(readings: Any, memory: Memory, params: Params, craft: Craft, period: Scalar) -> tuple[Estimate, Memory]:
@@ -58,8 +69,8 @@ def estimate(readings: Any, memory: Memory, params: Params, craft: Craft, period
     measured = readings.attitude
     # A sensor that does not tell whether its attitude is new gives a new one at each control step.
     new = less(0.5, getattr(readings, "attitude_is_new", 1.0))
-    begun = less(0.5, memory.begun)
-    foretold: Any = tuple(where(begun, old, x) for old, x in zip(memory.attitude, measured, strict=True))
+    first = both(new, opposite(less(0.5, memory.begun)))
+    foretold: Any = tuple(where(first, x, old) for x, old in zip(measured, memory.attitude, strict=True))
     error = relative(foretold, measured)
     turn = scale(2.0 * side(error[0]), vector_part(error))
     half = scale(where(new, 0.5 * params.attitude_gain, 0.0), turn)
@@ -73,4 +84,4 @@ def estimate(readings: Any, memory: Memory, params: Params, craft: Craft, period
 
 def examples() -> list[Params]:
     """A slow filter, and one that trusts its attitudes."""
-    return [Params(0.05, 0.002), Params(1.0, 0.0)]
+    return [Params(0.05, 0.002), Params(1.0, 0.0, (0.6, 0.0, 0.8, 0.0))]

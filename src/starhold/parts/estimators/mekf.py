@@ -4,14 +4,14 @@ of the star tracker corrects both, by gains that follow from how sure either is.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, NamedTuple, cast
+from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.cosines import from_quaternion
 from starhold.algebra.quantity import Quantity
-from starhold.algebra.quaternion import Quaternion, multiply, normalise, relative, renormalise, vector_part
+from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise, relative, renormalise, vector_part
 from starhold.algebra.rotation import short_turn
-from starhold.algebra.scalar import Scalar, Truth, both, less, side, sqrt, where
-from starhold.algebra.structure import rebuild
+from starhold.algebra.scalar import Scalar, less, maximum, side, sqrt
+from starhold.algebra.structure import chosen
 from starhold.algebra.structured import when
 from starhold.algebra.vector import (
     IDENTITY,
@@ -30,6 +30,7 @@ from starhold.algebra.vector import (
 from starhold.algebra.vector import multiply as product
 from starhold.parts.contract import Card, Parameter
 from starhold.parts.craft import Craft
+from starhold.parts.stated_attitude import START, unit_quaternion
 
 CARD = Card(
     title="Multiplicative extended Kalman filter",
@@ -43,12 +44,15 @@ CARD = Card(
         "attitudes come without delay",
         "the rate changes in proportion to time between control steps",
         "the error of the attitude is small",
+        "the first attitude of the star tracker takes the place of the one stated for the start",
     ),
 )
 ROLE = "estimator"
 NEEDS = ("attitude", "rate")
 FIRST = {"gyro_bias": ZERO, "attitude_deviation": ZERO, "gyro_bias_deviation": ZERO}
 HOUR = 3600.0
+UNKNOWN = math.sqrt(math.pi**2 / 9.0 + 2.0 / 3.0)
+"""Standard deviation about each axis (rad) of an attitude that may be any: of its rotation vector."""
 
 
 class Params(NamedTuple):
@@ -64,14 +68,22 @@ class Params(NamedTuple):
         0.0,
         1.0,
     )
+    start: Annotated[Quaternion, START] = NO_TURN
+    start_deviation: Annotated[
+        float, Parameter("rad", above=0.0, text="of that attitude: deviation about each axis; 76 deg if nothing is known")
+    ] = UNKNOWN
 
 
 class Numbers(NamedTuple):
-    """Variances: of the tracker's attitude (rad2, body axes), of the bias at the start (rad2/s2), and what a control period
-    adds to those of attitude, attitude with bias, and bias."""
+    """The attitude stated for the start. Variances: of it (rad2), of the bias then (rad2/s2), of the tracker's attitude
+    (rad2, body axes), and what the noise of one reading of the gyro adds to that of the attitude; what the walk of the bias
+    adds in a control period to those of attitude, attitude with bias, and bias."""
 
-    tracker: Matrix
+    start: Quaternion
+    start_turn: Scalar
     bias: Scalar
+    tracker: Matrix
+    reading: Scalar
     turned: Scalar
     mixed: Scalar
     walked: Scalar
@@ -88,8 +100,12 @@ class Estimate(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """The estimate at the last control step, the gyro's reading then (rad/s), the covariance of the errors of attitude
-    (rad, body axes) and bias in blocks, and whether an attitude has come yet (1)."""
+    """The attitude at the last control step, the bias and the gyro's reading then (rad/s), the covariance of the errors of
+    attitude (rad, body axes) and bias in blocks, and 0 before the first reading, 1 before the first attitude, 2 after it.
+
+    Half the noise of that reading will turn the attitude in the period that begins, half did so in the one before. What a
+    new attitude says of it is kept by counting it into the attitude and its error: attitude less half a period of noise.
+    """
 
     attitude: Quaternion
     bias: Vector
@@ -97,11 +113,21 @@ class Memory(NamedTuple):
     turn: Matrix
     mixed: Matrix
     walk: Matrix
-    begun: Scalar
+    stage: Scalar
+
+
+class Instant(NamedTuple):
+    """The attitude at a control step, the covariance of its error, the noise of the gyro's reading as far as it is known
+    (rad/s), and what is remembered."""
+
+    attitude: Quaternion
+    turn: Matrix
+    noise: Vector
+    memory: Memory
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a control step. ValueError for a boresight without direction."""
+    """The numbers of a control step. ValueError for a boresight without direction, or a start that is no quaternion."""
     size = math.hypot(*params.boresight)
     if not size > 0.0:
         raise ValueError("the boresight needs a direction")
@@ -112,17 +138,21 @@ def prepare(params: Params, period: float) -> Numbers:
         add((0.0, cross, 0.0), scale((roll - cross) * axis[1], axis)),
         add((0.0, 0.0, cross), scale((roll - cross) * axis[2], axis)),
     )
-    # Of a rate with white noise whose bias is a random walk (Farrenkopf).
-    walk = params.bias_walk**2 / HOUR
-    turned = params.noise**2 * period + walk * period**3 / 3.0
-    return Numbers(tracker, params.bias**2, turned, -0.5 * walk * period**2, walk * period)
+    # The rate between two readings is their mean: each turns the attitude by its noise for half a period, and so does the
+    # step of the bias between them.
+    walk = params.bias_walk**2 / HOUR * period
+    reading = 0.25 * params.noise**2 * period
+    turned, mixed = 0.25 * walk * period**2, -0.5 * walk * period
+    start = unit_quaternion(params.start)
+    return Numbers(start, params.start_deviation**2, params.bias**2, tracker, reading, turned, mixed, walk)
 
 
 def remember(params: Numbers, state: Any) -> Memory:
-    """Nothing is known before the first attitude."""
-    begin = diagonal((params.bias, params.bias, params.bias))
+    """What is stated for the start."""
+    square, begin = params.start_turn, params.bias
     nothing: Matrix = (ZERO, ZERO, ZERO)
-    return Memory((1.0, 0.0, 0.0, 0.0), ZERO, ZERO, params.tracker, nothing, begin, 0.0)
+    turn, walk = diagonal((square, square, square)), diagonal((begin, begin, begin))
+    return Memory(params.start, ZERO, ZERO, turn, nothing, walk, 0.0)
 
 
 def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, period: Scalar) -> tuple[Estimate, Memory]:
@@ -130,33 +160,50 @@ def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, perio
     measured = readings.attitude
     # A sensor that does not tell whether its attitude is new gives a new one at each control step.
     new = less(0.5, getattr(readings, "attitude_is_new", 1.0))
-    begun = less(0.5, memory.begun)
     foretold = propagated(memory, readings.rate, params, period)
-    start: Any = remember(params, None)._replace(attitude=measured)
-    before: Memory = chosen(begun, foretold, start)
+    before = chosen(less(0.5, memory.stage), foretold, memory)._replace(rate=readings.rate, stage=maximum(memory.stage, 1.0))
 
-    def correct(before: Memory) -> tuple[Memory]:
-        return (corrected(before, measured, params),)
+    def correct(now: Instant) -> tuple[Instant]:
+        known = less(1.5, now.memory.stage)
+        after = chosen(known, corrected(now, measured, params, period), taken(now, measured, params))
+        return (after._replace(memory=after.memory._replace(stage=2.0)),)
 
-    # The first attitude has been taken as it is.
-    (after,) = when(both(new, begun), correct, before)
-    after = after._replace(rate=readings.rate, begun=where(new, 1.0, memory.begun))
-    rate = subtract(readings.rate, after.bias)
-    return Estimate(after.attitude, rate, after.bias, deviations(after.turn), deviations(after.walk)), after
+    ahead = combine(1.0, before.turn, 3.0 * params.reading, IDENTITY)
+    (now,) = when(new, correct, Instant(before.attitude, before.turn, ZERO, before._replace(turn=ahead)))
+    after = now.memory
+    rate = subtract(subtract(readings.rate, after.bias), now.noise)
+    return Estimate(now.attitude, rate, after.bias, deviations(now.turn), deviations(after.walk)), after
 
 
-def corrected(before: Memory, measured: Quaternion, params: Numbers) -> Memory:
-    """The estimate with what a new attitude tells."""
-    error = relative(before.attitude, measured)
+def taken(now: Instant, measured: Quaternion, params: Numbers) -> Instant:
+    """The first attitude as it is: its error has nothing to do with the bias, nor with the noise of the gyro."""
+    ahead = combine(1.0, params.tracker, params.reading, IDENTITY)
+    memory = now.memory._replace(attitude=measured, turn=ahead, mixed=(ZERO, ZERO, ZERO))
+    return Instant(measured, params.tracker, ZERO, memory)
+
+
+def corrected(now: Instant, measured: Quaternion, params: Numbers, period: Scalar) -> Instant:
+    """The estimate with what a new attitude says of attitude, bias and noise."""
+    before = now.memory
+    error = relative(now.attitude, measured)
     turn = scale(2.0 * side(error[0]), vector_part(error))
-    sure = inverse(summed(before.turn, params.tracker))
-    gain, mixed_gain = product(before.turn, sure), product(transpose(before.mixed), sure)
-    return before._replace(
-        attitude=normalise(multiply(before.attitude, (1.0, *scale(0.5, apply(gain, turn))))),
-        bias=add(before.bias, apply(mixed_gain, turn)),
-        turn=symmetric(combine(1.0, before.turn, -1.0, product(gain, before.turn))),
-        mixed=combine(1.0, before.mixed, -1.0, product(gain, before.mixed)),
-        walk=symmetric(combine(1.0, before.walk, -1.0, product(mixed_gain, before.mixed))),
+    sure = inverse(summed(now.turn, params.tracker))
+    # Of the attitude that is remembered, whose error has the noise of the reading twice that of the present one.
+    both_turns = combine(1.0, now.turn, params.reading, IDENTITY)
+    gain, ahead_gain = product(now.turn, sure), product(both_turns, sure)
+    bias_gain = product(transpose(before.mixed), sure)
+    memory = before._replace(
+        attitude=turned_by(now.attitude, apply(ahead_gain, turn)),
+        bias=add(before.bias, apply(bias_gain, turn)),
+        turn=symmetric(combine(1.0, before.turn, -1.0, product(ahead_gain, both_turns))),
+        mixed=combine(1.0, before.mixed, -1.0, product(ahead_gain, before.mixed)),
+        walk=symmetric(combine(1.0, before.walk, -1.0, product(bias_gain, before.mixed))),
+    )
+    return Instant(
+        turned_by(now.attitude, apply(gain, turn)),
+        symmetric(combine(1.0, now.turn, -1.0, product(gain, now.turn))),
+        scale(-2.0 * params.reading / period, apply(sure, turn)),
+        memory,
     )
 
 
@@ -174,18 +221,15 @@ def propagated(memory: Memory, rate: Vector, params: Numbers, period: Scalar) ->
     )
     return memory._replace(
         attitude=renormalise(multiply(memory.attitude, turn)),
-        turn=symmetric(combine(1.0, spread, params.turned, IDENTITY)),
+        turn=symmetric(combine(1.0, spread, params.reading + params.turned, IDENTITY)),
         mixed=combine(1.0, mixed, params.mixed, IDENTITY),
         walk=combine(1.0, memory.walk, params.walked, IDENTITY),
     )
 
 
-def chosen(condition: Truth, one: Any, other: Any) -> Any:
-    """Choose one nested tuple or another of the same form."""
-    if not isinstance(one, tuple):
-        return where(condition, one, other)
-    pairs: Any = zip(cast(Any, one), other, strict=True)
-    return rebuild(cast(Any, one), [chosen(condition, *pair) for pair in pairs])
+def turned_by(attitude: Quaternion, turn: Vector) -> Quaternion:
+    """Return an attitude turned on by a small rotation vector (rad, body axes)."""
+    return normalise(multiply(attitude, (1.0, *scale(0.5, turn))))
 
 
 def summed(a: Matrix, b: Matrix) -> Matrix:
@@ -208,4 +252,5 @@ def examples() -> list[Params]:
     """A small tracker with a MEMS gyro, and a good gyro with a tracker that is as sure about every axis."""
     arcsec = math.radians(1.0 / 3600.0)
     small = Params(math.radians(0.15) / 60.0, math.radians(3.0) / HOUR, 1e-3, 6.0 * arcsec, 40.0 * arcsec, (0.0, 0.6, 0.8))
-    return [small, Params(1e-6, 1e-7, 1e-5, 3.0 * arcsec, 3.0 * arcsec)]
+    fine = Params(1e-6, 1e-7, 1e-5, 3.0 * arcsec, 3.0 * arcsec)
+    return [small, fine._replace(start=(0.6, 0.0, 0.8, 0.0), start_deviation=0.02)]

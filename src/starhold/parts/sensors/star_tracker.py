@@ -6,7 +6,7 @@ import math
 from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quantity import Quantity
-from starhold.algebra.quaternion import Quaternion, multiply, normalise
+from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise
 from starhold.algebra.scalar import Scalar, both, less, opposite, where
 from starhold.algebra.structured import when
 from starhold.algebra.vector import Vector, add, dot, scale, subtract
@@ -18,7 +18,11 @@ CARD = Card(
     title="Star tracker",
     summary="q_m = q(t - delay) turned by Gaussian angles, less sure about the boresight; held between updates",
     sources=("Fundamentals of Spacecraft Attitude Determination and Control (2014)",),
-    assumptions=("stars are in view but in the outage", "errors independent from update to update"),
+    assumptions=(
+        "stars are in view but in the outage",
+        "errors independent from update to update",
+        "before its first update it shows the inertial axes",
+    ),
 )
 ROLE = "sensor"
 FIRST = {"attitude_is_new": 0.0}
@@ -89,8 +93,8 @@ def prepare(params: Params, period: float) -> Numbers:
 
 
 def remember(params: Numbers, state: Any) -> Memory:
-    """An update is due, and what is on its way is the attitude at the start."""
-    return Memory(state.attitude, (state.attitude,) * params.late, 0.0)
+    """An update is due, and what is on its way is the attitude at the start. Until it comes the inertial axes are shown."""
+    return Memory(NO_TURN, (state.attitude,) * params.late, 0.0)
 
 
 def measure(state: Any, memory: Memory, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Memory]:

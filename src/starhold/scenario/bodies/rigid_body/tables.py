@@ -12,6 +12,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from starhold.laws.interface import Gain
 from starhold.parts.craft import check_inertia
 from starhold.parts.epoch import START
+from starhold.parts.stated_attitude import ALLOWED, LONGEST, SHORTEST
 from starhold.scenario.bodies.rigid_body.budget import BudgetTable
 from starhold.scenario.bodies.rigid_body.transient import TransientTable
 from starhold.scenario.orbit import Orbit
@@ -21,8 +22,6 @@ from starhold.scenario.tables import Flag, Table, at_key, refuse
 
 QUATERNION = Gain("1", shape=(4,), spread=False, text="quaternion, scalar first, normalised on reading")
 ANGLES = Gain("rad", shape=(3,), spread=False, text="Euler-Krylov angles yaw, pitch, roll")
-SHORTEST, LONGEST = 0.5, 2.0
-"""Lengths between which four numbers are taken for a direction among quaternions; [0, 1, 1, 1] is one."""
 
 
 MOMENTS = Gain("kg m^2", shape=(3, 3))
@@ -71,8 +70,7 @@ class Pointing(Table):
         if self.attitude is not None and not any(self.attitude):
             raise at_key("attitude", "a quaternion that is not zero", list(self.attitude))
         if self.attitude is not None and not SHORTEST <= math.hypot(*self.attitude) <= LONGEST:
-            allowed = f"a quaternion of length 1, or between {SHORTEST:g} and {LONGEST:g} to be normalised"
-            raise at_key("attitude", allowed, list(self.attitude))
+            raise at_key("attitude", ALLOWED, list(self.attitude))
         return self
 
 

@@ -1,0 +1,27 @@
+"""A quaternion that a user states: of any length that can be meant for 1, and used as a unit quaternion."""
+
+from __future__ import annotations
+
+import math
+
+from starhold.algebra.quaternion import Quaternion, stretch
+from starhold.parts.contract import Parameter
+
+SHORTEST, LONGEST = 0.5, 2.0
+"""Lengths between which four numbers are taken for a direction among quaternions; [0, 1, 1, 1] is one."""
+ALLOWED = f"a quaternion of length 1, or between {SHORTEST:g} and {LONGEST:g} to be normalised"
+START = Parameter(
+    "1",
+    shape=(4,),
+    spread=False,
+    text="attitude that is taken for true at the start: quaternion, inertial to body, scalar first",
+)
+"""How estimators declare where they begin, in the same words."""
+
+
+def unit_quaternion(stated: Quaternion) -> Quaternion:
+    """Return the unit quaternion in the direction of four numbers. ValueError where they can hardly be meant for one."""
+    length = math.hypot(*stated)
+    if not SHORTEST <= length <= LONGEST:
+        raise ValueError(f"must be {ALLOWED}, not of length {length:g}")
+    return stretch(1.0 / length, stated)
