@@ -316,7 +316,7 @@ def linearise(scenario: reading.Scenario | str | Path, law: str | None = None, d
     """The linear loop of a law of a scenario, the first if `law` is None, near rest on target, as systems of python-control:
     `plant`, `law`, `loop` (cut at the command) and `closed` in continuous time, the same in `sampled`, exact for a held
     command. delay: from the control instant until the command acts (s). InputError for a law that iterates or switches
-    there, and where python-control is not installed."""
+    there or whose memory never comes to rest, and where python-control is not installed."""
     from starhold.studies.linear import linear_of, systems_of
 
     opened = _turning(scenario)
@@ -326,12 +326,11 @@ def linearise(scenario: reading.Scenario | str | Path, law: str | None = None, d
 @shortly
 def margins(scenario: reading.Scenario | str | Path, law: str | None = None, delay: float = 0.0) -> list[Margins]:
     """Gain, phase and delay margins of the linear loop about each body axis, the loops about the others closed: see
-    `linearise`, of whose sampled loop they are."""
-    from starhold.analysis.margins import margins as margins_of
-    from starhold.studies.linear import linear_of
+    `linearise`, of whose sampled loop they are. NaN, and a warning why, where that loop is not stable."""
+    from starhold.studies.linear import margins_of
 
     opened = _turning(scenario)
-    return margins_of(linear_of(opened, opened.laws[0] if law is None else opened.pick(law), delay))
+    return margins_of(opened, opened.laws[0] if law is None else opened.pick(law), delay)
 
 
 @shortly

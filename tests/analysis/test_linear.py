@@ -12,7 +12,7 @@ from starhold.algebra.structure import flatten
 from starhold.analysis.linear import COMMAND, LinearityError, linearise, sampled
 from starhold.analysis.margins import margins, response
 from starhold.certification.certify import certify
-from starhold.laws.catalogue import catalogue
+from starhold.laws.catalogue import catalogue, from_file
 from starhold.loop.kernels import make_step
 from starhold.parts.catalogue import fit
 from starhold.scenario.building import build
@@ -195,6 +195,80 @@ def test_what_is_left_out_is_named():
 def test_a_loop_without_a_linear_form_is_refused(place, why):
     with pytest.raises(LinearityError, match=why):
         linearise(loop_of(*place))
+
+
+LAW = """
+from typing import Annotated, NamedTuple
+from starhold.algebra.quaternion import vector_part
+from starhold.algebra.scalar import less, where
+from starhold.algebra.vector import add, scale
+from starhold.laws.interface import Card, Gain
+
+CARD = Card(title="Remembers", summary="u", sources=("definition",), assumptions=(), claims="none")
+
+class Gains(NamedTuple):
+    damping: Annotated[float, Gain("N m s")] = 0.02
+
+class Memory(NamedTuple):
+    kept: float
+    constant: float
+
+def remember(gains, craft, period):
+    return Memory({first}, 2.0)
+
+def torque(told, gains, craft, memory):
+    factor, kept = {factor}, {after}
+    feedback = add(scale(gains.damping * factor, told.rate), scale(0.004, vector_part(told.attitude)))
+    return scale(-1.0, feedback), Memory(kept, memory.constant)
+
+def examples():
+    return [Gains()]
+"""
+
+
+def remembering(tmp_path, factor, after, first="0.0", damping=0.02):
+    path = tmp_path / "law.py"
+    path.write_text(LAW.format(factor=factor, after=after, first=first))
+    law = from_file(path)
+    return replace(loop_of("cubesat-slew", "pd"), law=law, gains=law.gains(damping))
+
+
+@pytest.mark.parametrize(
+    ("factor", "after", "first"),
+    [
+        # A flag of having started, and one that is never put back.
+        ("where(less(0.5, memory.kept), 1.0, 0.0)", "1.0", "0.0"),
+        ("where(less(0.5, memory.kept), 1.0, 0.0)", "where(less(0.5, memory.kept), memory.kept, 1.0)", "0.0"),
+        # A filter that takes a million calls to come to rest, at 1, and one that needs a few.
+        ("memory.kept", "memory.kept + 1e-5 * (1.0 - memory.kept)", "7.0"),
+        ("memory.kept", "memory.kept + 0.5 * (1.0 - memory.kept)", "7.0"),
+        # What the command does not depend on.
+        ("1.0", "0.5 * memory.kept + told.rate[0]", "3.0"),
+    ],
+)
+def test_memory_is_that_at_rest(tmp_path, factor, after, first):
+    linear, plain = linearise(remembering(tmp_path, factor, after, first)), linearise(remembering(tmp_path, "1.0", "0.0"))
+    assert linear.is_stable
+    reached = np.abs(linear.poles[: len(plain.poles)])
+    assert np.abs(linear.stepped_law.D - plain.stepped_law.D).max() < 1e-9
+    if linear.law.states == ():
+        np.testing.assert_allclose(reached, np.abs(plain.poles), rtol=1e-9)
+    for ours, theirs in zip(margins(linear), margins(plain), strict=True):
+        np.testing.assert_allclose(ours[1:], theirs[1:], rtol=1e-6)
+
+
+def test_damping_in_the_first_call_alone_is_none(tmp_path):
+    loop = remembering(tmp_path, "where(less(0.5, memory.kept), 0.0, 1.0)", "1.0")
+    assert not linearise(loop).is_stable
+    assert linearise(remembering(tmp_path, "1.0", "0.0")).is_stable
+
+
+@pytest.mark.parametrize("after", ["memory.kept + told.period", "1.0 - memory.kept", "2.0 * memory.kept + 1.0"])
+def test_memory_that_never_rests_is_refused(tmp_path, after):
+    """A clock, one that goes to and fro, and one that runs away."""
+    loop = remembering(tmp_path, "1.0", after)
+    with pytest.raises(LinearityError, match="goes on changing its memory"):
+        linearise(loop)
 
 
 def test_a_delay_is_neither_negative_nor_endless():

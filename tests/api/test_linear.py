@@ -62,6 +62,24 @@ def test_a_law_that_leaves_an_axis_alone_has_margins_about_the_others(tmp_path):
     assert found[0].crossover > found[1].crossover > 0.0
 
 
+def test_margins_of_an_unstable_loop_are_nan_with_a_reason():
+    with pytest.warns(
+        UserWarning, match=r"law sliding: a pole of a step of the linear loop has size 1\.\d+, so the loop is not"
+    ):
+        found = sh.margins("cubesat-slew", "sliding", 0.25)
+    assert all(np.isnan(about.gain) for about in found)
+
+
+def test_a_law_of_modes_with_a_clock_is_refused():
+    modes = [
+        {"name": "one", "type": "pd", "k_rate": 0.02, "k_attitude": 0.004, "until": {"after": "1 min"}},
+        {"name": "two", "type": "pd", "k_rate": 0.03, "k_attitude": 0.004},
+    ]
+    scenario = sh.load("cubesat-slew").with_({"law": [{"name": "both", "type": "modes", "mode": modes}]})
+    with pytest.raises(sh.InputError, match="the law modes goes on changing its memory at rest on target"):
+        sh.margins(scenario)
+
+
 @pytest.mark.parametrize(
     ("scenario", "law", "why"),
     [

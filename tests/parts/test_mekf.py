@@ -62,10 +62,10 @@ def most_likely(attitudes, rates, new):
     tracker = np.linalg.inv(PARAMS.cross * np.eye(3) + (PARAMS.roll - PARAMS.cross) * np.outer(axis, axis))
     deviation, walk = PARAMS.noise / math.sqrt(PERIOD), PARAMS.bias_walk * math.sqrt(PERIOD / 3600.0)
     # From a guess that the gyro carries on.
-    guess = [measured[0]]
+    carried = [measured[0]]
     for mean in 0.5 * (rates[1:] + rates[:-1]):
-        guess.append(guess[-1] * Rotation.from_rotvec(PERIOD * mean))
-    guess = Rotation.concatenate(guess)
+        carried.append(carried[-1] * Rotation.from_rotvec(PERIOD * mean))
+    guess = Rotation.concatenate(carried)
 
     def noises(turns, biases, first):
         """The noise of each reading: between two the body turns by the mean of both, less bias and noise."""

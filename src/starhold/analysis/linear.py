@@ -14,8 +14,9 @@ from starhold.algebra.dual import Dual, differentiate, variables
 from starhold.algebra.quaternion import NO_TURN, relative, to_body
 from starhold.algebra.structure import buffers, flatten, mapped
 from starhold.algebra.vector import ZERO
-from starhold.loop.closed_loop import ClosedLoop
+from starhold.loop.closed_loop import Carry, ClosedLoop, Setup
 from starhold.loop.kernels import make_step
+from starhold.loop.step import Step
 from starhold.parts.catalogue import fit
 
 Array = NDArray[np.float64]
@@ -27,6 +28,12 @@ COMMAND = tuple(f"command_{axis}" for axis in AXES)
 DISTURBANCE = tuple(f"disturbance_{axis}" for axis in AXES)
 MOST_HELD = 1000
 """Control periods that a delay may last."""
+CALLS, SOLVED = 30, 10
+"""The law is called so often at rest for its memory to settle, and what then still changes is solved for so often."""
+LONG = 2**40
+"""Calls after which what changes must have died away."""
+SETTLED = 1e-9
+"""A number has settled once a call changes it by so small a part of its largest change."""
 
 
 class LinearityError(ValueError):
@@ -115,8 +122,12 @@ def linearise(loop: ClosedLoop, delay: float = 0.0) -> Linear:
             raise LinearityError(f"{one.name} takes the {_told(one.reads)} too, not attitude and rate alone")
     left_out: list[str] = []
     still = _at_rest(loop, left_out)
-    with np.errstate(all="ignore"):
-        plant, law = _matrices(still)
+    try:
+        with np.errstate(all="ignore"):
+            plant, law = _matrices(still)
+    except ArithmeticError:
+        # A division by zero, too.
+        raise LinearityError(f"the law {loop.law.name}, or a part of the loop, has no slope at rest on target") from None
     plant, law = _needed(plant, law)
     if len(law.states):
         difference = (law.A - np.eye(len(law.states))) / loop.period
@@ -160,9 +171,41 @@ def _at_rest(loop: ClosedLoop, left_out: list[str]) -> ClosedLoop:
     return replace(kept, parts=parts, start=start, limit="none", events=(), sign_policy="as_published")
 
 
+def _settled(loop: ClosedLoop, step: Step, setup: Setup) -> Carry:
+    """The carry with the memory that the law has after a long time at rest on target, whatever it does when it starts.
+    LinearityError where its memory goes on changing."""
+    carry = loop.carry()
+
+    def called(numbers: Any) -> list[Any]:
+        after = step.update(_with_memory(carry, numbers), 0, loop.seed, loop.gains, loop.craft, setup)
+        return flatten((after.memory,))
+
+    memory = np.array(flatten((carry.memory,)))
+    most = np.zeros(len(memory))
+    for turn in range(CALLS + SOLVED):
+        change = np.subtract(called(memory.tolist()), memory)
+        most = np.maximum(most, np.abs(change))
+        if (np.abs(change) <= SETTLED * most).all():
+            return _with_memory(carry, memory.tolist())
+        if turn >= CALLS:
+            slopes = differentiate(lambda: called(variables(memory.tolist(), 0, len(memory))), len(memory))  # noqa: B023
+            if not (np.abs(np.linalg.matrix_power(slopes, LONG) @ change) <= SETTLED * most).all():
+                break
+            change = np.linalg.lstsq(np.eye(len(memory)) - slopes, change)[0]
+        memory = memory + change
+    raise LinearityError(f"the law {loop.law.name} goes on changing its memory at rest on target")
+
+
+def _with_memory(carry: Carry, numbers: Any) -> Carry:
+    """A carry whose law remembers these numbers."""
+    given = iter(numbers)
+    return carry._replace(memory=mapped(carry.memory, lambda _: next(given)))
+
+
 def _matrices(loop: ClosedLoop) -> tuple[System, System]:
     """The plant in continuous time and the law in steps, with all states."""
-    step, setup, carry = make_step(loop.composition()), loop.setup(), loop.carry()
+    step, setup = make_step(loop.composition()), loop.setup()
+    carry = _settled(loop, step, setup)
     lags = any(fitted.part.hook("rates") is not None for fitted in loop.used("actuator"))
     inner = flatten((carry.effectors, carry.actuators))
     more = [f"{f.called}_{k + 1}" for f, own in zip(loop.used("effector"), carry.effectors, strict=True)
@@ -175,7 +218,6 @@ def _matrices(loop: ClosedLoop) -> tuple[System, System]:
     count = size + 6 + len(memory)
     x = variables([0.0] * 6 + inner + [0.0] * 3 * lags, 0, count)
     u, d = variables(ZERO, size, count), variables(ZERO, size + 3, count)
-    kept = iter(variables(memory, size + 6, count))
     numbers = iter(x[6:])
     effectors, outputs = (mapped(part, lambda _: next(numbers)) for part in (carry.effectors, carry.actuators))
     told: Any = [*NO_TURN[:1], *(0.5 * turn for turn in x[:3])]
@@ -186,7 +228,7 @@ def _matrices(loop: ClosedLoop) -> tuple[System, System]:
     pushed = setup.environments[-1]._replace(torque=tuple(d))
     setup = setup._replace(environments=(*setup.environments[:-1], pushed))
     now = carry._replace(state=state, effectors=effectors, actuators=outputs, command=tuple(u))
-    now = now._replace(memory=mapped(carry.memory, lambda _: next(kept)))
+    now = _with_memory(now, variables(memory, size + 6, count))
 
     def moving() -> list[Any]:
         rates, own, driven = step.slope(now, loop.craft, setup)
@@ -198,11 +240,7 @@ def _matrices(loop: ClosedLoop) -> tuple[System, System]:
         after = step.update(now, 0, loop.seed, loop.gains, loop.known, setup)
         return [*after.command, *flatten((after.memory,))]
 
-    try:
-        by_all, answer = differentiate(moving, count), differentiate(decided, count)
-    except ArithmeticError:
-        # A division by zero, too.
-        raise LinearityError(f"the law {loop.law.name}, or a part of the loop, has no slope at rest on target") from None
+    by_all, answer = differentiate(moving, count), differentiate(decided, count)
     plant = System(
         by_all[:, :size], by_all[:, size : size + 6], np.eye(size), np.zeros((size, 6)),
         states, (*COMMAND, *DISTURBANCE), states,
@@ -233,7 +271,9 @@ def _flat(rate: Any, state: Any) -> list[Any]:
 
 
 def _needed(plant: System, law: System) -> tuple[System, System]:
-    """Both without states of the plant that nothing depends on, as the momenta of wheels whose friction is none."""
+    """Both without states of the plant that nothing depends on, as the momenta of wheels whose friction is none, without
+    what the law remembers and its command does not depend on, and without what never changes, as a flag."""
+    law = _remembered(law)
     feeds = plant.A != 0.0
     heard = (law.D != 0.0).any(axis=0) | (law.B != 0.0).any(axis=0)
     needed = np.array([name in ERROR for name in plant.states]) | heard
@@ -248,6 +288,18 @@ def _needed(plant: System, law: System) -> tuple[System, System]:
         states=names, outputs=names,
     )  # fmt: skip
     return reduced, law._replace(B=law.B[:, needed], D=law.D[:, needed], inputs=names)
+
+
+def _remembered(law: System) -> System:
+    """The law without states that are none."""
+    size = len(law.states)
+    constant = (np.eye(size) == law.A).all(axis=1) & (law.B == 0.0).all(axis=1)
+    needed = (law.C != 0.0).any(axis=0)
+    for _ in range(size):
+        needed = needed | (law.A[needed] != 0.0).any(axis=0)
+    keep = needed & ~constant
+    names = tuple(name for name, kept in zip(law.states, keep, strict=True) if kept)
+    return law._replace(A=law.A[np.ix_(keep, keep)], B=law.B[keep], C=law.C[:, keep], states=names)
 
 
 def sampled(plant: System, period: float, delay: float = 0.0) -> System:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -18,6 +19,7 @@ from starhold.analysis.linear import (
     in_series,
     linearise,
 )
+from starhold.analysis.margins import Margins, margins
 from starhold.errors import InputError
 from starhold.scenario.building import build
 
@@ -58,6 +60,16 @@ def linear_of(scenario: Scenario, entry: LawEntry, delay: float = 0.0) -> Linear
         return linearise(build(scenario, entry), delay)
     except LinearityError as error:
         raise InputError(scenario.where, f"law {entry.name}", str(error), "a loop that is linear near rest") from None
+
+
+def margins_of(scenario: Scenario, entry: LawEntry, delay: float = 0.0) -> list[Margins]:
+    """The margins of the linear loop of a law of a scenario; of one that is not stable they are NaN, which a warning says.
+    InputError where there is no linear loop."""
+    linear = linear_of(scenario, entry, delay)
+    if not linear.is_stable:
+        why = f"a pole of a step of the linear loop has size {abs(linear.poles[0]):.6g}, so the loop is not stable"
+        warnings.warn(f"{scenario.where}: law {entry.name}: {why} and has no margins", stacklevel=3)
+    return margins(linear)
 
 
 def systems_of(linear: Linear) -> LinearLoop:
