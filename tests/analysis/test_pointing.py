@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
+from starhold.analysis import pointing
 from starhold.analysis.pointing import about_axes, figures, indices, level, root_sum_square
 
 LENGTH, APART = 20, 35
@@ -48,9 +49,31 @@ def test_indices_are_those_of_rolling_means(length, apart):
         means = pd.DataFrame(errors[run]).rolling(length).mean().to_numpy()[length - 1 :]
         assert found["MPE"][run] == pytest.approx(means, abs=1e-13)
         assert found["PDE"][run] == pytest.approx(means[apart:] - means[:-apart], abs=1e-13)
-        starts = range(0, len(means), max(1, length // 4))
-        relative = [errors[run, at : at + length] - means[at] for at in starts]
+        relative = [errors[run, at : at + length] - mean for at, mean in enumerate(means)]
         assert found["RPE"][run] == pytest.approx(np.concatenate(relative), abs=1e-13)
+
+
+def test_relative_errors_of_a_pulse_are_those_of_its_worst_window():
+    """The end of a pulse counts for most in the window that begins with it, wherever that is."""
+    for begin in range(20, 60):
+        errors = np.zeros((1, 100, 3))
+        errors[0, begin : begin + LENGTH // 4, 0] = 1.0
+        errors[0, begin + LENGTH // 4 : begin + LENGTH, 0] = -1.0
+        assert np.abs(indices(errors, LENGTH, APART)["RPE"]).max() == pytest.approx(1.7)
+
+
+@pytest.mark.parametrize("most", [40_000, 90_000, 10**9])
+def test_of_too_many_windows_the_largest_error_is_short_by_the_stated_share_at_most(monkeypatch, most):
+    errors = np.cumsum(np.random.default_rng(2).standard_t(2, size=(4, 500, 3)), axis=1)
+    exact = np.linalg.norm(indices(errors, 60, 1)["RPE"], axis=-1).max()
+    monkeypatch.setattr(pointing, "MOST", most)
+    taken = indices(errors, 60, 1)["RPE"]
+    apart = pointing.spacing(4, 500, 60)
+    assert taken.size <= 3 * max(most + 4 * 60, 4 * 442 * 60 // 15)
+    assert (1.0 - pointing.shortfall(apart, 60)) * exact <= np.linalg.norm(taken, axis=-1).max() <= exact
+    # The last instants are in a window too.
+    last = errors[:, -60:]
+    assert taken[:, -60:] == pytest.approx(last - last.mean(axis=1, keepdims=True), abs=1e-9)
 
 
 @pytest.mark.parametrize(("length", "apart"), [(0, 1), (5, 0), (30, 21), (51, 1)])

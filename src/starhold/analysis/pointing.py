@@ -27,8 +27,9 @@ MEANINGS = PERFORMANCE | {
     name: PERFORMANCE[like].replace(" error", " error of the estimate") for name, like in KNOWLEDGE.items()
 }
 ANGLE, LINE = "angle", "line of sight"
-OVERLAP = 4
-"""Windows in which errors are relative to the mean begin so many times a window."""
+OVERLAP, MOST = 4, 2**22
+"""Windows in which errors are relative to the mean begin at each instant, or, where that were more than MOST errors, as
+often as they may, and at least OVERLAP times a window."""
 
 
 class Figures(NamedTuple):
@@ -49,15 +50,30 @@ def indices(errors: Array, length: int, apart: int) -> dict[str, Array]:
     sums = np.cumsum(errors, axis=1)
     sums = np.concatenate([np.zeros_like(sums[:, :1]), sums], axis=1)
     means = (sums[:, length:] - sums[:, :-length]) / length
-    every = max(1, length // OVERLAP)
-    windows = sliding_window_view(errors, length, axis=1)[:, ::every]
-    relative = np.moveaxis(windows - means[:, ::every, :, None], -1, 2)
+    starts = np.unique(np.append(np.arange(0, means.shape[1], spacing(len(errors), instants, length)), means.shape[1] - 1))
+    windows = sliding_window_view(errors, length, axis=1)[:, starts]
+    relative = np.moveaxis(windows - means[:, starts, :, None], -1, 2)
     return {
         "APE": errors,
         "MPE": means,
         "RPE": relative.reshape(len(errors), -1, 3),
         "PDE": means[:, apart:] - means[:, :-apart],
     }
+
+
+def spacing(runs: int, instants: int, length: int) -> int:
+    """How many instants apart the windows begin in which errors are relative to the mean."""
+    wanted = -(-runs * (instants - length + 1) * length // MOST)
+    return min(wanted, max(1, length // OVERLAP))
+
+
+def shortfall(apart: int, length: int) -> float:
+    """By what share, at most, the largest relative error is too small where windows begin so many instants apart.
+
+    A window and the next one taken that holds an instant too differ by k < apart instants at either end. With M the largest
+    relative error of all windows their means differ by at most 2 k M / (length - k).
+    """
+    return min(1.0, 2.0 * (apart - 1) / (length - apart + 1))
 
 
 def about_axes(vectors: Array, boresight: Any = None) -> dict[str, Array]:

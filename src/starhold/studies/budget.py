@@ -28,6 +28,8 @@ from starhold.analysis.pointing import (
     figures,
     indices,
     root_sum_square,
+    shortfall,
+    spacing,
 )
 from starhold.errors import InputError
 from starhold.laws.modes import Modes, make_law
@@ -180,6 +182,12 @@ def study(
     if largest > SMALL:
         seen = f"errors up to {math.degrees(largest):.3g} deg from {clock.settings.start:g} s on"
         warnings.warn(f"{scenario.where}: {seen}, which do not add up as small ones do", stacklevel=2)
+    runs, instants = flown[0][0].shape[:2]
+    apart = spacing(runs, instants, clock.length)
+    if apart > 1:
+        period, share = clock.settings.window / clock.length, shortfall(apart, clock.length)
+        seen = f"relative errors are taken over windows that begin every {apart * period:g} s, not every {period:g} s"
+        warnings.warn(f"{scenario.where}: {seen}: the largest may be up to {share:.1%} too small", stacklevel=2)
     still, rows = flown[0], list[Contribution]()
     for name, errors in zip(names, flown, strict=True):
         kind = "loop" if name == LOOP else "together" if name == TOGETHER else "source"
