@@ -245,16 +245,20 @@ def export_aem(
     """Write the attitudes of a run as a CCSDS attitude ephemeris message, and return its path.
 
     run: what `simulate` returns, a run.nc or the folder of one. epoch: UTC at the start of the run, by default that of the
-    scenario's [orbit], else 2000-01-01T12:00:00; frame: what its inertial
-    axes are called. The quaternions turn the frame to the body's axes, scalar last. InputError for a run without
-    attitudes, a word that does not fit, and a file that cannot be written."""
-    from starhold.export.aem import write_aem
+    scenario's [orbit], else 2000-01-01T12:00:00. frame: "EME2000", into which the attitudes of a run whose inertial axes are
+    those of date (MOD_EARTH) are turned; any other name is what the inertial axes are called. The quaternions turn the frame
+    to the body's axes, scalar last. InputError for a run without attitudes, a word that does not fit, and a file that cannot
+    be written."""
+    from starhold.export.aem import from_date, write_aem
+    from starhold.parts.epoch import OF_DATE, OF_J2000, date_of
 
     into, flown = Path(file), _read_run(run)
     if "attitude" not in flown:
         raise InputError("export aem", "", "a run without attitudes", "one of a rigid body")
     times, attitudes = flown["time"].to_numpy(), flown["attitude"].to_numpy()
     begun = flown.attrs.get("epoch", "2000-01-01T12:00:00") if epoch is None else epoch
+    if flown.attrs.get("frame") == OF_DATE and frame == OF_J2000:
+        attitudes = from_date(attitudes, date_of(flown.attrs["epoch"]))
     try:
         write_aem(
             into, times, attitudes, epoch=begun, object_name=object_name, object_id=object_id, frame=frame, version=version

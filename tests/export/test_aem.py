@@ -1,13 +1,19 @@
 """Attitude ephemeris messages: written for a library of others, read from it, flown to."""
 
+from dataclasses import fields
+
+import erfa
 import numpy as np
 import pytest
+from ccsds_ndm import kvn_builder
 from ccsds_ndm.mapping import NDMFileFormats
+from ccsds_ndm.models.ndmxml4.ndmxml_4_0_0_common_4_0 import QuaternionType
 from ccsds_ndm.ndm_io import NdmIo
 from scipy.spatial.transform import Rotation
 
 import starhold as sh
 from starhold.export.aem import read_aem, write_aem
+from starhold.parts.epoch import days_of, precession
 from tests.running import starhold
 
 TIMES = np.array([0.0, 0.1, 2.5, 86400.25])
@@ -58,6 +64,60 @@ def test_a_library_of_others_reads_what_is_written(tmp_path):
     assert [state.epoch for state in states][1:3] == ["2026-12-31T23:59:59.6", "2027-01-01T00:00:02"]
     found = [[float(getattr(state.quaternion, name)) for name in ("qc", "q1", "q2", "q3")] for state in states]
     np.testing.assert_allclose(found, ATTITUDES, rtol=0, atol=1e-15)
+
+
+def test_a_library_of_others_reads_version_2_once_two_words_of_version_1_are_put_right(tmp_path, monkeypatch):
+    """ccsds-ndm 3.1 looks in messages of version 2.0 for a field by its name in version 1.0, and expects the scalar first, which
+    the schema of 2.0 that comes with it has last."""
+    path = written(tmp_path, "2.0")
+    with pytest.raises(KeyError, match="quaternion_state"):
+        NdmIo().from_path(path)
+    monkeypatch.setitem(kvn_builder._AEM_FIELD_MAP, "QUATERNION", "quaternion_ephemeris")
+    columns = [item.metadata["name"] for item in fields(QuaternionType)]
+    assert columns == ["Q1", "Q2", "Q3", "QC"]
+    monkeypatch.setattr(kvn_builder, "_att_column_template", lambda _: ["EPOCH", *columns])
+    (segment,) = NdmIo().from_path(path).body.segment
+    assert (segment.metadata.ref_frame_a, segment.metadata.ref_frame_b) == ("EME2000", "SC_BODY_1")
+    states = [state.quaternion_ephemeris.quaternion for state in segment.data.attitude_state]
+    found = [[float(getattr(state, name)) for name in ("qc", "q1", "q2", "q3")] for state in states]
+    np.testing.assert_allclose(found, ATTITUDES, rtol=0, atol=1e-15)
+
+
+def test_precession_is_that_of_erfa():
+    for days in np.linspace(-18000.0, 36000.0, 20):
+        seen = Rotation.from_quat(precession(days), scalar_first=True).inv().as_matrix()
+        np.testing.assert_allclose(seen, erfa.bp06(2451545.0, days)[1], rtol=0, atol=1e-11)
+
+
+def test_axes_of_date_are_turned_into_those_that_are_named(tmp_path):
+    """A body that holds its first axis on the Sun sees it where ERFA has it in the frame of the message."""
+    scenario = sh.load("three-laws").with_({"simulation.duration": 2.0, "orbit.epoch": "2027-03-20T12:00:00Z"})
+    run = sh.simulate(scenario, "lyapunov")
+    sun, _ = erfa.epv00(2451545.0, days_of((2027.0, 3.0, 20.0, 12.0, 0.0, 0.0)))
+    toward = -sun["p"] / np.linalg.norm(sun["p"])
+    to_date = erfa.bp06(2451545.0, days_of((2027.0, 3.0, 20.0, 12.0, 0.0, 0.0)))[1]
+    own = Rotation.from_quat(run["attitude"].to_numpy()[0], scalar_first=True).inv().apply(to_date @ toward)
+    for frame, seen in (("EME2000", toward), ("MOD_EARTH", to_date @ toward)):
+        sh.export_aem(run, tmp_path / "run.aem", frame=frame)
+        told = read_aem(tmp_path / "run.aem")
+        assert told.frame == frame
+        found = Rotation.from_quat(told.attitudes[0], scalar_first=True).inv().apply(seen)
+        np.testing.assert_allclose(found, own, rtol=0, atol=1e-11)
+        # And back, as a target.
+        changed = {"target": {"mode": "history", "file": str(tmp_path / "run.aem")}, "simulation.duration": 1.0}
+        again = sh.simulate(scenario.with_(changed), "lyapunov")
+        offset = Rotation.from_quat(again["attitude_error"].to_numpy()[0], scalar_first=True)
+        goal = Rotation.from_quat(again["attitude"].to_numpy()[0], scalar_first=True) * offset.inv()
+        assert (goal.inv() * Rotation.from_quat(run["attitude"].to_numpy()[0], scalar_first=True)).magnitude() < 1e-9
+
+
+def test_axes_that_nothing_ties_to_a_date_are_left_alone(tmp_path):
+    nowhere = {"orbit": None, "environment.gravity_gradient": False}
+    mars = {"orbit.gravitational_parameter": "42828.37 km^3/s^2", "orbit.epoch": "2027-03-20"}
+    for about in ({}, nowhere, mars):
+        run = sh.simulate(sh.load("three-laws").with_({"simulation.duration": 2.0} | about), "lyapunov")
+        sh.export_aem(run, tmp_path / "run.aem")
+        np.testing.assert_array_equal(read_aem(tmp_path / "run.aem").attitudes, run["attitude"].to_numpy())
 
 
 def test_what_a_library_of_others_writes_is_read(tmp_path):

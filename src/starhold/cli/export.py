@@ -53,7 +53,9 @@ def aem(
     ] = None,
     object_name: Annotated[str, typer.Option("--object", help="name of the spacecraft")] = "SPACECRAFT",
     object_id: Annotated[str, typer.Option("--id", help="its international designator")] = "0000-000A",
-    frame: Annotated[str, typer.Option(help="what the inertial axes are called")] = "EME2000",
+    frame: Annotated[
+        str, typer.Option(help="EME2000, into which axes of date are turned, or what the inertial axes are called")
+    ] = "EME2000",
     version: Annotated[str, typer.Option(help="of the message, 1.0 or 2.0")] = "2.0",
     force: Force = False,
 ) -> None:

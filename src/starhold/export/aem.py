@@ -17,7 +17,9 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra.quaternion import conjugate, multiply
 from starhold.files import atomic_write, read_text
+from starhold.parts.epoch import OF_J2000, Date, days_of, precession
 
 Version = Literal["1.0", "2.0"]
 BODY = "SC_BODY"
@@ -34,6 +36,14 @@ VALUES = {
 NAME = re.compile(r"[ -~]*[!-~][ -~]*")
 _EPOCH = re.compile(r"(\d{4})-(?:(\d{2})-(\d{2})|(\d{3}))T(\d{2}):(\d{2}):(\d{2})(?:\.(\d*))?Z?")
 _SECOND = 10**9
+
+
+def from_date(attitudes: Any, epoch: Date, back: bool = False) -> NDArray[np.float64]:
+    """Attitudes (n, 4) relative to the mean equator and equinox of J2000 (EME2000), of those relative to the mean ones of a
+    date; back: the reverse."""
+    turn = precession(days_of(epoch))
+    turned: Any = multiply(conjugate(turn) if back else turn, tuple(np.asarray(attitudes, dtype=float).T))
+    return np.stack(turned, axis=1)
 
 
 class Aem(NamedTuple):
@@ -56,7 +66,7 @@ def write_aem(
     epoch: str,
     object_name: str,
     object_id: str,
-    frame: str = "EME2000",
+    frame: str = OF_J2000,
     time_system: str = "UTC",
     version: Version = "2.0",
 ) -> None:

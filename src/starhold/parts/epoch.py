@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import UTC, date, datetime, timedelta
+from math import cos, radians, sin
 from typing import TypeAlias
 
+from starhold.algebra.quaternion import Quaternion, multiply
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Vector
 from starhold.parts.contract import Parameter
@@ -27,6 +29,8 @@ START: Date = (2026.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 """The epoch of a flight that is given none."""
 WRITTEN = 'a date as "2026-03-20T12:00:00Z", or as whole year, month, day, hour, minute and a second below 60, UTC'
 """How an epoch may be written."""
+OF_DATE, OF_J2000 = "MOD_EARTH", "EME2000"
+"""What CCSDS calls the Earth's mean equator and equinox of date, and those of J2000."""
 DAY = 86400.0
 SIDEREAL = 360.98564736629 / 360.0
 """Turns of the Earth in a day of Universal Time."""
@@ -59,6 +63,19 @@ def days_of(epoch: Date) -> float:
 def iso_text(epoch: Date) -> str:
     """The date in ISO 8601, UTC, to the microsecond, such as "2026-03-20T12:00:00". ValueError for what is no date."""
     return _instant(epoch).isoformat()
+
+
+def precession(days: float) -> Quaternion:
+    """The turn from the mean equator and equinox of J2000 to those so many days later (IAU 2006; Capitaine, Wallace and
+    Chapront, Expressions for IAU 2000 precession quantities, 2003)."""
+    t = days / 36525.0
+    zeta = 2.650545 + t * (2306.083227 + t * (0.2988499 + t * (0.01801828 + t * (-5.971e-6 - 3.173e-7 * t))))
+    z = -2.650545 + t * (2306.077181 + t * (1.0927348 + t * (0.01826837 + t * (-2.8596e-5 - 2.904e-7 * t))))
+    theta = t * (2004.191903 + t * (-0.4294934 + t * (-0.04182264 + t * (-7.089e-6 - 1.274e-7 * t))))
+    # Half of each angle, given in seconds of arc.
+    a, b, c = (radians(angle / 7200.0) for angle in (zeta, theta, z))
+    about_y: Quaternion = (cos(b), 0.0, sin(b), 0.0)
+    return multiply(multiply((cos(a), 0.0, 0.0, -sin(a)), about_y), (cos(c), 0.0, 0.0, -sin(c)))
 
 
 def _instant(epoch: Date) -> datetime:

@@ -14,7 +14,10 @@ from starhold.parts.epoch import DAY, Date, date_text, days_of
 from starhold.parts.orbit import BODIES
 
 SOURCES = ("The Astronomical Almanac: low-precision formulas for the Sun",)
-ASSUMPTIONS = ("the Sun's direction to 0.01 deg, from 1950 to 2050", "inertial axes of the equator and equinox of date")
+ASSUMPTIONS = (
+    "the Sun's direction, as the Earth sees it, to 0.011 deg from 1950 to 2050",
+    "inertial axes of the equator and equinox of date",
+)
 SHADOW = "the Earth's shadow is that of a sphere without air, its edge straight across the Sun's disc"
 """For the cards of parts that take it."""
 UNIT = 1.495978707e11

@@ -16,8 +16,9 @@ from starhold.loop.kernels import make_step
 from starhold.parts.bodies.rigid_body import kinetic_energy
 from starhold.parts.craft import tensor
 from starhold.parts.effectors.wheels import gives_what_is_asked
-from starhold.parts.epoch import iso_text
+from starhold.parts.epoch import OF_DATE, iso_text
 from starhold.parts.quaternion_sign import SIGN_POLICIES
+from starhold.scenario.bodies.rigid_body.start import date_of_axes
 from starhold.simulation.lane import fly, label
 from starhold.studies.body import NO_CONES, BodyStudy, Cones, Issued, Values
 from starhold.studies.modes import certify_modes, mode_departures, same_numbers
@@ -44,8 +45,11 @@ class RigidBodyStudy:
         told = {f"settling_{name}": getattr(settling, name) for name in ("attitude_tolerance", "rate_tolerance")}
         if transient is not None:
             told |= {f"transient_{name}": getattr(transient, name) for name in TRANSIENT}
-        if scenario.table.orbit is not None and scenario.table.orbit.epoch is not None:
-            told["epoch"] = iso_text(scenario.table.orbit.epoch)
+        orbit, of_date = scenario.table.orbit, date_of_axes(scenario)
+        if orbit is not None and orbit.epoch is not None:
+            told["epoch"] = iso_text(orbit.epoch)
+        if of_date is not None:
+            told |= {"epoch": iso_text(of_date), "frame": OF_DATE}
         run = label(loop, samples, carry, scenario.table.simulation.record_every)
         angle = {"error_angle": error_angle(run["attitude_error"])}
         meant = {"error_angle": Quantity("rad", "angle to the target")}

@@ -15,15 +15,16 @@ from starhold.files import read_text
 COLUMNS = ("time", "q0", "q1", "q2", "q3")
 
 
-def read_history(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Times (n,) in s and quaternions (n, 4), scalar first. Columns that are named may stand in any order; without names
-    they are those of COLUMNS. A file that ends in .aem is an attitude ephemeris message, whose first epoch is time 0.
+def read_history(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
+    """Times (n,) in s, quaternions (n, 4), scalar first, and the name of the reference frame, "" for none. Columns that are
+    named may stand in any order; without names they are those of COLUMNS. A file that ends in .aem is an attitude ephemeris
+    message, whose first epoch is time 0.
 
     Raises OSError, or ValueError that names the line and what is wrong with it.
     """
     if path.suffix.lower() == ".aem":
         message = read_aem(path)
-        return message.times, message.attitudes
+        return message.times, message.attitudes, message.frame
     rows: list[list[float]] = []
     order = list(range(len(COLUMNS)))
     for number, cells in enumerate(csv.reader(read_text(path).splitlines()), 1):
@@ -41,7 +42,7 @@ def read_history(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     if len(backwards):
         later, earlier = table[backwards[0] + 1, 0], table[backwards[0], 0]
         raise ValueError(f"a time of {later:g} s after one of {earlier:g} s")
-    return table[:, 0], table[:, 1:]
+    return table[:, 0], table[:, 1:], ""
 
 
 def _order(names: list[str], line: int) -> list[int]:

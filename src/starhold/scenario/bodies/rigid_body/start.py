@@ -13,10 +13,13 @@ from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise
 from starhold.algebra.scalar import side
 from starhold.algebra.vector import ZERO, add, most, subtract
 from starhold.errors import InputError
+from starhold.export.aem import from_date
 from starhold.laws.interface import Start
 from starhold.parts.bodies.rigid_body import State
 from starhold.parts.catalogue import fit
 from starhold.parts.effectors.wheels import capacity, wheel_momentum
+from starhold.parts.epoch import EPOCH, OF_J2000, Date
+from starhold.parts.orbit import body_of
 from starhold.parts.part import Fitted
 from starhold.parts.roles import Goal
 from starhold.parts.targets import history
@@ -97,6 +100,16 @@ def _told(scenario: Scenario, table: TargetTable, key: str) -> Fitted:
     )
 
 
+def date_of_axes(scenario: Scenario) -> Date | None:
+    """The date whose mean equator and equinox the inertial axes are: that of an orbit about the Earth, where the scenario
+    states it or has a part that knows the Sun or the turn of the Earth. None where the axes may be any."""
+    orbit = scenario.table.orbit
+    if orbit is None or body_of(orbit.gravitational_parameter) != "Earth":
+        return None
+    knows = any(item.gain.shared == EPOCH.shared for fitted in scenario.parts for item in fitted.part.fields())
+    return scenario.table.shared[EPOCH.shared] if knows or orbit.epoch is not None else None
+
+
 def _history(scenario: Scenario, table: TargetTable, key: str, use: Callable[..., Any]) -> Any:
     """The result of `use` on the times and attitudes in the file of a history. InputError where it cannot be used."""
     path = scenario.folder / str(table.file)
@@ -104,7 +117,11 @@ def _history(scenario: Scenario, table: TargetTable, key: str, use: Callable[...
     if path.suffix.lower() == ".aem":
         allowed = "a CCSDS attitude ephemeris message of one segment, unit quaternions, epochs that increase"
     try:
-        return use(*read_history(path))
+        times, attitudes, frame = read_history(path)
+        of_date = date_of_axes(scenario)
+        if frame == OF_J2000 and of_date is not None:
+            attitudes = from_date(attitudes, of_date, back=True)
+        return use(times, attitudes)
     except OSError as error:
         raise InputError(scenario.where, f"{key}.file", f"{path}: {error.strerror}", allowed) from None
     except ValueError as error:
