@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 import starhold as sh
 from starhold.scenario.reading import builtin_names, builtin_text
@@ -93,6 +94,25 @@ def test_an_input_error_has_no_frames_but_the_callers():
         assert caught.value.__suppress_context__
 
 
+def test_a_rotation_of_scipy_is_an_attitude():
+    """As it is, in tables and in changes, and the same attitude: it turns body components into inertial ones."""
+    turn = Rotation.from_euler("ZYX", [40.0, -20.0, 70.0], degrees=True)
+    made = sh.scenario(BODY | {"initial": {"attitude": turn}, "target": {"attitude": turn.inv()}})
+    again = made.with_({"initial.attitude": turn * turn, "target.attitude": turn})
+    for scenario, start, goal in ((made, turn, turn.inv()), (again, turn * turn, turn)):
+        run = sh.simulate(scenario.with_({"simulation.duration": 1.0}), "pd")
+        own = Rotation.from_quat(run["attitude"].to_numpy()[0], scalar_first=True)
+        np.testing.assert_allclose(own.as_matrix(), start.as_matrix(), atol=1e-12)
+        error = Rotation.from_quat(run["attitude_error"].to_numpy()[0], scalar_first=True)
+        np.testing.assert_allclose(error.as_matrix(), (goal.inv() * start).as_matrix(), atol=1e-12)
+    angles = made.with_({"initial": {"angles": ["40 deg", "-20 deg", "70 deg"]}})
+    by_angles = sh.simulate(angles.with_({"simulation.duration": 1.0}), "pd")["attitude"].to_numpy()[0]
+    np.testing.assert_allclose(Rotation.from_quat(by_angles, scalar_first=True).as_matrix(), turn.as_matrix(), atol=1e-12)
+    filters = [{"type": "star-tracker", "cross": 1e-4, "roll": 1e-4}, {"type": "gyro"}]
+    filters.append({"type": "complementary-filter", "attitude_gain": 0.1, "bias_gain": 0.0, "start": turn})
+    assert sh.scenario(BODY | {"part": filters}).parts[-1].params.start == pytest.approx(turn.as_quat(scalar_first=True))
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
@@ -106,7 +126,10 @@ def test_an_input_error_has_no_frames_but_the_callers():
         ({"name.first": 1}, "name.first: found a value that is no table"),
         ({"spacecraft..inertia": 1}, "not a key"),
         ({3: 1}, "a key that is no string"),
-        ({"spacecraft.inertia": {1, 2}}, "allowed: numbers, strings, truths, dates, and lists and tables of them"),
+        (
+            {"spacecraft.inertia": {1, 2}},
+            "numbers, strings, truths, dates, rotations, and lists and tables of them",
+        ),
         ({"initial": {3: 1}}, "the key 3"),
         ({"law": None}, "law: found no law"),
         ({"simulation": None}, "simulation: found nothing; allowed: this key is required"),

@@ -67,8 +67,8 @@ def test_a_library_of_others_reads_what_is_written(tmp_path):
 
 
 def test_a_library_of_others_reads_version_2_once_two_words_of_version_1_are_put_right(tmp_path, monkeypatch):
-    """ccsds-ndm 3.1 looks in messages of version 2.0 for a field by its name in version 1.0, and expects the scalar first, which
-    the schema of 2.0 that comes with it has last."""
+    """ccsds-ndm 3.1 looks in messages of version 2.0 for a field by its name in version 1.0 and expects the scalar first,
+    which the schema of 2.0 that comes with it has last."""
     path = written(tmp_path, "2.0")
     with pytest.raises(KeyError, match="quaternion_state"):
         NdmIo().from_path(path)

@@ -261,6 +261,35 @@ def test_a_panel_that_no_craft_has_is_refused_in_one_line(change, words):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        # 8 kg at 1.1 m have more inertia than the whole, or leave the hub two moments whose sum is less than the third.
+        (
+            ("hinged-panels", "mass = 30.0\npanels = [{}]", {0: 8.0}),
+            "without its panels the craft of 30 kg is no body",
+        ),
+        (("hinged-panels", "mass = 30.0\npanels = [{}]", {12: 6.0}), "no body has these principal moments"),
+        (("flexible-modes", "modes = [[0.6, 0.005, 3.0, 0, 0, 0]]", {}), "the modes carry more inertia than the craft has"),
+    ],
+)
+def test_appendages_that_leave_the_hub_no_inertia_are_refused(table, words):
+    kind, lines, change = table
+    row = [change.get(k, x) for k, x in enumerate(panels(0.01, 1)[0])]
+    text = BODY + part(f'type = "{kind}"\n{lines.format(row)}\n') + PD
+    with pytest.raises(InputError, match=f"part {kind}: .*{words}") as caught:
+        sh.simulate(parse(text, "own"))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_fault_that_leaves_the_hub_no_inertia_is_refused():
+    modes = part('type = "flexible-modes"\nmodes = [[0.6, 0.005, 2.0, 0, 0, 0]]\n')
+    sh.simulate(parse(BODY + modes + PD, "own"))
+    fault = '[[fault]]\ntime = 1.0\ninertia = [3.9, 4.0, 4.0]\naction = "none"\n'
+    with pytest.raises(InputError, match="part flexible-modes: the modes carry more inertia"):
+        sh.simulate(parse(BODY + modes + fault + PD, "own"))
+
+
 def test_panels_fly_from_a_scenario_and_claims_leave_them_out():
     row = [0.2, *panels(0.01, 1)[0][1:]]
     text = BODY + part(f'type = "hinged-panels"\nname = "wing"\nmass = "30 kg"\npanels = [{row}]\n') + PD

@@ -127,6 +127,11 @@ def test_keplerian_elements_in_a_file():
     assert np.allclose(found.start, expected, rtol=1e-12)
 
 
+def test_a_low_altitude_that_states_its_unit_is_taken():
+    assert orbit('altitude = "90 km"\ninclination = 1', "1.0").altitude == 9e4
+    assert orbit('altitude = 5e4\ninclination = 1\ngravitational_parameter = "4902.8 km^3/s^2"', "1.0").altitude == 5e4
+
+
 FAULTS = {
     "nothing": ("", ["orbit.position", "altitude or semi_major_axis"]),
     "half a state": ("position = [7e6, 0, 0]", ["orbit.velocity", "together"]),
@@ -148,6 +153,8 @@ FAULTS = {
         ["orbit.true_anomaly", "120"],
     ),
     "degrees without a unit": ("altitude = 5e5\ninclination = 97", ["orbit.inclination", '"97 deg"']),
+    "altitude in km": ("altitude = 620\ninclination = 1", ["orbit.altitude: found 620", '"620 km" or "620 m"']),
+    "geostationary altitude in km": ("altitude = 35786.0\ninclination = 0", ["orbit.altitude", '"35786 km"']),
     "position in km": ("position = [7000, 0, 0]\nvelocity = [0, 7550, 0]", ["orbit.position", "6378.14 km", "in m"]),
     "axis in km": ("semi_major_axis = 7000\ninclination = 1", ["orbit.semi_major_axis", "in m"]),
     "inside the Earth": ('position = ["6300 km", 0, 0]\nvelocity = [0, 7900, 0]', ["orbit.position", "the Earth's radius"]),

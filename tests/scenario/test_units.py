@@ -7,6 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+import starhold as sh
 from starhold.scenario import units
 from starhold.scenario.reading import builtin_text, parse
 from starhold.scenario.units import LONGEST, to_number
@@ -116,6 +117,12 @@ REFUSED = [
 def test_what_is_no_quantity_is_refused_with_the_unit_that_is_asked_for(text, unit):
     with pytest.raises(ValueError, match=r"^a (number, or a string|quantity in)"):
         to_number(text, unit)
+
+
+def test_a_plain_field_in_nanotesla_is_asked_for_its_unit():
+    noisy = {"type": "magnetometer", "noise": 50.0}
+    with pytest.raises(sh.InputError, match=r'noise: found 50.0; .*"50 nT" or "50 T"$'):
+        sh.load("cubesat-detumble").with_({"part": [noisy]})
 
 
 @given(st.text("0123456789.eE+-_*^/() sNmkgrade°²⁻", max_size=30), st.sampled_from(["s", "N m", "rad", "1", "1/(N m)^2"]))

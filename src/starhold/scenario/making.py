@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from datetime import date
@@ -24,9 +25,10 @@ _PART = re.compile(r"([^.\[\]]+)(?:\[(\d+)\])?")
 @shortly
 def make_scenario(tables: Mapping[str, Any], folder: str | Path = ".", allow_unstable: bool = False) -> Scenario:
     """The scenario of tables as a file would hold them, {"name": "mine", "spacecraft": {"inertia": [2, 3, 4]}, ..., "law":
-    [{"type": "pd", ...}]}: strings, numbers, truths, dates, lists and tables; tuples and NumPy arrays count as lists, and
-    what is None as left out. `folder`: what file names in it are relative to. InputError says what is wrong, as of a file. A
-    scenario's `with_` gives others like it, and its `text` is the file."""
+    [{"type": "pd", ...}]}: strings, numbers, truths, dates, lists and tables; tuples and NumPy arrays count as lists, a
+    Rotation of SciPy as the quaternion of an attitude, and what is None as left out. `folder`: what file names in it are
+    relative to. InputError says what is wrong, as of a file. A scenario's `with_` gives others like it, and its `text` is
+    the file."""
     written = plain(tables, WHERE, "")
     return read_tables(written, toml_text(written), WHERE, Path(folder), allow_unstable)
 
@@ -107,6 +109,10 @@ def _put(tables: Any, path: Sequence[str | int], value: Any, where: str, held: A
 
 def plain(value: Any, where: str, key: str) -> Any:
     """The value in what TOML has; InputError where it is nothing of that."""
+    # One that is not loaded has made no rotation.
+    transform: Any = sys.modules.get("scipy.spatial.transform")
+    if transform is not None and isinstance(value, transform.Rotation):
+        return cast(Any, value).as_quat(scalar_first=True).tolist()
     if isinstance(value, np.generic | np.ndarray):
         value = cast(Any, value).tolist()
     if isinstance(value, bool | int | float | str):
@@ -126,4 +132,4 @@ def plain(value: Any, where: str, key: str) -> Any:
     if isinstance(value, list | tuple):
         items = list(cast(Sequence[Any], value))
         return [plain(item, where, f"{key}[{n}]") for n, item in enumerate(items, 1) if item is not None]
-    raise InputError(where, key, show(value), "numbers, strings, truths, dates, and lists and tables of them")
+    raise InputError(where, key, show(value), "numbers, strings, truths, dates, rotations, and lists and tables of them")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import warnings
-from typing import Annotated, Any
+from collections.abc import Callable
+from typing import Annotated, Any, cast
 
 from pydantic import BeforeValidator, WithJsonSchema, model_validator
 
@@ -13,11 +14,13 @@ from starhold.laws.interface import Gain
 from starhold.parts.craft import EARTH
 from starhold.parts.epoch import EPOCH, START, date_of
 from starhold.parts.orbit import BODIES, NEWTON, Elements, body_of, from_elements, lowest, meets_at
-from starhold.scenario.quantity import quantity, reader
+from starhold.scenario.quantity import ask_for_unit, quantity, reader
 from starhold.scenario.tables import Table, at_key, refuse
 
 DENSEST = 1e6
 """Mean density (kg/m3) of what is closer to a centre of attraction than a craft can be; planets have less than 6000."""
+LOWEST = 1.0 / 64.0
+"""Plain altitudes below this share of the body's radius are asked for their unit: about the Earth, below 100 km."""
 FASTEST = 10.0
 """Speed over that of escape from the Sun, a planet or the Moon beyond which a unit is taken to be wrong."""
 STRAIGHT = 1e-9
@@ -105,6 +108,15 @@ class Orbit(Table):
         angles = [getattr(self, key) or 0.0 for key in ANGLES]
         size = self.semi_major_axis if self.altitude is None else self.altitude + (self.surface or 0.0)
         return from_elements(Elements(size or 0.0, self.eccentricity or 0.0, *angles), self.gravitational_parameter)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _in_metres(cls, given: Any, read: Callable[[Any], Orbit]) -> Orbit:
+        found, altitude = read(given), cast(Any, given).get("altitude") if isinstance(given, dict) else None
+        if isinstance(altitude, int | float) and found.surface is not None and altitude < LOWEST * found.surface:
+            low = f"{LOWEST * found.surface:.6g} or more about this body"
+            raise at_key("altitude", ask_for_unit(altitude, "m", low, "km"), altitude)
+        return found
 
     @model_validator(mode="after")
     def _told_once(self) -> Orbit:

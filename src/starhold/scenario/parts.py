@@ -249,12 +249,16 @@ def _key(fitted: Fitted) -> str:
 def try_parts(loop: ClosedLoop, where: str, key: str) -> None:
     """InputError where a part cannot work with its numbers, or a part's file fails: a control step is flown in plain Python,
     which goes through all of it. `key`: what errors call the law."""
+    crafts = (loop.craft, *(event.craft for event in loop.events))
     for fitted in loop.parts:
+        own_file = fitted.part.file is not None
+        one = _watched(fitted, loop, where) if own_file else fitted
         try:
-            if fitted.part.file is None:
-                fitted.prepared(loop.period)
-            elif fitted.part.role == "estimator" or (fitted.part.role == "sensor" and is_recorded(fitted.part)):
+            if own_file and (fitted.part.role == "estimator" or (fitted.part.role == "sensor" and is_recorded(fitted.part))):
                 before_first(fitted.part, loop.start)
+            params, check = one.prepared(loop.period), one.part.hook("check")
+            for craft in crafts if check is not None else ():
+                check(params, craft)
         except ValueError as error:
             raise InputError(where, _key(fitted), "", str(error)) from None
     if all(fitted.part.file is None for fitted in loop.parts):

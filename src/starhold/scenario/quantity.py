@@ -17,6 +17,8 @@ from starhold.scenario.units import shown, to_number
 
 LEAST, MOST = 1e-30, 1e30
 """Sizes of quantities that files may hold, beside zero; of a vector or matrix the size of its largest entry."""
+PLAIN = {"rad": (math.tau, "within 2 pi", "deg"), "T": (1e-3, "within 0.001", "nT")}
+"""By unit: up to what size plain numbers are taken, and what a larger one may be meant in."""
 MOST_WHOLE = 2**53
 """Up to here floats hold every whole number."""
 
@@ -94,9 +96,15 @@ def _to_numbers(value: Any, gain: Gain, worth: float) -> Any:
         return to_number(value, gain.unit) / worth
     if gain.whole and abs(value) > MOST_WHOLE:
         raise ValueError("at most 2^53")
-    if gain.unit == "rad" and abs(value) > math.tau:
-        raise ValueError(f'a plain number is in rad, within 2 pi; with a unit it is "{value:g} deg" or "{value:g} rad"')
+    most, told, unit = PLAIN.get(gain.unit, (math.inf, "", ""))
+    if abs(value) > most:
+        raise ValueError(ask_for_unit(value, gain.unit, told, unit))
     return value
+
+
+def ask_for_unit(value: float, unit: str, told: str, other: str) -> str:
+    """The question for the unit of a plain number that is far from any of its kind; other: the unit that may be meant."""
+    return f'a plain number is in {unit}, {told}; with a unit it is "{value:g} {other}" or "{value:g} {unit}"'
 
 
 def _check_size(value: Any) -> None:

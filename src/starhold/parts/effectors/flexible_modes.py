@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
+import numpy as np
+
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.several import each, weighted
 from starhold.algebra.vector import Matrix, Vector, cross, dot, scale, subtract
 from starhold.parts.contract import Card, Parameter
+from starhold.parts.craft import Craft, tensor, total_inertia
 
 CARD = Card(
     title="Flexible modes",
@@ -70,6 +73,15 @@ def prepare(params: Params, period: float) -> Numbers:
             raise ValueError(f"mode {number} needs a frequency above 0 and a damping of at least 0")
     rows = [(f * f, 2.0 * damping * f, (x, y, z), at) for f, damping, x, y, z, at in params.modes]
     return Numbers(*zip(*rows, strict=True))
+
+
+def check(params: Numbers, craft: Craft) -> None:
+    """Raise ValueError where the modes carry more inertia than the craft has, so that its hub would have a negative one."""
+    rest = tensor(total_inertia(craft)) + np.array(inertia(remember(params), params))
+    moments = np.linalg.eigvalsh(rest)
+    if moments[0] <= 0.0:
+        shown = ", ".join(f"{moment:g}" for moment in moments)
+        raise ValueError(f"the modes carry more inertia than the craft has: without them its principal moments are {shown}")
 
 
 def remember(params: Numbers) -> State:

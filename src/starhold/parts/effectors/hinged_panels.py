@@ -32,7 +32,7 @@ from starhold.algebra.vector import (
     transpose,
 )
 from starhold.parts.contract import Card, Parameter
-from starhold.parts.craft import vector
+from starhold.parts.craft import Craft, check_inertia, tensor, total_inertia, vector
 
 CARD = Card(
     title="Hinged panels",
@@ -138,6 +138,18 @@ def prepare(params: Params, period: float) -> Numbers:
         raise ValueError(f"the panels together must have less than the craft's mass of {params.mass:g} kg")
     still = Numbers(panels, params.mass, 1.0 / params.mass, _NONE)
     return still._replace(rest=_whole(*_swung(State((0.0,) * len(panels), (0.0,) * len(panels)), still), still))
+
+
+def check(params: Numbers, craft: Craft) -> None:
+    """Raise ValueError where a craft without these panels is no rigid body: its hub would have a negative inertia."""
+    masses = np.array([panel.mass for panel in params.panels])
+    places = np.array([np.array(panel.hinge) + panel.length * np.array(panel.out) for panel in params.panels])
+    hub = params.mass - masses.sum()
+    centre = vector(-(masses @ places) / hub)
+    try:
+        check_inertia(tensor(total_inertia(craft)) - np.array(combine(1.0, params.rest, 1.0, _point(hub, centre))))
+    except ValueError as error:
+        raise ValueError(f"without its panels the craft of {params.mass:g} kg is no body: {error}") from None
 
 
 def _panel(number: int, row: tuple[float, ...]) -> Panel:
