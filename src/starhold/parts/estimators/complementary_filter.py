@@ -60,7 +60,7 @@ def prepare(params: Params, period: float) -> Params:
 
 
 def remember(params: Params, state: Any) -> Memory:
-    """What is stated for the start."""
+    """The filter begins with what is stated for the start."""
     return Memory(params.start, ZERO, 0.0)
 
 

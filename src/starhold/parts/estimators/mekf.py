@@ -148,7 +148,7 @@ def prepare(params: Params, period: float) -> Numbers:
 
 
 def remember(params: Numbers, state: Any) -> Memory:
-    """What is stated for the start."""
+    """The filter begins with what is stated for the start."""
     square, begin = params.start_turn, params.bias
     nothing: Matrix = (ZERO, ZERO, ZERO)
     turn, walk = diagonal((square, square, square)), diagonal((begin, begin, begin))
