@@ -257,8 +257,9 @@ def try_parts(loop: ClosedLoop, where: str, key: str) -> None:
             if own_file and (fitted.part.role == "estimator" or (fitted.part.role == "sensor" and is_recorded(fitted.part))):
                 before_first(fitted.part, loop.start)
             params, check = one.prepared(loop.period), one.part.hook("check")
-            for craft in crafts if check is not None else ():
-                check(params, craft)
+            if check is not None:
+                for craft in crafts:
+                    check(params, craft)
         except ValueError as error:
             raise InputError(where, _key(fitted), "", str(error)) from None
     if all(fitted.part.file is None for fitted in loop.parts):
