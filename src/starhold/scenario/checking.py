@@ -262,7 +262,7 @@ def _translate(
         return InputError(where, key, context["found"], context["reason"])
     found = "nothing" if context.get("found", "") is None else show(context.get("found", fault.get("input")))
     if fault["type"] == "extra_forbidden":
-        known = list({*_model_at(model, place[:-1]).model_fields, *(extra if len(place) == 1 else [])})
+        known: list[str] = [*{*_model_at(model, place[:-1]).model_fields, *(extra if len(place) == 1 else [])}]
         found = "an old name" if RENAMED.get(place[-1]) in known else "an unknown key"
         return InputError(where, key, found, nearest(place[-1], known))
     if fault["type"] == "missing":
