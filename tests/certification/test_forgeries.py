@@ -11,8 +11,8 @@ from starhold.certification.certify import Wanted, certify
 from starhold.checker import check, passed
 from starhold.laws.catalogue import catalogue
 from tests.certification.edits import alone, changed, claims_of, content_at, spots
+from tests.certification.handed import POINT, bounded, handed
 from tests.certification.loops import certified, free, loop_of, rotors, textbook
-from tests.certification.test_modes import POINT, bounded, handed
 from tests.making import ORBITAL
 
 # Together: each worker would make the certificates of the textbook loops for itself.

@@ -16,30 +16,8 @@ from starhold.scenario.reading import parse
 from starhold.studies.bodies.rigid_body import STUDY
 from starhold.studies.compare import fly_law, prove
 from starhold.studies.modes import loop_of_mode
+from tests.certification.handed import POINT, bounded, handed, issued
 from tests.missions import BASE, DETUMBLE
-
-POINT = """
-[[law.mode]]
-name = "point"
-type = "lyapunov"
-k_rate = 0.006
-k_attitude = 0.0008
-"""
-
-
-def issued(modes, text=BASE):
-    scenario = parse(text + modes, "mission.toml")
-    entry = scenario.laws[0]
-    return {one.certificate.name: one for one in STUDY.certify(scenario, entry, build(scenario, entry))}
-
-
-def bounded(rate, angle=None):
-    told = f', angle_below = "{angle}"' if angle else ""
-    return DETUMBLE.replace('rate_below = "0.5 deg/s"', f'rate_below = "{rate}"{told}')
-
-
-def handed(modes, text=BASE):
-    return issued(modes, text)["mission: detumble to point"].certificate
 
 
 def test_each_mode_is_certified_as_its_law_alone_is():
