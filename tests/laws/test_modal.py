@@ -123,7 +123,10 @@ def test_needs_no_rate():
         ('form = "equal"\na = 0.1', "phi_0 has the root 0.1 1/s, which is not stable"),
         ('form = "equal"\na = 0.0', "phi_0 has the root 0 1/s, which is not stable"),
         ('form = "equal"\na = -0.1\nb = 0.01', "b = 0.01 s gives the scalar part a root that is not stable"),
-        ("phi_0 = -0.1\nphi_1 = [[-1, 3, 0], [-3, 1.5, 0], [0, 0, -1]]\nb = -0.01", r"phi_1 has the root 0\.25\+2\.727j"),
+        (
+            "phi_0 = -0.1\nphi_1 = [[-1, 3, 0], [-3, 1.5, 0], [0, 0, -1]]\nb = -0.01",
+            "phi_1 has a root with a real part of zero or more",
+        ),
         ("phi_0 = -0.1\nphi_1 = [-1, -2]\nb = -0.01", "phi_1"),
         ('form = "fit"\nangle = 4.0', "angle"),
     ],

@@ -20,6 +20,7 @@ from starhold.report.page import write_page
 from starhold.scenario.reading import Scenario, builtin_text, load, parse
 from starhold.studies import compare as studies
 from starhold.studies.flight import Flight
+from starhold.studies.questions import UNASKED
 from starhold.studies.reflight import COMPUTED, FAULTS, reflight
 from tests.browser import Browser
 from tests.report import flown
@@ -187,12 +188,18 @@ def test_what_no_body_has_is_said(browser: Browser, page: Path) -> None:
             field.value = "9"; field.dispatchEvent(new Event("change")); })()"""
     )
     assert "exceeds the sum" in browser.ask('document.getElementById("unsound").textContent')
+    assert "spacecraft.inertia: no body has these principal moments" in browser.ask(
+        'document.getElementById("unsound").textContent'
+    )
+    assert browser.ask('document.getElementById("dials-copy").disabled')
     assert browser.ask("state.flown") == flown_before
     browser.ask(
         """(() => { const field = document.querySelector('input[aria-label="lyapunov k_rate"]');
             field.value = "-2"; field.dispatchEvent(new Event("change")); })()"""
     )
     assert browser.ask("""document.querySelector('[data-key="law.lyapunov.k_rate"]').className""") == "dial bad"
+    why = browser.ask("""document.querySelector('[data-key="law.lyapunov.k_rate"] .why').textContent""")
+    assert why == "must be above 0"
     assert not browser.ask('moved.has("law.lyapunov.k_rate")')
 
 
@@ -348,9 +355,8 @@ def test_what_a_law_computes_by_other_means_is_held() -> None:
     laws = {law.name: law for law in reflight(scenario).laws}
     assert "spacecraft.inertia" in laws["sliding"].follows
     assert laws["sliding"].held == {}
-    assert laws["mpc"].held == dict.fromkeys(
-        ("spacecraft.inertia", "law.mpc.q_attitude", "law.mpc.q_rate", "law.mpc.r"), COMPUTED
-    )
+    weights = ("law.mpc.q_attitude", "law.mpc.q_rate", "law.mpc.r")
+    assert laws["mpc"].held == {"spacecraft.inertia": COMPUTED} | dict.fromkeys(weights, UNASKED)
     assert "initial.rate" in laws["mpc"].follows
     assert "torque_limit" in laws["mpc"].reads
     assert "torque_limit" not in laws["sliding"].reads

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,11 @@ def test_nothing_is_loaded(page: str, reader: Reader) -> None:
     assert "http" not in policy
     assert page.count("leeoniya/uPlot") == 1
     assert "plotly.js v" not in page
+
+
+def test_the_licence_of_what_draws_goes_with_the_page(page: str) -> None:
+    licence = (resources.files("starhold.report") / "assets" / "uplot.LICENSE").read_text(encoding="utf-8")
+    assert licence.strip() in page
 
 
 def test_every_law_and_every_metric_is_there(reader: Reader) -> None:

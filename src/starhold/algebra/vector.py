@@ -4,7 +4,20 @@ from __future__ import annotations
 
 from typing import Any, TypeAlias
 
-from starhold.algebra.scalar import Scalar, absolute, clip, less, maximum, sign, sqrt, where
+from starhold.algebra.scalar import (
+    Scalar,
+    Truth,
+    absolute,
+    both,
+    clip,
+    divide,
+    less,
+    maximum,
+    minimum,
+    sign,
+    sqrt,
+    where,
+)
 
 Vector: TypeAlias = tuple[Scalar, Scalar, Scalar]
 Matrix: TypeAlias = tuple[Vector, Vector, Vector]
@@ -154,3 +167,45 @@ def inverse(m: Matrix) -> Matrix:
     """Return the inverse by the adjugate; not defined for a singular matrix."""
     c = 1.0 / determinant(m)
     return transpose((scale(c, cross(m[1], m[2])), scale(c, cross(m[2], m[0])), scale(c, cross(m[0], m[1]))))
+
+
+SWEEPS = 6
+"""Of Jacobi's rotations, after which nothing is left beside the diagonal."""
+
+
+def principal_moments(m: Matrix | Vector) -> Vector:
+    """Return the eigenvalues of a symmetric matrix, or of the diagonal one with these entries, the least first."""
+    a, b, c = _diagonal_of(m)
+    low, high = minimum(minimum(a, b), c), maximum(maximum(a, b), c)
+    return low, maximum(minimum(a, b), minimum(maximum(a, b), c)), high
+
+
+def _diagonal_of(m: Matrix | Vector) -> Vector:
+    """Return the diagonal after Jacobi's rotations."""
+    if _is_diagonal(m):
+        return m  # pyright: ignore
+    a: Any = [list(row) for row in m]  # pyright: ignore
+    for p, q in SWEEPS * ((0, 1), (0, 2), (1, 2)):
+        r, beside = 3 - p - q, a[p][q]
+        theta = divide(a[q][q] - a[p][p], 2.0 * beside)
+        t = where(less(theta, 0.0), -1.0, 1.0) / (absolute(theta) + sqrt(theta * theta + 1.0))
+        t = where(less(0.0, absolute(beside)), t, 0.0)
+        c = 1.0 / sqrt(t * t + 1.0)
+        s = t * c
+        a[p][p], a[q][q] = a[p][p] - t * beside, a[q][q] + t * beside
+        a[p][q] = a[q][p] = 0.0
+        x, y = c * a[r][p] - s * a[r][q], s * a[r][p] + c * a[r][q]
+        a[r][p] = a[p][r] = x
+        a[r][q] = a[q][r] = y
+    return (a[0][0], a[1][1], a[2][2])
+
+
+def decays(m: Matrix | Vector) -> Truth:
+    """Tell whether x' = m x comes to rest, all eigenvalues having real parts below zero, by Routh's criterion."""
+    if _is_diagonal(m):
+        return both(both(less(m[0], 0.0), less(m[1], 0.0)), less(m[2], 0.0))  # pyright: ignore
+    rows: Any = m
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    minors = (a * e - b * d) + (a * i - c * g) + (e * i - f * h)
+    whole = determinant(rows)
+    return both(both(less(a + e + i, 0.0), less(whole, 0.0)), less((a + e + i) * minors, whole))

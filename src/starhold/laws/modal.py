@@ -11,7 +11,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.scalar import Scalar
-from starhold.algebra.vector import Matrix, Vector, add, apply, cross, dot, gyroscopic_torque, scale, subtract
+from starhold.algebra.vector import (
+    Matrix,
+    Vector,
+    add,
+    apply,
+    cross,
+    decays,
+    dot,
+    gyroscopic_torque,
+    principal_moments,
+    scale,
+    subtract,
+)
 from starhold.laws.interface import Card, Gain, Measurement, NoMemory, Start
 from starhold.parts.craft import Craft, tensor
 
@@ -101,11 +113,11 @@ def explain(craft: Craft, spec: Equal | Fit) -> list[tuple[str, Any]]:
 def check(gains: Gains, craft: Craft) -> None:
     """Raise ValueError where a spectrum is not stable."""
     for name in ("phi_0", "phi_1"):
-        roots = np.linalg.eigvals(tensor(getattr(gains, name)))
-        worst = roots[np.argmax(roots.real)]
-        if not worst.real < 0.0:
-            shown = f"{worst.real:.4g}" if worst.imag == 0.0 else f"{worst:.4g}"
-            raise ValueError(f"{name} has the root {shown} 1/s, which is not stable")
+        phi: Any = getattr(gains, name)
+        if not decays(phi):
+            if isinstance(phi[0], tuple):
+                raise ValueError(f"{name} has a root with a real part of zero or more, which is not stable")
+            raise ValueError(f"{name} has the root {principal_moments(phi)[2]:.4g} 1/s, which is not stable")
     if not gains.b < 0.0:
         raise ValueError(f"b = {gains.b:g} s gives the scalar part a root that is not stable")
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from starhold.algebra.quaternion import vector_part
-from starhold.algebra.vector import ZERO, Vector, add, clip_axes, scale, subtract
+from starhold.algebra.vector import ZERO, Vector, add, clip_axes, principal_moments, scale, subtract
 from starhold.laws.interface import Card, Gain, Measurement, tracking_torque
 from starhold.parts.craft import Craft
-from starhold.synthesis.response import largest_moment
 
 CARD = Card(
     title="Quaternion PID",
@@ -53,7 +52,7 @@ def check(gains: Gains, craft: Craft) -> None:
     About a principal axis of moment J its polynomial is J s^3 + k_rate s^2 + k_attitude/2 s + k_integral/2; by Routh's
     criterion it is stable where k_rate k_attitude > J k_integral, which is hardest about the axis of the largest moment.
     """
-    most = gains.k_rate * gains.k_attitude / largest_moment(craft)
+    most = gains.k_rate * gains.k_attitude / principal_moments(craft.inertia)[2]
     if not gains.k_integral < most:
         allowed = f"k_rate k_attitude / J_max = {most:.6g} N m/s"
         raise ValueError(f"k_integral must be below {allowed}, or the linear loop is unstable; it is {gains.k_integral:g}")

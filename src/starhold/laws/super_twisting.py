@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
-
-import numpy as np
+from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quaternion import vector_part
 from starhold.algebra.scalar import absolute, sqrt
-from starhold.algebra.vector import ZERO, Matrix, Vector, add, apply, scale, signs, subtract, times
+from starhold.algebra.vector import ZERO, Matrix, Vector, add, apply, decays, scale, signs, subtract, times
 from starhold.laws.interface import Card, Gain, Measurement
 from starhold.laws.sliding import equivalent_torque
-from starhold.parts.craft import Craft, tensor
+from starhold.parts.craft import Craft
 
 CARD = Card(
     title="Super-twisting",
@@ -55,7 +53,9 @@ def remember(gains: Gains, craft: Craft, period: float) -> Memory:
 
 def check(gains: Gains, craft: Craft) -> None:
     """Raise ValueError where motion on the surface, q' = -K q/2 near the target, leads away from it."""
-    if np.linalg.eigvals(tensor(gains.surface_gain)).real.min() <= 0.0:
+    slope: Any = gains.surface_gain
+    backwards: Any = tuple(scale(-1.0, row) for row in slope) if isinstance(slope[0], tuple) else scale(-1.0, slope)
+    if not decays(backwards):
         raise ValueError("surface_gain must have eigenvalues with positive real parts, or the surface leads off the target")
 
 

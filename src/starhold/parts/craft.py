@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.quantity import Quantity
-from starhold.algebra.vector import Matrix, Vector
+from starhold.algebra.vector import Matrix, Vector, principal_moments
 from starhold.algebra.vector import inverse as inverse_matrix
 
 EARTH = 3.986e14
@@ -77,13 +77,28 @@ def check_inertia(inertia: Any) -> NDArray[np.float64]:
     if np.abs(tensor - tensor.T).max() > 1e-9 * np.abs(tensor).max():
         raise ValueError("inertia must be symmetric")
     tensor = 0.5 * (tensor + tensor.T)
-    moments = np.linalg.eigvalsh(tensor)
+    check_moments(compact(tensor))
+    return tensor
+
+
+def check_moments(inertia: Matrix | Vector) -> None:
+    """Raise ValueError where no rigid body has this inertia; of recorded numbers too."""
+    moments = principal_moments(inertia)
     shown = ", ".join(f"{m:g}" for m in moments)
     if moments[0] <= 0.0:
         raise ValueError(f"inertia must be positive definite; its principal moments are {shown}")
     if moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-9):
         raise ValueError(f"no body has these principal moments ({shown}): the largest exceeds the sum of the others")
-    return tensor
+
+
+def check_rest(rest: Matrix | Vector) -> float:
+    """Return the largest principal moment of a craft without its rotors' about their axes (kg m2); ValueError where one is
+    not positive, of recorded numbers too."""
+    moments = principal_moments(rest)
+    if moments[0] <= 0.0:
+        shown = ", ".join(f"{m:g}" for m in moments)
+        raise ValueError(f"the rotors have more inertia than the craft: without them its principal moments are {shown}")
+    return moments[2]
 
 
 def compact(array: Any) -> Matrix | Vector:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from starhold.algebra.quaternion import Quaternion, stretch
+from starhold.algebra.vector import most
 from starhold.parts.contract import Parameter
 
 SHORTEST, LONGEST = 0.5, 2.0
@@ -22,6 +24,16 @@ START = Parameter(
 def unit_quaternion(stated: Quaternion) -> Quaternion:
     """Return the unit quaternion in the direction of four numbers. ValueError where they can hardly be meant for one."""
     length = math.hypot(*stated)
-    if not SHORTEST <= length <= LONGEST:
-        raise ValueError(f"must be {ALLOWED}, not of length {length:g}")
+    try:
+        check_attitude(stated)
+    except ValueError as error:
+        raise ValueError(f"must be {error}, not of length {length:g}") from None
     return stretch(1.0 / length, stated)
+
+
+def check_attitude(stated: Any) -> None:
+    """Raise ValueError where four numbers, recorded ones too, are no attitude."""
+    if most(stated) == 0.0:
+        raise ValueError("a quaternion that is not zero")
+    if not SHORTEST * SHORTEST <= sum(x * x for x in stated) <= LONGEST * LONGEST:
+        raise ValueError(ALLOWED)

@@ -12,7 +12,10 @@ import numpy as np
 from starhold.algebra.structure import flatten
 from starhold.analysis.rigid_body import recorded_meter
 from starhold.certification.standing import standing
+from starhold.laws.interface import Gain
 from starhold.report.colours import colour
+from starhold.scenario.quantity import LEAST, MOST, declared
+from starhold.studies.questions import NEAR, RANGE
 from starhold.studies.reflight import Reflight, Reflown, reflight
 from starhold.trace.javascript import JavaScript
 
@@ -29,13 +32,6 @@ LABELS = {
     "initial.attitude": "attitude",
     "initial.rate": "rate",
 }
-UNITS = {
-    "spacecraft.inertia": "kg m²",
-    "fault[1].inertia": "kg m²",
-    "spacecraft.torque_limit": "N m",
-    "initial.attitude": "",
-    "initial.rate": "rad/s",
-}
 
 
 def living_data(scenario: Scenario, flights: Sequence[Flight], sampling: Sampling) -> dict[str, Any] | None:
@@ -50,6 +46,12 @@ def living_data(scenario: Scenario, flights: Sequence[Flight], sampling: Samplin
     keys = [key for key in made.dials if key not in made.gains or key.partition(".")[2].rpartition(".")[0] in numbers]
     return {
         "dials": [_dial(made, key) for key in keys],
+        "asked": [
+            {"law": one.law, "keys": one.keys, "program": _script(one.program), "refusals": one.refusals}
+            for one in made.asked.questions
+        ],
+        "ranged": made.asked.ranged,
+        "ranges": {"near": NEAR, "range": RANGE, "least": LEAST, "most": MOST},
         "linked": dict(scenario.hooks.linked),
         "file": [piece._asdict() for piece in made.pieces],
         "laws": {str(numbers[law.name]): _law(law) | _measured(law, flights[numbers[law.name]], table) for law in laws},
@@ -66,14 +68,19 @@ def living_data(scenario: Scenario, flights: Sequence[Flight], sampling: Samplin
 def _dial(made: Reflight, key: str) -> dict[str, Any]:
     """A key that can be moved: its numbers, bounds and words."""
     item = made.gains.get(key)
-    found: dict[str, Any] = {"key": key, "value": made.dials[key]}
-    if item is None:
-        return found | {"label": LABELS.get(key, key), "unit": UNITS.get(key, ""), "law": None, "text": "", "above": None}
-    gain = item.gain
+    gain = _declared(made.scenario, key) if item is None else item.gain
     bounds = {"above": gain.above, "least": gain.at_least, "most": gain.at_most}
-    law = key.partition(".")[2].rpartition(".")[0]
     unit = "" if gain.unit == "1" else gain.unit.replace("^2", "²")
-    return found | bounds | {"label": item.name, "unit": unit, "law": law, "text": gain.text}
+    found = {"key": key, "value": made.dials[key], "unit": unit} | bounds
+    if item is None:
+        return found | {"label": LABELS.get(key, key), "law": None, "text": ""}
+    return found | {"label": item.name, "law": key.partition(".")[2].rpartition(".")[0], "text": gain.text}
+
+
+def _declared(scenario: Scenario, key: str) -> Gain:
+    """The declaration of a key of the scenario's own tables; that of a fault is the craft's."""
+    table, _, name = key.replace("fault[1]", "spacecraft").partition(".")
+    return declared(type(getattr(scenario.table, table)).model_fields[name]) or Gain()
 
 
 def _law(law: Reflown) -> dict[str, Any]:

@@ -57,7 +57,8 @@ def document(
         libraries.append(get_plotlyjs())
         own.insert(0, "look.js")
     if data["plots"]:
-        libraries.append(_asset("uplot.js"))
+        # Its licence goes with every copy.
+        libraries.append(f"/*!\n{_asset('uplot.LICENSE').strip()}\n*/\n{_asset('uplot.js')}")
         own.insert(0, "plots.js")
     held = [_held("data", data)]
     if living is not None:

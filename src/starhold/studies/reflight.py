@@ -24,6 +24,7 @@ from starhold.scenario.building import build
 from starhold.scenario.checking import read_toml
 from starhold.scenario.making import changed, plain, variants
 from starhold.simulation.lane import recorded
+from starhold.studies.questions import Asked, ask
 from starhold.trace.calling import record_call
 from starhold.trace.handles import Handle
 from starhold.trace.program import Load, Program, statements
@@ -88,6 +89,7 @@ class Reflight:
     laws: tuple[Reflown, ...]
     grounded: dict[str, str]
     pieces: tuple[Piece, ...]
+    asked: Asked
 
     def changed(self, values: Mapping[str, Any]) -> Scenario:
         """The scenario with these values at keys of `dials`, as the page's file has it."""
@@ -121,10 +123,12 @@ def reflight(scenario: Scenario) -> Reflight:
     held = changed(held, _changes(held, {key: dials[key] for key in shared if key == "initial.attitude"}))
     tried = _Tried(held, dials)
     laws: list[Reflown] = []
+    loops = {entry.name: build(held, entry) for entry in held.laws}
+    asked = ask(held, loops, dials)
     for entry in held.laws:
+        loop = loops[entry.name]
         if entry.name in grounded:
             continue
-        loop = build(held, entry)
         if loop.events:
             grounded[entry.name] = FAULTS
         elif loop.nominal is not None:
@@ -133,8 +137,8 @@ def reflight(scenario: Scenario) -> Reflight:
             own = [
                 key for key in gains if key.startswith(f"law.{entry.name}.") and key[len(entry.name) + 5 :] in _names(entry)
             ]
-            laws.append(_reflown(held, entry, loop, {key: dials[key] for key in (*shared, *own)}, tried))
-    return Reflight(held, dials, gains, tuple(laws), grounded, tuple(_pieces(held, dials)))
+            laws.append(_reflown(held, entry, loop, {key: dials[key] for key in (*shared, *own)}, tried, asked.fixed))
+    return Reflight(held, dials, gains, tuple(laws), grounded, tuple(_pieces(held, dials)), asked)
 
 
 def _names(entry: LawEntry) -> list[str]:
@@ -202,7 +206,9 @@ def _others(value: Any) -> Iterator[Any]:
         yield moved
 
 
-def _reflown(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, own: Values, tried: _Tried) -> Reflown:
+def _reflown(
+    scenario: Scenario, entry: LawEntry, loop: ClosedLoop, own: Values, tried: _Tried, fixed: Mapping[str, str]
+) -> Reflown:
     timing = scenario.table.simulation
     steps = timing.steps
     numbers, like = _numbers(loop, steps), _form(loop, steps)
@@ -224,7 +230,8 @@ def _reflown(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, own: Values,
     kept = kept if _same(numbers, _given(scenario, loop, {key: own[key] for key in kept})) else []
     held |= {key: COMPUTED for key in own if not key.startswith("law.") and key not in kept}
     kept += [key for key in own if key.startswith("law.")]
-    held |= {key: ALONE for key in kept if not tried.of(key)}
+    held |= {key: fixed[key] for key in kept if key in fixed}
+    held |= {key: ALONE for key in kept if key not in held and not tried.of(key)}
     kept = [key for key in kept if key not in held]
 
     def all_follow(keys: Sequence[str]) -> bool:

@@ -28,11 +28,13 @@ class Handle:
     def __init__(self, recorder: Recorder, ref: str) -> None:
         self.recorder, self.ref = recorder, ref
 
-    def __bool__(self) -> NoReturn:
-        refuse(
-            "an `if`, `while`, `and`, `or` or `not` on a truth that is not known yet",
-            "where(truth, a, b), both, either, opposite",
-        )
+    def __bool__(self) -> bool:
+        if self.recorder.path is None or self.kind != TRUTH:
+            refuse(
+                "an `if`, `while`, `and`, `or` or `not` on a truth that is not known yet",
+                "where(truth, a, b), both, either, opposite",
+            )
+        return self.recorder.path.turn(self)
 
     def __float__(self) -> NoReturn:
         refuse("a function that is none of the scalar operations", INSTEAD)
@@ -58,13 +60,40 @@ class Handle:
     __round__ = __trunc__ = __floor__ = __ceil__ = __divmod__ = __iter__ = __len__ = __getitem__ = _unknown
     __invert__ = __and__ = __rand__ = __or__ = __ror__ = __xor__ = __rxor__ = __lshift__ = __rshift__ = _unknown
 
-    def _compared(self, other: Any) -> NoReturn:
-        refuse(
-            "a comparison of numbers by < > == or !=, or by `min` or `max`",
-            "less or less_equal, and where(less(a, b), x, y); minimum, maximum",
-        )
+    def __format__(self, spec: str) -> str:
+        return super().__format__(spec) if self.recorder.path is None else self.recorder.path.shown(self, spec)
 
-    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = _compared  # pyright: ignore
+
+def _compared(name: str, turned: bool = False) -> Any:
+    def compare(self: Handle, other: Any) -> Any:
+        if self.recorder.path is None:
+            refuse(
+                "a comparison of numbers by < > == or !=, or by `min` or `max`",
+                "less or less_equal, and where(less(a, b), x, y); minimum, maximum",
+            )
+        return self.recorder.apply(OPERATIONS[name], (other, self) if turned else (self, other))
+
+    return compare
+
+
+def _equal(self: Handle, other: Any) -> Any:
+    ends = _compared("less_equal")(self, other), _compared("less_equal", turned=True)(self, other)
+    return self.recorder.apply(OPERATIONS["both"], ends)
+
+
+def _different(self: Handle, other: Any) -> Any:
+    return self.recorder.apply(OPERATIONS["opposite"], (_equal(self, other),))
+
+
+for _name, _operator in {
+    "__lt__": _compared("less"),
+    "__le__": _compared("less_equal"),
+    "__gt__": _compared("less", turned=True),
+    "__ge__": _compared("less_equal", turned=True),
+    "__eq__": _equal,
+    "__ne__": _different,
+}.items():
+    setattr(Handle, _name, _operator)
 
 
 def _binary(name: str, turned: bool = False) -> Any:

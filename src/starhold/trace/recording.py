@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections import Counter
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager
 from typing import Any, NoReturn
 
@@ -42,6 +42,9 @@ RESERVED = frozenset(_WORDS.split())
 """Words of the languages printed, which no variable may be called."""
 
 
+MARK = "\u241e"
+"""Stands on both sides of a number's place and format in a text that a check made of recorded numbers."""
+
 _CONSTANTS = {NUMBER: (float, int), TRUTH: (bool,), WORD: (int,), INDEX: (int,), STATIC: (int,)}
 
 
@@ -78,11 +81,36 @@ class _Names:
         return name
 
 
+class Path:
+    """One way through the comparisons of a check: the answers that are given, and no from there on. `truths` and
+    `taken` are the comparisons met with the answers that they got; `numbers` those that a text asked for."""
+
+    def __init__(self, turns: Sequence[bool]) -> None:
+        self.taken, self._turns = list[bool](), turns
+        self.truths, self.numbers = list[Handle](), list[Handle]()
+
+    def turn(self, truth: Handle) -> bool:
+        """Return the answer to a comparison on this way; one that was met before has the same."""
+        known = next((place for place, met in enumerate(self.truths) if met.ref == truth.ref), None)
+        if known is not None:
+            return self.taken[known]
+        self.taken.append(len(self.taken) < len(self._turns) and self._turns[len(self.taken)])
+        self.truths.append(truth)
+        return self.taken[-1]
+
+    def shown(self, number: Handle, spec: str) -> str:
+        """Return a mark in the place of a number in a text, as `refusals` reads it."""
+        self.numbers.append(number)
+        return f"{MARK}{len(self.numbers) - 1}:{spec}{MARK}"
+
+
 class Recorder:
     """Keeps what is done to handles as a tree of blocks, equal operations of a block and those round it once."""
 
     def __init__(self) -> None:
         self.memories: list[Memory] = []
+        self.path: Path | None = None
+        """The way that a check takes through its comparisons, where one is recorded."""
         self._functions: dict[Any, tuple[Function, list[int], Any]] = {}
         self._open: list[list[Any]] = [[]]
         self._seen: list[dict[Any, Handle]] = [{}]

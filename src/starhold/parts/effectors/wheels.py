@@ -22,7 +22,7 @@ from starhold.algebra.several import each, weighted
 from starhold.algebra.structured import Buffer, repeat
 from starhold.algebra.vector import Vector, add, cross, dot, scale
 from starhold.parts.contract import Card
-from starhold.parts.craft import check_inertia, vector
+from starhold.parts.craft import check_inertia, check_rest, compact, vector
 from starhold.parts.effectors.layouts import pyramid, three_orthogonal
 
 CARD = Card(
@@ -328,12 +328,8 @@ def body_inertia(inertia_total: Any, wheels: Wheels) -> NDArray[np.float64]:
     """
     axes = np.array(wheels.axes)
     rest = check_inertia(inertia_total) - (axes.T * np.array(wheels.inertia)) @ axes
-    moments = np.linalg.eigvalsh(rest)
-    if moments[0] <= 0.0:
-        shown = ", ".join(f"{m:g}" for m in moments)
-        raise ValueError(f"the rotors have more inertia than the craft: without them its principal moments are {shown}")
     # What symmetric layouts leave of the products is rounding, and would cost the loop its diagonal inertia.
-    rest[np.abs(rest) < 1e-15 * moments[-1]] = 0.0
+    rest[np.abs(rest) < 1e-15 * check_rest(compact(rest))] = 0.0
     return rest
 
 

@@ -86,10 +86,11 @@ function send(number) {
 let fates = [];
 
 function move() {
-  const wrong = invalid();
+  const wrong = refusal();
   fates = report.laws.map((_, number) => fate(number));
-  document.getElementById("unsound").textContent = wrong;
+  document.getElementById("unsound").textContent = `The program refuses this, so nothing flies again: ${wrong}.`;
   document.getElementById("unsound").hidden = !wrong;
+  document.getElementById("dials-copy").disabled = Boolean(wrong);
   if (!wrong) {
     fates.forEach((found, number) => {
       if (found.flies) send(number); else if (state.results.has(number)) restore(number);
@@ -274,18 +275,36 @@ function claims() {
   document.body.classList.toggle("moved", living.dials.some((dial) => isMoved(dial.key)));
 }
 
-// --- what no body has ---
+// --- what the program refuses ---
 
-function invalid() {
-  for (const key of [KNOWN, TRUE]) {
-    if (!dials.has(key)) continue;
-    const value = valueOf(key);
-    const moments = (Array.isArray(value[0]) ? principal(value)[0] : value).slice().sort((a, b) => a - b);
-    if (!(moments[0] > 0)) return "No body has this inertia: a principal moment is not positive. Nothing flies again until it can.";
-    if (moments[2] > (moments[0] + moments[1]) * (1 + 1e-9)) return "No body has this inertia: one principal moment exceeds the sum of the others. Nothing flies again until it can.";
+// Texts of functions, run as a script of the page: its policy forbids `eval`.
+const questions = [];
+const script = document.createElement("script");
+script.textContent = living.asked.map(({ program }) => `questions.push((() => {\n${program.text}\nreturn ${program.name};\n})());`).join("\n");
+document.head.append(script);
+
+// A number as Python's format "g" or ".4g" writes it.
+const formatted = (value, spec) => (Number.isFinite(value) ? general(value, Number(spec.match(/\.(\d+)g/)?.[1] ?? 6)) : String(value));
+
+// What the program would say of the file as it is; "" where it takes it.
+function refusal() {
+  const { least, most } = living.ranges;
+  for (const dial of living.dials.filter(({ key }) => isMoved(key))) {
+    const sizes = flatten(valueOf(dial.key)).map(Math.abs), size = Math.max(...sizes);
+    if (size && !(size >= least && size <= most)) return `${told(dial)}: 0, or between ${least} and ${most} in size`;
+    if (dial.unit === "rad" && size > 2 * Math.PI) return `${told(dial)}: a plain number is in rad, within 2 pi`;
+    const range = living.ranged[dial.key];
+    const beyond = (x, k) => x > flatten(dial.value).map(Math.abs)[k] * range * 1.001 || x < flatten(dial.value).map(Math.abs)[k] / range / 1.001;
+    const diagonal = (k) => sizes.length !== 9 || k % 4 === 0;
+    if (range && sizes.some((x, k) => diagonal(k) && beyond(x, k))) return `${told(dial)}: only up to ${range} times the file's, or down to 1/${range}: beyond, a law may refuse it by a check that this page does not have`;
   }
-  const attitude = dials.has(ATTITUDE) ? valueOf(ATTITUDE) : [1];
-  return attitude.every((x) => x === 0) ? "No attitude: the quaternion is zero." : "";
+  for (const [place, { keys, refusals }] of living.asked.entries()) {
+    const found = new Float64Array(1 + Math.max(...refusals.flatMap(([flag, words]) => [flag, ...words.map((word) => word[0]).filter(Number.isInteger)])));
+    questions[place](Float64Array.from(flatten(keys.map(valueOf))), found, 1);
+    const held = refusals.find(([flag]) => found[flag] === 1);
+    if (held) return held[1].map((word) => (typeof word === "string" ? word : formatted(found[word[0]], word[1]))).join("");
+  }
+  return "";
 }
 
 // --- the file of what is seen, and its address ---
@@ -320,7 +339,7 @@ function readAddress() {
       const [key, value] = part.split("=").map(decodeURIComponent);
       const given = JSON.parse(value);
       const like = dials.get(key);
-      const sound = like && flatten(given).every((x) => typeof x === "number" && Number.isFinite(x))
+      const sound = like && Object.values(living.laws).some((law) => law.follows.includes(key)) && flatten(given).every((x) => typeof x === "number" && Number.isFinite(x))
         && same(shapeOf(given), shapeOf(like.value)) && flatten(given).every((x) => within(like, x));
       if (sound) moved.set(key, given);
     } catch {
@@ -330,8 +349,7 @@ function readAddress() {
 }
 
 const shapeOf = (value) => (Array.isArray(value) ? value.map(shapeOf) : 0);
-const within = (dial, x) => !(dial.above !== null && dial.above !== undefined && x <= dial.above)
-  && !(dial.least !== null && dial.least !== undefined && x < dial.least) && !(dial.most !== null && dial.most !== undefined && x > dial.most);
+const within = ({ above, least, most }, x) => !(above !== null && x <= above) && !(least !== null && x < least) && !(most !== null && x > most);
 
 async function copied(button, text) {
   try {

@@ -3,7 +3,7 @@
 
 const panel = document.getElementById("dials");
 const sliders = [];
-const RANGE = 10, NEAR = 3;
+const { range: RANGE, near: NEAR } = living.ranges;
 const AXES = ["x", "y", "z"];
 // Which of the two inertias the sliders move.
 let lawsKnow = true;
@@ -19,7 +19,7 @@ const fromZero = (high) => ({ to: (t) => tidy(high * t ** 3), from: (value) => M
 
 function scaleOf(dial, base) {
   if (dial.key === KNOWN) return logarithmic(base, NEAR);
-  const bounded = dial.least !== null && dial.least !== undefined && dial.most !== null && dial.most !== undefined;
+  const bounded = dial.least !== null && dial.most !== null;
   if (bounded) return linear(dial.least, dial.most);
   if (base > 0) return logarithmic(base, RANGE);
   if (dial.law !== null && base === 0) return dial.least === 0 ? fromZero(1) : linear(-1, 1);
@@ -111,7 +111,7 @@ function row(slider) {
   const label = slider.label && dial.key !== ATTITUDE ? `${dial.label} ${slider.label}` : slider.label || dial.label;
   const name = `${told(dial)} ${slider.label}`.trim();
   box.innerHTML = `<label><span>${plain(label)}</span><input class="field" type="text" inputmode="decimal" spellcheck="false" aria-label="${plain(name)}">`
-    + `<small>${plain(slider.unit)}</small></label><input class="slide" type="range" min="0" max="1" step="any" aria-label="${plain(name)}, slider">`;
+    + `<small>${plain(slider.unit)}</small></label><input class="slide" type="range" min="0" max="1" step="any" aria-label="${plain(name)}, slider"><p class="why" hidden></p>`;
   if (dial.text) box.title = dial.text;
   const [field, slide] = [box.querySelector(".field"), box.querySelector(".slide")];
   Object.assign(slider, { box, field, slide });
@@ -127,19 +127,23 @@ function set(slider, value) {
   const key = keyOf(dial);
   const bad = !Number.isFinite(value) || !(slider.unit === "deg" || slider.label === "factor" || within(dial, value));
   slider.box.classList.toggle("bad", bad);
-  if (bad) {
-    slider.field.title = "not a number within its bounds";
-    return;
-  }
+  const why = slider.box.querySelector(".why");
+  why.hidden = !bad;
+  why.textContent = Number.isFinite(value) ? `must be ${boundsOf(dial)}` : "must be a number";
+  if (bad) return;
   moved.set(key, slider.write(valueOf(key), value));
   if (!isMoved(key)) moved.delete(key);
   place(slider);
   move();
 }
 
+const boundsOf = ({ above, least, most }) => [[above, "above"], [least, "at least"], [most, "at most"]]
+  .filter(([bound]) => bound !== null).map(([bound, word]) => `${word} ${bound}`).join(", ");
+
 function place(slider) {
   const value = slider.read(valueOf(keyOf(slider.dial)));
   slider.box.classList.remove("bad");
+  slider.box.querySelector(".why").hidden = true;
   if (document.activeElement !== slider.field || slider.slide === document.activeElement) slider.field.value = String(value);
   else slider.field.value = String(value);
   const t = slider.scale.from(value);

@@ -123,6 +123,11 @@ class Body(Protocol):
         gives of the scenario that `changes` tells."""
         return Moved(loop.start, loop.start, loop.craft, loop.craft, loop.cutoff())
 
+    def admitted(self, scenario: Scenario, values: Mapping[str, Any]) -> Any:
+        """The body's numbers as laws know them under these values of the keys of `dials`, which may be recorded numbers;
+        InputError, as of a file, where no file may have them."""
+        return scenario.craft
+
     def changes(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """The changes of a file, as a scenario's `with_` takes them, that values of these keys mean."""
         return dict(values)

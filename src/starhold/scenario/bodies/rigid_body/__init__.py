@@ -12,7 +12,7 @@ from starhold.parts.part import Fitted
 from starhold.scenario.bodies.interface import Body, Moved
 from starhold.scenario.bodies.rigid_body.building import build, check_events
 from starhold.scenario.bodies.rigid_body.craft import Made, make
-from starhold.scenario.bodies.rigid_body.dials import KNOWN, TRUE, changes, dials, moved
+from starhold.scenario.bodies.rigid_body.dials import KNOWN, TRUE, admitted, changes, dials, moved
 from starhold.scenario.bodies.rigid_body.lanes import derive, refused
 from starhold.scenario.bodies.rigid_body.start import mode_target, told_to_design
 from starhold.scenario.bodies.rigid_body.tables import AttitudeLawTable, RigidBodyTable
@@ -85,6 +85,9 @@ class RigidBody(Body):
 
     def moved(self, scenario: Scenario, loop: ClosedLoop, values: Mapping[str, Any]) -> Moved:
         return moved(scenario, loop, values)
+
+    def admitted(self, scenario: Scenario, values: Mapping[str, Any]) -> Any:
+        return admitted(scenario, values)
 
     def changes(self, values: Mapping[str, Any]) -> dict[str, Any]:
         return changes(values)

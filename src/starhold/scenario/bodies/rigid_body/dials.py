@@ -12,9 +12,11 @@ import numpy as np
 from starhold.algebra.scalar import both, less_equal, minimum, where
 from starhold.algebra.structure import leaves
 from starhold.algebra.vector import apply
+from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.craft import Craft, compact, inverse
+from starhold.parts.craft import Craft, check_moments, check_rest, compact, inverse
 from starhold.parts.effectors.wheels import body_inertia
+from starhold.parts.stated_attitude import check_attitude
 from starhold.scenario.bodies.interface import Moved
 from starhold.scenario.bodies.rigid_body.craft import torque_limit, wheels_of
 from starhold.scenario.bodies.rigid_body.start import start_of, target_of
@@ -57,11 +59,22 @@ def changes(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def moved(scenario: Scenario, loop: ClosedLoop, values: Mapping[str, Any]) -> Moved:
     """The numbers of a loop under these values, as `build` and `make_events` give them."""
-    craft, limit = loop.craft, values.get(LIMIT)
-    cutoff = loop.cutoff()
+    nominal, flown = _crafts(scenario, values)
+    cutoff = values.get(LIMIT, loop.cutoff())
+    begun = start_of(scenario, target_of(scenario), values.get(ATTITUDE), values.get(RATE))
+    # An inertia that changes as the motion begins leaves the angular momentum, as in `Phase.rate_from`.
+    pairs = zip(leaves(flown.inertia), leaves(nominal.inertia), strict=True)
+    same = reduce(both, (both(less_equal(a, b), less_equal(b, a)) for a, b in pairs))
+    jumped = apply(flown.inverse_inertia, apply(nominal.inertia, begun.rate))
+    rate: Any = tuple(where(same, kept, other) for kept, other in zip(begun.rate, jumped, strict=True))
+    return Moved(begun._replace(rate=rate), begun, flown, nominal, cutoff)
+
+
+def _crafts(scenario: Scenario, values: Mapping[str, Any]) -> tuple[Craft, Craft]:
+    """The craft that laws know, and the one that flies."""
+    craft, limit = scenario.craft, values.get(LIMIT)
     if limit is not None:
-        cutoff, reckoned = limit, limit
-        wheels = wheels_of(scenario)
+        reckoned, wheels = limit, wheels_of(scenario)
         if wheels is not None:
             # What the wheels surely give does not depend on the limit.
             free = scenario.table.model_copy(
@@ -70,14 +83,26 @@ def moved(scenario: Scenario, loop: ClosedLoop, values: Mapping[str, Any]) -> Mo
             reckoned = minimum(limit, torque_limit(free, wheels))
         craft = craft._replace(torque_limit=reckoned)
     nominal = _with_inertia(scenario, craft, values[KNOWN]) if KNOWN in values else craft
-    flown = _with_inertia(scenario, craft, values[TRUE]) if TRUE in values else nominal
-    begun = start_of(scenario, target_of(scenario), values.get(ATTITUDE), values.get(RATE))
-    # An inertia that changes as the motion begins leaves the angular momentum, as in `Phase.rate_from`.
-    pairs = zip(leaves(flown.inertia), leaves(nominal.inertia), strict=True)
-    same = reduce(both, (both(less_equal(a, b), less_equal(b, a)) for a, b in pairs))
-    jumped = apply(flown.inverse_inertia, apply(nominal.inertia, begun.rate))
-    rate: Any = tuple(where(same, kept, other) for kept, other in zip(begun.rate, jumped, strict=True))
-    return Moved(begun._replace(rate=rate), begun, flown, nominal, cutoff)
+    return nominal, _with_inertia(scenario, craft, values[TRUE]) if TRUE in values else nominal
+
+
+def admitted(scenario: Scenario, values: Mapping[str, Any]) -> Craft:
+    """The craft that laws know under these values, which may be recorded ones; InputError where no file may have them."""
+    crafts = _crafts(scenario, values)
+    for key, craft in zip((KNOWN, TRUE), crafts, strict=True):
+        try:
+            if key in values:
+                check_moments(values[key])
+            if key in values and wheels_of(scenario) is not None:
+                check_rest(craft.inertia)
+        except ValueError as error:
+            raise InputError("", key, "", str(error)) from None
+    if ATTITUDE in values:
+        try:
+            check_attitude(values[ATTITUDE])
+        except ValueError as error:
+            raise InputError("", ATTITUDE, "", str(error)) from None
+    return crafts[0]
 
 
 def _with_inertia(scenario: Scenario, craft: Craft, inertia: Any) -> Craft:

@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from starhold.laws.interface import Gain
 from starhold.parts.craft import check_inertia
 from starhold.parts.epoch import START
-from starhold.parts.stated_attitude import ALLOWED, LONGEST, SHORTEST
+from starhold.parts.stated_attitude import check_attitude
 from starhold.scenario.bodies.rigid_body.budget import BudgetTable
 from starhold.scenario.bodies.rigid_body.transient import TransientTable
 from starhold.scenario.orbit import Orbit
@@ -67,10 +67,11 @@ class Pointing(Table):
     def _one_attitude(self) -> Pointing:
         if self.attitude is not None and self.angles is not None:
             raise at_key("angles", "either attitude or angles, not both", list(self.angles))
-        if self.attitude is not None and not any(self.attitude):
-            raise at_key("attitude", "a quaternion that is not zero", list(self.attitude))
-        if self.attitude is not None and not SHORTEST <= math.hypot(*self.attitude) <= LONGEST:
-            raise at_key("attitude", ALLOWED, list(self.attitude))
+        try:
+            if self.attitude is not None:
+                check_attitude(self.attitude)
+        except ValueError as error:
+            raise at_key("attitude", str(error), list(self.attitude or ())) from None
         return self
 
 

@@ -1,0 +1,135 @@
+"""What the program asks of a scenario's numbers before it flies them, as programs of the keys that a page moves: those of
+the craft and the start, and each law's own `check` and `remember`, in the words of their refusals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from itertools import product
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from starhold.errors import InputError
+from starhold.parts.craft import matrix
+from starhold.trace.handles import RecordingError
+from starhold.trace.program import Program
+from starhold.trace.refusals import Words, record_check
+
+if TYPE_CHECKING:
+    from starhold.loop.closed_loop import ClosedLoop
+    from starhold.scenario.reading import LawEntry, Scenario
+
+UNASKED = "the law checks it by means that no equation records"
+NEAR, RANGE = 3.0, 10.0
+"""Factors up to which inertias, and other numbers, are moved."""
+
+
+class Question(NamedTuple):
+    """A program of the values of these keys, in order; for each refusal the place of the number that is 1 where it holds,
+    with its text; and the law that asks, "" for the scenario."""
+
+    law: str
+    keys: tuple[str, ...]
+    program: Program
+    refusals: list[tuple[int, Words]]
+
+
+class Asked(NamedTuple):
+    """All questions; keys that cannot be moved, each with the reason; and those that can by a factor up to this alone, for
+    within it a law that no equation asks was tried."""
+
+    questions: tuple[Question, ...]
+    fixed: dict[str, str]
+    ranged: dict[str, float]
+
+
+def ask(scenario: Scenario, loops: Mapping[str, ClosedLoop], dials: Mapping[str, Any]) -> Asked:
+    """The questions of a scenario whose laws have these loops, about these keys."""
+    shared = {key: value for key, value in dials.items() if not key.startswith("law.")}
+    found, unasked = _recorded("", lambda values: scenario.hooks.admitted(scenario, values), shared)
+    fixed, ranged = dict.fromkeys(unasked, UNASKED), dict[str, float]()
+    # First of all laws what is asked as a file is read, then what is asked as loops are built.
+    for entry, reads in [(entry, reads) for reads in (True, False) for entry in scenario.laws]:
+        check, prefix = _check(scenario, entry, loops[entry.name], reads), f"law.{entry.name}."
+        own = {key: value for key, value in dials.items() if key.startswith(prefix) and "." not in key[len(prefix) :]}
+        questions, unasked = _recorded(entry.name, check, shared | own)
+        found += questions
+        fixed |= {key: UNASKED for key in unasked if key in own}
+        for key in unasked:
+            if key in shared:
+                ranged[key] = NEAR if isinstance(shared[key], tuple) else RANGE
+                if not all(_takes(scenario, check, {key: value}) for value in _corners(shared[key], ranged[key])):
+                    fixed[key] = UNASKED
+    return Asked(tuple(found), fixed, ranged)
+
+
+def _check(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, reads: bool) -> Callable[[Mapping[str, Any]], None]:
+    """What a law asks of the gains and of the craft that it knows, under values of keys, as its file is read or its memory
+    made."""
+
+    def check(values: Mapping[str, Any]) -> None:
+        own = {key.rpartition(".")[2]: value for key, value in values.items() if key.startswith("law.")}
+        shared = {key: value for key, value in values.items() if not key.startswith("law.")}
+        gains, craft = entry.gains._replace(**own), scenario.hooks.moved(scenario, loop, shared).nominal
+        try:
+            if not reads:
+                entry.law.remember(gains, craft, loop.period)
+            elif not scenario.allow_unstable:
+                entry.law.check(gains, craft)
+        except (InputError, ZeroDivisionError):
+            raise
+        except ValueError as error:
+            raise InputError("", f"law {entry.name}", "", str(error)) from None
+
+    return check
+
+
+def _recorded(
+    law: str, check: Callable[[Mapping[str, Any]], Any], values: Mapping[str, Any]
+) -> tuple[list[Question], list[str]]:
+    """The question that a check is, if it asks anything, and the keys that it looks at by means that cannot be recorded."""
+
+    def of(keys: tuple[str, ...]) -> list[Question]:
+        made = record_check(lambda given: check(dict(zip(keys, given, strict=True))), (tuple(values[key] for key in keys),))
+        return [] if made is None else [Question(law, keys, *made)]
+
+    def recordable(key: str) -> bool:
+        try:
+            of((key,))
+        except RecordingError:
+            return False
+        return True
+
+    try:
+        return (of(tuple(values)) if values else []), []
+    except RecordingError:
+        kept = tuple(key for key in values if recordable(key))
+    try:
+        return (of(kept) if kept else []), [key for key in values if key not in kept]
+    except RecordingError:
+        return [], list(values)
+
+
+def _takes(scenario: Scenario, check: Callable[[Mapping[str, Any]], Any], values: Mapping[str, Any]) -> bool:
+    """Whether a law takes these values, as it does where no body has them."""
+    try:
+        scenario.hooks.admitted(scenario, values)
+    except InputError:
+        return True
+    try:
+        check(values)
+    except (InputError, ZeroDivisionError):
+        return False
+    return True
+
+
+def _corners(value: Any, factor: float) -> Iterator[Any]:
+    """A number times and over the factor; an inertia with each axis stretched so."""
+    if not isinstance(value, tuple):
+        yield from (value / factor, value * factor)
+        return
+    for factors in product((1.0 / factor, factor), repeat=len(value)):
+        if isinstance(value[0], tuple):
+            yield matrix(np.sqrt(np.outer(factors, factors)) * np.array(value))
+        else:
+            yield tuple(x * f for x, f in zip(value, factors, strict=True))
