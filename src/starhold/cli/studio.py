@@ -30,11 +30,12 @@ def studio(
         raise InputError("studio", "", "no starlette and uvicorn installed", EXTRA)
     if not 0 <= port < 65536:
         raise InputError("studio", "--port", str(port), "0 to 65535")
-    path, text = None, template_text("rigid-body")
+    path, name, text = None, "mine.toml", template_text("rigid-body")
     if file is not None and file in builtin_names() and not Path(file).is_file():
-        text = builtin_text(file)
+        name, text = f"{file}.toml", builtin_text(file)
     elif file is not None:
         path = Path(file)
+        name = path.name
         try:
             text = read_text(path)
         except (OSError, ValueError) as error:
@@ -48,4 +49,4 @@ def studio(
         console.print(f"Studio: {address}", soft_wrap=True, highlight=False, markup=False)
         console.print("Nothing leaves this machine. Ctrl-C ends it.", highlight=False)
 
-    serve(path, text, port, told, browser)
+    serve(path, name, text, port, told, browser)

@@ -3,25 +3,54 @@
 from __future__ import annotations
 
 import re
-from typing import Any
+from pathlib import Path
+from typing import Any, cast
 
 from starhold.errors import InputError
 from starhold.laws.catalogue import catalogue
+from starhold.scenario.building import build
+from starhold.scenario.checking import read_toml
 from starhold.scenario.json_schema import json_schema
 from starhold.scenario.parts import installed
 from starhold.scenario.reading import builtin_names, parse
+
+TABLES = (".csv", ".aem")
+"""How files of numbers end; others that a scenario names are Python."""
 
 _HEAD = re.compile(r"\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(?:#.*)?$")
 
 
 def check(text: str, where: str, folder: Any) -> dict[str, Any]:
-    """Tell whether a text is a scenario, with its name and laws, or what is wrong, where."""
+    """Tell whether a text is a scenario whose loops can be flown, with its name and laws, or what is wrong, where."""
     try:
         scenario = parse(text, where, folder)
+        for entry in scenario.laws:
+            build(scenario, entry)
     except InputError as error:
         line = line_of(text, error.key, error.found)
         return {"error": str(error), "key": error.key, "line": line}
     return {"name": scenario.name, "laws": [entry.name for entry in scenario.laws], "body": scenario.body}
+
+
+def files_run(text: str) -> list[str]:
+    """The files that are run as Python where a scenario of this text is read."""
+    try:
+        tables = read_toml(text, "")
+    except InputError:
+        return []
+    found: set[str] = set()
+    left: list[Any] = [tables]
+    while left:
+        value = left.pop()
+        if isinstance(value, dict):
+            given = cast(dict[str, Any], value)
+            file = given.get("file")
+            if isinstance(file, str) and Path(file).suffix.lower() not in TABLES:
+                found.add(file)
+            left += given.values()
+        elif isinstance(value, list):
+            left += cast(list[Any], value)
+    return sorted(found)
 
 
 def line_of(text: str, key: str, found: str = "") -> int | None:

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,12 +27,20 @@ class Job:
     name: str
     folder: Path
     process: subprocess.Popen[str]
+    laws: Sequence[str] = ()
     state: dict[str, Any] = field(default_factory=dict[str, Any])
     ended: bool = False
 
     def told(self) -> dict[str, Any]:
         """Tell the page of it."""
-        return {"number": self.number, "kind": self.kind, "name": self.name, "ended": self.ended, **self.state}
+        return {
+            "number": self.number,
+            "kind": self.kind,
+            "name": self.name,
+            "laws": self.laws,
+            "ended": self.ended,
+            **self.state,
+        }
 
 
 class Jobs:
@@ -42,19 +51,19 @@ class Jobs:
         self._jobs: dict[int, Job] = {}
         self._lock = threading.Lock()
 
-    def start(self, kind: str, name: str, text: str, where: str, beside: Path) -> Job:
-        """Begin a job; ValueError where as many as may are at work."""
+    def start(self, kind: str, name: str, text: str, where: str, beside: Path, laws: Sequence[str]) -> Job:
+        """Begin a job about these laws; ValueError where as many as may are at work."""
         with self._lock:
             if sum(not job.ended for job in self._jobs.values()) >= MOST:
                 raise ValueError(f"{MOST} things are at work already; stop one, or wait")
             number = len(self._jobs) + 1
             folder = Path(self._place.name) / str(number)
             folder.mkdir()
-            command = [sys.executable, "-m", "starhold.studio.worker", kind, where, str(beside), str(folder)]
+            command = [sys.executable, "-m", "starhold.studio.worker", kind, where, str(beside), str(folder), *laws]
             process = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8"
             )
-            job = self._jobs[number] = Job(number, kind, name, folder, process)
+            job = self._jobs[number] = Job(number, kind, name, folder, process, laws)
         threading.Thread(target=_follow, args=(job, text), daemon=True).start()
         return job
 

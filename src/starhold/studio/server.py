@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import secrets
 import socket
 import webbrowser
@@ -19,14 +20,14 @@ from starlette.routing import Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from starhold.errors import InputError
-from starhold.files import atomic_write
 from starhold.scenario.reading import builtin_names, builtin_text
 from starhold.studio import editing
+from starhold.studio.checker import Checker
+from starhold.studio.documents import Documents, RefusedError
 from starhold.studio.jobs import Jobs
-from starhold.studio.worker import KINDS
+from starhold.studio.worker import KINDS, RERUN
 
 HOST = "127.0.0.1"
-COOKIE = "starhold-studio"
 MOST_TEXT = 2**23
 """Bytes that a request may have."""
 POLICY = (
@@ -56,17 +57,20 @@ class Guard:
             return
         request = Request(scope, receive)
         answer: Response | None = None
-        if (request.url.hostname or "") not in (HOST, "localhost"):
+        cookie, receives = cookie_name(scope["server"][1]), receive
+        if _host(request) not in (HOST, "localhost"):
             answer = PlainTextResponse("this studio answers on this machine alone", 403)
         elif _equal(request.query_params.get("token", ""), self._token):
             answer = RedirectResponse("/", 303)
-            answer.set_cookie(COOKIE, self._token, httponly=True, samesite="strict")
-        elif not _equal(request.cookies.get(COOKIE, ""), self._token):
+            answer.set_cookie(cookie, self._token, httponly=True, samesite="strict")
+        elif not _equal(request.cookies.get(cookie, ""), self._token):
             answer = PlainTextResponse("open the address that `starhold studio` printed: it holds the token", 403)
         elif request.method != "GET" and not request.headers.get("content-type", "").startswith("application/json"):
             answer = PlainTextResponse("JSON is wanted", 415)
-        elif int(request.headers.get("content-length", "0") or 0) > MOST_TEXT:
+        elif (body := await _body(receive)) is None:
             answer = PlainTextResponse("too long", 413)
+        else:
+            receives = _given(body, receive)
 
         async def guarded(message: Any) -> None:
             if message["type"] == "http.response.start":
@@ -75,7 +79,42 @@ class Guard:
                 message["headers"] = [*message["headers"], *((k.encode(), v.encode()) for k, v in own.items())]
             await send(message)
 
-        await (answer or self._app)(scope, receive, guarded)
+        await (answer or self._app)(scope, receives, guarded)
+
+
+def cookie_name(port: int) -> str:
+    """Name the cookie of the studio on a port: browsers keep one jar for all ports of a machine."""
+    return f"starhold-studio-{port}"
+
+
+def _host(request: Request) -> str:
+    """The host that a request names; "" where it names none."""
+    try:
+        return request.url.hostname or ""
+    except ValueError:
+        return ""
+
+
+async def _body(receive: Receive) -> bytes | None:
+    """The whole body of a request, however it comes; None where it is too long."""
+    found = b""
+    while True:
+        message = await receive()
+        found += message.get("body", b"")
+        if len(found) > MOST_TEXT:
+            return None
+        if message["type"] != "http.request" or not message.get("more_body", False):
+            return found
+
+
+def _given(body: bytes, receive: Receive) -> Receive:
+    """A `receive` that gives a body which was read, and what comes after it."""
+    left = [{"type": "http.request", "body": body, "more_body": False}]
+
+    async def again() -> Any:
+        return left.pop() if left else await receive()
+
+    return again
 
 
 def _equal(given: str, token: str) -> bool:
@@ -83,12 +122,14 @@ def _equal(given: str, token: str) -> bool:
 
 
 class Studio:
-    """One studio: the file that it edits, if any, and the jobs."""
+    """One studio: the folder whose scenarios it edits, and the jobs. `name`: what the text is called that it begins with
+    where no file is given; `run`: files that may be run as Python, for the user said so."""
 
-    def __init__(self, path: Path | None, text: str) -> None:
-        self.path, self.text, self.jobs = path, text, Jobs()
-        self.where = "scenario" if path is None else path.name
-        self.folder = Path() if path is None else path.parent
+    def __init__(self, path: Path | None, name: str, text: str) -> None:
+        self.name, self.text, self.jobs, self.checker = name, text, Jobs(), Checker()
+        self.documents = Documents(path)
+        self.where, self.folder = name, self.documents.folder
+        self.run: set[str] = set()
 
     def app(self, token: str) -> Starlette:
         """Make the application."""
@@ -98,10 +139,13 @@ class Studio:
             Route("/begin", self._begin),
             Route("/builtin/{name}", self._builtin),
             Route("/check", self._check, methods=["POST"]),
+            Route("/file", self._file),
             Route("/save", self._save, methods=["POST"]),
+            Route("/run", self._run, methods=["POST"]),
             Route("/jobs", self._all),
             Route("/jobs", self._start, methods=["POST"]),
             Route("/jobs/{number:int}/stop", self._stop, methods=["POST"]),
+            Route("/jobs/{number:int}/again", self._again, methods=["POST"]),
             Route("/results/{number:int}/{name}", self._result),
         ]
         return Starlette(routes=routes, middleware=[Middleware(Guard, token=token)])
@@ -115,8 +159,10 @@ class Studio:
 
     async def _begin(self, request: Request) -> Response:
         words, choices = await run_in_threadpool(editing.words), await run_in_threadpool(editing.choices)
-        file = None if self.path is None else str(self.path)
-        return JSONResponse({"text": self.text, "file": file, "words": words, "kinds": list(KINDS), **choices})
+        own = None if self.documents.path is None else self.documents.path.name
+        begun = {"name": self.name, "text": self.text, "version": ""}
+        told = {"own": own, "folder": str(self.folder), "words": words, "kinds": list(KINDS), **choices}
+        return await _answered(lambda: (begun if own is None else self.documents.read()) | told)
 
     async def _builtin(self, request: Request) -> Response:
         name = request.path_params["name"]
@@ -126,31 +172,62 @@ class Studio:
 
     async def _check(self, request: Request) -> Response:
         asked = await _asked(request, "text")
-        return JSONResponse(await run_in_threadpool(editing.check, asked["text"], self.where, self.folder))
+        return _malformed() if asked is None else JSONResponse(await self._checked(asked["text"]))
+
+    async def _checked(self, text: str) -> dict[str, Any]:
+        """What a check tells of a text; or the files that it would run and the user did not yet allow."""
+        files = [file for file in editing.files_run(text) if file not in self.run]
+        return {"asks": files} if files else await run_in_threadpool(self.checker.check, text, self.where, self.folder)
+
+    async def _run(self, request: Request) -> Response:
+        given = await _json(request)
+        files = given.get("files") if isinstance(given, dict) else None
+        if not isinstance(files, list) or not all(isinstance(file, str) for file in files):
+            return _malformed()
+        self.run |= set(files)
+        return JSONResponse({})
+
+    async def _file(self, request: Request) -> Response:
+        if self.documents.path is None:
+            return JSONResponse({"error": "the studio was started without a file"}, 404)
+        return await _answered(self.documents.read)
 
     async def _save(self, request: Request) -> Response:
-        asked = await _asked(request, "text")
-        if self.path is None:
-            return JSONResponse({"error": "no file: start the studio with the name of one"}, 409)
-        try:
-            with atomic_write(self.path) as hidden:
-                hidden.write_text(asked["text"], encoding="utf-8")
-        except OSError as error:
-            return JSONResponse({"error": f"{self.path}: {error.strerror}"}, 409)
-        return JSONResponse({"saved": str(self.path)})
+        asked = await _asked(request, "text", "name", "version")
+        return _malformed() if asked is None else await _answered(lambda: self.documents.save(**asked))
 
     async def _all(self, request: Request) -> Response:
         return JSONResponse(self.jobs.all())
 
     async def _start(self, request: Request) -> Response:
         asked = await _asked(request, "text", "kind")
+        if asked is None:
+            return _malformed()
         if asked["kind"] not in KINDS:
             return JSONResponse({"error": f"no such thing: {asked['kind']}; one of {', '.join(KINDS)}"}, 422)
-        found = await run_in_threadpool(editing.check, asked["text"], self.where, self.folder)
-        if "error" in found:
+        found = await self._checked(asked["text"])
+        if "name" not in found:
             return JSONResponse(found, 422)
         try:
-            job = self.jobs.start(asked["kind"], found["name"], asked["text"], self.where, self.folder)
+            job = self.jobs.start(asked["kind"], found["name"], asked["text"], self.where, self.folder, found["laws"])
+        except ValueError as error:
+            return JSONResponse({"error": str(error)}, 409)
+        return JSONResponse(job.told(), 201)
+
+    async def _again(self, request: Request) -> Response:
+        """Fly one run of a campaign that is a job of this studio again."""
+        asked, job = await _asked(request, "law", "run"), self.jobs.get(request.path_params["number"])
+        if (
+            asked is None
+            or job is None
+            or job.kind != "campaign"
+            or not asked["run"].isdecimal()
+            or asked["law"] not in job.laws
+        ):
+            return _malformed()
+        try:
+            told = f"{asked['law']}, run {asked['run']}"
+            job = self.jobs.start(RERUN, told, "", str(job.folder), self.folder, (asked["law"], asked["run"]))
         except ValueError as error:
             return JSONResponse({"error": str(error)}, 409)
         return JSONResponse(job.told(), 201)
@@ -161,21 +238,40 @@ class Studio:
 
     async def _result(self, request: Request) -> Response:
         job, name = self.jobs.get(request.path_params["number"]), request.path_params["name"]
-        path = None if job is None else job.folder / name
         # A name of the folder itself, and nothing beyond it.
-        if path is None or Path(name).name != name or not path.is_file():
+        path = None if job is None else next((path for path in job.folder.iterdir() if path.name == name), None)
+        if path is None or not path.is_file():
             return PlainTextResponse("no such file", 404)
         return FileResponse(path)
 
 
-async def _asked(request: Request, *names: str) -> dict[str, str]:
-    """Read the strings of these names in a request."""
+def _malformed() -> Response:
+    return JSONResponse({"error": "not what is asked here"}, 422)
+
+
+async def _answered(work: Callable[[], dict[str, Any]]) -> Response:
+    """What work on files comes to."""
     try:
-        given: Any = await request.json()
-    except ValueError:
-        given = None
+        return JSONResponse(await run_in_threadpool(work))
+    except RefusedError as refused:
+        return JSONResponse(refused.told, 409)
+
+
+async def _json(request: Request) -> Any:
+    """What a request holds; None where it is no JSON, or holds what is no text."""
+    try:
+        given = json.loads(await request.body())
+        json.dumps(given, ensure_ascii=False).encode()
+    except (ValueError, RecursionError):
+        return None
+    return given
+
+
+async def _asked(request: Request, *names: str) -> dict[str, str] | None:
+    """Read the strings of these names in a request; None where it does not hold them."""
+    given = await _json(request)
     if not isinstance(given, dict) or not all(isinstance(given.get(name), str) for name in names):
-        return dict.fromkeys(names, "")
+        return None
     return {name: given[name] for name in names}
 
 
@@ -183,11 +279,11 @@ def _text(name: str) -> str:
     return (resources.files("starhold.studio") / "assets" / name).read_text(encoding="utf-8")
 
 
-def serve(path: Path | None, text: str, port: int, told: Callable[[str], None], browse: bool) -> None:
+def serve(path: Path | None, name: str, text: str, port: int, told: Callable[[str], None], browse: bool) -> None:
     """Serve a studio until it is interrupted. told: hears the address with its token. InputError where the port is taken."""
     import uvicorn
 
-    token, studio = secrets.token_urlsafe(24), Studio(path, text)
+    token, studio = secrets.token_urlsafe(24), Studio(path, name, text)
     listener = socket.socket()
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
@@ -207,5 +303,6 @@ def serve(path: Path | None, text: str, port: int, told: Callable[[str], None], 
     try:
         uvicorn.Server(config).run(sockets=[listener])
     finally:
+        studio.checker.close()
         studio.jobs.close()
         listener.close()

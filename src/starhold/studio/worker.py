@@ -4,8 +4,11 @@ standard input does."""
 
 from __future__ import annotations
 
+import base64
+import csv
 import json
 import os
+import shutil
 import sys
 import threading
 import time
@@ -65,7 +68,6 @@ def _certify(scenario: Scenario, folder: Path, tell: Tell) -> str:
 
 
 def _design(scenario: Scenario, folder: Path, tell: Tell) -> str:
-    from starhold.report.page_parts import document, versions
     from starhold.report.text import number_text
     from starhold.scenario.designing import design
 
@@ -89,7 +91,7 @@ def _design(scenario: Scenario, folder: Path, tell: Tell) -> str:
             for name, value in found.figures.items()
         )
         parts.append(f"<dl>{figures}</dl>")
-    return _page(folder, document(scenario, parts, {"laws": [], "plots": []}, (), f"{versions()}."))
+    return _document(scenario, folder, parts)
 
 
 def _shown(value: Any) -> str:
@@ -109,7 +111,88 @@ def _failures(scenario: Scenario, folder: Path, tell: Tell) -> str:
     found = study(scenario, entry, lambda done, total, name: tell(done, total, f"lost: {name}" if name else "flown"))
     write_failures(found, entry, folder / FAILURES[0])
     draw(found, folder / FAILURES[1], f"{scenario.name}, {entry.name}: loss of wheels")
-    return FAILURES[1]
+    return _shown_table(scenario, folder, f"Loss of wheels under {entry.name}", *FAILURES)
+
+
+def _budget(scenario: Scenario, folder: Path, tell: Tell) -> str:
+    from starhold.report.budget_picture import draw, setting_text
+    from starhold.report.results import BUDGET
+    from starhold.report.tables import write_budget
+    from starhold.studies.budget import study
+
+    entry = scenario.about("rigid-body").laws[0]
+    found = study(scenario, entry, lambda done, total, name: tell(done, total, name or "flown"))
+    write_budget(found, folder / BUDGET[0])
+    draw(found, folder / BUDGET[1])
+    return _shown_table(scenario, folder, f"Pointing error by source under {entry.name}", *BUDGET, setting_text(found))
+
+
+def _export(scenario: Scenario, folder: Path, tell: Tell) -> str:
+    from starhold.api import export_c
+
+    parts: list[str] = []
+    for place, entry in enumerate(scenario.laws):
+        tell(place, len(scenario.laws), f"{entry.name} is written and certified")
+        parts.append(f"<h2>{escape(entry.name)}</h2>")
+        try:
+            made = export_c(scenario, folder / entry.name, entry.name)
+        except InputError as error:
+            parts.append(f"<p>{escape(str(error))}</p>")
+            continue
+        archive = shutil.make_archive(str(folder / f"{entry.name}-c"), "zip", folder, entry.name)
+        said = made.proof.warning or f"Proved: {made.proof.file}, sha256 {made.proof.digest}."
+        costs = "".join(
+            f"<li>{escape(cost.target)}: {cost.flash} bytes of flash, {cost.stack} of stack</li>" for cost in made.costs
+        )
+        parts.append(
+            f'<p><a href="{escape(Path(archive).name)}" download>{escape(Path(archive).name)}</a>: '
+            f"{escape(', '.join(made.files))}</p><p>{escape(said)}</p><ul>{costs}</ul>"
+        )
+    return _document(scenario, folder, parts)
+
+
+def _shown_table(scenario: Scenario, folder: Path, title: str, table: str, picture: str, note: str = "") -> str:
+    """A page of a picture and the table beside it, without the columns that are empty throughout."""
+    with (folder / table).open(encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file))
+    kept = [place for place, _ in enumerate(rows[0]) if any(row[place] for row in rows[1:])]
+    lines = [
+        "".join(f"<{cell}>{escape(_short(row[place]))}</{cell}>" for place in kept)
+        for row, cell in zip(rows, ["th", *["td"] * (len(rows) - 1)], strict=True)
+    ]
+    drawn = base64.b64encode((folder / picture).read_bytes()).decode()
+    parts = [
+        f"<h2>{escape(title)}</h2>",
+        f'<p><img src="data:image/png;base64,{drawn}" alt="{escape(title)}" style="max-width:100%"></p>',
+        f"<p>{escape(note)}</p>" if note else "",
+        f'<div class="wide"><table class="text"><thead><tr>{lines[0]}</tr></thead>'
+        f"<tbody>{''.join(f'<tr>{line}</tr>' for line in lines[1:])}</tbody></table></div>",
+        f'<p>All digits: <a href="{table}" download>{table}</a>. Picture: <a href="{picture}" download>{picture}</a>.</p>',
+    ]
+    return _document(scenario, folder, parts)
+
+
+def _short(text: str) -> str:
+    """Numbers of a cell to a few digits; all else as it stands."""
+    try:
+        return " ".join(f"{float(word):.5g}" for word in text.split())
+    except ValueError:
+        return text
+
+
+def _document(scenario: Scenario, folder: Path, parts: list[str]) -> str:
+    from starhold.report.page_parts import document, versions
+
+    return _page(folder, document(scenario, parts, {"laws": [], "plots": []}, (), f"{versions()}."))
+
+
+def _rerun(campaign: Path, law: str, run: int, folder: Path, tell: Tell) -> str:
+    from starhold.campaign.campaign import fly_again
+    from starhold.report.results import write_results
+
+    tell(0, 0, f"run {run} of {law} flies")
+    found = fly_again(campaign, run, law)
+    return write_results(found.scenario, [found.flight], folder).name
 
 
 def _campaign(scenario: Scenario, folder: Path, tell: Tell) -> str:
@@ -134,12 +217,26 @@ def _page(folder: Path, text: str) -> str:
     return "report.html"
 
 
-KINDS = {"compare": _compare, "certify": _certify, "design": _design, "failures": _failures, "campaign": _campaign}
+KINDS = {
+    "compare": _compare,
+    "certify": _certify,
+    "design": _design,
+    "failures": _failures,
+    "budget": _budget,
+    "campaign": _campaign,
+    "export": _export,
+}
 """What can be asked for."""
+RERUN = "rerun"
+"""And of a campaign: one of its runs again."""
 
 
-def main(kind: str, where: str, beside: str, folder: str) -> None:
-    """Do it; the last line tells the file to look at, or what was wrong."""
+def main(kind: str, where: str, beside: str, folder: str, *more: str) -> None:
+    """Do it; the last line tells the file to look at, or what was wrong. more: the laws of the scenario; of a run of a
+    campaign, whose folder `where` is, the law and the run's number."""
+    # What files print as they are run must not stand between the lines.
+    global _answers
+    _answers, sys.stdout = sys.stdout, sys.stderr
     told, text = [0.0], json.loads(sys.stdin.readline())
     threading.Thread(target=_end_with_studio, daemon=True).start()
 
@@ -150,6 +247,9 @@ def main(kind: str, where: str, beside: str, folder: str) -> None:
             _say({"done": done, "total": total, "what": what})
 
     try:
+        if kind == RERUN:
+            _say({"shown": _rerun(Path(where), more[0], int(more[1]), Path(folder), tell)})
+            return
         scenario = parse(text, where, Path(beside))
         _say({"shown": KINDS[kind](scenario, Path(folder), tell)})
     except InputError as error:
@@ -163,8 +263,11 @@ def _end_with_studio() -> None:
     os._exit(1)
 
 
+_answers: Any = sys.stdout
+
+
 def _say(what: dict[str, Any]) -> None:
-    print(json.dumps(what), flush=True)
+    print(json.dumps(what), file=_answers, flush=True)
 
 
 if __name__ == "__main__":

@@ -68,29 +68,128 @@ function completion(cm) {
   return list(free.map((key) => item(`${key} = `, keys[key].text)), cursor.ch - part.length);
 }
 
+// --- questions to the user ---
+
+// Resolves with the value of the button that is pressed, "" for none; with a field, [value, its text].
+function choose(text, buttons, field = null) {
+  const box = $("asking");
+  box.querySelector("p").textContent = text;
+  const input = box.querySelector("input");
+  input.hidden = field === null;
+  input.value = field ?? "";
+  box.querySelector(".tools").innerHTML = Object.entries(buttons).map(([value, word]) => `<button value="${value}">${plain(word)}</button>`).join("");
+  box.showModal();
+  return new Promise((done) => {
+    const answer = (value) => done(field === null ? value : [value, input.value.trim()]);
+    for (const button of box.querySelectorAll("button")) button.addEventListener("click", () => answer(button.value));
+    box.oncancel = () => answer("");
+  });
+}
+
+// --- the document: its name, the version of its file that was seen ("" for none), and the text as it was then ---
+
+const doc = { name: "", version: "", saved: "" };
+const edited = () => Boolean(editor) && editor.getValue() !== doc.saved;
+
+function show(name, version, text) {
+  Object.assign(doc, { name, version, saved: text });
+  editor.setValue(text);
+  editor.clearHistory();
+  named();
+  check();
+}
+
+function named() {
+  $("file").textContent = `${doc.name}${doc.version ? "" : " (not saved as a file)"}${edited() ? " — edited" : ""}`;
+  document.title = `${edited() ? "• " : ""}${doc.name} — starhold studio`;
+}
+
+// Whether what is edited may make room for another text: nothing that was typed goes unasked.
+async function room() {
+  if (!edited()) return true;
+  const how = await choose(`${doc.name} has edits that are not saved.`, { save: "Save them", drop: "Drop them", "": "Stay here" });
+  return how === "drop" || (how === "save" && save());
+}
+
+// Answers whether the text was written.
+async function save() {
+  let { name, version } = doc;
+  for (let again = !version; ; again = true) {
+    if (again) {
+      const [how, given] = await choose(`A name for this scenario, in ${known.folder}:`, { save: "Save", "": "Cancel" }, name);
+      if (how !== "save") return false;
+      [name, version] = [given, given === doc.name ? version : ""];
+    }
+    const text = editor.getValue();
+    let found = await ask("/save", { text, name, version });
+    if (found.changed && !found.exists) {
+      const how = await choose(`${found.error}. What is there now would be lost.`, { over: "Overwrite it", other: "Another name", "": "Cancel" });
+      if (how === "") return false;
+      if (how === "over") found = await ask("/save", { text, name, version: found.version });
+      else continue;
+    }
+    if (!found.error) {
+      Object.assign(doc, { name: found.name, version: found.version, saved: text });
+      named();
+      say(`saved ${found.saved}`);
+      return true;
+    }
+    say(found.error, "bad");
+    if (!found.exists) return false;
+    await choose(`${found.error}; it is not overwritten.`, { "": "Another name" });
+  }
+}
+
 // --- errors at the key ---
 
 let checking = 0;
-let checked = "";
+let verdict = null;
+let busy = null;
 function soon() {
+  named();
   clearTimeout(checking);
   checking = setTimeout(check, 300);
 }
 
+// What is told of the text that stands there; one check at a time.
 async function check() {
+  clearTimeout(checking);
+  while (busy) await busy;
   const text = editor.getValue();
-  const found = await ask("/check", { text });
-  if (text !== editor.getValue()) return;
-  checked = text;
+  if (verdict && verdict.text === text) return verdict.found;
+  say("is checked …", "");
+  let ended;
+  busy = new Promise((done) => { ended = done; });
+  const found = await ask("/check", { text }).catch((error) => ({ error: `the studio does not answer: ${error.message}` }));
+  busy = null;
+  ended();
+  if (text !== editor.getValue()) return check();
+  verdict = { text, found };
   tell(found);
+  return found;
+}
+
+function say(text, how = "good") {
+  $("verdict").className = how;
+  $("verdict").textContent = text;
 }
 
 function tell(found) {
   if (wrong !== null) editor.removeLineClass(wrong, "background", "wrong-line");
   wrong = null;
-  const verdict = $("verdict");
-  verdict.classList.toggle("bad", Boolean(found.error));
-  verdict.textContent = found.error || `${found.name}: ${found.laws.join(", ")}`;
+  if (found.asks) {
+    say(`To check this, Python code is run: ${found.asks.join(", ")}. It may do whatever you may. It is run again at each check and each flight. `, "");
+    const button = document.createElement("button");
+    button.textContent = "Run it";
+    button.addEventListener("click", async () => {
+      await ask("/run", { files: found.asks });
+      verdict = null;
+      check();
+    });
+    $("verdict").append(button);
+    return;
+  }
+  say(found.error || `${found.name}: ${found.laws.join(", ")}`, found.error ? "bad" : "good");
   if (found.line) wrong = editor.addLineClass(found.line - 1, "background", "wrong-line");
 }
 
@@ -100,30 +199,50 @@ const boxes = new Map();
 
 async function begin(kind) {
   // What is wrong is said here, where it can be seen; the server would refuse it likewise.
-  if (checked !== editor.getValue()) await check();
-  if ($("verdict").classList.contains("bad")) return;
-  const found = await ask("/jobs", { kind, text: editor.getValue() });
+  if (!(await check()).name) return;
+  started(await ask("/jobs", { kind, text: editor.getValue() }), doc.name);
+}
+
+function started(found, name) {
   if (!found.ok) {
     tell(found);
     return;
   }
-  place(found);
+  place(found, name);
   watch();
 }
 
-function place(job) {
+function place(job, name = "") {
   document.querySelector("#results .hint")?.remove();
   const box = document.createElement("div");
   box.className = "result";
+  box.dataset.document = name;
+  const tab = document.createElement("button");
+  tab.type = "button";
+  tab.textContent = `${job.number} ${job.kind}`;
+  tab.addEventListener("click", () => front(box));
+  box.tab = tab;
+  $("tabs").prepend(tab);
+  front(box);
   box.innerHTML = `<div><b>${plain(job.kind)}</b><span class="said"></span><progress></progress><button type="button">Stop</button></div>`;
   box.querySelector("button").addEventListener("click", () => {
     if (box.dataset.ended) {
       box.remove();
+      tab.remove();
       boxes.delete(job.number);
+      const next = [...boxes.values()].pop();
+      if (next) front(next);
     } else ask(`/jobs/${job.number}/stop`, {});
   });
   $("results").prepend(box);
   boxes.set(job.number, box);
+}
+
+// One result has the whole place, unless all are to stand beside each other.
+function front(box) {
+  for (const one of document.querySelectorAll(".result.front, #tabs .front")) one.classList.remove("front");
+  box.classList.add("front");
+  box.tab.classList.add("front");
 }
 
 function update(job) {
@@ -149,27 +268,50 @@ function update(job) {
   apart.textContent = "Alone";
   apart.addEventListener("click", () => open(address));
   box.querySelector("div").insertBefore(apart, box.querySelector("button"));
-  shown.addEventListener("load", () => { if (shown.contentWindow && shown.contentWindow.fileText) box.querySelector("div").insertBefore(taker(shown), apart); });
+  if (job.kind === "campaign") box.querySelector("div").insertBefore(again(job), apart);
+  shown.addEventListener("load", () => { if (shown.contentWindow && shown.contentWindow.fileText) box.querySelector("div").insertBefore(taker(shown, box), apart); });
 }
 
 // What a report's sliders say, as the scenario that is edited.
-function taker(frame) {
+function taker(frame, box) {
   const button = document.createElement("button");
   button.textContent = "To the editor";
   button.title = "Edit the scenario of what the report shows";
-  button.addEventListener("click", () => editor.setValue(frame.contentWindow.fileText()));
+  button.addEventListener("click", async () => {
+    const text = frame.contentWindow.fileText(), own = box.dataset.document === doc.name;
+    if (!(await room())) return;
+    // Of the document that it was flown from it is an edit, which can be undone.
+    if (own) editor.setValue(text);
+    else {
+      show(box.dataset.document || "flown.toml", "", text);
+      doc.saved = "";
+      named();
+    }
+  });
   return button;
+}
+
+// One run of a campaign again.
+function again(job) {
+  const form = document.createElement("form");
+  form.innerHTML = `<select aria-label="law">${job.laws.map((law) => `<option>${plain(law)}</option>`).join("")}</select>`
+    + '<input type="number" min="0" step="1" value="0" aria-label="run"><button>Fly run again</button>';
+  form.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    started(await ask(`/jobs/${job.number}/again`, { law: form.querySelector("select").value, run: form.querySelector("input").value }), doc.name);
+  });
+  return form;
 }
 
 let watching = false;
 async function watch() {
   if (watching) return;
   watching = true;
-  for (let busy = true; busy;) {
+  for (let working = true; working;) {
     const { list } = await ask("/jobs");
     list.forEach(update);
-    busy = list.some((job) => !job.ended);
-    if (busy) await new Promise((done) => { setTimeout(done, 250); });
+    working = list.some((job) => !job.ended);
+    if (working) await new Promise((done) => { setTimeout(done, 250); });
   }
   watching = false;
 }
@@ -188,21 +330,27 @@ function append(table) {
 
 async function open_() {
   known = await ask("/begin");
-  $("file").textContent = known.file || "no file";
-  $("save").disabled = !known.file;
   editor = CodeMirror($("editor"), {
     value: known.text, mode: "toml", lineNumbers: true, lineWrapping: false,
-    extraKeys: { "Ctrl-Space": (cm) => cm.showHint(), "Ctrl-S": save, "Cmd-S": save },
+    extraKeys: { "Ctrl-Space": (cm) => cm.showHint(), "Ctrl-S": () => { save(); }, "Cmd-S": () => { save(); } },
     hintOptions: { hint: completion, completeSingle: false },
   });
   editor.on("change", soon);
   editor.on("inputRead", (cm, change) => { if (/^[\w"[]$/.test(change.text[0])) cm.showHint(); });
-  options($("scenarios"), "begin with …", known.scenarios.map((name) => ({ name })));
+  Object.assign(doc, { name: known.name, version: known.version, saved: known.text });
+  named();
+  options($("scenarios"), "open …", [...(known.own ? [{ name: known.own }] : []), ...known.scenarios.map((name) => ({ name }))]);
   options($("laws"), "add a law …", known.laws);
   options($("parts"), "add a part …", known.parts);
   $("scenarios").addEventListener("change", async ({ target }) => {
-    if (target.value) editor.setValue(await (await fetch(`/builtin/${target.value}`)).text());
+    const name = target.value;
     target.value = "";
+    if (!name || !(await room())) return;
+    if (name === known.own) {
+      const found = await ask("/file");
+      if (found.error) say(found.error, "bad");
+      else show(found.name, found.version, found.text);
+    } else show(`${name}.toml`, "", await (await fetch(`/builtin/${name}`)).text());
   });
   for (const name of ["laws", "parts"]) {
     $(name).addEventListener("change", ({ target }) => {
@@ -218,12 +366,13 @@ async function open_() {
   watch();
 }
 
-async function save() {
-  const found = await ask("/save", { text: editor.getValue() });
-  const verdict = $("verdict");
-  verdict.classList.toggle("bad", Boolean(found.error));
-  verdict.textContent = found.error || `saved ${found.saved}`;
-}
-
-$("save").addEventListener("click", save);
+$("save").addEventListener("click", () => { save(); });
+$("wide").addEventListener("click", ({ target }) => {
+  const on = document.body.classList.toggle("wide");
+  target.textContent = on ? "Show the editor" : "Hide the editor";
+  target.setAttribute("aria-pressed", String(on));
+  editor.refresh();
+});
+$("beside").addEventListener("change", ({ target }) => $("results").classList.toggle("beside", target.checked));
+addEventListener("beforeunload", (event) => { if (edited()) event.preventDefault(); });
 open_();
