@@ -12,9 +12,11 @@ from starhold.publications.desk import Desk
 from starhold.publications.figure import Curve, Figure, Panel
 from starhold.publications.paper import PAPERS, Paper, folder_of, read_paper, scenario_files
 from starhold.publications.reproduction import Judged, Reproduction, measure_of
-from starhold.publications.verdicts import Finding
+from starhold.publications.verdicts import VERDICTS, Finding
 from starhold.report.reproduction_figures import draw
+from starhold.report.reproduction_page import index_page
 from starhold.scenario.reading import parse
+from tests.browser import Browser
 from tests.running import starhold
 
 ERRATA = 11
@@ -80,6 +82,23 @@ def test_bad_words_on_the_command_line(tmp_path):
     assert ended.returncode == 2
     assert ended.stderr.splitlines() == ["starhold: reproduce: publication: found Z; allowed: A, B, C, D, E or all"]
     assert not (tmp_path / "r").exists()
+
+
+@pytest.mark.xdist_group("browser")
+@pytest.mark.parametrize("width", [1400, 390])
+def test_all_verdicts_of_the_index_can_be_seen(tmp_path, width):
+    """Of a publication with a long title and every verdict."""
+    text = HEAD | {"title": "A study of the stabilisation of spacecraft " * 3, "source": "printed somewhere, " * 6}
+    paper = Paper.model_validate(text | {"section": [{"title": "t", "row": [ROW]}]})
+    rows = {word: Judged(paper.rows[0], Finding(False, "so"), word) for word in VERDICTS}
+    (tmp_path / "index.html").write_text(index_page([Reproduction(paper, {}, rows, {}, 0.0)]), encoding="utf-8")
+    browser = Browser()
+    try:
+        browser.open(tmp_path / "index.html", width, 900)
+        edges = "(name) => [...document.querySelectorAll(name)].map((x) => x.getBoundingClientRect().right)"
+        assert max(browser.ask(f'({edges})(".count")')) <= browser.ask(f'({edges})(".wide")')[0] <= width
+    finally:
+        browser.close()
 
 
 def test_a_verdict_other_than_recorded_fails_the_command(tmp_path, monkeypatch):

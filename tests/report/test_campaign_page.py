@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from starhold.report.campaign_page import render, write_page
 from starhold.report.campaign_plots import envelopes, histograms
 from starhold.report.campaign_units import Wording, count_text, figure
 from starhold.report.campaign_words import headline
+from tests.browser import Browser
 from tests.report import flown
 from tests.report.campaign_made import ASKED, indices, law, result, spread
 from tests.report.reader import Reader
@@ -277,3 +279,22 @@ def test_a_bad_condition_known_before_flight_is_named() -> None:
 )
 def test_numbers_are_short(value: float, shown: str) -> None:
     assert figure(value) == shown
+
+
+@pytest.mark.xdist_group("browser")
+def test_small_numbers_have_powers_of_ten_and_no_letter_beside_their_unit(tmp_path: Path) -> None:
+    path = tmp_path / "report.html"
+    path.write_text(render(flown.scenario("detumbling"), whole()), encoding="utf-8")
+    browser = Browser()
+    try:
+        browser.open(path)
+        ticks = browser.ask(
+            """(async () => { const box = document.createElement("div"); document.body.append(box);
+                await Plotly.newPlot(box, [{x: [0, 1], y: [0, 7e-4]}], {yaxis: look().axis});
+                return [...box.querySelectorAll(".ytick text")].map((one) => one.textContent); })()"""
+        )
+        assert len(ticks) > 2
+        assert not any(letter in tick for tick in ticks for letter in "µumk")
+        assert browser.complaints == []
+    finally:
+        browser.close()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +12,15 @@ import pytest
 from PIL import Image
 
 from starhold.algebra.cosines import to_angles
-from starhold.report.attitude_plots import collect, early, roll_pitch_yaw, until
+from starhold.analysis.rigid_body import METRICS
+from starhold.report.attitude_plots import KNOWN, collect, early, roll_pitch_yaw, until
 from starhold.report.colours import COLOURS, colour
-from starhold.report.plots import thin, thin_times
+from starhold.report.figures import WORD_ROWS, word_rows
+from starhold.report.plots import Mark, recorded_plots, thin, thin_times
 from starhold.report.text import number_text
-from starhold.simulation.lane import Recording
+from starhold.scenario.building import build
+from starhold.scenario.reading import load
+from starhold.simulation.lane import Recording, fly, label
 from starhold.studies.flight import Flight
 from tests.report import flown
 from tests.report.flown import draw
@@ -93,6 +98,44 @@ def test_a_limit_is_shown_where_it_matters() -> None:
     ).torque
     assert plot.panels[0].levels == ()
     assert "off the scale" in plot.dashed
+
+
+def test_a_far_limit_of_wheels_does_not_flatten_them() -> None:
+    scenario = load("wheels-orbital").with_({"simulation.duration": "2 s", "law.uncompensated": None})
+    entry = scenario.laws[0]
+    loop = build(scenario, entry)
+    run = label(loop, *fly(loop, scenario.table.simulation.steps), 1)
+    for name, grown in (("wheel_torque", 1e-3), ("wheel_torque", 1e3)):
+        arrays = run.arrays | {name: run[name] * grown}
+        flight = Flight(entry.name, entry.law.name, replace(run, arrays=arrays), {}, {}, METRICS)
+        plot = next(one for one in collect([flight], 2000, scenario).further if one.name == "wheel-torque")
+        assert all(bool(panel.levels) == (grown > 1.0) for panel in plot.panels)
+        assert ("off the scale" in plot.dashed) == (grown < 1.0)
+
+
+def test_whether_a_reading_is_new_has_no_plot() -> None:
+    first = flown.flights()[0]
+    columns = first.recording.columns | {
+        "magnetometer_magnetic_field_is_new": ("1", "1 where it is a new one, else 0", ""),
+        "own_count": ("1", "a count", ""),
+    }
+    zeros = np.zeros(len(first.recording["time"]))
+    arrays = first.recording.arrays | {"magnetometer_magnetic_field_is_new": zeros, "own_count": zeros}
+    run = replace(first.recording, arrays=arrays, columns=columns)
+    names = [plot.name for plot in recorded_plots([replace(first, recording=run)], 1, KNOWN)]
+    assert "own-count" in names
+    assert not any("is-new" in name for name in names)
+
+
+def test_words_of_marks_do_not_stand_over_one_another() -> None:
+    random = np.random.default_rng(2)
+    marks = [Mark(float(time), "detumble"[: random.integers(1, 9)]) for time in random.uniform(0.0, 100.0, 30)]
+    rows = word_rows(marks, 100.0)
+    assert 8 < len(rows) < len(marks)
+    for row in range(WORD_ROWS):
+        own = sorted(mark for mark in rows if rows[mark] == row)
+        # A letter has about 4.6 of 507 points.
+        assert all(b.time - a.time > len(a.word) * 100.0 * 4.6 / 507.0 for a, b in pairwise(own))
 
 
 def test_roll_pitch_and_yaw_are_those_of_the_algebra() -> None:

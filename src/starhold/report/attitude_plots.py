@@ -219,9 +219,13 @@ def _wheels(flights: Sequence[Flight], factor: int, scenario: Scenario) -> tuple
         panels: list[Panel] = []
         for wheel in range(flights[0].recording[name].shape[1]):
             curves = [thin(flight.recording[name][:, wheel], factor) for flight in flights]
-            levels = () if limits is None else (-limits[wheel], limits[wheel])
+            levels = () if limits is None else near((-limits[wheel], limits[wheel]), curves)
             panels.append(Panel(f"wheel {wheel + 1}, {unit}", curves, False, levels, source=("column", name, wheel, 1.0)))
-        plots.append(Plot(name.replace("_", "-"), title, panels, "limit" if limits else ""))
+        dashed = "" if limits is None else "limit"
+        if limits is not None and not any(panel.levels for panel in panels):
+            least = min(limits)
+            dashed = f"limit of {'each' if max(limits) == least else 'the weakest'}, {least:g} {unit}, off the scale"
+        plots.append(Plot(name.replace("_", "-"), title, panels, dashed))
     return tuple(plots)
 
 

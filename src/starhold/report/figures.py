@@ -55,8 +55,11 @@ def warm_up() -> None:
 def over_time(plot: Plot, times: Any, marks: Sequence[Mark], flights: Sequence[Flight], name: str) -> Any:
     """A figure of panels over one time axis."""
     count = len(plot.panels)
-    height = {1: 3.6, 2: 5.2}.get(count, 1.6 * (count + 1))
-    figure, axes = blank(count, 1, height, f"{plot.title}", flights, name, plot.dashed)
+    end = max(float(times[-1]), 1e-9)
+    rows = word_rows(marks, end)
+    above = (14.0 + WORD_HEIGHT * max(rows.values())) / 72.0 if rows else 0.0
+    height = {1: 3.6, 2: 5.2}.get(count, 1.6 * (count + 1)) + above
+    figure, axes = blank(count, 1, height, f"{plot.title}", flights, name, plot.dashed, above)
     for axis, panel in zip(axes, plot.panels, strict=True):
         for number in back_to_front(flights, plot):
             curve = panel.curves[number]
@@ -75,22 +78,47 @@ def over_time(plot: Plot, times: Any, marks: Sequence[Mark], flights: Sequence[F
             axis.axhline(level, color="0.35", linewidth=0.9, dashes=(5, 3))
         for mark in marks:
             axis.axvline(mark.time, color="0.2", linewidth=0.9, linestyle=":")
-            if mark.word and axis is axes[0]:
+            if mark in rows and axis is axes[0]:
+                # Above the axes, and what powers of ten stand there.
                 place = {"xy": (mark.time, 1.0), "xycoords": axis.get_xaxis_transform(), "textcoords": "offset points"}
-                axis.annotate(mark.word, xytext=(3, -3), rotation=90, va="top", fontsize=8, color="0.2", **place)
+                side = "right" if mark.time > 0.9 * end else "left"
+                axis.annotate(
+                    shortened(mark.word, 24),
+                    xytext=(0, 12 + WORD_HEIGHT * rows[mark]),
+                    ha=side,
+                    fontsize=8,
+                    color="0.2",
+                    **place,
+                )
         if panel.span is not None:
             axis.set_ylim(*panel.span)
         axis.set_ylabel(panel.label)
-        axis.set_xlim(0.0, max(float(times[-1]), 1e-9))
+        axis.set_xlim(0.0, end)
     axes[-1].set_xlabel(f"time, {plot.clock}")
     return figure
 
 
+WORD_HEIGHT, WORD_ROWS = 9.5, 4
+"""Points from row to row of words above axes, and rows at the most."""
+
+
+def word_rows(marks: Sequence[Mark], end: float) -> dict[Mark, int]:
+    """The row in which the word of each mark stands, so that none overlaps another; those without room are left out."""
+    ends, found = [-1.0] * WORD_ROWS, dict[Mark, int]()
+    for mark in sorted(marks):
+        row = next((row for row, taken in enumerate(ends) if mark.time >= taken), None)
+        if mark.word and row is not None:
+            # About 4.6 points a letter on axes of 507 points.
+            found[mark] = row
+            ends[row] = mark.time + end * (4.6 * len(shortened(mark.word, 24)) + 8.0) / 507.0
+    return found
+
+
 def blank(
-    rows: int, columns: int, height: float, title: str, flights: Sequence[Flight], name: str, dashed: str
+    rows: int, columns: int, height: float, title: str, flights: Sequence[Flight], name: str, dashed: str, above: float = 0.0
 ) -> tuple[Any, Any]:
-    """A figure with its title, its legend and its axes."""
-    figure, total, top = headed(height, title, flights, name, dashed, 0.28 if columns > 1 else 0.06)
+    """A figure with its title, its legend and its axes, which leave room above (inches)."""
+    figure, total, top = headed(height, title, flights, name, dashed, (0.28 if columns > 1 else 0.06) + above)
     grid: Any = figure.subplots(rows, columns, sharex=True, squeeze=False)
     figure.subplots_adjust(left=0.098, right=0.978, bottom=0.48 / total, top=top, hspace=0.09, wspace=0.14)
     axes = grid.ravel()

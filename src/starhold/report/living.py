@@ -14,6 +14,8 @@ from starhold.analysis.rigid_body import recorded_meter
 from starhold.certification.standing import standing
 from starhold.laws.interface import Gain
 from starhold.report.colours import colour
+from starhold.report.page_parts import with_units
+from starhold.scenario.checking import read_toml
 from starhold.scenario.quantity import LEAST, MOST, declared
 from starhold.studies.questions import NEAR, RANGE
 from starhold.studies.reflight import Reflight, Reflown, reflight
@@ -34,13 +36,13 @@ LABELS = {
 }
 
 
-def living_data(scenario: Scenario, flights: Sequence[Flight], sampling: Sampling) -> dict[str, Any] | None:
-    """The data of the page's sliders; None where nothing can be moved."""
+def living_data(scenario: Scenario, flights: Sequence[Flight], sampling: Sampling) -> dict[str, Any] | str:
+    """The data of the page's sliders; where nothing can be moved, why not."""
     made = reflight(scenario)
     numbers = {flight.name: number for number, flight in enumerate(flights)}
     laws = [law for law in made.laws if law.name in numbers]
     if not any(law.follows for law in laws):
-        return None
+        return "; ".join(sorted({*made.grounded.values(), *(why for law in laws for why in law.held.values())}))
     table = scenario.table
     transient = getattr(table, "transient", None)
     keys = [key for key in made.dials if key not in made.gains or key.partition(".")[2].rpartition(".")[0] in numbers]
@@ -71,8 +73,9 @@ def _dial(made: Reflight, key: str) -> dict[str, Any]:
     gain = _declared(made.scenario, key) if item is None else item.gain
     bounds = {"above": gain.above, "least": gain.at_least, "most": gain.at_most}
     unit = "" if gain.unit == "1" else gain.unit.replace("^2", "²")
-    found = {"key": key, "value": made.dials[key], "unit": unit} | bounds
+    found: dict[str, Any] = {"key": key, "value": made.dials[key], "unit": unit} | bounds
     if item is None:
+        found["degrees"] = unit.startswith("rad") and "deg" in _written(made.scenario, key, made.dials[key])
         return found | {"label": LABELS.get(key, key), "law": None, "text": ""}
     return found | {"label": item.name, "law": key.partition(".")[2].rpartition(".")[0], "text": gain.text}
 
@@ -81,6 +84,12 @@ def _declared(scenario: Scenario, key: str) -> Gain:
     """The declaration of a key of the scenario's own tables; that of a fault is the craft's."""
     table, _, name = key.replace("fault[1]", "spacecraft").partition(".")
     return declared(type(getattr(scenario.table, table)).model_fields[name]) or Gain()
+
+
+def _written(scenario: Scenario, key: str, value: Any) -> str:
+    """Return what the file has for a key of its own tables, where that is told with units; else ""."""
+    table, _, name = key.partition(".")
+    return with_units(read_toml(scenario.text, scenario.where).get(table, {}).get(name), value)
 
 
 def _law(law: Reflown) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,6 +36,12 @@ def write_page(path: Path, scenario: Scenario, flights: Sequence[Flight]) -> Non
 def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
     """The report as HTML text. Whatever comes from files is escaped."""
     own = report_of(scenario.body).page(flights, scenario)
+    living = "the page of this body has none" if own.sampling is None else living_data(scenario, flights, own.sampling)
+    grounded = (
+        f'<p class="note">Nothing here can be flown again with sliders: {escape(living)}.</p>'
+        if isinstance(living, str)
+        else ""
+    )
     sections = [
         lost_alarm(flights),
         ranking(flights),
@@ -42,6 +49,7 @@ def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
         proved(flights),
         *own.views,
         over_time_heading(own.transient),
+        grounded,
         *(plot_box(plot) for plot in own.data["plots"] if "planes" not in plot),
         laws_table(flights),
         own.units,
@@ -49,5 +57,4 @@ def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
         columns_list(flights),
     ]
     data = {"laws": law_data(flights), **own.data}
-    living = None if own.sampling is None else living_data(scenario, flights, own.sampling)
-    return document(scenario, sections, data, own.scripts, f"{versions()}{own.footer}.", living)
+    return document(scenario, sections, data, own.scripts, f"{versions()}{own.footer}.", None if grounded else living)

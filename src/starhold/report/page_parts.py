@@ -7,7 +7,7 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from html import escape
 from importlib import metadata, resources
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from starhold.report.colours import colour
 from starhold.report.plots import Mark, Panel, Plot, back_to_front
 from starhold.report.proved import swatch
 from starhold.report.text import lost_text, number_text, value_text
+from starhold.scenario.checking import read_toml
 from starhold.studies.flight import Flight
 
 if TYPE_CHECKING:
@@ -146,7 +147,7 @@ def over_time_heading(transient: float | None) -> str:
         return OVER_TIME
     return (
         f'{OVER_TIME}\n<p class="switch"><button id="whole" type="button" aria-pressed="true">Whole run</button>'
-        f'<button id="transient-only" type="button" aria-pressed="false">Transient, first {transient:.3g} s</button></p>'
+        f'<button id="transient-only" type="button" aria-pressed="false">Transient, first {float(f"{transient:.3g}"):g} s</button></p>'
     )
 
 
@@ -238,17 +239,18 @@ def settings(scenario: Scenario, title: str) -> str:
     from pydantic import BaseModel
 
     parts: list[str] = []
+    written = read_toml(scenario.text, scenario.where)
     shared = {key: scenario.table.shared[key] for key in _taken(scenario)}
     for name in type(scenario.table).model_fields:
         table = getattr(scenario.table, name)
         # What a campaign draws is not flown here, nor a target beside one that is a part.
         own = any(fitted.part.role == name for fitted in scenario.parts)
         if isinstance(table, BaseModel) and name != "campaign" and not own:
-            parts.append(_table(name, table, shared))
+            parts.append(_table(name, table, shared, written.get(name, {})))
         elif table is None:
             # Told with each part where the table is not there.
             shared = {key: value for key, value in shared.items() if not key.startswith(f"{name}.")}
-    parts += [_part(fitted, shared) for fitted in scenario.parts]
+    parts += [_part(fitted, shared, own) for fitted, own in zip(scenario.parts, written.get("part", []), strict=True)]
     return f'<h2>{title}</h2>\n<div class="columns">{"".join(parts)}</div>'
 
 
@@ -260,9 +262,9 @@ def _taken(scenario: Scenario) -> set[str]:
     return {item.gain.shared for item in declared} & {*scenario.table.shared}
 
 
-def _table(name: str, table: Any, shared: Mapping[str, Any]) -> str:
-    """One table of the scenario with the descriptions its schema holds; keys without a value are left out, but for those
-    with a default that parts take."""
+def _table(name: str, table: Any, shared: Mapping[str, Any], written: Any) -> str:
+    """One table of the scenario with the descriptions its schema holds, numbers with units as the file has them; keys
+    without a value are left out, but for those with a default that parts take."""
     from pydantic import BaseModel
 
     properties = type(table).model_json_schema()["properties"]
@@ -273,23 +275,34 @@ def _table(name: str, table: Any, shared: Mapping[str, Any]) -> str:
             value, given = shared[f"{name}.{key}"], ", by default"
         if isinstance(value, BaseModel):
             inner = {f"{key}.{one}": getattr(value, one) for one in type(value).model_fields}
-            rows += [_row(one, _value(found), "") for one, found in inner.items() if found is not None]
+            texts = written.get(key, {})
+            for one, found in inner.items():
+                if found is not None:
+                    rows.append(_row(one, with_units(texts.get(one.partition(".")[2]), found) or _value(found), ""))
         elif value is not None:
             meaning = str(properties.get(key, {}).get("description", "")).replace("^2", "²").replace("^3", "³")
-            rows.append(_row(key, _value(value) + given, meaning))
+            rows.append(_row(key, (with_units(written.get(key), value) or _value(value)) + given, meaning))
     title = name.replace("_", " ")
     return f'<section><h3>{escape(title)}</h3><table class="text"><tbody>{"".join(rows)}</tbody></table></section>'
 
 
-def _part(fitted: Fitted, shared: Collection[str]) -> str:
-    """The parameters of a part, with their units and meanings; without those that these keys of the scenario give."""
+def with_units(written: Any, value: Any) -> str:
+    """Return what a file has for numbers, where that is told with units; "" where it is not."""
+    texts = cast(list[Any], written) if isinstance(written, list) else [written]
+    numbers = isinstance(value, (int, float, tuple, list, np.ndarray)) and not isinstance(value, bool)
+    return ", ".join(texts) if numbers and texts and all(isinstance(text, str) for text in texts) else ""
+
+
+def _part(fitted: Fitted, shared: Collection[str], written: Mapping[str, Any]) -> str:
+    """The parameters of a part, with their units and meanings, numbers with units as the file has them; without those that
+    these keys of the scenario give."""
     rows: list[str] = []
     for item, value in zip(fitted.part.fields(), fitted.params, strict=True):
         if item.gain.shared in shared:
             continue
         told = item.gain.choices[value] if item.gain.choices else _value(value)
         unit = "" if item.gain.unit == "1" or item.gain.choices else f" {item.gain.unit}"
-        rows.append(_row(item.name, told + unit, item.gain.text))
+        rows.append(_row(item.name, with_units(written.get(item.name), value) or told + unit, item.gain.text))
     title = f"{fitted.part.role} {fitted.called}"
     return f'<section><h3>{escape(title)}</h3><table class="text"><tbody>{"".join(rows)}</tbody></table></section>'
 

@@ -15,6 +15,8 @@ Curve: TypeAlias = NDArray[np.float64]
 
 OFF_SCALE = 5.0
 """Limits so many times above all curves are not drawn."""
+FLAG = "_is_new"
+"""How quantities end that tell at which control instants a reading is a new one; nothing is seen of them over a flight."""
 
 
 @dataclass(frozen=True)
@@ -128,12 +130,12 @@ def sound(panel: Panel, flights: Sequence[Flight]) -> Panel:
 
 def recorded_plots(flights: Sequence[Flight], factor: int, known: Container[str] = ()) -> list[Plot]:
     """A plot of each quantity that all flights record and that is not known otherwise, with the name, unit and meaning that
-    its part declares; a panel for each component."""
+    its part declares; a panel for each component. What only tells whether a reading is new is not drawn."""
     longest = max((flight.recording for flight in flights), key=lambda run: len(run["time"]))
     _, coordinates = longest.variables()
     plots: list[Plot] = []
     for name, (unit, meaning, dimension) in longest.columns.items():
-        if name in known or not all(name in flight.recording.arrays for flight in flights):
+        if name in known or name.endswith(FLAG) or not all(name in flight.recording.arrays for flight in flights):
             continue
         runs = [np.reshape(flight.recording[name], (len(flight.recording["time"]), -1)) for flight in flights]
         labels = coordinates[dimension].data if dimension in coordinates else range(1, runs[0].shape[1] + 1)

@@ -56,7 +56,7 @@ def index_page(made: Sequence[Reproduction]) -> str:
         '<p class="lead">Every figure, table and numerical statement of the publications that starhold implements, made '
         "again and laid beside what is printed.</p>",
         _changes([judged for one in made for judged in one.changed]),
-        _grid(("publication", "figures", "rows", "verdicts"), rows),
+        _grid(("publication", "figures", "rows", "verdicts"), rows, "wide titled"),
         _errata(found),
         _reading(),
         f"<footer>starhold {__version__}</footer>",
@@ -67,7 +67,8 @@ def index_page(made: Sequence[Reproduction]) -> str:
 def tally(rows: Any) -> str:
     """How often each verdict was given."""
     counted = Counter(judged.verdict for judged in rows)
-    return " ".join(f"{badge(verdict)} {counted[verdict]}" for verdict in VERDICTS if counted[verdict])
+    given = [verdict for verdict in VERDICTS if counted[verdict]]
+    return " ".join(f'<span class="count">{badge(verdict)} {counted[verdict]}</span>' for verdict in given)
 
 
 def badge(verdict: Verdict) -> str:

@@ -1,5 +1,5 @@
-"""What the program asks of a scenario's numbers before it flies them, as programs of the keys that a page moves: those of
-the craft and the start, and each law's own `check` and `remember`, in the words of their refusals."""
+"""The program asks questions of a scenario's numbers before it flies them; here they become programs of the keys that a
+page moves: those of the craft and the start, and each law's own `check` and `remember`, in the words of their refusals."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def ask(scenario: Scenario, loops: Mapping[str, ClosedLoop], dials: Mapping[str,
 
 
 def _check(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, reads: bool) -> Callable[[Mapping[str, Any]], None]:
-    """What a law asks of the gains and of the craft that it knows, under values of keys, as its file is read or its memory
+    """Return what a law asks of the gains and of the craft that it knows, under values of keys, as its file is read or its memory
     made."""
 
     def check(values: Mapping[str, Any]) -> None:

@@ -175,7 +175,7 @@ class Studio:
         return _malformed() if asked is None else JSONResponse(await self._checked(asked["text"]))
 
     async def _checked(self, text: str) -> dict[str, Any]:
-        """What a check tells of a text; or the files that it would run and the user did not yet allow."""
+        """Return what a check tells of a text; or the files that it would run and the user did not yet allow."""
         files = [file for file in editing.files_run(text) if file not in self.run]
         return {"asks": files} if files else await run_in_threadpool(self.checker.check, text, self.where, self.folder)
 
@@ -250,7 +250,7 @@ def _malformed() -> Response:
 
 
 async def _answered(work: Callable[[], dict[str, Any]]) -> Response:
-    """What work on files comes to."""
+    """Answer with what work on files comes to."""
     try:
         return JSONResponse(await run_in_threadpool(work))
     except RefusedError as refused:
@@ -258,7 +258,7 @@ async def _answered(work: Callable[[], dict[str, Any]]) -> Response:
 
 
 async def _json(request: Request) -> Any:
-    """What a request holds; None where it is no JSON, or holds what is no text."""
+    """Return what a request holds; None where it is no JSON, or holds what is no text."""
     try:
         given = json.loads(await request.body())
         json.dumps(given, ensure_ascii=False).encode()

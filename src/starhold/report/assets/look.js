@@ -2,7 +2,7 @@
 "use strict";
 
 function look() {
-  const axis = { gridcolor: css("--line"), linecolor: css("--soft"), zerolinecolor: css("--line"), automargin: false };
+  const axis = { gridcolor: css("--line"), linecolor: css("--soft"), zerolinecolor: css("--line"), automargin: false, exponentformat: "power" };
   return {
     axis,
     layout: {

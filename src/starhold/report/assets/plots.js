@@ -19,8 +19,20 @@ const nearlyWhole = (x) => Math.abs(x - Math.round(x)) < 1e-9;
 function short(value, digits = 4) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   const size = Math.abs(value);
-  return String(size !== 0 && (size < 1e-3 || size >= 1e5) ? value.toExponential(digits - 1) : Number(value.toPrecision(digits)))
-    .replace(/-/g, "−");
+  if (size === 0 || (size >= 1e-3 && size < 1e5)) return String(Number(value.toPrecision(digits))).replace("-", "−");
+  const [mantissa, power] = value.toExponential(digits - 1).split("e");
+  return `${Number(mantissa)}×10${superscript(Number(power))}`.replace("-", "−");
+}
+
+// Where the words of marks stand above a plot: rows of which none overlaps another; "" for what has no room.
+const WORD_ROWS = 3, WORD_HEIGHT = 13;
+function placedWords(marks, place, measure) {
+  const ends = Array(WORD_ROWS).fill(-Infinity);
+  return marks.map(([time, word]) => {
+    const x = place(time), row = ends.findIndex((end) => x >= end);
+    if (row >= 0 && word) ends[row] = x + measure(word) + 8;
+    return { x, word: row < 0 ? "" : word, row };
+  });
 }
 
 // The ordinates to show: of laws that are shown and were not lost, with the levels.
@@ -72,19 +84,20 @@ function guides(panel, plot) {
       const y = u.valToPos(level, "y", true);
       line([bbox.left, y], [bbox.left + bbox.width, y], [6, 4]);
     }
+    ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
+    const inside = (plot.marks || []).filter(([time]) => time >= u.scales.x.min && time <= u.scales.x.max);
+    const words = placedWords(inside, (time) => u.valToPos(time, "x", true), (word) => ctx.measureText(word).width);
+    for (const { x } of words) line([x, bbox.top], [x, bbox.top + bbox.height], [2, 3]);
+    ctx.restore();
+    if (panel !== plot.panels[0]) return;
+    ctx.save();
     ctx.fillStyle = colours.soft;
+    ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
     ctx.textAlign = "left";
     ctx.textBaseline = "alphabetic";
-    ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
-    for (const [time, word] of plot.marks || []) {
-      const x = u.valToPos(time, "x", true);
-      line([x, bbox.top], [x, bbox.top + bbox.height], [2, 3]);
-      if (panel !== plot.panels[0]) continue;
-      ctx.save();
-      ctx.translate(x + 4 * devicePixelRatio, bbox.top + 4 * devicePixelRatio);
-      ctx.rotate(Math.PI / 2);
-      ctx.fillText(word, 0, 0);
-      ctx.restore();
+    for (const { x, word, row } of words) {
+      const room = bbox.left + bbox.width + 20 * devicePixelRatio - ctx.measureText(word).width;
+      ctx.fillText(word, Math.min(x, room), bbox.top - (4 + row * WORD_HEIGHT) * devicePixelRatio);
     }
     ctx.restore();
   };
@@ -115,7 +128,7 @@ function options(plot, panel, k, chart, size) {
   const grid = { stroke: () => colours.line, width: 1 };
   const axis = { stroke: () => colours.ink, grid, ticks: { show: false }, font: "12px system-ui, sans-serif", labelFont: "12.5px system-ui, sans-serif" };
   return {
-    ...size, plugins: [readout(panel, k, chart)], legend: { show: false }, padding: [8, 22, 0, 0],
+    ...size, plugins: [readout(panel, k, chart)], legend: { show: false }, padding: [k === 0 ? 8 + wordsAbove(plot) : 8, 22, 0, 0],
     cursor: { sync: { key: plot.split ? `${plot.name}${k}` : plot.name, setSeries: false }, drag: { x: true, y: false }, points: { size: 6 } },
     scales: {
       x: { time: false, ...(plot.split ? { range: [0.8, 6.2] } : {}) },
@@ -157,11 +170,13 @@ function dataOf(plot, panel) {
   return [times, ...panel.order.map((number) => gaps(panel.curves[number], times.length, panel.log))];
 }
 
+const wordsAbove = (plot) => ((plot.marks || []).some(([, word]) => word) ? WORD_ROWS * WORD_HEIGHT : 0);
+
 function sizes(plot, box) {
   const rows = plot.split ? 1 : plot.panels.length;
   const width = Math.floor(plot.split ? box.clientWidth / (box.clientWidth > 700 ? 2 : 1) : box.clientWidth);
   const high = rows === 1 ? 270 : rows === 2 ? 200 : 150;
-  return plot.panels.map((_, k) => ({ width, height: high + (plot.split || k === plot.panels.length - 1 ? 44 : 0) }));
+  return plot.panels.map((_, k) => ({ width, height: high + (k === 0 ? wordsAbove(plot) : 0) + (plot.split || k === plot.panels.length - 1 ? 44 : 0) }));
 }
 
 function legend(plot) {

@@ -48,8 +48,15 @@ function slidersOf(dial) {
       return [one("all axes", value[0], (given) => given[0], (given, x) => given.map(() => x))];
     }
     const most = Math.max(...value.map(Math.abs)) || 0.02;
-    const wide = dial.key === "initial.rate" ? linear(-2 * most, 2 * most) : undefined;
-    return value.map((base, k) => one(AXES[k], base, (given) => given[k], (given, x) => given.map((y, i) => (i === k ? x : y)), wide));
+    // In degrees where the file is; the file's own number stays as it is.
+    const unit = dial.degrees ? 180 / Math.PI : 1;
+    const told = (x) => (dial.degrees ? Number((x * unit).toPrecision(12)) : x);
+    const meant = (x, k) => (x === told(value[k]) ? value[k] : x / unit);
+    const wide = dial.key === "initial.rate" ? linear(-2 * most * unit, 2 * most * unit) : undefined;
+    return value.map((base, k) => one(
+      AXES[k], told(base), (given) => told(given[k]), (given, x) => given.map((y, i) => (i === k ? meant(x, k) : y)), wide,
+      dial.degrees ? dial.unit.replace("rad", "deg") : dial.unit,
+    ));
   }
   if (dial.law !== null) {
     // A matrix of gains is stretched as a whole.
