@@ -145,9 +145,10 @@ def over_time_heading(transient: float | None) -> str:
     """The heading of the plots over time, with a switch to the transient (s) where there is one."""
     if transient is None:
         return OVER_TIME
+    first = f"{float(f'{transient:.3g}'):g}"
     return (
         f'{OVER_TIME}\n<p class="switch"><button id="whole" type="button" aria-pressed="true">Whole run</button>'
-        f'<button id="transient-only" type="button" aria-pressed="false">Transient, first {float(f"{transient:.3g}"):g} s</button></p>'
+        f'<button id="transient-only" type="button" aria-pressed="false">Transient, first {first} s</button></p>'
     )
 
 

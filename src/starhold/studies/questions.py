@@ -64,8 +64,8 @@ def ask(scenario: Scenario, loops: Mapping[str, ClosedLoop], dials: Mapping[str,
 
 
 def _check(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, reads: bool) -> Callable[[Mapping[str, Any]], None]:
-    """Return what a law asks of the gains and of the craft that it knows, under values of keys, as its file is read or its memory
-    made."""
+    """Return what a law asks of the gains and of the craft that it knows, under values of keys, as its file is read or its
+    memory made."""
 
     def check(values: Mapping[str, Any]) -> None:
         own = {key.rpartition(".")[2]: value for key, value in values.items() if key.startswith("law.")}
