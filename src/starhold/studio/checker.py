@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import queue
 import subprocess
 import sys
@@ -87,13 +88,22 @@ def main() -> None:
     """Answer each line of standard input, a text with its name and folder, by a line of JSON."""
     # What files print as they are run must not stand between the answers.
     answers, sys.stdout = sys.stdout, sys.stderr
-    for line in sys.stdin:
-        text, where, folder = json.loads(line)
+    asked: queue.Queue[str] = queue.Queue()
+    threading.Thread(target=_hear, args=(asked,), daemon=True).start()
+    while True:
+        text, where, folder = json.loads(asked.get())
         try:
             found = editing.check(text, where, Path(folder))
         except Exception as error:
             found = {"error": f"{where}: {type(error).__name__}: {error}"}
         print(json.dumps(found), file=answers, flush=True)
+
+
+def _hear(asked: queue.Queue[str]) -> None:
+    for line in sys.stdin:
+        asked.put(line)
+    # The studio is gone, and with it whoever waits for a check that may not end.
+    os._exit(0)
 
 
 if __name__ == "__main__":
