@@ -12,16 +12,35 @@
 typedef lqr_quaternion_t quaternion_t;
 typedef lqr_vector_t vector_t;
 
+/* The gains are damping and stiffness matrices, and the share of the gyroscopic torque that is cancelled. */
+typedef struct {
+    vector_t k_rate; /* N m s: damping */
+    vector_t k_attitude; /* N m: stiffness */
+    double gyroscopic; /* share of w x Jw cancelled */
+} gains_t;
+
+/* A rigid spacecraft. */
+typedef struct {
+    vector_t inertia; /* kg m^2: of a craft with wheels without their rotors' about their axes */
+} craft_t;
+
 /* Which attitude. */
 typedef struct {
     quaternion_t attitude; /* unit quaternion, scalar first */
 } inertial_params_t;
 
-/* The attitude to be reached: q_RN (inertial to target axes), and the target's angular velocity (rad/s)
-   and acceleration (rad/s2), both in target axes. */
+/* The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. */
 typedef struct {
-    quaternion_t attitude;
-} goal_t;
+    double limit;
+    inertial_params_t target;
+} setup_t;
+
+/* The numbers that do not change in flight. */
+typedef struct {
+    gains_t gains;
+    craft_t craft;
+    setup_t setup;
+} parameters_t;
 
 /* Attitude q_BN (inertial to body), rate omega_BN_B (rad/s), position and velocity (inertial; m, m/s), and
    the torque the actuators give (body, N m), which has dynamics of its own when the actuators lag. */
@@ -29,6 +48,12 @@ typedef struct {
     quaternion_t attitude;
     vector_t rate;
 } state_t;
+
+/* The attitude to be reached: q_RN (inertial to target axes), and the target's angular velocity (rad/s)
+   and acceleration (rad/s2), both in target axes. */
+typedef struct {
+    quaternion_t attitude;
+} goal_t;
 
 /* Beside the state all that a measurement is made of: the goal (None where the loop has no target),
    whether it never turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s,
@@ -45,36 +70,6 @@ typedef struct {
     vector_t body_rate; /* rad/s: absolute angular velocity */
     vector_t target_acceleration; /* rad/s^2: derivative of target_rate as the turning body sees it */
 } measurement_t;
-
-/* What as_published gives. */
-typedef struct {
-    quaternion_t attitude;
-} as_published_result_t;
-
-/* A rigid spacecraft. */
-typedef struct {
-    vector_t inertia; /* kg m^2: of a craft with wheels without their rotors' about their axes */
-} craft_t;
-
-/* The gains are damping and stiffness matrices, and the share of the gyroscopic torque that is cancelled. */
-typedef struct {
-    vector_t k_rate; /* N m s: damping */
-    vector_t k_attitude; /* N m: stiffness */
-    double gyroscopic; /* share of w x Jw cancelled */
-} gains_t;
-
-/* The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. */
-typedef struct {
-    double limit;
-    inertial_params_t target;
-} setup_t;
-
-/* The numbers that do not change in flight. */
-typedef struct {
-    gains_t gains;
-    craft_t craft;
-    setup_t setup;
-} parameters_t;
 
 static const parameters_t parameters = {
     .gains = {
@@ -93,14 +88,6 @@ static const parameters_t parameters = {
     },
 };
 
-
-/* -------------------------------- parts.targets.inertial -------------------------------- */
-
-/* The attitude, at rest. */
-static goal_t inertial_goal(const inertial_params_t *params)
-{
-    return (goal_t){.attitude = params->attitude};
-}
 
 /* ---------------------------------- algebra.quaternion ---------------------------------- */
 
@@ -163,14 +150,6 @@ static measurement_t observe(const state_t *state, const scene_t *scene)
     const quaternion_t error = relative(scene->goal.attitude, state->attitude);
     return (measurement_t){.attitude = error, .rate = state->rate, .body_rate = state->rate,
         .target_acceleration = {0.0, 0.0, 0.0}};
-}
-
-/* -------------------------------- parts.quaternion_sign --------------------------------- */
-
-/* Feed back q itself: continuous, but the body may turn the long way (unwinding). */
-static as_published_result_t as_published(quaternion_t attitude)
-{
-    return (as_published_result_t){.attitude = attitude};
 }
 
 /* ------------------------------------ algebra.vector ------------------------------------ */
@@ -250,14 +229,10 @@ void lqr_init(lqr_state_t *state)
 void lqr_step(lqr_state_t *state, const lqr_input_t *input, lqr_command_t *command)
 {
     (void)state;
-    const goal_t goal = inertial_goal(&parameters.setup.target);
     const state_t body_state = {.attitude = input->attitude, .rate = input->rate};
+    const goal_t goal = {.attitude = parameters.setup.target.attitude};
     const scene_t scene = {.goal = goal};
     const measurement_t told = observe(&body_state, &scene);
-    const as_published_result_t as_published_result = as_published(told.attitude);
-    const measurement_t told_2 = {.attitude = as_published_result.attitude, .rate = told.rate,
-        .body_rate = told.body_rate, .target_acceleration = told.target_acceleration};
-    const vector_t wanted = limit_axis(lqr_torque(&told_2, &parameters.gains, &parameters.craft),
-        parameters.setup.limit);
-    command->torque = wanted;
+    const vector_t wanted = lqr_torque(&told, &parameters.gains, &parameters.craft);
+    command->torque = limit_axis(wanted, parameters.setup.limit);
 }

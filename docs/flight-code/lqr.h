@@ -15,7 +15,7 @@
    compile with -std=c99 -ffp-contract=off, never with -ffast-math.
 
 
-   Certificate: certificate.json, sha256 64fd369e776360cd6d37aa9cafdac822917b02f14eae92d120a573da09c4b131:
+   Certificate: certificate.json, sha256 f709f51a74f766b29ebcf9d17ea10cddcd7b37d1621f9ec06bb15936e715504f:
    proved
    Claims:
      proved: converges: with unlimited torque, from every attitude and rate the body comes to rest on

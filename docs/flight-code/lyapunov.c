@@ -15,16 +15,11 @@
 typedef lyapunov_quaternion_t quaternion_t;
 typedef lyapunov_vector_t vector_t;
 
-/* Which attitude. */
+/* The gains are damping and stiffness. */
 typedef struct {
-    quaternion_t attitude; /* unit quaternion, scalar first */
-} inertial_params_t;
-
-/* The attitude to be reached: q_RN (inertial to target axes), and the target's angular velocity (rad/s)
-   and acceleration (rad/s2), both in target axes. */
-typedef struct {
-    quaternion_t attitude;
-} goal_t;
+    double k_rate; /* N m s: damping */
+    double k_attitude; /* N m: stiffness against the quaternion's vector part */
+} gains_t;
 
 /* A rigid spacecraft. */
 typedef struct {
@@ -32,11 +27,23 @@ typedef struct {
     double gravity; /* m^3/s^2: gravitational parameter of the body that it orbits */
 } craft_t;
 
-/* What attraction gives. */
+/* Which attitude. */
 typedef struct {
-    double scalar;
-    double inverse_square;
-} attraction_result_t;
+    quaternion_t attitude; /* unit quaternion, scalar first */
+} inertial_params_t;
+
+/* The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. */
+typedef struct {
+    double limit;
+    inertial_params_t target;
+} setup_t;
+
+/* The numbers that do not change in flight. */
+typedef struct {
+    gains_t gains;
+    craft_t craft;
+    setup_t setup;
+} parameters_t;
 
 /* Attitude q_BN (inertial to body), rate omega_BN_B (rad/s), position and velocity (inertial; m, m/s), and
    the torque the actuators give (body, N m), which has dynamics of its own when the actuators lag. */
@@ -45,6 +52,18 @@ typedef struct {
     vector_t rate;
     vector_t position;
 } state_t;
+
+/* The attitude to be reached: q_RN (inertial to target axes), and the target's angular velocity (rad/s)
+   and acceleration (rad/s2), both in target axes. */
+typedef struct {
+    quaternion_t attitude;
+} goal_t;
+
+/* What attraction gives. */
+typedef struct {
+    double scalar;
+    double inverse_square;
+} attraction_result_t;
 
 /* Beside the state all that a measurement is made of: the goal (None where the loop has no target),
    whether it never turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s,
@@ -64,30 +83,6 @@ typedef struct {
     vector_t external_torque; /* N m: modelled torque from outside at this attitude */
 } measurement_t;
 
-/* What as_published gives. */
-typedef struct {
-    quaternion_t attitude;
-} as_published_result_t;
-
-/* The gains are damping and stiffness. */
-typedef struct {
-    double k_rate; /* N m s: damping */
-    double k_attitude; /* N m: stiffness against the quaternion's vector part */
-} gains_t;
-
-/* The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. */
-typedef struct {
-    double limit;
-    inertial_params_t target;
-} setup_t;
-
-/* The numbers that do not change in flight. */
-typedef struct {
-    gains_t gains;
-    craft_t craft;
-    setup_t setup;
-} parameters_t;
-
 static const parameters_t parameters = {
     .gains = {
         .k_rate = 0.09, /* N m s */
@@ -105,14 +100,6 @@ static const parameters_t parameters = {
     },
 };
 
-
-/* -------------------------------- parts.targets.inertial -------------------------------- */
-
-/* The attitude, at rest. */
-static goal_t inertial_goal(const inertial_params_t *params)
-{
-    return (goal_t){.attitude = params->attitude};
-}
 
 /* ------------------------------------ algebra.vector ------------------------------------ */
 
@@ -170,14 +157,6 @@ static vector_t to_body(quaternion_t q, vector_t r)
     return add(add(r, scale(q.q0, t)), cross(t, v));
 }
 
-/* ------------------------------------- parts.craft -------------------------------------- */
-
-/* The inertia with all that is in the craft, which gravity acts on (kg m2). */
-static vector_t total_inertia(const craft_t *craft)
-{
-    return craft->inertia;
-}
-
 /* ------------------------------------ algebra.vector ------------------------------------ */
 
 /* Return a x (m a) for a symmetric m: the gyroscopic torque is gyroscopic_torque(J, w). */
@@ -191,16 +170,16 @@ static vector_t gyroscopic_torque(vector_t m, vector_t a)
 /* Gravity-gradient torque (N m) for the position in body axes (m) and strength 3 mu/r5 (1/(m2 s2)). */
 static vector_t gravity_gradient(vector_t position, double strength, const craft_t *craft)
 {
-    return scale(strength, gyroscopic_torque(total_inertia(craft), position));
+    return scale(strength, gyroscopic_torque(craft->inertia, position));
 }
 
 /* Torque on the body (N m, body axes). */
 static vector_t gravity_gradient_torque(const state_t *state, const craft_t *craft)
 {
     const attraction_result_t attraction_result = attraction(state->position, craft);
-    const vector_t gravity_gradient_2 = gravity_gradient(to_body(state->attitude, state->position), 3.0 *
+    const vector_t gravity_gradient_result = gravity_gradient(to_body(state->attitude, state->position), 3.0 *
         attraction_result.scalar * attraction_result.inverse_square, craft);
-    return gravity_gradient_2;
+    return gravity_gradient_result;
 }
 
 /* ---------------------------------- algebra.quaternion ---------------------------------- */
@@ -236,14 +215,6 @@ static measurement_t observe(const state_t *state, const scene_t *scene)
     const quaternion_t error = relative(scene->goal.attitude, state->attitude);
     return (measurement_t){.attitude = error, .rate = state->rate, .body_rate = state->rate,
         .target_acceleration = {0.0, 0.0, 0.0}, .external_torque = scene->torque};
-}
-
-/* -------------------------------- parts.quaternion_sign --------------------------------- */
-
-/* Feed back q itself: continuous, but the body may turn the long way (unwinding). */
-static as_published_result_t as_published(quaternion_t attitude)
-{
-    return (as_published_result_t){.attitude = attitude};
 }
 
 /* ------------------------------------ algebra.vector ------------------------------------ */
@@ -313,17 +284,12 @@ void lyapunov_init(lyapunov_state_t *state)
 void lyapunov_step(lyapunov_state_t *state, const lyapunov_input_t *input, lyapunov_command_t *command)
 {
     (void)state;
-    const goal_t goal = inertial_goal(&parameters.setup.target);
     const state_t body_state = {.attitude = input->attitude, .rate = input->rate,
         .position = input->position};
     const vector_t torque = gravity_gradient_torque(&body_state, &parameters.craft);
+    const goal_t goal = {.attitude = parameters.setup.target.attitude};
     const scene_t scene = {.goal = goal, .torque = torque};
     const measurement_t told = observe(&body_state, &scene);
-    const as_published_result_t as_published_result = as_published(told.attitude);
-    const measurement_t told_2 = {.attitude = as_published_result.attitude, .rate = told.rate,
-        .body_rate = told.body_rate, .target_acceleration = told.target_acceleration,
-        .external_torque = told.external_torque};
-    const vector_t wanted = limit_axis(lyapunov_torque(&told_2, &parameters.gains, &parameters.craft),
-        parameters.setup.limit);
-    command->torque = wanted;
+    const vector_t wanted = lyapunov_torque(&told, &parameters.gains, &parameters.craft);
+    command->torque = limit_axis(wanted, parameters.setup.limit);
 }

@@ -2,8 +2,6 @@
 
 #include "modal.h"
 
-#include <math.h>
-
 #if defined(__FAST_MATH__) || (defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ != 0)
 #error "this code needs IEEE arithmetic in doubles: no -ffast-math, no x87"
 #endif
@@ -14,16 +12,34 @@
 typedef modal_quaternion_t quaternion_t;
 typedef modal_vector_t vector_t;
 
+/* The gains are the spectra of the three levels. */
+typedef struct {
+    vector_t phi_0; /* 1/s: of the rates; a number a stands for a E */
+    vector_t phi_1; /* 1/s: of the quaternion's vector part */
+    double b; /* s: of its scalar part, over |w|2 */
+} gains_t;
+
+/* A rigid spacecraft. */
+typedef struct {
+    vector_t inertia; /* kg m^2: of a craft with wheels without their rotors' about their axes */
+} craft_t;
+
 /* Which attitude. */
 typedef struct {
     quaternion_t attitude; /* unit quaternion, scalar first */
 } inertial_params_t;
 
-/* The attitude to be reached: q_RN (inertial to target axes), and the target's angular velocity (rad/s)
-   and acceleration (rad/s2), both in target axes. */
+/* The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. */
 typedef struct {
-    quaternion_t attitude;
-} goal_t;
+    inertial_params_t target;
+} setup_t;
+
+/* The numbers that do not change in flight. */
+typedef struct {
+    gains_t gains;
+    craft_t craft;
+    setup_t setup;
+} parameters_t;
 
 /* Attitude q_BN (inertial to body), rate omega_BN_B (rad/s), position and velocity (inertial; m, m/s), and
    the torque the actuators give (body, N m), which has dynamics of its own when the actuators lag. */
@@ -31,6 +47,12 @@ typedef struct {
     quaternion_t attitude;
     vector_t rate;
 } state_t;
+
+/* The attitude to be reached: q_RN (inertial to target axes), and the target's angular velocity (rad/s)
+   and acceleration (rad/s2), both in target axes. */
+typedef struct {
+    quaternion_t attitude;
+} goal_t;
 
 /* Beside the state all that a measurement is made of: the goal (None where the loop has no target),
    whether it never turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s,
@@ -52,35 +74,6 @@ typedef struct {
     vector_t wheel_momentum; /* N m s: angular momentum of the body's wheels */
 } measurement_t;
 
-/* What as_published gives. */
-typedef struct {
-    quaternion_t attitude;
-} as_published_result_t;
-
-/* The gains are the spectra of the three levels. */
-typedef struct {
-    vector_t phi_0; /* 1/s: of the rates; a number a stands for a E */
-    vector_t phi_1; /* 1/s: of the quaternion's vector part */
-    double b; /* s: of its scalar part, over |w|2 */
-} gains_t;
-
-/* A rigid spacecraft. */
-typedef struct {
-    vector_t inertia; /* kg m^2: of a craft with wheels without their rotors' about their axes */
-} craft_t;
-
-/* The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. */
-typedef struct {
-    inertial_params_t target;
-} setup_t;
-
-/* The numbers that do not change in flight. */
-typedef struct {
-    gains_t gains;
-    craft_t craft;
-    setup_t setup;
-} parameters_t;
-
 static const parameters_t parameters = {
     .gains = {
         .phi_0 = {-0.42840147464805134, -0.42840147464805134, -0.42840147464805134}, /* 1/s */
@@ -97,14 +90,6 @@ static const parameters_t parameters = {
     },
 };
 
-
-/* -------------------------------- parts.targets.inertial -------------------------------- */
-
-/* The attitude, at rest. */
-static goal_t inertial_goal(const inertial_params_t *params)
-{
-    return (goal_t){.attitude = params->attitude};
-}
 
 /* ---------------------------------- algebra.quaternion ---------------------------------- */
 
@@ -166,14 +151,6 @@ static measurement_t observe(const state_t *state, const scene_t *scene)
     return (measurement_t){.attitude = error, .rate = state->rate, .body_rate = state->rate,
         .target_acceleration = {0.0, 0.0, 0.0}, .external_torque = scene->torque,
         .wheel_momentum = scene->momentum};
-}
-
-/* -------------------------------- parts.quaternion_sign --------------------------------- */
-
-/* Feed back q itself: continuous, but the body may turn the long way (unwinding). */
-static as_published_result_t as_published(quaternion_t attitude)
-{
-    return (as_published_result_t){.attitude = attitude};
 }
 
 /* ------------------------------------ algebra.vector ------------------------------------ */
@@ -257,19 +234,11 @@ static vector_t modal_torque(const measurement_t *measurement, const gains_t *ga
     const vector_t moved = upper(q, measurement->rate, gains, craft, turning.q0, vector_part(turning));
     const vector_t feedback = subtract(moved, apply(gains->phi_0,
         add(held, apply(craft->inertia, measurement->rate))));
-    const vector_t add_2 = add(add(gyroscopic_torque(craft->inertia, measurement->body_rate),
+    const vector_t add_result = add(add(gyroscopic_torque(craft->inertia, measurement->body_rate),
         cross(measurement->body_rate, measurement->wheel_momentum)),
         apply(craft->inertia, measurement->target_acceleration));
-    const vector_t model = subtract(add_2, measurement->external_torque);
+    const vector_t model = subtract(add_result, measurement->external_torque);
     return subtract(model, feedback);
-}
-
-/* -------------------------------- parts.actuators.limits -------------------------------- */
-
-/* The command as it is. */
-static vector_t limit_none(vector_t command)
-{
-    return command;
 }
 
 /* -------------------------------------- interface --------------------------------------- */
@@ -282,14 +251,10 @@ void modal_init(modal_state_t *state)
 void modal_step(modal_state_t *state, const modal_input_t *input, modal_command_t *command)
 {
     (void)state;
-    const goal_t goal = inertial_goal(&parameters.setup.target);
     const state_t body_state = {.attitude = input->attitude, .rate = input->rate};
+    const goal_t goal = {.attitude = parameters.setup.target.attitude};
     const scene_t scene = {.goal = goal, .torque = {0.0, 0.0, 0.0}, .momentum = {0.0, 0.0, 0.0}};
     const measurement_t told = observe(&body_state, &scene);
-    const as_published_result_t as_published_result = as_published(told.attitude);
-    const measurement_t told_2 = {.attitude = as_published_result.attitude, .rate = told.rate,
-        .body_rate = told.body_rate, .target_acceleration = told.target_acceleration,
-        .external_torque = told.external_torque, .wheel_momentum = told.wheel_momentum};
-    const vector_t wanted = limit_none(modal_torque(&told_2, &parameters.gains, &parameters.craft));
+    const vector_t wanted = modal_torque(&told, &parameters.gains, &parameters.craft);
     command->torque = wanted;
 }

@@ -16,16 +16,10 @@
 typedef mpc_quaternion_t quaternion_t;
 typedef mpc_vector_t vector_t;
 
-/* Which attitude. */
+/* Rows of a 3x3 matrix. */
 typedef struct {
-    quaternion_t attitude; /* unit quaternion, scalar first */
-} inertial_params_t;
-
-/* The attitude to be reached: q_RN (inertial to target axes), and the target's angular velocity (rad/s)
-   and acceleration (rad/s2), both in target axes. */
-typedef struct {
-    quaternion_t attitude;
-} goal_t;
+    vector_t row[3];
+} matrix_t;
 
 /* A rigid spacecraft. */
 typedef struct {
@@ -37,6 +31,24 @@ typedef struct {
     double gravity; /* m^3/s^2: gravitational parameter of the body that it orbits */
 } craft_t;
 
+/* Which attitude. */
+typedef struct {
+    quaternion_t attitude; /* unit quaternion, scalar first */
+} inertial_params_t;
+
+/* The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. */
+typedef struct {
+    double period;
+    double limit;
+    inertial_params_t target;
+} setup_t;
+
+/* The numbers that do not change in flight. */
+typedef struct {
+    craft_t craft;
+    setup_t setup;
+} parameters_t;
+
 /* Attitude q_BN (inertial to body), rate omega_BN_B (rad/s), position and velocity (inertial; m, m/s), and
    the torque the actuators give (body, N m), which has dynamics of its own when the actuators lag. */
 typedef struct {
@@ -44,6 +56,12 @@ typedef struct {
     vector_t rate;
     vector_t position;
 } state_t;
+
+/* The attitude to be reached: q_RN (inertial to target axes), and the target's angular velocity (rad/s)
+   and acceleration (rad/s2), both in target axes. */
+typedef struct {
+    quaternion_t attitude;
+} goal_t;
 
 /* Beside the state all that a measurement is made of: the goal (None where the loop has no target),
    whether it never turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s,
@@ -64,16 +82,6 @@ typedef struct {
     double period; /* s: for which the torque will be held */
 } measurement_t;
 
-/* What as_published gives. */
-typedef struct {
-    quaternion_t attitude;
-} as_published_result_t;
-
-/* Rows of a 3x3 matrix. */
-typedef struct {
-    vector_t row[3];
-} matrix_t;
-
 /* The motion is x' = A x + B u for x = (q; w), small about the measured motion, in blocks of three: A =
    [[turning, E/2], [stiffness, damping]], B = [0; push]. */
 typedef struct {
@@ -91,19 +99,18 @@ typedef struct {
     matrix_t damping;
 } rates_t;
 
-/* Six numbers. */
 typedef struct {
     double e[6];
-} six_t;
+} doubles6_t;
 
 typedef struct {
-    six_t e[6];
-} six_rows_t;
+    doubles6_t e[6];
+} doubles6s6_t;
 
 /* What share gives. */
 typedef struct {
-    double share;
-    double count;
+    double scalar;
+    double scalar1;
 } share_result_t;
 
 /* A move v keeps |v - centre| <= bound (N m; inf: none), in norm (ball) or on each axis, which is low <= v
@@ -123,29 +130,29 @@ typedef struct {
 
 typedef struct {
     vector_t e[6];
-} six_vectors_t;
+} vectors6_t;
 
 /* What motion gives. */
 typedef struct {
-    six_rows_t rows;
-    six_vectors_t rows1;
+    doubles6s6_t rows;
+    vectors6_t rows1;
 } motion_result_t;
 
 /* The weights are Q and R, full or as their diagonals, the inverse of R, and P. */
 typedef struct {
-    six_t q;
+    doubles6_t q;
     vector_t r;
     vector_t r_inverse;
-    six_rows_t p;
+    doubles6s6_t p;
 } weights_t;
 
 typedef struct {
-    six_t e[3];
-} sixs3_t;
+    doubles6_t e[3];
+} doubles6s3_t;
 
 /* What repelled gives. */
 typedef struct {
-    six_t symmetric;
+    doubles6_t symmetric;
     vector_t push;
 } repelled_result_t;
 
@@ -155,7 +162,7 @@ typedef struct {
 
 /* What held_inverse gives. */
 typedef struct {
-    six_t symmetric;
+    doubles6_t symmetric;
     double scalar;
 } held_inverse_result_t;
 
@@ -199,7 +206,7 @@ typedef struct {
 /* What interior gives. */
 typedef struct {
     double scalar;
-    double kept;
+    double scalar1;
 } interior_result_t;
 
 /* A run gives the number of Riccati sweeps, whether the optimum was reached, and whether limits shape it. */
@@ -208,19 +215,6 @@ typedef struct {
     bool solved;
     bool shaped;
 } solved_t;
-
-/* The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. */
-typedef struct {
-    double period;
-    double limit;
-    inertial_params_t target;
-} setup_t;
-
-/* The numbers that do not change in flight. */
-typedef struct {
-    craft_t craft;
-    setup_t setup;
-} parameters_t;
 
 static const parameters_t parameters = {
     .craft = {
@@ -258,45 +252,6 @@ enum {
     MULTIPLIERS_AT = 637,
     SPARE_AT = 667,
 };
-
-/* Read 6 numbers that stand together. */
-static six_t six_at(const double *numbers)
-{
-    return (six_t){{numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5]}};
-}
-
-/* Write 6 numbers that stand together. */
-static void put_six(double *numbers, six_t value)
-{
-    numbers[0] = value.e[0];
-    numbers[1] = value.e[1];
-    numbers[2] = value.e[2];
-    numbers[3] = value.e[3];
-    numbers[4] = value.e[4];
-    numbers[5] = value.e[5];
-}
-
-/* Read 3 numbers that stand together. */
-static vector_t vector_at(const double *numbers)
-{
-    return (vector_t){numbers[0], numbers[1], numbers[2]};
-}
-
-/* Write 3 numbers that stand together. */
-static void put_vector(double *numbers, vector_t value)
-{
-    numbers[0] = value.x;
-    numbers[1] = value.y;
-    numbers[2] = value.z;
-}
-
-/* -------------------------------- parts.targets.inertial -------------------------------- */
-
-/* The attitude, at rest. */
-static goal_t inertial_goal(const inertial_params_t *params)
-{
-    return (goal_t){.attitude = params->attitude};
-}
 
 /* ------------------------------------ algebra.vector ------------------------------------ */
 
@@ -344,14 +299,6 @@ static vector_t to_body(quaternion_t q, vector_t r)
     return add(add(r, scale(q.q0, t)), cross(t, v));
 }
 
-/* ------------------------------------- parts.craft -------------------------------------- */
-
-/* The inertia with all that is in the craft, which gravity acts on (kg m2). */
-static vector_t total_inertia(const craft_t *craft)
-{
-    return craft->inertia;
-}
-
 /* ------------------------------------ algebra.vector ------------------------------------ */
 
 /* Return a x (m a) for a symmetric m: the gyroscopic torque is gyroscopic_torque(J, w). */
@@ -391,17 +338,9 @@ static quaternion_t relative(quaternion_t target, quaternion_t q)
 static measurement_t observe(const state_t *state, const scene_t *scene)
 {
     const quaternion_t error = relative(scene->goal.attitude, state->attitude);
-    const vector_t position = to_body(state->attitude, state->position);
     return (measurement_t){.attitude = error, .rate = state->rate, .body_rate = state->rate,
-        .target_acceleration = {0.0, 0.0, 0.0}, .position = position, .period = scene->period};
-}
-
-/* -------------------------------- parts.quaternion_sign --------------------------------- */
-
-/* Feed back q itself: continuous, but the body may turn the long way (unwinding). */
-static as_published_result_t as_published(quaternion_t attitude)
-{
-    return (as_published_result_t){.attitude = attitude};
+        .target_acceleration = {0.0, 0.0, 0.0}, .position = to_body(state->attitude, state->position),
+        .period = scene->period};
 }
 
 /* ------------------------------------ algebra.vector ------------------------------------ */
@@ -444,10 +383,10 @@ static matrix_t skew(vector_t a)
 }
 
 /* Return the transposed matrix. */
-static matrix_t transpose(matrix_t m)
+static matrix_t transpose(const matrix_t *m)
 {
-    return (matrix_t){{{m.row[0].x, m.row[1].x, m.row[2].x}, {m.row[0].y, m.row[1].y, m.row[2].y},
-        {m.row[0].z, m.row[1].z, m.row[2].z}}};
+    return (matrix_t){{{m->row[0].x, m->row[1].x, m->row[2].x}, {m->row[0].y, m->row[1].y, m->row[2].y},
+        {m->row[0].z, m->row[1].z, m->row[2].z}}};
 }
 
 /* -------------------------------- laws.predictive.motion -------------------------------- */
@@ -456,45 +395,50 @@ static matrix_t transpose(matrix_t m)
 static linear_t linearise(const measurement_t *measurement, const craft_t *craft)
 {
     const vector_t momentum = apply(craft->inertia, measurement->rate);
-    const vector_t pull = apply(total_inertia(craft), measurement->position);
+    const vector_t pull = apply(craft->inertia, measurement->position);
     const double square = dot(measurement->position, measurement->position);
     const double strength = 0.0 < square ? 6.0 * craft->gravity / (square * square * sqrt(square)) : 0.0;
+    const matrix_t skew_result = skew(measurement->rate);
+    const matrix_t transpose_result = transpose(&skew_result);
     const vector_t lever = cross(measurement->position, (vector_t){1.0, 0.0, 0.0});
-    const vector_t scale_2 = scale(strength, apply(craft->inverse_inertia,
-        subtract(cross(measurement->position, apply(total_inertia(craft), lever)), cross(pull, lever))));
+    const vector_t scale_result = scale(strength, apply(craft->inverse_inertia,
+        subtract(cross(measurement->position, apply(craft->inertia, lever)), cross(pull, lever))));
     const vector_t lever_2 = cross(measurement->position, (vector_t){0.0, 1.0, 0.0});
-    const vector_t scale_3 = scale(strength, apply(craft->inverse_inertia,
-        subtract(cross(measurement->position, apply(total_inertia(craft), lever_2)), cross(pull, lever_2))));
+    const vector_t scale_result_2 = scale(strength, apply(craft->inverse_inertia,
+        subtract(cross(measurement->position, apply(craft->inertia, lever_2)), cross(pull, lever_2))));
     const vector_t lever_3 = cross(measurement->position, (vector_t){0.0, 0.0, 1.0});
-    const vector_t tilt = subtract(cross(measurement->position, apply(total_inertia(craft), lever_3)),
+    const vector_t tilt = subtract(cross(measurement->position, apply(craft->inertia, lever_3)),
         cross(pull, lever_3));
-    const vector_t apply_2 = apply(craft->inverse_inertia,
+    const matrix_t m = {{scale_result, scale_result_2, scale(strength, apply(craft->inverse_inertia, tilt))}};
+    const matrix_t transpose_result_2 = transpose(&m);
+    const vector_t apply_result = apply(craft->inverse_inertia,
         subtract(cross(momentum, (vector_t){1.0, 0.0, 0.0}), cross(measurement->rate,
         apply(craft->inertia, (vector_t){1.0, 0.0, 0.0}))));
-    const vector_t apply_3 = apply(craft->inverse_inertia,
+    const vector_t apply_result_2 = apply(craft->inverse_inertia,
         subtract(cross(momentum, (vector_t){0.0, 1.0, 0.0}), cross(measurement->rate,
         apply(craft->inertia, (vector_t){0.0, 1.0, 0.0}))));
-    const vector_t apply_4 = apply(craft->inverse_inertia,
+    const vector_t apply_result_3 = apply(craft->inverse_inertia,
         subtract(cross(momentum, (vector_t){0.0, 0.0, 1.0}), cross(measurement->rate,
         apply(craft->inertia, (vector_t){0.0, 0.0, 1.0}))));
-    const matrix_t transpose_2 =
-        transpose((matrix_t){{apply(craft->inverse_inertia, (vector_t){1.0, 0.0, 0.0}),
+    const matrix_t m_2 = {{apply_result, apply_result_2, apply_result_3}};
+    const matrix_t transpose_result_3 = transpose(&m_2);
+    const matrix_t m_3 = {{apply(craft->inverse_inertia, (vector_t){1.0, 0.0, 0.0}),
         apply(craft->inverse_inertia, (vector_t){0.0, 1.0, 0.0}),
-        apply(craft->inverse_inertia, (vector_t){0.0, 0.0, 1.0})}});
-    return (linear_t){.turning = transpose(skew(measurement->rate)), .stiffness =
-        transpose((matrix_t){{scale_2, scale_3, scale(strength, apply(craft->inverse_inertia, tilt))}}),
-        .damping = transpose((matrix_t){{apply_2, apply_3, apply_4}}), .push = transpose_2};
+        apply(craft->inverse_inertia, (vector_t){0.0, 0.0, 1.0})}};
+    const matrix_t transpose_result_4 = transpose(&m_3);
+    return (linear_t){.turning = transpose_result, .stiffness = transpose_result_2,
+        .damping = transpose_result_3, .push = transpose_result_4};
 }
 
-static matrix_t scaled(matrix_t m, double c)
+static matrix_t scaled(const matrix_t *m, double c)
 {
-    return (matrix_t){{scale(c, m.row[0]), scale(c, m.row[1]), scale(c, m.row[2])}};
+    return (matrix_t){{scale(c, m->row[0]), scale(c, m->row[1]), scale(c, m->row[2])}};
 }
 
 /* Return the whole matrix. */
-static six_rows_t rows(const rates_t *rates)
+static doubles6s6_t rows(const rates_t *rates)
 {
-    return (six_rows_t){{{{0.0, rates->turning.row[0].y, rates->turning.row[0].z, rates->half, 0.0, 0.0}},
+    return (doubles6s6_t){{{{0.0, rates->turning.row[0].y, rates->turning.row[0].z, rates->half, 0.0, 0.0}},
         {{rates->turning.row[1].x, 0.0, rates->turning.row[1].z, 0.0, rates->half, 0.0}},
         {{rates->turning.row[2].x, rates->turning.row[2].y, 0.0, 0.0, 0.0, rates->half}},
         {{rates->stiffness.row[0].x, rates->stiffness.row[0].y, rates->stiffness.row[0].z,
@@ -524,31 +468,31 @@ static double maximum(double a, double b)
 /* Return the share of the period, halved until no row's absolute sum passes 1, and how often that was. */
 static share_result_t share_1(const rates_t *rates)
 {
-    const six_rows_t rows_2 = rows(rates);
-    const double t3 = 0.0 + absolute(rows_2.e[0].e[0]) + absolute(rows_2.e[0].e[1]) +
-        absolute(rows_2.e[0].e[2]);
-    const double t6 = t3 + absolute(rows_2.e[0].e[3]) + absolute(rows_2.e[0].e[4]) +
-        absolute(rows_2.e[0].e[5]);
-    const double t9 = 0.0 + absolute(rows_2.e[1].e[0]) + absolute(rows_2.e[1].e[1]) +
-        absolute(rows_2.e[1].e[2]);
-    const double t12 = t9 + absolute(rows_2.e[1].e[3]) + absolute(rows_2.e[1].e[4]) +
-        absolute(rows_2.e[1].e[5]);
-    const double t15 = 0.0 + absolute(rows_2.e[2].e[0]) + absolute(rows_2.e[2].e[1]) +
-        absolute(rows_2.e[2].e[2]);
-    const double t18 = t15 + absolute(rows_2.e[2].e[3]) + absolute(rows_2.e[2].e[4]) +
-        absolute(rows_2.e[2].e[5]);
-    const double t21 = 0.0 + absolute(rows_2.e[3].e[0]) + absolute(rows_2.e[3].e[1]) +
-        absolute(rows_2.e[3].e[2]);
-    const double t24 = t21 + absolute(rows_2.e[3].e[3]) + absolute(rows_2.e[3].e[4]) +
-        absolute(rows_2.e[3].e[5]);
-    const double t27 = 0.0 + absolute(rows_2.e[4].e[0]) + absolute(rows_2.e[4].e[1]) +
-        absolute(rows_2.e[4].e[2]);
-    const double t30 = t27 + absolute(rows_2.e[4].e[3]) + absolute(rows_2.e[4].e[4]) +
-        absolute(rows_2.e[4].e[5]);
-    const double t33 = 0.0 + absolute(rows_2.e[5].e[0]) + absolute(rows_2.e[5].e[1]) +
-        absolute(rows_2.e[5].e[2]);
-    const double total = t33 + absolute(rows_2.e[5].e[3]) + absolute(rows_2.e[5].e[4]) +
-        absolute(rows_2.e[5].e[5]);
+    const doubles6s6_t rows_result = rows(rates);
+    const double t3 = 0.0 + absolute(rows_result.e[0].e[0]) + absolute(rows_result.e[0].e[1]) +
+        absolute(rows_result.e[0].e[2]);
+    const double t6 = t3 + absolute(rows_result.e[0].e[3]) + absolute(rows_result.e[0].e[4]) +
+        absolute(rows_result.e[0].e[5]);
+    const double t9 = 0.0 + absolute(rows_result.e[1].e[0]) + absolute(rows_result.e[1].e[1]) +
+        absolute(rows_result.e[1].e[2]);
+    const double t12 = t9 + absolute(rows_result.e[1].e[3]) + absolute(rows_result.e[1].e[4]) +
+        absolute(rows_result.e[1].e[5]);
+    const double t15 = 0.0 + absolute(rows_result.e[2].e[0]) + absolute(rows_result.e[2].e[1]) +
+        absolute(rows_result.e[2].e[2]);
+    const double t18 = t15 + absolute(rows_result.e[2].e[3]) + absolute(rows_result.e[2].e[4]) +
+        absolute(rows_result.e[2].e[5]);
+    const double t21 = 0.0 + absolute(rows_result.e[3].e[0]) + absolute(rows_result.e[3].e[1]) +
+        absolute(rows_result.e[3].e[2]);
+    const double t24 = t21 + absolute(rows_result.e[3].e[3]) + absolute(rows_result.e[3].e[4]) +
+        absolute(rows_result.e[3].e[5]);
+    const double t27 = 0.0 + absolute(rows_result.e[4].e[0]) + absolute(rows_result.e[4].e[1]) +
+        absolute(rows_result.e[4].e[2]);
+    const double t30 = t27 + absolute(rows_result.e[4].e[3]) + absolute(rows_result.e[4].e[4]) +
+        absolute(rows_result.e[4].e[5]);
+    const double t33 = 0.0 + absolute(rows_result.e[5].e[0]) + absolute(rows_result.e[5].e[1]) +
+        absolute(rows_result.e[5].e[2]);
+    const double total = t33 + absolute(rows_result.e[5].e[3]) + absolute(rows_result.e[5].e[4]) +
+        absolute(rows_result.e[5].e[5]);
     double size_ = maximum(total, maximum(t30, maximum(t24, maximum(t18, maximum(t12, maximum(t6, 0.0))))));
     double share_ = 1.0;
     double count_ = 0.0;
@@ -561,34 +505,38 @@ static share_result_t share_1(const rates_t *rates)
         share_ = 0.5 * share;
         count_ = count + 1.0;
     }
-    return (share_result_t){.share = share_, .count = count_};
+    return (share_result_t){.scalar = share_, .scalar1 = count_};
 }
 
 /* The rates act over that share of the time. */
 static rates_t during(const rates_t *rates, double share)
 {
-    return (rates_t){.turning = scaled(rates->turning, share), .half = rates->half * share,
-        .stiffness = scaled(rates->stiffness, share), .damping = scaled(rates->damping, share)};
+    const matrix_t scaled_result = scaled(&rates->turning, share);
+    const matrix_t scaled_result_2 = scaled(&rates->stiffness, share);
+    const matrix_t scaled_result_3 = scaled(&rates->damping, share);
+    return (rates_t){.turning = scaled_result, .half = rates->half * share, .stiffness = scaled_result_2,
+        .damping = scaled_result_3};
 }
 
 /* -------------------------------- laws.predictive.sixes --------------------------------- */
 
 /* Return the transposed matrix. */
-static six_rows_t transposed(six_rows_t m)
+static doubles6s6_t transposed(const doubles6s6_t *m)
 {
-    return (six_rows_t){{{{m.e[0].e[0], m.e[1].e[0], m.e[2].e[0], m.e[3].e[0], m.e[4].e[0], m.e[5].e[0]}},
-        {{m.e[0].e[1], m.e[1].e[1], m.e[2].e[1], m.e[3].e[1], m.e[4].e[1], m.e[5].e[1]}}, {{m.e[0].e[2],
-        m.e[1].e[2], m.e[2].e[2], m.e[3].e[2], m.e[4].e[2], m.e[5].e[2]}}, {{m.e[0].e[3], m.e[1].e[3],
-        m.e[2].e[3], m.e[3].e[3], m.e[4].e[3], m.e[5].e[3]}}, {{m.e[0].e[4], m.e[1].e[4], m.e[2].e[4],
-        m.e[3].e[4], m.e[4].e[4], m.e[5].e[4]}}, {{m.e[0].e[5], m.e[1].e[5], m.e[2].e[5], m.e[3].e[5],
-        m.e[4].e[5], m.e[5].e[5]}}}};
+    return (doubles6s6_t){{{{m->e[0].e[0], m->e[1].e[0], m->e[2].e[0], m->e[3].e[0], m->e[4].e[0],
+        m->e[5].e[0]}}, {{m->e[0].e[1], m->e[1].e[1], m->e[2].e[1], m->e[3].e[1], m->e[4].e[1],
+        m->e[5].e[1]}}, {{m->e[0].e[2], m->e[1].e[2], m->e[2].e[2], m->e[3].e[2], m->e[4].e[2],
+        m->e[5].e[2]}}, {{m->e[0].e[3], m->e[1].e[3], m->e[2].e[3], m->e[3].e[3], m->e[4].e[3],
+        m->e[5].e[3]}}, {{m->e[0].e[4], m->e[1].e[4], m->e[2].e[4], m->e[3].e[4], m->e[4].e[4],
+        m->e[5].e[4]}}, {{m->e[0].e[5], m->e[1].e[5], m->e[2].e[5], m->e[3].e[5], m->e[4].e[5],
+        m->e[5].e[5]}}}};
 }
 
 /* -------------------------------- laws.predictive.motion -------------------------------- */
 
-static six_t times1(six_t row, double c)
+static doubles6_t times1(doubles6_t row, double c)
 {
-    return (six_t){{row.e[0] * c, row.e[1] * c, row.e[2] * c, row.e[3] * c, row.e[4] * c, row.e[5] * c}};
+    return (doubles6_t){{row.e[0] * c, row.e[1] * c, row.e[2] * c, row.e[3] * c, row.e[4] * c, row.e[5] * c}};
 }
 
 /* -------------------------------- laws.predictive.sixes --------------------------------- */
@@ -596,37 +544,37 @@ static six_t times1(six_t row, double c)
 /* Return start + a'b. */
 static double dot1(vector_t a, vector_t b)
 {
-    const double total = 0.0 + a.x * b.x + a.y * b.y + a.z * b.z;
-    return total;
+    const double total = 0.0 + a.x * b.x + a.y * b.y;
+    return total + a.z * b.z;
 }
 
 /* Return start + a'b. */
-static double dot2(six_t a, six_t b)
+static double dot2(doubles6_t a, doubles6_t b)
 {
     const double t8 = 0.0 + a.e[0] * b.e[0] + a.e[1] * b.e[1] + a.e[2] * b.e[2] + a.e[3] * b.e[3];
-    const double total = t8 + a.e[4] * b.e[4] + a.e[5] * b.e[5];
-    return total;
+    const double total = t8 + a.e[4] * b.e[4];
+    return total + a.e[5] * b.e[5];
 }
 
 /* -------------------------------- laws.predictive.motion -------------------------------- */
 
 /* Return the matrix times a column, without its zeros. */
-static six_t product(const rates_t *rates, six_t x)
+static doubles6_t product(const rates_t *rates, doubles6_t x)
 {
-    const six_rows_t rows_2 = rows(rates);
-    return (six_t){{dot1((vector_t){rates->turning.row[0].y, rates->turning.row[0].z, rates->half},
+    const doubles6s6_t rows_result = rows(rates);
+    return (doubles6_t){{dot1((vector_t){rates->turning.row[0].y, rates->turning.row[0].z, rates->half},
         (vector_t){x.e[1], x.e[2], x.e[3]}), dot1((vector_t){rates->turning.row[1].x, rates->turning.row[1].z,
         rates->half}, (vector_t){x.e[0], x.e[2], x.e[4]}), dot1((vector_t){rates->turning.row[2].x,
-        rates->turning.row[2].y, rates->half}, (vector_t){x.e[0], x.e[1], x.e[5]}), dot2(rows_2.e[3], x),
-        dot2(rows_2.e[4], x), dot2(rows_2.e[5], x)}};
+        rates->turning.row[2].y, rates->half}, (vector_t){x.e[0], x.e[1], x.e[5]}), dot2(rows_result.e[3], x),
+        dot2(rows_result.e[4], x), dot2(rows_result.e[5], x)}};
 }
 
 /* -------------------------------- laws.predictive.sixes --------------------------------- */
 
 /* Return a + b. */
-static six_t plus(six_t a, six_t b)
+static doubles6_t plus(doubles6_t a, doubles6_t b)
 {
-    return (six_t){{a.e[0] + b.e[0], a.e[1] + b.e[1], a.e[2] + b.e[2], a.e[3] + b.e[3], a.e[4] + b.e[4],
+    return (doubles6_t){{a.e[0] + b.e[0], a.e[1] + b.e[1], a.e[2] + b.e[2], a.e[3] + b.e[3], a.e[4] + b.e[4],
         a.e[5] + b.e[5]}};
 }
 
@@ -643,49 +591,80 @@ static double minimum(double a, double b)
 /* Write the sum of A^k / (k + 1)! from k = 0 on to `mean`, column after column. */
 static void sum_up(double *numbers, const rates_t *rates)
 {
-    const six_rows_t transposed_2 = transposed(rows(rates));
-    const six_t first = times1(transposed_2.e[0], 0.5);
-    put_six(&numbers[TERM_AT], first);
+    const doubles6s6_t rows_result = rows(rates);
+    const doubles6s6_t transposed_result = transposed(&rows_result);
+    const doubles6_t first = times1(transposed_result.e[0], 0.5);
+    numbers[TERM_AT] = first.e[0];
+    numbers[TERM_AT + 1] = first.e[1];
+    numbers[TERM_AT + 2] = first.e[2];
+    numbers[TERM_AT + 3] = first.e[3];
+    numbers[TERM_AT + 4] = first.e[4];
+    numbers[TERM_AT + 5] = first.e[5];
     numbers[MEAN_AT] = 1.0 + first.e[0];
     numbers[MEAN_AT + 1] = first.e[1];
     numbers[MEAN_AT + 2] = first.e[2];
     numbers[MEAN_AT + 3] = first.e[3];
     numbers[MEAN_AT + 4] = first.e[4];
     numbers[MEAN_AT + 5] = first.e[5];
-    const six_t first_2 = times1(transposed_2.e[1], 0.5);
-    put_six(&numbers[TERM_AT + 6], first_2);
+    const doubles6_t first_2 = times1(transposed_result.e[1], 0.5);
+    numbers[TERM_AT + 6] = first_2.e[0];
+    numbers[TERM_AT + 7] = first_2.e[1];
+    numbers[TERM_AT + 8] = first_2.e[2];
+    numbers[TERM_AT + 9] = first_2.e[3];
+    numbers[TERM_AT + 10] = first_2.e[4];
+    numbers[TERM_AT + 11] = first_2.e[5];
     numbers[MEAN_AT + 6] = first_2.e[0];
     numbers[MEAN_AT + 7] = 1.0 + first_2.e[1];
     numbers[MEAN_AT + 8] = first_2.e[2];
     numbers[MEAN_AT + 9] = first_2.e[3];
     numbers[MEAN_AT + 10] = first_2.e[4];
     numbers[MEAN_AT + 11] = first_2.e[5];
-    const six_t first_3 = times1(transposed_2.e[2], 0.5);
-    put_six(&numbers[TERM_AT + 12], first_3);
+    const doubles6_t first_3 = times1(transposed_result.e[2], 0.5);
+    numbers[TERM_AT + 12] = first_3.e[0];
+    numbers[TERM_AT + 13] = first_3.e[1];
+    numbers[TERM_AT + 14] = first_3.e[2];
+    numbers[TERM_AT + 15] = first_3.e[3];
+    numbers[TERM_AT + 16] = first_3.e[4];
+    numbers[TERM_AT + 17] = first_3.e[5];
     numbers[MEAN_AT + 12] = first_3.e[0];
     numbers[MEAN_AT + 13] = first_3.e[1];
     numbers[MEAN_AT + 14] = 1.0 + first_3.e[2];
     numbers[MEAN_AT + 15] = first_3.e[3];
     numbers[MEAN_AT + 16] = first_3.e[4];
     numbers[MEAN_AT + 17] = first_3.e[5];
-    const six_t first_4 = times1(transposed_2.e[3], 0.5);
-    put_six(&numbers[TERM_AT + 18], first_4);
+    const doubles6_t first_4 = times1(transposed_result.e[3], 0.5);
+    numbers[TERM_AT + 18] = first_4.e[0];
+    numbers[TERM_AT + 19] = first_4.e[1];
+    numbers[TERM_AT + 20] = first_4.e[2];
+    numbers[TERM_AT + 21] = first_4.e[3];
+    numbers[TERM_AT + 22] = first_4.e[4];
+    numbers[TERM_AT + 23] = first_4.e[5];
     numbers[MEAN_AT + 18] = first_4.e[0];
     numbers[MEAN_AT + 19] = first_4.e[1];
     numbers[MEAN_AT + 20] = first_4.e[2];
     numbers[MEAN_AT + 21] = 1.0 + first_4.e[3];
     numbers[MEAN_AT + 22] = first_4.e[4];
     numbers[MEAN_AT + 23] = first_4.e[5];
-    const six_t first_5 = times1(transposed_2.e[4], 0.5);
-    put_six(&numbers[TERM_AT + 24], first_5);
+    const doubles6_t first_5 = times1(transposed_result.e[4], 0.5);
+    numbers[TERM_AT + 24] = first_5.e[0];
+    numbers[TERM_AT + 25] = first_5.e[1];
+    numbers[TERM_AT + 26] = first_5.e[2];
+    numbers[TERM_AT + 27] = first_5.e[3];
+    numbers[TERM_AT + 28] = first_5.e[4];
+    numbers[TERM_AT + 29] = first_5.e[5];
     numbers[MEAN_AT + 24] = first_5.e[0];
     numbers[MEAN_AT + 25] = first_5.e[1];
     numbers[MEAN_AT + 26] = first_5.e[2];
     numbers[MEAN_AT + 27] = first_5.e[3];
     numbers[MEAN_AT + 28] = 1.0 + first_5.e[4];
     numbers[MEAN_AT + 29] = first_5.e[5];
-    const six_t first_6 = times1(transposed_2.e[5], 0.5);
-    put_six(&numbers[TERM_AT + 30], first_6);
+    const doubles6_t first_6 = times1(transposed_result.e[5], 0.5);
+    numbers[TERM_AT + 30] = first_6.e[0];
+    numbers[TERM_AT + 31] = first_6.e[1];
+    numbers[TERM_AT + 32] = first_6.e[2];
+    numbers[TERM_AT + 33] = first_6.e[3];
+    numbers[TERM_AT + 34] = first_6.e[4];
+    numbers[TERM_AT + 35] = first_6.e[5];
     numbers[MEAN_AT + 30] = first_6.e[0];
     numbers[MEAN_AT + 31] = first_6.e[1];
     numbers[MEAN_AT + 32] = first_6.e[2];
@@ -693,27 +672,47 @@ static void sum_up(double *numbers, const rates_t *rates)
     numbers[MEAN_AT + 34] = first_6.e[4];
     numbers[MEAN_AT + 35] = 1.0 + first_6.e[5];
     double divisor_ = 3.0;
-    bool small_ = false;
+    bool small_ = 0;
     for (int32_t turn = 0; turn < 28; turn++) {
         const double divisor = divisor_;
         const bool small = small_;
         if (small) break;
-        bool small1_ = true;
+        bool small1_ = 1;
         for (int32_t j = 0; j < 6; j++) {
             const bool small1 = small1_;
-            const six_t row = six_at(&numbers[TERM_AT + 6 * j]);
-            const six_t product_2 = product(rates, row);
-            const double t25 = product_2.e[0] / divisor;
-            const double t26 = product_2.e[1] / divisor;
-            const double t27 = product_2.e[2] / divisor;
-            const double t28 = product_2.e[3] / divisor;
-            const double t29 = product_2.e[4] / divisor;
-            const double t30 = product_2.e[5] / divisor;
-            const six_t entries = {{t25, t26, t27, t28, t29, t30}};
-            put_six(&numbers[TERM_AT + 6 * j], entries);
-            const six_t row_2 = six_at(&numbers[MEAN_AT + 6 * j]);
-            const six_t plus_2 = plus(row_2, entries);
-            put_six(&numbers[MEAN_AT + 6 * j], plus_2);
+            const double t9 = numbers[TERM_AT + 6 * j];
+            const double t12 = numbers[TERM_AT + 6 * j + 1];
+            const double t15 = numbers[TERM_AT + 6 * j + 2];
+            const double t18 = numbers[TERM_AT + 6 * j + 3];
+            const double t21 = numbers[TERM_AT + 6 * j + 4];
+            const double t24 = numbers[TERM_AT + 6 * j + 5];
+            const doubles6_t product_result = product(rates, (doubles6_t){{t9, t12, t15, t18, t21, t24}});
+            const double t25 = product_result.e[0] / divisor;
+            const double t26 = product_result.e[1] / divisor;
+            const double t27 = product_result.e[2] / divisor;
+            const double t28 = product_result.e[3] / divisor;
+            const double t29 = product_result.e[4] / divisor;
+            const double t30 = product_result.e[5] / divisor;
+            numbers[TERM_AT + 6 * j] = t25;
+            numbers[TERM_AT + 6 * j + 1] = t26;
+            numbers[TERM_AT + 6 * j + 2] = t27;
+            numbers[TERM_AT + 6 * j + 3] = t28;
+            numbers[TERM_AT + 6 * j + 4] = t29;
+            numbers[TERM_AT + 6 * j + 5] = t30;
+            const double t32 = numbers[MEAN_AT + 6 * j];
+            const double t34 = numbers[MEAN_AT + 6 * j + 1];
+            const double t36 = numbers[MEAN_AT + 6 * j + 2];
+            const double t38 = numbers[MEAN_AT + 6 * j + 3];
+            const double t40 = numbers[MEAN_AT + 6 * j + 4];
+            const double t42 = numbers[MEAN_AT + 6 * j + 5];
+            const doubles6_t entries = {{t25, t26, t27, t28, t29, t30}};
+            const doubles6_t plus_result = plus((doubles6_t){{t32, t34, t36, t38, t40, t42}}, entries);
+            numbers[MEAN_AT + 6 * j] = plus_result.e[0];
+            numbers[MEAN_AT + 6 * j + 1] = plus_result.e[1];
+            numbers[MEAN_AT + 6 * j + 2] = plus_result.e[2];
+            numbers[MEAN_AT + 6 * j + 3] = plus_result.e[3];
+            numbers[MEAN_AT + 6 * j + 4] = plus_result.e[4];
+            numbers[MEAN_AT + 6 * j + 5] = plus_result.e[5];
             const double largest = maximum(maximum(maximum(maximum(maximum(t25, t26), t27), t28), t29), t30);
             const double least = minimum(minimum(minimum(minimum(minimum(t25, t26), t27), t28), t29), t30);
             small1_ = small1 && (largest < 1e-21 && -1e-21 < least);
@@ -726,10 +725,10 @@ static void sum_up(double *numbers, const rates_t *rates)
 /* -------------------------------- laws.predictive.sixes --------------------------------- */
 
 /* Return m x. */
-static six_t apply1(six_rows_t m, six_t x)
+static doubles6_t apply1(const doubles6s6_t *m, doubles6_t x)
 {
-    return (six_t){{dot2(m.e[0], x), dot2(m.e[1], x), dot2(m.e[2], x), dot2(m.e[3], x), dot2(m.e[4], x),
-        dot2(m.e[5], x)}};
+    return (doubles6_t){{dot2(m->e[0], x), dot2(m->e[1], x), dot2(m->e[2], x), dot2(m->e[3], x),
+        dot2(m->e[4], x), dot2(m->e[5], x)}};
 }
 
 /* -------------------------------- laws.predictive.motion -------------------------------- */
@@ -738,26 +737,71 @@ static six_t apply1(six_rows_t m, six_t x)
 static void double_of(double *numbers, const rates_t *rates)
 {
     for (int32_t j = 0; j < 6; j++) {
-        const six_t row = six_at(&numbers[MEAN_AT + 6 * j]);
-        const six_t product_2 = product(rates, row);
-        put_six(&numbers[TERM_AT + 6 * j], product_2);
+        const double t3 = numbers[MEAN_AT + 6 * j];
+        const double t6 = numbers[MEAN_AT + 6 * j + 1];
+        const double t9 = numbers[MEAN_AT + 6 * j + 2];
+        const double t12 = numbers[MEAN_AT + 6 * j + 3];
+        const double t15 = numbers[MEAN_AT + 6 * j + 4];
+        const double t18 = numbers[MEAN_AT + 6 * j + 5];
+        const doubles6_t product_result = product(rates, (doubles6_t){{t3, t6, t9, t12, t15, t18}});
+        numbers[TERM_AT + 6 * j] = product_result.e[0];
+        numbers[TERM_AT + 6 * j + 1] = product_result.e[1];
+        numbers[TERM_AT + 6 * j + 2] = product_result.e[2];
+        numbers[TERM_AT + 6 * j + 3] = product_result.e[3];
+        numbers[TERM_AT + 6 * j + 4] = product_result.e[4];
+        numbers[TERM_AT + 6 * j + 5] = product_result.e[5];
     }
-    const six_t row_2 = six_at(&numbers[TERM_AT]);
-    const six_t row_3 = six_at(&numbers[TERM_AT + 6]);
-    const six_t row_4 = six_at(&numbers[TERM_AT + 12]);
-    const six_t row_5 = six_at(&numbers[TERM_AT + 18]);
-    const six_t row_6 = six_at(&numbers[TERM_AT + 24]);
-    const six_t row_7 = six_at(&numbers[TERM_AT + 30]);
-    const six_rows_t turned = transposed((six_rows_t){{row_2, row_3, row_4, row_5, row_6, row_7}});
+    const double t25 = numbers[TERM_AT];
+    const double t26 = numbers[TERM_AT + 1];
+    const double t27 = numbers[TERM_AT + 2];
+    const double t28 = numbers[TERM_AT + 3];
+    const double t29 = numbers[TERM_AT + 4];
+    const double t30 = numbers[TERM_AT + 5];
+    const double t31 = numbers[TERM_AT + 6];
+    const double t32 = numbers[TERM_AT + 7];
+    const double t33 = numbers[TERM_AT + 8];
+    const double t34 = numbers[TERM_AT + 9];
+    const double t35 = numbers[TERM_AT + 10];
+    const double t36 = numbers[TERM_AT + 11];
+    const double t37 = numbers[TERM_AT + 12];
+    const double t38 = numbers[TERM_AT + 13];
+    const double t39 = numbers[TERM_AT + 14];
+    const double t40 = numbers[TERM_AT + 15];
+    const double t41 = numbers[TERM_AT + 16];
+    const double t42 = numbers[TERM_AT + 17];
+    const double t43 = numbers[TERM_AT + 18];
+    const double t44 = numbers[TERM_AT + 19];
+    const double t45 = numbers[TERM_AT + 20];
+    const double t46 = numbers[TERM_AT + 21];
+    const double t47 = numbers[TERM_AT + 22];
+    const double t48 = numbers[TERM_AT + 23];
+    const double t49 = numbers[TERM_AT + 24];
+    const double t50 = numbers[TERM_AT + 25];
+    const double t51 = numbers[TERM_AT + 26];
+    const double t52 = numbers[TERM_AT + 27];
+    const double t53 = numbers[TERM_AT + 28];
+    const double t54 = numbers[TERM_AT + 29];
+    const double t55 = numbers[TERM_AT + 30];
+    const double t56 = numbers[TERM_AT + 31];
+    const double t57 = numbers[TERM_AT + 32];
+    const double t58 = numbers[TERM_AT + 33];
+    const double t59 = numbers[TERM_AT + 34];
+    const double t60 = numbers[TERM_AT + 35];
+    const doubles6s6_t m = {{{{t25, t26, t27, t28, t29, t30}}, {{t31, t32, t33, t34, t35, t36}},
+        {{t37, t38, t39, t40, t41, t42}}, {{t43, t44, t45, t46, t47, t48}}, {{t49, t50, t51, t52, t53, t54}},
+        {{t55, t56, t57, t58, t59, t60}}}};
+    const doubles6s6_t turned = transposed(&m);
     for (int32_t j1 = 0; j1 < 6; j1++) {
-        const six_t before = six_at(&numbers[MEAN_AT + 6 * j1]);
-        const six_t apply1_2 = apply1(turned, before);
-        numbers[MEAN_AT + 6 * j1] = before.e[0] + 0.5 * apply1_2.e[0];
-        numbers[MEAN_AT + 6 * j1 + 1] = before.e[1] + 0.5 * apply1_2.e[1];
-        numbers[MEAN_AT + 6 * j1 + 2] = before.e[2] + 0.5 * apply1_2.e[2];
-        numbers[MEAN_AT + 6 * j1 + 3] = before.e[3] + 0.5 * apply1_2.e[3];
-        numbers[MEAN_AT + 6 * j1 + 4] = before.e[4] + 0.5 * apply1_2.e[4];
-        numbers[MEAN_AT + 6 * j1 + 5] = before.e[5] + 0.5 * apply1_2.e[5];
+        const doubles6_t before = {{numbers[MEAN_AT + 6 * j1], numbers[MEAN_AT + 6 * j1 + 1], numbers[MEAN_AT
+            + 6 * j1 + 2], numbers[MEAN_AT + 6 * j1 + 3], numbers[MEAN_AT + 6 * j1 + 4], numbers[MEAN_AT + 6 *
+            j1 + 5]}};
+        const doubles6_t apply1_result = apply1(&turned, before);
+        numbers[MEAN_AT + 6 * j1] = before.e[0] + 0.5 * apply1_result.e[0];
+        numbers[MEAN_AT + 6 * j1 + 1] = before.e[1] + 0.5 * apply1_result.e[1];
+        numbers[MEAN_AT + 6 * j1 + 2] = before.e[2] + 0.5 * apply1_result.e[2];
+        numbers[MEAN_AT + 6 * j1 + 3] = before.e[3] + 0.5 * apply1_result.e[3];
+        numbers[MEAN_AT + 6 * j1 + 4] = before.e[4] + 0.5 * apply1_result.e[4];
+        numbers[MEAN_AT + 6 * j1 + 5] = before.e[5] + 0.5 * apply1_result.e[5];
     }
 }
 
@@ -767,133 +811,173 @@ static vector_t times2(vector_t row, double c)
 }
 
 /* Set A and B from S, back in the units of time. */
-static void put_motion(double *numbers, const rates_t *rates, matrix_t push, double period)
+static void put_motion(double *numbers, const rates_t *rates, const matrix_t *push, double period)
 {
-    const six_t row = six_at(&numbers[MEAN_AT]);
-    const six_t row_2 = six_at(&numbers[MEAN_AT + 6]);
-    const six_t row_3 = six_at(&numbers[MEAN_AT + 12]);
-    const six_t row_4 = six_at(&numbers[MEAN_AT + 18]);
-    const six_t row_5 = six_at(&numbers[MEAN_AT + 24]);
-    const six_t row_6 = six_at(&numbers[MEAN_AT + 30]);
-    const six_rows_t a = transposed((six_rows_t){{product(rates, row), product(rates, row_2),
-        product(rates, row_3), product(rates, row_4), product(rates, row_5), product(rates, row_6)}});
-    const six_rows_t transposed_2 = transposed((six_rows_t){{row, row_2, row_3, row_4, row_5, row_6}});
-    const matrix_t transpose_2 = transpose(push);
-    const matrix_t transpose_3 = transpose(push);
-    const matrix_t transpose_4 = transpose(push);
-    const matrix_t transpose_5 = transpose(push);
-    const matrix_t transpose_6 = transpose(push);
-    const matrix_t transpose_7 = transpose(push);
+    const double t1 = numbers[MEAN_AT];
+    const double t2 = numbers[MEAN_AT + 1];
+    const double t3 = numbers[MEAN_AT + 2];
+    const double t4 = numbers[MEAN_AT + 3];
+    const double t5 = numbers[MEAN_AT + 4];
+    const double t6 = numbers[MEAN_AT + 5];
+    const double t7 = numbers[MEAN_AT + 6];
+    const double t8 = numbers[MEAN_AT + 7];
+    const double t9 = numbers[MEAN_AT + 8];
+    const double t10 = numbers[MEAN_AT + 9];
+    const double t11 = numbers[MEAN_AT + 10];
+    const double t12 = numbers[MEAN_AT + 11];
+    const double t13 = numbers[MEAN_AT + 12];
+    const double t14 = numbers[MEAN_AT + 13];
+    const double t15 = numbers[MEAN_AT + 14];
+    const double t16 = numbers[MEAN_AT + 15];
+    const double t17 = numbers[MEAN_AT + 16];
+    const double t18 = numbers[MEAN_AT + 17];
+    const double t19 = numbers[MEAN_AT + 18];
+    const double t20 = numbers[MEAN_AT + 19];
+    const double t21 = numbers[MEAN_AT + 20];
+    const double t22 = numbers[MEAN_AT + 21];
+    const double t23 = numbers[MEAN_AT + 22];
+    const double t24 = numbers[MEAN_AT + 23];
+    const double t25 = numbers[MEAN_AT + 24];
+    const double t26 = numbers[MEAN_AT + 25];
+    const double t27 = numbers[MEAN_AT + 26];
+    const double t28 = numbers[MEAN_AT + 27];
+    const double t29 = numbers[MEAN_AT + 28];
+    const double t30 = numbers[MEAN_AT + 29];
+    const double t31 = numbers[MEAN_AT + 30];
+    const double t32 = numbers[MEAN_AT + 31];
+    const double t33 = numbers[MEAN_AT + 32];
+    const double t34 = numbers[MEAN_AT + 33];
+    const double t35 = numbers[MEAN_AT + 34];
+    const double t36 = numbers[MEAN_AT + 35];
+    const doubles6s6_t m = {{product(rates, (doubles6_t){{t1, t2, t3, t4, t5, t6}}),
+        product(rates, (doubles6_t){{t7, t8, t9, t10, t11, t12}}),
+        product(rates, (doubles6_t){{t13, t14, t15, t16, t17, t18}}),
+        product(rates, (doubles6_t){{t19, t20, t21, t22, t23, t24}}),
+        product(rates, (doubles6_t){{t25, t26, t27, t28, t29, t30}}),
+        product(rates, (doubles6_t){{t31, t32, t33, t34, t35, t36}})}};
+    const doubles6s6_t a = transposed(&m);
+    const doubles6s6_t m_2 = {{{{t1, t2, t3, t4, t5, t6}}, {{t7, t8, t9, t10, t11, t12}},
+        {{t13, t14, t15, t16, t17, t18}}, {{t19, t20, t21, t22, t23, t24}}, {{t25, t26, t27, t28, t29, t30}},
+        {{t31, t32, t33, t34, t35, t36}}}};
+    const doubles6s6_t transposed_result = transposed(&m_2);
+    const matrix_t transpose_result = transpose(push);
+    const matrix_t transpose_result_2 = transpose(push);
+    const matrix_t transpose_result_3 = transpose(push);
+    const matrix_t transpose_result_4 = transpose(push);
+    const matrix_t transpose_result_5 = transpose(push);
+    const matrix_t transpose_result_6 = transpose(push);
     const double per = 1.0 / period;
-    const vector_t times2_2 = times2((vector_t){a.e[0].e[3], a.e[0].e[4], a.e[0].e[5]}, period);
-    const vector_t times2_3 = times2((vector_t){a.e[1].e[3], a.e[1].e[4], a.e[1].e[5]}, period);
-    const vector_t times2_4 = times2((vector_t){a.e[2].e[3], a.e[2].e[4], a.e[2].e[5]}, period);
-    const vector_t times2_5 = times2((vector_t){a.e[3].e[0], a.e[3].e[1], a.e[3].e[2]}, per);
-    const vector_t times2_6 = times2((vector_t){a.e[4].e[0], a.e[4].e[1], a.e[4].e[2]}, per);
-    const vector_t times2_7 = times2((vector_t){a.e[5].e[0], a.e[5].e[1], a.e[5].e[2]}, per);
-    const vector_t times2_8 = times2((vector_t){dot1((vector_t){transposed_2.e[3].e[3],
-        transposed_2.e[3].e[4], transposed_2.e[3].e[5]}, transpose_5.row[0]),
-        dot1((vector_t){transposed_2.e[3].e[3], transposed_2.e[3].e[4], transposed_2.e[3].e[5]},
-        transpose_5.row[1]), dot1((vector_t){transposed_2.e[3].e[3], transposed_2.e[3].e[4],
-        transposed_2.e[3].e[5]}, transpose_5.row[2])}, per);
-    const vector_t times2_9 = times2((vector_t){dot1((vector_t){transposed_2.e[4].e[3],
-        transposed_2.e[4].e[4], transposed_2.e[4].e[5]}, transpose_6.row[0]),
-        dot1((vector_t){transposed_2.e[4].e[3], transposed_2.e[4].e[4], transposed_2.e[4].e[5]},
-        transpose_6.row[1]), dot1((vector_t){transposed_2.e[4].e[3], transposed_2.e[4].e[4],
-        transposed_2.e[4].e[5]}, transpose_6.row[2])}, per);
-    const vector_t times2_10 = times2((vector_t){dot1((vector_t){transposed_2.e[5].e[3],
-        transposed_2.e[5].e[4], transposed_2.e[5].e[5]}, transpose_7.row[0]),
-        dot1((vector_t){transposed_2.e[5].e[3], transposed_2.e[5].e[4], transposed_2.e[5].e[5]},
-        transpose_7.row[1]), dot1((vector_t){transposed_2.e[5].e[3], transposed_2.e[5].e[4],
-        transposed_2.e[5].e[5]}, transpose_7.row[2])}, per);
+    const vector_t times2_result = times2((vector_t){a.e[0].e[3], a.e[0].e[4], a.e[0].e[5]}, period);
+    const vector_t times2_result_2 = times2((vector_t){a.e[1].e[3], a.e[1].e[4], a.e[1].e[5]}, period);
+    const vector_t times2_result_3 = times2((vector_t){a.e[2].e[3], a.e[2].e[4], a.e[2].e[5]}, period);
+    const vector_t times2_result_4 = times2((vector_t){a.e[3].e[0], a.e[3].e[1], a.e[3].e[2]}, per);
+    const vector_t times2_result_5 = times2((vector_t){a.e[4].e[0], a.e[4].e[1], a.e[4].e[2]}, per);
+    const vector_t times2_result_6 = times2((vector_t){a.e[5].e[0], a.e[5].e[1], a.e[5].e[2]}, per);
+    const vector_t times2_result_7 = times2((vector_t){dot1((vector_t){transposed_result.e[3].e[3],
+        transposed_result.e[3].e[4], transposed_result.e[3].e[5]}, transpose_result_4.row[0]),
+        dot1((vector_t){transposed_result.e[3].e[3], transposed_result.e[3].e[4],
+        transposed_result.e[3].e[5]}, transpose_result_4.row[1]), dot1((vector_t){transposed_result.e[3].e[3],
+        transposed_result.e[3].e[4], transposed_result.e[3].e[5]}, transpose_result_4.row[2])}, per);
+    const vector_t times2_result_8 = times2((vector_t){dot1((vector_t){transposed_result.e[4].e[3],
+        transposed_result.e[4].e[4], transposed_result.e[4].e[5]}, transpose_result_5.row[0]),
+        dot1((vector_t){transposed_result.e[4].e[3], transposed_result.e[4].e[4],
+        transposed_result.e[4].e[5]}, transpose_result_5.row[1]), dot1((vector_t){transposed_result.e[4].e[3],
+        transposed_result.e[4].e[4], transposed_result.e[4].e[5]}, transpose_result_5.row[2])}, per);
+    const vector_t times2_result_9 = times2((vector_t){dot1((vector_t){transposed_result.e[5].e[3],
+        transposed_result.e[5].e[4], transposed_result.e[5].e[5]}, transpose_result_6.row[0]),
+        dot1((vector_t){transposed_result.e[5].e[3], transposed_result.e[5].e[4],
+        transposed_result.e[5].e[5]}, transpose_result_6.row[1]), dot1((vector_t){transposed_result.e[5].e[3],
+        transposed_result.e[5].e[4], transposed_result.e[5].e[5]}, transpose_result_6.row[2])}, per);
     numbers[MOTION_AT] = 1.0 + a.e[0].e[0];
     numbers[MOTION_AT + 1] = a.e[0].e[1];
     numbers[MOTION_AT + 2] = a.e[0].e[2];
-    numbers[MOTION_AT + 3] = times2_2.x;
-    numbers[MOTION_AT + 4] = times2_2.y;
-    numbers[MOTION_AT + 5] = times2_2.z;
+    numbers[MOTION_AT + 3] = times2_result.x;
+    numbers[MOTION_AT + 4] = times2_result.y;
+    numbers[MOTION_AT + 5] = times2_result.z;
     numbers[MOTION_AT + 6] = a.e[1].e[0];
     numbers[MOTION_AT + 7] = 1.0 + a.e[1].e[1];
     numbers[MOTION_AT + 8] = a.e[1].e[2];
-    numbers[MOTION_AT + 9] = times2_3.x;
-    numbers[MOTION_AT + 10] = times2_3.y;
-    numbers[MOTION_AT + 11] = times2_3.z;
+    numbers[MOTION_AT + 9] = times2_result_2.x;
+    numbers[MOTION_AT + 10] = times2_result_2.y;
+    numbers[MOTION_AT + 11] = times2_result_2.z;
     numbers[MOTION_AT + 12] = a.e[2].e[0];
     numbers[MOTION_AT + 13] = a.e[2].e[1];
     numbers[MOTION_AT + 14] = 1.0 + a.e[2].e[2];
-    numbers[MOTION_AT + 15] = times2_4.x;
-    numbers[MOTION_AT + 16] = times2_4.y;
-    numbers[MOTION_AT + 17] = times2_4.z;
-    numbers[MOTION_AT + 18] = times2_5.x;
-    numbers[MOTION_AT + 19] = times2_5.y;
-    numbers[MOTION_AT + 20] = times2_5.z;
+    numbers[MOTION_AT + 15] = times2_result_3.x;
+    numbers[MOTION_AT + 16] = times2_result_3.y;
+    numbers[MOTION_AT + 17] = times2_result_3.z;
+    numbers[MOTION_AT + 18] = times2_result_4.x;
+    numbers[MOTION_AT + 19] = times2_result_4.y;
+    numbers[MOTION_AT + 20] = times2_result_4.z;
     numbers[MOTION_AT + 21] = 1.0 + a.e[3].e[3];
     numbers[MOTION_AT + 22] = a.e[3].e[4];
     numbers[MOTION_AT + 23] = a.e[3].e[5];
-    numbers[MOTION_AT + 24] = times2_6.x;
-    numbers[MOTION_AT + 25] = times2_6.y;
-    numbers[MOTION_AT + 26] = times2_6.z;
+    numbers[MOTION_AT + 24] = times2_result_5.x;
+    numbers[MOTION_AT + 25] = times2_result_5.y;
+    numbers[MOTION_AT + 26] = times2_result_5.z;
     numbers[MOTION_AT + 27] = a.e[4].e[3];
     numbers[MOTION_AT + 28] = 1.0 + a.e[4].e[4];
     numbers[MOTION_AT + 29] = a.e[4].e[5];
-    numbers[MOTION_AT + 30] = times2_7.x;
-    numbers[MOTION_AT + 31] = times2_7.y;
-    numbers[MOTION_AT + 32] = times2_7.z;
+    numbers[MOTION_AT + 30] = times2_result_6.x;
+    numbers[MOTION_AT + 31] = times2_result_6.y;
+    numbers[MOTION_AT + 32] = times2_result_6.z;
     numbers[MOTION_AT + 33] = a.e[5].e[3];
     numbers[MOTION_AT + 34] = a.e[5].e[4];
     numbers[MOTION_AT + 35] = 1.0 + a.e[5].e[5];
-    numbers[MOTION_AT + 36] = dot1((vector_t){transposed_2.e[0].e[3], transposed_2.e[0].e[4],
-        transposed_2.e[0].e[5]}, transpose_2.row[0]);
-    numbers[MOTION_AT + 37] = dot1((vector_t){transposed_2.e[0].e[3], transposed_2.e[0].e[4],
-        transposed_2.e[0].e[5]}, transpose_2.row[1]);
-    numbers[MOTION_AT + 38] = dot1((vector_t){transposed_2.e[0].e[3], transposed_2.e[0].e[4],
-        transposed_2.e[0].e[5]}, transpose_2.row[2]);
-    numbers[MOTION_AT + 39] = dot1((vector_t){transposed_2.e[1].e[3], transposed_2.e[1].e[4],
-        transposed_2.e[1].e[5]}, transpose_3.row[0]);
-    numbers[MOTION_AT + 40] = dot1((vector_t){transposed_2.e[1].e[3], transposed_2.e[1].e[4],
-        transposed_2.e[1].e[5]}, transpose_3.row[1]);
-    numbers[MOTION_AT + 41] = dot1((vector_t){transposed_2.e[1].e[3], transposed_2.e[1].e[4],
-        transposed_2.e[1].e[5]}, transpose_3.row[2]);
-    numbers[MOTION_AT + 42] = dot1((vector_t){transposed_2.e[2].e[3], transposed_2.e[2].e[4],
-        transposed_2.e[2].e[5]}, transpose_4.row[0]);
-    numbers[MOTION_AT + 43] = dot1((vector_t){transposed_2.e[2].e[3], transposed_2.e[2].e[4],
-        transposed_2.e[2].e[5]}, transpose_4.row[1]);
-    numbers[MOTION_AT + 44] = dot1((vector_t){transposed_2.e[2].e[3], transposed_2.e[2].e[4],
-        transposed_2.e[2].e[5]}, transpose_4.row[2]);
-    numbers[MOTION_AT + 45] = times2_8.x;
-    numbers[MOTION_AT + 46] = times2_8.y;
-    numbers[MOTION_AT + 47] = times2_8.z;
-    numbers[MOTION_AT + 48] = times2_9.x;
-    numbers[MOTION_AT + 49] = times2_9.y;
-    numbers[MOTION_AT + 50] = times2_9.z;
-    numbers[MOTION_AT + 51] = times2_10.x;
-    numbers[MOTION_AT + 52] = times2_10.y;
-    numbers[MOTION_AT + 53] = times2_10.z;
+    numbers[MOTION_AT + 36] = dot1((vector_t){transposed_result.e[0].e[3], transposed_result.e[0].e[4],
+        transposed_result.e[0].e[5]}, transpose_result.row[0]);
+    numbers[MOTION_AT + 37] = dot1((vector_t){transposed_result.e[0].e[3], transposed_result.e[0].e[4],
+        transposed_result.e[0].e[5]}, transpose_result.row[1]);
+    numbers[MOTION_AT + 38] = dot1((vector_t){transposed_result.e[0].e[3], transposed_result.e[0].e[4],
+        transposed_result.e[0].e[5]}, transpose_result.row[2]);
+    numbers[MOTION_AT + 39] = dot1((vector_t){transposed_result.e[1].e[3], transposed_result.e[1].e[4],
+        transposed_result.e[1].e[5]}, transpose_result_2.row[0]);
+    numbers[MOTION_AT + 40] = dot1((vector_t){transposed_result.e[1].e[3], transposed_result.e[1].e[4],
+        transposed_result.e[1].e[5]}, transpose_result_2.row[1]);
+    numbers[MOTION_AT + 41] = dot1((vector_t){transposed_result.e[1].e[3], transposed_result.e[1].e[4],
+        transposed_result.e[1].e[5]}, transpose_result_2.row[2]);
+    numbers[MOTION_AT + 42] = dot1((vector_t){transposed_result.e[2].e[3], transposed_result.e[2].e[4],
+        transposed_result.e[2].e[5]}, transpose_result_3.row[0]);
+    numbers[MOTION_AT + 43] = dot1((vector_t){transposed_result.e[2].e[3], transposed_result.e[2].e[4],
+        transposed_result.e[2].e[5]}, transpose_result_3.row[1]);
+    numbers[MOTION_AT + 44] = dot1((vector_t){transposed_result.e[2].e[3], transposed_result.e[2].e[4],
+        transposed_result.e[2].e[5]}, transpose_result_3.row[2]);
+    numbers[MOTION_AT + 45] = times2_result_7.x;
+    numbers[MOTION_AT + 46] = times2_result_7.y;
+    numbers[MOTION_AT + 47] = times2_result_7.z;
+    numbers[MOTION_AT + 48] = times2_result_8.x;
+    numbers[MOTION_AT + 49] = times2_result_8.y;
+    numbers[MOTION_AT + 50] = times2_result_8.z;
+    numbers[MOTION_AT + 51] = times2_result_9.x;
+    numbers[MOTION_AT + 52] = times2_result_9.y;
+    numbers[MOTION_AT + 53] = times2_result_9.z;
 }
 
 /* Sample exactly with a held input: A = exp(A h), B = (integral of exp(A s) over 0..h) B of the problem. */
 static void sample(double *numbers, const linear_t *linear, double period)
 {
     const double square = period * period;
-    const matrix_t scaled_2 = scaled(linear->turning, period);
-    const matrix_t scaled_3 = scaled(linear->stiffness, square);
-    const matrix_t scaled_4 = scaled(linear->damping, period);
-    const rates_t rates = {.turning = scaled_2, .half = 0.5, .stiffness = scaled_3, .damping = scaled_4};
-    const share_result_t share_result = share_1(&rates);
-    const rates_t during_2 = during(&rates, share_result.share);
-    sum_up(numbers, &during_2);
-    double share_ = share_result.share;
-    double left_ = share_result.count;
+    const matrix_t scaled_result = scaled(&linear->turning, period);
+    const matrix_t scaled_result_2 = scaled(&linear->stiffness, square);
+    const matrix_t scaled_result_3 = scaled(&linear->damping, period);
+    const rates_t rates = {.turning = scaled_result, .half = 0.5, .stiffness = scaled_result_2,
+        .damping = scaled_result_3};
+    const share_result_t share_1_result = share_1(&rates);
+    const rates_t during_result = during(&rates, share_1_result.scalar);
+    sum_up(numbers, &during_result);
+    double share_ = share_1_result.scalar;
+    double left_ = share_1_result.scalar1;
     for (int32_t turn = 0; turn < 60; turn++) {
         const double share = share_;
         const double left = left_;
         if (left <= 0.0) break;
-        const rates_t during_3 = during(&rates, share);
-        double_of(numbers, &during_3);
+        const rates_t during_result_2 = during(&rates, share);
+        double_of(numbers, &during_result_2);
         share_ = 2.0 * share;
         left_ = left - 1.0;
     }
-    put_motion(numbers, &rates, scaled(linear->push, square), period);
+    const matrix_t scaled_result_4 = scaled(&linear->push, square);
+    put_motion(numbers, &rates, &scaled_result_4, period);
 }
 
 /* ------------------------------- laws.predictive.problem -------------------------------- */
@@ -901,7 +985,9 @@ static void sample(double *numbers, const linear_t *linear, double period)
 /* Set the limits: their centre and their bound (inf: none). */
 static void put_limits(double *numbers, vector_t centre, double bound)
 {
-    put_vector(&numbers[LIMITS_AT], centre);
+    numbers[LIMITS_AT] = centre.x;
+    numbers[LIMITS_AT + 1] = centre.y;
+    numbers[LIMITS_AT + 2] = centre.z;
     numbers[LIMITS_AT + 3] = bound;
 }
 
@@ -910,8 +996,10 @@ static void put_limits(double *numbers, vector_t centre, double bound)
 /* Return the k-th three numbers of a buffer. */
 static vector_t triple(double *numbers)
 {
-    const vector_t row = vector_at(&numbers[LIMITS_AT]);
-    return row;
+    const double t1 = numbers[LIMITS_AT];
+    const double t2 = numbers[LIMITS_AT + 1];
+    const double t3 = numbers[LIMITS_AT + 2];
+    return (vector_t){t1, t2, t3};
 }
 
 /* ------------------------------- laws.predictive.problem -------------------------------- */
@@ -921,9 +1009,9 @@ static limits_t limits(double *numbers)
 {
     const vector_t centre = triple(numbers);
     const double bound = numbers[LIMITS_AT + 3];
-    return (limits_t){.centre = centre, .bound = bound,
-        .low = subtract(centre, (vector_t){bound, bound, bound}),
-        .high = add(centre, (vector_t){bound, bound, bound})};
+    const vector_t wide = {bound, bound, bound};
+    return (limits_t){.centre = centre, .bound = bound, .low = subtract(centre, wide),
+        .high = add(centre, wide)};
 }
 
 /* -------------------------------- laws.predictive.limits -------------------------------- */
@@ -945,53 +1033,108 @@ static project_result_t project(const limits_t *limits, vector_t v)
 static void advance(double *numbers)
 {
     const limits_t bounds = limits(numbers);
-    const six_t row = six_at(&numbers[STATES_AT + 60]);
-    const double y = -row.e[0];
-    const double y_2 = -row.e[1];
-    const double y_3 = -row.e[2];
-    const double y_4 = -row.e[3];
-    const double y_5 = -row.e[4];
-    const double y_6 = -row.e[5];
-    const six_t a = six_at(&numbers[TAIL_AT]);
-    const double t28 = 0.0 + a.e[0] * y + a.e[1] * y_2 + a.e[2] * y_3 + a.e[3] * y_4 + a.e[4] * y_5;
-    const six_t a_2 = six_at(&numbers[TAIL_AT + 6]);
-    const double t46 = 0.0 + a_2.e[0] * y + a_2.e[1] * y_2 + a_2.e[2] * y_3 + a_2.e[3] * y_4 + a_2.e[4] * y_5;
-    const six_t a_3 = six_at(&numbers[TAIL_AT + 12]);
-    const double t64 = 0.0 + a_3.e[0] * y + a_3.e[1] * y_2 + a_3.e[2] * y_3 + a_3.e[3] * y_4 + a_3.e[4] * y_5;
-    const double total = t64 + a_3.e[5] * y_6;
+    const double t1 = numbers[STATES_AT + 60];
+    const double t2 = numbers[STATES_AT + 61];
+    const double t3 = numbers[STATES_AT + 62];
+    const double t4 = numbers[STATES_AT + 63];
+    const double t5 = numbers[STATES_AT + 64];
+    const double t6 = numbers[STATES_AT + 65];
+    const doubles6_t a = {{numbers[TAIL_AT], numbers[TAIL_AT + 1], numbers[TAIL_AT + 2], numbers[TAIL_AT + 3],
+        numbers[TAIL_AT + 4], numbers[TAIL_AT + 5]}};
+    const double t28 = 0.0 + a.e[0] * -t1 + a.e[1] * -t2 + a.e[2] * -t3 + a.e[3] * -t4 + a.e[4] * -t5;
+    const doubles6_t a_2 = {{numbers[TAIL_AT + 6], numbers[TAIL_AT + 7], numbers[TAIL_AT + 8], numbers[TAIL_AT
+        + 9], numbers[TAIL_AT + 10], numbers[TAIL_AT + 11]}};
+    const double t46 = 0.0 + a_2.e[0] * -t1 + a_2.e[1] * -t2 + a_2.e[2] * -t3 + a_2.e[3] * -t4 + a_2.e[4] *
+        -t5;
+    const doubles6_t a_3 = {{numbers[TAIL_AT + 12], numbers[TAIL_AT + 13], numbers[TAIL_AT + 14],
+        numbers[TAIL_AT + 15], numbers[TAIL_AT + 16], numbers[TAIL_AT + 17]}};
+    const double total = 0.0 + a_3.e[0] * -t1 + a_3.e[1] * -t2 + a_3.e[2] * -t3 + a_3.e[3] * -t4 + a_3.e[4] *
+        -t5;
     for (int32_t k = 0; k < 9; k++) {
-        const vector_t row_2 = vector_at(&numbers[PLAN_AT + 3 * k + 3]);
-        const project_result_t project_result = project(&bounds, row_2);
-        put_vector(&numbers[PLAN_AT + 3 * k], project_result.w);
+        const double t70 = numbers[PLAN_AT + 3 * k + 3];
+        const double t73 = numbers[PLAN_AT + 3 * k + 4];
+        const double t76 = numbers[PLAN_AT + 3 * k + 5];
+        const project_result_t project_result = project(&bounds, (vector_t){t70, t73, t76});
+        numbers[PLAN_AT + 3 * k] = project_result.w.x;
+        numbers[PLAN_AT + 3 * k + 1] = project_result.w.y;
+        numbers[PLAN_AT + 3 * k + 2] = project_result.w.z;
     }
-    const project_result_t project_result_2 = project(&bounds,
-        (vector_t){t28 + a.e[5] * y_6, t46 + a_2.e[5] * y_6, total});
-    put_vector(&numbers[PLAN_AT + 27], project_result_2.w);
+    const vector_t last = {t28 + a.e[5] * -t6, t46 + a_2.e[5] * -t6, total + a_3.e[5] * -t6};
+    const project_result_t project_result_2 = project(&bounds, last);
+    numbers[PLAN_AT + 27] = project_result_2.w.x;
+    numbers[PLAN_AT + 28] = project_result_2.w.y;
+    numbers[PLAN_AT + 29] = project_result_2.w.z;
 }
 
 /* -------------------------------- laws.predictive.sixes --------------------------------- */
 
 /* A buffer holds a matrix row after row. */
-static six_rows_t matrix(double *numbers)
+static doubles6s6_t matrix(double *numbers)
 {
-    const six_t row = six_at(&numbers[MOTION_AT]);
-    const six_t row_2 = six_at(&numbers[MOTION_AT + 6]);
-    const six_t row_3 = six_at(&numbers[MOTION_AT + 12]);
-    const six_t row_4 = six_at(&numbers[MOTION_AT + 18]);
-    const six_t row_5 = six_at(&numbers[MOTION_AT + 24]);
-    const six_t row_6 = six_at(&numbers[MOTION_AT + 30]);
-    return (six_rows_t){{row, row_2, row_3, row_4, row_5, row_6}};
+    const double t1 = numbers[MOTION_AT];
+    const double t2 = numbers[MOTION_AT + 1];
+    const double t3 = numbers[MOTION_AT + 2];
+    const double t4 = numbers[MOTION_AT + 3];
+    const double t5 = numbers[MOTION_AT + 4];
+    const double t6 = numbers[MOTION_AT + 5];
+    const double t7 = numbers[MOTION_AT + 6];
+    const double t8 = numbers[MOTION_AT + 7];
+    const double t9 = numbers[MOTION_AT + 8];
+    const double t10 = numbers[MOTION_AT + 9];
+    const double t11 = numbers[MOTION_AT + 10];
+    const double t12 = numbers[MOTION_AT + 11];
+    const double t13 = numbers[MOTION_AT + 12];
+    const double t14 = numbers[MOTION_AT + 13];
+    const double t15 = numbers[MOTION_AT + 14];
+    const double t16 = numbers[MOTION_AT + 15];
+    const double t17 = numbers[MOTION_AT + 16];
+    const double t18 = numbers[MOTION_AT + 17];
+    const double t19 = numbers[MOTION_AT + 18];
+    const double t20 = numbers[MOTION_AT + 19];
+    const double t21 = numbers[MOTION_AT + 20];
+    const double t22 = numbers[MOTION_AT + 21];
+    const double t23 = numbers[MOTION_AT + 22];
+    const double t24 = numbers[MOTION_AT + 23];
+    const double t25 = numbers[MOTION_AT + 24];
+    const double t26 = numbers[MOTION_AT + 25];
+    const double t27 = numbers[MOTION_AT + 26];
+    const double t28 = numbers[MOTION_AT + 27];
+    const double t29 = numbers[MOTION_AT + 28];
+    const double t30 = numbers[MOTION_AT + 29];
+    const double t31 = numbers[MOTION_AT + 30];
+    const double t32 = numbers[MOTION_AT + 31];
+    const double t33 = numbers[MOTION_AT + 32];
+    const double t34 = numbers[MOTION_AT + 33];
+    const double t35 = numbers[MOTION_AT + 34];
+    const double t36 = numbers[MOTION_AT + 35];
+    return (doubles6s6_t){{{{t1, t2, t3, t4, t5, t6}}, {{t7, t8, t9, t10, t11, t12}},
+        {{t13, t14, t15, t16, t17, t18}}, {{t19, t20, t21, t22, t23, t24}}, {{t25, t26, t27, t28, t29, t30}},
+        {{t31, t32, t33, t34, t35, t36}}}};
 }
 
 /* A buffer holds a matrix row after row. */
-static six_vectors_t matrix1(double *numbers)
+static vectors6_t matrix1(double *numbers)
 {
-    const six_t row = six_at(&numbers[MOTION_AT + 36]);
-    const six_t row_2 = six_at(&numbers[MOTION_AT + 42]);
-    const six_t row_3 = six_at(&numbers[MOTION_AT + 48]);
-    return (six_vectors_t){{{row.e[0], row.e[1], row.e[2]}, {row.e[3], row.e[4], row.e[5]},
-        {row_2.e[0], row_2.e[1], row_2.e[2]}, {row_2.e[3], row_2.e[4], row_2.e[5]},
-        {row_3.e[0], row_3.e[1], row_3.e[2]}, {row_3.e[3], row_3.e[4], row_3.e[5]}}};
+    const double t1 = numbers[MOTION_AT + 36];
+    const double t2 = numbers[MOTION_AT + 37];
+    const double t3 = numbers[MOTION_AT + 38];
+    const double t4 = numbers[MOTION_AT + 39];
+    const double t5 = numbers[MOTION_AT + 40];
+    const double t6 = numbers[MOTION_AT + 41];
+    const double t7 = numbers[MOTION_AT + 42];
+    const double t8 = numbers[MOTION_AT + 43];
+    const double t9 = numbers[MOTION_AT + 44];
+    const double t10 = numbers[MOTION_AT + 45];
+    const double t11 = numbers[MOTION_AT + 46];
+    const double t12 = numbers[MOTION_AT + 47];
+    const double t13 = numbers[MOTION_AT + 48];
+    const double t14 = numbers[MOTION_AT + 49];
+    const double t15 = numbers[MOTION_AT + 50];
+    const double t16 = numbers[MOTION_AT + 51];
+    const double t17 = numbers[MOTION_AT + 52];
+    const double t18 = numbers[MOTION_AT + 53];
+    return (vectors6_t){{{t1, t2, t3}, {t4, t5, t6}, {t7, t8, t9}, {t10, t11, t12}, {t13, t14, t15},
+        {t16, t17, t18}}};
 }
 
 /* ------------------------------- laws.predictive.problem -------------------------------- */
@@ -999,23 +1142,55 @@ static six_vectors_t matrix1(double *numbers)
 /* Return A (6, 6) and B (6, 3). */
 static motion_result_t motion(double *numbers)
 {
-    const six_rows_t matrix_2 = matrix(numbers);
-    const six_vectors_t matrix1_2 = matrix1(numbers);
-    return (motion_result_t){.rows = matrix_2, .rows1 = matrix1_2};
+    const doubles6s6_t matrix_result = matrix(numbers);
+    const vectors6_t matrix1_result = matrix1(numbers);
+    return (motion_result_t){.rows = matrix_result, .rows1 = matrix1_result};
 }
 
 /* -------------------------------- laws.predictive.sixes --------------------------------- */
 
 /* A buffer holds a matrix row after row. */
-static six_rows_t matrix2(double *numbers)
+static doubles6s6_t matrix2(double *numbers)
 {
-    const six_t row = six_at(&numbers[WEIGHTS_AT + 12]);
-    const six_t row_2 = six_at(&numbers[WEIGHTS_AT + 18]);
-    const six_t row_3 = six_at(&numbers[WEIGHTS_AT + 24]);
-    const six_t row_4 = six_at(&numbers[WEIGHTS_AT + 30]);
-    const six_t row_5 = six_at(&numbers[WEIGHTS_AT + 36]);
-    const six_t row_6 = six_at(&numbers[WEIGHTS_AT + 42]);
-    return (six_rows_t){{row, row_2, row_3, row_4, row_5, row_6}};
+    const double t1 = numbers[WEIGHTS_AT + 12];
+    const double t2 = numbers[WEIGHTS_AT + 13];
+    const double t3 = numbers[WEIGHTS_AT + 14];
+    const double t4 = numbers[WEIGHTS_AT + 15];
+    const double t5 = numbers[WEIGHTS_AT + 16];
+    const double t6 = numbers[WEIGHTS_AT + 17];
+    const double t7 = numbers[WEIGHTS_AT + 18];
+    const double t8 = numbers[WEIGHTS_AT + 19];
+    const double t9 = numbers[WEIGHTS_AT + 20];
+    const double t10 = numbers[WEIGHTS_AT + 21];
+    const double t11 = numbers[WEIGHTS_AT + 22];
+    const double t12 = numbers[WEIGHTS_AT + 23];
+    const double t13 = numbers[WEIGHTS_AT + 24];
+    const double t14 = numbers[WEIGHTS_AT + 25];
+    const double t15 = numbers[WEIGHTS_AT + 26];
+    const double t16 = numbers[WEIGHTS_AT + 27];
+    const double t17 = numbers[WEIGHTS_AT + 28];
+    const double t18 = numbers[WEIGHTS_AT + 29];
+    const double t19 = numbers[WEIGHTS_AT + 30];
+    const double t20 = numbers[WEIGHTS_AT + 31];
+    const double t21 = numbers[WEIGHTS_AT + 32];
+    const double t22 = numbers[WEIGHTS_AT + 33];
+    const double t23 = numbers[WEIGHTS_AT + 34];
+    const double t24 = numbers[WEIGHTS_AT + 35];
+    const double t25 = numbers[WEIGHTS_AT + 36];
+    const double t26 = numbers[WEIGHTS_AT + 37];
+    const double t27 = numbers[WEIGHTS_AT + 38];
+    const double t28 = numbers[WEIGHTS_AT + 39];
+    const double t29 = numbers[WEIGHTS_AT + 40];
+    const double t30 = numbers[WEIGHTS_AT + 41];
+    const double t31 = numbers[WEIGHTS_AT + 42];
+    const double t32 = numbers[WEIGHTS_AT + 43];
+    const double t33 = numbers[WEIGHTS_AT + 44];
+    const double t34 = numbers[WEIGHTS_AT + 45];
+    const double t35 = numbers[WEIGHTS_AT + 46];
+    const double t36 = numbers[WEIGHTS_AT + 47];
+    return (doubles6s6_t){{{{t1, t2, t3, t4, t5, t6}}, {{t7, t8, t9, t10, t11, t12}},
+        {{t13, t14, t15, t16, t17, t18}}, {{t19, t20, t21, t22, t23, t24}}, {{t25, t26, t27, t28, t29, t30}},
+        {{t31, t32, t33, t34, t35, t36}}}};
 }
 
 /* ------------------------------- laws.predictive.problem -------------------------------- */
@@ -1023,105 +1198,80 @@ static six_rows_t matrix2(double *numbers)
 /* Return the weights of the cost. */
 static weights_t weights(double *numbers)
 {
-    const six_t row = six_at(&numbers[WEIGHTS_AT]);
-    const six_t row_2 = six_at(&numbers[WEIGHTS_AT + 6]);
-    const six_rows_t matrix2_2 = matrix2(numbers);
-    return (weights_t){.q = row, .r = {row_2.e[0], row_2.e[1], row_2.e[2]},
-        .r_inverse = {row_2.e[3], row_2.e[4], row_2.e[5]}, .p = matrix2_2};
+    const double t1 = numbers[WEIGHTS_AT];
+    const double t2 = numbers[WEIGHTS_AT + 1];
+    const double t3 = numbers[WEIGHTS_AT + 2];
+    const double t4 = numbers[WEIGHTS_AT + 3];
+    const double t5 = numbers[WEIGHTS_AT + 4];
+    const double t6 = numbers[WEIGHTS_AT + 5];
+    const double t7 = numbers[WEIGHTS_AT + 6];
+    const double t8 = numbers[WEIGHTS_AT + 7];
+    const double t9 = numbers[WEIGHTS_AT + 8];
+    const double t10 = numbers[WEIGHTS_AT + 9];
+    const double t11 = numbers[WEIGHTS_AT + 10];
+    const double t12 = numbers[WEIGHTS_AT + 11];
+    const doubles6s6_t matrix2_result = matrix2(numbers);
+    return (weights_t){.q = {{t1, t2, t3, t4, t5, t6}}, .r = {t7, t8, t9}, .r_inverse = {t10, t11, t12},
+        .p = matrix2_result};
 }
 
 /* -------------------------------- laws.predictive.sixes --------------------------------- */
 
 /* Return the transposed matrix. */
-static sixs3_t transposed1(six_vectors_t m)
+static doubles6s3_t transposed1(const vectors6_t *m)
 {
-    return (sixs3_t){{{{m.e[0].x, m.e[1].x, m.e[2].x, m.e[3].x, m.e[4].x, m.e[5].x}},
-        {{m.e[0].y, m.e[1].y, m.e[2].y, m.e[3].y, m.e[4].y, m.e[5].y}},
-        {{m.e[0].z, m.e[1].z, m.e[2].z, m.e[3].z, m.e[4].z, m.e[5].z}}}};
+    return (doubles6s3_t){{{{m->e[0].x, m->e[1].x, m->e[2].x, m->e[3].x, m->e[4].x, m->e[5].x}}, {{m->e[0].y,
+        m->e[1].y, m->e[2].y, m->e[3].y, m->e[4].y, m->e[5].y}}, {{m->e[0].z, m->e[1].z, m->e[2].z, m->e[3].z,
+        m->e[4].z, m->e[5].z}}}};
 }
 
 /* Return m n. */
-static six_rows_t product1(six_rows_t m, six_rows_t n)
+static doubles6s6_t product1(const doubles6s6_t *m, const doubles6s6_t *n)
 {
-    const six_rows_t columns = transposed(n);
-    return (six_rows_t){{apply1(columns, m.e[0]), apply1(columns, m.e[1]), apply1(columns, m.e[2]),
-        apply1(columns, m.e[3]), apply1(columns, m.e[4]), apply1(columns, m.e[5])}};
+    const doubles6s6_t columns = transposed(n);
+    return (doubles6s6_t){{apply1(&columns, m->e[0]), apply1(&columns, m->e[1]), apply1(&columns, m->e[2]),
+        apply1(&columns, m->e[3]), apply1(&columns, m->e[4]), apply1(&columns, m->e[5])}};
 }
 
 /* Return m x. */
-static vector_t apply2(sixs3_t m, six_t x)
+static vector_t apply2(const doubles6s3_t *m, doubles6_t x)
 {
-    return (vector_t){dot2(m.e[0], x), dot2(m.e[1], x), dot2(m.e[2], x)};
+    return (vector_t){dot2(m->e[0], x), dot2(m->e[1], x), dot2(m->e[2], x)};
 }
 
 /* Return m n. */
-static six_vectors_t product2(six_rows_t m, six_vectors_t n)
+static vectors6_t product2(const doubles6s6_t *m, const vectors6_t *n)
 {
-    const sixs3_t columns = transposed1(n);
-    return (six_vectors_t){{apply2(columns, m.e[0]), apply2(columns, m.e[1]), apply2(columns, m.e[2]),
-        apply2(columns, m.e[3]), apply2(columns, m.e[4]), apply2(columns, m.e[5])}};
+    const doubles6s3_t columns = transposed1(n);
+    return (vectors6_t){{apply2(&columns, m->e[0]), apply2(&columns, m->e[1]), apply2(&columns, m->e[2]),
+        apply2(&columns, m->e[3]), apply2(&columns, m->e[4]), apply2(&columns, m->e[5])}};
 }
 
 /* Return the transposed matrix. */
-static six_vectors_t transposed2(sixs3_t m)
+static vectors6_t transposed2(const doubles6s3_t *m)
 {
-    return (six_vectors_t){{{m.e[0].e[0], m.e[1].e[0], m.e[2].e[0]}, {m.e[0].e[1], m.e[1].e[1], m.e[2].e[1]},
-        {m.e[0].e[2], m.e[1].e[2], m.e[2].e[2]}, {m.e[0].e[3], m.e[1].e[3], m.e[2].e[3]},
-        {m.e[0].e[4], m.e[1].e[4], m.e[2].e[4]}, {m.e[0].e[5], m.e[1].e[5], m.e[2].e[5]}}};
-}
-
-/* Return the number in row i and column j. */
-static double entry(vector_t m)
-{
-    return m.x;
+    return (vectors6_t){{{m->e[0].e[0], m->e[1].e[0], m->e[2].e[0]},
+        {m->e[0].e[1], m->e[1].e[1], m->e[2].e[1]}, {m->e[0].e[2], m->e[1].e[2], m->e[2].e[2]},
+        {m->e[0].e[3], m->e[1].e[3], m->e[2].e[3]}, {m->e[0].e[4], m->e[1].e[4], m->e[2].e[4]},
+        {m->e[0].e[5], m->e[1].e[5], m->e[2].e[5]}}};
 }
 
 /* Return start + a'b. */
-static double dot3(six_t a, six_t b, double start)
+static double dot3(doubles6_t a, doubles6_t b, double start)
 {
     const double t8 = start + a.e[0] * b.e[0] + a.e[1] * b.e[1] + a.e[2] * b.e[2] + a.e[3] * b.e[3];
-    const double total = t8 + a.e[4] * b.e[4] + a.e[5] * b.e[5];
-    return total;
-}
-
-/* Return the number in row i and column j. */
-static double entry1(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry2(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry3(vector_t m)
-{
-    return m.y;
-}
-
-/* Return the number in row i and column j. */
-static double entry4(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry5(vector_t m)
-{
-    return m.z;
+    const double total = t8 + a.e[4] * b.e[4];
+    return total + a.e[5] * b.e[5];
 }
 
 /* ------------------------------- laws.predictive.horizon -------------------------------- */
 
 /* Return R + B'P B. */
-static six_t curvature_1(vector_t r, sixs3_t pushes, sixs3_t pushed)
+static doubles6_t curvature_1(vector_t r, const doubles6s3_t *pushes, const doubles6s3_t *pushed)
 {
-    return (six_t){{dot3(pushes.e[0], pushed.e[0], entry(r)), dot3(pushes.e[0], pushed.e[1], entry1()),
-        dot3(pushes.e[0], pushed.e[2], entry2()), dot3(pushes.e[1], pushed.e[1], entry3(r)),
-        dot3(pushes.e[1], pushed.e[2], entry4()), dot3(pushes.e[2], pushed.e[2], entry5(r))}};
+    return (doubles6_t){{dot3(pushes->e[0], pushed->e[0], r.x), dot3(pushes->e[0], pushed->e[1], 0.0),
+        dot3(pushes->e[0], pushed->e[2], 0.0), dot3(pushes->e[1], pushed->e[1], r.y),
+        dot3(pushes->e[1], pushed->e[2], 0.0), dot3(pushes->e[2], pushed->e[2], r.z)}};
 }
 
 /* -------------------------------- laws.predictive.limits -------------------------------- */
@@ -1139,7 +1289,7 @@ static vector_t slack(const limits_t *limits, vector_t v)
 /* Return a symmetric matrix with the curvature of the limits added, and their push: the interior-point
    step. */
 static repelled_result_t repelled(const limits_t *limits, vector_t v, vector_t multipliers, double barrier,
-    six_t m)
+    doubles6_t m)
 {
     const vector_t d = subtract(v, limits->centre);
     const vector_t s = slack(limits, v);
@@ -1159,7 +1309,7 @@ static bools3_t held(const limits_t *limits, vector_t v, vector_t g)
 }
 
 /* Return the inverse of a symmetric matrix. */
-static six_t inverse(six_t m)
+static doubles6_t inverse(doubles6_t m)
 {
     const double c0 = m.e[3] * m.e[5] - m.e[4] * m.e[4];
     const double c1 = m.e[2] * m.e[4] - m.e[1] * m.e[5];
@@ -1167,34 +1317,36 @@ static six_t inverse(six_t m)
     const double s = 1.0 / (m.e[0] * c0 + m.e[1] * c1 + m.e[2] * c2);
     const double d0 = m.e[0] * m.e[5] - m.e[2] * m.e[2];
     const double d1 = m.e[1] * m.e[2] - m.e[0] * m.e[4];
-    return (six_t){{s * c0, s * c1, s * c2, s * d0, s * d1, s * (m.e[0] * m.e[3] - m.e[1] * m.e[1])}};
+    return (doubles6_t){{s * c0, s * c1, s * c2, s * d0, s * d1, s * (m.e[0] * m.e[3] - m.e[1] * m.e[1])}};
 }
 
 /* Return the inverse of a symmetric matrix on the axes that are not fixed, zero on the others. */
-static six_t box_inverse(six_t m, bools3_t fixed)
+static doubles6_t box_inverse(doubles6_t m, bools3_t fixed)
 {
-    const six_t w = inverse((six_t){{fixed.e[0] ? 1.0 : m.e[0], fixed.e[0] || fixed.e[1] ? 0.0 : m.e[1],
-        fixed.e[0] || fixed.e[2] ? 0.0 : m.e[2], fixed.e[1] ? 1.0 : m.e[3],
-        fixed.e[1] || fixed.e[2] ? 0.0 : m.e[4], fixed.e[2] ? 1.0 : m.e[5]}});
-    return (six_t){{fixed.e[0] ? 0.0 : w.e[0], w.e[1], w.e[2], fixed.e[1] ? 0.0 : w.e[3], w.e[4],
+    const doubles6_t w = inverse((doubles6_t){{fixed.e[0] ? 1.0 : m.e[0],
+        fixed.e[0] || fixed.e[1] ? 0.0 : m.e[1], fixed.e[0] || fixed.e[2] ? 0.0 : m.e[2],
+        fixed.e[1] ? 1.0 : m.e[3], fixed.e[1] || fixed.e[2] ? 0.0 : m.e[4], fixed.e[2] ? 1.0 : m.e[5]}});
+    return (doubles6_t){{fixed.e[0] ? 0.0 : w.e[0], w.e[1], w.e[2], fixed.e[1] ? 0.0 : w.e[3], w.e[4],
         fixed.e[2] ? 0.0 : w.e[5]}};
 }
 
 /* ------------------------------- laws.predictive.horizon -------------------------------- */
 
 /* Return the inverse of m on what no limit holds, and the number of limits that hold. */
-static held_inverse_result_t held_inverse(const limits_t *bounds, vector_t v, vector_t g, six_t m, bool holds)
+static held_inverse_result_t held_inverse(const limits_t *bounds, vector_t v, vector_t g, doubles6_t m,
+    bool holds)
 {
-    const bools3_t held_2 = held(bounds, v, g);
-    const bool t1 = holds && held_2.e[0];
-    const bool t2 = holds && held_2.e[1];
-    const bool t3 = holds && held_2.e[2];
-    return (held_inverse_result_t){.symmetric = box_inverse(m, (bools3_t){{t1, t2, t3}}),
+    const bools3_t held_result = held(bounds, v, g);
+    const bool t1 = holds && held_result.e[0];
+    const bool t2 = holds && held_result.e[1];
+    const bool t3 = holds && held_result.e[2];
+    const bools3_t fixed = {{t1, t2, t3}};
+    return (held_inverse_result_t){.symmetric = box_inverse(m, fixed),
         .scalar = (t1 ? 1.0 : 0.0) + (t2 ? 1.0 : 0.0) + (t3 ? 1.0 : 0.0)};
 }
 
 /* Return -w x. */
-static vector_t minus(six_t w, vector_t x)
+static vector_t minus(doubles6_t w, vector_t x)
 {
     return (vector_t){-(w.e[0] * x.x + w.e[1] * x.y + w.e[2] * x.z),
         -(w.e[1] * x.x + w.e[3] * x.y + w.e[4] * x.z), -(w.e[2] * x.x + w.e[4] * x.y + w.e[5] * x.z)};
@@ -1202,299 +1354,83 @@ static vector_t minus(six_t w, vector_t x)
 
 /* -------------------------------- laws.predictive.sixes --------------------------------- */
 
-/* Return the number in row i and column j. */
-static double entry6(six_t m)
-{
-    return m.e[0];
-}
-
 /* Return start + a'b. */
 static double dot4(vector_t a, vector_t b, double start)
 {
-    const double total = start + a.x * b.x + a.y * b.y + a.z * b.z;
-    return total;
-}
-
-/* Return the number in row i and column j. */
-static double entry7(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry8(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry9(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry10(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry11(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry12(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry13(six_t m)
-{
-    return m.e[1];
-}
-
-/* Return the number in row i and column j. */
-static double entry14(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry15(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry16(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry17(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry18(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry19(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry20(six_t m)
-{
-    return m.e[2];
-}
-
-/* Return the number in row i and column j. */
-static double entry21(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry22(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry23(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry24(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry25(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry26(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry27(six_t m)
-{
-    return m.e[3];
-}
-
-/* Return the number in row i and column j. */
-static double entry28(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry29(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry30(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry31(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry32(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry33(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry34(six_t m)
-{
-    return m.e[4];
-}
-
-/* Return the number in row i and column j. */
-static double entry35(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry36(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry37(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry38(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry39(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry40(void)
-{
-    return 0.0;
-}
-
-/* Return the number in row i and column j. */
-static double entry41(six_t m)
-{
-    return m.e[5];
+    const double total = start + a.x * b.x + a.y * b.y;
+    return total + a.z * b.z;
 }
 
 /* ------------------------------- laws.predictive.horizon -------------------------------- */
 
 /* Keep the matrix symmetric against rounding, which long horizons would amplify. */
-static six_rows_t symmetric(six_rows_t m)
+static doubles6s6_t symmetric(const doubles6s6_t *m)
 {
-    const double t2 = 0.5 * (m.e[1].e[0] + m.e[0].e[1]);
-    const double t4 = 0.5 * (m.e[2].e[0] + m.e[0].e[2]);
-    const double t6 = 0.5 * (m.e[3].e[0] + m.e[0].e[3]);
-    const double t8 = 0.5 * (m.e[4].e[0] + m.e[0].e[4]);
-    const double t10 = 0.5 * (m.e[5].e[0] + m.e[0].e[5]);
-    const double t12 = 0.5 * (m.e[2].e[1] + m.e[1].e[2]);
-    const double t14 = 0.5 * (m.e[3].e[1] + m.e[1].e[3]);
-    const double t16 = 0.5 * (m.e[4].e[1] + m.e[1].e[4]);
-    const double t18 = 0.5 * (m.e[5].e[1] + m.e[1].e[5]);
-    const double t20 = 0.5 * (m.e[3].e[2] + m.e[2].e[3]);
-    const double t22 = 0.5 * (m.e[4].e[2] + m.e[2].e[4]);
-    const double t24 = 0.5 * (m.e[5].e[2] + m.e[2].e[5]);
-    const double t26 = 0.5 * (m.e[4].e[3] + m.e[3].e[4]);
-    const double t28 = 0.5 * (m.e[5].e[3] + m.e[3].e[5]);
-    const double t30 = 0.5 * (m.e[5].e[4] + m.e[4].e[5]);
-    return (six_rows_t){{{{m.e[0].e[0], t2, t4, t6, t8, t10}}, {{t2, m.e[1].e[1], t12, t14, t16, t18}},
-        {{t4, t12, m.e[2].e[2], t20, t22, t24}}, {{t6, t14, t20, m.e[3].e[3], t26, t28}},
-        {{t8, t16, t22, t26, m.e[4].e[4], t30}}, {{t10, t18, t24, t28, t30, m.e[5].e[5]}}}};
+    const double t2 = 0.5 * (m->e[1].e[0] + m->e[0].e[1]);
+    const double t4 = 0.5 * (m->e[2].e[0] + m->e[0].e[2]);
+    const double t6 = 0.5 * (m->e[3].e[0] + m->e[0].e[3]);
+    const double t8 = 0.5 * (m->e[4].e[0] + m->e[0].e[4]);
+    const double t10 = 0.5 * (m->e[5].e[0] + m->e[0].e[5]);
+    const double t12 = 0.5 * (m->e[2].e[1] + m->e[1].e[2]);
+    const double t14 = 0.5 * (m->e[3].e[1] + m->e[1].e[3]);
+    const double t16 = 0.5 * (m->e[4].e[1] + m->e[1].e[4]);
+    const double t18 = 0.5 * (m->e[5].e[1] + m->e[1].e[5]);
+    const double t20 = 0.5 * (m->e[3].e[2] + m->e[2].e[3]);
+    const double t22 = 0.5 * (m->e[4].e[2] + m->e[2].e[4]);
+    const double t24 = 0.5 * (m->e[5].e[2] + m->e[2].e[5]);
+    const double t26 = 0.5 * (m->e[4].e[3] + m->e[3].e[4]);
+    const double t28 = 0.5 * (m->e[5].e[3] + m->e[3].e[5]);
+    const double t30 = 0.5 * (m->e[5].e[4] + m->e[4].e[5]);
+    return (doubles6s6_t){{{{m->e[0].e[0], t2, t4, t6, t8, t10}}, {{t2, m->e[1].e[1], t12, t14, t16, t18}},
+        {{t4, t12, m->e[2].e[2], t20, t22, t24}}, {{t6, t14, t20, m->e[3].e[3], t26, t28}},
+        {{t8, t16, t22, t26, m->e[4].e[4], t30}}, {{t10, t18, t24, t28, t30, m->e[5].e[5]}}}};
 }
 
 /* Find the Newton step by one backward Riccati sweep, as a policy: step + feedback (x - x of the plan). */
 static sweep_result_t sweep(double *numbers, double barrier)
 {
     const motion_result_t motion_result = motion(numbers);
-    const weights_t weights_2 = weights(numbers);
+    const weights_t weights_result = weights(numbers);
     const limits_t bounds = limits(numbers);
-    const six_rows_t columns = transposed(motion_result.rows);
-    const sixs3_t pushes = transposed1(motion_result.rows1);
+    const doubles6s6_t columns = transposed(&motion_result.rows);
+    const doubles6s3_t pushes = transposed1(&motion_result.rows1);
     const bool holds = barrier <= 0.0;
-    double curvature_ = weights_2.p.e[0].e[0];
-    double curvature1_ = weights_2.p.e[0].e[1];
-    double curvature2_ = weights_2.p.e[0].e[2];
-    double curvature3_ = weights_2.p.e[0].e[3];
-    double curvature4_ = weights_2.p.e[0].e[4];
-    double curvature5_ = weights_2.p.e[0].e[5];
-    double curvature6_ = weights_2.p.e[1].e[0];
-    double curvature7_ = weights_2.p.e[1].e[1];
-    double curvature8_ = weights_2.p.e[1].e[2];
-    double curvature9_ = weights_2.p.e[1].e[3];
-    double curvature10_ = weights_2.p.e[1].e[4];
-    double curvature11_ = weights_2.p.e[1].e[5];
-    double curvature12_ = weights_2.p.e[2].e[0];
-    double curvature13_ = weights_2.p.e[2].e[1];
-    double curvature14_ = weights_2.p.e[2].e[2];
-    double curvature15_ = weights_2.p.e[2].e[3];
-    double curvature16_ = weights_2.p.e[2].e[4];
-    double curvature17_ = weights_2.p.e[2].e[5];
-    double curvature18_ = weights_2.p.e[3].e[0];
-    double curvature19_ = weights_2.p.e[3].e[1];
-    double curvature20_ = weights_2.p.e[3].e[2];
-    double curvature21_ = weights_2.p.e[3].e[3];
-    double curvature22_ = weights_2.p.e[3].e[4];
-    double curvature23_ = weights_2.p.e[3].e[5];
-    double curvature24_ = weights_2.p.e[4].e[0];
-    double curvature25_ = weights_2.p.e[4].e[1];
-    double curvature26_ = weights_2.p.e[4].e[2];
-    double curvature27_ = weights_2.p.e[4].e[3];
-    double curvature28_ = weights_2.p.e[4].e[4];
-    double curvature29_ = weights_2.p.e[4].e[5];
-    double curvature30_ = weights_2.p.e[5].e[0];
-    double curvature31_ = weights_2.p.e[5].e[1];
-    double curvature32_ = weights_2.p.e[5].e[2];
-    double curvature33_ = weights_2.p.e[5].e[3];
-    double curvature34_ = weights_2.p.e[5].e[4];
-    double curvature35_ = weights_2.p.e[5].e[5];
+    double curvature_ = weights_result.p.e[0].e[0];
+    double curvature1_ = weights_result.p.e[0].e[1];
+    double curvature2_ = weights_result.p.e[0].e[2];
+    double curvature3_ = weights_result.p.e[0].e[3];
+    double curvature4_ = weights_result.p.e[0].e[4];
+    double curvature5_ = weights_result.p.e[0].e[5];
+    double curvature6_ = weights_result.p.e[1].e[0];
+    double curvature7_ = weights_result.p.e[1].e[1];
+    double curvature8_ = weights_result.p.e[1].e[2];
+    double curvature9_ = weights_result.p.e[1].e[3];
+    double curvature10_ = weights_result.p.e[1].e[4];
+    double curvature11_ = weights_result.p.e[1].e[5];
+    double curvature12_ = weights_result.p.e[2].e[0];
+    double curvature13_ = weights_result.p.e[2].e[1];
+    double curvature14_ = weights_result.p.e[2].e[2];
+    double curvature15_ = weights_result.p.e[2].e[3];
+    double curvature16_ = weights_result.p.e[2].e[4];
+    double curvature17_ = weights_result.p.e[2].e[5];
+    double curvature18_ = weights_result.p.e[3].e[0];
+    double curvature19_ = weights_result.p.e[3].e[1];
+    double curvature20_ = weights_result.p.e[3].e[2];
+    double curvature21_ = weights_result.p.e[3].e[3];
+    double curvature22_ = weights_result.p.e[3].e[4];
+    double curvature23_ = weights_result.p.e[3].e[5];
+    double curvature24_ = weights_result.p.e[4].e[0];
+    double curvature25_ = weights_result.p.e[4].e[1];
+    double curvature26_ = weights_result.p.e[4].e[2];
+    double curvature27_ = weights_result.p.e[4].e[3];
+    double curvature28_ = weights_result.p.e[4].e[4];
+    double curvature29_ = weights_result.p.e[4].e[5];
+    double curvature30_ = weights_result.p.e[5].e[0];
+    double curvature31_ = weights_result.p.e[5].e[1];
+    double curvature32_ = weights_result.p.e[5].e[2];
+    double curvature33_ = weights_result.p.e[5].e[3];
+    double curvature34_ = weights_result.p.e[5].e[4];
+    double curvature35_ = weights_result.p.e[5].e[5];
     double slope_ = 0.0;
     double slope1_ = 0.0;
     double slope2_ = 0.0;
@@ -1548,163 +1484,185 @@ static sweep_result_t sweep(double *numbers, double barrier)
         const double slope5 = slope5_;
         const double decrement = decrement_;
         const double holding = holding_;
-        const six_rows_t product1_2 = product1((six_rows_t){{{{curvature, curvature1, curvature2, curvature3,
-            curvature4, curvature5}}, {{curvature6, curvature7, curvature8, curvature9, curvature10,
-            curvature11}}, {{curvature12, curvature13, curvature14, curvature15, curvature16, curvature17}},
-            {{curvature18, curvature19, curvature20, curvature21, curvature22, curvature23}}, {{curvature24,
-            curvature25, curvature26, curvature27, curvature28, curvature29}}, {{curvature30, curvature31,
-            curvature32, curvature33, curvature34, curvature35}}}}, motion_result.rows);
-        const six_rows_t onward = transposed(product1_2);
-        const six_vectors_t product2_2 = product2((six_rows_t){{{{curvature, curvature1, curvature2,
-            curvature3, curvature4, curvature5}}, {{curvature6, curvature7, curvature8, curvature9,
-            curvature10, curvature11}}, {{curvature12, curvature13, curvature14, curvature15, curvature16,
-            curvature17}}, {{curvature18, curvature19, curvature20, curvature21, curvature22, curvature23}},
-            {{curvature24, curvature25, curvature26, curvature27, curvature28, curvature29}}, {{curvature30,
-            curvature31, curvature32, curvature33, curvature34, curvature35}}}}, motion_result.rows1);
-        const sixs3_t pushed = transposed1(product2_2);
-        const six_vectors_t cross_2 = transposed2((sixs3_t){{apply1(onward, pushes.e[0]),
-            apply1(onward, pushes.e[1]), apply1(onward, pushes.e[2])}});
-        const six_t m_2 = curvature_1(weights_2.r, pushes, pushed);
-        numbers[STIFFNESS_AT + (9 - back)] = m_2.e[0] + m_2.e[3] + m_2.e[5];
-        const vector_t v = vector_at(&numbers[PLAN_AT + 3 * (9 - back)]);
-        const vector_t pull = vector_at(&numbers[GRADIENT_AT + 3 * (9 - back)]);
-        const vector_t g_2 = add(apply2(pushes, (six_t){{slope, slope1, slope2, slope3, slope4, slope5}}),
-            pull);
-        double m_ = m_2.e[0];
-        double m1_ = m_2.e[1];
-        double m2_ = m_2.e[2];
-        double m3_ = m_2.e[3];
-        double m4_ = m_2.e[4];
-        double m5_ = m_2.e[5];
-        double g_ = g_2.x;
-        double g1_ = g_2.y;
-        double g2_ = g_2.z;
+        const doubles6s6_t m_2 = {{{{curvature, curvature1, curvature2, curvature3, curvature4, curvature5}},
+            {{curvature6, curvature7, curvature8, curvature9, curvature10, curvature11}}, {{curvature12,
+            curvature13, curvature14, curvature15, curvature16, curvature17}}, {{curvature18, curvature19,
+            curvature20, curvature21, curvature22, curvature23}}, {{curvature24, curvature25, curvature26,
+            curvature27, curvature28, curvature29}}, {{curvature30, curvature31, curvature32, curvature33,
+            curvature34, curvature35}}}};
+        const doubles6s6_t product1_result = product1(&m_2, &motion_result.rows);
+        const doubles6s6_t onward = transposed(&product1_result);
+        const vectors6_t product2_result = product2(&m_2, &motion_result.rows1);
+        const doubles6s3_t pushed = transposed1(&product2_result);
+        const doubles6s3_t m_3 = {{apply1(&onward, pushes.e[0]), apply1(&onward, pushes.e[1]),
+            apply1(&onward, pushes.e[2])}};
+        const vectors6_t cross_2 = transposed2(&m_3);
+        const doubles6_t m_4 = curvature_1(weights_result.r, &pushes, &pushed);
+        numbers[STIFFNESS_AT - back + 9] = m_4.e[0] + m_4.e[3] + m_4.e[5];
+        const vector_t v = {numbers[PLAN_AT - 3 * back + 27], numbers[PLAN_AT - 3 * back + 28],
+            numbers[PLAN_AT - 3 * back + 29]};
+        const vector_t pull = {numbers[GRADIENT_AT - 3 * back + 27], numbers[GRADIENT_AT - 3 * back + 28],
+            numbers[GRADIENT_AT - 3 * back + 29]};
+        const vector_t add_result = add(apply2(&pushes,
+            (doubles6_t){{slope, slope1, slope2, slope3, slope4, slope5}}), pull);
+        double m_ = m_4.e[0];
+        double m1_ = m_4.e[1];
+        double m2_ = m_4.e[2];
+        double m3_ = m_4.e[3];
+        double m4_ = m_4.e[4];
+        double m5_ = m_4.e[5];
+        double g_ = add_result.x;
+        double g1_ = add_result.y;
+        double g2_ = add_result.z;
         if (!holds) {
-            const vector_t row = vector_at(&numbers[MULTIPLIERS_AT + 3 * (9 - back)]);
-            const repelled_result_t repelled_result = repelled(&bounds, v, row, barrier, m_2);
-            const vector_t add_2 = add(g_2, repelled_result.push);
+            const double t22 = numbers[MULTIPLIERS_AT - 3 * back + 27];
+            const double t24 = numbers[MULTIPLIERS_AT - 3 * back + 28];
+            const double t26 = numbers[MULTIPLIERS_AT - 3 * back + 29];
+            const repelled_result_t repelled_result = repelled(&bounds, v, (vector_t){t22, t24, t26}, barrier,
+                m_4);
+            const vector_t add_result_2 = add(add_result, repelled_result.push);
             m_ = repelled_result.symmetric.e[0];
             m1_ = repelled_result.symmetric.e[1];
             m2_ = repelled_result.symmetric.e[2];
             m3_ = repelled_result.symmetric.e[3];
             m4_ = repelled_result.symmetric.e[4];
             m5_ = repelled_result.symmetric.e[5];
-            g_ = add_2.x;
-            g1_ = add_2.y;
-            g2_ = add_2.z;
+            g_ = add_result_2.x;
+            g1_ = add_result_2.y;
+            g2_ = add_result_2.z;
         }
-        const held_inverse_result_t held_inverse_result = held_inverse(&bounds, v, pull,
-            (six_t){{m_, m1_, m2_, m3_, m4_, m5_}}, holds);
-        const vector_t step_2 = minus(held_inverse_result.symmetric, (vector_t){g_, g1_, g2_});
-        const vector_t minus_2 = minus(held_inverse_result.symmetric, cross_2.e[0]);
-        const vector_t minus_3 = minus(held_inverse_result.symmetric, cross_2.e[1]);
-        const vector_t minus_4 = minus(held_inverse_result.symmetric, cross_2.e[2]);
-        const vector_t minus_5 = minus(held_inverse_result.symmetric, cross_2.e[3]);
-        const vector_t minus_6 = minus(held_inverse_result.symmetric, cross_2.e[4]);
-        const vector_t minus_7 = minus(held_inverse_result.symmetric, cross_2.e[5]);
-        put_vector(&numbers[STEP_AT + 3 * (9 - back)], step_2);
-        const sixs3_t transposed1_2 = transposed1((six_vectors_t){{minus_2, minus_3, minus_4, minus_5,
-            minus_6, minus_7}});
-        put_six(&numbers[FEEDBACK_AT + 18 * (9 - back)], transposed1_2.e[0]);
-        put_six(&numbers[FEEDBACK_AT + 18 * (9 - back) + 6], transposed1_2.e[1]);
-        put_six(&numbers[FEEDBACK_AT + 18 * (9 - back) + 12], transposed1_2.e[2]);
-        const six_rows_t symmetric_2 = symmetric((six_rows_t){{{{dot3(columns.e[0], onward.e[0],
-            dot4(cross_2.e[0], minus_2, entry6(weights_2.q))), dot3(columns.e[0], onward.e[1],
-            dot4(cross_2.e[0], minus_3, entry7())), dot3(columns.e[0], onward.e[2],
-            dot4(cross_2.e[0], minus_4, entry8())), dot3(columns.e[0], onward.e[3],
-            dot4(cross_2.e[0], minus_5, entry9())), dot3(columns.e[0], onward.e[4],
-            dot4(cross_2.e[0], minus_6, entry10())), dot3(columns.e[0], onward.e[5],
-            dot4(cross_2.e[0], minus_7, entry11()))}}, {{dot3(columns.e[1], onward.e[0],
-            dot4(cross_2.e[1], minus_2, entry12())), dot3(columns.e[1], onward.e[1],
-            dot4(cross_2.e[1], minus_3, entry13(weights_2.q))), dot3(columns.e[1], onward.e[2],
-            dot4(cross_2.e[1], minus_4, entry14())), dot3(columns.e[1], onward.e[3],
-            dot4(cross_2.e[1], minus_5, entry15())), dot3(columns.e[1], onward.e[4],
-            dot4(cross_2.e[1], minus_6, entry16())), dot3(columns.e[1], onward.e[5],
-            dot4(cross_2.e[1], minus_7, entry17()))}}, {{dot3(columns.e[2], onward.e[0],
-            dot4(cross_2.e[2], minus_2, entry18())), dot3(columns.e[2], onward.e[1],
-            dot4(cross_2.e[2], minus_3, entry19())), dot3(columns.e[2], onward.e[2],
-            dot4(cross_2.e[2], minus_4, entry20(weights_2.q))), dot3(columns.e[2], onward.e[3],
-            dot4(cross_2.e[2], minus_5, entry21())), dot3(columns.e[2], onward.e[4],
-            dot4(cross_2.e[2], minus_6, entry22())), dot3(columns.e[2], onward.e[5],
-            dot4(cross_2.e[2], minus_7, entry23()))}}, {{dot3(columns.e[3], onward.e[0],
-            dot4(cross_2.e[3], minus_2, entry24())), dot3(columns.e[3], onward.e[1],
-            dot4(cross_2.e[3], minus_3, entry25())), dot3(columns.e[3], onward.e[2],
-            dot4(cross_2.e[3], minus_4, entry26())), dot3(columns.e[3], onward.e[3],
-            dot4(cross_2.e[3], minus_5, entry27(weights_2.q))), dot3(columns.e[3], onward.e[4],
-            dot4(cross_2.e[3], minus_6, entry28())), dot3(columns.e[3], onward.e[5],
-            dot4(cross_2.e[3], minus_7, entry29()))}}, {{dot3(columns.e[4], onward.e[0],
-            dot4(cross_2.e[4], minus_2, entry30())), dot3(columns.e[4], onward.e[1],
-            dot4(cross_2.e[4], minus_3, entry31())), dot3(columns.e[4], onward.e[2],
-            dot4(cross_2.e[4], minus_4, entry32())), dot3(columns.e[4], onward.e[3],
-            dot4(cross_2.e[4], minus_5, entry33())), dot3(columns.e[4], onward.e[4],
-            dot4(cross_2.e[4], minus_6, entry34(weights_2.q))), dot3(columns.e[4], onward.e[5],
-            dot4(cross_2.e[4], minus_7, entry35()))}}, {{dot3(columns.e[5], onward.e[0],
-            dot4(cross_2.e[5], minus_2, entry36())), dot3(columns.e[5], onward.e[1],
-            dot4(cross_2.e[5], minus_3, entry37())), dot3(columns.e[5], onward.e[2],
-            dot4(cross_2.e[5], minus_4, entry38())), dot3(columns.e[5], onward.e[3],
-            dot4(cross_2.e[5], minus_5, entry39())), dot3(columns.e[5], onward.e[4],
-            dot4(cross_2.e[5], minus_6, entry40())), dot3(columns.e[5], onward.e[5],
-            dot4(cross_2.e[5], minus_7, entry41(weights_2.q)))}}}});
-        curvature_ = symmetric_2.e[0].e[0];
-        curvature1_ = symmetric_2.e[0].e[1];
-        curvature2_ = symmetric_2.e[0].e[2];
-        curvature3_ = symmetric_2.e[0].e[3];
-        curvature4_ = symmetric_2.e[0].e[4];
-        curvature5_ = symmetric_2.e[0].e[5];
-        curvature6_ = symmetric_2.e[1].e[0];
-        curvature7_ = symmetric_2.e[1].e[1];
-        curvature8_ = symmetric_2.e[1].e[2];
-        curvature9_ = symmetric_2.e[1].e[3];
-        curvature10_ = symmetric_2.e[1].e[4];
-        curvature11_ = symmetric_2.e[1].e[5];
-        curvature12_ = symmetric_2.e[2].e[0];
-        curvature13_ = symmetric_2.e[2].e[1];
-        curvature14_ = symmetric_2.e[2].e[2];
-        curvature15_ = symmetric_2.e[2].e[3];
-        curvature16_ = symmetric_2.e[2].e[4];
-        curvature17_ = symmetric_2.e[2].e[5];
-        curvature18_ = symmetric_2.e[3].e[0];
-        curvature19_ = symmetric_2.e[3].e[1];
-        curvature20_ = symmetric_2.e[3].e[2];
-        curvature21_ = symmetric_2.e[3].e[3];
-        curvature22_ = symmetric_2.e[3].e[4];
-        curvature23_ = symmetric_2.e[3].e[5];
-        curvature24_ = symmetric_2.e[4].e[0];
-        curvature25_ = symmetric_2.e[4].e[1];
-        curvature26_ = symmetric_2.e[4].e[2];
-        curvature27_ = symmetric_2.e[4].e[3];
-        curvature28_ = symmetric_2.e[4].e[4];
-        curvature29_ = symmetric_2.e[4].e[5];
-        curvature30_ = symmetric_2.e[5].e[0];
-        curvature31_ = symmetric_2.e[5].e[1];
-        curvature32_ = symmetric_2.e[5].e[2];
-        curvature33_ = symmetric_2.e[5].e[3];
-        curvature34_ = symmetric_2.e[5].e[4];
-        curvature35_ = symmetric_2.e[5].e[5];
-        slope_ = dot3(columns.e[0], (six_t){{slope, slope1, slope2, slope3, slope4, slope5}},
+        const doubles6_t m_5 = {{m_, m1_, m2_, m3_, m4_, m5_}};
+        const held_inverse_result_t held_inverse_result = held_inverse(&bounds, v, pull, m_5, holds);
+        const vector_t g_2 = {g_, g1_, g2_};
+        const vector_t step_2 = minus(held_inverse_result.symmetric, g_2);
+        const vector_t minus_result = minus(held_inverse_result.symmetric, cross_2.e[0]);
+        const vector_t minus_result_2 = minus(held_inverse_result.symmetric, cross_2.e[1]);
+        const vector_t minus_result_3 = minus(held_inverse_result.symmetric, cross_2.e[2]);
+        const vector_t minus_result_4 = minus(held_inverse_result.symmetric, cross_2.e[3]);
+        const vector_t minus_result_5 = minus(held_inverse_result.symmetric, cross_2.e[4]);
+        const vector_t minus_result_6 = minus(held_inverse_result.symmetric, cross_2.e[5]);
+        numbers[STEP_AT - 3 * back + 27] = step_2.x;
+        numbers[STEP_AT - 3 * back + 28] = step_2.y;
+        numbers[STEP_AT - 3 * back + 29] = step_2.z;
+        const vectors6_t gains = {{minus_result, minus_result_2, minus_result_3, minus_result_4,
+            minus_result_5, minus_result_6}};
+        const doubles6s3_t transposed1_result = transposed1(&gains);
+        numbers[FEEDBACK_AT - 18 * back + 162] = transposed1_result.e[0].e[0];
+        numbers[FEEDBACK_AT - 18 * back + 163] = transposed1_result.e[0].e[1];
+        numbers[FEEDBACK_AT - 18 * back + 164] = transposed1_result.e[0].e[2];
+        numbers[FEEDBACK_AT - 18 * back + 165] = transposed1_result.e[0].e[3];
+        numbers[FEEDBACK_AT - 18 * back + 166] = transposed1_result.e[0].e[4];
+        numbers[FEEDBACK_AT - 18 * back + 167] = transposed1_result.e[0].e[5];
+        numbers[FEEDBACK_AT - 18 * back + 168] = transposed1_result.e[1].e[0];
+        numbers[FEEDBACK_AT - 18 * back + 169] = transposed1_result.e[1].e[1];
+        numbers[FEEDBACK_AT - 18 * back + 170] = transposed1_result.e[1].e[2];
+        numbers[FEEDBACK_AT - 18 * back + 171] = transposed1_result.e[1].e[3];
+        numbers[FEEDBACK_AT - 18 * back + 172] = transposed1_result.e[1].e[4];
+        numbers[FEEDBACK_AT - 18 * back + 173] = transposed1_result.e[1].e[5];
+        numbers[FEEDBACK_AT - 18 * back + 174] = transposed1_result.e[2].e[0];
+        numbers[FEEDBACK_AT - 18 * back + 175] = transposed1_result.e[2].e[1];
+        numbers[FEEDBACK_AT - 18 * back + 176] = transposed1_result.e[2].e[2];
+        numbers[FEEDBACK_AT - 18 * back + 177] = transposed1_result.e[2].e[3];
+        numbers[FEEDBACK_AT - 18 * back + 178] = transposed1_result.e[2].e[4];
+        numbers[FEEDBACK_AT - 18 * back + 179] = transposed1_result.e[2].e[5];
+        const doubles6s6_t curvature_2 = {{{{dot3(columns.e[0], onward.e[0],
+            dot4(cross_2.e[0], minus_result, weights_result.q.e[0])), dot3(columns.e[0], onward.e[1],
+            dot4(cross_2.e[0], minus_result_2, 0.0)), dot3(columns.e[0], onward.e[2],
+            dot4(cross_2.e[0], minus_result_3, 0.0)), dot3(columns.e[0], onward.e[3],
+            dot4(cross_2.e[0], minus_result_4, 0.0)), dot3(columns.e[0], onward.e[4],
+            dot4(cross_2.e[0], minus_result_5, 0.0)), dot3(columns.e[0], onward.e[5],
+            dot4(cross_2.e[0], minus_result_6, 0.0))}}, {{dot3(columns.e[1], onward.e[0],
+            dot4(cross_2.e[1], minus_result, 0.0)), dot3(columns.e[1], onward.e[1],
+            dot4(cross_2.e[1], minus_result_2, weights_result.q.e[1])), dot3(columns.e[1], onward.e[2],
+            dot4(cross_2.e[1], minus_result_3, 0.0)), dot3(columns.e[1], onward.e[3],
+            dot4(cross_2.e[1], minus_result_4, 0.0)), dot3(columns.e[1], onward.e[4],
+            dot4(cross_2.e[1], minus_result_5, 0.0)), dot3(columns.e[1], onward.e[5],
+            dot4(cross_2.e[1], minus_result_6, 0.0))}}, {{dot3(columns.e[2], onward.e[0],
+            dot4(cross_2.e[2], minus_result, 0.0)), dot3(columns.e[2], onward.e[1],
+            dot4(cross_2.e[2], minus_result_2, 0.0)), dot3(columns.e[2], onward.e[2],
+            dot4(cross_2.e[2], minus_result_3, weights_result.q.e[2])), dot3(columns.e[2], onward.e[3],
+            dot4(cross_2.e[2], minus_result_4, 0.0)), dot3(columns.e[2], onward.e[4],
+            dot4(cross_2.e[2], minus_result_5, 0.0)), dot3(columns.e[2], onward.e[5],
+            dot4(cross_2.e[2], minus_result_6, 0.0))}}, {{dot3(columns.e[3], onward.e[0],
+            dot4(cross_2.e[3], minus_result, 0.0)), dot3(columns.e[3], onward.e[1],
+            dot4(cross_2.e[3], minus_result_2, 0.0)), dot3(columns.e[3], onward.e[2],
+            dot4(cross_2.e[3], minus_result_3, 0.0)), dot3(columns.e[3], onward.e[3],
+            dot4(cross_2.e[3], minus_result_4, weights_result.q.e[3])), dot3(columns.e[3], onward.e[4],
+            dot4(cross_2.e[3], minus_result_5, 0.0)), dot3(columns.e[3], onward.e[5],
+            dot4(cross_2.e[3], minus_result_6, 0.0))}}, {{dot3(columns.e[4], onward.e[0],
+            dot4(cross_2.e[4], minus_result, 0.0)), dot3(columns.e[4], onward.e[1],
+            dot4(cross_2.e[4], minus_result_2, 0.0)), dot3(columns.e[4], onward.e[2],
+            dot4(cross_2.e[4], minus_result_3, 0.0)), dot3(columns.e[4], onward.e[3],
+            dot4(cross_2.e[4], minus_result_4, 0.0)), dot3(columns.e[4], onward.e[4],
+            dot4(cross_2.e[4], minus_result_5, weights_result.q.e[4])), dot3(columns.e[4], onward.e[5],
+            dot4(cross_2.e[4], minus_result_6, 0.0))}}, {{dot3(columns.e[5], onward.e[0],
+            dot4(cross_2.e[5], minus_result, 0.0)), dot3(columns.e[5], onward.e[1],
+            dot4(cross_2.e[5], minus_result_2, 0.0)), dot3(columns.e[5], onward.e[2],
+            dot4(cross_2.e[5], minus_result_3, 0.0)), dot3(columns.e[5], onward.e[3],
+            dot4(cross_2.e[5], minus_result_4, 0.0)), dot3(columns.e[5], onward.e[4],
+            dot4(cross_2.e[5], minus_result_5, 0.0)), dot3(columns.e[5], onward.e[5],
+            dot4(cross_2.e[5], minus_result_6, weights_result.q.e[5]))}}}};
+        const doubles6s6_t symmetric_result = symmetric(&curvature_2);
+        curvature_ = symmetric_result.e[0].e[0];
+        curvature1_ = symmetric_result.e[0].e[1];
+        curvature2_ = symmetric_result.e[0].e[2];
+        curvature3_ = symmetric_result.e[0].e[3];
+        curvature4_ = symmetric_result.e[0].e[4];
+        curvature5_ = symmetric_result.e[0].e[5];
+        curvature6_ = symmetric_result.e[1].e[0];
+        curvature7_ = symmetric_result.e[1].e[1];
+        curvature8_ = symmetric_result.e[1].e[2];
+        curvature9_ = symmetric_result.e[1].e[3];
+        curvature10_ = symmetric_result.e[1].e[4];
+        curvature11_ = symmetric_result.e[1].e[5];
+        curvature12_ = symmetric_result.e[2].e[0];
+        curvature13_ = symmetric_result.e[2].e[1];
+        curvature14_ = symmetric_result.e[2].e[2];
+        curvature15_ = symmetric_result.e[2].e[3];
+        curvature16_ = symmetric_result.e[2].e[4];
+        curvature17_ = symmetric_result.e[2].e[5];
+        curvature18_ = symmetric_result.e[3].e[0];
+        curvature19_ = symmetric_result.e[3].e[1];
+        curvature20_ = symmetric_result.e[3].e[2];
+        curvature21_ = symmetric_result.e[3].e[3];
+        curvature22_ = symmetric_result.e[3].e[4];
+        curvature23_ = symmetric_result.e[3].e[5];
+        curvature24_ = symmetric_result.e[4].e[0];
+        curvature25_ = symmetric_result.e[4].e[1];
+        curvature26_ = symmetric_result.e[4].e[2];
+        curvature27_ = symmetric_result.e[4].e[3];
+        curvature28_ = symmetric_result.e[4].e[4];
+        curvature29_ = symmetric_result.e[4].e[5];
+        curvature30_ = symmetric_result.e[5].e[0];
+        curvature31_ = symmetric_result.e[5].e[1];
+        curvature32_ = symmetric_result.e[5].e[2];
+        curvature33_ = symmetric_result.e[5].e[3];
+        curvature34_ = symmetric_result.e[5].e[4];
+        curvature35_ = symmetric_result.e[5].e[5];
+        slope_ = dot3(columns.e[0], (doubles6_t){{slope, slope1, slope2, slope3, slope4, slope5}},
             dot(cross_2.e[0], step_2));
-        slope1_ = dot3(columns.e[1], (six_t){{slope, slope1, slope2, slope3, slope4, slope5}},
+        slope1_ = dot3(columns.e[1], (doubles6_t){{slope, slope1, slope2, slope3, slope4, slope5}},
             dot(cross_2.e[1], step_2));
-        slope2_ = dot3(columns.e[2], (six_t){{slope, slope1, slope2, slope3, slope4, slope5}},
+        slope2_ = dot3(columns.e[2], (doubles6_t){{slope, slope1, slope2, slope3, slope4, slope5}},
             dot(cross_2.e[2], step_2));
-        slope3_ = dot3(columns.e[3], (six_t){{slope, slope1, slope2, slope3, slope4, slope5}},
+        slope3_ = dot3(columns.e[3], (doubles6_t){{slope, slope1, slope2, slope3, slope4, slope5}},
             dot(cross_2.e[3], step_2));
-        slope4_ = dot3(columns.e[4], (six_t){{slope, slope1, slope2, slope3, slope4, slope5}},
+        slope4_ = dot3(columns.e[4], (doubles6_t){{slope, slope1, slope2, slope3, slope4, slope5}},
             dot(cross_2.e[4], step_2));
-        slope5_ = dot3(columns.e[5], (six_t){{slope, slope1, slope2, slope3, slope4, slope5}},
+        slope5_ = dot3(columns.e[5], (doubles6_t){{slope, slope1, slope2, slope3, slope4, slope5}},
             dot(cross_2.e[5], step_2));
-        decrement_ = decrement - dot(step_2, (vector_t){g_, g1_, g2_});
+        decrement_ = decrement - dot(step_2, g_2);
         holding_ = holding + held_inverse_result.scalar;
     }
     return (sweep_result_t){.scalar = decrement_, .scalar1 = holding_};
 }
 
 /* Return A x + B v. */
-static six_t transition(six_rows_t a, six_vectors_t b, six_t x, vector_t v)
+static doubles6_t transition(const doubles6s6_t *a, const vectors6_t *b, doubles6_t x, vector_t v)
 {
-    return (six_t){{dot3(a.e[0], x, dot(b.e[0], v)), dot3(a.e[1], x, dot(b.e[1], v)),
-        dot3(a.e[2], x, dot(b.e[2], v)), dot3(a.e[3], x, dot(b.e[3], v)), dot3(a.e[4], x, dot(b.e[4], v)),
-        dot3(a.e[5], x, dot(b.e[5], v))}};
+    return (doubles6_t){{dot3(a->e[0], x, dot(b->e[0], v)), dot3(a->e[1], x, dot(b->e[1], v)),
+        dot3(a->e[2], x, dot(b->e[2], v)), dot3(a->e[3], x, dot(b->e[3], v)),
+        dot3(a->e[4], x, dot(b->e[4], v)), dot3(a->e[5], x, dot(b->e[5], v))}};
 }
 
 /* -------------------------------- laws.predictive.sixes --------------------------------- */
@@ -1713,21 +1671,21 @@ static six_t transition(six_rows_t a, six_vectors_t b, six_t x, vector_t v)
 static double form(vector_t m, vector_t x)
 {
     const double x_2 = m.z * x.z;
-    const double total = 0.0 + m.x * x.x * x.x + m.y * x.y * x.y + x_2 * x.z;
-    return total;
+    const double total = 0.0 + m.x * x.x * x.x + m.y * x.y * x.y;
+    return total + x_2 * x.z;
 }
 
 /* Return x'm x. */
-static double form1(six_t m, six_t x)
+static double form1(doubles6_t m, doubles6_t x)
 {
     const double x_2 = m.e[5] * x.e[5];
     const double t12 = 0.0 + m.e[0] * x.e[0] * x.e[0] + m.e[1] * x.e[1] * x.e[1] + m.e[2] * x.e[2] * x.e[2];
-    const double total = t12 + m.e[3] * x.e[3] * x.e[3] + m.e[4] * x.e[4] * x.e[4] + x_2 * x.e[5];
-    return total;
+    const double total = t12 + m.e[3] * x.e[3] * x.e[3] + m.e[4] * x.e[4] * x.e[4];
+    return total + x_2 * x.e[5];
 }
 
 /* Return x'm x. */
-static double form2(six_rows_t m, six_t x)
+static double form2(const doubles6s6_t *m, doubles6_t x)
 {
     return dot2(apply1(m, x), x);
 }
@@ -1735,12 +1693,12 @@ static double form2(six_rows_t m, six_t x)
 /* ------------------------------- laws.predictive.horizon -------------------------------- */
 
 /* Fly the policy of a sweep through the limits. */
-static trial_t follow(double *numbers, six_t start)
+static trial_t follow(double *numbers, doubles6_t start)
 {
     const motion_result_t motion_result = motion(numbers);
-    const weights_t weights_2 = weights(numbers);
+    const weights_t weights_result = weights(numbers);
     const limits_t bounds = limits(numbers);
-    bool cut_ = false;
+    bool cut_ = 0;
     double slope_ = 0.0;
     double change_ = 0.0;
     double x_ = start.e[0];
@@ -1759,26 +1717,52 @@ static trial_t follow(double *numbers, six_t start)
         const double x3 = x3_;
         const double x4 = x4_;
         const double x5 = x5_;
-        const vector_t v = vector_at(&numbers[PLAN_AT + 3 * k]);
-        const vector_t row = vector_at(&numbers[STEP_AT + 3 * k]);
-        const vector_t start_2 = add(v, row);
-        const six_t row_2 = six_at(&numbers[FEEDBACK_AT + (6 * (3 * k))]);
-        const six_t row_3 = six_at(&numbers[FEEDBACK_AT + (6 * (3 * k + 1))]);
-        const six_t row_4 = six_at(&numbers[FEEDBACK_AT + (6 * (3 * k + 2))]);
+        const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1], numbers[PLAN_AT + 3 * k +
+            2]};
+        const double t11 = numbers[STEP_AT + 3 * k];
+        const double t13 = numbers[STEP_AT + 3 * k + 1];
+        const double t15 = numbers[STEP_AT + 3 * k + 2];
+        const vector_t start_2 = add(v, (vector_t){t11, t13, t15});
+        const double t18 = numbers[FEEDBACK_AT + 18 * k];
+        const double t21 = numbers[FEEDBACK_AT + 18 * k + 1];
+        const double t24 = numbers[FEEDBACK_AT + 18 * k + 2];
+        const double t27 = numbers[FEEDBACK_AT + 18 * k + 3];
+        const double t30 = numbers[FEEDBACK_AT + 18 * k + 4];
+        const double t33 = numbers[FEEDBACK_AT + 18 * k + 5];
+        const doubles6_t x_2 = {{x, x1, x2, x3, x4, x5}};
+        const double t36 = numbers[FEEDBACK_AT + 18 * k + 6];
+        const double t39 = numbers[FEEDBACK_AT + 18 * k + 7];
+        const double t42 = numbers[FEEDBACK_AT + 18 * k + 8];
+        const double t45 = numbers[FEEDBACK_AT + 18 * k + 9];
+        const double t48 = numbers[FEEDBACK_AT + 18 * k + 10];
+        const double t51 = numbers[FEEDBACK_AT + 18 * k + 11];
+        const double t54 = numbers[FEEDBACK_AT + 18 * k + 12];
+        const double t57 = numbers[FEEDBACK_AT + 18 * k + 13];
+        const double t60 = numbers[FEEDBACK_AT + 18 * k + 14];
+        const double t63 = numbers[FEEDBACK_AT + 18 * k + 15];
+        const double t66 = numbers[FEEDBACK_AT + 18 * k + 16];
+        const double t69 = numbers[FEEDBACK_AT + 18 * k + 17];
         const project_result_t project_result = project(&bounds,
-            (vector_t){dot3(row_2, (six_t){{x, x1, x2, x3, x4, x5}}, start_2.x),
-            dot3(row_3, (six_t){{x, x1, x2, x3, x4, x5}}, start_2.y),
-            dot3(row_4, (six_t){{x, x1, x2, x3, x4, x5}}, start_2.z)});
+            (vector_t){dot3((doubles6_t){{t18, t21, t24, t27, t30, t33}}, x_2, start_2.x),
+            dot3((doubles6_t){{t36, t39, t42, t45, t48, t51}}, x_2, start_2.y),
+            dot3((doubles6_t){{t54, t57, t60, t63, t66, t69}}, x_2, start_2.z)});
         const vector_t d = subtract(project_result.w, v);
-        const six_t after = transition(motion_result.rows, motion_result.rows1,
-            (six_t){{x, x1, x2, x3, x4, x5}}, d);
-        put_vector(&numbers[TRIAL_AT + 3 * k], project_result.w);
-        put_six(&numbers[BEND_AT + 6 * k], after);
-        const vector_t row_5 = vector_at(&numbers[GRADIENT_AT + 3 * k]);
-        const double t92 = form(weights_2.r, d) + form1(weights_2.q, (six_t){{x, x1, x2, x3, x4, x5}});
+        const doubles6_t after = transition(&motion_result.rows, &motion_result.rows1, x_2, d);
+        numbers[TRIAL_AT + 3 * k] = project_result.w.x;
+        numbers[TRIAL_AT + 3 * k + 1] = project_result.w.y;
+        numbers[TRIAL_AT + 3 * k + 2] = project_result.w.z;
+        numbers[BEND_AT + 6 * k] = after.e[0];
+        numbers[BEND_AT + 6 * k + 1] = after.e[1];
+        numbers[BEND_AT + 6 * k + 2] = after.e[2];
+        numbers[BEND_AT + 6 * k + 3] = after.e[3];
+        numbers[BEND_AT + 6 * k + 4] = after.e[4];
+        numbers[BEND_AT + 6 * k + 5] = after.e[5];
+        const double t86 = numbers[GRADIENT_AT + 3 * k];
+        const double t88 = numbers[GRADIENT_AT + 3 * k + 1];
+        const double t90 = numbers[GRADIENT_AT + 3 * k + 2];
         cut_ = cut || project_result.truth;
-        slope_ = slope + dot(row_5, d);
-        change_ = change + t92;
+        slope_ = slope + dot((vector_t){t86, t88, t90}, d);
+        change_ = change + (form(weights_result.r, d) + form1(weights_result.q, x_2));
         x_ = after.e[0];
         x1_ = after.e[1];
         x2_ = after.e[2];
@@ -1786,8 +1770,8 @@ static trial_t follow(double *numbers, six_t start)
         x4_ = after.e[4];
         x5_ = after.e[5];
     }
-    const double t96 = 0.5 * (change_ + form2(weights_2.p, (six_t){{x_, x1_, x2_, x3_, x4_, x5_}}));
-    return (trial_t){.cut = cut_, .change = slope_ + t96};
+    const doubles6_t x_3 = {{x_, x1_, x2_, x3_, x4_, x5_}};
+    return (trial_t){.cut = cut_, .change = slope_ + 0.5 * (change_ + form2(&weights_result.p, x_3))};
 }
 
 /* -------------------------------- laws.predictive.solver -------------------------------- */
@@ -1805,13 +1789,22 @@ static bool fly_freely(double *numbers)
         numbers[GRADIENT_AT + 3 * k + 2] = 0.0;
     }
     (void)sweep(numbers, 0.0);
-    const six_t row = six_at(&numbers[STATES_AT]);
-    const trial_t follow_2 = follow(numbers, row);
+    const double t10 = numbers[STATES_AT];
+    const double t11 = numbers[STATES_AT + 1];
+    const double t12 = numbers[STATES_AT + 2];
+    const double t13 = numbers[STATES_AT + 3];
+    const double t14 = numbers[STATES_AT + 4];
+    const double t15 = numbers[STATES_AT + 5];
+    const trial_t follow_result = follow(numbers, (doubles6_t){{t10, t11, t12, t13, t14, t15}});
     for (int32_t k1 = 0; k1 < 10; k1++) {
-        const vector_t row_2 = vector_at(&numbers[TRIAL_AT + 3 * k1]);
-        put_vector(&numbers[PLAN_AT + 3 * k1], row_2);
+        const double t18 = numbers[TRIAL_AT + 3 * k1];
+        const double t21 = numbers[TRIAL_AT + 3 * k1 + 1];
+        const double t24 = numbers[TRIAL_AT + 3 * k1 + 2];
+        numbers[PLAN_AT + 3 * k1] = t18;
+        numbers[PLAN_AT + 3 * k1 + 1] = t21;
+        numbers[PLAN_AT + 3 * k1 + 2] = t24;
     }
-    return follow_2.cut;
+    return follow_result.cut;
 }
 
 /* ------------------------------- laws.predictive.horizon -------------------------------- */
@@ -1820,15 +1813,20 @@ static bool fly_freely(double *numbers)
 static double rollout(double *numbers)
 {
     const motion_result_t motion_result = motion(numbers);
-    const weights_t weights_2 = weights(numbers);
-    const six_t row = six_at(&numbers[STATES_AT]);
+    const weights_t weights_result = weights(numbers);
+    const double t1 = numbers[STATES_AT];
+    const double t2 = numbers[STATES_AT + 1];
+    const double t3 = numbers[STATES_AT + 2];
+    const double t4 = numbers[STATES_AT + 3];
+    const double t5 = numbers[STATES_AT + 4];
+    const double t6 = numbers[STATES_AT + 5];
     double cost_ = 0.0;
-    double x_ = row.e[0];
-    double x1_ = row.e[1];
-    double x2_ = row.e[2];
-    double x3_ = row.e[3];
-    double x4_ = row.e[4];
-    double x5_ = row.e[5];
+    double x_ = t1;
+    double x1_ = t2;
+    double x2_ = t3;
+    double x3_ = t4;
+    double x4_ = t5;
+    double x5_ = t6;
     for (int32_t k = 0; k < 10; k++) {
         const double cost = cost_;
         const double x = x_;
@@ -1837,12 +1835,17 @@ static double rollout(double *numbers)
         const double x3 = x3_;
         const double x4 = x4_;
         const double x5 = x5_;
-        const vector_t v = vector_at(&numbers[PLAN_AT + 3 * k]);
-        const six_t after = transition(motion_result.rows, motion_result.rows1,
-            (six_t){{x, x1, x2, x3, x4, x5}}, v);
-        put_six(&numbers[STATES_AT + 6 * k + 6], after);
-        const double t29 = form1(weights_2.q, (six_t){{x, x1, x2, x3, x4, x5}}) + form(weights_2.r, v);
-        cost_ = cost + t29;
+        const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1], numbers[PLAN_AT + 3 * k +
+            2]};
+        const doubles6_t x_2 = {{x, x1, x2, x3, x4, x5}};
+        const doubles6_t after = transition(&motion_result.rows, &motion_result.rows1, x_2, v);
+        numbers[STATES_AT + 6 * k + 6] = after.e[0];
+        numbers[STATES_AT + 6 * k + 7] = after.e[1];
+        numbers[STATES_AT + 6 * k + 8] = after.e[2];
+        numbers[STATES_AT + 6 * k + 9] = after.e[3];
+        numbers[STATES_AT + 6 * k + 10] = after.e[4];
+        numbers[STATES_AT + 6 * k + 11] = after.e[5];
+        cost_ = cost + (form1(weights_result.q, x_2) + form(weights_result.r, v));
         x_ = after.e[0];
         x1_ = after.e[1];
         x2_ = after.e[2];
@@ -1850,8 +1853,8 @@ static double rollout(double *numbers)
         x4_ = after.e[4];
         x5_ = after.e[5];
     }
-    const double t32 = 0.5 * (cost_ + form2(weights_2.p, (six_t){{x_, x1_, x2_, x3_, x4_, x5_}}));
-    return t32;
+    const doubles6_t x_3 = {{x_, x1_, x2_, x3_, x4_, x5_}};
+    return 0.5 * (cost_ + form2(&weights_result.p, x_3));
 }
 
 /* Return R v. */
@@ -1872,30 +1875,30 @@ static vector_t loose(const limits_t *limits, vector_t v, vector_t g)
 /* ------------------------------- laws.predictive.horizon -------------------------------- */
 
 /* Return Q x + A'y, summed up together. */
-static six_t costate(six_t q, six_rows_t columns, six_t x, six_t y)
+static doubles6_t costate(doubles6_t q, const doubles6s6_t *columns, doubles6_t x, doubles6_t y)
 {
-    const double t6 = 0.0 + (entry6(q) * x.e[0] + columns.e[0].e[0] * y.e[0]) + columns.e[0].e[1] * y.e[1];
-    const double t12 = t6 + columns.e[0].e[2] * y.e[2] + columns.e[0].e[3] * y.e[3] + columns.e[0].e[4] *
+    const double t6 = 0.0 + (q.e[0] * x.e[0] + columns->e[0].e[0] * y.e[0]) + columns->e[0].e[1] * y.e[1];
+    const double t12 = t6 + columns->e[0].e[2] * y.e[2] + columns->e[0].e[3] * y.e[3] + columns->e[0].e[4] *
         y.e[4];
-    const double t20 = 0.0 + columns.e[1].e[0] * y.e[0] + (entry13(q) * x.e[1] + columns.e[1].e[1] * y.e[1]);
-    const double t26 = t20 + columns.e[1].e[2] * y.e[2] + columns.e[1].e[3] * y.e[3] + columns.e[1].e[4] *
+    const double t20 = 0.0 + columns->e[1].e[0] * y.e[0] + (q.e[1] * x.e[1] + columns->e[1].e[1] * y.e[1]);
+    const double t26 = t20 + columns->e[1].e[2] * y.e[2] + columns->e[1].e[3] * y.e[3] + columns->e[1].e[4] *
         y.e[4];
-    const double t36 = 0.0 + columns.e[2].e[0] * y.e[0] + columns.e[2].e[1] * y.e[1] + (entry20(q) * x.e[2] +
-        columns.e[2].e[2] * y.e[2]);
-    const double t42 = t36 + columns.e[2].e[3] * y.e[3] + columns.e[2].e[4] * y.e[4] + columns.e[2].e[5] *
+    const double t36 = 0.0 + columns->e[2].e[0] * y.e[0] + columns->e[2].e[1] * y.e[1] + (q.e[2] * x.e[2] +
+        columns->e[2].e[2] * y.e[2]);
+    const double t42 = t36 + columns->e[2].e[3] * y.e[3] + columns->e[2].e[4] * y.e[4] + columns->e[2].e[5] *
         y.e[5];
-    const double t48 = 0.0 + columns.e[3].e[0] * y.e[0] + columns.e[3].e[1] * y.e[1] + columns.e[3].e[2] *
+    const double t48 = 0.0 + columns->e[3].e[0] * y.e[0] + columns->e[3].e[1] * y.e[1] + columns->e[3].e[2] *
         y.e[2];
-    const double t54 = t48 + (entry27(q) * x.e[3] + columns.e[3].e[3] * y.e[3]) + columns.e[3].e[4] * y.e[4];
-    const double t62 = 0.0 + columns.e[4].e[0] * y.e[0] + columns.e[4].e[1] * y.e[1] + columns.e[4].e[2] *
+    const double t54 = t48 + (q.e[3] * x.e[3] + columns->e[3].e[3] * y.e[3]) + columns->e[3].e[4] * y.e[4];
+    const double t62 = 0.0 + columns->e[4].e[0] * y.e[0] + columns->e[4].e[1] * y.e[1] + columns->e[4].e[2] *
         y.e[2];
-    const double t68 = t62 + columns.e[4].e[3] * y.e[3] + (entry34(q) * x.e[4] + columns.e[4].e[4] * y.e[4]);
-    const double t76 = 0.0 + columns.e[5].e[0] * y.e[0] + columns.e[5].e[1] * y.e[1] + columns.e[5].e[2] *
+    const double t68 = t62 + columns->e[4].e[3] * y.e[3] + (q.e[4] * x.e[4] + columns->e[4].e[4] * y.e[4]);
+    const double t76 = 0.0 + columns->e[5].e[0] * y.e[0] + columns->e[5].e[1] * y.e[1] + columns->e[5].e[2] *
         y.e[2];
-    const double term = entry41(q) * x.e[5] + columns.e[5].e[5] * y.e[5];
-    const double total = t76 + columns.e[5].e[3] * y.e[3] + columns.e[5].e[4] * y.e[4] + term;
-    return (six_t){{t12 + columns.e[0].e[5] * y.e[5], t26 + columns.e[1].e[5] * y.e[5], t42,
-        t54 + columns.e[3].e[5] * y.e[5], t68 + columns.e[4].e[5] * y.e[5], total}};
+    const double total = t76 + columns->e[5].e[3] * y.e[3] + columns->e[5].e[4] * y.e[4];
+    const double term = q.e[5] * x.e[5] + columns->e[5].e[5] * y.e[5];
+    return (doubles6_t){{t12 + columns->e[0].e[5] * y.e[5], t26 + columns->e[1].e[5] * y.e[5], t42,
+        t54 + columns->e[3].e[5] * y.e[5], t68 + columns->e[4].e[5] * y.e[5], total + term}};
 }
 
 /* Find the gradient of half the cost, and a bound on its gap to the optimum if all that is held has to be. */
@@ -1904,17 +1907,22 @@ static double adjoint(double *numbers)
     const motion_result_t motion_result = motion(numbers);
     const weights_t weight = weights(numbers);
     const limits_t bounds = limits(numbers);
-    const six_rows_t columns = transposed(motion_result.rows);
-    const sixs3_t pushes = transposed1(motion_result.rows1);
-    const six_t row = six_at(&numbers[STATES_AT + 60]);
-    const six_t apply1_2 = apply1(weight.p, row);
+    const doubles6s6_t columns = transposed(&motion_result.rows);
+    const doubles6s3_t pushes = transposed1(&motion_result.rows1);
+    const double t1 = numbers[STATES_AT + 60];
+    const double t2 = numbers[STATES_AT + 61];
+    const double t3 = numbers[STATES_AT + 62];
+    const double t4 = numbers[STATES_AT + 63];
+    const double t5 = numbers[STATES_AT + 64];
+    const double t6 = numbers[STATES_AT + 65];
+    const doubles6_t apply1_result = apply1(&weight.p, (doubles6_t){{t1, t2, t3, t4, t5, t6}});
     double gap_ = 0.0;
-    double y_ = apply1_2.e[0];
-    double y1_ = apply1_2.e[1];
-    double y2_ = apply1_2.e[2];
-    double y3_ = apply1_2.e[3];
-    double y4_ = apply1_2.e[4];
-    double y5_ = apply1_2.e[5];
+    double y_ = apply1_result.e[0];
+    double y1_ = apply1_result.e[1];
+    double y2_ = apply1_result.e[2];
+    double y3_ = apply1_result.e[3];
+    double y4_ = apply1_result.e[4];
+    double y5_ = apply1_result.e[5];
     for (int32_t back = 0; back < 10; back++) {
         const double gap = gap_;
         const double y = y_;
@@ -1923,22 +1931,28 @@ static double adjoint(double *numbers)
         const double y3 = y3_;
         const double y4 = y4_;
         const double y5 = y5_;
-        const vector_t v = vector_at(&numbers[PLAN_AT + 3 * (9 - back)]);
-        const six_t x = six_at(&numbers[STATES_AT + 6 * (9 - back)]);
-        const vector_t weighed_2 = weighed(weight.r, v);
-        const double dot3_2 = dot3(pushes.e[0], (six_t){{y, y1, y2, y3, y4, y5}}, weighed_2.x);
-        const double dot3_3 = dot3(pushes.e[1], (six_t){{y, y1, y2, y3, y4, y5}}, weighed_2.y);
-        const double dot3_4 = dot3(pushes.e[2], (six_t){{y, y1, y2, y3, y4, y5}}, weighed_2.z);
-        const vector_t g = {dot3_2, dot3_3, dot3_4};
-        put_vector(&numbers[GRADIENT_AT + 3 * (9 - back)], g);
-        const six_t costate_2 = costate(weight.q, columns, x, (six_t){{y, y1, y2, y3, y4, y5}});
+        const vector_t v = {numbers[PLAN_AT - 3 * back + 27], numbers[PLAN_AT - 3 * back + 28],
+            numbers[PLAN_AT - 3 * back + 29]};
+        const doubles6_t x = {{numbers[STATES_AT - 6 * back + 54], numbers[STATES_AT - 6 * back + 55],
+            numbers[STATES_AT - 6 * back + 56], numbers[STATES_AT - 6 * back + 57], numbers[STATES_AT - 6 *
+            back + 58], numbers[STATES_AT - 6 * back + 59]}};
+        const vector_t weighed_result = weighed(weight.r, v);
+        const doubles6_t y_2 = {{y, y1, y2, y3, y4, y5}};
+        const double dot3_result = dot3(pushes.e[0], y_2, weighed_result.x);
+        const double dot3_result_2 = dot3(pushes.e[1], y_2, weighed_result.y);
+        const double dot3_result_3 = dot3(pushes.e[2], y_2, weighed_result.z);
+        numbers[GRADIENT_AT - 3 * back + 27] = dot3_result;
+        numbers[GRADIENT_AT - 3 * back + 28] = dot3_result_2;
+        numbers[GRADIENT_AT - 3 * back + 29] = dot3_result_3;
+        const vector_t g = {dot3_result, dot3_result_2, dot3_result_3};
+        const doubles6_t costate_result = costate(weight.q, &columns, x, y_2);
         gap_ = gap + form(weight.r_inverse, loose(&bounds, v, g));
-        y_ = costate_2.e[0];
-        y1_ = costate_2.e[1];
-        y2_ = costate_2.e[2];
-        y3_ = costate_2.e[3];
-        y4_ = costate_2.e[4];
-        y5_ = costate_2.e[5];
+        y_ = costate_result.e[0];
+        y1_ = costate_result.e[1];
+        y2_ = costate_result.e[2];
+        y3_ = costate_result.e[3];
+        y4_ = costate_result.e[4];
+        y5_ = costate_result.e[5];
     }
     return 0.5 * gap_;
 }
@@ -1960,23 +1974,41 @@ static void unroll(double *numbers)
         const double x3 = x3_;
         const double x4 = x4_;
         const double x5 = x5_;
-        const vector_t start = vector_at(&numbers[STEP_AT + 3 * k]);
-        const six_t row = six_at(&numbers[FEEDBACK_AT + (6 * (3 * k))]);
-        const double dot3_2 = dot3(row, (six_t){{x, x1, x2, x3, x4, x5}}, start.x);
-        const six_t row_2 = six_at(&numbers[FEEDBACK_AT + (6 * (3 * k + 1))]);
-        const double dot3_3 = dot3(row_2, (six_t){{x, x1, x2, x3, x4, x5}}, start.y);
-        const six_t row_3 = six_at(&numbers[FEEDBACK_AT + (6 * (3 * k + 2))]);
-        const double dot3_4 = dot3(row_3, (six_t){{x, x1, x2, x3, x4, x5}}, start.z);
-        const vector_t d = {dot3_2, dot3_3, dot3_4};
-        put_vector(&numbers[STEP_AT + 3 * k], d);
-        const six_t transition_2 = transition(motion_result.rows, motion_result.rows1,
-            (six_t){{x, x1, x2, x3, x4, x5}}, d);
-        x_ = transition_2.e[0];
-        x1_ = transition_2.e[1];
-        x2_ = transition_2.e[2];
-        x3_ = transition_2.e[3];
-        x4_ = transition_2.e[4];
-        x5_ = transition_2.e[5];
+        const vector_t start = {numbers[STEP_AT + 3 * k], numbers[STEP_AT + 3 * k + 1], numbers[STEP_AT + 3 *
+            k + 2]};
+        const double t12 = numbers[FEEDBACK_AT + 18 * k];
+        const double t15 = numbers[FEEDBACK_AT + 18 * k + 1];
+        const double t18 = numbers[FEEDBACK_AT + 18 * k + 2];
+        const double t21 = numbers[FEEDBACK_AT + 18 * k + 3];
+        const double t24 = numbers[FEEDBACK_AT + 18 * k + 4];
+        const double t27 = numbers[FEEDBACK_AT + 18 * k + 5];
+        const doubles6_t x_2 = {{x, x1, x2, x3, x4, x5}};
+        const double dot3_result = dot3((doubles6_t){{t12, t15, t18, t21, t24, t27}}, x_2, start.x);
+        const double t30 = numbers[FEEDBACK_AT + 18 * k + 6];
+        const double t33 = numbers[FEEDBACK_AT + 18 * k + 7];
+        const double t36 = numbers[FEEDBACK_AT + 18 * k + 8];
+        const double t39 = numbers[FEEDBACK_AT + 18 * k + 9];
+        const double t42 = numbers[FEEDBACK_AT + 18 * k + 10];
+        const double t45 = numbers[FEEDBACK_AT + 18 * k + 11];
+        const double dot3_result_2 = dot3((doubles6_t){{t30, t33, t36, t39, t42, t45}}, x_2, start.y);
+        const double t48 = numbers[FEEDBACK_AT + 18 * k + 12];
+        const double t51 = numbers[FEEDBACK_AT + 18 * k + 13];
+        const double t54 = numbers[FEEDBACK_AT + 18 * k + 14];
+        const double t57 = numbers[FEEDBACK_AT + 18 * k + 15];
+        const double t60 = numbers[FEEDBACK_AT + 18 * k + 16];
+        const double t63 = numbers[FEEDBACK_AT + 18 * k + 17];
+        const double dot3_result_3 = dot3((doubles6_t){{t48, t51, t54, t57, t60, t63}}, x_2, start.z);
+        numbers[STEP_AT + 3 * k] = dot3_result;
+        numbers[STEP_AT + 3 * k + 1] = dot3_result_2;
+        numbers[STEP_AT + 3 * k + 2] = dot3_result_3;
+        const vector_t d = {dot3_result, dot3_result_2, dot3_result_3};
+        const doubles6_t transition_result = transition(&motion_result.rows, &motion_result.rows1, x_2, d);
+        x_ = transition_result.e[0];
+        x1_ = transition_result.e[1];
+        x2_ = transition_result.e[2];
+        x3_ = transition_result.e[3];
+        x4_ = transition_result.e[4];
+        x5_ = transition_result.e[5];
     }
 }
 
@@ -1995,7 +2027,7 @@ static double shorten(double *numbers, double halvings)
         const double left = left_;
         if (change < 0.0 || left <= 0.0) break;
         const motion_result_t motion_result = motion(numbers);
-        const weights_t weights_2 = weights(numbers);
+        const weights_t weights_result = weights(numbers);
         const limits_t bounds = limits(numbers);
         double slope_ = 0.0;
         double change1_ = 0.0;
@@ -2014,18 +2046,30 @@ static double shorten(double *numbers, double halvings)
             const double x3 = x3_;
             const double x4 = x4_;
             const double x5 = x5_;
-            const vector_t v = vector_at(&numbers[PLAN_AT + 3 * k]);
-            const vector_t row = vector_at(&numbers[STEP_AT + 3 * k]);
-            const project_result_t project_result = project(&bounds, add(v, scale(length, row)));
+            const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1], numbers[PLAN_AT + 3 *
+                k + 2]};
+            const double t14 = numbers[STEP_AT + 3 * k];
+            const double t16 = numbers[STEP_AT + 3 * k + 1];
+            const double t18 = numbers[STEP_AT + 3 * k + 2];
+            const project_result_t project_result = project(&bounds,
+                add(v, scale(length, (vector_t){t14, t16, t18})));
             const vector_t d = subtract(project_result.w, v);
-            const six_t after = transition(motion_result.rows, motion_result.rows1,
-                (six_t){{x, x1, x2, x3, x4, x5}}, d);
-            put_vector(&numbers[TRIAL_AT + 3 * k], project_result.w);
-            put_six(&numbers[BEND_AT + 6 * k], after);
-            const vector_t row_2 = vector_at(&numbers[GRADIENT_AT + 3 * k]);
-            const double t41 = form(weights_2.r, d) + form1(weights_2.q, (six_t){{x, x1, x2, x3, x4, x5}});
-            slope_ = slope + dot(row_2, d);
-            change1_ = change1 + t41;
+            const doubles6_t x_2 = {{x, x1, x2, x3, x4, x5}};
+            const doubles6_t after = transition(&motion_result.rows, &motion_result.rows1, x_2, d);
+            numbers[TRIAL_AT + 3 * k] = project_result.w.x;
+            numbers[TRIAL_AT + 3 * k + 1] = project_result.w.y;
+            numbers[TRIAL_AT + 3 * k + 2] = project_result.w.z;
+            numbers[BEND_AT + 6 * k] = after.e[0];
+            numbers[BEND_AT + 6 * k + 1] = after.e[1];
+            numbers[BEND_AT + 6 * k + 2] = after.e[2];
+            numbers[BEND_AT + 6 * k + 3] = after.e[3];
+            numbers[BEND_AT + 6 * k + 4] = after.e[4];
+            numbers[BEND_AT + 6 * k + 5] = after.e[5];
+            const double t35 = numbers[GRADIENT_AT + 3 * k];
+            const double t37 = numbers[GRADIENT_AT + 3 * k + 1];
+            const double t39 = numbers[GRADIENT_AT + 3 * k + 2];
+            slope_ = slope + dot((vector_t){t35, t37, t39}, d);
+            change1_ = change1 + (form(weights_result.r, d) + form1(weights_result.q, x_2));
             x_ = after.e[0];
             x1_ = after.e[1];
             x2_ = after.e[2];
@@ -2033,8 +2077,8 @@ static double shorten(double *numbers, double halvings)
             x4_ = after.e[4];
             x5_ = after.e[5];
         }
-        const double t45 = 0.5 * (change1_ + form2(weights_2.p, (six_t){{x_, x1_, x2_, x3_, x4_, x5_}}));
-        const double t46 = slope_ + t45;
+        const doubles6_t x_3 = {{x_, x1_, x2_, x3_, x4_, x5_}};
+        const double t46 = slope_ + 0.5 * (change1_ + form2(&weights_result.p, x_3));
         const bool falls = slope_ < 0.0 && t46 <= 0.0001 * slope_;
         length_ = 0.5 * length;
         change_ = falls ? t46 : 0.0;
@@ -2048,8 +2092,8 @@ static double shorten(double *numbers, double halvings)
 static double search(double *numbers)
 {
     unroll(numbers);
-    const double shorten_2 = shorten(numbers, 8.0);
-    return shorten_2;
+    const double shorten_result = shorten(numbers, 8.0);
+    return shorten_result;
 }
 
 static bool is_zero(double x)
@@ -2063,12 +2107,16 @@ static double gradient_step(double *numbers)
 {
     for (int32_t k = 0; k < 10; k++) {
         const double t2 = numbers[STIFFNESS_AT + k];
-        const vector_t row = vector_at(&numbers[GRADIENT_AT + 3 * k]);
-        const vector_t scale_2 = scale(-1.0 / t2, row);
-        put_vector(&numbers[STEP_AT + 3 * k], scale_2);
+        const double t6 = numbers[GRADIENT_AT + 3 * k];
+        const double t9 = numbers[GRADIENT_AT + 3 * k + 1];
+        const double t12 = numbers[GRADIENT_AT + 3 * k + 2];
+        const vector_t scale_result = scale(-1.0 / t2, (vector_t){t6, t9, t12});
+        numbers[STEP_AT + 3 * k] = scale_result.x;
+        numbers[STEP_AT + 3 * k + 1] = scale_result.y;
+        numbers[STEP_AT + 3 * k + 2] = scale_result.z;
     }
-    const double shorten_2 = shorten(numbers, 60.0);
-    return shorten_2;
+    const double shorten_result = shorten(numbers, 60.0);
+    return shorten_result;
 }
 
 /* ------------------------------- laws.predictive.horizon -------------------------------- */
@@ -2077,12 +2125,32 @@ static double gradient_step(double *numbers)
 static void take_over(double *numbers)
 {
     for (int32_t k = 0; k < 10; k++) {
-        const vector_t row = vector_at(&numbers[TRIAL_AT + 3 * k]);
-        put_vector(&numbers[PLAN_AT + 3 * k], row);
-        const six_t row_2 = six_at(&numbers[STATES_AT + 6 * k + 6]);
-        const six_t row_3 = six_at(&numbers[BEND_AT + 6 * k]);
-        const six_t plus_2 = plus(row_2, row_3);
-        put_six(&numbers[STATES_AT + 6 * k + 6], plus_2);
+        const double t3 = numbers[TRIAL_AT + 3 * k];
+        const double t6 = numbers[TRIAL_AT + 3 * k + 1];
+        const double t9 = numbers[TRIAL_AT + 3 * k + 2];
+        numbers[PLAN_AT + 3 * k] = t3;
+        numbers[PLAN_AT + 3 * k + 1] = t6;
+        numbers[PLAN_AT + 3 * k + 2] = t9;
+        const double t16 = numbers[STATES_AT + 6 * k + 6];
+        const double t19 = numbers[STATES_AT + 6 * k + 7];
+        const double t22 = numbers[STATES_AT + 6 * k + 8];
+        const double t25 = numbers[STATES_AT + 6 * k + 9];
+        const double t28 = numbers[STATES_AT + 6 * k + 10];
+        const double t31 = numbers[STATES_AT + 6 * k + 11];
+        const double t34 = numbers[BEND_AT + 6 * k];
+        const double t37 = numbers[BEND_AT + 6 * k + 1];
+        const double t40 = numbers[BEND_AT + 6 * k + 2];
+        const double t43 = numbers[BEND_AT + 6 * k + 3];
+        const double t46 = numbers[BEND_AT + 6 * k + 4];
+        const double t49 = numbers[BEND_AT + 6 * k + 5];
+        const doubles6_t plus_result = plus((doubles6_t){{t16, t19, t22, t25, t28, t31}},
+            (doubles6_t){{t34, t37, t40, t43, t46, t49}});
+        numbers[STATES_AT + 6 * k + 6] = plus_result.e[0];
+        numbers[STATES_AT + 6 * k + 7] = plus_result.e[1];
+        numbers[STATES_AT + 6 * k + 8] = plus_result.e[2];
+        numbers[STATES_AT + 6 * k + 9] = plus_result.e[3];
+        numbers[STATES_AT + 6 * k + 10] = plus_result.e[4];
+        numbers[STATES_AT + 6 * k + 11] = plus_result.e[5];
     }
 }
 
@@ -2094,15 +2162,15 @@ static attempt_t newton(double *numbers, const progress_t *now)
 {
     const sweep_result_t sweep_result = sweep(numbers, 0.0);
     const double sweeps = now->sweeps + 1.0;
-    const trial_t trial = follow(numbers, (six_t){{0.0, 0.0, 0.0, 0.0, 0.0, 0.0}});
+    const trial_t trial = follow(numbers, (doubles6_t){{0.0, 0.0, 0.0, 0.0, 0.0, 0.0}});
     const bool none_held = sweep_result.scalar1 <= 0.0;
     const bool free = !trial.cut;
     const double change_2 = free ? -(0.5 * sweep_result.scalar) : trial.change;
     const bool enough = free || change_2 <= -0.25 * sweep_result.scalar;
     double change_ = change_2;
     if (!enough) {
-        const double search_2 = search(numbers);
-        change_ = search_2;
+        const double search_result = search(numbers);
+        change_ = search_result;
     }
     const bool failed = !free && is_zero(change_);
     const bool hopeful = 1e-12 * now->half < sweep_result.scalar && sweeps < 50.0;
@@ -2110,8 +2178,8 @@ static attempt_t newton(double *numbers, const progress_t *now)
     const bool t19 = !rescue;
     double change1_ = change_;
     if (failed && t19) {
-        const double gradient_step_2 = gradient_step(numbers);
-        change1_ = gradient_step_2;
+        const double gradient_step_result = gradient_step(numbers);
+        change1_ = gradient_step_result;
     }
     const bool moves = free || !is_zero(change1_);
     const bool t24 = !moves;
@@ -2134,21 +2202,20 @@ static void begin(double *numbers, double barrier)
 {
     const limits_t bounds = limits(numbers);
     for (int32_t k = 0; k < 10; k++) {
-        const vector_t v = vector_at(&numbers[PLAN_AT + 3 * k]);
-        put_vector(&numbers[SPARE_AT + 3 * k], v);
+        const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1], numbers[PLAN_AT + 3 * k +
+            2]};
+        numbers[SPARE_AT + 3 * k] = v.x;
+        numbers[SPARE_AT + 3 * k + 1] = v.y;
+        numbers[SPARE_AT + 3 * k + 2] = v.z;
         const vector_t w = add(bounds.centre, scale(0.9, subtract(v, bounds.centre)));
-        put_vector(&numbers[PLAN_AT + 3 * k], w);
-        const vector_t slack_2 = slack(&bounds, w);
-        numbers[MULTIPLIERS_AT + 3 * k] = barrier / slack_2.x;
-        numbers[MULTIPLIERS_AT + 3 * k + 1] = barrier / slack_2.y;
-        numbers[MULTIPLIERS_AT + 3 * k + 2] = barrier / slack_2.z;
+        numbers[PLAN_AT + 3 * k] = w.x;
+        numbers[PLAN_AT + 3 * k + 1] = w.y;
+        numbers[PLAN_AT + 3 * k + 2] = w.z;
+        const vector_t slack_result = slack(&bounds, w);
+        numbers[MULTIPLIERS_AT + 3 * k] = barrier / slack_result.x;
+        numbers[MULTIPLIERS_AT + 3 * k + 1] = barrier / slack_result.y;
+        numbers[MULTIPLIERS_AT + 3 * k + 2] = barrier / slack_result.z;
     }
-}
-
-/* Return for a ball the sum, thrice. */
-static vector_t joined(vector_t x)
-{
-    return x;
 }
 
 /* Return the share of the step that keeps slacks and multipliers positive; steps of the multipliers go to
@@ -2159,12 +2226,14 @@ static double length_1(double *numbers, double barrier)
     double length_ = 1.0;
     for (int32_t k = 0; k < 10; k++) {
         const double length = length_;
-        const vector_t v = vector_at(&numbers[PLAN_AT + 3 * k]);
-        const vector_t d = vector_at(&numbers[STEP_AT + 3 * k]);
+        const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1], numbers[PLAN_AT + 3 * k +
+            2]};
+        const vector_t d = {numbers[STEP_AT + 3 * k], numbers[STEP_AT + 3 * k + 1], numbers[STEP_AT + 3 * k +
+            2]};
         const vector_t room = slack(&bounds, v);
         const vector_t away = subtract(v, bounds.centre);
-        const vector_t inner = joined(times(away, d));
-        const vector_t square = joined(times(d, d));
+        const vector_t inner = times(away, d);
+        const vector_t square = times(d, d);
         const double old = numbers[MULTIPLIERS_AT + 3 * k];
         const double step_2 = barrier / room.x - old + old / room.x * inner.x;
         numbers[TRIAL_AT + 3 * k] = step_2;
@@ -2195,10 +2264,16 @@ static double go(double *numbers, double length)
     double gap_ = 0.0;
     for (int32_t k = 0; k < 10; k++) {
         const double gap = gap_;
-        const vector_t row = vector_at(&numbers[PLAN_AT + 3 * k]);
-        const vector_t row_2 = vector_at(&numbers[STEP_AT + 3 * k]);
-        const vector_t w = add(row, scale(length, row_2));
-        put_vector(&numbers[PLAN_AT + 3 * k], w);
+        const double t3 = numbers[PLAN_AT + 3 * k];
+        const double t6 = numbers[PLAN_AT + 3 * k + 1];
+        const double t9 = numbers[PLAN_AT + 3 * k + 2];
+        const double t11 = numbers[STEP_AT + 3 * k];
+        const double t13 = numbers[STEP_AT + 3 * k + 1];
+        const double t15 = numbers[STEP_AT + 3 * k + 2];
+        const vector_t w = add((vector_t){t3, t6, t9}, scale(length, (vector_t){t11, t13, t15}));
+        numbers[PLAN_AT + 3 * k] = w.x;
+        numbers[PLAN_AT + 3 * k + 1] = w.y;
+        numbers[PLAN_AT + 3 * k + 2] = w.z;
         const vector_t room = slack(&bounds, w);
         const double t17 = numbers[MULTIPLIERS_AT + 3 * k];
         const double t19 = numbers[TRIAL_AT + 3 * k];
@@ -2208,12 +2283,12 @@ static double go(double *numbers, double length)
         const double t27 = numbers[TRIAL_AT + 3 * k + 1];
         const double multiplier_2 = t25 + length * t27;
         numbers[MULTIPLIERS_AT + 3 * k + 1] = multiplier_2;
+        const double gap_2 = gap + multiplier * room.x + multiplier_2 * room.y;
         const double t33 = numbers[MULTIPLIERS_AT + 3 * k + 2];
         const double t35 = numbers[TRIAL_AT + 3 * k + 2];
         const double multiplier_3 = t33 + length * t35;
         numbers[MULTIPLIERS_AT + 3 * k + 2] = multiplier_3;
-        const double t39 = gap + multiplier * room.x + multiplier_2 * room.y + multiplier_3 * room.z;
-        gap_ = t39;
+        gap_ = gap_2 + multiplier_3 * room.z;
     }
     return gap_;
 }
@@ -2240,13 +2315,16 @@ static void settle(double *numbers)
     const limits_t bounds = limits(numbers);
     const double near = 1e-05 * bounds.bound * bounds.bound;
     for (int32_t k = 0; k < 10; k++) {
-        const vector_t v = vector_at(&numbers[PLAN_AT + 3 * k]);
+        const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1], numbers[PLAN_AT + 3 * k +
+            2]};
         const vector_t room = slack(&bounds, v);
         const vector_t b = subtract(v, bounds.centre);
-        const vector_t add_2 = add(bounds.centre, (vector_t){(room.x < near ? 2.0 : 1.0) * b.x,
+        const vector_t add_result = add(bounds.centre, (vector_t){(room.x < near ? 2.0 : 1.0) * b.x,
             (room.y < near ? 2.0 : 1.0) * b.y, (room.z < near ? 2.0 : 1.0) * b.z});
-        const project_result_t project_result = project(&bounds, add_2);
-        put_vector(&numbers[PLAN_AT + 3 * k], project_result.w);
+        const project_result_t project_result = project(&bounds, add_result);
+        numbers[PLAN_AT + 3 * k] = project_result.w.x;
+        numbers[PLAN_AT + 3 * k + 1] = project_result.w.y;
+        numbers[PLAN_AT + 3 * k + 2] = project_result.w.z;
     }
 }
 
@@ -2254,11 +2332,15 @@ static void settle(double *numbers)
 static double restore(double *numbers)
 {
     for (int32_t k = 0; k < 10; k++) {
-        const vector_t row = vector_at(&numbers[SPARE_AT + 3 * k]);
-        put_vector(&numbers[PLAN_AT + 3 * k], row);
+        const double t3 = numbers[SPARE_AT + 3 * k];
+        const double t6 = numbers[SPARE_AT + 3 * k + 1];
+        const double t9 = numbers[SPARE_AT + 3 * k + 2];
+        numbers[PLAN_AT + 3 * k] = t3;
+        numbers[PLAN_AT + 3 * k + 1] = t6;
+        numbers[PLAN_AT + 3 * k + 2] = t9;
     }
-    const double rollout_2 = rollout(numbers);
-    return rollout_2;
+    const double rollout_result = rollout(numbers);
+    return rollout_result;
 }
 
 /* Solve by the primal-dual interior-point method (Boyd and Vandenberghe 2004, section 11.7): it comes near
@@ -2278,19 +2360,19 @@ static interior_result_t interior(double *numbers, double half, double most)
         const bool done = done_;
         if (done) break;
         const turn_t now = {.barrier = barrier, .sweeps = sweeps, .done = done};
-        const turn_t turn_1_2 = turn_1(numbers, &now, 30.0, most);
-        barrier_ = turn_1_2.barrier;
-        sweeps_ = turn_1_2.sweeps;
-        done_ = turn_1_2.done;
+        const turn_t turn_1_result = turn_1(numbers, &now, 30.0, most);
+        barrier_ = turn_1_result.barrier;
+        sweeps_ = turn_1_result.sweeps;
+        done_ = turn_1_result.done;
     }
     settle(numbers);
     const double reached = rollout(numbers);
     double half1_ = reached;
     if (!(reached <= half)) {
-        const double restore_2 = restore(numbers);
-        half1_ = restore_2;
+        const double restore_result = restore(numbers);
+        half1_ = restore_result;
     }
-    return (interior_result_t){.scalar = sweeps_, .kept = half1_};
+    return (interior_result_t){.scalar = sweeps_, .scalar1 = half1_};
 }
 
 /* -------------------------------- laws.predictive.solver -------------------------------- */
@@ -2307,23 +2389,23 @@ static progress_t better(double *numbers, const progress_t *now)
     bool shaped_ = now->shaped;
     bool rescue_ = slow;
     if (!slow) {
-        const attempt_t newton_2 = newton(numbers, now);
-        half_ = newton_2.progress.half;
-        sweeps_ = newton_2.progress.sweeps;
-        rescued_ = newton_2.progress.rescued;
-        over_ = newton_2.progress.over;
-        solved_ = newton_2.progress.solved;
-        shaped_ = newton_2.progress.shaped;
-        rescue_ = newton_2.rescue;
+        const attempt_t newton_result = newton(numbers, now);
+        half_ = newton_result.progress.half;
+        sweeps_ = newton_result.progress.sweeps;
+        rescued_ = newton_result.progress.rescued;
+        over_ = newton_result.progress.over;
+        solved_ = newton_result.progress.solved;
+        shaped_ = newton_result.progress.shaped;
+        rescue_ = newton_result.rescue;
     }
     double half1_ = half_;
     double sweeps1_ = sweeps_;
     bool rescued1_ = rescued_;
     if (rescue_) {
         const interior_result_t interior_result = interior(numbers, half_, 50.0 - sweeps_);
-        half1_ = interior_result.kept;
+        half1_ = interior_result.scalar1;
         sweeps1_ = sweeps_ + interior_result.scalar;
-        rescued1_ = true;
+        rescued1_ = 1;
     }
     return (progress_t){.half = half1_, .sweeps = sweeps1_, .rescued = rescued1_, .over = over_,
         .solved = solved_, .shaped = shaped_};
@@ -2332,23 +2414,23 @@ static progress_t better(double *numbers, const progress_t *now)
 /* End the run or improve the plan in one turn. */
 static progress_t turn1_1(double *numbers, const progress_t *now)
 {
-    const double adjoint_2 = adjoint(numbers);
-    const bool optimal = adjoint_2 <= 1e-16 * now->half;
+    const double adjoint_result = adjoint(numbers);
+    const bool optimal = adjoint_result <= 1e-16 * now->half;
     const bool used_up = 50.0 <= now->sweeps;
     double half_ = now->half;
     double sweeps_ = now->sweeps;
     bool rescued_ = now->rescued;
-    bool over_ = true;
+    bool over_ = 1;
     bool solved_ = optimal;
     bool shaped_ = now->shaped;
     if (!(optimal || used_up)) {
-        const progress_t better_2 = better(numbers, now);
-        half_ = better_2.half;
-        sweeps_ = better_2.sweeps;
-        rescued_ = better_2.rescued;
-        over_ = better_2.over;
-        solved_ = better_2.solved;
-        shaped_ = better_2.shaped;
+        const progress_t better_result = better(numbers, now);
+        half_ = better_result.half;
+        sweeps_ = better_result.sweeps;
+        rescued_ = better_result.rescued;
+        over_ = better_result.over;
+        solved_ = better_result.solved;
+        shaped_ = better_result.shaped;
     }
     return (progress_t){.half = half_, .sweeps = sweeps_, .rescued = rescued_, .over = over_,
         .solved = solved_, .shaped = shaped_};
@@ -2367,13 +2449,13 @@ static bool is_finite(double x)
 /* Improve the plan until it is the optimum or the sweeps are used up. */
 static solved_t descend(double *numbers, double sweeps)
 {
-    const double rollout_2 = rollout(numbers);
-    double half_ = rollout_2;
+    const double rollout_result = rollout(numbers);
+    double half_ = rollout_result;
     double sweeps1_ = sweeps;
-    bool rescued_ = false;
-    bool over_ = false;
-    bool solved_ = false;
-    bool shaped_ = true;
+    bool rescued_ = 0;
+    bool over_ = 0;
+    bool solved_ = 0;
+    bool shaped_ = 1;
     for (int32_t turn = 0; turn < 51; turn++) {
         const double half = half_;
         const double sweeps1 = sweeps1_;
@@ -2384,13 +2466,13 @@ static solved_t descend(double *numbers, double sweeps)
         if (over) break;
         const progress_t now = {.half = half, .sweeps = sweeps1, .rescued = rescued, .over = over,
             .solved = solved, .shaped = shaped};
-        const progress_t turn1_1_2 = turn1_1(numbers, &now);
-        half_ = turn1_1_2.half;
-        sweeps1_ = turn1_1_2.sweeps;
-        rescued_ = turn1_1_2.rescued;
-        over_ = turn1_1_2.over;
-        solved_ = turn1_1_2.solved;
-        shaped_ = turn1_1_2.shaped;
+        const progress_t turn1_1_result = turn1_1(numbers, &now);
+        half_ = turn1_1_result.half;
+        sweeps1_ = turn1_1_result.sweeps;
+        rescued_ = turn1_1_result.rescued;
+        over_ = turn1_1_result.over;
+        solved_ = turn1_1_result.solved;
+        shaped_ = turn1_1_result.shaped;
     }
     return (solved_t){.sweeps = sweeps1_, .solved = solved_, .shaped = shaped_ && is_finite(half_)};
 }
@@ -2399,20 +2481,20 @@ static solved_t descend(double *numbers, double sweeps)
 static solved_t improve(double *numbers, bool warm)
 {
     double sweeps_ = 0.0;
-    bool cut_ = true;
+    bool cut_ = 1;
     if (!warm) {
-        const bool fly_freely_2 = fly_freely(numbers);
+        const bool fly_freely_result = fly_freely(numbers);
         sweeps_ = 1.0;
-        cut_ = fly_freely_2;
+        cut_ = fly_freely_result;
     }
     double sweeps1_ = sweeps_;
-    bool solved_ = true;
-    bool shaped_ = false;
+    bool solved_ = 1;
+    bool shaped_ = 0;
     if (cut_) {
-        const solved_t descend_2 = descend(numbers, sweeps_);
-        sweeps1_ = descend_2.sweeps;
-        solved_ = descend_2.solved;
-        shaped_ = descend_2.shaped;
+        const solved_t descend_result = descend(numbers, sweeps_);
+        sweeps1_ = descend_result.sweeps;
+        solved_ = descend_result.solved;
+        shaped_ = descend_result.shaped;
     }
     return (solved_t){.sweeps = sweeps1_, .solved = solved_, .shaped = shaped_};
 }
@@ -2422,11 +2504,13 @@ static solved_t improve(double *numbers, bool warm)
 /* Bring the counters up to date. */
 static void count_1(double *numbers, const solved_t *end)
 {
-    const vector_t row = vector_at(&numbers[COUNTERS_AT]);
+    const double t1 = numbers[COUNTERS_AT];
+    const double t2 = numbers[COUNTERS_AT + 1];
+    const double t3 = numbers[COUNTERS_AT + 2];
     const double t4 = numbers[COUNTERS_AT + 3];
-    numbers[COUNTERS_AT] = row.x + 1.0;
-    numbers[COUNTERS_AT + 1] = row.y + end->sweeps;
-    numbers[COUNTERS_AT + 2] = maximum(row.z, end->sweeps);
+    numbers[COUNTERS_AT] = t1 + 1.0;
+    numbers[COUNTERS_AT + 1] = t2 + end->sweeps;
+    numbers[COUNTERS_AT + 2] = maximum(t3, end->sweeps);
     numbers[COUNTERS_AT + 3] = t4 + (end->solved ? 0.0 : 1.0);
     numbers[COUNTERS_AT + 4] = end->shaped ? 1.0 : 0.0;
 }
@@ -2436,8 +2520,10 @@ static void count_1(double *numbers, const solved_t *end)
 /* Return the k-th three numbers of a buffer. */
 static vector_t triple1(double *numbers)
 {
-    const vector_t row = vector_at(&numbers[PLAN_AT]);
-    return row;
+    const double t1 = numbers[PLAN_AT];
+    const double t2 = numbers[PLAN_AT + 1];
+    const double t3 = numbers[PLAN_AT + 2];
+    return (vector_t){t1, t2, t3};
 }
 
 /* ------------------------------------ algebra.scalar ------------------------------------ */
@@ -2462,26 +2548,25 @@ static vector_t clip_axes(vector_t a, double limit)
 static vector_t mpc_torque(double *numbers, const measurement_t *measurement, const craft_t *craft)
 {
     const vector_t ahead = tracking_torque(measurement, craft);
-    const linear_t linearise_2 = linearise(measurement, craft);
-    sample(numbers, &linearise_2, measurement->period);
+    const linear_t linearise_result = linearise(measurement, craft);
+    sample(numbers, &linearise_result, measurement->period);
     put_limits(numbers, scale(-1.0, ahead), craft->torque_limit);
     const double t1 = numbers[COUNTERS_AT + 4];
     const bool warm = 0.0 < t1;
     if (warm) {
         advance(numbers);
     }
-    const vector_t vector_part_2 = vector_part(measurement->attitude);
-    numbers[STATES_AT] = vector_part_2.x;
-    numbers[STATES_AT + 1] = vector_part_2.y;
-    numbers[STATES_AT + 2] = vector_part_2.z;
+    const vector_t vector_part_result = vector_part(measurement->attitude);
+    numbers[STATES_AT] = vector_part_result.x;
+    numbers[STATES_AT + 1] = vector_part_result.y;
+    numbers[STATES_AT + 2] = vector_part_result.z;
     numbers[STATES_AT + 3] = measurement->rate.x;
     numbers[STATES_AT + 4] = measurement->rate.y;
     numbers[STATES_AT + 5] = measurement->rate.z;
-    const solved_t improve_2 = improve(numbers, warm);
-    count_1(numbers, &improve_2);
-    const vector_t triple1_2 = triple1(numbers);
-    const vector_t command = add(triple1_2, ahead);
-    return clip_axes(command, craft->torque_limit);
+    const solved_t improve_result = improve(numbers, warm);
+    count_1(numbers, &improve_result);
+    const vector_t triple1_result = triple1(numbers);
+    return clip_axes(add(triple1_result, ahead), craft->torque_limit);
 }
 
 /* -------------------------------- parts.actuators.limits -------------------------------- */
@@ -2497,12 +2582,12 @@ static vector_t limit_axis(vector_t command, double limit)
 /* What numbers begin with; the rest are zeros. */
 static const double first_numbers[71] = {
     0.0, 0.0, 0.0, 0.0, 0.0, 0.2, 0.2, 0.2, 0.2, 0.2, 0.2, 50.0, 50.0, 50.0, 0.02, 0.02, 0.02,
-    22.946773472133042, 0.0, 0.0, 63.245632260866046, 0.0, 0.0, 0.0, 27.938050579455364, 0.0, 0.0,
-    94.86838250802516, 0.0, 0.0, 0.0, 32.16149041269614, 0.0, 0.0, 126.49114593545856, 63.245632260866046,
-    0.0, 0.0, 361.33965833959996, 0.0, 0.0, 0.0, 94.86838250802516, 0.0, 0.0, 660.337707668138, 0.0, 0.0, 0.0,
-    126.49114593545856, 0.0, 0.0, 1013.9736656741607, 0.06267696292404693, 0.0, 0.0, 0.3595585175330206, 0.0,
-    0.0, 0.0, 0.06278328749571621, 0.0, 0.0, 0.4385106654037334, 0.0, 0.0, 0.0, 0.06284605433756812, 0.0, 0.0,
-    0.5053056935128754
+    22.9467734721486, 0.0, 0.0, 63.24563226095957, 0.0, 0.0, 0.0, 27.938050579458753, 0.0, 0.0,
+    94.86838250806161, 0.0, 0.0, 0.0, 32.161490412695684, 0.0, 0.0, 126.4911459354713, 63.24563226095957, 0.0,
+    0.0, 361.3396583401284, 0.0, 0.0, 0.0, 94.86838250806161, 0.0, 0.0, 660.3377076682774, 0.0, 0.0, 0.0,
+    126.4911459354713, 0.0, 0.0, 1013.9736656743705, 0.06267696292413753, 0.0, 0.0, 0.3595585175335371, 0.0,
+    0.0, 0.0, 0.06278328749574003, 0.0, 0.0, 0.43851066540382566, 0.0, 0.0, 0.0, 0.06284605433757424, 0.0,
+    0.0, 0.5053056935129779
 };
 
 void mpc_init(mpc_state_t *state)
@@ -2515,15 +2600,11 @@ void mpc_init(mpc_state_t *state)
 void mpc_step(mpc_state_t *state, const mpc_input_t *input, mpc_command_t *command)
 {
     double *const numbers = state->numbers;
-    const goal_t goal = inertial_goal(&parameters.setup.target);
     const state_t body_state = {.attitude = input->attitude, .rate = input->rate,
         .position = input->position};
+    const goal_t goal = {.attitude = parameters.setup.target.attitude};
     const scene_t scene = {.goal = goal, .period = parameters.setup.period};
     const measurement_t told = observe(&body_state, &scene);
-    const as_published_result_t as_published_result = as_published(told.attitude);
-    const measurement_t told_2 = {.attitude = as_published_result.attitude, .rate = told.rate,
-        .body_rate = told.body_rate, .target_acceleration = told.target_acceleration,
-        .position = told.position, .period = told.period};
-    const vector_t wanted = mpc_torque(numbers, &told_2, &parameters.craft);
+    const vector_t wanted = mpc_torque(numbers, &told, &parameters.craft);
     command->torque = limit_axis(wanted, parameters.setup.limit);
 }

@@ -14,16 +14,36 @@
 typedef sliding_quaternion_t quaternion_t;
 typedef sliding_vector_t vector_t;
 
+/* The gains are the surface slope, the switching torque and, to trade chatter for accuracy, the thickness
+   of a boundary layer. */
+typedef struct {
+    vector_t surface_gain; /* 1/s: K of the surface w + K q = 0, symmetric positive definite */
+    vector_t switching_gain; /* N m: switching torque, above the disturbance */
+    double boundary_layer; /* rad/s: boundary layer; 0 switches by sign */
+} gains_t;
+
+/* A rigid spacecraft. */
+typedef struct {
+    vector_t inertia; /* kg m^2: of a craft with wheels without their rotors' about their axes */
+} craft_t;
+
 /* Which attitude. */
 typedef struct {
     quaternion_t attitude; /* unit quaternion, scalar first */
 } inertial_params_t;
 
-/* The attitude to be reached: q_RN (inertial to target axes), and the target's angular velocity (rad/s)
-   and acceleration (rad/s2), both in target axes. */
+/* The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. */
 typedef struct {
-    quaternion_t attitude;
-} goal_t;
+    double limit;
+    inertial_params_t target;
+} setup_t;
+
+/* The numbers that do not change in flight. */
+typedef struct {
+    gains_t gains;
+    craft_t craft;
+    setup_t setup;
+} parameters_t;
 
 /* Attitude q_BN (inertial to body), rate omega_BN_B (rad/s), position and velocity (inertial; m, m/s), and
    the torque the actuators give (body, N m), which has dynamics of its own when the actuators lag. */
@@ -31,6 +51,12 @@ typedef struct {
     quaternion_t attitude;
     vector_t rate;
 } state_t;
+
+/* The attitude to be reached: q_RN (inertial to target axes), and the target's angular velocity (rad/s)
+   and acceleration (rad/s2), both in target axes. */
+typedef struct {
+    quaternion_t attitude;
+} goal_t;
 
 /* Beside the state all that a measurement is made of: the goal (None where the loop has no target),
    whether it never turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s,
@@ -47,37 +73,6 @@ typedef struct {
     vector_t body_rate; /* rad/s: absolute angular velocity */
     vector_t target_acceleration; /* rad/s^2: derivative of target_rate as the turning body sees it */
 } measurement_t;
-
-/* What as_published gives. */
-typedef struct {
-    quaternion_t attitude;
-} as_published_result_t;
-
-/* The gains are the surface slope, the switching torque and, to trade chatter for accuracy, the thickness
-   of a boundary layer. */
-typedef struct {
-    vector_t surface_gain; /* 1/s: K of the surface w + K q = 0, symmetric positive definite */
-    vector_t switching_gain; /* N m: switching torque, above the disturbance */
-    double boundary_layer; /* rad/s: boundary layer; 0 switches by sign */
-} gains_t;
-
-/* A rigid spacecraft. */
-typedef struct {
-    vector_t inertia; /* kg m^2: of a craft with wheels without their rotors' about their axes */
-} craft_t;
-
-/* The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. */
-typedef struct {
-    double limit;
-    inertial_params_t target;
-} setup_t;
-
-/* The numbers that do not change in flight. */
-typedef struct {
-    gains_t gains;
-    craft_t craft;
-    setup_t setup;
-} parameters_t;
 
 static const parameters_t parameters = {
     .gains = {
@@ -96,14 +91,6 @@ static const parameters_t parameters = {
     },
 };
 
-
-/* -------------------------------- parts.targets.inertial -------------------------------- */
-
-/* The attitude, at rest. */
-static goal_t inertial_goal(const inertial_params_t *params)
-{
-    return (goal_t){.attitude = params->attitude};
-}
 
 /* ---------------------------------- algebra.quaternion ---------------------------------- */
 
@@ -172,14 +159,6 @@ static measurement_t observe(const state_t *state, const scene_t *scene)
     const quaternion_t error = relative(scene->goal.attitude, state->attitude);
     return (measurement_t){.attitude = error, .rate = state->rate, .body_rate = state->rate,
         .target_acceleration = {0.0, 0.0, 0.0}};
-}
-
-/* -------------------------------- parts.quaternion_sign --------------------------------- */
-
-/* Feed back q itself: continuous, but the body may turn the long way (unwinding). */
-static as_published_result_t as_published(quaternion_t attitude)
-{
-    return (as_published_result_t){.attitude = attitude};
 }
 
 /* ------------------------------------ algebra.vector ------------------------------------ */
@@ -259,9 +238,9 @@ static vector_t sliding_torque(const measurement_t *measurement, const gains_t *
 {
     const vector_t s = surface(measurement, gains);
     const vector_t equivalent = equivalent_torque(measurement, gains->surface_gain, craft);
-    const vector_t times_2 = times(gains->switching_gain, (vector_t){switch_of(s.x, gains->boundary_layer),
-        switch_of(s.y, gains->boundary_layer), switch_of(s.z, gains->boundary_layer)});
-    return subtract(equivalent, times_2);
+    const vector_t switching = {switch_of(s.x, gains->boundary_layer), switch_of(s.y, gains->boundary_layer),
+        switch_of(s.z, gains->boundary_layer)};
+    return subtract(equivalent, times(gains->switching_gain, switching));
 }
 
 /* ------------------------------------ algebra.vector ------------------------------------ */
@@ -290,14 +269,10 @@ void sliding_init(sliding_state_t *state)
 void sliding_step(sliding_state_t *state, const sliding_input_t *input, sliding_command_t *command)
 {
     (void)state;
-    const goal_t goal = inertial_goal(&parameters.setup.target);
     const state_t body_state = {.attitude = input->attitude, .rate = input->rate};
+    const goal_t goal = {.attitude = parameters.setup.target.attitude};
     const scene_t scene = {.goal = goal};
     const measurement_t told = observe(&body_state, &scene);
-    const as_published_result_t as_published_result = as_published(told.attitude);
-    const measurement_t told_2 = {.attitude = as_published_result.attitude, .rate = told.rate,
-        .body_rate = told.body_rate, .target_acceleration = told.target_acceleration};
-    const vector_t wanted = limit_axis(sliding_torque(&told_2, &parameters.gains, &parameters.craft),
-        parameters.setup.limit);
-    command->torque = wanted;
+    const vector_t wanted = sliding_torque(&told, &parameters.gains, &parameters.craft);
+    command->torque = limit_axis(wanted, parameters.setup.limit);
 }

@@ -22,6 +22,48 @@ typedef struct {
     vector_t row[3];
 } matrix_t;
 
+/* The gains are damping, stiffness, and the share of the modelled torque that is compensated. */
+typedef struct {
+    double k_rate; /* N m s: damping */
+    vector_t k_attitude; /* N m: weights of 1 - a_ii, one for all or one each */
+    double compensation; /* share of the gyroscopic, target and external torque compensated */
+} gains_t;
+
+/* A rigid spacecraft. */
+typedef struct {
+    vector_t inertia; /* kg m^2: of a craft with wheels without their rotors' about their axes */
+    double gravity; /* m^3/s^2: gravitational parameter of the body that it orbits */
+    vector_t with_rotors; /* kg m^2: inertia with the rotors; () without wheels */
+} craft_t;
+
+typedef struct {
+    vector_t e[4];
+} vectors4_t;
+
+/* N wheels: unit spin axes (body), rotor inertias about them (kg m2), largest motor torques (N m; 0 for a
+   lost wheel), largest axial momenta (N m s), viscous (N m s) and Coulomb friction (N m); and how to share
+   out a torque, by least squares (one row a wheel, zero for one that takes no part) or with the least peak
+   (see `envelope.with_facets`, without which there is nothing to share it out with). */
+typedef struct {
+    vectors4_t axes;
+} wheels_t;
+
+typedef struct {
+    wheels_t wheels;
+} effectors_t;
+
+/* The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. */
+typedef struct {
+    effectors_t effectors;
+} setup_t;
+
+/* The numbers that do not change in flight. */
+typedef struct {
+    gains_t gains;
+    craft_t craft;
+    setup_t setup;
+} parameters_t;
+
 /* Attitude q_BN (inertial to body), rate omega_BN_B (rad/s), position and velocity (inertial; m, m/s), and
    the torque the actuators give (body, N m), which has dynamics of its own when the actuators lag. */
 typedef struct {
@@ -39,30 +81,11 @@ typedef struct {
     vector_t acceleration;
 } goal_t;
 
-/* A rigid spacecraft. */
-typedef struct {
-    vector_t inertia; /* kg m^2: of a craft with wheels without their rotors' about their axes */
-    double gravity; /* m^3/s^2: gravitational parameter of the body that it orbits */
-    vector_t with_rotors; /* kg m^2: inertia with the rotors; () without wheels */
-} craft_t;
-
 /* What attraction gives. */
 typedef struct {
     double scalar;
     double inverse_square;
 } attraction_result_t;
-
-typedef struct {
-    vector_t e[4];
-} vectors4_t;
-
-/* N wheels: unit spin axes (body), rotor inertias about them (kg m2), largest motor torques (N m; 0 for a
-   lost wheel), largest axial momenta (N m s), viscous (N m s) and Coulomb friction (N m); and how to share
-   out a torque, by least squares (one row a wheel, zero for one that takes no part) or with the least peak
-   (see `envelope.with_facets`, without which there is nothing to share it out with). */
-typedef struct {
-    vectors4_t axes;
-} wheels_t;
 
 /* Beside the state all that a measurement is made of: the goal (None where the loop has no target),
    whether it never turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s,
@@ -83,34 +106,6 @@ typedef struct {
     vector_t external_torque; /* N m: modelled torque from outside at this attitude */
     vector_t wheel_momentum; /* N m s: angular momentum of the body's wheels */
 } measurement_t;
-
-/* What as_published gives. */
-typedef struct {
-    quaternion_t attitude;
-} as_published_result_t;
-
-/* The gains are damping, stiffness, and the share of the modelled torque that is compensated. */
-typedef struct {
-    double k_rate; /* N m s: damping */
-    vector_t k_attitude; /* N m: weights of 1 - a_ii, one for all or one each */
-    double compensation; /* share of the gyroscopic, target and external torque compensated */
-} gains_t;
-
-typedef struct {
-    wheels_t wheels;
-} effectors_t;
-
-/* The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. */
-typedef struct {
-    effectors_t effectors;
-} setup_t;
-
-/* The numbers that do not change in flight. */
-typedef struct {
-    gains_t gains;
-    craft_t craft;
-    setup_t setup;
-} parameters_t;
 
 static const parameters_t parameters = {
     .gains = {
@@ -179,26 +174,29 @@ static quaternion_t normalise(quaternion_t q)
 
 /* Return the quaternion of a rotation matrix, from the largest of its four squared components (Shepperd's
    method). */
-static quaternion_t to_quaternion(matrix_t a)
+static quaternion_t to_quaternion(const matrix_t *a)
 {
-    const double trace = a.row[0].x + a.row[1].y + a.row[2].z;
-    const double x = a.row[1].z - a.row[2].y;
-    const double y = a.row[2].x - a.row[0].z;
-    const double z = a.row[0].y - a.row[1].x;
-    const double xy = a.row[0].y + a.row[1].x;
-    const double yz = a.row[1].z + a.row[2].y;
-    const double zx = a.row[2].x + a.row[0].z;
+    const double trace = a->row[0].x + a->row[1].y + a->row[2].z;
+    const double x = a->row[1].z - a->row[2].y;
+    const double y = a->row[2].x - a->row[0].z;
+    const double z = a->row[0].y - a->row[1].x;
+    const double xy = a->row[0].y + a->row[1].x;
+    const double yz = a->row[1].z + a->row[2].y;
+    const double zx = a->row[2].x + a->row[0].z;
     const double t9 = 1.0 + trace;
-    const double t12 = 1.0 + 2.0 * a.row[0].x - trace;
-    const double t15 = 1.0 + 2.0 * a.row[1].y - trace;
-    const double t18 = 1.0 + 2.0 * a.row[2].z - trace;
+    const double t12 = 1.0 + 2.0 * a->row[0].x - trace;
+    const double t15 = 1.0 + 2.0 * a->row[1].y - trace;
+    const double t18 = 1.0 + 2.0 * a->row[2].z - trace;
     const bool t19 = t9 < t12;
+    const quaternion_t first = {x, t12, xy, zx};
+    const quaternion_t scalar = {t9, x, y, z};
     const double size = t19 ? t12 : t9;
     const bool t21 = size < t15;
-    const quaternion_t largest = choose(t21, (quaternion_t){y, xy, t15, yz}, choose(t19,
-        (quaternion_t){x, t12, xy, zx}, (quaternion_t){t9, x, y, z}));
+    const quaternion_t second = {y, xy, t15, yz};
+    const quaternion_t largest = choose(t21, second, choose(t19, first, scalar));
     const double size_2 = t21 ? t15 : size;
-    return normalise(choose(size_2 < t18, (quaternion_t){z, zx, yz, t18}, largest));
+    const quaternion_t third = {z, zx, yz, t18};
+    return normalise(choose(size_2 < t18, third, largest));
 }
 
 /* ------------------------------------ algebra.scalar ------------------------------------ */
@@ -228,8 +226,8 @@ static goal_t orbital_goal(const state_t *state, quaternion_t before)
     const double size = sqrt(h2);
     const vector_t down = scale(-1.0 / sqrt(r2_2), state->position);
     const vector_t against = scale(-1.0 / size, h);
-    const quaternion_t attitude = nearer(to_quaternion((matrix_t){{cross(against, down), against, down}}),
-        before);
+    const matrix_t a = {{cross(against, down), against, down}};
+    const quaternion_t attitude = nearer(to_quaternion(&a), before);
     const double rate = size / r2_2;
     return (goal_t){.attitude = attitude, .rate = {0.0, -rate, 0.0}, .acceleration = {0.0,
         2.0 * rate * dot(state->position, state->velocity) / r2_2, 0.0}};
@@ -271,14 +269,6 @@ static vector_t to_body(quaternion_t q, vector_t r)
     return add(add(r, scale(q.q0, t)), cross(t, v));
 }
 
-/* ------------------------------------- parts.craft -------------------------------------- */
-
-/* The inertia with all that is in the craft, which gravity acts on (kg m2). */
-static vector_t total_inertia(const craft_t *craft)
-{
-    return craft->with_rotors;
-}
-
 /* ------------------------------------ algebra.vector ------------------------------------ */
 
 /* Return a x (m a) for a symmetric m: the gyroscopic torque is gyroscopic_torque(J, w). */
@@ -292,41 +282,40 @@ static vector_t gyroscopic_torque(vector_t m, vector_t a)
 /* Gravity-gradient torque (N m) for the position in body axes (m) and strength 3 mu/r5 (1/(m2 s2)). */
 static vector_t gravity_gradient(vector_t position, double strength, const craft_t *craft)
 {
-    return scale(strength, gyroscopic_torque(total_inertia(craft), position));
+    return scale(strength, gyroscopic_torque(craft->with_rotors, position));
 }
 
 /* Torque on the body (N m, body axes). */
 static vector_t gravity_gradient_torque(const state_t *state, const craft_t *craft)
 {
     const attraction_result_t attraction_result = attraction(state->position, craft);
-    const vector_t gravity_gradient_2 = gravity_gradient(to_body(state->attitude, state->position), 3.0 *
+    const vector_t gravity_gradient_result = gravity_gradient(to_body(state->attitude, state->position), 3.0 *
         attraction_result.scalar * attraction_result.inverse_square, craft);
-    return gravity_gradient_2;
+    return gravity_gradient_result;
 }
 
 /* ----------------------------------- algebra.several ------------------------------------ */
 
 /* Return the sum of weights[i] * vectors[i], from the first to the last; there is at least one. */
-static vector_t weighted(quaternion_t weights, vectors4_t vectors)
+static vector_t weighted(doubles4_t weights, const vectors4_t *vectors)
 {
-    const vector_t total = add(add(add(scale(weights.q0, vectors.e[0]), scale(weights.q1, vectors.e[1])),
-        scale(weights.q2, vectors.e[2])), scale(weights.q3, vectors.e[3]));
-    return total;
+    const vector_t total = add(add(scale(weights.e[0], vectors->e[0]), scale(weights.e[1], vectors->e[1])),
+        scale(weights.e[2], vectors->e[2]));
+    return add(total, scale(weights.e[3], vectors->e[3]));
 }
 
 /* -------------------------------- parts.effectors.wheels -------------------------------- */
 
 /* The wheels' momentum in body axes (N m s): sum a_i h_i. */
-static vector_t wheel_momentum(quaternion_t momentum, const wheels_t *wheels)
+static vector_t wheel_momentum(doubles4_t momentum, const wheels_t *wheels)
 {
-    return weighted(momentum, wheels->axes);
+    return weighted(momentum, &wheels->axes);
 }
 
 /* The rotors' momentum in body axes (N m s). */
 static vector_t wheels_momentum(const wheels_state_t *own, const wheels_t *params)
 {
-    return wheel_momentum((quaternion_t){own->momentum.e[0], own->momentum.e[1], own->momentum.e[2],
-        own->momentum.e[3]}, params);
+    return wheel_momentum(own->momentum, params);
 }
 
 /* ---------------------------------- algebra.quaternion ---------------------------------- */
@@ -369,20 +358,11 @@ static measurement_t observe(const state_t *state, const scene_t *scene)
 {
     const quaternion_t error = relative(scene->goal.attitude, state->attitude);
     const vector_t target_rate = to_body(error, scene->goal.rate);
+    const vector_t target_acceleration = to_body(error, scene->goal.acceleration);
     const vector_t error_rate = subtract(state->rate, target_rate);
-    const vector_t target_acceleration = subtract(to_body(error, scene->goal.acceleration),
-        cross(error_rate, target_rate));
     return (measurement_t){.attitude = error, .rate = error_rate, .body_rate = state->rate,
-        .target_acceleration = target_acceleration, .external_torque = scene->torque,
-        .wheel_momentum = scene->momentum};
-}
-
-/* -------------------------------- parts.quaternion_sign --------------------------------- */
-
-/* Feed back q itself: continuous, but the body may turn the long way (unwinding). */
-static as_published_result_t as_published(quaternion_t attitude)
-{
-    return (as_published_result_t){.attitude = attitude};
+        .target_acceleration = subtract(target_acceleration, cross(error_rate, target_rate)),
+        .external_torque = scene->torque, .wheel_momentum = scene->momentum};
 }
 
 /* -------------------------------------- laws.wheel -------------------------------------- */
@@ -422,20 +402,11 @@ static vector_t wheel_torque(const measurement_t *measurement, const gains_t *ga
     return subtract(scale(gains->compensation, model), feedback);
 }
 
-/* -------------------------------- parts.actuators.limits -------------------------------- */
-
-/* The command as it is. */
-static vector_t limit_none(vector_t command)
-{
-    return command;
-}
-
 /* -------------------------------------- interface --------------------------------------- */
 
 void wheel_init(wheel_state_t *state)
 {
-    const quaternion_t followed = {0.7055202438209324, 0.047341161359353054, -0.7055202438209324, -0.047341161359353054};
-    state->followed = followed;
+    state->followed = (quaternion_t){0.7055202438209324, 0.047341161359353054, -0.7055202438209324, -0.047341161359353054};
 }
 
 void wheel_step(wheel_state_t *state, const wheel_input_t *input, wheel_command_t *command)
@@ -447,12 +418,8 @@ void wheel_step(wheel_state_t *state, const wheel_input_t *input, wheel_command_
     const vector_t momentum = wheels_momentum(&input->wheels, &parameters.setup.effectors.wheels);
     const scene_t scene = {.goal = goal, .torque = torque, .momentum = momentum};
     const measurement_t told = observe(&body_state, &scene);
-    const as_published_result_t as_published_result = as_published(told.attitude);
-    const measurement_t told_2 = {.attitude = as_published_result.attitude, .rate = told.rate,
-        .body_rate = told.body_rate, .target_acceleration = told.target_acceleration,
-        .external_torque = told.external_torque, .wheel_momentum = told.wheel_momentum};
-    const vector_t wanted = limit_none(wheel_torque(&told_2, &parameters.gains, &parameters.craft));
-    command->torque = wanted;
+    const vector_t wanted = wheel_torque(&told, &parameters.gains, &parameters.craft);
     const quaternion_t followed = goal.attitude;
+    command->torque = wanted;
     state->followed = followed;
 }

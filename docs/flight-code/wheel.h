@@ -13,7 +13,7 @@
    compile with -std=c99 -ffp-contract=off, never with -ffast-math.
 
 
-   Certificate: certificate.json, sha256 3cc1c3be8f2c31aef798167487e172adb5bfbf90e8f6c39fdab992441e773c31:
+   Certificate: certificate.json, sha256 28ca2d5571893bfa7158d983ec90f99f9526c933ce9b4a6c3b70a814336f0024:
    proved
    Claims:
      proved: converges: with wheels that have neither limits nor friction, from every attitude and rate the

@@ -12,7 +12,7 @@ from starhold.algebra.structure import buffers, leaves
 from starhold.algebra.structured import Buffer
 from starhold.algebra.vector import ZERO
 from starhold.errors import InputError
-from starhold.export.rebinding import Rebinder
+from starhold.export.copies import Copies
 from starhold.loop.closed_loop import Carry, ClosedLoop, Composition, Memories, is_recorded
 from starhold.loop.step import make_equations
 from starhold.parts.contract import NoMemory
@@ -53,12 +53,12 @@ class FlightLaw:
     command: Any
     """The class of the command."""
 
-    def equation(self, rebinder: Rebinder | None = None) -> Callable[..., Any]:
-        """Return the step; with a rebinder, of copies of the equations."""
-        if rebinder is None:
+    def equation(self, copies: Copies | None = None) -> Callable[..., Any]:
+        """Return the step; with copies, made of those."""
+        if copies is None:
             update = make_equations(self.parts).update
         else:
-            update = rebinder.copy(make_equations)(_seen(self.parts, rebinder)).update
+            update = copies.copy(make_equations)(_seen(self.parts, copies)).update
 
         command: Any = self.command
 
@@ -154,13 +154,13 @@ def flight_law(loop: ClosedLoop) -> FlightLaw:
     return FlightLaw(loop, composition, Parameters(loop.gains, loop.known, named), start, inputs, given, command)
 
 
-def _seen(parts: Composition, rebinder: Rebinder) -> Composition:
+def _seen(parts: Composition, copies: Copies) -> Composition:
     """Return the parts with copies of their equations."""
 
     def seen(value: Any) -> Any:
         if isinstance(value, tuple):
             return tuple(seen(part) for part in value)  # pyright: ignore
-        return replace(value, module=rebinder.seen(value.module)) if isinstance(value, Part) else value
+        return replace(value, module=copies.seen(value.module)) if isinstance(value, Part) else value
 
     return Composition(*(seen(value) for value in parts))
 

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from starhold.algebra.operations import NUMBER
 from starhold.algebra.structure import leaves
 from starhold.algebra.structured import Buffer
 from starhold.export.code import Code
-from starhold.export.memory import helpers
 from starhold.export.printing import Readable
 from starhold.export.proof import UNPROVED, Proof
 from starhold.export.types import Member, Type, comment
 from starhold.parts.contract import fields
+from starhold.trace.c99 import GUARD
+from starhold.trace.source import TIE
 from starhold.version import __version__
 
 WIDTH = 110
@@ -29,34 +32,29 @@ class Text(NamedTuple):
 
 def texts(code: Code, scenario: str, law: str, proof: Proof = UNPROVED) -> Text:
     """Return header and source. scenario, law: names that the scenario's file gives."""
-    printed = code.printed
-    public = {name: f"{code.name}_{name.removeprefix('flight_')}" for name in _public(code)}
-    return Text(_header(code, printed, public, scenario, law, proof), _source(code, printed, public))
+    types = _spoken_of(code, _interface(code))
+    public = {kind.name: f"{code.name}_{kind.name.removeprefix('flight_')}" for kind in types}
+    return Text(_header(code, types, public, scenario, law, proof), _source(code, public))
 
 
-def _public(code: Code) -> list[str]:
-    """Return the types that callers see, those of members first."""
-    found: dict[str, Type] = {}
-
-    def visit(kind: Type) -> None:
-        for member in code.printed.members(kind):
-            visit(member.type)
-        if kind.members:
-            found.setdefault(kind.name, kind)
-
-    for kind in _interface(code):
-        visit(kind)
-    return list(found)
-
-
-def _interface(code: Code) -> tuple[Type, Type, Type]:
+def _interface(code: Code) -> str:
+    """Return the names of the types that the step takes and gives."""
     shape = code.signature
     assert shape.result is not None
-    command = shape.result.members[0].type
-    return shape.params[1].type, shape.params[2].type, command
+    return f"{shape.params[1].type.name} {shape.params[2].type.name} {shape.result.members[0].type.name}"
 
 
-def _header(code: Code, printed: Readable, public: dict[str, str], scenario: str, law: str, proof: Proof) -> str:
+def _spoken_of(code: Code, text: str) -> list[Type]:
+    """Return the types that a text speaks of, those of members first."""
+    types: list[Type] = []
+    for kind in reversed(code.types.values()):
+        if re.search(rf"\b{kind.name}\b", text):
+            types.insert(0, kind)
+            text += "".join(f" {member.type.name}" for member in code.printed.members(kind))
+    return types
+
+
+def _header(code: Code, types: list[Type], public: dict[str, str], scenario: str, law: str, proof: Proof) -> str:
     name, loop = code.name, code.flight.loop
     card = loop.law.card
     guard = f"{name.upper()}_H"
@@ -67,11 +65,10 @@ def _header(code: Code, printed: Readable, public: dict[str, str], scenario: str
         f"#define {name.upper()}_PERIOD ({loop.period!r})",
         "",
     ]
-    types = _types(code, printed)
-    for own in public:
-        if own != STATE.name:
-            lines += [*declaration(types[own], printed, public, {}), ""]
-    lines += [*_state(code, printed, public), ""]
+    for kind in types:
+        if kind.name != STATE.name:
+            lines += [*_declaration(kind, code.printed, public), ""]
+    lines += [*_state(code, public), ""]
     lines += comment(
         "Sets the state to that of the scenario's start"
         + (": the side of the quaternion is that of its initial attitude." if "sign" in code.flight.start._fields else ".")
@@ -90,17 +87,15 @@ def _header(code: Code, printed: Readable, public: dict[str, str], scenario: str
 STATE = Type("flight_state_t", named=True)
 
 
-def _state(code: Code, printed: Readable, public: dict[str, str]) -> Iterator[str]:
+def _state(code: Code, public: dict[str, str]) -> Iterator[str]:
     """Yield the declaration of the state."""
-    kind, public = code.signature.params[1].type, {**public, STATE.name: f"{code.name}_state_t"}
-    if not _has_state(code):
+    if code.flight.start._fields:
+        yield from comment("What is remembered from step to step: set it by the function below, and leave it alone.")
+        kind = code.types.get(STATE.name, STATE)
+        yield from _declaration(kind, code.printed, {**public, STATE.name: f"{code.name}_state_t"}, code.buffers)
+    else:
         yield from comment("What the law remembers: nothing. C has no empty structs.")
-        yield "typedef struct {"
-        yield "    double unused;"
-        yield f"}} {code.name}_state_t;"
-        return
-    yield from comment("What is remembered from step to step: set it by the function below, and leave it alone.")
-    yield from declaration(kind if kind.members else STATE, printed, public, code.buffers)
+        yield from ("typedef struct {", "    double unused;", f"}} {code.name}_state_t;")
 
 
 def _banner(code: Code, scenario: str, law: str, proof: Proof) -> list[str]:
@@ -155,106 +150,61 @@ def _choices(loop: Any) -> list[str]:
     return [f"Fixed in this code: {', '.join(found)}."] if found else []
 
 
-def _source(code: Code, printed: Readable, public: dict[str, str]) -> str:
-    name = code.name
-    lines = comment(
-        f"{name}.c: made by starhold {__version__}; see {name}.h. Do not edit: change the scenario and export it again."
-    )
-    includes = (
-        ["#include <math.h>"]
-        if any("sqrt(" in line or "INFINITY" in line for line in printed.lines) or _unlimited(code)
-        else []
-    )
-    types = _types(code, printed)
-    body = "\n".join(printed.lines)
-    includes += ["#include <stdbool.h>"] if re.search(r"\bbool\b", body) else []
-    includes += ["#include <stdint.h>"] if "int32_t" in body or code.buffers else []
-    lines += ["", f'#include "{name}.h"', "", *includes, *([""] if includes else []), GUARD, ""]
-    shown = {kind: own for kind, own in public.items() if not kind.startswith("flight_")}
-    lines += [f"typedef {own} {kind};" for kind, own in shown.items()]
-    lines += [""] if shown else []
-    for kind in types.values():
-        if kind.name not in public and kind.name != "parameters_t":
-            lines += [*declaration(kind, printed, {}, {}), ""]
+def _source(code: Code, public: dict[str, str]) -> str:
+    name, printed = code.name, code.printed
+    banner = f"{name}.c: made by starhold {__version__}; see {name}.h. Do not edit: change the scenario and export it again."
+    lines = [*comment(banner), "", f'#include "{name}.h"', ""]
     parameters = code.signature.params[0].type
-    if printed.members(parameters):
-        lines += [*declaration(parameters, printed, {}, {}), "", *_values(code, printed), ""]
-    for memory in code.buffers:
-        parts = printed.parts.get(memory, {})
-        if parts:
-            lines += [*comment(f"Where the parts of {memory} begin."), "enum {"]
-            lines += [f"    {part.upper()}_AT = {first}," for first, part in sorted(parts.items())]
-            lines += ["};"]
-    lines += helpers(list(printed.rows.values()))
+    constants = list(_constants(code, parameters)) if printed.members(parameters) else []
+    body = "\n".join([*constants, *printed.lines])
+    needed = {"math": r"\bsqrt\(|\bINFINITY\b|\bNAN\b", "stdbool": r"\bbool\b", "stdint": r"\bint32_t\b"}
+    includes = [f"#include <{file}.h>" for file, words in needed.items() if re.search(words, body)]
+    includes += ["#include <stdint.h>"] if code.buffers and "#include <stdint.h>" not in includes else []
+    lines += [*includes, *([""] if includes else []), GUARD, ""]
+    aliases = [f"typedef {title} {kind};" for kind, title in public.items() if not kind.startswith("flight_")]
+    lines += [*aliases, ""] if aliases else []
+    for kind in _spoken_of(code, f"{body} {_interface(code)}"):
+        if kind.name not in public:
+            lines += [*_declaration(kind, printed, {}), ""]
+    lines += [*constants, ""] if constants else []
+    for memory, parts in code.parts.items():
+        lines += [*comment(f"Where the parts of {memory} begin."), "enum {"]
+        lines += [f"    {part.upper()}_AT = {first}," for first, part in sorted(parts.items())]
+        lines += ["};"]
     module = ""
     for function in printed.functions.values():
-        if printed.is_main(function):
-            continue
-        own = getattr(function.shape, "module", module) or module
-        if own != module:
-            module = own
-            lines += ["", _rule(own.removeprefix("starhold."))]
-        lines += printed.chunks[function.name]
+        if not printed.is_main(function):
+            if function.shape.module != module:
+                module = function.shape.module
+                lines += ["", _rule(module.removeprefix("starhold."))]
+            lines += printed.chunks[function.name]
     lines += ["", _rule("interface"), "", *_init(code), ""]
     lines += [f"void {name}_step({name}_state_t *state, const {name}_input_t *input, {name}_command_t *command)", "{"]
     chunk = printed.chunks[code.program.main.name]
     if not any(re.search(r"\bstate\b", line) for line in chunk) and not code.buffers:
         lines += ["    (void)state;"]
     lines += [f"    double *const {memory} = state->{memory};" for memory in code.buffers]
-    lines += [*chunk, "}", ""]
-    return "\n".join(lines)
-
-
-GUARD = """\
-#if defined(__FAST_MATH__) || (defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ != 0)
-#error "this code needs IEEE arithmetic in doubles: no -ffast-math, no x87"
-#endif
-#if !defined(__GNUC__) || defined(__clang__)
-#pragma STDC FP_CONTRACT OFF
-#endif"""
+    return "\n".join([*lines, *chunk, "}", ""])
 
 
 def _rule(title: str) -> str:
     return f"/* {f' {title} '.center(88, '-')} */"
 
 
-def _unlimited(code: Code) -> bool:
-    return any(leaf in (float("inf"), float("-inf")) for leaf in leaves(code.flight.parameters) if isinstance(leaf, float))
-
-
-def _has_state(code: Code) -> bool:
-    return bool(code.flight.start._fields)
-
-
-def _types(code: Code, printed: Readable) -> dict[str, Type]:
-    """Return all types that are used, those of members first."""
-    found: dict[str, Type] = {}
-
-    def visit(kind: Type) -> None:
-        for member in printed.members(kind):
-            visit(member.type)
-        if kind.members:
-            found.setdefault(kind.name, kind)
-
-    for kind in (*printed.used.values(), code.signature.params[0].type, *_interface(code)):
-        if printed.members(kind):
-            visit(kind)
-    return found
-
-
-def declaration(kind: Type, printed: Readable, public: dict[str, str], arrays: dict[str, int]) -> Iterator[str]:
-    """Yield the lines of a struct; arrays: names and sizes of more members."""
-    if kind.text:
-        yield from comment(kind.text)
+def _declaration(
+    kind: Type, printed: Readable, public: dict[str, str], arrays: Mapping[str, int] = MappingProxyType({})
+) -> Iterator[str]:
+    """Yield the lines of a struct; public: names of types that the header has; arrays: names and sizes of more members."""
+    yield from comment(kind.text)
     yield "typedef struct {"
+    members = printed.members(kind)
+    first = public.get(members[0].type.name, members[0].type.name) if members else ""
     if kind.elements:
-        yield f"    {_called(kind.members[0].type, public)} {kind.elements}[{len(kind.members)}];"
+        yield f"    {first} {kind.elements}[{len(members)}];"
+    elif members and not kind.named and all(member.type == members[0].type for member in members):
+        yield f"    {first} {', '.join(member.name for member in members)};"
     else:
-        members = printed.members(kind)
-        same = bool(members) and len({m.type for m in members}) == 1 and not any(m.text for m in members) and not kind.named
-        if same:
-            yield f"    {_called(members[0].type, public)} {', '.join(m.name for m in members)};"
-        for member in () if same else members:
+        for member in members:
             yield from _member(member, public)
     for name, size in arrays.items():
         yield f"    double {name}[{size}];"
@@ -262,7 +212,7 @@ def declaration(kind: Type, printed: Readable, public: dict[str, str], arrays: d
 
 
 def _member(member: Member, public: dict[str, str]) -> Iterator[str]:
-    line = f"    {_called(member.type, public)} {member.name};"
+    line = f"    {public.get(member.type.name, member.type.name)} {member.name};"
     note = f" /* {member.text.replace('*/', '* /')} */" if member.text else ""
     if len(line + note) > WIDTH:
         yield from ("    " + part for part in comment(member.text))
@@ -271,90 +221,61 @@ def _member(member: Member, public: dict[str, str]) -> Iterator[str]:
         yield line + note
 
 
-def _called(kind: Type, public: dict[str, str]) -> str:
-    return public.get(kind.name, kind.name)
-
-
-def _values(code: Code, printed: Readable) -> Iterator[str]:
-    """Yield the lines of the constants."""
+def _constants(code: Code, parameters: Type) -> Iterator[str]:
+    """Yield the lines of the numbers that do not change in flight."""
+    values = [leaf for leaf in leaves(code.flight.parameters) if isinstance(leaf, float)]
     yield "static const parameters_t parameters = {"
-    source = iter([leaf for leaf in leaves(code.flight.parameters) if isinstance(leaf, float)])
-    yield from _fields(code.signature.params[0].type, source, printed, 1)
+    yield from _fields(parameters, values, code.printed, "    ")
     yield "};"
 
 
-def _fields(kind: Type, source: Iterator[float], printed: Readable, depth: int) -> Iterator[str]:
-    live = printed.members(kind)
-    for member in kind.members:
-        if member not in live:
-            for _ in range(_count(member.type)):
-                next(source)
-        elif member.type.named:
-            yield f"{'    ' * depth}.{member.name} = {{"
-            yield from _fields(member.type, source, printed, depth + 1)
-            yield f"{'    ' * depth}}},"
+def _fields(kind: Type, values: list[float], printed: Readable, indent: str) -> Iterator[str]:
+    for member, part in printed.split(kind, values):
+        if member.type.named:
+            yield f"{indent}.{member.name} = {{"
+            yield from _fields(member.type, part, printed, indent + "    ")
+            yield f"{indent}}},"
         else:
             note = f" /* {member.text.partition(':')[0]} */" if ":" in member.text else ""
-            yield f"{'    ' * depth}.{member.name} = {_constant(member.type, source, printed)},{note}"
+            yield f"{indent}.{member.name} = {_text(printed.initialiser(member.type, part))},{note}"
 
 
-def _count(kind: Type) -> int:
-    return sum(_count(member.type) for member in kind.members) if kind.members else 1
-
-
-def _constant(kind: Type, source: Iterator[float], printed: Readable) -> str:
-    if not kind.members:
-        return printed.constant(next(source))
-    inner = ", ".join(_constant(member.type, source, printed) for member in kind.members)
-    return f"{{{{{inner}}}}}" if kind.elements else f"{{{inner}}}"
+def _text(text: str) -> str:
+    return text.replace(TIE, " ")
 
 
 def _init(code: Code) -> Iterator[str]:
     """Yield the lines that set the state to its start."""
-    name, printed = code.name, code.printed
-    start = code.flight.start
-    kind = code.signature.params[1].type
-    floats = iter([leaf for leaf in leaves(start) if isinstance(leaf, float)])
-    held = [leaf for leaf in leaves(start) if isinstance(leaf, Buffer)]
-    firsts = {
-        memory: _trimmed([buffer[k] for k in range(buffer.size)]) for memory, buffer in zip(code.buffers, held, strict=True)
-    }
+    name, printed, start = code.name, code.printed, code.flight.start
+    buffers = [leaf for leaf in leaves(start) if isinstance(leaf, Buffer)]
+    firsts = {memory: _trimmed(buffer.row(0, buffer.size)) for memory, buffer in zip(code.buffers, buffers, strict=True)}
     for memory, first in firsts.items():
         if first:
             yield f"/* What {memory} begin with; the rest are zeros. */"
             yield f"static const double first_{memory}[{len(first)}] = {{"
-            yield from textwrap.wrap(
-                ", ".join(map(printed.constant, first)), WIDTH, initial_indent="    ", subsequent_indent="    "
-            )
-            yield "};"
-            yield ""
+            text = ", ".join(printed.text(number, NUMBER) for number in first)
+            yield from textwrap.wrap(text, WIDTH, initial_indent="    ", subsequent_indent="    ")
+            yield from ("};", "")
     yield f"void {name}_init({name}_state_t *state)"
     yield "{"
-    if not _has_state(code):
+    if not start._fields:
         yield "    state->unused = 0.0;"
-    for member in kind.members if code.signature.params[1].leaves else ():
-        value = _constant(member.type, floats, printed)
-        if member.type.members:
-            yield f"    const {member.type.name} {member.name} = {value};"
-            yield f"    state->{member.name} = {member.name};"
-        else:
-            yield f"    state->{member.name} = {value};"
+    kind, values = code.signature.params[1].type, [leaf for leaf in leaves(start) if isinstance(leaf, float)]
+    for member, part in printed.split(kind, values) if values else ():
+        yield f"    state->{member.name} = {_text(printed.whole(member.type, part))};"
     for memory, first in firsts.items():
-        size = code.buffers[memory]
-        yield f"    for (int32_t k = 0; k < {size}; k++) {{"
-        yield (
-            f"        state->{memory}[k] = k < {len(first)} ? first_{memory}[k] : 0.0;"
-            if first
-            else f"        state->{memory}[k] = 0.0;"
-        )
+        value = f"k < {len(first)} ? first_{memory}[k] : 0.0" if first else "0.0"
+        yield f"    for (int32_t k = 0; k < {code.buffers[memory]}; k++) {{"
+        yield f"        state->{memory}[k] = {value};"
         yield "    }"
     yield "}"
 
 
-def _trimmed(numbers: list[float]) -> list[float]:
-    while numbers and numbers[-1] == 0.0 and str(numbers[-1]) == "0.0":
-        numbers.pop()
-    return numbers
+def _trimmed(values: tuple[float, ...]) -> tuple[float, ...]:
+    """Return numbers without the zeros at their end."""
+    while values and str(values[-1]) == "0.0":
+        values = values[:-1]
+    return values
 
 
 CMAKE = """\

@@ -12,6 +12,7 @@ from starhold.algebra.quantity import Quantity
 from starhold.algebra.structured import Buffer
 from starhold.parts.contract import Parameter
 from starhold.trace.handles import kind_of
+from starhold.trace.recording import RESERVED
 
 
 class Member(NamedTuple):
@@ -25,13 +26,18 @@ class Member(NamedTuple):
 
 class Type(NamedTuple):
     """A scalar (no members), or a struct. `elements`: a struct of one array, of that name. `named`: one of a NamedTuple,
-    which is passed by pointer and loses the members that nobody reads."""
+    which loses the members that nobody reads."""
 
     name: str
     members: tuple[Member, ...] = ()
     elements: str = ""
     named: bool = False
     text: str = ""
+
+    @property
+    def by_pointer(self) -> bool:
+        """Whether functions are given the address of a value: of structs of NamedTuples and of matrices."""
+        return self.named or (bool(self.elements) and bool(self.members[0].type.members))
 
 
 DOUBLE, BOOL = Type("double"), Type("bool")
@@ -40,9 +46,6 @@ QUATERNION = Type(
     "quaternion_t", tuple(Member(f"q{k}", DOUBLE) for k in range(4)), text="Scalar part first, Hamilton product."
 )
 MATRIX = Type("matrix_t", tuple(Member(f"row[{k}]", VECTOR) for k in range(3)), "row", text="Rows of a 3x3 matrix.")
-
-SIX = Type("six_t", tuple(Member(f"e[{k}]", DOUBLE) for k in range(6)), "e", text="Six numbers.")
-_NAMES = {"sixs6_t": "six_rows_t", "vectors6_t": "six_vectors_t"}
 
 
 class Path(NamedTuple):
@@ -57,9 +60,9 @@ class Types:
     """Types by their names, each with one form."""
 
     def __init__(self) -> None:
-        self.known: dict[str, Type] = {}
+        self.known = {kind.name: kind for kind in (QUATERNION, VECTOR, MATRIX)}
 
-    def of(self, value: Any, hint: str = "", annotation: str = "") -> Type | None:
+    def of(self, value: Any, annotation: str = "") -> Type | None:
         """Return the type of a value; None where nothing of it is left once equations are recorded."""
         if value is None or isinstance(value, (bool, int, Buffer)):
             return None
@@ -67,75 +70,51 @@ class Types:
             return BOOL if kind_of(value) == TRUTH else DOUBLE
         if hasattr(value, "_fields"):
             return self._struct(value)
-        found = [self.of(part, f"{hint}{k}") for k, part in enumerate(value)]
-        kept = [one for one in found if one is not None]
-        if not kept:
-            return None
-        first, count = kept[0], len(value)
-        if len(kept) == 1:
-            return first
-        if len(kept) == count and all(one == first for one in kept):
-            if first == DOUBLE and count == 3:
-                return VECTOR
-            if first == DOUBLE and count == 4 and _may_turn(annotation):
-                return QUATERNION
-            if first == VECTOR and count == 3:
-                return MATRIX
-            if first == DOUBLE and count == 6:
-                return SIX
-            name = f"{first.name.removesuffix('_t')}s{count}_t"
-            return self.keep(Type(_NAMES.get(name, name), tuple(Member(f"e[{k}]", first) for k in range(count)), "e"))
-        members = tuple(Member(f"part{k}", one) for k, one in enumerate(found) if one is not None)
-        return self.keep(Type(f"{hint or 'several'}_t", members))
+        kinds = [self.of(part) for part in value]
+        members = tuple(Member(f"part{k}", kind) for k, kind in enumerate(kinds) if kind is not None)
+        if len(members) < 2:
+            return members[0].type if members else None
+        first, count = members[0].type, len(value)
+        if any(kind != first for kind in kinds):
+            return self.keep(Type("several_t", members))
+        # Of what is not annotated four numbers are a quaternion.
+        turns = not annotation or "Quaternion" in annotation or "Any" in annotation
+        plain = {(DOUBLE, 3): VECTOR, (VECTOR, 3): MATRIX, (DOUBLE, 4): QUATERNION if turns else None}.get((first, count))
+        name = f"{first.name.removesuffix('_t')}s{count}_t"
+        return plain or self.keep(Type(name, tuple(Member(f"e[{k}]", first) for k in range(count)), "e"))
 
     def _struct(self, value: Any) -> Type | None:
         cls = type(value)
         words = getattr(cls, "__annotations__", {})
-        members: list[Member] = []
-        for name, part in zip(value._fields, value, strict=True):
-            found = self.of(part, name, str(words.get(name, "")))
-            if found is not None:
-                members.append(Member(free(name), found, _told(cls, name)))
-        if not members:
-            return None
-        return self.keep(Type(f"{title(cls)}_t", tuple(members), named=True, text=sentence(cls.__doc__ or "")))
+        kinds = {name: self.of(part, str(words.get(name, ""))) for name, part in zip(value._fields, value, strict=True)}
+        members = tuple(Member(free(name), kind, _meaning(cls, name)) for name, kind in kinds.items() if kind is not None)
+        text = sentence(cls.__doc__ or "")
+        return self.keep(Type(f"{title(cls)}_t", members, named=True, text=text)) if members else None
 
-    def keep(self, found: Type) -> Type:
+    def keep(self, kind: Type) -> Type:
         """Return a type under a name that no other has."""
-        base, count = found.name.removesuffix("_t"), 1
-        while self.known.get(found.name, found) != found:
+        base, count = kind.name.removesuffix("_t"), 1
+        while self.known.get(kind.name, kind) != kind:
             count += 1
-            found = found._replace(name=f"{base}_{count}_t")
-        return self.known.setdefault(found.name, found)
-
-
-_KEYWORDS = """
-    auto bool break case char const continue default do double else enum extern false float for goto if inline int long
-    register restrict return short signed sizeof sqrt static struct switch true typedef union unsigned void volatile while
-"""
-RESTRICTED = frozenset(_KEYWORDS.split())
-"""Words that nothing may be called."""
+            kind = kind._replace(name=f"{base}_{count}_t")
+        return self.known.setdefault(kind.name, kind)
 
 
 def free(name: str) -> str:
+    """Return a name that is no word of the language."""
     name = name.strip("_") or "x"
-    return f"{name}_of" if name in RESTRICTED else name
-
-
-def _may_turn(annotation: str) -> bool:
-    """Tell whether four numbers so annotated are a quaternion."""
-    return not annotation or "Quaternion" in annotation or "Any" in annotation
+    return f"{name}_of" if name in RESERVED else name
 
 
 def title(cls: Any) -> str:
     """A struct is called as its class; parts have classes of the same names, which are called after the part too."""
-    own = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower().strip("_")
+    name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower().strip("_")
     stem = cls.__module__.rpartition(".")[2]
-    ambiguous = own in ("params", "memory", "numbers", "reading") or (own == "state" and ".bodies." not in cls.__module__)
-    return f"{stem}_{own}" if ambiguous else own
+    ambiguous = name in ("params", "memory", "numbers", "reading") or (name == "state" and ".bodies." not in cls.__module__)
+    return f"{stem}_{name}" if ambiguous else name
 
 
-def _told(cls: Any, name: str) -> str:
+def _meaning(cls: Any, name: str) -> str:
     """Return unit and meaning of a field, where its class says them."""
     try:
         hint = get_type_hints(cls, include_extras=True).get(name)
@@ -150,21 +129,16 @@ def _told(cls: Any, name: str) -> str:
 def sentence(doc: str) -> str:
     """Return the first sentence of a docstring, unless Python made it."""
     text = " ".join(doc.split())
-    if re.match(r"\w+\(.*\)$", text):
-        return ""
-    return re.split(r"(?<=\.) (?=[A-Z])", text, maxsplit=1)[0]
+    return "" if re.match(r"\w+\(.*\)$", text) else re.split(r"(?<=\.) (?=[A-Z])", text, maxsplit=1)[0]
 
 
 def paths(kind: Type | None, base: str, link: str = ".") -> Iterator[Path]:
     """Yield the leaves of a value of this type in order, of which `base` is the name."""
-    if kind is None:
-        return
-    if not kind.members:
+    if kind is not None and not kind.members:
         yield Path(base, TRUTH if kind == BOOL else NUMBER, ())
-        return
-    for member in kind.members:
+    for member in kind.members if kind is not None else ():
         for path in paths(member.type, f"{base}{link}{member.name}"):
-            yield path._replace(through=((kind.name, member.name), *path.through)) if kind.named else path
+            yield path._replace(through=((kind.name, member.name), *path.through)) if kind and kind.named else path
 
 
 def comment(text: str, width: int = 104) -> list[str]:

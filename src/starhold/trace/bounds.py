@@ -8,7 +8,7 @@ are reached, but for some products of a counter with itself. What a branch or a 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import prod
 from typing import Any, NamedTuple, TypeAlias
 
@@ -127,6 +127,16 @@ class Form:
             for b, d in other.terms.items():
                 found[tuple(sorted(a + b))] += c * d
         return Form(found)
+
+    def text(self, names: Sequence[str]) -> str:
+        """Return it in the names of the symbols, its number last."""
+        terms: list[str] = []
+        for symbols, c in sorted(self.terms.items(), key=lambda term: (not term[0], term[0])):
+            factors = [names[symbol] for symbol in symbols]
+            if abs(c) != 1 or not factors:
+                factors.insert(0, str(abs(c)))
+            terms += ["-" if c < 0 else "+", " * ".join(factors)]
+        return " ".join(terms[1:] if terms[:1] == ["+"] else terms) or "0"
 
     @property
     def last(self) -> int | None:
@@ -292,21 +302,10 @@ class _Walk:
             if s.memory not in self.sizes:
                 raise ValueError(f"no size for the memory {s.memory}")
             if low < 0 or high >= self.sizes[s.memory]:
-                what = f"{function.name}: {s.memory}[{self._text(place)}] may lie from {low} to {high}"
+                what = f"{function.name}: {s.memory}[{place.text(self.names)}] may lie from {low} to {high}"
                 raise OutsideError(f"{what}, and {s.memory} holds {self.sizes[s.memory]} numbers")
         ends = self.places.get(s.memory, (low, high))
         self.places[s.memory] = min(low, ends[0]), max(high, ends[1])
-
-    def _text(self, form: Form) -> str:
-        terms: list[str] = []
-        for symbols, c in sorted(form.terms.items(), key=lambda term: (not term[0], term[0])):
-            factors = [self.names[symbol] for symbol in symbols]
-            if abs(c) != 1 or not factors:
-                factors.insert(0, str(abs(c)))
-            terms += ["-" if c < 0 else "+", " * ".join(factors)]
-        if not terms:
-            return "0"
-        return " ".join(terms[1:] if terms[0] == "+" else terms)
 
     def _call(self, s: Call, known: dict[str, Form]) -> _Part:
         pairs = zip(s.function.params, s.args, strict=True)

@@ -8,7 +8,7 @@ doubles are IEEE doubles and the compiler contracts nothing (`-std=c99 -ffp-cont
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, ClassVar
 
 from starhold.algebra.operations import INDEX, NUMBER, TRUTH, UNIFORM, WORD
 from starhold.trace.program import Call, Function, Memory, Value
@@ -25,7 +25,7 @@ _STRING = """
     memchr memcmp memcpy memmove memset strcat strchr strcmp strcoll strcpy strcspn strerror strlen strncat strncmp strncpy
     strpbrk strrchr strspn strstr strtok strxfrm
 """
-_GUARD = """\
+GUARD = """\
 #if defined(__FAST_MATH__) || (defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ != 0)
 #error "this code needs IEEE arithmetic in doubles: no -ffast-math, no x87"
 #endif
@@ -56,6 +56,7 @@ class C99(Source):
     than one value."""
 
     language = "c"
+    types: ClassVar[dict[str, str]] = TYPES
     taken = frozenset(name + end for name in _MATH.split() for end in ("", "f", "l")) | frozenset((*_STRING.split(), "main"))
 
     @property
@@ -66,7 +67,7 @@ class C99(Source):
     def _opening(self) -> list[str]:
         body = "\n".join(self.lines)
         helpers = [text for name, text in _HELPERS.items() if f"{name}(" in body]
-        found = ["#include <math.h>", "#include <stdint.h>", *["#include <string.h>"] * bool(helpers), "", _GUARD]
+        found = ["#include <math.h>", "#include <stdint.h>", *["#include <string.h>"] * bool(helpers), "", GUARD]
         for text in helpers:
             found += ["", text]
         return found
@@ -75,14 +76,13 @@ class C99(Source):
         main = self.is_main(function)
         memories = self.program.memories if main else self.memories[function.name]
         given = [_pointer(memory) for memory in memories]
-        given += [f"{TYPES[kind]}{TIE}{name}" for name, kind in function.params]
+        given += [f"{self.types[kind]}{TIE}{name}" for name, kind in function.params]
         gives = "void"
         if len(function.outs) == 1:
-            gives = TYPES[function.outs[0][1]]
+            gives = self.types[function.outs[0][1]]
         else:
-            given += [
-                f"{TYPES[kind]}{TIE}*{name}" for (_, kind), name in zip(function.outs, self._pointers(function), strict=True)
-            ]
+            outs = zip(function.outs, self._pointers(function), strict=True)
+            given += [f"{self.types[kind]}{TIE}*{name}" for (_, kind), name in outs]
         return f"{'' if main else 'static '}{gives} {self.titles[function.name]}({', '.join(given) or 'void'})"
 
     def _pointers(self, function: Function) -> list[str]:
@@ -127,16 +127,16 @@ class C99(Source):
         return repr(number)
 
     def _let(self, kind: str, name: str, text: str) -> None:
-        self.put(f"const {TYPES[kind]} {name} = {text};")
+        self.put(f"const {self.types[kind]} {name} = {text};")
 
     def _variable(self, kind: str, name: str, value: Value) -> None:
-        self.put(f"{TYPES[kind]} {name} = {self.text(value, kind)};")
+        self.put(f"{self.types[kind]} {name} = {self.text(value, kind)};")
 
     def _assign(self, kind: str, name: str, value: Value) -> None:
         self.put(f"{name} = {self.text(value, kind)};")
 
     def _counted(self, counter: str, most: str) -> str:
-        return f"for (long {counter} = 0; {counter} < {most}; {counter}++)"
+        return f"for ({self.types[INDEX]} {counter} = 0; {counter} < {most}; {counter}++)"
 
     def _call(self, s: Call) -> None:
         function = self.functions[s.function.name]
@@ -148,7 +148,7 @@ class C99(Source):
             return
         if len(s.refs) > 1:
             for name, kind in s.refs:
-                self.put(f"{TYPES[kind]} {name};")
+                self.put(f"{self.types[kind]} {name};")
             given += [f"&{name}" for name, _ in s.refs]
         self.put(f"{self.titles[function.name]}({', '.join(given)});")
 

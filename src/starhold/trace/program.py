@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 from starhold.algebra.operations import Operation
@@ -170,7 +170,7 @@ def prune(block: Block, outs: Iterable[Value]) -> tuple[Block, dict[str, Value]]
             break
         wanted = {renamed(out, found) for out in wanted}
         names = {name: renamed(value, found) for name, value in names.items()} | found
-    return _kept(block, _live(block, wanted)), names
+    return pruned(block, live_names(block, wanted)), names
 
 
 def single_turns(function: Function) -> Function:
@@ -220,27 +220,36 @@ def _same(a: Value, b: Value) -> bool:
     return type(a) is type(b) and repr(a) == repr(b)
 
 
-def _live(block: Block, outs: Iterable[Value]) -> set[Value]:
-    """Keep what is read for the sake of the outs, of what is written, or of functions that are called."""
-    live, before = set(outs), -1
+def _arguments(s: Call, names: set[Value]) -> Sequence[Value] | None:
+    return s.args
+
+
+def live_names(
+    block: Block, outs: Iterable[Value], arguments: Callable[..., Sequence[Value] | None] = _arguments
+) -> set[Value]:
+    """Return what is read for the sake of the outs, of what is written, or of functions that are called. arguments(call,
+    names) gives what a call reads where these names are read; None where it is not needed."""
+    names, before = set(outs), -1
     # Backwards, so that what is read by what is read is mostly found at once.
     order = [*statements(block)][::-1]
     acts = {id(s): _acts(s.body) for s in order if isinstance(s, (Loop, Branch))}
-    while before != (before := len(live)):
+    while before != (before := len(names)):
         for s in order:
             if isinstance(s, (Op, Load)):
-                if s.ref in live:
-                    live.update(reads((s,)))
+                if s.ref in names:
+                    names.update(reads((s,)))
             elif isinstance(s, Loop):
-                slots = [slot for slot in s.slots if {slot.name, slot.end} & live]
+                slots = [slot for slot in s.slots if {slot.name, slot.end} & names]
                 if slots or acts[id(s)]:
-                    live.update((s.most, s.done, *(x for slot in slots for x in (slot.before, slot.after))))
+                    names.update((s.most, s.done, *(x for slot in slots for x in (slot.before, slot.after))))
             elif isinstance(s, Branch):
                 if acts[id(s)]:
-                    live.add(s.truth)
+                    names.add(s.truth)
+            elif isinstance(s, Call):
+                names.update(arguments(s, names) or ())
             else:
-                live.update(reads((s,)))
-    return live
+                names.update(reads((s,)))
+    return names
 
 
 def _acts(block: Block) -> bool:
@@ -248,19 +257,25 @@ def _acts(block: Block) -> bool:
     return any(isinstance(s, (Store, Call)) for s in statements(block))
 
 
-def _kept(block: Block, live: set[Value]) -> Block:
+def pruned(block: Block, names: set[Value], arguments: Callable[..., Sequence[Value] | None] = _arguments) -> Block:
+    """Return the block without what gives none of these names; arguments: as `live_names` takes it."""
     found: list[Any] = []
     for s in block:
         if isinstance(s, Loop):
-            slots = tuple(slot for slot in s.slots if {slot.name, slot.end} & live)
-            s = s._replace(slots=slots, head=_kept(s.head, live), body=_kept(s.body, live))
+            slots = tuple(slot for slot in s.slots if {slot.name, slot.end} & names)
+            s = s._replace(slots=slots, head=pruned(s.head, names, arguments), body=pruned(s.body, names, arguments))
             if not slots and not _acts(s.body):
                 continue
         elif isinstance(s, Branch):
-            s = s._replace(body=_kept(s.body, live))
+            s = s._replace(body=pruned(s.body, names, arguments))
             if not _acts(s.body):
                 continue
-        elif isinstance(s, (Op, Load)) and s.ref not in live:
+        elif isinstance(s, Call):
+            given = arguments(s, names)
+            if given is None:
+                continue
+            s = s._replace(args=tuple(given))
+        elif isinstance(s, (Op, Load)) and s.ref not in names:
             continue
         found.append(s)
     return tuple(found)

@@ -268,8 +268,6 @@ class Recorder:
         return self._handles(out, list(refs))
 
     def _define(self, equation: Callable[..., Any], values: tuple[Any, ...]) -> tuple[Function, list[int], Any]:
-        outer = self._open, self._seen, self._names
-        self._open, self._seen, self._names = [], [], _Names(memory.name for memory in self.memories)
         params: list[tuple[str, str]] = []
 
         def formal(word: str) -> Callable[[Any], Any]:
@@ -284,17 +282,25 @@ class Recorder:
             return make
 
         words = [*inspect.signature(equation).parameters]
-        given = [mapped(value, formal(word)) for value, word in zip(values, words, strict=True)]
-        body, out = self._block(equation, *given)
+        with self._alone():
+            given = [mapped(value, formal(word)) for value, word in zip(values, words, strict=True)]
+            body, out = self._block(equation, *given)
         outs = self._refs(out)
         body, names = prune(body, outs)
         ends = tuple((renamed(x, names), kind_of(leaf)) for x, leaf in zip(outs, leaves(out), strict=True))
-        self._open, self._seen, self._names = outer
         used = {*reads(body), *(x for x, _ in ends)}
         kept = [place for place, (name, _) in enumerate(params) if name in used]
         params = [params[place] for place in kept]
         doc = inspect.cleandoc(equation.__doc__ or "")
         return Function(self._titles.new(equation.__name__), doc, tuple(params), body, ends), kept, out
+
+    @contextmanager
+    def _alone(self) -> Generator[None]:
+        """Record a function apart from what is open."""
+        outer = self._open, self._seen, self._names
+        self._open, self._seen, self._names = [], [], _Names(memory.name for memory in self.memories)
+        yield
+        self._open, self._seen, self._names = outer
 
     def _parts(self, leaf: Any) -> list[Any]:
         """Yield the parts of an argument that are passed on: those not known while recording."""

@@ -209,6 +209,9 @@ class Source(ABC):
             for s in block:
                 if isinstance(s, (Op, Load)):
                     home[s.ref] = own
+                elif isinstance(s, Call) and s.refs:
+                    # Members of one variable, where it has any.
+                    home[s.refs[0][0].partition(".")[0]] = own
                 for value, times in self._operands(s):
                     seen[value] += [own] * times
                 if isinstance(s, (Branch, Loop)):
@@ -223,9 +226,9 @@ class Source(ABC):
                     walk(s.body, inner)
 
         walk(function.body, 0)
-        for out, kind in function.outs:
-            seen[out] += [0] * self._halves(kind)
-        self._once = {name for name, own in home.items() if seen[name] == [own]}
+        for out, times in self._results(function):
+            seen[out] += [0] * times
+        self._once = {name for name, own in home.items() if seen.get(name) == [own]}
         self._read = {value for value in seen if isinstance(value, str)}
         self._folded = {}
 
@@ -243,6 +246,10 @@ class Source(ABC):
         else:
             yield from ((value, 1) for value in reads((s._replace(body=()),) if isinstance(s, Branch) else (s,)))
 
+    def _results(self, function: Function) -> Iterator[tuple[Value, int]]:
+        """Yield the values that a function gives, and how often its text names them."""
+        yield from ((out, self._halves(kind)) for out, kind in function.outs)
+
     def _halves(self, kind: str) -> int:
         """Tell how many texts a value is made of."""
         return 1
@@ -258,10 +265,9 @@ class Source(ABC):
             if isinstance(s, Op):
                 self._op(s)
             elif isinstance(s, Load):
-                text = f"{s.memory}[{self.text(s.index, INDEX)}]"
-                self._keep(s.ref, NUMBER, Expression(text), moves=not self.program.memory(s.memory).writable)
+                self._keep(s.ref, NUMBER, Expression(self._place(s)), moves=not self.program.memory(s.memory).writable)
             elif isinstance(s, Store):
-                self.put(f"{s.memory}[{self.text(s.index, INDEX)}] = {self.text(s.value, NUMBER)};")
+                self.put(f"{self._place(s)} = {self.text(s.value, NUMBER)};")
             elif isinstance(s, Call):
                 self._call(s)
             elif isinstance(s, Branch):
@@ -270,6 +276,10 @@ class Source(ABC):
                 self.close()
             else:
                 self._loop(s)
+
+    def _place(self, s: Load | Store) -> str:
+        """Return the text of a place in memory."""
+        return f"{s.memory}[{self.text(s.index, INDEX)}]"
 
     def _op(self, s: Op) -> None:
         (text,) = self._texts(s)
