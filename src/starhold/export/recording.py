@@ -15,7 +15,7 @@ from starhold.export.copies import COPIED, Copies
 from starhold.export.types import BOOL, Member, Path, Type, Types, free, paths, title
 from starhold.trace.handles import HANDLES, Handle
 from starhold.trace.program import Block, Call, Function, Program, Value, prune, renamed, writes
-from starhold.trace.recording import Recorder
+from starhold.trace.recording import Cells, Recorder
 
 _SIZES = (3, 4, 6)
 """Numbers that a tuple in a call may have."""
@@ -76,7 +76,7 @@ class Recording(Recorder):
 
     def _called(self, equation: Callable[..., Any], values: tuple[Any, ...]) -> Any:
         self._look_up_names()
-        if not all(map(_is_plain, values)) or not any(isinstance(leaf, (Handle, Buffer)) for leaf in leaves(values)):
+        if not all(map(_is_part, leaves(values))) or not any(isinstance(leaf, (Handle, Buffer)) for leaf in leaves(values)):
             return equation(*values)
         key = (equation, self._form(values))
         if key not in self._functions and key not in self._inlined:
@@ -125,7 +125,7 @@ class Recording(Recorder):
         says = str(equation.__annotations__.get("return", ""))
         several = out if isinstance(out, tuple) and not hasattr(out, "_fields") else ()
         kinds = [self.types.of(part) for part in several]
-        if sum(kind is not None for kind in kinds) < 2 or (len(kinds) > 2 and _is_group(several)):
+        if sum(kind is not None for kind in kinds) < 2 or (len(kinds) > 2 and all(kind == kinds[0] for kind in kinds)):
             return self.types.of(out, says)
         inner = re.fullmatch(r"tuple\[(.*)\]", says)
         words = [] if inner is None else [re.sub(r"\W.*", "", word.strip()).lower() for word in inner[1].split(",")]
@@ -180,7 +180,7 @@ class Recording(Recorder):
         for field in getattr(value, "_fields", ()):
             part = getattr(value, field)
             # The whole of a memory has a name already.
-            if isinstance(part, Buffer) and type(part.base) is int and part.size != part.cells.memory.size:
+            if isinstance(part, Buffer) and _is_part(part) and part.size != part.cells.memory.size:
                 self.parts.setdefault(part.cells.memory.name, {}).setdefault(part.base, free(field))
 
 
@@ -195,7 +195,7 @@ def _title(equation: Any) -> str:
 
 def _key(value: Any) -> Any:
     """Return the title of a value's class, and its numbers; None for what needs no name."""
-    if not isinstance(value, (tuple, Handle)) or not _is_plain(value):
+    if not isinstance(value, (tuple, Handle)) or not all(map(_is_part, leaves(value))):
         return None
     numbers = _numbers(value)
     known = not any(isinstance(number, str) for number in numbers)
@@ -217,24 +217,8 @@ def _numbers(value: Any) -> list[Value]:
     return [leaf.ref if isinstance(leaf, Handle) else leaf for leaf in leaves(value) if _counts(leaf)]
 
 
-def _is_plain(value: Any) -> bool:
-    """Tell whether a value has a type of C: numbers, vectors, quaternions, matrices and NamedTuples of such."""
-    if isinstance(value, tuple) and not hasattr(value, "_fields"):
-        return _is_group(value)
-    return all(map(_is_part, leaves(value)))
-
-
 def _is_part(leaf: Any) -> bool:
-    """Tell whether a leaf may be a member of a struct, or is known while recording."""
+    """Tell whether a leaf may be a member of a struct, is known while recording, or lies in the law's memory."""
     if isinstance(leaf, Buffer):
-        return type(leaf.base) is type(leaf.size) is int
+        return isinstance(leaf.cells, Cells) and type(leaf.base) is type(leaf.size) is int
     return leaf.kind in (NUMBER, TRUTH) if isinstance(leaf, Handle) else isinstance(leaf, (bool, int, float))
-
-
-def _is_group(parts: Any) -> bool:
-    """Tell whether these are a vector or a quaternion, six numbers, or rows of a matrix of such."""
-    if len(parts) not in _SIZES:
-        return False
-    if all(isinstance(part, tuple) and not hasattr(part, "_fields") for part in parts):
-        return all(len(part) == len(parts[0]) and _is_group(part) for part in parts)
-    return all(isinstance(part, (Handle, float)) and _is_part(part) for part in parts)
