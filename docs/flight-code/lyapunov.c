@@ -101,6 +101,14 @@ static const parameters_t parameters = {
 };
 
 
+/* -------------------------------- parts.targets.inertial -------------------------------- */
+
+/* The attitude, at rest. */
+static goal_t inertial_goal(const inertial_params_t *params)
+{
+    return (goal_t){.attitude = params->attitude};
+}
+
 /* ------------------------------------ algebra.vector ------------------------------------ */
 
 /* Return the scalar product. */
@@ -157,6 +165,14 @@ static vector_t to_body(quaternion_t q, vector_t r)
     return add(add(r, scale(q.q0, t)), cross(t, v));
 }
 
+/* ------------------------------------- parts.craft -------------------------------------- */
+
+/* The inertia with all that is in the craft, which gravity acts on (kg m2). */
+static vector_t total_inertia(const craft_t *craft)
+{
+    return craft->inertia;
+}
+
 /* ------------------------------------ algebra.vector ------------------------------------ */
 
 /* Return a x (m a) for a symmetric m: the gyroscopic torque is gyroscopic_torque(J, w). */
@@ -170,16 +186,15 @@ static vector_t gyroscopic_torque(vector_t m, vector_t a)
 /* Gravity-gradient torque (N m) for the position in body axes (m) and strength 3 mu/r5 (1/(m2 s2)). */
 static vector_t gravity_gradient(vector_t position, double strength, const craft_t *craft)
 {
-    return scale(strength, gyroscopic_torque(craft->inertia, position));
+    return scale(strength, gyroscopic_torque(total_inertia(craft), position));
 }
 
 /* Torque on the body (N m, body axes). */
 static vector_t gravity_gradient_torque(const state_t *state, const craft_t *craft)
 {
     const attraction_result_t attraction_result = attraction(state->position, craft);
-    const vector_t gravity_gradient_result = gravity_gradient(to_body(state->attitude, state->position), 3.0 *
-        attraction_result.scalar * attraction_result.inverse_square, craft);
-    return gravity_gradient_result;
+    return gravity_gradient(to_body(state->attitude, state->position), 3.0 * attraction_result.scalar *
+        attraction_result.inverse_square, craft);
 }
 
 /* ---------------------------------- algebra.quaternion ---------------------------------- */
@@ -284,10 +299,10 @@ void lyapunov_init(lyapunov_state_t *state)
 void lyapunov_step(lyapunov_state_t *state, const lyapunov_input_t *input, lyapunov_command_t *command)
 {
     (void)state;
+    const goal_t goal = inertial_goal(&parameters.setup.target);
     const state_t body_state = {.attitude = input->attitude, .rate = input->rate,
         .position = input->position};
     const vector_t torque = gravity_gradient_torque(&body_state, &parameters.craft);
-    const goal_t goal = {.attitude = parameters.setup.target.attitude};
     const scene_t scene = {.goal = goal, .torque = torque};
     const measurement_t told = observe(&body_state, &scene);
     const vector_t wanted = lyapunov_torque(&told, &parameters.gains, &parameters.craft);

@@ -91,6 +91,14 @@ static const parameters_t parameters = {
 };
 
 
+/* -------------------------------- parts.targets.inertial -------------------------------- */
+
+/* The attitude, at rest. */
+static goal_t inertial_goal(const inertial_params_t *params)
+{
+    return (goal_t){.attitude = params->attitude};
+}
+
 /* ---------------------------------- algebra.quaternion ---------------------------------- */
 
 /* Return the inverse rotation. */
@@ -251,8 +259,8 @@ void modal_init(modal_state_t *state)
 void modal_step(modal_state_t *state, const modal_input_t *input, modal_command_t *command)
 {
     (void)state;
+    const goal_t goal = inertial_goal(&parameters.setup.target);
     const state_t body_state = {.attitude = input->attitude, .rate = input->rate};
-    const goal_t goal = {.attitude = parameters.setup.target.attitude};
     const scene_t scene = {.goal = goal, .torque = {0.0, 0.0, 0.0}, .momentum = {0.0, 0.0, 0.0}};
     const measurement_t told = observe(&body_state, &scene);
     const vector_t wanted = modal_torque(&told, &parameters.gains, &parameters.craft);

@@ -253,6 +253,14 @@ enum {
     SPARE_AT = 667,
 };
 
+/* -------------------------------- parts.targets.inertial -------------------------------- */
+
+/* The attitude, at rest. */
+static goal_t inertial_goal(const inertial_params_t *params)
+{
+    return (goal_t){.attitude = params->attitude};
+}
+
 /* ------------------------------------ algebra.vector ------------------------------------ */
 
 /* Return the scalar product. */
@@ -297,6 +305,14 @@ static vector_t to_body(quaternion_t q, vector_t r)
     const vector_t v = vector_part(q);
     const vector_t t = scale(2.0, cross(r, v));
     return add(add(r, scale(q.q0, t)), cross(t, v));
+}
+
+/* ------------------------------------- parts.craft -------------------------------------- */
+
+/* The inertia with all that is in the craft, which gravity acts on (kg m2). */
+static vector_t total_inertia(const craft_t *craft)
+{
+    return craft->inertia;
 }
 
 /* ------------------------------------ algebra.vector ------------------------------------ */
@@ -383,10 +399,10 @@ static matrix_t skew(vector_t a)
 }
 
 /* Return the transposed matrix. */
-static matrix_t transpose(const matrix_t *m)
+static matrix_t transpose(matrix_t m)
 {
-    return (matrix_t){{{m->row[0].x, m->row[1].x, m->row[2].x}, {m->row[0].y, m->row[1].y, m->row[2].y},
-        {m->row[0].z, m->row[1].z, m->row[2].z}}};
+    return (matrix_t){{{m.row[0].x, m.row[1].x, m.row[2].x}, {m.row[0].y, m.row[1].y, m.row[2].y},
+        {m.row[0].z, m.row[1].z, m.row[2].z}}};
 }
 
 /* -------------------------------- laws.predictive.motion -------------------------------- */
@@ -395,22 +411,18 @@ static matrix_t transpose(const matrix_t *m)
 static linear_t linearise(const measurement_t *measurement, const craft_t *craft)
 {
     const vector_t momentum = apply(craft->inertia, measurement->rate);
-    const vector_t pull = apply(craft->inertia, measurement->position);
+    const vector_t pull = apply(total_inertia(craft), measurement->position);
     const double square = dot(measurement->position, measurement->position);
     const double strength = 0.0 < square ? 6.0 * craft->gravity / (square * square * sqrt(square)) : 0.0;
-    const matrix_t skew_result = skew(measurement->rate);
-    const matrix_t transpose_result = transpose(&skew_result);
     const vector_t lever = cross(measurement->position, (vector_t){1.0, 0.0, 0.0});
     const vector_t scale_result = scale(strength, apply(craft->inverse_inertia,
-        subtract(cross(measurement->position, apply(craft->inertia, lever)), cross(pull, lever))));
+        subtract(cross(measurement->position, apply(total_inertia(craft), lever)), cross(pull, lever))));
     const vector_t lever_2 = cross(measurement->position, (vector_t){0.0, 1.0, 0.0});
     const vector_t scale_result_2 = scale(strength, apply(craft->inverse_inertia,
-        subtract(cross(measurement->position, apply(craft->inertia, lever_2)), cross(pull, lever_2))));
+        subtract(cross(measurement->position, apply(total_inertia(craft), lever_2)), cross(pull, lever_2))));
     const vector_t lever_3 = cross(measurement->position, (vector_t){0.0, 0.0, 1.0});
-    const vector_t tilt = subtract(cross(measurement->position, apply(craft->inertia, lever_3)),
-        cross(pull, lever_3));
-    const matrix_t m = {{scale_result, scale_result_2, scale(strength, apply(craft->inverse_inertia, tilt))}};
-    const matrix_t transpose_result_2 = transpose(&m);
+    const vector_t scale_result_3 = scale(strength, apply(craft->inverse_inertia,
+        subtract(cross(measurement->position, apply(total_inertia(craft), lever_3)), cross(pull, lever_3))));
     const vector_t apply_result = apply(craft->inverse_inertia,
         subtract(cross(momentum, (vector_t){1.0, 0.0, 0.0}), cross(measurement->rate,
         apply(craft->inertia, (vector_t){1.0, 0.0, 0.0}))));
@@ -420,19 +432,18 @@ static linear_t linearise(const measurement_t *measurement, const craft_t *craft
     const vector_t apply_result_3 = apply(craft->inverse_inertia,
         subtract(cross(momentum, (vector_t){0.0, 0.0, 1.0}), cross(measurement->rate,
         apply(craft->inertia, (vector_t){0.0, 0.0, 1.0}))));
-    const matrix_t m_2 = {{apply_result, apply_result_2, apply_result_3}};
-    const matrix_t transpose_result_3 = transpose(&m_2);
-    const matrix_t m_3 = {{apply(craft->inverse_inertia, (vector_t){1.0, 0.0, 0.0}),
+    const matrix_t transpose_result =
+        transpose((matrix_t){{apply(craft->inverse_inertia, (vector_t){1.0, 0.0, 0.0}),
         apply(craft->inverse_inertia, (vector_t){0.0, 1.0, 0.0}),
-        apply(craft->inverse_inertia, (vector_t){0.0, 0.0, 1.0})}};
-    const matrix_t transpose_result_4 = transpose(&m_3);
-    return (linear_t){.turning = transpose_result, .stiffness = transpose_result_2,
-        .damping = transpose_result_3, .push = transpose_result_4};
+        apply(craft->inverse_inertia, (vector_t){0.0, 0.0, 1.0})}});
+    return (linear_t){.turning = transpose(skew(measurement->rate)), .stiffness =
+        transpose((matrix_t){{scale_result, scale_result_2, scale_result_3}}), .damping =
+        transpose((matrix_t){{apply_result, apply_result_2, apply_result_3}}), .push = transpose_result};
 }
 
-static matrix_t scaled(const matrix_t *m, double c)
+static matrix_t scaled(matrix_t m, double c)
 {
-    return (matrix_t){{scale(c, m->row[0]), scale(c, m->row[1]), scale(c, m->row[2])}};
+    return (matrix_t){{scale(c, m.row[0]), scale(c, m.row[1]), scale(c, m.row[2])}};
 }
 
 /* Return the whole matrix. */
@@ -491,9 +502,9 @@ static share_result_t share_1(const rates_t *rates)
         absolute(rows_result.e[4].e[5]);
     const double t33 = 0.0 + absolute(rows_result.e[5].e[0]) + absolute(rows_result.e[5].e[1]) +
         absolute(rows_result.e[5].e[2]);
-    const double total = t33 + absolute(rows_result.e[5].e[3]) + absolute(rows_result.e[5].e[4]) +
+    const double t36 = t33 + absolute(rows_result.e[5].e[3]) + absolute(rows_result.e[5].e[4]) +
         absolute(rows_result.e[5].e[5]);
-    double size_ = maximum(total, maximum(t30, maximum(t24, maximum(t18, maximum(t12, maximum(t6, 0.0))))));
+    double size_ = maximum(t36, maximum(t30, maximum(t24, maximum(t18, maximum(t12, maximum(t6, 0.0))))));
     double share_ = 1.0;
     double count_ = 0.0;
     for (int32_t turn = 0; turn < 60; turn++) {
@@ -511,25 +522,21 @@ static share_result_t share_1(const rates_t *rates)
 /* The rates act over that share of the time. */
 static rates_t during(const rates_t *rates, double share)
 {
-    const matrix_t scaled_result = scaled(&rates->turning, share);
-    const matrix_t scaled_result_2 = scaled(&rates->stiffness, share);
-    const matrix_t scaled_result_3 = scaled(&rates->damping, share);
-    return (rates_t){.turning = scaled_result, .half = rates->half * share, .stiffness = scaled_result_2,
-        .damping = scaled_result_3};
+    return (rates_t){.turning = scaled(rates->turning, share), .half = rates->half * share,
+        .stiffness = scaled(rates->stiffness, share), .damping = scaled(rates->damping, share)};
 }
 
 /* -------------------------------- laws.predictive.sixes --------------------------------- */
 
 /* Return the transposed matrix. */
-static doubles6s6_t transposed(const doubles6s6_t *m)
+static doubles6s6_t transposed(doubles6s6_t m)
 {
-    return (doubles6s6_t){{{{m->e[0].e[0], m->e[1].e[0], m->e[2].e[0], m->e[3].e[0], m->e[4].e[0],
-        m->e[5].e[0]}}, {{m->e[0].e[1], m->e[1].e[1], m->e[2].e[1], m->e[3].e[1], m->e[4].e[1],
-        m->e[5].e[1]}}, {{m->e[0].e[2], m->e[1].e[2], m->e[2].e[2], m->e[3].e[2], m->e[4].e[2],
-        m->e[5].e[2]}}, {{m->e[0].e[3], m->e[1].e[3], m->e[2].e[3], m->e[3].e[3], m->e[4].e[3],
-        m->e[5].e[3]}}, {{m->e[0].e[4], m->e[1].e[4], m->e[2].e[4], m->e[3].e[4], m->e[4].e[4],
-        m->e[5].e[4]}}, {{m->e[0].e[5], m->e[1].e[5], m->e[2].e[5], m->e[3].e[5], m->e[4].e[5],
-        m->e[5].e[5]}}}};
+    return (doubles6s6_t){{{{m.e[0].e[0], m.e[1].e[0], m.e[2].e[0], m.e[3].e[0], m.e[4].e[0], m.e[5].e[0]}},
+        {{m.e[0].e[1], m.e[1].e[1], m.e[2].e[1], m.e[3].e[1], m.e[4].e[1], m.e[5].e[1]}}, {{m.e[0].e[2],
+        m.e[1].e[2], m.e[2].e[2], m.e[3].e[2], m.e[4].e[2], m.e[5].e[2]}}, {{m.e[0].e[3], m.e[1].e[3],
+        m.e[2].e[3], m.e[3].e[3], m.e[4].e[3], m.e[5].e[3]}}, {{m.e[0].e[4], m.e[1].e[4], m.e[2].e[4],
+        m.e[3].e[4], m.e[4].e[4], m.e[5].e[4]}}, {{m.e[0].e[5], m.e[1].e[5], m.e[2].e[5], m.e[3].e[5],
+        m.e[4].e[5], m.e[5].e[5]}}}};
 }
 
 /* -------------------------------- laws.predictive.motion -------------------------------- */
@@ -552,8 +559,7 @@ static double dot1(vector_t a, vector_t b)
 static double dot2(doubles6_t a, doubles6_t b)
 {
     const double t8 = 0.0 + a.e[0] * b.e[0] + a.e[1] * b.e[1] + a.e[2] * b.e[2] + a.e[3] * b.e[3];
-    const double total = t8 + a.e[4] * b.e[4];
-    return total + a.e[5] * b.e[5];
+    return t8 + a.e[4] * b.e[4] + a.e[5] * b.e[5];
 }
 
 /* -------------------------------- laws.predictive.motion -------------------------------- */
@@ -591,8 +597,7 @@ static double minimum(double a, double b)
 /* Write the sum of A^k / (k + 1)! from k = 0 on to `mean`, column after column. */
 static void sum_up(double *numbers, const rates_t *rates)
 {
-    const doubles6s6_t rows_result = rows(rates);
-    const doubles6s6_t transposed_result = transposed(&rows_result);
+    const doubles6s6_t transposed_result = transposed(rows(rates));
     const doubles6_t first = times1(transposed_result.e[0], 0.5);
     numbers[TERM_AT] = first.e[0];
     numbers[TERM_AT + 1] = first.e[1];
@@ -725,10 +730,10 @@ static void sum_up(double *numbers, const rates_t *rates)
 /* -------------------------------- laws.predictive.sixes --------------------------------- */
 
 /* Return m x. */
-static doubles6_t apply1(const doubles6s6_t *m, doubles6_t x)
+static doubles6_t apply1(doubles6s6_t m, doubles6_t x)
 {
-    return (doubles6_t){{dot2(m->e[0], x), dot2(m->e[1], x), dot2(m->e[2], x), dot2(m->e[3], x),
-        dot2(m->e[4], x), dot2(m->e[5], x)}};
+    return (doubles6_t){{dot2(m.e[0], x), dot2(m.e[1], x), dot2(m.e[2], x), dot2(m.e[3], x), dot2(m.e[4], x),
+        dot2(m.e[5], x)}};
 }
 
 /* -------------------------------- laws.predictive.motion -------------------------------- */
@@ -787,15 +792,14 @@ static void double_of(double *numbers, const rates_t *rates)
     const double t58 = numbers[TERM_AT + 33];
     const double t59 = numbers[TERM_AT + 34];
     const double t60 = numbers[TERM_AT + 35];
-    const doubles6s6_t m = {{{{t25, t26, t27, t28, t29, t30}}, {{t31, t32, t33, t34, t35, t36}},
-        {{t37, t38, t39, t40, t41, t42}}, {{t43, t44, t45, t46, t47, t48}}, {{t49, t50, t51, t52, t53, t54}},
-        {{t55, t56, t57, t58, t59, t60}}}};
-    const doubles6s6_t turned = transposed(&m);
+    const doubles6s6_t turned = transposed((doubles6s6_t){{{{t25, t26, t27, t28, t29, t30}},
+        {{t31, t32, t33, t34, t35, t36}}, {{t37, t38, t39, t40, t41, t42}}, {{t43, t44, t45, t46, t47, t48}},
+        {{t49, t50, t51, t52, t53, t54}}, {{t55, t56, t57, t58, t59, t60}}}});
     for (int32_t j1 = 0; j1 < 6; j1++) {
         const doubles6_t before = {{numbers[MEAN_AT + 6 * j1], numbers[MEAN_AT + 6 * j1 + 1], numbers[MEAN_AT
             + 6 * j1 + 2], numbers[MEAN_AT + 6 * j1 + 3], numbers[MEAN_AT + 6 * j1 + 4], numbers[MEAN_AT + 6 *
             j1 + 5]}};
-        const doubles6_t apply1_result = apply1(&turned, before);
+        const doubles6_t apply1_result = apply1(turned, before);
         numbers[MEAN_AT + 6 * j1] = before.e[0] + 0.5 * apply1_result.e[0];
         numbers[MEAN_AT + 6 * j1 + 1] = before.e[1] + 0.5 * apply1_result.e[1];
         numbers[MEAN_AT + 6 * j1 + 2] = before.e[2] + 0.5 * apply1_result.e[2];
@@ -811,7 +815,7 @@ static vector_t times2(vector_t row, double c)
 }
 
 /* Set A and B from S, back in the units of time. */
-static void put_motion(double *numbers, const rates_t *rates, const matrix_t *push, double period)
+static void put_motion(double *numbers, const rates_t *rates, matrix_t push, double period)
 {
     const double t1 = numbers[MEAN_AT];
     const double t2 = numbers[MEAN_AT + 1];
@@ -849,17 +853,15 @@ static void put_motion(double *numbers, const rates_t *rates, const matrix_t *pu
     const double t34 = numbers[MEAN_AT + 33];
     const double t35 = numbers[MEAN_AT + 34];
     const double t36 = numbers[MEAN_AT + 35];
-    const doubles6s6_t m = {{product(rates, (doubles6_t){{t1, t2, t3, t4, t5, t6}}),
+    const doubles6s6_t a = transposed((doubles6s6_t){{product(rates, (doubles6_t){{t1, t2, t3, t4, t5, t6}}),
         product(rates, (doubles6_t){{t7, t8, t9, t10, t11, t12}}),
         product(rates, (doubles6_t){{t13, t14, t15, t16, t17, t18}}),
         product(rates, (doubles6_t){{t19, t20, t21, t22, t23, t24}}),
         product(rates, (doubles6_t){{t25, t26, t27, t28, t29, t30}}),
-        product(rates, (doubles6_t){{t31, t32, t33, t34, t35, t36}})}};
-    const doubles6s6_t a = transposed(&m);
-    const doubles6s6_t m_2 = {{{{t1, t2, t3, t4, t5, t6}}, {{t7, t8, t9, t10, t11, t12}},
-        {{t13, t14, t15, t16, t17, t18}}, {{t19, t20, t21, t22, t23, t24}}, {{t25, t26, t27, t28, t29, t30}},
-        {{t31, t32, t33, t34, t35, t36}}}};
-    const doubles6s6_t transposed_result = transposed(&m_2);
+        product(rates, (doubles6_t){{t31, t32, t33, t34, t35, t36}})}});
+    const doubles6s6_t transposed_result = transposed((doubles6s6_t){{{{t1, t2, t3, t4, t5, t6}},
+        {{t7, t8, t9, t10, t11, t12}}, {{t13, t14, t15, t16, t17, t18}}, {{t19, t20, t21, t22, t23, t24}},
+        {{t25, t26, t27, t28, t29, t30}}, {{t31, t32, t33, t34, t35, t36}}}});
     const matrix_t transpose_result = transpose(push);
     const matrix_t transpose_result_2 = transpose(push);
     const matrix_t transpose_result_3 = transpose(push);
@@ -957,9 +959,9 @@ static void put_motion(double *numbers, const rates_t *rates, const matrix_t *pu
 static void sample(double *numbers, const linear_t *linear, double period)
 {
     const double square = period * period;
-    const matrix_t scaled_result = scaled(&linear->turning, period);
-    const matrix_t scaled_result_2 = scaled(&linear->stiffness, square);
-    const matrix_t scaled_result_3 = scaled(&linear->damping, period);
+    const matrix_t scaled_result = scaled(linear->turning, period);
+    const matrix_t scaled_result_2 = scaled(linear->stiffness, square);
+    const matrix_t scaled_result_3 = scaled(linear->damping, period);
     const rates_t rates = {.turning = scaled_result, .half = 0.5, .stiffness = scaled_result_2,
         .damping = scaled_result_3};
     const share_result_t share_1_result = share_1(&rates);
@@ -976,8 +978,7 @@ static void sample(double *numbers, const linear_t *linear, double period)
         share_ = 2.0 * share;
         left_ = left - 1.0;
     }
-    const matrix_t scaled_result_4 = scaled(&linear->push, square);
-    put_motion(numbers, &rates, &scaled_result_4, period);
+    put_motion(numbers, &rates, scaled(linear->push, square), period);
 }
 
 /* ------------------------------- laws.predictive.problem -------------------------------- */
@@ -1048,7 +1049,7 @@ static void advance(double *numbers)
         -t5;
     const doubles6_t a_3 = {{numbers[TAIL_AT + 12], numbers[TAIL_AT + 13], numbers[TAIL_AT + 14],
         numbers[TAIL_AT + 15], numbers[TAIL_AT + 16], numbers[TAIL_AT + 17]}};
-    const double total = 0.0 + a_3.e[0] * -t1 + a_3.e[1] * -t2 + a_3.e[2] * -t3 + a_3.e[3] * -t4 + a_3.e[4] *
+    const double t64 = 0.0 + a_3.e[0] * -t1 + a_3.e[1] * -t2 + a_3.e[2] * -t3 + a_3.e[3] * -t4 + a_3.e[4] *
         -t5;
     for (int32_t k = 0; k < 9; k++) {
         const double t70 = numbers[PLAN_AT + 3 * k + 3];
@@ -1059,7 +1060,7 @@ static void advance(double *numbers)
         numbers[PLAN_AT + 3 * k + 1] = project_result.w.y;
         numbers[PLAN_AT + 3 * k + 2] = project_result.w.z;
     }
-    const vector_t last = {t28 + a.e[5] * -t6, t46 + a_2.e[5] * -t6, total + a_3.e[5] * -t6};
+    const vector_t last = {t28 + a.e[5] * -t6, t46 + a_2.e[5] * -t6, t64 + a_3.e[5] * -t6};
     const project_result_t project_result_2 = project(&bounds, last);
     numbers[PLAN_AT + 27] = project_result_2.w.x;
     numbers[PLAN_AT + 28] = project_result_2.w.y;
@@ -1218,60 +1219,76 @@ static weights_t weights(double *numbers)
 /* -------------------------------- laws.predictive.sixes --------------------------------- */
 
 /* Return the transposed matrix. */
-static doubles6s3_t transposed1(const vectors6_t *m)
+static doubles6s3_t transposed1(vectors6_t m)
 {
-    return (doubles6s3_t){{{{m->e[0].x, m->e[1].x, m->e[2].x, m->e[3].x, m->e[4].x, m->e[5].x}}, {{m->e[0].y,
-        m->e[1].y, m->e[2].y, m->e[3].y, m->e[4].y, m->e[5].y}}, {{m->e[0].z, m->e[1].z, m->e[2].z, m->e[3].z,
-        m->e[4].z, m->e[5].z}}}};
+    return (doubles6s3_t){{{{m.e[0].x, m.e[1].x, m.e[2].x, m.e[3].x, m.e[4].x, m.e[5].x}},
+        {{m.e[0].y, m.e[1].y, m.e[2].y, m.e[3].y, m.e[4].y, m.e[5].y}},
+        {{m.e[0].z, m.e[1].z, m.e[2].z, m.e[3].z, m.e[4].z, m.e[5].z}}}};
 }
 
 /* Return m n. */
-static doubles6s6_t product1(const doubles6s6_t *m, const doubles6s6_t *n)
+static doubles6s6_t product1(doubles6s6_t m, doubles6s6_t n)
 {
     const doubles6s6_t columns = transposed(n);
-    return (doubles6s6_t){{apply1(&columns, m->e[0]), apply1(&columns, m->e[1]), apply1(&columns, m->e[2]),
-        apply1(&columns, m->e[3]), apply1(&columns, m->e[4]), apply1(&columns, m->e[5])}};
+    return (doubles6s6_t){{apply1(columns, m.e[0]), apply1(columns, m.e[1]), apply1(columns, m.e[2]),
+        apply1(columns, m.e[3]), apply1(columns, m.e[4]), apply1(columns, m.e[5])}};
 }
 
 /* Return m x. */
-static vector_t apply2(const doubles6s3_t *m, doubles6_t x)
+static vector_t apply2(doubles6s3_t m, doubles6_t x)
 {
-    return (vector_t){dot2(m->e[0], x), dot2(m->e[1], x), dot2(m->e[2], x)};
+    return (vector_t){dot2(m.e[0], x), dot2(m.e[1], x), dot2(m.e[2], x)};
 }
 
 /* Return m n. */
-static vectors6_t product2(const doubles6s6_t *m, const vectors6_t *n)
+static vectors6_t product2(doubles6s6_t m, vectors6_t n)
 {
     const doubles6s3_t columns = transposed1(n);
-    return (vectors6_t){{apply2(&columns, m->e[0]), apply2(&columns, m->e[1]), apply2(&columns, m->e[2]),
-        apply2(&columns, m->e[3]), apply2(&columns, m->e[4]), apply2(&columns, m->e[5])}};
+    return (vectors6_t){{apply2(columns, m.e[0]), apply2(columns, m.e[1]), apply2(columns, m.e[2]),
+        apply2(columns, m.e[3]), apply2(columns, m.e[4]), apply2(columns, m.e[5])}};
 }
 
 /* Return the transposed matrix. */
-static vectors6_t transposed2(const doubles6s3_t *m)
+static vectors6_t transposed2(doubles6s3_t m)
 {
-    return (vectors6_t){{{m->e[0].e[0], m->e[1].e[0], m->e[2].e[0]},
-        {m->e[0].e[1], m->e[1].e[1], m->e[2].e[1]}, {m->e[0].e[2], m->e[1].e[2], m->e[2].e[2]},
-        {m->e[0].e[3], m->e[1].e[3], m->e[2].e[3]}, {m->e[0].e[4], m->e[1].e[4], m->e[2].e[4]},
-        {m->e[0].e[5], m->e[1].e[5], m->e[2].e[5]}}};
+    return (vectors6_t){{{m.e[0].e[0], m.e[1].e[0], m.e[2].e[0]}, {m.e[0].e[1], m.e[1].e[1], m.e[2].e[1]},
+        {m.e[0].e[2], m.e[1].e[2], m.e[2].e[2]}, {m.e[0].e[3], m.e[1].e[3], m.e[2].e[3]},
+        {m.e[0].e[4], m.e[1].e[4], m.e[2].e[4]}, {m.e[0].e[5], m.e[1].e[5], m.e[2].e[5]}}};
+}
+
+/* Return the number in row i and column j. */
+static double entry(vector_t m)
+{
+    return m.x;
 }
 
 /* Return start + a'b. */
 static double dot3(doubles6_t a, doubles6_t b, double start)
 {
     const double t8 = start + a.e[0] * b.e[0] + a.e[1] * b.e[1] + a.e[2] * b.e[2] + a.e[3] * b.e[3];
-    const double total = t8 + a.e[4] * b.e[4];
-    return total + a.e[5] * b.e[5];
+    return t8 + a.e[4] * b.e[4] + a.e[5] * b.e[5];
+}
+
+/* Return the number in row i and column j. */
+static double entry1(vector_t m)
+{
+    return m.y;
+}
+
+/* Return the number in row i and column j. */
+static double entry2(vector_t m)
+{
+    return m.z;
 }
 
 /* ------------------------------- laws.predictive.horizon -------------------------------- */
 
 /* Return R + B'P B. */
-static doubles6_t curvature_1(vector_t r, const doubles6s3_t *pushes, const doubles6s3_t *pushed)
+static doubles6_t curvature_1(vector_t r, doubles6s3_t pushes, doubles6s3_t pushed)
 {
-    return (doubles6_t){{dot3(pushes->e[0], pushed->e[0], r.x), dot3(pushes->e[0], pushed->e[1], 0.0),
-        dot3(pushes->e[0], pushed->e[2], 0.0), dot3(pushes->e[1], pushed->e[1], r.y),
-        dot3(pushes->e[1], pushed->e[2], 0.0), dot3(pushes->e[2], pushed->e[2], r.z)}};
+    return (doubles6_t){{dot3(pushes.e[0], pushed.e[0], entry(r)), dot3(pushes.e[0], pushed.e[1], 0.0),
+        dot3(pushes.e[0], pushed.e[2], 0.0), dot3(pushes.e[1], pushed.e[1], entry1(r)),
+        dot3(pushes.e[1], pushed.e[2], 0.0), dot3(pushes.e[2], pushed.e[2], entry2(r))}};
 }
 
 /* -------------------------------- laws.predictive.limits -------------------------------- */
@@ -1304,8 +1321,8 @@ static bools3_t held(const limits_t *limits, vector_t v, vector_t g)
 {
     const bool t7 = (g.x < 0.0 && limits->high.x <= v.x) || (0.0 < g.x && v.x <= limits->low.x);
     const bool t14 = (g.y < 0.0 && limits->high.y <= v.y) || (0.0 < g.y && v.y <= limits->low.y);
-    const bool above = g.z < 0.0 && limits->high.z <= v.z;
-    return (bools3_t){{t7, t14, above || (0.0 < g.z && v.z <= limits->low.z)}};
+    const bool t21 = (g.z < 0.0 && limits->high.z <= v.z) || (0.0 < g.z && v.z <= limits->low.z);
+    return (bools3_t){{t7, t14, t21}};
 }
 
 /* Return the inverse of a symmetric matrix. */
@@ -1354,6 +1371,12 @@ static vector_t minus(doubles6_t w, vector_t x)
 
 /* -------------------------------- laws.predictive.sixes --------------------------------- */
 
+/* Return the number in row i and column j. */
+static double entry3(doubles6_t m)
+{
+    return m.e[0];
+}
+
 /* Return start + a'b. */
 static double dot4(vector_t a, vector_t b, double start)
 {
@@ -1361,29 +1384,59 @@ static double dot4(vector_t a, vector_t b, double start)
     return total + a.z * b.z;
 }
 
+/* Return the number in row i and column j. */
+static double entry4(doubles6_t m)
+{
+    return m.e[1];
+}
+
+/* Return the number in row i and column j. */
+static double entry5(doubles6_t m)
+{
+    return m.e[2];
+}
+
+/* Return the number in row i and column j. */
+static double entry6(doubles6_t m)
+{
+    return m.e[3];
+}
+
+/* Return the number in row i and column j. */
+static double entry7(doubles6_t m)
+{
+    return m.e[4];
+}
+
+/* Return the number in row i and column j. */
+static double entry8(doubles6_t m)
+{
+    return m.e[5];
+}
+
 /* ------------------------------- laws.predictive.horizon -------------------------------- */
 
 /* Keep the matrix symmetric against rounding, which long horizons would amplify. */
-static doubles6s6_t symmetric(const doubles6s6_t *m)
+static doubles6s6_t symmetric(doubles6s6_t m)
 {
-    const double t2 = 0.5 * (m->e[1].e[0] + m->e[0].e[1]);
-    const double t4 = 0.5 * (m->e[2].e[0] + m->e[0].e[2]);
-    const double t6 = 0.5 * (m->e[3].e[0] + m->e[0].e[3]);
-    const double t8 = 0.5 * (m->e[4].e[0] + m->e[0].e[4]);
-    const double t10 = 0.5 * (m->e[5].e[0] + m->e[0].e[5]);
-    const double t12 = 0.5 * (m->e[2].e[1] + m->e[1].e[2]);
-    const double t14 = 0.5 * (m->e[3].e[1] + m->e[1].e[3]);
-    const double t16 = 0.5 * (m->e[4].e[1] + m->e[1].e[4]);
-    const double t18 = 0.5 * (m->e[5].e[1] + m->e[1].e[5]);
-    const double t20 = 0.5 * (m->e[3].e[2] + m->e[2].e[3]);
-    const double t22 = 0.5 * (m->e[4].e[2] + m->e[2].e[4]);
-    const double t24 = 0.5 * (m->e[5].e[2] + m->e[2].e[5]);
-    const double t26 = 0.5 * (m->e[4].e[3] + m->e[3].e[4]);
-    const double t28 = 0.5 * (m->e[5].e[3] + m->e[3].e[5]);
-    const double t30 = 0.5 * (m->e[5].e[4] + m->e[4].e[5]);
-    return (doubles6s6_t){{{{m->e[0].e[0], t2, t4, t6, t8, t10}}, {{t2, m->e[1].e[1], t12, t14, t16, t18}},
-        {{t4, t12, m->e[2].e[2], t20, t22, t24}}, {{t6, t14, t20, m->e[3].e[3], t26, t28}},
-        {{t8, t16, t22, t26, m->e[4].e[4], t30}}, {{t10, t18, t24, t28, t30, m->e[5].e[5]}}}};
+    const double t2 = 0.5 * (m.e[1].e[0] + m.e[0].e[1]);
+    const double t4 = 0.5 * (m.e[2].e[0] + m.e[0].e[2]);
+    const double t6 = 0.5 * (m.e[3].e[0] + m.e[0].e[3]);
+    const double t8 = 0.5 * (m.e[4].e[0] + m.e[0].e[4]);
+    const double t10 = 0.5 * (m.e[5].e[0] + m.e[0].e[5]);
+    const double t12 = 0.5 * (m.e[2].e[1] + m.e[1].e[2]);
+    const double t14 = 0.5 * (m.e[3].e[1] + m.e[1].e[3]);
+    const double t16 = 0.5 * (m.e[4].e[1] + m.e[1].e[4]);
+    const double t18 = 0.5 * (m.e[5].e[1] + m.e[1].e[5]);
+    const double t20 = 0.5 * (m.e[3].e[2] + m.e[2].e[3]);
+    const double t22 = 0.5 * (m.e[4].e[2] + m.e[2].e[4]);
+    const double t24 = 0.5 * (m.e[5].e[2] + m.e[2].e[5]);
+    const double t26 = 0.5 * (m.e[4].e[3] + m.e[3].e[4]);
+    const double t28 = 0.5 * (m.e[5].e[3] + m.e[3].e[5]);
+    const double t30 = 0.5 * (m.e[5].e[4] + m.e[4].e[5]);
+    return (doubles6s6_t){{{{m.e[0].e[0], t2, t4, t6, t8, t10}}, {{t2, m.e[1].e[1], t12, t14, t16, t18}},
+        {{t4, t12, m.e[2].e[2], t20, t22, t24}}, {{t6, t14, t20, m.e[3].e[3], t26, t28}},
+        {{t8, t16, t22, t26, m.e[4].e[4], t30}}, {{t10, t18, t24, t28, t30, m.e[5].e[5]}}}};
 }
 
 /* Find the Newton step by one backward Riccati sweep, as a policy: step + feedback (x - x of the plan). */
@@ -1392,8 +1445,8 @@ static sweep_result_t sweep(double *numbers, double barrier)
     const motion_result_t motion_result = motion(numbers);
     const weights_t weights_result = weights(numbers);
     const limits_t bounds = limits(numbers);
-    const doubles6s6_t columns = transposed(&motion_result.rows);
-    const doubles6s3_t pushes = transposed1(&motion_result.rows1);
+    const doubles6s6_t columns = transposed(motion_result.rows);
+    const doubles6s3_t pushes = transposed1(motion_result.rows1);
     const bool holds = barrier <= 0.0;
     double curvature_ = weights_result.p.e[0].e[0];
     double curvature1_ = weights_result.p.e[0].e[1];
@@ -1484,33 +1537,36 @@ static sweep_result_t sweep(double *numbers, double barrier)
         const double slope5 = slope5_;
         const double decrement = decrement_;
         const double holding = holding_;
-        const doubles6s6_t m_2 = {{{{curvature, curvature1, curvature2, curvature3, curvature4, curvature5}},
-            {{curvature6, curvature7, curvature8, curvature9, curvature10, curvature11}}, {{curvature12,
-            curvature13, curvature14, curvature15, curvature16, curvature17}}, {{curvature18, curvature19,
-            curvature20, curvature21, curvature22, curvature23}}, {{curvature24, curvature25, curvature26,
-            curvature27, curvature28, curvature29}}, {{curvature30, curvature31, curvature32, curvature33,
-            curvature34, curvature35}}}};
-        const doubles6s6_t product1_result = product1(&m_2, &motion_result.rows);
-        const doubles6s6_t onward = transposed(&product1_result);
-        const vectors6_t product2_result = product2(&m_2, &motion_result.rows1);
-        const doubles6s3_t pushed = transposed1(&product2_result);
-        const doubles6s3_t m_3 = {{apply1(&onward, pushes.e[0]), apply1(&onward, pushes.e[1]),
-            apply1(&onward, pushes.e[2])}};
-        const vectors6_t cross_2 = transposed2(&m_3);
-        const doubles6_t m_4 = curvature_1(weights_result.r, &pushes, &pushed);
-        numbers[STIFFNESS_AT - back + 9] = m_4.e[0] + m_4.e[3] + m_4.e[5];
+        const doubles6s6_t product1_result = product1((doubles6s6_t){{{{curvature, curvature1, curvature2,
+            curvature3, curvature4, curvature5}}, {{curvature6, curvature7, curvature8, curvature9,
+            curvature10, curvature11}}, {{curvature12, curvature13, curvature14, curvature15, curvature16,
+            curvature17}}, {{curvature18, curvature19, curvature20, curvature21, curvature22, curvature23}},
+            {{curvature24, curvature25, curvature26, curvature27, curvature28, curvature29}}, {{curvature30,
+            curvature31, curvature32, curvature33, curvature34, curvature35}}}}, motion_result.rows);
+        const doubles6s6_t onward = transposed(product1_result);
+        const vectors6_t product2_result = product2((doubles6s6_t){{{{curvature, curvature1, curvature2,
+            curvature3, curvature4, curvature5}}, {{curvature6, curvature7, curvature8, curvature9,
+            curvature10, curvature11}}, {{curvature12, curvature13, curvature14, curvature15, curvature16,
+            curvature17}}, {{curvature18, curvature19, curvature20, curvature21, curvature22, curvature23}},
+            {{curvature24, curvature25, curvature26, curvature27, curvature28, curvature29}}, {{curvature30,
+            curvature31, curvature32, curvature33, curvature34, curvature35}}}}, motion_result.rows1);
+        const doubles6s3_t pushed = transposed1(product2_result);
+        const vectors6_t cross_2 = transposed2((doubles6s3_t){{apply1(onward, pushes.e[0]),
+            apply1(onward, pushes.e[1]), apply1(onward, pushes.e[2])}});
+        const doubles6_t m_2 = curvature_1(weights_result.r, pushes, pushed);
+        numbers[STIFFNESS_AT - back + 9] = m_2.e[0] + m_2.e[3] + m_2.e[5];
         const vector_t v = {numbers[PLAN_AT - 3 * back + 27], numbers[PLAN_AT - 3 * back + 28],
             numbers[PLAN_AT - 3 * back + 29]};
         const vector_t pull = {numbers[GRADIENT_AT - 3 * back + 27], numbers[GRADIENT_AT - 3 * back + 28],
             numbers[GRADIENT_AT - 3 * back + 29]};
-        const vector_t add_result = add(apply2(&pushes,
+        const vector_t add_result = add(apply2(pushes,
             (doubles6_t){{slope, slope1, slope2, slope3, slope4, slope5}}), pull);
-        double m_ = m_4.e[0];
-        double m1_ = m_4.e[1];
-        double m2_ = m_4.e[2];
-        double m3_ = m_4.e[3];
-        double m4_ = m_4.e[4];
-        double m5_ = m_4.e[5];
+        double m_ = m_2.e[0];
+        double m1_ = m_2.e[1];
+        double m2_ = m_2.e[2];
+        double m3_ = m_2.e[3];
+        double m4_ = m_2.e[4];
+        double m5_ = m_2.e[5];
         double g_ = add_result.x;
         double g1_ = add_result.y;
         double g2_ = add_result.z;
@@ -1519,7 +1575,7 @@ static sweep_result_t sweep(double *numbers, double barrier)
             const double t24 = numbers[MULTIPLIERS_AT - 3 * back + 28];
             const double t26 = numbers[MULTIPLIERS_AT - 3 * back + 29];
             const repelled_result_t repelled_result = repelled(&bounds, v, (vector_t){t22, t24, t26}, barrier,
-                m_4);
+                m_2);
             const vector_t add_result_2 = add(add_result, repelled_result.push);
             m_ = repelled_result.symmetric.e[0];
             m1_ = repelled_result.symmetric.e[1];
@@ -1531,8 +1587,8 @@ static sweep_result_t sweep(double *numbers, double barrier)
             g1_ = add_result_2.y;
             g2_ = add_result_2.z;
         }
-        const doubles6_t m_5 = {{m_, m1_, m2_, m3_, m4_, m5_}};
-        const held_inverse_result_t held_inverse_result = held_inverse(&bounds, v, pull, m_5, holds);
+        const doubles6_t m_3 = {{m_, m1_, m2_, m3_, m4_, m5_}};
+        const held_inverse_result_t held_inverse_result = held_inverse(&bounds, v, pull, m_3, holds);
         const vector_t g_2 = {g_, g1_, g2_};
         const vector_t step_2 = minus(held_inverse_result.symmetric, g_2);
         const vector_t minus_result = minus(held_inverse_result.symmetric, cross_2.e[0]);
@@ -1546,7 +1602,7 @@ static sweep_result_t sweep(double *numbers, double barrier)
         numbers[STEP_AT - 3 * back + 29] = step_2.z;
         const vectors6_t gains = {{minus_result, minus_result_2, minus_result_3, minus_result_4,
             minus_result_5, minus_result_6}};
-        const doubles6s3_t transposed1_result = transposed1(&gains);
+        const doubles6s3_t transposed1_result = transposed1(gains);
         numbers[FEEDBACK_AT - 18 * back + 162] = transposed1_result.e[0].e[0];
         numbers[FEEDBACK_AT - 18 * back + 163] = transposed1_result.e[0].e[1];
         numbers[FEEDBACK_AT - 18 * back + 164] = transposed1_result.e[0].e[2];
@@ -1566,43 +1622,43 @@ static sweep_result_t sweep(double *numbers, double barrier)
         numbers[FEEDBACK_AT - 18 * back + 178] = transposed1_result.e[2].e[4];
         numbers[FEEDBACK_AT - 18 * back + 179] = transposed1_result.e[2].e[5];
         const doubles6s6_t curvature_2 = {{{{dot3(columns.e[0], onward.e[0],
-            dot4(cross_2.e[0], minus_result, weights_result.q.e[0])), dot3(columns.e[0], onward.e[1],
+            dot4(cross_2.e[0], minus_result, entry3(weights_result.q))), dot3(columns.e[0], onward.e[1],
             dot4(cross_2.e[0], minus_result_2, 0.0)), dot3(columns.e[0], onward.e[2],
             dot4(cross_2.e[0], minus_result_3, 0.0)), dot3(columns.e[0], onward.e[3],
             dot4(cross_2.e[0], minus_result_4, 0.0)), dot3(columns.e[0], onward.e[4],
             dot4(cross_2.e[0], minus_result_5, 0.0)), dot3(columns.e[0], onward.e[5],
             dot4(cross_2.e[0], minus_result_6, 0.0))}}, {{dot3(columns.e[1], onward.e[0],
             dot4(cross_2.e[1], minus_result, 0.0)), dot3(columns.e[1], onward.e[1],
-            dot4(cross_2.e[1], minus_result_2, weights_result.q.e[1])), dot3(columns.e[1], onward.e[2],
+            dot4(cross_2.e[1], minus_result_2, entry4(weights_result.q))), dot3(columns.e[1], onward.e[2],
             dot4(cross_2.e[1], minus_result_3, 0.0)), dot3(columns.e[1], onward.e[3],
             dot4(cross_2.e[1], minus_result_4, 0.0)), dot3(columns.e[1], onward.e[4],
             dot4(cross_2.e[1], minus_result_5, 0.0)), dot3(columns.e[1], onward.e[5],
             dot4(cross_2.e[1], minus_result_6, 0.0))}}, {{dot3(columns.e[2], onward.e[0],
             dot4(cross_2.e[2], minus_result, 0.0)), dot3(columns.e[2], onward.e[1],
             dot4(cross_2.e[2], minus_result_2, 0.0)), dot3(columns.e[2], onward.e[2],
-            dot4(cross_2.e[2], minus_result_3, weights_result.q.e[2])), dot3(columns.e[2], onward.e[3],
+            dot4(cross_2.e[2], minus_result_3, entry5(weights_result.q))), dot3(columns.e[2], onward.e[3],
             dot4(cross_2.e[2], minus_result_4, 0.0)), dot3(columns.e[2], onward.e[4],
             dot4(cross_2.e[2], minus_result_5, 0.0)), dot3(columns.e[2], onward.e[5],
             dot4(cross_2.e[2], minus_result_6, 0.0))}}, {{dot3(columns.e[3], onward.e[0],
             dot4(cross_2.e[3], minus_result, 0.0)), dot3(columns.e[3], onward.e[1],
             dot4(cross_2.e[3], minus_result_2, 0.0)), dot3(columns.e[3], onward.e[2],
             dot4(cross_2.e[3], minus_result_3, 0.0)), dot3(columns.e[3], onward.e[3],
-            dot4(cross_2.e[3], minus_result_4, weights_result.q.e[3])), dot3(columns.e[3], onward.e[4],
+            dot4(cross_2.e[3], minus_result_4, entry6(weights_result.q))), dot3(columns.e[3], onward.e[4],
             dot4(cross_2.e[3], minus_result_5, 0.0)), dot3(columns.e[3], onward.e[5],
             dot4(cross_2.e[3], minus_result_6, 0.0))}}, {{dot3(columns.e[4], onward.e[0],
             dot4(cross_2.e[4], minus_result, 0.0)), dot3(columns.e[4], onward.e[1],
             dot4(cross_2.e[4], minus_result_2, 0.0)), dot3(columns.e[4], onward.e[2],
             dot4(cross_2.e[4], minus_result_3, 0.0)), dot3(columns.e[4], onward.e[3],
             dot4(cross_2.e[4], minus_result_4, 0.0)), dot3(columns.e[4], onward.e[4],
-            dot4(cross_2.e[4], minus_result_5, weights_result.q.e[4])), dot3(columns.e[4], onward.e[5],
+            dot4(cross_2.e[4], minus_result_5, entry7(weights_result.q))), dot3(columns.e[4], onward.e[5],
             dot4(cross_2.e[4], minus_result_6, 0.0))}}, {{dot3(columns.e[5], onward.e[0],
             dot4(cross_2.e[5], minus_result, 0.0)), dot3(columns.e[5], onward.e[1],
             dot4(cross_2.e[5], minus_result_2, 0.0)), dot3(columns.e[5], onward.e[2],
             dot4(cross_2.e[5], minus_result_3, 0.0)), dot3(columns.e[5], onward.e[3],
             dot4(cross_2.e[5], minus_result_4, 0.0)), dot3(columns.e[5], onward.e[4],
             dot4(cross_2.e[5], minus_result_5, 0.0)), dot3(columns.e[5], onward.e[5],
-            dot4(cross_2.e[5], minus_result_6, weights_result.q.e[5]))}}}};
-        const doubles6s6_t symmetric_result = symmetric(&curvature_2);
+            dot4(cross_2.e[5], minus_result_6, entry8(weights_result.q)))}}}};
+        const doubles6s6_t symmetric_result = symmetric(curvature_2);
         curvature_ = symmetric_result.e[0].e[0];
         curvature1_ = symmetric_result.e[0].e[1];
         curvature2_ = symmetric_result.e[0].e[2];
@@ -1658,11 +1714,11 @@ static sweep_result_t sweep(double *numbers, double barrier)
 }
 
 /* Return A x + B v. */
-static doubles6_t transition(const doubles6s6_t *a, const vectors6_t *b, doubles6_t x, vector_t v)
+static doubles6_t transition(doubles6s6_t a, vectors6_t b, doubles6_t x, vector_t v)
 {
-    return (doubles6_t){{dot3(a->e[0], x, dot(b->e[0], v)), dot3(a->e[1], x, dot(b->e[1], v)),
-        dot3(a->e[2], x, dot(b->e[2], v)), dot3(a->e[3], x, dot(b->e[3], v)),
-        dot3(a->e[4], x, dot(b->e[4], v)), dot3(a->e[5], x, dot(b->e[5], v))}};
+    return (doubles6_t){{dot3(a.e[0], x, dot(b.e[0], v)), dot3(a.e[1], x, dot(b.e[1], v)),
+        dot3(a.e[2], x, dot(b.e[2], v)), dot3(a.e[3], x, dot(b.e[3], v)), dot3(a.e[4], x, dot(b.e[4], v)),
+        dot3(a.e[5], x, dot(b.e[5], v))}};
 }
 
 /* -------------------------------- laws.predictive.sixes --------------------------------- */
@@ -1670,22 +1726,20 @@ static doubles6_t transition(const doubles6s6_t *a, const vectors6_t *b, doubles
 /* Return x'm x. */
 static double form(vector_t m, vector_t x)
 {
-    const double x_2 = m.z * x.z;
     const double total = 0.0 + m.x * x.x * x.x + m.y * x.y * x.y;
-    return total + x_2 * x.z;
+    return total + m.z * x.z * x.z;
 }
 
 /* Return x'm x. */
 static double form1(doubles6_t m, doubles6_t x)
 {
-    const double x_2 = m.e[5] * x.e[5];
     const double t12 = 0.0 + m.e[0] * x.e[0] * x.e[0] + m.e[1] * x.e[1] * x.e[1] + m.e[2] * x.e[2] * x.e[2];
-    const double total = t12 + m.e[3] * x.e[3] * x.e[3] + m.e[4] * x.e[4] * x.e[4];
-    return total + x_2 * x.e[5];
+    const double t18 = t12 + m.e[3] * x.e[3] * x.e[3] + m.e[4] * x.e[4] * x.e[4] + m.e[5] * x.e[5] * x.e[5];
+    return t18;
 }
 
 /* Return x'm x. */
-static double form2(const doubles6s6_t *m, doubles6_t x)
+static double form2(doubles6s6_t m, doubles6_t x)
 {
     return dot2(apply1(m, x), x);
 }
@@ -1747,7 +1801,7 @@ static trial_t follow(double *numbers, doubles6_t start)
             dot3((doubles6_t){{t36, t39, t42, t45, t48, t51}}, x_2, start_2.y),
             dot3((doubles6_t){{t54, t57, t60, t63, t66, t69}}, x_2, start_2.z)});
         const vector_t d = subtract(project_result.w, v);
-        const doubles6_t after = transition(&motion_result.rows, &motion_result.rows1, x_2, d);
+        const doubles6_t after = transition(motion_result.rows, motion_result.rows1, x_2, d);
         numbers[TRIAL_AT + 3 * k] = project_result.w.x;
         numbers[TRIAL_AT + 3 * k + 1] = project_result.w.y;
         numbers[TRIAL_AT + 3 * k + 2] = project_result.w.z;
@@ -1771,7 +1825,7 @@ static trial_t follow(double *numbers, doubles6_t start)
         x5_ = after.e[5];
     }
     const doubles6_t x_3 = {{x_, x1_, x2_, x3_, x4_, x5_}};
-    return (trial_t){.cut = cut_, .change = slope_ + 0.5 * (change_ + form2(&weights_result.p, x_3))};
+    return (trial_t){.cut = cut_, .change = slope_ + 0.5 * (change_ + form2(weights_result.p, x_3))};
 }
 
 /* -------------------------------- laws.predictive.solver -------------------------------- */
@@ -1838,7 +1892,7 @@ static double rollout(double *numbers)
         const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1], numbers[PLAN_AT + 3 * k +
             2]};
         const doubles6_t x_2 = {{x, x1, x2, x3, x4, x5}};
-        const doubles6_t after = transition(&motion_result.rows, &motion_result.rows1, x_2, v);
+        const doubles6_t after = transition(motion_result.rows, motion_result.rows1, x_2, v);
         numbers[STATES_AT + 6 * k + 6] = after.e[0];
         numbers[STATES_AT + 6 * k + 7] = after.e[1];
         numbers[STATES_AT + 6 * k + 8] = after.e[2];
@@ -1854,7 +1908,7 @@ static double rollout(double *numbers)
         x5_ = after.e[5];
     }
     const doubles6_t x_3 = {{x_, x1_, x2_, x3_, x4_, x5_}};
-    return 0.5 * (cost_ + form2(&weights_result.p, x_3));
+    return 0.5 * (cost_ + form2(weights_result.p, x_3));
 }
 
 /* Return R v. */
@@ -1875,30 +1929,30 @@ static vector_t loose(const limits_t *limits, vector_t v, vector_t g)
 /* ------------------------------- laws.predictive.horizon -------------------------------- */
 
 /* Return Q x + A'y, summed up together. */
-static doubles6_t costate(doubles6_t q, const doubles6s6_t *columns, doubles6_t x, doubles6_t y)
+static doubles6_t costate(doubles6_t q, doubles6s6_t columns, doubles6_t x, doubles6_t y)
 {
-    const double t6 = 0.0 + (q.e[0] * x.e[0] + columns->e[0].e[0] * y.e[0]) + columns->e[0].e[1] * y.e[1];
-    const double t12 = t6 + columns->e[0].e[2] * y.e[2] + columns->e[0].e[3] * y.e[3] + columns->e[0].e[4] *
+    const double t6 = 0.0 + (entry3(q) * x.e[0] + columns.e[0].e[0] * y.e[0]) + columns.e[0].e[1] * y.e[1];
+    const double t12 = t6 + columns.e[0].e[2] * y.e[2] + columns.e[0].e[3] * y.e[3] + columns.e[0].e[4] *
         y.e[4];
-    const double t20 = 0.0 + columns->e[1].e[0] * y.e[0] + (q.e[1] * x.e[1] + columns->e[1].e[1] * y.e[1]);
-    const double t26 = t20 + columns->e[1].e[2] * y.e[2] + columns->e[1].e[3] * y.e[3] + columns->e[1].e[4] *
+    const double t20 = 0.0 + columns.e[1].e[0] * y.e[0] + (entry4(q) * x.e[1] + columns.e[1].e[1] * y.e[1]);
+    const double t26 = t20 + columns.e[1].e[2] * y.e[2] + columns.e[1].e[3] * y.e[3] + columns.e[1].e[4] *
         y.e[4];
-    const double t36 = 0.0 + columns->e[2].e[0] * y.e[0] + columns->e[2].e[1] * y.e[1] + (q.e[2] * x.e[2] +
-        columns->e[2].e[2] * y.e[2]);
-    const double t42 = t36 + columns->e[2].e[3] * y.e[3] + columns->e[2].e[4] * y.e[4] + columns->e[2].e[5] *
+    const double t36 = 0.0 + columns.e[2].e[0] * y.e[0] + columns.e[2].e[1] * y.e[1] + (entry5(q) * x.e[2] +
+        columns.e[2].e[2] * y.e[2]);
+    const double t42 = t36 + columns.e[2].e[3] * y.e[3] + columns.e[2].e[4] * y.e[4] + columns.e[2].e[5] *
         y.e[5];
-    const double t48 = 0.0 + columns->e[3].e[0] * y.e[0] + columns->e[3].e[1] * y.e[1] + columns->e[3].e[2] *
+    const double t48 = 0.0 + columns.e[3].e[0] * y.e[0] + columns.e[3].e[1] * y.e[1] + columns.e[3].e[2] *
         y.e[2];
-    const double t54 = t48 + (q.e[3] * x.e[3] + columns->e[3].e[3] * y.e[3]) + columns->e[3].e[4] * y.e[4];
-    const double t62 = 0.0 + columns->e[4].e[0] * y.e[0] + columns->e[4].e[1] * y.e[1] + columns->e[4].e[2] *
+    const double t54 = t48 + (entry6(q) * x.e[3] + columns.e[3].e[3] * y.e[3]) + columns.e[3].e[4] * y.e[4];
+    const double t62 = 0.0 + columns.e[4].e[0] * y.e[0] + columns.e[4].e[1] * y.e[1] + columns.e[4].e[2] *
         y.e[2];
-    const double t68 = t62 + columns->e[4].e[3] * y.e[3] + (q.e[4] * x.e[4] + columns->e[4].e[4] * y.e[4]);
-    const double t76 = 0.0 + columns->e[5].e[0] * y.e[0] + columns->e[5].e[1] * y.e[1] + columns->e[5].e[2] *
+    const double t68 = t62 + columns.e[4].e[3] * y.e[3] + (entry7(q) * x.e[4] + columns.e[4].e[4] * y.e[4]);
+    const double t76 = 0.0 + columns.e[5].e[0] * y.e[0] + columns.e[5].e[1] * y.e[1] + columns.e[5].e[2] *
         y.e[2];
-    const double total = t76 + columns->e[5].e[3] * y.e[3] + columns->e[5].e[4] * y.e[4];
-    const double term = q.e[5] * x.e[5] + columns->e[5].e[5] * y.e[5];
-    return (doubles6_t){{t12 + columns->e[0].e[5] * y.e[5], t26 + columns->e[1].e[5] * y.e[5], t42,
-        t54 + columns->e[3].e[5] * y.e[5], t68 + columns->e[4].e[5] * y.e[5], total + term}};
+    const double t84 = t76 + columns.e[5].e[3] * y.e[3] + columns.e[5].e[4] * y.e[4] + (entry8(q) * x.e[5] +
+        columns.e[5].e[5] * y.e[5]);
+    return (doubles6_t){{t12 + columns.e[0].e[5] * y.e[5], t26 + columns.e[1].e[5] * y.e[5], t42,
+        t54 + columns.e[3].e[5] * y.e[5], t68 + columns.e[4].e[5] * y.e[5], t84}};
 }
 
 /* Find the gradient of half the cost, and a bound on its gap to the optimum if all that is held has to be. */
@@ -1907,15 +1961,15 @@ static double adjoint(double *numbers)
     const motion_result_t motion_result = motion(numbers);
     const weights_t weight = weights(numbers);
     const limits_t bounds = limits(numbers);
-    const doubles6s6_t columns = transposed(&motion_result.rows);
-    const doubles6s3_t pushes = transposed1(&motion_result.rows1);
+    const doubles6s6_t columns = transposed(motion_result.rows);
+    const doubles6s3_t pushes = transposed1(motion_result.rows1);
     const double t1 = numbers[STATES_AT + 60];
     const double t2 = numbers[STATES_AT + 61];
     const double t3 = numbers[STATES_AT + 62];
     const double t4 = numbers[STATES_AT + 63];
     const double t5 = numbers[STATES_AT + 64];
     const double t6 = numbers[STATES_AT + 65];
-    const doubles6_t apply1_result = apply1(&weight.p, (doubles6_t){{t1, t2, t3, t4, t5, t6}});
+    const doubles6_t apply1_result = apply1(weight.p, (doubles6_t){{t1, t2, t3, t4, t5, t6}});
     double gap_ = 0.0;
     double y_ = apply1_result.e[0];
     double y1_ = apply1_result.e[1];
@@ -1945,7 +1999,7 @@ static double adjoint(double *numbers)
         numbers[GRADIENT_AT - 3 * back + 28] = dot3_result_2;
         numbers[GRADIENT_AT - 3 * back + 29] = dot3_result_3;
         const vector_t g = {dot3_result, dot3_result_2, dot3_result_3};
-        const doubles6_t costate_result = costate(weight.q, &columns, x, y_2);
+        const doubles6_t costate_result = costate(weight.q, columns, x, y_2);
         gap_ = gap + form(weight.r_inverse, loose(&bounds, v, g));
         y_ = costate_result.e[0];
         y1_ = costate_result.e[1];
@@ -2002,7 +2056,7 @@ static void unroll(double *numbers)
         numbers[STEP_AT + 3 * k + 1] = dot3_result_2;
         numbers[STEP_AT + 3 * k + 2] = dot3_result_3;
         const vector_t d = {dot3_result, dot3_result_2, dot3_result_3};
-        const doubles6_t transition_result = transition(&motion_result.rows, &motion_result.rows1, x_2, d);
+        const doubles6_t transition_result = transition(motion_result.rows, motion_result.rows1, x_2, d);
         x_ = transition_result.e[0];
         x1_ = transition_result.e[1];
         x2_ = transition_result.e[2];
@@ -2055,7 +2109,7 @@ static double shorten(double *numbers, double halvings)
                 add(v, scale(length, (vector_t){t14, t16, t18})));
             const vector_t d = subtract(project_result.w, v);
             const doubles6_t x_2 = {{x, x1, x2, x3, x4, x5}};
-            const doubles6_t after = transition(&motion_result.rows, &motion_result.rows1, x_2, d);
+            const doubles6_t after = transition(motion_result.rows, motion_result.rows1, x_2, d);
             numbers[TRIAL_AT + 3 * k] = project_result.w.x;
             numbers[TRIAL_AT + 3 * k + 1] = project_result.w.y;
             numbers[TRIAL_AT + 3 * k + 2] = project_result.w.z;
@@ -2078,7 +2132,7 @@ static double shorten(double *numbers, double halvings)
             x5_ = after.e[5];
         }
         const doubles6_t x_3 = {{x_, x1_, x2_, x3_, x4_, x5_}};
-        const double t46 = slope_ + 0.5 * (change1_ + form2(&weights_result.p, x_3));
+        const double t46 = slope_ + 0.5 * (change1_ + form2(weights_result.p, x_3));
         const bool falls = slope_ < 0.0 && t46 <= 0.0001 * slope_;
         length_ = 0.5 * length;
         change_ = falls ? t46 : 0.0;
@@ -2251,8 +2305,7 @@ static double length_1(double *numbers, double barrier)
         numbers[TRIAL_AT + 3 * k + 2] = step_4;
         const double length_6 = step_4 < 0.0 ? minimum(-0.95 * old_3 / step_4, length_5) : length_5;
         const double ahead_3 = inner.z + sqrt(inner.z * inner.z + 2.0 * room.z * square.z);
-        const double shorter = minimum(1.9 * room.z / ahead_3, length_6);
-        length_ = 0.0 < ahead_3 ? shorter : length_6;
+        length_ = 0.0 < ahead_3 ? minimum(1.9 * room.z / ahead_3, length_6) : length_6;
     }
     return length_;
 }
@@ -2283,12 +2336,12 @@ static double go(double *numbers, double length)
         const double t27 = numbers[TRIAL_AT + 3 * k + 1];
         const double multiplier_2 = t25 + length * t27;
         numbers[MULTIPLIERS_AT + 3 * k + 1] = multiplier_2;
-        const double gap_2 = gap + multiplier * room.x + multiplier_2 * room.y;
         const double t33 = numbers[MULTIPLIERS_AT + 3 * k + 2];
         const double t35 = numbers[TRIAL_AT + 3 * k + 2];
         const double multiplier_3 = t33 + length * t35;
         numbers[MULTIPLIERS_AT + 3 * k + 2] = multiplier_3;
-        gap_ = gap_2 + multiplier_3 * room.z;
+        const double t39 = gap + multiplier * room.x + multiplier_2 * room.y + multiplier_3 * room.z;
+        gap_ = t39;
     }
     return gap_;
 }
@@ -2600,9 +2653,9 @@ void mpc_init(mpc_state_t *state)
 void mpc_step(mpc_state_t *state, const mpc_input_t *input, mpc_command_t *command)
 {
     double *const numbers = state->numbers;
+    const goal_t goal = inertial_goal(&parameters.setup.target);
     const state_t body_state = {.attitude = input->attitude, .rate = input->rate,
         .position = input->position};
-    const goal_t goal = {.attitude = parameters.setup.target.attitude};
     const scene_t scene = {.goal = goal, .period = parameters.setup.period};
     const measurement_t told = observe(&body_state, &scene);
     const vector_t wanted = mpc_torque(numbers, &told, &parameters.craft);

@@ -92,6 +92,14 @@ static const parameters_t parameters = {
 };
 
 
+/* -------------------------------- parts.targets.inertial -------------------------------- */
+
+/* The attitude, at rest. */
+static goal_t inertial_goal(const inertial_params_t *params)
+{
+    return (goal_t){.attitude = params->attitude};
+}
+
 /* ---------------------------------- algebra.quaternion ---------------------------------- */
 
 /* Return (q1, q2, q3). */
@@ -269,8 +277,8 @@ void sliding_init(sliding_state_t *state)
 void sliding_step(sliding_state_t *state, const sliding_input_t *input, sliding_command_t *command)
 {
     (void)state;
+    const goal_t goal = inertial_goal(&parameters.setup.target);
     const state_t body_state = {.attitude = input->attitude, .rate = input->rate};
-    const goal_t goal = {.attitude = parameters.setup.target.attitude};
     const scene_t scene = {.goal = goal};
     const measurement_t told = observe(&body_state, &scene);
     const vector_t wanted = sliding_torque(&told, &parameters.gains, &parameters.craft);

@@ -174,19 +174,19 @@ static quaternion_t normalise(quaternion_t q)
 
 /* Return the quaternion of a rotation matrix, from the largest of its four squared components (Shepperd's
    method). */
-static quaternion_t to_quaternion(const matrix_t *a)
+static quaternion_t to_quaternion(matrix_t a)
 {
-    const double trace = a->row[0].x + a->row[1].y + a->row[2].z;
-    const double x = a->row[1].z - a->row[2].y;
-    const double y = a->row[2].x - a->row[0].z;
-    const double z = a->row[0].y - a->row[1].x;
-    const double xy = a->row[0].y + a->row[1].x;
-    const double yz = a->row[1].z + a->row[2].y;
-    const double zx = a->row[2].x + a->row[0].z;
+    const double trace = a.row[0].x + a.row[1].y + a.row[2].z;
+    const double x = a.row[1].z - a.row[2].y;
+    const double y = a.row[2].x - a.row[0].z;
+    const double z = a.row[0].y - a.row[1].x;
+    const double xy = a.row[0].y + a.row[1].x;
+    const double yz = a.row[1].z + a.row[2].y;
+    const double zx = a.row[2].x + a.row[0].z;
     const double t9 = 1.0 + trace;
-    const double t12 = 1.0 + 2.0 * a->row[0].x - trace;
-    const double t15 = 1.0 + 2.0 * a->row[1].y - trace;
-    const double t18 = 1.0 + 2.0 * a->row[2].z - trace;
+    const double t12 = 1.0 + 2.0 * a.row[0].x - trace;
+    const double t15 = 1.0 + 2.0 * a.row[1].y - trace;
+    const double t18 = 1.0 + 2.0 * a.row[2].z - trace;
     const bool t19 = t9 < t12;
     const quaternion_t first = {x, t12, xy, zx};
     const quaternion_t scalar = {t9, x, y, z};
@@ -226,8 +226,8 @@ static goal_t orbital_goal(const state_t *state, quaternion_t before)
     const double size = sqrt(h2);
     const vector_t down = scale(-1.0 / sqrt(r2_2), state->position);
     const vector_t against = scale(-1.0 / size, h);
-    const matrix_t a = {{cross(against, down), against, down}};
-    const quaternion_t attitude = nearer(to_quaternion(&a), before);
+    const quaternion_t attitude = nearer(to_quaternion((matrix_t){{cross(against, down), against, down}}),
+        before);
     const double rate = size / r2_2;
     return (goal_t){.attitude = attitude, .rate = {0.0, -rate, 0.0}, .acceleration = {0.0,
         2.0 * rate * dot(state->position, state->velocity) / r2_2, 0.0}};
@@ -269,6 +269,14 @@ static vector_t to_body(quaternion_t q, vector_t r)
     return add(add(r, scale(q.q0, t)), cross(t, v));
 }
 
+/* ------------------------------------- parts.craft -------------------------------------- */
+
+/* The inertia with all that is in the craft, which gravity acts on (kg m2). */
+static vector_t total_inertia(const craft_t *craft)
+{
+    return craft->with_rotors;
+}
+
 /* ------------------------------------ algebra.vector ------------------------------------ */
 
 /* Return a x (m a) for a symmetric m: the gyroscopic torque is gyroscopic_torque(J, w). */
@@ -282,26 +290,24 @@ static vector_t gyroscopic_torque(vector_t m, vector_t a)
 /* Gravity-gradient torque (N m) for the position in body axes (m) and strength 3 mu/r5 (1/(m2 s2)). */
 static vector_t gravity_gradient(vector_t position, double strength, const craft_t *craft)
 {
-    return scale(strength, gyroscopic_torque(craft->with_rotors, position));
+    return scale(strength, gyroscopic_torque(total_inertia(craft), position));
 }
 
 /* Torque on the body (N m, body axes). */
 static vector_t gravity_gradient_torque(const state_t *state, const craft_t *craft)
 {
     const attraction_result_t attraction_result = attraction(state->position, craft);
-    const vector_t gravity_gradient_result = gravity_gradient(to_body(state->attitude, state->position), 3.0 *
-        attraction_result.scalar * attraction_result.inverse_square, craft);
-    return gravity_gradient_result;
+    return gravity_gradient(to_body(state->attitude, state->position), 3.0 * attraction_result.scalar *
+        attraction_result.inverse_square, craft);
 }
 
 /* ----------------------------------- algebra.several ------------------------------------ */
 
 /* Return the sum of weights[i] * vectors[i], from the first to the last; there is at least one. */
-static vector_t weighted(doubles4_t weights, const vectors4_t *vectors)
+static vector_t weighted(doubles4_t weights, vectors4_t vectors)
 {
-    const vector_t total = add(add(scale(weights.e[0], vectors->e[0]), scale(weights.e[1], vectors->e[1])),
-        scale(weights.e[2], vectors->e[2]));
-    return add(total, scale(weights.e[3], vectors->e[3]));
+    return add(add(add(scale(weights.e[0], vectors.e[0]), scale(weights.e[1], vectors.e[1])),
+        scale(weights.e[2], vectors.e[2])), scale(weights.e[3], vectors.e[3]));
 }
 
 /* -------------------------------- parts.effectors.wheels -------------------------------- */
@@ -309,7 +315,7 @@ static vector_t weighted(doubles4_t weights, const vectors4_t *vectors)
 /* The wheels' momentum in body axes (N m s): sum a_i h_i. */
 static vector_t wheel_momentum(doubles4_t momentum, const wheels_t *wheels)
 {
-    return weighted(momentum, &wheels->axes);
+    return weighted(momentum, wheels->axes);
 }
 
 /* The rotors' momentum in body axes (N m s). */

@@ -123,6 +123,13 @@ def test_part_without_a_form_in_c(tmp_path):
         make_code(loop, "law")
 
 
+def test_tables_that_no_command_reads_need_no_form_in_c():
+    """Wheels that share out a torque with the least peak hold facets, which are not the law's memory."""
+    code = code_of("wheels with a fault, least-peak")
+    assert not code.buffers
+    assert "wheel_momentum" in code.printed.titles.values()
+
+
 @pytest.mark.parametrize("name", [*(name for name in LAWS if name != "mission"), "estimator"])
 def test_code_is_written_to_be_read(name):
     """Functions as in the equations, not one block; nothing from the library but sqrt; no recursion, no allocation."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice, takewhile
 from typing import Any, ClassVar
@@ -17,9 +18,11 @@ from starhold.trace.program import Call, Function, Load, Op, Program, Store, Val
 from starhold.trace.source import TIE, Expression, names
 
 SHORT = 130
-"""Characters of a call that is written where its value is used."""
+"""Characters of a call that is written where its value is used, other than in `return`."""
 _ROWS = [kind for count in (6, 3) if (kind := Types().of((0.0,) * count)) is not None]
 """What Python reads at once from a memory."""
+_MANY = 2
+"""Values that one name has; of more, as a loop makes them, none is what the name says but one that is not known here."""
 _IN_STEP = {"state": "body_state", "command": "wanted"}
 """What the step calls its own values of names that its parameters have."""
 
@@ -67,7 +70,7 @@ class Readable(C99):
         given = [f"{'' if memory.writable else f'const{TIE}'}double{TIE}*{memory.name}" for memory in memories]
         for param in (param for param in function.shape.params if self.needs.takes(function, param)):
             kind = param.type.name
-            given.append(f"const{TIE}{kind}{TIE}*{param.name}" if param.type.by_pointer else f"{kind}{TIE}{param.name}")
+            given.append(f"const{TIE}{kind}{TIE}*{param.name}" if param.type.named else f"{kind}{TIE}{param.name}")
         result = self._result(function)
         gives = "void" if result is None else result.name
         return f"static {gives} {self.titles[function.name]}({', '.join(given) or 'void'})"
@@ -75,7 +78,7 @@ class Readable(C99):
     # Functions.
 
     def _prepare(self, function: Function) -> None:
-        main, shape, names_read = self.is_main(function), function.shape, self.needs.live[function.name]
+        self._function, shape, names_read = function, function.shape, self.needs.live[function.name]
         self._variables: dict[str, Type] = {}
         """Types of variables and of members of such, by how they are reached."""
         self._texts_of: dict[str, str] = {}
@@ -99,12 +102,12 @@ class Readable(C99):
         self._renewed: set[Any] = set()
         """Values whose names Python gives to others later: mostly they are read once, by those."""
         hints: dict[Any, str] = shape.hints
-        last = {name: key for key, name in hints.items()}
+        last, counts = {name: key for key, name in hints.items()}, Counter(hints.values())
         for full, name in hints.items():
             key = (full[0], *(x for x in full[1:] if isinstance(x, str) and x in names_read))
             if len(key) > 1:
-                self._hints[key] = _IN_STEP.get(name, name) if main else name
-                if last[name] != full:
+                self._hints[key] = _IN_STEP.get(name, name) if self.is_main(function) else name
+                if counts[name] > _MANY or last[name] != full:
                     self._renewed.add(key)
         used = {re.split(r"\.|->", name)[0] for name in names(function)}
         memories = (memory.name for memory in self.memories[function.name])
@@ -221,7 +224,7 @@ class Readable(C99):
 
     def _argument(self, param: Parameter, values: list[Value]) -> str:
         """Return a value, or the address of one that is passed by pointer."""
-        if not param.type.by_pointer:
+        if not param.type.named:
             return self.whole(param.type, values)
         text = self.whole(param.type, values, hint=param.name)
         return text.removeprefix("*") if text.startswith("*") else f"&{text}"
@@ -281,7 +284,8 @@ class Readable(C99):
         base, key = _variable(s), self._key(result, [ref for ref, _ in s.refs])
         hint = self._hints.get(key)
         nameless = hint is None or hint in self._taken or key in self._renewed
-        if nameless and base in self._once and not (memories or result.by_pointer) and len(text) <= SHORT:
+        short = len(text) <= SHORT or [*self._results(self._function)] == [(base, 1)]
+        if nameless and short and base in self._once and not (memories or result.named):
             self._folded[base] = Expression(text)
             return
         self._texts_of[base] = self._fresh(hint or f"{self.titles[function.name]}_result")

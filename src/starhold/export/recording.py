@@ -57,7 +57,7 @@ class Recording(Recorder):
     def parameter(self, name: str, like: Any, annotation: str = "", link: str = "") -> tuple[Any, Parameter]:
         """Return handles in the form of a value, which are the leaves of a variable of C, and what that is."""
         kind = self.types.of(like, annotation)
-        link = link or ("->" if kind is not None and kind.by_pointer else ".")
+        link = link or ("->" if kind is not None and kind.named else ".")
         places = tuple(paths(kind, name, link))
         return self._shaped(like, places), Parameter(name, kind or BOOL, places, link)
 
@@ -89,7 +89,7 @@ class Recording(Recorder):
         return self._shaped(out, places)
 
     def _record(self, equation: Any, values: tuple[Any, ...], key: Any) -> None:
-        """Record a function, unless it only hands on what it is given or what it gives has no type of C."""
+        """Record a function, unless it only hands on arguments or what it gives has no type of C."""
         outer = self._hints, self._locals
         self._hints, self._locals = {}, {}
         words = {word: str(equation.__annotations__.get(word, "")) for word in inspect.signature(equation).parameters}
@@ -103,7 +103,7 @@ class Recording(Recorder):
         else:
             function = None
         self._hints, self._locals = outer
-        if function is None or not (function.body or any(map(_is_rearranged, function.outs, function.shape.leaves))):
+        if function is None or not (function.body or any(map(_is_picked, function.outs, function.shape.leaves))):
             self._inlined.add(key)
         else:
             self._functions[key] = function._replace(name=self._titles.new(_title(equation))), [], out
@@ -179,8 +179,9 @@ class Recording(Recorder):
             self._hints[key] = depth, name
         for field in getattr(value, "_fields", ()):
             part = getattr(value, field)
+            lies = isinstance(part, Buffer) and isinstance(part.cells, Cells) and type(part.base) is int
             # The whole of a memory has a name already.
-            if isinstance(part, Buffer) and _is_part(part) and part.size != part.cells.memory.size:
+            if lies and part.size != part.cells.memory.size:
                 self.parts.setdefault(part.cells.memory.name, {}).setdefault(part.base, free(field))
 
 
@@ -202,10 +203,10 @@ def _key(value: Any) -> Any:
     return None if known else (title(type(value)) if hasattr(value, "_fields") else "", *numbers)
 
 
-def _is_rearranged(out: tuple[Value, str], path: Path) -> bool:
-    """Tell whether a function that computes nothing gives a number at another place than where it is given."""
-    last = re.split(r"\.|->", str(out[0]))
-    return isinstance(out[0], str) and path.text != "" and len(last) > 1 and last[-1] != path.text.rpartition(".")[2]
+def _is_picked(out: tuple[Value, str], path: Path) -> bool:
+    """Tell whether a number that a function gives is none of an argument that it hands on whole, nor a constant."""
+    name, dot, rest = out[0].partition(".") if isinstance(out[0], str) else ("", "", "")
+    return "->" in name or not path.text.endswith(dot + rest)
 
 
 def _counts(leaf: Any) -> bool:
@@ -218,7 +219,7 @@ def _numbers(value: Any) -> list[Value]:
 
 
 def _is_part(leaf: Any) -> bool:
-    """Tell whether a leaf may be a member of a struct, is known while recording, or lies in the law's memory."""
+    """Tell whether a leaf may be a member of a struct, is known while recording, or lies in a buffer."""
     if isinstance(leaf, Buffer):
-        return isinstance(leaf.cells, Cells) and type(leaf.base) is type(leaf.size) is int
+        return type(leaf.base) is type(leaf.size) is int
     return leaf.kind in (NUMBER, TRUTH) if isinstance(leaf, Handle) else isinstance(leaf, (bool, int, float))

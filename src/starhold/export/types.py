@@ -26,18 +26,13 @@ class Member(NamedTuple):
 
 class Type(NamedTuple):
     """A scalar (no members), or a struct. `elements`: a struct of one array, of that name. `named`: one of a NamedTuple,
-    which loses the members that nobody reads."""
+    which is passed by its address and loses the members that nobody reads."""
 
     name: str
     members: tuple[Member, ...] = ()
     elements: str = ""
     named: bool = False
     text: str = ""
-
-    @property
-    def by_pointer(self) -> bool:
-        """Whether functions are given the address of a value: of structs of NamedTuples and of matrices."""
-        return self.named or (bool(self.elements) and bool(self.members[0].type.members))
 
 
 DOUBLE, BOOL = Type("double"), Type("bool")

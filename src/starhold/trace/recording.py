@@ -313,7 +313,9 @@ class Recorder:
         if isinstance(value, tuple):
             return (type(value), *(self._form(part) for part in value))  # pyright: ignore
         if isinstance(value, Buffer):
-            return (value.cells.memory.name, self._form(value.base), self._form(value.size))
+            # Of numbers that are known while recording the list itself.
+            cells = value.cells.memory.name if isinstance(value.cells, Cells) else id(value.cells)
+            return (cells, self._form(value.base), self._form(value.size))
         if value is None or type(value) in (int, bool):
             return (type(value), value)
         return kind_of(value)
