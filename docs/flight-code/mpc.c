@@ -796,9 +796,9 @@ static void double_of(double *numbers, const rates_t *rates)
         {{t31, t32, t33, t34, t35, t36}}, {{t37, t38, t39, t40, t41, t42}}, {{t43, t44, t45, t46, t47, t48}},
         {{t49, t50, t51, t52, t53, t54}}, {{t55, t56, t57, t58, t59, t60}}}});
     for (int32_t j1 = 0; j1 < 6; j1++) {
-        const doubles6_t before = {{numbers[MEAN_AT + 6 * j1], numbers[MEAN_AT + 6 * j1 + 1], numbers[MEAN_AT
-            + 6 * j1 + 2], numbers[MEAN_AT + 6 * j1 + 3], numbers[MEAN_AT + 6 * j1 + 4], numbers[MEAN_AT + 6 *
-            j1 + 5]}};
+        const doubles6_t before = {{numbers[MEAN_AT + 6 * j1], numbers[MEAN_AT + 6 * j1 + 1],
+            numbers[MEAN_AT + 6 * j1 + 2], numbers[MEAN_AT + 6 * j1 + 3], numbers[MEAN_AT + 6 * j1 + 4],
+            numbers[MEAN_AT + 6 * j1 + 5]}};
         const doubles6_t apply1_result = apply1(turned, before);
         numbers[MEAN_AT + 6 * j1] = before.e[0] + 0.5 * apply1_result.e[0];
         numbers[MEAN_AT + 6 * j1 + 1] = before.e[1] + 0.5 * apply1_result.e[1];
@@ -1043,8 +1043,8 @@ static void advance(double *numbers)
     const doubles6_t a = {{numbers[TAIL_AT], numbers[TAIL_AT + 1], numbers[TAIL_AT + 2], numbers[TAIL_AT + 3],
         numbers[TAIL_AT + 4], numbers[TAIL_AT + 5]}};
     const double t28 = 0.0 + a.e[0] * -t1 + a.e[1] * -t2 + a.e[2] * -t3 + a.e[3] * -t4 + a.e[4] * -t5;
-    const doubles6_t a_2 = {{numbers[TAIL_AT + 6], numbers[TAIL_AT + 7], numbers[TAIL_AT + 8], numbers[TAIL_AT
-        + 9], numbers[TAIL_AT + 10], numbers[TAIL_AT + 11]}};
+    const doubles6_t a_2 = {{numbers[TAIL_AT + 6], numbers[TAIL_AT + 7], numbers[TAIL_AT + 8],
+        numbers[TAIL_AT + 9], numbers[TAIL_AT + 10], numbers[TAIL_AT + 11]}};
     const double t46 = 0.0 + a_2.e[0] * -t1 + a_2.e[1] * -t2 + a_2.e[2] * -t3 + a_2.e[3] * -t4 + a_2.e[4] *
         -t5;
     const doubles6_t a_3 = {{numbers[TAIL_AT + 12], numbers[TAIL_AT + 13], numbers[TAIL_AT + 14],
@@ -1554,11 +1554,11 @@ static sweep_result_t sweep(double *numbers, double barrier)
         const vectors6_t cross_2 = transposed2((doubles6s3_t){{apply1(onward, pushes.e[0]),
             apply1(onward, pushes.e[1]), apply1(onward, pushes.e[2])}});
         const doubles6_t m_2 = curvature_1(weights_result.r, pushes, pushed);
-        numbers[STIFFNESS_AT - back + 9] = m_2.e[0] + m_2.e[3] + m_2.e[5];
-        const vector_t v = {numbers[PLAN_AT - 3 * back + 27], numbers[PLAN_AT - 3 * back + 28],
-            numbers[PLAN_AT - 3 * back + 29]};
-        const vector_t pull = {numbers[GRADIENT_AT - 3 * back + 27], numbers[GRADIENT_AT - 3 * back + 28],
-            numbers[GRADIENT_AT - 3 * back + 29]};
+        numbers[STIFFNESS_AT + (9 - back)] = m_2.e[0] + m_2.e[3] + m_2.e[5];
+        const vector_t v = {numbers[PLAN_AT + 3 * (9 - back)], numbers[PLAN_AT + 3 * (9 - back) + 1],
+            numbers[PLAN_AT + 3 * (9 - back) + 2]};
+        const vector_t pull = {numbers[GRADIENT_AT + 3 * (9 - back)],
+            numbers[GRADIENT_AT + 3 * (9 - back) + 1], numbers[GRADIENT_AT + 3 * (9 - back) + 2]};
         const vector_t add_result = add(apply2(pushes,
             (doubles6_t){{slope, slope1, slope2, slope3, slope4, slope5}}), pull);
         double m_ = m_2.e[0];
@@ -1571,9 +1571,9 @@ static sweep_result_t sweep(double *numbers, double barrier)
         double g1_ = add_result.y;
         double g2_ = add_result.z;
         if (!holds) {
-            const double t22 = numbers[MULTIPLIERS_AT - 3 * back + 27];
-            const double t24 = numbers[MULTIPLIERS_AT - 3 * back + 28];
-            const double t26 = numbers[MULTIPLIERS_AT - 3 * back + 29];
+            const double t22 = numbers[MULTIPLIERS_AT + 3 * (9 - back)];
+            const double t24 = numbers[MULTIPLIERS_AT + 3 * (9 - back) + 1];
+            const double t26 = numbers[MULTIPLIERS_AT + 3 * (9 - back) + 2];
             const repelled_result_t repelled_result = repelled(&bounds, v, (vector_t){t22, t24, t26}, barrier,
                 m_2);
             const vector_t add_result_2 = add(add_result, repelled_result.push);
@@ -1597,30 +1597,30 @@ static sweep_result_t sweep(double *numbers, double barrier)
         const vector_t minus_result_4 = minus(held_inverse_result.symmetric, cross_2.e[3]);
         const vector_t minus_result_5 = minus(held_inverse_result.symmetric, cross_2.e[4]);
         const vector_t minus_result_6 = minus(held_inverse_result.symmetric, cross_2.e[5]);
-        numbers[STEP_AT - 3 * back + 27] = step_2.x;
-        numbers[STEP_AT - 3 * back + 28] = step_2.y;
-        numbers[STEP_AT - 3 * back + 29] = step_2.z;
+        numbers[STEP_AT + 3 * (9 - back)] = step_2.x;
+        numbers[STEP_AT + 3 * (9 - back) + 1] = step_2.y;
+        numbers[STEP_AT + 3 * (9 - back) + 2] = step_2.z;
         const vectors6_t gains = {{minus_result, minus_result_2, minus_result_3, minus_result_4,
             minus_result_5, minus_result_6}};
         const doubles6s3_t transposed1_result = transposed1(gains);
-        numbers[FEEDBACK_AT - 18 * back + 162] = transposed1_result.e[0].e[0];
-        numbers[FEEDBACK_AT - 18 * back + 163] = transposed1_result.e[0].e[1];
-        numbers[FEEDBACK_AT - 18 * back + 164] = transposed1_result.e[0].e[2];
-        numbers[FEEDBACK_AT - 18 * back + 165] = transposed1_result.e[0].e[3];
-        numbers[FEEDBACK_AT - 18 * back + 166] = transposed1_result.e[0].e[4];
-        numbers[FEEDBACK_AT - 18 * back + 167] = transposed1_result.e[0].e[5];
-        numbers[FEEDBACK_AT - 18 * back + 168] = transposed1_result.e[1].e[0];
-        numbers[FEEDBACK_AT - 18 * back + 169] = transposed1_result.e[1].e[1];
-        numbers[FEEDBACK_AT - 18 * back + 170] = transposed1_result.e[1].e[2];
-        numbers[FEEDBACK_AT - 18 * back + 171] = transposed1_result.e[1].e[3];
-        numbers[FEEDBACK_AT - 18 * back + 172] = transposed1_result.e[1].e[4];
-        numbers[FEEDBACK_AT - 18 * back + 173] = transposed1_result.e[1].e[5];
-        numbers[FEEDBACK_AT - 18 * back + 174] = transposed1_result.e[2].e[0];
-        numbers[FEEDBACK_AT - 18 * back + 175] = transposed1_result.e[2].e[1];
-        numbers[FEEDBACK_AT - 18 * back + 176] = transposed1_result.e[2].e[2];
-        numbers[FEEDBACK_AT - 18 * back + 177] = transposed1_result.e[2].e[3];
-        numbers[FEEDBACK_AT - 18 * back + 178] = transposed1_result.e[2].e[4];
-        numbers[FEEDBACK_AT - 18 * back + 179] = transposed1_result.e[2].e[5];
+        numbers[FEEDBACK_AT + 18 * (9 - back)] = transposed1_result.e[0].e[0];
+        numbers[FEEDBACK_AT + 18 * (9 - back) + 1] = transposed1_result.e[0].e[1];
+        numbers[FEEDBACK_AT + 18 * (9 - back) + 2] = transposed1_result.e[0].e[2];
+        numbers[FEEDBACK_AT + 18 * (9 - back) + 3] = transposed1_result.e[0].e[3];
+        numbers[FEEDBACK_AT + 18 * (9 - back) + 4] = transposed1_result.e[0].e[4];
+        numbers[FEEDBACK_AT + 18 * (9 - back) + 5] = transposed1_result.e[0].e[5];
+        numbers[FEEDBACK_AT + 18 * (9 - back) + 6] = transposed1_result.e[1].e[0];
+        numbers[FEEDBACK_AT + 18 * (9 - back) + 7] = transposed1_result.e[1].e[1];
+        numbers[FEEDBACK_AT + 18 * (9 - back) + 8] = transposed1_result.e[1].e[2];
+        numbers[FEEDBACK_AT + 18 * (9 - back) + 9] = transposed1_result.e[1].e[3];
+        numbers[FEEDBACK_AT + 18 * (9 - back) + 10] = transposed1_result.e[1].e[4];
+        numbers[FEEDBACK_AT + 18 * (9 - back) + 11] = transposed1_result.e[1].e[5];
+        numbers[FEEDBACK_AT + 18 * (9 - back) + 12] = transposed1_result.e[2].e[0];
+        numbers[FEEDBACK_AT + 18 * (9 - back) + 13] = transposed1_result.e[2].e[1];
+        numbers[FEEDBACK_AT + 18 * (9 - back) + 14] = transposed1_result.e[2].e[2];
+        numbers[FEEDBACK_AT + 18 * (9 - back) + 15] = transposed1_result.e[2].e[3];
+        numbers[FEEDBACK_AT + 18 * (9 - back) + 16] = transposed1_result.e[2].e[4];
+        numbers[FEEDBACK_AT + 18 * (9 - back) + 17] = transposed1_result.e[2].e[5];
         const doubles6s6_t curvature_2 = {{{{dot3(columns.e[0], onward.e[0],
             dot4(cross_2.e[0], minus_result, entry3(weights_result.q))), dot3(columns.e[0], onward.e[1],
             dot4(cross_2.e[0], minus_result_2, 0.0)), dot3(columns.e[0], onward.e[2],
@@ -1771,8 +1771,8 @@ static trial_t follow(double *numbers, doubles6_t start)
         const double x3 = x3_;
         const double x4 = x4_;
         const double x5 = x5_;
-        const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1], numbers[PLAN_AT + 3 * k +
-            2]};
+        const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1],
+            numbers[PLAN_AT + 3 * k + 2]};
         const double t11 = numbers[STEP_AT + 3 * k];
         const double t13 = numbers[STEP_AT + 3 * k + 1];
         const double t15 = numbers[STEP_AT + 3 * k + 2];
@@ -1889,8 +1889,8 @@ static double rollout(double *numbers)
         const double x3 = x3_;
         const double x4 = x4_;
         const double x5 = x5_;
-        const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1], numbers[PLAN_AT + 3 * k +
-            2]};
+        const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1],
+            numbers[PLAN_AT + 3 * k + 2]};
         const doubles6_t x_2 = {{x, x1, x2, x3, x4, x5}};
         const doubles6_t after = transition(motion_result.rows, motion_result.rows1, x_2, v);
         numbers[STATES_AT + 6 * k + 6] = after.e[0];
@@ -1985,19 +1985,19 @@ static double adjoint(double *numbers)
         const double y3 = y3_;
         const double y4 = y4_;
         const double y5 = y5_;
-        const vector_t v = {numbers[PLAN_AT - 3 * back + 27], numbers[PLAN_AT - 3 * back + 28],
-            numbers[PLAN_AT - 3 * back + 29]};
-        const doubles6_t x = {{numbers[STATES_AT - 6 * back + 54], numbers[STATES_AT - 6 * back + 55],
-            numbers[STATES_AT - 6 * back + 56], numbers[STATES_AT - 6 * back + 57], numbers[STATES_AT - 6 *
-            back + 58], numbers[STATES_AT - 6 * back + 59]}};
+        const vector_t v = {numbers[PLAN_AT + 3 * (9 - back)], numbers[PLAN_AT + 3 * (9 - back) + 1],
+            numbers[PLAN_AT + 3 * (9 - back) + 2]};
+        const doubles6_t x = {{numbers[STATES_AT + 6 * (9 - back)], numbers[STATES_AT + 6 * (9 - back) + 1],
+            numbers[STATES_AT + 6 * (9 - back) + 2], numbers[STATES_AT + 6 * (9 - back) + 3],
+            numbers[STATES_AT + 6 * (9 - back) + 4], numbers[STATES_AT + 6 * (9 - back) + 5]}};
         const vector_t weighed_result = weighed(weight.r, v);
         const doubles6_t y_2 = {{y, y1, y2, y3, y4, y5}};
         const double dot3_result = dot3(pushes.e[0], y_2, weighed_result.x);
         const double dot3_result_2 = dot3(pushes.e[1], y_2, weighed_result.y);
         const double dot3_result_3 = dot3(pushes.e[2], y_2, weighed_result.z);
-        numbers[GRADIENT_AT - 3 * back + 27] = dot3_result;
-        numbers[GRADIENT_AT - 3 * back + 28] = dot3_result_2;
-        numbers[GRADIENT_AT - 3 * back + 29] = dot3_result_3;
+        numbers[GRADIENT_AT + 3 * (9 - back)] = dot3_result;
+        numbers[GRADIENT_AT + 3 * (9 - back) + 1] = dot3_result_2;
+        numbers[GRADIENT_AT + 3 * (9 - back) + 2] = dot3_result_3;
         const vector_t g = {dot3_result, dot3_result_2, dot3_result_3};
         const doubles6_t costate_result = costate(weight.q, columns, x, y_2);
         gap_ = gap + form(weight.r_inverse, loose(&bounds, v, g));
@@ -2028,8 +2028,8 @@ static void unroll(double *numbers)
         const double x3 = x3_;
         const double x4 = x4_;
         const double x5 = x5_;
-        const vector_t start = {numbers[STEP_AT + 3 * k], numbers[STEP_AT + 3 * k + 1], numbers[STEP_AT + 3 *
-            k + 2]};
+        const vector_t start = {numbers[STEP_AT + 3 * k], numbers[STEP_AT + 3 * k + 1],
+            numbers[STEP_AT + 3 * k + 2]};
         const double t12 = numbers[FEEDBACK_AT + 18 * k];
         const double t15 = numbers[FEEDBACK_AT + 18 * k + 1];
         const double t18 = numbers[FEEDBACK_AT + 18 * k + 2];
@@ -2100,8 +2100,8 @@ static double shorten(double *numbers, double halvings)
             const double x3 = x3_;
             const double x4 = x4_;
             const double x5 = x5_;
-            const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1], numbers[PLAN_AT + 3 *
-                k + 2]};
+            const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1],
+                numbers[PLAN_AT + 3 * k + 2]};
             const double t14 = numbers[STEP_AT + 3 * k];
             const double t16 = numbers[STEP_AT + 3 * k + 1];
             const double t18 = numbers[STEP_AT + 3 * k + 2];
@@ -2256,8 +2256,8 @@ static void begin(double *numbers, double barrier)
 {
     const limits_t bounds = limits(numbers);
     for (int32_t k = 0; k < 10; k++) {
-        const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1], numbers[PLAN_AT + 3 * k +
-            2]};
+        const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1],
+            numbers[PLAN_AT + 3 * k + 2]};
         numbers[SPARE_AT + 3 * k] = v.x;
         numbers[SPARE_AT + 3 * k + 1] = v.y;
         numbers[SPARE_AT + 3 * k + 2] = v.z;
@@ -2280,10 +2280,10 @@ static double length_1(double *numbers, double barrier)
     double length_ = 1.0;
     for (int32_t k = 0; k < 10; k++) {
         const double length = length_;
-        const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1], numbers[PLAN_AT + 3 * k +
-            2]};
-        const vector_t d = {numbers[STEP_AT + 3 * k], numbers[STEP_AT + 3 * k + 1], numbers[STEP_AT + 3 * k +
-            2]};
+        const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1],
+            numbers[PLAN_AT + 3 * k + 2]};
+        const vector_t d = {numbers[STEP_AT + 3 * k], numbers[STEP_AT + 3 * k + 1],
+            numbers[STEP_AT + 3 * k + 2]};
         const vector_t room = slack(&bounds, v);
         const vector_t away = subtract(v, bounds.centre);
         const vector_t inner = times(away, d);
@@ -2368,8 +2368,8 @@ static void settle(double *numbers)
     const limits_t bounds = limits(numbers);
     const double near = 1e-05 * bounds.bound * bounds.bound;
     for (int32_t k = 0; k < 10; k++) {
-        const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1], numbers[PLAN_AT + 3 * k +
-            2]};
+        const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1],
+            numbers[PLAN_AT + 3 * k + 2]};
         const vector_t room = slack(&bounds, v);
         const vector_t b = subtract(v, bounds.centre);
         const vector_t add_result = add(bounds.centre, (vector_t){(room.x < near ? 2.0 : 1.0) * b.x,

@@ -298,26 +298,31 @@ class Readable(C99):
         if not isinstance(s, Op) or s.operation.gives != INDEX:
             return False
         a, b = (self._form(value) for value in s.args)
-        name = s.operation.name
-        self._forms[s.ref] = a * b if name == "index_product" else a + b if name == "index_plus" else a - b
+        if s.operation.name == "index_minus":
+            self._forms[s.ref] = self._symbol(f"({a.text(self._symbols)} - {self.text(s.args[1], INDEX)})")
+        else:
+            self._forms[s.ref] = a * b if s.operation.name == "index_product" else a + b
         return True
 
     def _form(self, value: Value) -> Form:
         if not isinstance(value, str):
             return constant(int(value))
         if value not in self._forms:
-            self._symbols.append(value)
-            self._forms[value] = Form({(len(self._symbols) - 1,): 1})
+            self._forms[value] = self._symbol(value)
         return self._forms[value]
+
+    def _symbol(self, text: str) -> Form:
+        self._symbols.append(text)
+        return Form({(len(self._symbols) - 1,): 1})
 
     def _place(self, s: Load | Store) -> str:
         """Return the text of a place: from where a part of the memory begins, if it lies in one."""
         form, parts = self._form(s.index), self.parts.get(s.memory, {})
         start = max((first for first in parts if first <= form.value), default=0)
-        base, text = f"{parts[start].upper()}_AT" if start in parts else "", (form - constant(start)).text(self._symbols)
-        if not base or text == "0":
-            return f"{s.memory}[{base or text}]"
-        return f"{s.memory}[{base} - {text[1:].strip()}]" if text.startswith("-") else f"{s.memory}[{base} + {text}]"
+        rest = (form - constant(start)).text(self._symbols)
+        base = [f"{parts[start].upper()}_AT"] if start in parts else []
+        text = " + ".join([*base, *([rest] if rest != "0" or not base else [])])
+        return f"{s.memory}[{text}]".replace(" ", TIE)
 
 
 def _variable(s: Call) -> str:
