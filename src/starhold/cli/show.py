@@ -51,12 +51,14 @@ def flying(entries: Sequence[LawEntry], steps: int) -> Iterator[Callable[[str, i
 
 def print_outcome(flights: Sequence[Flight]) -> None:
     """The table, what went wrong and what is proved."""
-    from starhold.report.text import lost_text
+    from starhold.report.text import lost_text, unknown_text
 
     print_table(flights)
     for flight in flights:
         if flight.lost is not None:
             console.print(f"{flight.name} diverged at {lost_text(flight)}; its results end there", style="red")
+        if said := unknown_text(flight):
+            console.print(said, style="red", markup=False, highlight=False)
         if flight.metrics.get("solver_budget_hits"):
             hits, calls = flight.metrics["solver_budget_hits"], flight.metrics["solver_calls"]
             console.print(f"{flight.name}: the solver used up its budget in {hits} of {calls} calls", style="yellow")

@@ -14,7 +14,7 @@ import numpy as np
 from starhold.report.colours import colour
 from starhold.report.plots import Mark, Panel, Plot, back_to_front
 from starhold.report.proved import swatch
-from starhold.report.text import lost_text, number_text, value_text
+from starhold.report.text import lost_text, number_text, unknown_text, value_text
 from starhold.scenario.checking import read_toml
 from starhold.studies.flight import Flight
 
@@ -168,11 +168,11 @@ def over_time(plot: Plot, flights: Sequence[Flight], marks: Sequence[Mark] = ())
 
 
 def lost_alarm(flights: Sequence[Flight]) -> str:
-    """Which motions were lost; empty where none was."""
+    """Which motions were lost, and what of others is no number; empty where nothing is wrong."""
     lost = [f"{flight.name} (at {lost_text(flight)})" for flight in flights if flight.lost is not None]
-    if not lost:
-        return ""
-    return f'<p class="alarm">Diverged, and so without final values: {escape(", ".join(lost))}.</p>'
+    told = [f"Diverged, and so without final values: {', '.join(lost)}"] if lost else []
+    told += [said for flight in flights if (said := unknown_text(flight))]
+    return "".join(f'<p class="alarm">{escape(said)}.</p>' for said in told)
 
 
 def ranking(flights: Sequence[Flight]) -> str:

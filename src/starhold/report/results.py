@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from starhold.certification.certificate import FILE as CERTIFICATES
 from starhold.certification.certificate import write as write_certificates
@@ -94,9 +95,18 @@ def write_run(run: Recording, path: Path) -> None:
 
 def write_summary(scenario: Scenario, results: dict[str, dict[str, Any]], path: Path) -> None:
     """The metrics of each law, SI units, as JSON; a value that does not exist is null."""
-    content = {"scenario": scenario.name, "starhold_version": __version__, "laws": results}
+    content = {"scenario": scenario.name, "starhold_version": __version__, "laws": _finite(results)}
     with atomic_write(path) as hidden:
         hidden.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _finite(value: Any) -> Any:
+    """A value in which what is no finite number is None."""
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in cast(dict[Any, Any], value).items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in cast(list[Any], value)]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def write_proofs(certificates: Sequence[Certificate], name: str, folder: Path) -> Path:

@@ -59,6 +59,12 @@ def _how(departures: Sequence[str]) -> str:
     return listed([*([HAS.removesuffix("the ") + enumerated(parts)] if parts else []), *others])
 
 
+def unknown_text(flight: Flight) -> str:
+    """Recorded quantities of a flight that are no numbers to its end, for reading; empty where all are."""
+    told = [f"{name} from {flight.metric_set.moment(time)} on" for name, time in flight.unknown.items()]
+    return f"{flight.name}: no number to the end: {', '.join(told)}" if told else ""
+
+
 def lost_text(flight: Flight, digits: int = 6) -> str:
     """When the motion of a flight was lost, for reading; empty where it was not."""
     return "" if flight.lost is None else flight.metric_set.moment(flight.lost, digits)

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -62,6 +64,17 @@ class Flight:
     def lost(self) -> float | None:
         """When the motion was lost (s), None for a run that did not diverge."""
         return self.metrics.get("diverged_at")
+
+    @cached_property
+    def unknown(self) -> dict[str, float]:
+        """Recorded quantities that are no numbers to the end of a motion that was not lost, and since when (s)."""
+        run, found = self.recording, dict[str, float]()
+        for name in run.columns if self.lost is None else ():
+            values = np.asarray(run.arrays.get(name, 0.0))
+            if values.dtype.kind == "f" and values.ndim and np.isnan(values[-1]).any():
+                sound = np.flatnonzero(~np.isnan(values.reshape(len(values), -1)).any(1))
+                found[name] = float(run["time"][sound[-1] + 1 if len(sound) else 0])
+        return found
 
     def left(self, certificate: int, kind: str) -> tuple[Departure, ...]:
         """How this flight leaves a claim of one of its certificates; empty where it does not."""
