@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from dataclasses import dataclass, replace
@@ -14,7 +16,7 @@ from starhold.campaign import engines
 from starhold.campaign.engines import Scheduler, Threads, Workers
 from starhold.campaign.store import Store
 from starhold.errors import InputError
-from tests.campaign.cluster import cluster
+from tests.campaign.cluster import ENVIRONMENT, cluster
 from tests.campaign.toy import LAWS, Toy, fly, manifest, missing
 
 
@@ -135,6 +137,20 @@ def test_workers_listen_to_nobody_else(store):
 
     fly(store, Workers(2), progress=progress)
     assert len(seen) >= 2
+
+
+def test_workers_of_a_script_without_its_guard_leave_nothing(tmp_path):
+    """Each worker reads the script too."""
+    text = (
+        "import starhold as sh\nfrom tests.campaign.flown import OVER, small\n"
+        "sh.campaign(small(), 'out', runs=20, over=OVER, search=False, workers=2)\n"
+    )
+    (tmp_path / "script.py").write_text(text)
+    done = subprocess.run(
+        [sys.executable, "script.py"], cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False, timeout=60
+    )
+    assert "InputError: 2 workers: cannot be started: one ended with code 1; a script needs `if __name__ ==" in done.stderr
+    assert not (tmp_path / "out").exists()
 
 
 def test_few_blocks_are_under_way_however_many_there_are(tmp_path, running):

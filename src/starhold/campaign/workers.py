@@ -33,7 +33,6 @@ class _Worker:
     process: BaseProcess
     pipe: Any
     blocks: deque[Any] = field(default_factory=deque[Any])
-    ready: bool = False
 
 
 class Team:
@@ -43,14 +42,23 @@ class Team:
         self._work, self._begun, self._name = work, begun, f"{count} workers"
         self._workers: list[_Worker] = []
         try:
-            with _undisturbed():
-                for _ in range(count):
-                    self._start()
+            self._start(count)
         except BaseException:
             self.close()
             raise
 
-    def _start(self) -> None:
+    def _start(self, count: int) -> None:
+        """Start processes, and wait until they listen."""
+        with _undisturbed():
+            begun = [self._begin() for _ in range(count)]
+        for worker in begun:
+            try:
+                worker.pipe.recv()
+            except (EOFError, OSError):
+                worker.process.join()
+                raise self._cannot_start(f"one ended with code {worker.process.exitcode}") from None
+
+    def _begin(self) -> _Worker:
         # Spawned: what a fork would copy are threads in the middle of what they do.
         context = multiprocessing.get_context("spawn")
         pipe, other = context.Pipe()
@@ -67,6 +75,7 @@ class Team:
             # Held by the process alone, so that its end is seen here.
             other.close()
         self._workers.append(_Worker(process, pipe))
+        return self._workers[-1]
 
     def fly(self, blocks: Iterable[Any]) -> Iterator[tuple[Any, Any]]:
         """Each block with its result, as they arrive. InputError where processes cannot be started, or where a block ends
@@ -74,7 +83,7 @@ class Team:
         waiting, deaths = deque(blocks), Counter[Any]()
         while waiting or any(worker.blocks for worker in self._workers):
             for worker in self._workers:
-                while worker.ready and waiting and len(worker.blocks) < AHEAD:
+                while waiting and len(worker.blocks) < AHEAD:
                     worker.blocks.append(waiting.popleft())
                     self._give(worker)
             ended: list[_Worker] = []
@@ -85,9 +94,7 @@ class Team:
                 except (EOFError, OSError):
                     ended.append(worker)
                     continue
-                if worker.ready:
-                    yield worker.blocks.popleft(), result
-                worker.ready = True
+                yield worker.blocks.popleft(), result
             for worker in ended:
                 self._replace(worker, deaths)
                 waiting.extendleft(reversed(worker.blocks))
@@ -104,14 +111,11 @@ class Team:
         self._workers.remove(worker)
         worker.pipe.close()
         worker.process.join()
-        if not worker.ready:
-            raise self._cannot_start(f"one ended with code {worker.process.exitcode}")
         if worker.blocks:
             deaths[worker.blocks[0]] += 1
             if deaths[worker.blocks[0]] >= TRIES:
                 raise InputError(self._name, "", "", "a block ended all workers that tried it; they may lack memory")
-        with _undisturbed():
-            self._start()
+        self._start(1)
 
     def _cannot_start(self, reason: str) -> InputError:
         hint = 'a script needs `if __name__ == "__main__":` before what starts workers'
