@@ -56,5 +56,5 @@ def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
         settings(scenario, own.settings),
         columns_list(flights),
     ]
-    data = {"laws": law_data(flights), **own.data}
-    return document(scenario, sections, data, own.scripts, f"{versions()}{own.footer}.", None if grounded else living)
+    data, moved = {"laws": law_data(flights), **own.data}, None if isinstance(living, str) else living
+    return document(scenario, sections, data, own.scripts, f"{versions()}{own.footer}.", moved)

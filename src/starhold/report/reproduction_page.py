@@ -10,12 +10,12 @@ from typing import Any
 
 from starhold.publications.paper import FigureItem, Paper, Section
 from starhold.publications.reproduction import Judged, Reproduction
-from starhold.publications.verdicts import PLAIN, VERDICTS, Verdict
+from starhold.publications.verdicts import PLAIN, VERDICTS
 from starhold.report.page_parts import plain_document
 from starhold.report.text import number_text
 from starhold.version import __version__
 
-MOODS: dict[Verdict, str] = {
+MOODS: dict[str, str] = {
     "agrees": "good",
     "holds": "good",
     "close": "open",
@@ -71,7 +71,7 @@ def tally(rows: Any) -> str:
     return " ".join(f'<span class="count">{badge(verdict)} {counted[verdict]}</span>' for verdict in given)
 
 
-def badge(verdict: Verdict) -> str:
+def badge(verdict: str) -> str:
     """The word in its colour."""
     return f'<span class="verdict {MOODS[verdict]}">{verdict}</span>'
 
