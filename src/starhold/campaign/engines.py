@@ -163,7 +163,7 @@ def _differing(chunk: Chunk, again: Chunk) -> str:
 
 
 def _bits(values: NDArray[Any]) -> Any:
-    """What must be the same: machines need not agree on the bits of what is no number."""
+    """Tell what must be the same: machines need not agree on the bits of what is no number."""
     if values.dtype.kind == "f":
         values = np.where(np.isnan(values), np.nan, values)
     return values.tolist() if values.dtype.kind in "OU" else values.tobytes()
