@@ -40,7 +40,7 @@ MOST_MARKS = 20
 """Switches of a flight that are marked."""
 NEAR = 0.02
 """Share of the largest error that counts as near the target."""
-KNOWN = (*rigid_body.Sample._fields, *wheels.Sample._fields)
+KNOWN = (*rigid_body.Sample._fields, *wheels.Sample._fields, "error_angle")
 """Recorded quantities that have plots of their own."""
 
 
