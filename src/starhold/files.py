@@ -53,7 +53,7 @@ def clear_unfinished(folder: Path) -> None:
 
 
 def read_bytes(path: Path) -> bytes:
-    """What a file holds. OSError where it cannot be read or is larger than any that is taken, for a device has no end."""
+    """Read a whole file. OSError where it cannot be read or is larger than any that is taken, for a device has no end."""
     with path.open("rb") as file:
         found = file.read(LARGEST + 1)
     if len(found) > LARGEST:
