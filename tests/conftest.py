@@ -1,6 +1,7 @@
 """Settings of the whole test run."""
 
 import os
+import signal
 import sys
 
 # Before NumPy loads: on small matrices the library's threads only wait for one another.
@@ -14,6 +15,9 @@ from tests.tiers import fewer
 # Where modules are not to be kept once compiled, each process that a test starts would compile all of starhold anew.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+
+# A shell that starts the tests in the background has them ignore interrupts, which some of them send.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 settings.register_profile("starhold", deadline=None, derandomize=True, max_examples=fewer(100, 4))
 settings.load_profile("starhold")

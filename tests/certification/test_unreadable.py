@@ -94,8 +94,11 @@ def test_a_law_with_a_root_and_a_memory_conforms_flies_and_is_undecided(declared
     head = HEAD.replace('d: Annotated[float, Gain("N m s", above=0.0, text="damping")]', root).replace("0.1)", "0.1, 0.05)")
     law = law_of(TWIST + V * (declared == "V"), tmp_path, head)
     failed = {v.name: v.reason for v in examine(law) if v.outcome == "failed"}
-    # What it declares as V is none of it.
-    assert set(failed) <= {"V is positive and does not rise, at random states, for a body free of other torques"}
+    # What it declares as V is none of it, and the numbers in its memory's equation have units.
+    assert set(failed) <= {
+        "V is positive and does not rise, at random states, for a body free of other torques",
+        "The declared units are right: the torque is the same in any system of units",
+    }
     with adopted(law):
         scenario = parse(scenario_with(law, law.examples()[0]), "here")
         (flight,) = compare(scenario)

@@ -14,7 +14,7 @@ from tests.campaign.flown import small
 
 over = {"law.pd.k_rate": {"distribution": "uniform", "low": 1.5, "high": 2.5}}
 text = small(campaign={"runs": 10_000_000, "over": over}).text
-job = Jobs().start("campaign", "small", text, "small.toml", Path())
+job = Jobs().start("campaign", "small", text, "small.toml", Path(), ["pd"])
 while not job.state:
     assert not job.ended
     time.sleep(0.05)

@@ -112,7 +112,7 @@ class Meter:
         return {name: metric.unit for name, metric in self.table.items()}
 
     def observers(self, parts: Composition) -> tuple[Observer, Observer]:
-        """What takes the notes inside a kernel of these parts: before the last of `marks`, and from it on."""
+        """Return what takes the notes inside a kernel of these parts, before the last of `marks` and from it on."""
         early, late = (Observer(_observing(note, parts), self.first, self.numbers) for note in self.notes)
         return early, late
 
@@ -164,7 +164,7 @@ class Meter:
         return instants > (1.0 - metric.kept) * self.steps
 
     def _values(self, metric: Metric, noted: Array, windows: Array, ends: Sequence[int]) -> Array:
-        """What the metric's kind makes of the notes (lanes,); `ends` are those of the windows."""
+        """Return the metric before it is scaled (lanes,); `ends` are those of the windows."""
         if metric.since is None:
             given = [noted[row] for row in metric.rows]
         else:
@@ -183,7 +183,7 @@ class Meter:
         return values / (count * metric.over[1])
 
     def _replayed(self, run: Recording, limit: float, ends: Sequence[int]) -> tuple[Array, Array]:
-        """What is noted of a recording, (numbers, 1), and in windows, (windows, quantities, 1)."""
+        """Take the notes of a recording, (numbers, 1), and in windows, (windows, quantities, 1)."""
         columns = tuple((name, values.shape[1:]) for name, values in run.arrays.items() if name != "time")
         kernels = [_replay(note, self.first, (self.numbers, limit), columns) for note in self.notes]
         shared = Arguments(self.numbers, limit).shared

@@ -26,8 +26,8 @@ def unit_quaternion(stated: Quaternion) -> Quaternion:
     length = math.hypot(*stated)
     try:
         check_attitude(stated)
-    except ValueError as error:
-        raise ValueError(f"must be {error}, not of length {length:g}") from None
+    except ValueError:
+        raise ValueError(f"must be {ALLOWED}, not of length {length:g}") from None
     return stretch(1.0 / length, stated)
 
 
