@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from starhold.loop.closed_loop import ClosedLoop, Phase
 from starhold.loop.kernels import Numbers, numbers_of
 from starhold.simulation.abreast import Flying, kernel_key
+from starhold.trace.handles import Handle
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -64,7 +65,7 @@ def named(value: Any, name: str) -> Iterator[tuple[str, Any]]:
         for place, part in enumerate(value):
             own = f"{name}.{fields[place]}".lstrip(".") if fields else f"{name}[{place + 1}]"
             yield from named(part, own)
-    elif isinstance(value, float | np.ndarray):
+    elif isinstance(value, float | np.ndarray | Handle):
         yield name, value
 
 

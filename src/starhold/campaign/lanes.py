@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.structure import flatten, mapped
+from starhold.algebra.structure import flatten, leaves, mapped
 from starhold.campaign.flat import Flat, named, named_carry, named_phases, same, shown_name
 from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop, Phase
@@ -23,6 +23,8 @@ from starhold.loop.kernels import Numbers, numbers_of
 from starhold.scenario.building import build
 from starhold.scenario.making import variants
 from starhold.simulation.lanes import carry_columns
+from starhold.trace.calling import Compiled
+from starhold.trace.handles import Handle
 
 if TYPE_CHECKING:
     from starhold.campaign.dispersions import Dispersion
@@ -36,8 +38,6 @@ TRIES = 64
 """Runs that are looked at for those whose value differs from the first run's."""
 PROBES = 4
 """Runs on which what many runs get is compared, first of all, with what each one gets."""
-MADE = {"start": ("state",), "craft": ("craft", "nominal")}
-"""Where in a carry, or in a phase, stands what a body makes of many runs' values."""
 _FORM = -1
 """Stands for whatever is no number: the kernel itself."""
 
@@ -203,14 +203,31 @@ class Lanes:
                     found[place] = equal[0]
         return found
 
+    @cached_property
+    def _equation(self) -> tuple[Compiled, list[str]]:
+        """What the body makes of drawn values, and the names of these numbers in a carry or in a phase."""
+        hooks, names = self.scenario.hooks, list[str]()
+        drawn = hooks.drawn(self.scenario, self._by_key(self.first))
+        first = {key: mapped(value, lambda lanes: float(lanes[0])) for key, value in drawn.items()}
+
+        def numbers(*values: Any) -> tuple[Any, ...]:
+            moved = hooks.moved(self.scenario, self.base.loop, dict(zip(first, values, strict=True)))
+            made = {"state": moved.made_with, "craft": moved.craft, "nominal": moved.craft}
+            pairs = [pair for prefix, value in made.items() for pair in named(value, prefix) if isinstance(pair[1], Handle)]
+            names[:] = [name for name, _ in pairs]
+            return tuple(number for _, number in pairs)
+
+        return Compiled(numbers, *first.values()), names
+
     def _together(self, columns: Columns, runs: NDArray[np.int64]) -> Lot:
         """Lanes made at once: numbers that are values, and those that the body makes of values."""
         base, moved = self.base, set[int]().union(*self.moved.values())
         rows: dict[int, Array] = {place: columns[name].astype(float) for place, name in self._follows.items()}
-        for kind, value in self.scenario.hooks.derive(self.scenario, self._by_key(columns)).items():
-            for prefix in MADE[kind]:
-                for name, row in named(value, prefix):
-                    rows |= {place: row for place in base.places(name) if place in moved and isinstance(row, np.ndarray)}
+        drawn = self.scenario.hooks.drawn(self.scenario, self._by_key(columns))
+        if drawn:
+            equation, names = self._equation
+            for name, row in zip(names, equation.over(np.array([*leaves(tuple(drawn.values()))])), strict=True):
+                rows |= {place: row for place in base.places(name) if place in moved}
         like = base.loop.carry()
         carried, moving = len(numbers_of(like)), len(flatten((like.state, like.effectors)))
         phases = _phases(base.loop.phases(self.steps), carried, lambda place, value: rows.get(place, value))

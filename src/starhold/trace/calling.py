@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -29,8 +30,14 @@ class Compiled:
         self.program, self._like = record_call(equation, like)
         self._count = len(list(_floats(like)))
         self._leaves = list(leaves(self._like))
-        self._one = load(self.program, 1)
-        self._many: Callable[..., None] | None = None
+
+    @cached_property
+    def _one(self) -> Callable[..., None]:
+        return load(self.program, 1)
+
+    @cached_property
+    def _many(self) -> Callable[..., None]:
+        return load(self.program, WIDTH)
 
     def __call__(self, *values: Any) -> Any:
         """Call the equation with numbers; the result is shaped as the equation gives it."""
@@ -43,8 +50,6 @@ class Compiled:
     def over(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the numbers it gives, (numbers, lanes), for arguments whose floats are the columns of (floats, lanes);
         truths are 1 and 0."""
-        if self._many is None:
-            self._many = load(self.program, WIDTH)
         count = columns.shape[1]
         blocks = -(-count // WIDTH)
         x, y = aligned(blocks, self._count, WIDTH), aligned(blocks, len(self._leaves), WIDTH)

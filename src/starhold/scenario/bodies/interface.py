@@ -108,10 +108,9 @@ class Body(Protocol):
         """InputError where the law of a loop, which has been called once, cannot work there."""
         ...
 
-    def derive(self, scenario: Scenario, columns: Mapping[str, Any]) -> dict[str, Any]:
-        """The "start" and the "craft" of many runs that differ in the values of some keys, or components of theirs,
-        (components..., lanes) by key, with an array (lanes,) in place of each number and the bits that `build` would give;
-        empty where only `build` can tell."""
+    def drawn(self, scenario: Scenario, columns: Mapping[str, Any]) -> dict[str, Any]:
+        """What `moved` takes of many runs, an array (lanes,) in place of each number, where they differ in the values of
+        some keys, or components of theirs, (components..., lanes) by key; without those of which only `build` can tell."""
         return {}
 
     def dials(self, scenario: Scenario) -> dict[str, Any]:

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from starhold.laws.catalogue import Law, catalogue
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.part import Fitted
-from starhold.scenario.bodies.interface import Body, Moved
 from starhold.scenario.bodies.rigid_body.building import build, check_events
 from starhold.scenario.bodies.rigid_body.craft import Made, make
-from starhold.scenario.bodies.rigid_body.dials import KNOWN, TRUE, admitted, changes, dials, moved
-from starhold.scenario.bodies.rigid_body.lanes import derive, refused
+from starhold.scenario.bodies.rigid_body.dials import Dials
 from starhold.scenario.bodies.rigid_body.start import mode_target, told_to_design
 from starhold.scenario.bodies.rigid_body.tables import AttitudeLawTable, RigidBodyTable
 
@@ -45,7 +42,7 @@ class Options(NamedTuple):
     """The action on any fault where this law flies; None: the fault's own."""
 
 
-class RigidBody(Body):
+class RigidBody(Dials):
     """A spacecraft that turns, with or without wheels."""
 
     name = "rigid-body"
@@ -54,7 +51,6 @@ class RigidBody(Body):
     law_table = AttitudeLawTable
     example = EXAMPLE
     modes = True
-    linked = MappingProxyType({TRUE: KNOWN})
     orbit = ORBIT
     modelled = ("spacecraft", "wheels", "wheel")
     designed = ("initial", "orbit")
@@ -76,24 +72,6 @@ class RigidBody(Body):
 
     def build(self, scenario: Scenario, entry: LawEntry) -> ClosedLoop:
         return build(scenario, entry)
-
-    def derive(self, scenario: Scenario, columns: Mapping[str, Any]) -> dict[str, Any]:
-        return derive(scenario, columns)
-
-    def dials(self, scenario: Scenario) -> dict[str, Any]:
-        return dials(scenario)
-
-    def moved(self, scenario: Scenario, loop: ClosedLoop, values: Mapping[str, Any]) -> Moved:
-        return moved(scenario, loop, values)
-
-    def admitted(self, scenario: Scenario, values: Mapping[str, Any]) -> Any:
-        return admitted(scenario, values)
-
-    def changes(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        return changes(values)
-
-    def refused(self, scenario: Scenario, columns: Mapping[str, Any]) -> Any:
-        return refused(scenario, columns)
 
     def examine(self, scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> None:
         check_events(scenario, entry, loop)

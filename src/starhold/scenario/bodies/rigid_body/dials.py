@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import reduce
-from typing import TYPE_CHECKING, Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
+from starhold.algebra.cosines import from_angles
 from starhold.algebra.scalar import both, less_equal, minimum, where
 from starhold.algebra.structure import leaves
 from starhold.algebra.vector import apply
@@ -17,57 +20,110 @@ from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.craft import Craft, check_moments, check_rest, compact, inverse
 from starhold.parts.effectors.wheels import body_inertia
 from starhold.parts.stated_attitude import check_attitude
-from starhold.scenario.bodies.interface import Moved
+from starhold.scenario.bodies.interface import Body, Moved
 from starhold.scenario.bodies.rigid_body.craft import torque_limit, wheels_of
-from starhold.scenario.bodies.rigid_body.start import start_of, target_of
+from starhold.scenario.bodies.rigid_body.start import start_of, stated, target_of, unit_of
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
 
+Array: TypeAlias = NDArray[np.float64]
+
 KNOWN, TRUE = "spacecraft.inertia", "fault[1].inertia"
 """The inertia that the laws know, and the one that the craft has where they do not know it."""
 LIMIT, ATTITUDE, RATE = "spacecraft.torque_limit", "initial.attitude", "initial.rate"
+ANGLES = "initial.angles"
+"""No key that may be moved, for sines are no operation: `moved` takes the quaternion of the angles."""
 
 
-def dials(scenario: Scenario) -> dict[str, Any]:
-    """The keys that may be moved, with their numbers; an attitude given by angles comes as a quaternion, and a limit that
-    is infinite not at all. With faults nothing may, nor where laws suppose another craft: what that changes is not told by
-    equations."""
-    table = scenario.table
-    if table.fault or table.nominal:
-        return {}
-    inertia = compact(table.spacecraft.inertia)
-    found: dict[str, Any] = {KNOWN: inertia, TRUE: inertia}
-    if math.isfinite(table.spacecraft.torque_limit) and table.spacecraft.limit != "none":
-        found[LIMIT] = table.spacecraft.torque_limit
-    given = table.initial.attitude
-    own = start_of(scenario.with_({"initial.relative_to": "inertial"}), target_of(scenario)).attitude
-    found[ATTITUDE] = tuple(map(float, own if given is None else given))
-    return found | {RATE: tuple(map(float, table.initial.rate))}
+class Dials(Body):
+    """A body whose inertia, limit and start may be moved."""
 
+    linked = MappingProxyType({TRUE: KNOWN})
 
-def changes(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The changes of a file that values of these keys mean: an inertia that the laws do not know is that of a fault at the
-    start, about which nothing is done."""
-    found = {key: value for key, value in values.items() if key != TRUE}
-    if ATTITUDE in found:
-        found["initial.angles"] = None
-    if TRUE in values:
-        found["fault"] = [{"time": 0.0, "inertia": values[TRUE], "action": "none"}]
-    return found
+    def dials(self, scenario: Scenario) -> dict[str, Any]:
+        """The keys that may be moved, with their numbers; an attitude given by angles comes as a quaternion, and a limit
+        that is infinite not at all. With faults nothing may, nor where laws suppose another craft: what that changes is not
+        told by equations."""
+        table = scenario.table
+        if table.fault or table.nominal:
+            return {}
+        inertia = compact(table.spacecraft.inertia)
+        found: dict[str, Any] = {KNOWN: inertia, TRUE: inertia}
+        if math.isfinite(table.spacecraft.torque_limit) and table.spacecraft.limit != "none":
+            found[LIMIT] = table.spacecraft.torque_limit
+        attitude = table.initial.attitude or stated(table.initial)
+        return found | {ATTITUDE: tuple(map(float, attitude)), RATE: tuple(map(float, table.initial.rate))}
 
+    def changes(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """The changes of a file that values of these keys mean: an inertia that the laws do not know is that of a fault at
+        the start, about which nothing is done."""
+        found = {key: value for key, value in values.items() if key != TRUE}
+        if ATTITUDE in found:
+            found[ANGLES] = None
+        if TRUE in values:
+            found["fault"] = [{"time": 0.0, "inertia": values[TRUE], "action": "none"}]
+        return found
 
-def moved(scenario: Scenario, loop: ClosedLoop, values: Mapping[str, Any]) -> Moved:
-    """The numbers of a loop under these values, as `build` and `make_events` give them."""
-    nominal, flown = _crafts(scenario, values)
-    cutoff = values.get(LIMIT, loop.cutoff())
-    begun = start_of(scenario, target_of(scenario), values.get(ATTITUDE), values.get(RATE))
-    # An inertia that changes as the motion begins leaves the angular momentum, as in `Phase.rate_from`.
-    pairs = zip(leaves(flown.inertia), leaves(nominal.inertia), strict=True)
-    same = reduce(both, (both(less_equal(a, b), less_equal(b, a)) for a, b in pairs))
-    jumped = apply(flown.inverse_inertia, apply(nominal.inertia, begun.rate))
-    rate: Any = tuple(where(same, kept, other) for kept, other in zip(begun.rate, jumped, strict=True))
-    return Moved(begun._replace(rate=rate), begun, flown, nominal, cutoff)
+    def moved(self, scenario: Scenario, loop: ClosedLoop, values: Mapping[str, Any]) -> Moved:
+        """The numbers of a loop under these values, as `build` and `make_events` give them."""
+        nominal, flown = _crafts(scenario, values)
+        cutoff = values.get(LIMIT, loop.cutoff())
+        attitude = unit_of(values[ATTITUDE]) if ATTITUDE in values else values.get(ANGLES)
+        begun = start_of(scenario, target_of(scenario), attitude, values.get(RATE))
+        # An inertia that changes as the motion begins leaves the angular momentum, as in `Phase.rate_from`.
+        pairs = zip(leaves(flown.inertia), leaves(nominal.inertia), strict=True)
+        same = reduce(both, (both(less_equal(a, b), less_equal(b, a)) for a, b in pairs))
+        jumped = apply(flown.inverse_inertia, apply(nominal.inertia, begun.rate))
+        rate: Any = tuple(where(same, kept, other) for kept, other in zip(begun.rate, jumped, strict=True))
+        return Moved(begun._replace(rate=rate), begun, flown, nominal, cutoff)
+
+    def admitted(self, scenario: Scenario, values: Mapping[str, Any]) -> Craft:
+        """The craft that laws know under these values, which may be recorded ones; InputError where no file may have
+        them."""
+        crafts = _crafts(scenario, values)
+        for key, craft in zip((KNOWN, TRUE), crafts, strict=True):
+            try:
+                if key in values:
+                    check_moments(values[key])
+                if key in values and wheels_of(scenario) is not None:
+                    check_rest(craft.inertia)
+            except ValueError as error:
+                raise InputError("", key, "", str(error)) from None
+        if ATTITUDE in values:
+            try:
+                check_attitude(values[ATTITUDE])
+            except ValueError as error:
+                raise InputError("", ATTITUDE, "", str(error)) from None
+        return crafts[0]
+
+    def drawn(self, scenario: Scenario, columns: Mapping[str, Array]) -> dict[str, Any]:
+        """What `moved` takes, with an array (lanes,) in place of each number; columns: values (components..., lanes) by
+        key, of whole vectors or of single components. An inertia beside wheels is left out."""
+        initial, found = scenario.table.initial, dict[str, Any]()
+        for key, given in ((ATTITUDE, initial.attitude), (ANGLES, initial.angles), (RATE, initial.rate)):
+            values = _whole(columns, key, given)
+            if values is not None and key == ANGLES:
+                # One by one, for the sine of an array may differ from that of a number.
+                values = np.array([from_angles(*lane) for lane in values.T.tolist()]).T
+            if values is not None:
+                found[key] = tuple(values)
+        moments = _moments(scenario, columns)
+        if moments is not None and wheels_of(scenario) is None:
+            found[KNOWN] = _inertia(moments, isinstance(scenario.craft.inertia[0], tuple))
+        return found
+
+    def refused(self, scenario: Scenario, columns: Mapping[str, Array]) -> NDArray[np.bool_] | None:
+        """Which lanes have an inertia that no body has, (lanes,); None where that is not drawn."""
+        moments = _moments(scenario, columns)
+        if moments is None:
+            return None
+        if moments.ndim == 2:
+            ordered = np.sort(moments, axis=0).T
+        else:
+            full = np.moveaxis(moments, -1, 0)
+            ordered = np.linalg.eigvalsh(0.5 * (full + full.swapaxes(1, 2)))
+        return (ordered[:, 0] <= 0.0) | (ordered[:, 2] > (ordered[:, 0] + ordered[:, 1]) * (1.0 + 1e-9))
 
 
 def _crafts(scenario: Scenario, values: Mapping[str, Any]) -> tuple[Craft, Craft]:
@@ -84,25 +140,6 @@ def _crafts(scenario: Scenario, values: Mapping[str, Any]) -> tuple[Craft, Craft
         craft = craft._replace(torque_limit=reckoned)
     nominal = _with_inertia(scenario, craft, values[KNOWN]) if KNOWN in values else craft
     return nominal, _with_inertia(scenario, craft, values[TRUE]) if TRUE in values else nominal
-
-
-def admitted(scenario: Scenario, values: Mapping[str, Any]) -> Craft:
-    """The craft that laws know under these values, which may be recorded ones; InputError where no file may have them."""
-    crafts = _crafts(scenario, values)
-    for key, craft in zip((KNOWN, TRUE), crafts, strict=True):
-        try:
-            if key in values:
-                check_moments(values[key])
-            if key in values and wheels_of(scenario) is not None:
-                check_rest(craft.inertia)
-        except ValueError as error:
-            raise InputError("", key, "", str(error)) from None
-    if ATTITUDE in values:
-        try:
-            check_attitude(values[ATTITUDE])
-        except ValueError as error:
-            raise InputError("", ATTITUDE, "", str(error)) from None
-    return crafts[0]
 
 
 def _with_inertia(scenario: Scenario, craft: Craft, inertia: Any) -> Craft:
@@ -131,3 +168,29 @@ def _less(inertia: Any, rotors: Any, rest: Any) -> Any:
     return tuple(
         tuple(inertia[i][j] - float(rotors[i, j]) if rest[i, j] != 0.0 else 0.0 for j in range(3)) for i in range(3)
     )
+
+
+def _moments(scenario: Scenario, columns: Mapping[str, Array]) -> Array | None:
+    return _whole(columns, KNOWN, np.diagonal(np.asarray(scenario.table.spacecraft.inertia)))
+
+
+def _whole(columns: Mapping[str, Array], key: str, nominal: Any) -> Array | None:
+    """The vectors (components, lanes), or matrices, of a key of which all or some components are drawn; None of one that is
+    not drawn."""
+    if key in columns:
+        return columns[key]
+    drawn = {name: values for name, values in columns.items() if name.startswith(f"{key}[")}
+    if not drawn or nominal is None or any("][" in name for name in drawn):
+        return None
+    found = np.repeat(np.asarray(nominal, dtype=float)[:, None], len(next(iter(drawn.values()))), axis=1)
+    for name, values in drawn.items():
+        found[int(name[len(key) + 1 :].partition("]")[0]) - 1] = values
+    return found
+
+
+def _inertia(moments: Array, matrix: bool) -> Any:
+    """Valid inertias (3, lanes) or (3, 3, lanes) in the form of the craft's."""
+    if moments.ndim == 2:
+        moments = np.eye(3)[:, :, None] * moments
+    rows = 0.5 * (moments + moments.swapaxes(0, 1))
+    return tuple(tuple(row) for row in rows) if matrix else tuple(rows[k, k] for k in range(3))

@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
 
 
-def _attitude(pointing: Pointing) -> Quaternion:
+def stated(pointing: Pointing) -> Quaternion:
+    """The unit quaternion that a table states."""
     if pointing.angles is not None:
         return from_angles(*pointing.angles)
     return NO_TURN if pointing.attitude is None else unit_of(pointing.attitude)
@@ -91,7 +92,7 @@ def _told(scenario: Scenario, table: TargetTable, key: str) -> Fitted:
     if table.mode == "orbital":
         return fit("target", "orbital")
     if table.mode == "inertial":
-        return fit("target", "inertial", _attitude(table))
+        return fit("target", "inertial", stated(table))
     samples = np.arange(simulation.steps + 1) * simulation.control_period
     last = simulation.steps * simulation.control_period
     rows = _history(scenario, table, key, lambda times, rows: history.tabulate(times, rows, samples))
@@ -129,11 +130,12 @@ def _history(scenario: Scenario, table: TargetTable, key: str, use: Callable[...
 
 
 def start_of(scenario: Scenario, goal: Fitted, attitude: Any = None, rate: Any = None) -> State:
-    """The first state of a run with this target; of numbers in the place of those of [initial] an equation."""
+    """The first state of a run with this target; of a unit quaternion or a rate in place of those of [initial] an
+    equation."""
     table = scenario.table
     orbit = table.orbit
     position, velocity = (ZERO, ZERO) if orbit is None else orbit.start
-    turned = _attitude(table.initial) if attitude is None else unit_of(attitude)
+    turned = stated(table.initial) if attitude is None else attitude
     begun = State(turned, table.initial.rate if rate is None else rate, position, velocity, ZERO)
     if table.initial.relative_to == "target":
         held = goal_at_start(goal, begun)
