@@ -22,7 +22,7 @@ from starhold.loop.closed_loop import ClosedLoop, Phase
 from starhold.loop.kernels import Numbers, numbers_of
 from starhold.scenario.building import build
 from starhold.scenario.making import variants
-from starhold.simulation.lanes import carry_columns
+from starhold.simulation.lanes import alongside, carry_columns
 from starhold.trace.calling import Compiled
 from starhold.trace.handles import Handle
 
@@ -230,7 +230,7 @@ class Lanes:
                 rows |= {place: row for place in base.places(name) if place in moved}
         like = base.loop.carry()
         carried, moving = len(numbers_of(like)), len(flatten((like.state, like.effectors)))
-        phases = _phases(base.loop.phases(self.steps), carried, lambda place, value: rows.get(place, value))
+        phases = _phases(base.loop.phases(self.steps), carried, rows)
         starts = np.repeat(base.numbers[:moving, None], len(runs), axis=1)
         for place in range(moving):
             if place in rows:
@@ -239,13 +239,9 @@ class Lanes:
 
     def _apart(self, flats: Sequence[Flat], runs: NDArray[np.int64]) -> Lot:
         """Lanes of one form, each made by itself."""
-        loop, table = flats[0].loop, np.array([flat.numbers for flat in flats]).T
-        carried = len(numbers_of(loop.carry()))
-
-        def row(place: int, value: float) -> Any:
-            return value if (table[place] == value).all() else table[place]
-
-        return Lot(runs, loop, np.ascontiguousarray(table[:carried]), _phases(loop.phases(self.steps), carried, row))
+        loop, phases = flats[0].loop, alongside([flat.loop.phases(self.steps) for flat in flats])
+        carries = np.array([flat.numbers[: len(numbers_of(loop.carry()))] for flat in flats]).T
+        return Lot(runs, loop, np.ascontiguousarray(carries), tuple(phases))
 
     def _read_back(self) -> tuple[str, ...]:
         """The names of numbers that show each dispersion: those that are its values, else all that it moves; of those that
@@ -275,8 +271,8 @@ class Lanes:
         }
 
 
-def _phases(phases: Sequence[Phase], begin: int, value: Any) -> tuple[Phase, ...]:
-    """Phases with value(place, number) in place of each number; the first has the place `begin`."""
+def _phases(phases: Sequence[Phase], begin: int, rows: Mapping[int, Array]) -> tuple[Phase, ...]:
+    """Phases with these rows (lanes,) by the places of the numbers that they replace; the first has the place `begin`."""
     found: list[Phase] = []
     place = begin - 1
     before: Any = None
@@ -286,7 +282,7 @@ def _phases(phases: Sequence[Phase], begin: int, value: Any) -> tuple[Phase, ...
         if not isinstance(number, float):
             return number
         place += 1
-        return value(place, number)
+        return rows.get(place, number)
 
     for phase in phases:
         own = mapped(Numbers.of(phase), leaf)

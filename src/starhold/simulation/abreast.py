@@ -11,10 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.structure import buffers, flatten, leaves, mapped, places
+from starhold.algebra.structure import buffers, flatten, mapped, places
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import Arguments, Kernel, Numbers, form, make_kernel, make_step, numbers_of, one, state_of
 from starhold.simulation.lane import Progress, fly
+from starhold.simulation.lanes import alongside
 from starhold.trace.machine import aligned, widest
 
 FEW = 3
@@ -95,7 +96,7 @@ def _together(group: Sequence[Flying], numbers: Sequence[int], use: Callable[...
         return _one_by_one(group, numbers, use)
     phases = [flight.loop.phases(steps) for flight in group]
     # Of all lanes at once, so that one kernel flies every block of them.
-    whole = [_spread([own[k] for own in phases]) for k in range(len(phases[0]))]
+    whole = [Numbers.of(phase) for phase in alongside(phases)]
     kernels = [make_kernel(one, loop.composition(), width, loop.carry(), values, loop.substeps) for values in whole]
 
     def block(first: int) -> list[tuple[int, Any]]:
@@ -106,19 +107,6 @@ def _together(group: Sequence[Flying], numbers: Sequence[int], use: Callable[...
         return [(numbers[first + k], use(numbers[first + k], *flown(k))) for k in range(min(width, len(group) - first))]
 
     return [partial(block, first) for first in range(0, len(group), width)]
-
-
-def _spread(phases: Sequence[Any]) -> Numbers:
-    """The numbers of a phase for many lanes: those that differ become arrays (lanes,)."""
-    values = [Numbers.of(phase) for phase in phases]
-    columns = zip(*(leaves(value) for value in values), strict=True)
-
-    def leaf(first: Any) -> Any:
-        column = next(columns)
-        alike = not isinstance(first, float) or all(number == first for number in column)
-        return first if alike else np.array(column)
-
-    return mapped(values[0], leaf)
 
 
 class _Vector:

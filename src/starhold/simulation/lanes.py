@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.structure import flatten, leaves, mapped, places, rebuild, unflatten
+from starhold.algebra.structured import Buffer
 from starhold.loop.closed_loop import ClosedLoop, Phase
 from starhold.loop.kernels import Arguments, Numbers, Observer, make_kernel, many, numbers_of
 from starhold.simulation.lane import Progress
@@ -266,7 +267,8 @@ def alongside(values: Sequence[Any]) -> Any:
         return parts if isinstance(first, list) else rebuild(first, parts)
     if isinstance(first, float):
         return first if len(set(values)) == 1 else np.array(values)
-    if any(not (value is first or (type(value) is type(first) and value == first)) for value in values):
+    constants = [(x.cells, x.base, x.size) if isinstance(x, Buffer) else x for x in values]
+    if any(not (x is constants[0] or (type(x) is type(constants[0]) and x == constants[0])) for x in constants):
         raise ValueError(f"lanes differ in what is a constant of their kernel: {first} and others")
     return first
 
