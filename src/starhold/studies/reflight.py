@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import islice
+from functools import reduce
+from operator import or_
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -171,23 +172,21 @@ def _changes(scenario: Scenario, values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 class _Tried:
-    """Scenarios with other values of one key, built for each law where they are asked for."""
+    """Scenarios with other values of some keys, read once for all laws."""
 
     def __init__(self, scenario: Scenario, dials: Values) -> None:
         self.scenario, self.dials = scenario, dials
-        self._known: dict[str, list[tuple[Any, Scenario]]] = {}
+        self._known: dict[tuple[str, ...], tuple[Values, Scenario] | None] = {}
 
-    def of(self, key: str) -> list[tuple[Any, Scenario]]:
-        """Another value of a key, with the scenario that has it; none where no other is allowed."""
-        if key not in self._known:
-            found = ((value, other) for value in _others(self.dials[key]) for other in self._with({key: value}))
-            self._known[key] = list(islice(found, 1))
-        return self._known[key]
-
-    def together(self, keys: Sequence[str]) -> list[tuple[Values, Scenario]]:
-        """All these keys moved at once."""
-        values = {key: self.of(key)[0][0] for key in keys}
-        return [(values, other) for other in self._with(values)]
+    def of(self, first: str, *more: str) -> tuple[Values, Scenario] | None:
+        """Other values of these keys, each as it may have alone, with the scenario that has them; None where no other is
+        allowed."""
+        keys = (first, *more)
+        if keys not in self._known:
+            alone = [pair[0] for pair in map(self.of, keys) if pair] if more else []
+            ways = [reduce(or_, alone)] if more else ({first: value} for value in _others(self.dials[first]))
+            self._known[keys] = next(((values, other) for values in ways for other in self._with(values)), None)
+        return self._known[keys]
 
     def _with(self, values: Values) -> Iterator[Scenario]:
         try:
@@ -213,13 +212,17 @@ def _reflown(
     steps = timing.steps
     numbers, like = _numbers(loop, steps), _form(loop, steps)
 
-    def follows(values: Values, other: Scenario, keys: Sequence[str]) -> bool:
+    def follows(*keys: str) -> bool:
+        """Whether the equation of all kept keys gives the numbers of a scenario in which these are moved."""
+        if (found := tried.of(*keys)) is None:
+            return False
+        values, other = found
         try:
             # Not tried out, as `build` does: only its numbers are looked at.
             made = other.hooks.build(other, other.pick(entry.name))
             # A key that goes with another has its value, unless it is moved itself.
             along = {key: values[leader] for key, leader in scenario.hooks.linked.items() if leader in values}
-            given = {key: (own | along | values)[key] for key in keys}
+            given = {key: (own | along | values)[key] for key in kept}
             return _form(made, steps) == like and _same(_numbers(made, steps), _given(scenario, loop, given))
         except (InputError, ValueError, ZeroDivisionError):
             return False
@@ -233,20 +236,11 @@ def _reflown(
     held |= {key: fixed[key] for key in kept if key in fixed}
     held |= {key: ALONE for key in kept if key not in held and not tried.of(key)}
     kept = [key for key in kept if key not in held]
-
-    def all_follow(keys: Sequence[str]) -> bool:
-        found = tried.together(keys)
-        return bool(found) and all(follows(values, other, keys) for values, other in found)
-
     # All at once, and those alone that others go with; one by one only where that does not do.
-    alone = [key for key in scenario.hooks.linked.values() if key in kept]
-    if kept and not (
-        all_follow(kept) and all(follows({key: value}, other, kept) for key in alone for value, other in tried.of(key))
-    ):
-        own_way = [key for key in kept if not all(follows({key: value}, other, kept) for value, other in tried.of(key))]
-        held |= dict.fromkeys(own_way, COMPUTED)
+    if kept and not (follows(*kept) and all(follows(key) for key in scenario.hooks.linked.values() if key in kept)):
+        held |= {key: COMPUTED for key in kept if not follows(key)}
         kept = [key for key in kept if key not in held]
-        if kept and not all_follow(kept):
+        if kept and not follows(*kept):
             held |= dict.fromkeys(kept, COMPUTED)
             kept = []
     derive, places = _recorded(scenario, loop, {key: own[key] for key in kept}) if kept else (None, ())
