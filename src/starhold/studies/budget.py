@@ -212,15 +212,15 @@ def _without_effectors(entry: LawEntry, gone: Collection[str]) -> LawEntry:
 def sources(scenario: Scenario) -> tuple[Source, ...]:
     """Tell what disturbs the loops of a scenario: torques, moving parts that take no command, friction of wheels, and
     whatever of a sensor may be zero and is not, but for times. Actuators, estimators and sampling belong to the loop."""
-    table = scenario.table
-    told: list[tuple[str, bool, dict[str, Any]]] = [
-        ("gravity gradient", table.environment.gravity_gradient, {"environment.gravity_gradient": False}),
-        ("torque noise", table.environment.torque_noise > 0.0, {"environment.torque_noise": 0.0}),
-        ("attitude noise", table.sensor.attitude_noise > 0.0, {"sensor.attitude_noise": 0.0}),
-        ("rate noise", table.sensor.rate_noise > 0.0, {"sensor.rate_noise": 0.0}),
-        ("wheel friction", _rubs(scenario), _smooth(scenario)),
+    found = [
+        Source(key.replace("_", " "), {f"{name}.{key}": type(value)()})
+        for name in ("environment", "sensor")
+        for key, value in getattr(scenario.table, name)
+        if value
     ]
-    found = [Source(name, without) for name, there, without in told if there]
+    wheels = wheels_of(scenario)
+    if wheels is not None and np.any((wheels.viscous, wheels.coulomb)):
+        found.append(Source("wheel friction", _smooth(scenario)))
     for fitted in scenario.parts:
         key, part = f"part.{fitted.called}", fitted.part
         passive = part.role == "effector" and not part.flag("ACTS")
@@ -232,11 +232,6 @@ def sources(scenario: Scenario) -> tuple[Source, ...]:
                 Source(f"{fitted.called} {name.replace('_', ' ')}", {f"{key}.{name}": zero}) for name, zero in errors.items()
             ]
     return tuple(found)
-
-
-def _rubs(scenario: Scenario) -> bool:
-    wheels = wheels_of(scenario)
-    return wheels is not None and bool(np.any(wheels.viscous) or np.any(wheels.coulomb))
 
 
 def _smooth(scenario: Scenario) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from starhold.errors import InputError
@@ -56,10 +57,15 @@ def _craft(table: RigidBodyTable, wheels: Wheels | None, inertia: Any) -> Craft:
 
 def torque_limit(table: RigidBodyTable, wheels: Wheels | None) -> float:
     """The torque that a law may reckon with (N m): the limit of [spacecraft], or what these wheels surely give in its
-    way (in norm, else about each axis at once) where that is less."""
-    own = table.spacecraft
+    way where that is less."""
+    own, least = table.spacecraft, sure_torque(table, wheels)
+    return least if own.limit == "none" and wheels is not None else min(own.torque_limit, least)
+
+
+def sure_torque(table: RigidBodyTable, wheels: Wheels | None) -> float:
+    """The torque that these wheels surely give (N m), in norm where the limit of [spacecraft] is one of it, else about each
+    axis at once; infinite without wheels."""
     if wheels is None:
-        return own.torque_limit
+        return math.inf
     peak = table.wheels is not None and table.wheels.allocation == "least-peak"
-    least = authority(wheels, "norm" if own.limit == "norm" else "axis", peak=peak)
-    return least if own.limit == "none" else min(own.torque_limit, least)
+    return authority(wheels, "norm" if table.spacecraft.limit == "norm" else "axis", peak=peak)

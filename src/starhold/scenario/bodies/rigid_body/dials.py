@@ -18,10 +18,9 @@ from starhold.algebra.vector import apply
 from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.craft import Craft, check_moments, check_rest, compact, inverse
-from starhold.parts.effectors.wheels import body_inertia
 from starhold.parts.stated_attitude import check_attitude
 from starhold.scenario.bodies.interface import Body, Moved
-from starhold.scenario.bodies.rigid_body.craft import torque_limit, wheels_of
+from starhold.scenario.bodies.rigid_body.craft import sure_torque, wheels_of
 from starhold.scenario.bodies.rigid_body.start import start_of, stated, target_of, unit_of
 
 if TYPE_CHECKING:
@@ -130,14 +129,8 @@ def _crafts(scenario: Scenario, values: Mapping[str, Any]) -> tuple[Craft, Craft
     """The craft that laws know, and the one that flies."""
     craft, limit = scenario.craft, values.get(LIMIT)
     if limit is not None:
-        reckoned, wheels = limit, wheels_of(scenario)
-        if wheels is not None:
-            # What the wheels surely give does not depend on the limit.
-            free = scenario.table.model_copy(
-                update={"spacecraft": scenario.table.spacecraft.model_copy(update={"torque_limit": math.inf})}
-            )
-            reckoned = minimum(limit, torque_limit(free, wheels))
-        craft = craft._replace(torque_limit=reckoned)
+        sure = sure_torque(scenario.table, wheels_of(scenario))
+        craft = craft._replace(torque_limit=minimum(limit, sure) if sure < math.inf else limit)
     nominal = _with_inertia(scenario, craft, values[KNOWN]) if KNOWN in values else craft
     return nominal, _with_inertia(scenario, craft, values[TRUE]) if TRUE in values else nominal
 
@@ -147,27 +140,19 @@ def _with_inertia(scenario: Scenario, craft: Craft, inertia: Any) -> Craft:
     wheels = wheels_of(scenario)
     if wheels is None:
         return craft._replace(inertia=inertia, inverse_inertia=inverse(inertia))
-    nominal = scenario.table.spacecraft.inertia
-    rest = body_inertia(nominal, wheels)
-    rotors = (np.array(wheels.axes).T * np.array(wheels.inertia)) @ np.array(wheels.axes)
-    own = _less(_as_form(inertia, craft.inertia), rotors, rest)
-    return craft._replace(inertia=own, inverse_inertia=inverse(own), with_rotors=inertia)
+    rotors = ((np.array(wheels.axes).T * np.array(wheels.inertia)) @ np.array(wheels.axes)).tolist()
+    like: Any = craft.inertia
 
+    def left(i: int, j: int) -> Any:
+        whole = inertia[i][j] if isinstance(inertia[0], tuple) else inertia[i] if i == j else 0.0
+        return whole - rotors[i][j]
 
-def _as_form(inertia: Any, like: Any) -> Any:
-    """An inertia written as a matrix where the one without rotors is one."""
-    if isinstance(like[0], tuple) and not isinstance(inertia[0], tuple):
-        return tuple(tuple(inertia[i] if i == j else 0.0 for j in range(3)) for i in range(3))
-    return inertia
-
-
-def _less(inertia: Any, rotors: Any, rest: Any) -> Any:
-    """An inertia without the rotors' moments; what is zero of the nominal one stays so, for it is but rounding."""
-    if not isinstance(inertia[0], tuple):
-        return tuple(inertia[i] - float(rotors[i, i]) for i in range(3))
-    return tuple(
-        tuple(inertia[i][j] - float(rotors[i, j]) if rest[i, j] != 0.0 else 0.0 for j in range(3)) for i in range(3)
+    # What is zero of the nominal one stays so, for it is but rounding.
+    own: Any = tuple(
+        tuple(left(i, j) if like[i][j] != 0.0 else 0.0 for j in range(3)) if isinstance(like[0], tuple) else left(i, i)
+        for i in range(3)
     )
+    return craft._replace(inertia=own, inverse_inertia=inverse(own), with_rotors=inertia)
 
 
 def _moments(scenario: Scenario, columns: Mapping[str, Array]) -> Array | None:

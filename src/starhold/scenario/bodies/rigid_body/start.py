@@ -23,7 +23,7 @@ from starhold.parts.orbit import body_of
 from starhold.parts.part import Fitted
 from starhold.parts.roles import Goal
 from starhold.parts.targets import history
-from starhold.scenario.bodies.rigid_body.craft import torque_limit, wheels_of
+from starhold.scenario.bodies.rigid_body.craft import sure_torque, torque_limit, wheels_of
 from starhold.scenario.bodies.rigid_body.history import read_history
 from starhold.scenario.bodies.rigid_body.rotors import start_momenta
 from starhold.scenario.bodies.rigid_body.tables import Pointing, TargetTable
@@ -157,8 +157,7 @@ def told_to_design(scenario: Scenario, sign: str) -> Start:
     error = error if sign == "as_published" else stretch(side(error[0]), error)
     rate = subtract(begun.rate, to_body(error, held.rate))
     momentum, held_by_wheels = math.inf, None
-    free = table.spacecraft.limit == "none" and wheels is None
-    torque = math.inf if free else torque_limit(table, wheels)
+    torque = (sure_torque if table.spacecraft.limit == "none" else torque_limit)(table, wheels)
     if wheels is not None:
         momenta = start_momenta(table.wheels, table.wheel, len(wheels.axes))
         held_by_wheels, momentum = wheel_momentum(momenta, wheels), capacity(wheels, momenta)
