@@ -163,7 +163,18 @@ def test_docs_show_the_code_of_today(name):
     scenario, law = page["shown"]()[name]
     code = make_code(build(scenario, scenario.pick(law)), name)
     kept = (DOCS / "flight-code" / f"{name}.c").read_text(encoding="utf-8")
-    assert texts(code, scenario.name, law).source == kept, "write it anew: python docs/flight_code.py"
+    made, again = texts(code, scenario.name, law).source, "write it anew: python docs/flight_code.py"
+    if name == "mpc":
+        # Its matrices come from LAPACK, whose last digits differ between processors, and with them the breaks of lines.
+        (made, mine), (kept, shown) = map(_numbers_apart, (made, kept))
+        assert mine == pytest.approx(shown, rel=1e-9, abs=0.0), again
+    assert made == kept, again
+
+
+def _numbers_apart(text):
+    """A text with # for each decimal number and a blank for any space, and the numbers."""
+    decimal = r"-?\b\d+\.\d+(?:e[-+]?\d+)?\b"
+    return re.sub(r"\s+", " ", re.sub(decimal, "#", text)), [float(x) for x in re.findall(decimal, text)]
 
 
 def test_docs_quote_the_law():
