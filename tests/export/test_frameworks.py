@@ -6,7 +6,7 @@ import subprocess
 
 import pytest
 
-from starhold.export.folder import shell_files
+from starhold.export.shells import shell_files
 from starhold.export.source import texts
 from tests.export.flown import code_of, need
 from tests.running import starhold

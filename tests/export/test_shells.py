@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from starhold.errors import InputError
-from starhold.export import basilisk, fmu
 from starhold.export.code import make_code
-from starhold.export.folder import shell_files
+from starhold.export.shells import shell_files
 from starhold.export.source import texts
 from starhold.export.vectors import vectors
 from starhold.laws.catalogue import catalogue
@@ -36,7 +35,7 @@ def test_basilisk_flies_the_same_loop(steps, tmp_path):
     text = texts(code, "test", "lyapunov")
     (tmp_path / "lyapunov.h").write_text(text.header)
     (tmp_path / "lyapunov.c").write_text(text.source)
-    (tmp_path / "lyapunov_basilisk.py").write_text(basilisk.files(code)["lyapunov_basilisk.py"])
+    (tmp_path / "lyapunov_basilisk.py").write_text(shell_files(code, ["basilisk"])["lyapunov_basilisk.py"])
     spec = importlib.util.spec_from_file_location("lyapunov_basilisk", tmp_path / "lyapunov_basilisk.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -65,7 +64,7 @@ def test_basilisk_flies_the_same_loop(steps, tmp_path):
 
 def test_basilisk_refuses_what_no_message_tells_of():
     with pytest.raises(InputError, match="the input wheels"):
-        basilisk.files(code_of("wheel"))
+        shell_files(code_of("wheel"), ["basilisk"])
     with pytest.raises(InputError, match=r"shell: found simulink; allowed: one of basilisk, fmu, cfs, fprime"):
         shell_files(code_of("lyapunov"), ["simulink"])
 
@@ -79,8 +78,8 @@ def test_fmu_gives_the_same_bits(name, tmp_path):
     from fmpy.validation import validate_fmu
 
     code = code_of(name)
-    (archive,) = fmu.files(code).items()
-    assert archive[1] == fmu.files(code)[f"{name}.fmu"]
+    (archive,) = shell_files(code, ["fmu"]).items()
+    assert archive[1] == shell_files(code, ["fmu"])[f"{name}.fmu"]
     (tmp_path / archive[0]).write_bytes(archive[1])
     assert not validate_fmu(str(tmp_path / archive[0]))
     unzipped = fmpy.extract(str(tmp_path / archive[0]), str(tmp_path / "fmu"))

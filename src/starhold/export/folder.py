@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
 from starhold.errors import InputError
-from starhold.export import basilisk, cfs, fmu, fprime
 from starhold.export.code import Code
 from starhold.export.cost import Cost, measure
 from starhold.export.proof import UNPROVED, Proof
-from starhold.export.source import cmake, texts
-from starhold.export.vectors import selftest, vectors
+from starhold.export.shells import filled
+from starhold.export.source import texts
+from starhold.export.vectors import selftest_rows, vectors
 from starhold.files import atomic_write
 from starhold.version import __version__
 
@@ -34,25 +34,6 @@ class Exported:
     """Of the self-test."""
 
 
-SHELLS: dict[str, Callable[[Code], Mapping[str, str | bytes]]] = {
-    "basilisk": basilisk.files,
-    "fmu": fmu.files,
-    "cfs": cfs.files,
-    "fprime": fprime.files,
-}
-"""What makes the files of a shell over the C, by its name."""
-
-
-def shell_files(code: Code, shells: Iterable[str]) -> dict[str, str | bytes]:
-    """Return the files of shells. InputError for an unknown one, and where a law does not fit one."""
-    found: dict[str, str | bytes] = {}
-    for shell in shells:
-        if shell not in SHELLS:
-            raise InputError("export c", "shell", shell, f"one of {', '.join(SHELLS)}")
-        found |= SHELLS[shell](code)
-    return found
-
-
 def make_files(
     code: Code, scenario: str, law: str, proof: Proof = UNPROVED, more: Mapping[str, str | bytes] = MappingProxyType({})
 ) -> Exported:
@@ -62,8 +43,7 @@ def make_files(
     files: dict[str, str | bytes] = {
         f"{code.name}.h": header,
         f"{code.name}.c": source,
-        f"{code.name}_selftest.c": selftest(code, cases),
-        "CMakeLists.txt": cmake(code.name),
+        **filled("build", code, ROWS=selftest_rows(cases), COUNT=len(cases), INPUTS=max(1, len(cases[0].inputs))),
         **more,
     }
     return Exported(code, proof, tuple(measure(code, header, source)), files, len(cases))

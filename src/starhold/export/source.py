@@ -276,32 +276,3 @@ def _trimmed(values: tuple[float, ...]) -> tuple[float, ...]:
     while values and str(values[-1]) == "0.0":
         values = values[:-1]
     return values
-
-
-CMAKE = """\
-# {name}: a library, and a self-test that demands the bits of the simulation.
-cmake_minimum_required(VERSION 3.13)
-project({name} LANGUAGES C)
-
-add_library({name} STATIC {name}.c)
-target_include_directories({name} PUBLIC ${{CMAKE_CURRENT_SOURCE_DIR}})
-set_target_properties({name} PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF)
-if(CMAKE_C_COMPILER_ID MATCHES "GNU|Clang")
-  target_compile_options({name} PUBLIC -ffp-contract=off PRIVATE -Wall -Wextra -pedantic)
-endif()
-find_library(MATH m)
-if(MATH)
-  target_link_libraries({name} PUBLIC ${{MATH}})
-endif()
-
-enable_testing()
-add_executable({name}_selftest {name}_selftest.c)
-set_target_properties({name}_selftest PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON)
-target_link_libraries({name}_selftest PRIVATE {name})
-add_test(NAME {name}_selftest COMMAND {name}_selftest)
-"""
-
-
-def cmake(name: str) -> str:
-    """Return the text of CMakeLists.txt."""
-    return CMAKE.format(name=name)

@@ -1,0 +1,133 @@
+"""Shells over the same C, and what builds it: files of templates, filled with the names and numbers of a law."""
+
+from __future__ import annotations
+
+import io
+import re
+import uuid
+import zipfile
+from collections.abc import Callable, Iterable, Mapping
+from importlib import resources
+from typing import Any
+
+from starhold.errors import InputError
+from starhold.export.code import Code
+from starhold.export.law import numbers
+from starhold.export.source import texts
+from starhold.export.types import paths
+from starhold.version import __version__
+
+SOURCES = {
+    "attitude": ("attitude", "self._quaternion(read.sigma_BN)"),
+    "rate": ("attitude", "read.omega_BN_B"),
+    "position": ("translation", "read.r_BN_N"),
+    "velocity": ("translation", "read.v_BN_N"),
+}
+"""Inputs of laws: the message of Basilisk that tells of them, and what they are in it."""
+
+
+def filled(template: str, code: Code, **more: Any) -> dict[str, str]:
+    """Return the files of a template by their places, each @KEY@ replaced; a line ==> begins a file with its place."""
+    given, told = variables(code)
+    period, kept = code.flight.loop.period, len(numbers(code.flight.start))
+    values = {
+        "NAME": code.name,
+        "UPPER": code.name.upper(),
+        "CLASS": "".join(word.capitalize() for word in code.name.split("_")),
+        "TITLE": code.flight.loop.law.card.title,
+        "PERIOD": repr(period),
+        "PERIOD_G": f"{period:g}",
+        "INPUTS": len(given),
+        "OUTPUTS": len(told),
+        "GIVEN": ", ".join(given),
+        "TOLD": ", ".join(told),
+        "STATE": kept or 1,
+        "STATES": kept,
+        **more,
+    }
+    text = (resources.files("starhold.export") / "templates" / f"{template}.txt").read_text(encoding="utf-8")
+    for key, value in values.items():
+        text = text.replace(f"@{key}@", str(value))
+    parts = re.split(r"^==> (.*)\n", text, flags=re.MULTILINE)
+    return dict(zip(parts[1::2], parts[2::2], strict=True))
+
+
+def variables(code: Code) -> tuple[list[str], list[str]]:
+    """Return the names of the inputs, and those of the command."""
+    given = [p.text.replace("input->", "") for p in code.signature.params[2].leaves if code.needs.reads(p)]
+    shape = code.signature.result
+    assert shape is not None
+    told = [p.text.removeprefix(".") for p in paths(shape.members[0].type, "")]
+    return [name.replace(".e[", "[") for name in given], told
+
+
+def _basilisk(code: Code) -> dict[str, str]:
+    """Return a law as a module of Basilisk. InputError for inputs that no message of Basilisk tells of."""
+    wanted = [member.name for member in code.members(2)]
+    for name in wanted:
+        if name not in SOURCES:
+            raise InputError(
+                "export basilisk", "", f"the input {name}", f"inputs that messages tell of: {', '.join(SOURCES)}"
+            )
+    reads: list[str] = []
+    for message in ("attitude", "translation"):
+        own = [name for name in wanted if SOURCES[name][0] == message]
+        if own:
+            reads += [f"        read = self.{message}InMsg()", *(f"        {name} = {SOURCES[name][1]}" for name in own)]
+    return filled("basilisk", code, READS="\n".join(reads), GIVEN=", ".join(f"*{name}" for name in wanted))
+
+
+def _fmu(code: Code) -> dict[str, bytes]:
+    """Return a law as an FMU for co-simulation, FMI 3.0: an archive of sources.
+
+    The standard wants every function of its interface in a binary; those that a sampled law has no use for refuse.
+    """
+    given, told = variables(code)
+    inputs, outputs = 'causality="input" start="0.0"', 'causality="output" variability="discrete"'
+    roles = [*((name, inputs) for name in given), *((name, outputs) for name in told)]
+    listed = [f'    <Float64 name="{name}" valueReference="{k}" {role}/>' for k, (name, role) in enumerate(roles, 1)]
+    text = texts(code, "", code.flight.loop.law.name)
+    ends = [(kind, k) for kind in ("Output", "InitialUnknown") for k in range(1 + len(given), 1 + len(roles))]
+    files = filled(
+        "fmu",
+        code,
+        VERSION=__version__,
+        # Changes with the code.
+        TOKEN=uuid.uuid5(uuid.NAMESPACE_URL, text.header + text.source),
+        VARIABLES="\n".join(listed),
+        STRUCTURE="\n".join(f'    <{kind} valueReference="{k}"/>' for kind, k in ends),
+    )
+    files["sources/fmi.c"] = re.sub(r"^@REFUSED@ (\w+)\((.*)\)$", _refused, files["sources/fmi.c"], flags=re.MULTILINE)
+    files |= {f"sources/{code.name}.c": text.source, f"sources/{code.name}.h": text.header}
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            # Always the same bytes.
+            archive.writestr(zipfile.ZipInfo(name, (2000, 1, 1, 0, 0, 0)), content, zipfile.ZIP_DEFLATED)
+    return {f"{code.name}.fmu": made.getvalue()}
+
+
+def _refused(found: re.Match[str]) -> str:
+    """Return a function of FMI 3.0 that refuses."""
+    words = [param.replace("[]", "").split()[-1].lstrip("*") for param in found[2].split(",")]
+    unused = " ".join(f"(void){word};" for word in words)
+    return f"FMI3_Export fmi3Status {found[1]}({found[2]})\n{{\n    {unused}\n    return fmi3Error;\n}}"
+
+
+SHELLS: dict[str, Callable[[Code], Mapping[str, str | bytes]]] = {
+    "basilisk": _basilisk,
+    "fmu": _fmu,
+    "cfs": lambda code: filled("cfs", code),
+    "fprime": lambda code: filled("fprime", code),
+}
+"""What makes the files of a shell over the C, by its name."""
+
+
+def shell_files(code: Code, shells: Iterable[str]) -> dict[str, str | bytes]:
+    """Return the files of shells. InputError for an unknown one, and where a law does not fit one."""
+    found: dict[str, str | bytes] = {}
+    for shell in shells:
+        if shell not in SHELLS:
+            raise InputError("export c", "shell", shell, f"one of {', '.join(SHELLS)}")
+        found |= SHELLS[shell](code)
+    return found
