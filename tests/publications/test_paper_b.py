@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from starhold.loop.kernels import Numbers, fly_plainly, make_step, replay
 from starhold.publications.desk import Desk
 from starhold.publications.paper import read_paper
-from starhold.publications.papers.B import calls, measures, random_starts
+from starhold.publications.papers.B import calls, equations, measures, random_starts
 from starhold.publications.reproduction import measure_of, reproduce
 from starhold.publications.verdicts import judge
 from starhold.scenario.building import build
@@ -62,7 +62,7 @@ def test_rate_of_a_target_is_scipys_by_e_and_not_as_printed(desk):
     block = q[3] * np.eye(3) + np.cross(np.eye(3), q[:3])
     assert np.allclose(2.0 * np.vstack([block, -q[:3]]).T @ slope, rate, atol=1e-8)
     assert np.linalg.norm(2.0 * block @ slope[:3] - rate) > 0.1
-    assert measures.target_motion(desk).value == {"rate": False, "acceleration": True}
+    assert equations.target_motion(desk).value == {"rate": False, "acceleration": True}
 
 
 def test_gravity_block_lacks_a_factor_by_scipys_rotations(desk):
@@ -77,7 +77,7 @@ def test_gravity_block_lacks_a_factor_by_scipys_rotations(desk):
 
     slopes = np.column_stack([(torque(h * e) - torque(-h * e)) / (2.0 * h) for e in np.eye(3)])
     printed = (cross(r) @ np.diag(MOMENTS) - cross(MOMENTS * r)) @ cross(r)
-    factor = measures.gravity_block(desk).value
+    factor = equations.gravity_block(desk).value
     assert np.allclose(slopes, factor * printed, atol=1e-6)
 
 

@@ -16,12 +16,14 @@ from starhold.studies import compare as studies
 from starhold.studies.body import study_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from starhold.campaign.results import CampaignResult
-    from starhold.certification.certificate import Certificate
+    from starhold.certification.certificate import Claim
+    from starhold.loop.closed_loop import ClosedLoop
     from starhold.scenario.reading import Scenario
     from starhold.simulation.lane import Recording
+    from starhold.studies.body import Issued
     from starhold.studies.flight import Flight
 
 
@@ -68,24 +70,28 @@ class Desk:
 
         def make() -> Flight:
             scenario = self.scenario(file, changes)
-            entry = scenario.pick(law)
-            return studies.fly_law(scenario, entry, studies.build(scenario, entry))
+            return studies.fly_law(scenario, scenario.pick(law), self.loop(file, law, changes))
 
         return self.once(("flight", file, law, changes), make)
+
+    def loop(self, file: str, law: str, changes: Mapping[str, Any] | None = None) -> ClosedLoop:
+        """A law's closed loop."""
+        scenario = self.scenario(file, changes)
+        return studies.build(scenario, scenario.pick(law))
 
     def recording(self, file: str, law: str, changes: Mapping[str, Any] | None = None) -> Recording:
         """The recording of a law's flight."""
         return self.flight(file, law, changes).recording
 
-    def certificate(self, file: str, law: str, changes: Mapping[str, Any] | None = None) -> Certificate:
-        """The certificate of a law as the flight starts, not tried by flights."""
+    def certificates(self, file: str, law: str, changes: Mapping[str, Any] | None = None) -> Sequence[Issued]:
+        """The certificates of a law, that of the flight's start first, not tried by flights."""
+        scenario = self.scenario(file, changes)
+        certify, loop = study_of(scenario.body).certify, self.loop(file, law, changes)
+        return self.once(("certificates", file, law, changes), lambda: certify(scenario, scenario.pick(law), loop))
 
-        def make() -> Certificate:
-            scenario = self.scenario(file, changes)
-            entry = scenario.pick(law)
-            return study_of(scenario.body).certify(scenario, entry, studies.build(scenario, entry))[0].certificate
-
-        return self.once(("certificate", file, law, changes), make)
+    def claims(self, file: str, law: str, changes: Mapping[str, Any] | None = None) -> dict[str, Claim]:
+        """What is claimed of a law as the flight starts, by kinds."""
+        return {claim.kind: claim for claim in self.certificates(file, law, changes)[0].certificate.claims}
 
     def campaign(self, file: str) -> CampaignResult:
         """The campaign of a scenario file, its store in a folder that goes with this desk."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -22,8 +23,17 @@ def metric(
 
 def proved(desk: Desk, file: str, law: str, claim: str) -> Finding:
     """Tell whether a claim of a law's certificate is proved."""
-    outcomes = {found.kind: found.outcome for found in desk.certificate(file, law).claims}
-    return Finding(outcomes[claim] == "proved", f"{claim}: {outcomes[claim]}")
+    outcome = desk.claims(file, law)[claim].outcome
+    return Finding(outcome == "proved", f"{claim}: {outcome}")
+
+
+def samples(
+    desk: Desk, file: str, law: str, quantity: str, until: float = math.inf, changes: Mapping[str, Any] | None = None
+) -> tuple[Any, Any]:
+    """The times (n,) of a flight up to one (the recording's unit of time), and a recorded quantity (n, ...) at these."""
+    recording = desk.recording(file, law, changes)
+    shown = np.asarray(recording["time"]) <= until
+    return np.asarray(recording["time"])[shown], np.asarray(recording[quantity])[shown]
 
 
 def history(
@@ -35,17 +45,14 @@ def history(
     components: Sequence[int] = (),
     names: Sequence[str] = (),
     scale: float = 1.0,
-    until: float | None = None,
+    until: float = math.inf,
     changes: Mapping[str, Any] | None = None,
 ) -> Figure:
     """Components of a recorded quantity over the time of a flight, up to `until` (the recording's unit of time)."""
-    recording = desk.recording(file, law, changes)
-    values, time = np.asarray(recording[quantity]), np.asarray(recording["time"])
-    shown = time <= (time[-1] if until is None else until)
+    time, values = samples(desk, file, law, quantity, until, changes)
     columns = values.reshape(len(values), -1)
-    picked = list(components) or list(range(columns.shape[1]))
     curves = [
-        Curve(time[shown], scale * columns[shown, number], names[place] if names else "", hue=place)
-        for place, number in enumerate(picked)
+        Curve(time, scale * columns[:, number], names[place] if names else "", hue=place)
+        for place, number in enumerate(components or range(columns.shape[1]))
     ]
-    return Figure([Panel(f"time, {recording.time_unit}", label, curves)])
+    return Figure([Panel(f"time, {desk.recording(file, law, changes).time_unit}", label, curves)])

@@ -19,7 +19,7 @@ class _Strict(BaseModel):
 
 
 class Item(_Strict):
-    """Something that a measure makes: the function's name, of the paper's own `measures` or of the common ones, and what
+    """Something that a measure makes: the function's name, of a module in the paper's folder or of the common ones, and what
     it is called with beside the desk."""
 
     by: str

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
+from pkgutil import iter_modules
 from typing import Any
 
 from starhold.publications import measures as common
@@ -65,9 +66,11 @@ class Reproduction:
 
 
 def measure_of(letter: str, item: Item) -> Callable[..., Any]:
-    """The function that makes an item: the publication's own, else a common one. AttributeError where there is none."""
-    own = import_module(f"starhold.publications.papers.{letter}.measures")
-    return getattr(own, item.by) if hasattr(own, item.by) else getattr(common, item.by)
+    """The function that makes an item: of a module of the publication, else a common one. AttributeError where there is
+    none."""
+    package = import_module(f"starhold.publications.papers.{letter}")
+    modules = (import_module(f"{package.__name__}.{module.name}") for module in iter_modules(package.__path__))
+    return getattr(next((module for module in modules if hasattr(module, item.by)), common), item.by)
 
 
 def reproduce(letter: str, notice: Callable[[int, int], None] | None = None) -> Reproduction:

@@ -1,2 +1,2 @@
 """One folder a publication: `paper.toml` says what it prints and who measures it, scenario files are what is flown, and
-`measures.py` computes what no scenario holds."""
+modules compute what no scenario holds."""

@@ -7,13 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from starhold.algebra.vector import ZERO
+from starhold.analysis.rigid_body import error_angle
 from starhold.laws import lqr
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.craft import make_craft
 from starhold.publications.desk import Desk
 from starhold.publications.figure import Curve, Figure, Panel
+from starhold.publications.measures import samples
 from starhold.publications.verdicts import Finding
-from starhold.studies.compare import build
 from starhold.synthesis.riccati import closed_form, linear_model, solve_riccati
 from starhold.synthesis.weights import balance, kappa
 
@@ -21,7 +23,6 @@ ORBIT = 2.0 * np.pi / 86164.1
 """The rate of a geostationary orbit (rad/s)."""
 RNG = 1812
 TRIALS = 60
-ZERO = (0.0, 0.0, 0.0)
 
 
 def gravity_torque(desk: Desk) -> Finding:
@@ -125,19 +126,20 @@ def channels(desk: Desk) -> Finding:
     def condition(logs: Any) -> float:
         return kappa(moments, np.exp(0.5 * (logs[3:6] - logs[6:]))) / 1e4
 
-    step = 1e-5 * np.eye(9)
-    slopes = np.array([(gains(start + one) - gains(start - one)) / 2e-5 for one in step]).T
-    normal = np.array([(condition(start + one) - condition(start - one)) / 2e-5 for one in step])
+    def slopes(function: Any) -> Any:
+        return np.array([(function(start + one) - function(start - one)) / 2e-5 for one in 1e-5 * np.eye(9)]).T
+
     # Moves of the weights along the surface are those across its normal.
-    along = np.linalg.svd(normal[None, :])[2][1:].T
-    ranks = [int(np.linalg.matrix_rank(found, tol=1e-6)) for found in (slopes, slopes @ along)]
+    every, along = slopes(gains), np.linalg.svd(slopes(condition)[None, :])[2][1:].T
+    ranks = [np.linalg.matrix_rank(moved, tol=1e-6) for moved in (every, every @ along)]
     return Finding([float(rank) for rank in ranks], "ranks of the gains' derivative by the weights")
 
 
 def conditions(desk: Desk, file: str, laws: Sequence[str], claim: str) -> Finding:
     """Tell of which laws a claim is proved."""
-    outcomes = {law: {found.kind: found.outcome for found in desk.certificate(file, law).claims}.get(claim) for law in laws}
-    return Finding({law: outcome == "proved" for law, outcome in outcomes.items()}, f"{claim} proved by certificate")
+    issued = {law: desk.claims(file, law).get(claim) for law in laws}
+    found = {law: one is not None and one.outcome == "proved" for law, one in issued.items()}
+    return Finding(found, f"{claim} proved by certificate")
 
 
 def falling(desk: Desk, runs: Sequence[tuple[str, str]]) -> Finding:
@@ -184,10 +186,9 @@ def gyroscopic_beyond(desk: Desk, rates: Sequence[Sequence[str]]) -> Finding:
 def globally(desk: Desk) -> Finding:
     """Tell for which laws the required attitude attracts every start: none has q0 = -1 among those, the same attitude, where
     their torque vanishes too."""
-    scenario = desk.scenario("stabilisation")
     found: dict[str, bool] = {}
-    for entry in scenario.laws:
-        loop = build(scenario, entry)
+    for entry in desk.scenario("stabilisation").laws:
+        loop = desk.loop("stabilisation", entry.name)
         turned = Measurement((-1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, loop.period)
         torque, _ = loop.law.module.torque(turned, loop.gains, loop.craft, NoMemory())
         found[entry.name] = any(part != 0.0 for part in torque)
@@ -198,8 +199,7 @@ def offset(desk: Desk, law: str) -> Finding:
     """Tell whether a law's error under disturbance is the one that its stiffness holds against it: |q| = |K^-1 M|, to a
     tenth."""
     run = desk.recording("disturbed", law)
-    scenario = desk.scenario("disturbed")
-    gain = build(scenario, scenario.pick(law)).gains.k_attitude
+    gain = desk.loop("disturbed", law).gains.k_attitude
     stiffness = np.full(3, gain) if isinstance(gain, float) else np.diag(gain) if np.ndim(gain) == 2 else np.asarray(gain)
     error = float(np.linalg.norm(np.asarray(run["attitude_error"])[-1, 1:]))
     pressure = np.array([6e-5, 6e-5, 5.29e-5])
@@ -210,15 +210,12 @@ def offset(desk: Desk, law: str) -> Finding:
     )
 
 
-def angles(desk: Desk, runs: Sequence[tuple[str, str]], until: float | None = None, log: bool = False) -> Figure:
+def angles(desk: Desk, runs: Sequence[tuple[str, str]], until: float = np.inf, log: bool = False) -> Figure:
     """The angle of rotation from the target over time, of several flights."""
     curves: list[Curve] = []
     for file, law in runs:
-        run = desk.recording(file, law)
-        error, time = np.asarray(run["attitude_error"]), np.asarray(run["time"])
-        shown = time <= (time[-1] if until is None else until)
-        angle = np.degrees(2.0 * np.arctan2(np.linalg.norm(error[:, 1:], axis=1), np.abs(error[:, 0])))
-        curves.append(Curve(time[shown] / 60.0, angle[shown], law))
+        time, error = samples(desk, file, law, "attitude_error", until)
+        curves.append(Curve(time / 60.0, np.degrees(error_angle(error)), law))
     return Figure([Panel("time, min", "angle from the target, °", curves, log_y=log)])
 
 
@@ -226,12 +223,8 @@ def torques(desk: Desk, runs: Sequence[tuple[str, str]], until: float) -> Figure
     """The torque about each axis over time, a panel a flight."""
     panels: list[Panel] = []
     for file, law in runs:
-        run = desk.recording(file, law)
-        time = np.asarray(run["time"])
-        shown = time <= until
-        curves = [
-            Curve(time[shown] / 60.0, np.asarray(run["torque"])[shown, axis], "xyz"[axis], "steps") for axis in range(3)
-        ]
+        time, torque = samples(desk, file, law, "torque", until)
+        curves = [Curve(time / 60.0, torque[:, axis], "xyz"[axis], "steps") for axis in range(3)]
         panels.append(Panel("time, min", "torque, N m", curves, law))
     return Figure(panels, columns=2)
 
@@ -247,8 +240,7 @@ def lyapunov_functions(desk: Desk, runs: Sequence[tuple[str, str]]) -> Figure:
 
 def _lyapunov(desk: Desk, file: str, law: str) -> Any:
     """V at each sample of a flight."""
-    scenario, run = desk.scenario(file), desk.recording(file, law)
-    loop = build(scenario, scenario.pick(law))
+    run, loop = desk.recording(file, law), desk.loop(file, law)
     q, rate = (tuple(np.asarray(run[name]).T) for name in ("attitude_error", "rate_error"))
     given: Any = Measurement(q, rate, rate, ZERO, ZERO, ZERO, ZERO, loop.period)
     assert loop.law.lyapunov is not None

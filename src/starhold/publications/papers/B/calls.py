@@ -13,7 +13,6 @@ from starhold.analysis.cost import CALLS, Replay, recorded_states
 from starhold.loop.kernels import Numbers, make_step, replay
 from starhold.publications.figure import Curve, Figure, Panel
 from starhold.publications.verdicts import Finding
-from starhold.scenario.building import build
 from starhold.trace.bounds import work
 
 if TYPE_CHECKING:
@@ -53,8 +52,7 @@ def call_times(desk: Desk) -> dict[str, NDArray[np.float64]]:
         found: dict[str, NDArray[np.float64]] = {}
         kernels: dict[str, Replay] = {}
         for name, (file, law, chunk, calls) in TIMED.items():
-            scenario = desk.scenario(file)
-            loop = build(scenario, scenario.pick(law))
+            loop = desk.loop(file, law)
             kernels[name] = Replay(loop, recorded_states(loop, desk.recording(file, law)))
             found[name] = np.full(calls // chunk, np.inf)
         empty = dict.fromkeys(TIMED, np.inf)
@@ -106,8 +104,7 @@ def time_cases(desk: Desk, names: Sequence[str], least: float, most: float = flo
 def operations(desk: Desk, law: str, gravity: bool) -> int:
     """Additions, multiplications, divisions and roots of one call, from the measured state to the limited torque; `gravity`:
     whether there is a gravity torque, which a law may have to compute."""
-    scenario = desk.scenario("three-laws", None if gravity else {"environment.gravity_gradient": False})
-    loop = build(scenario, scenario.pick(law))
+    loop = desk.loop("three-laws", law, None if gravity else {"environment.gravity_gradient": False})
     program = replay(make_step(loop.composition()), loop.carry(), Numbers.of(loop.phases(1)[0]))
     return work(program, {"first": 0, "count": 1}).work.arithmetic
 
@@ -130,15 +127,13 @@ def fewer_operations(desk: Desk, law: str, than: str, factor: float = 1.0) -> Fi
 def call_figure(desk: Desk, names: Mapping[str, str], unit: str = "ns", scale: float = 1e9) -> Figure:
     """The time of a call over the time of the flight: labels by the names of TIMED."""
     times = call_times(desk)
-    curves: list[Curve] = []
+    alone, curves = len(names) == 1, list[Curve]()
     for name, label in names.items():
         middle = 0.1 * TIMED[name].chunk * (np.arange(len(times[name])) + 0.5)
-        curves.append(Curve(middle, scale * times[name], label, "line" if len(names) == 1 else "steps"))
-    if len(names) > 1:
-        return Figure([Panel("time, s", f"time of a call, {unit}", curves, log_y=True)])
+        curves.append(Curve(middle, scale * times[name], label, "line" if alone else "steps"))
     # Whatever else the machine did meanwhile.
-    top = 1.5 * float(np.quantile(curves[0].y, 0.95))
-    return Figure([Panel("time, s", f"time of a call, {unit}", curves, y_span=(0.0, top))])
+    span = (0.0, 1.5 * float(np.quantile(curves[0].y, 0.95))) if alone else None
+    return Figure([Panel("time, s", f"time of a call, {unit}", curves, y_span=span, log_y=not alone)])
 
 
 def horizon_figure(desk: Desk, weighted: Mapping[str, Any], printed: Mapping[str, Any], published: float) -> Figure:

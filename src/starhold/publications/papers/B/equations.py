@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.quaternion import to_body
+from starhold.algebra import vector
+from starhold.algebra.quaternion import derivative, to_body
 from starhold.analysis.rigid_body import error_angle
 from starhold.parts.craft import tensor
 from starhold.parts.environments.gravity_gradient import gravity_gradient
 from starhold.publications.verdicts import Finding
-from starhold.scenario.building import build
 from starhold.simulation.lane import fly
 
 if TYPE_CHECKING:
@@ -21,6 +21,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 COMMON = "three-laws"
+
+
+def skew(a: Any) -> Array:
+    """[a]x (3, 3) of a (3,)."""
+    return np.array(vector.skew(a))
 
 
 def near_the_target(desk: Desk, degrees: float = 1.0) -> Finding:
@@ -37,28 +42,18 @@ def near_the_target(desk: Desk, degrees: float = 1.0) -> Finding:
     return Finding(found, "; ".join(notes))
 
 
-def _cross(a: Any) -> Array:
-    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
-
-
-def _product(p: Array, q: Array) -> Array:
-    """Hamilton's product, scalars first."""
-    return np.array([p[0] * q[0] - p[1:] @ q[1:], *(p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:]))])
-
-
 def target_motion(desk: Desk, cases: int = 100) -> Finding:
     """The largest relative errors of the two formulas (10) over random motions of a target: of the rate from the vector part
     as printed, and of the acceleration from E."""
-    random = np.random.default_rng(1)
+    random: Any = np.random.default_rng(1)
     printed: list[float] = []
     by_e: list[float] = []
     for _ in range(cases):
         q, rate, acceleration = random.normal(size=4), random.normal(size=3), random.normal(size=3)
         q /= np.linalg.norm(q)
-        pure = np.array([0.0, *rate])
-        first = 0.5 * _product(q, pure)
-        second = 0.5 * (_product(first, pure) + _product(q, np.array([0.0, *acceleration])))
-        block = q[0] * np.eye(3) + _cross(q[1:])
+        first: Any = np.array(derivative(q, rate))
+        second = np.add(derivative(first, rate), derivative(q, acceleration))
+        block = q[0] * np.eye(3) + skew(q[1:])
         # E has the scalar below.
         e = np.vstack([block, -q[1:]])
         printed.append(float(np.linalg.norm(2.0 * block @ first[1:] - rate) / np.linalg.norm(rate)))
@@ -76,9 +71,8 @@ def on_the_surface(desk: Desk, cases: int = 2000) -> Finding:
     attitudes = random.normal(size=(cases, 4))
     attitudes /= np.linalg.norm(attitudes, axis=1)[:, None]
 
-    def slope(q: Array) -> float:
-        rate = -gain * q[1:]
-        return float(gain * q[1:] @ (0.5 * (q[0] * rate + np.cross(q[1:], rate))))
+    def slope(q: Any) -> float:
+        return float(gain * q[1:] @ derivative(q, -gain * q[1:])[1:])
 
     start = np.array([0.0, 1.0, 1.0, 1.0]) / np.sqrt(3.0)
     found = {
@@ -106,8 +100,7 @@ def reaching_condition(desk: Desk, cases: int = 2000) -> Finding:
 def gravity_block(desk: Desk, cases: int = 20) -> Finding:
     """The factor that the gravity block of the printed matrix lacks: differences of the torque with the vector part of a
     small turn of the body, against (mu/R^5) ([R]J - [JR]) [R] at random attitudes."""
-    scenario = desk.scenario(COMMON)
-    craft = build(scenario, scenario.pick("mpc")).craft
+    craft = desk.loop(COMMON, "mpc").craft
     moments, random = tensor(craft.inertia), np.random.default_rng(4)
     factors: list[float] = []
     for _ in range(cases):
@@ -121,7 +114,7 @@ def gravity_block(desk: Desk, cases: int = 20) -> Finding:
         step = 1e-4
         slopes = np.column_stack([(torque(step * e) - torque(-step * e)) / (2.0 * step) for e in np.eye(3)])
         r = np.array(place)
-        printed = craft.gravity / 7.0e6**5 * (_cross(r) @ moments - _cross(moments @ r)) @ _cross(r)
+        printed = craft.gravity / 7.0e6**5 * (skew(r) @ moments - skew(moments @ r)) @ skew(r)
         factors.append(float((slopes * printed).sum() / (printed**2).sum()))
     return Finding(float(np.mean(factors)), f"from {min(factors):.6f} to {max(factors):.6f} at {cases} places")
 
@@ -131,14 +124,13 @@ def one_step(desk: Desk, of: Mapping[str, Mapping[str, Any]]) -> Finding:
     under predictive control. of: cases by name; `step`: whether h is the control period, or 1 as printed; `changes`."""
     found: dict[str, float] = {}
     for name, case in of.items():
-        scenario = desk.scenario(COMMON, case.get("changes"))
-        loop = build(scenario, scenario.pick("mpc"))
+        loop = desk.loop(COMMON, "mpc", case.get("changes"))
         end, inertia = fly(loop, 1)[1], tensor(loop.craft.inertia)
         before, after = (np.array([*state.attitude[1:], *state.rate]) for state in (loop.start, end.state))
         rate, control = before[3:], np.array(end.command)
-        damping = _cross(inertia @ rate) - _cross(rate) @ inertia
+        damping = skew(inertia @ rate) - skew(rate) @ inertia
         # The gravity block is six orders smaller.
-        slope = np.block([[-_cross(rate), 0.5 * np.eye(3)], [np.zeros((3, 3)), np.linalg.solve(inertia, damping)]]) @ before
+        slope = np.block([[-skew(rate), 0.5 * np.eye(3)], [np.zeros((3, 3)), np.linalg.solve(inertia, damping)]]) @ before
         slope[3:] += np.linalg.solve(inertia, control)
         foreseen = before + (loop.period if case["step"] else 1.0) * slope
         found[name] = float(np.linalg.norm(foreseen - after) / np.linalg.norm(after - before))

@@ -12,24 +12,8 @@ from numpy.typing import NDArray
 from starhold.analysis.metrics import stays_within
 from starhold.parts.craft import tensor
 from starhold.publications.figure import Curve, Figure, Panel
-from starhold.publications.papers.B.calls import call_figure as call_figure
-from starhold.publications.papers.B.calls import fewer_operations as fewer_operations
-from starhold.publications.papers.B.calls import horizon_figure as horizon_figure
-from starhold.publications.papers.B.calls import operations_ratio as operations_ratio
-from starhold.publications.papers.B.calls import time_cases as time_cases
-from starhold.publications.papers.B.calls import time_ratio as time_ratio
-from starhold.publications.papers.B.calls import total_time as total_time
-from starhold.publications.papers.B.equations import gravity_block as gravity_block
-from starhold.publications.papers.B.equations import near_the_target as near_the_target
-from starhold.publications.papers.B.equations import on_the_surface as on_the_surface
-from starhold.publications.papers.B.equations import one_step as one_step
-from starhold.publications.papers.B.equations import reaching_condition as reaching_condition
-from starhold.publications.papers.B.equations import target_motion as target_motion
-from starhold.publications.papers.B.random_starts import fewest as fewest
-from starhold.publications.papers.B.random_starts import rises as rises
-from starhold.publications.papers.B.random_starts import steps_figure as steps_figure
+from starhold.publications.measures import samples
 from starhold.publications.verdicts import Finding
-from starhold.scenario.building import build
 from starhold.simulation.lane import fly
 
 if TYPE_CHECKING:
@@ -59,8 +43,7 @@ def first_command(desk: Desk, file: str, law: str, component: bool = False) -> F
 
 def gravity_torque(desk: Desk) -> Finding:
     """The largest norm that the gravity torque can have (N m): 3 mu/R^3 times half the difference of the extreme moments."""
-    scenario = desk.scenario(COMMON)
-    craft = build(scenario, scenario.pick("lyapunov")).craft
+    craft = desk.loop(COMMON, "lyapunov").craft
     moments = np.linalg.eigvalsh(tensor(craft.inertia))
     radius = float(np.linalg.norm(desk.recording(COMMON, "lyapunov")["position"], axis=1).min())
     return Finding(1.5 * craft.gravity / radius**3 * (moments[-1] - moments[0]))
@@ -164,13 +147,15 @@ def least_accurate(desk: Desk, of: Sequence[Mapping[str, Any]], law: str) -> Fin
 
 def same_after(desk: Desk, law: str, bound: float, short: float) -> Finding:
     """Tell whether the step after which the error stays within a bound is the same in a flight that ends sooner (s)."""
-    error = _deviation(desk, COMMON, law)
+    _, error = _deviation(desk, COMMON, law)
     cut, whole = stays_within(error[: int(10.0 * short) + 1], bound), stays_within(error, bound)
     return Finding(cut == whole, f"{_count(cut)} after {short:.0f} s, {_count(whole)} in the end")
 
 
-def _deviation(desk: Desk, file: str, law: str) -> Array:
-    return np.linalg.norm(desk.recording(file, law)["attitude_error"][:, 1:], axis=1)
+def _deviation(desk: Desk, file: str, law: str, until: float = np.inf) -> tuple[Array, Array]:
+    """Times of a flight, and |q| at these."""
+    time, error = samples(desk, file, law, "attitude_error", until)
+    return time, np.linalg.norm(error[:, 1:], axis=1)
 
 
 def quotients(desk: Desk, totals: Sequence[float], calls: int) -> Finding:
@@ -187,13 +172,10 @@ def plans(desk: Desk, file: str, law: str, instants: Sequence[int], until: float
     from starhold.laws.mpc import program
     from starhold.laws.predictive.problem import carve
 
-    scenario = desk.scenario(file)
-    loop = build(scenario, scenario.pick(law))
-    run = desk.recording(file, law)
-    shown = run["time"] <= until
-    time = run["time"][shown]
-    states = [Curve(time, run["attitude_error"][shown, 1], "flown")]
-    moves = [Curve(time, 1e3 * run["torque"][shown, 0], "flown", "steps")]
+    loop = desk.loop(file, law)
+    time, torque = samples(desk, file, law, "torque", until)
+    states = [Curve(time, samples(desk, file, law, "attitude_error", until)[1][:, 1], "flown")]
+    moves = [Curve(time, 1e3 * torque[:, 0], "flown", "steps")]
     for number, instant in enumerate(instants):
         memory: Any = fly(loop, instant + 1)[1].memory
         store = carve(program(loop.gains, memory))
@@ -234,11 +216,8 @@ def with_detail(
 
 def fall(desk: Desk, of: Mapping[str, Sequence[str]], until: float, levels: Sequence[float] = ()) -> Figure:
     """|q| over time of several flights: file and law by their names."""
-    curves: list[Curve] = []
-    for name, (file, law) in of.items():
-        time = desk.recording(file, law)["time"]
-        shown = time <= until
-        curves.append(Curve(time[shown], np.maximum(_deviation(desk, file, law)[shown], 1e-9), name))
+    flown = {name: _deviation(desk, file, law, until) for name, (file, law) in of.items()}
+    curves = [Curve(time, np.maximum(error, 1e-9), name) for name, (time, error) in flown.items()]
     return Figure([Panel("time, s", "|q|", curves, log_y=True, levels=levels)])
 
 
@@ -248,50 +227,33 @@ def by_gain(desk: Desk, least: float, most: float, count: int, limits: Mapping[s
 
     values = np.geomspace(least, most, count)
     table = sweep(desk.scenario(COMMON), {"law.sliding.switching_gain": values}, "sliding")
-    mine = 1e3 * table["law.sliding.switching_gain"].to_numpy(dtype=float)
-    curves = [
-        Curve(mine, table[f"iterations_1e-{k}"].to_numpy(dtype=float), f"to 10^-{k}", "points", k - 1) for k in (1, 2, 3, 4)
-    ]
-    ends = [Curve(mine, table["final_attitude_error"].to_numpy(dtype=float), "sliding", "points")]
+
+    def over_gain(name: str, label: str, hue: int | None = None) -> Curve:
+        gain, column = (table[key].to_numpy(dtype=float) for key in ("law.sliding.switching_gain", name))
+        return Curve(1e3 * gain, column, label, "points", hue)
+
+    curves = [over_gain(f"iterations_1e-{k}", f"to 10^-{k}", k - 1) for k in (1, 2, 3, 4)]
+    ends = [over_gain("final_attitude_error", "sliding")]
     levels = [_final(desk, COMMON, law) for law in limits.values()]
-    notes = [(3.0 * mine[0], 2.2 * level, name) for level, name in zip(levels, limits, strict=True)]
-    label, span = "switching torque g, mN m", (0.9e3 * least, 1.1e3 * most)
-    return Figure(
-        [
-            Panel(label, "steps to stay within", curves, x_span=span, log_x=True, log_y=True),
-            Panel(
-                label,
-                "largest angle in the last quarter, rad",
-                ends,
-                x_span=span,
-                log_x=True,
-                log_y=True,
-                levels=levels,
-                notes=notes,
-            ),
-        ],
-        columns=2,
-    )
+    notes = [(3.0 * ends[0].x[0], 2.2 * level, name) for level, name in zip(levels, limits, strict=True)]
+    drawn: dict[str, Any] = {"x_span": (0.9e3 * least, 1.1e3 * most), "log_x": True, "log_y": True}
+    label, up = "switching torque g, mN m", "largest angle in the last quarter, rad"
+    steps, angle = Panel(label, "steps to stay within", curves, **drawn), Panel(label, up, ends, **drawn)
+    return Figure([steps, replace(angle, levels=levels, notes=notes)], columns=2)
 
 
 def by_period(desk: Desk, periods: Sequence[float], duration: float) -> Figure:
     """Where each law ends after a flight of some length, over the control period."""
     curves: list[Curve] = []
     for law in LAWS:
-        ends = [
-            _final(desk, COMMON, law, {"simulation.duration": duration, "simulation.control_period": h}) for h in periods
-        ]
-        curves += [Curve(periods, ends, law, "line"), Curve(periods, ends, "", "points", len(curves) // 2)]
-    curves = [replace(curve, hue=number // 2) for number, curve in enumerate(curves)]
+        flights = [{"simulation.duration": duration, "simulation.control_period": h} for h in periods]
+        ends, hue = [_final(desk, COMMON, law, changes) for changes in flights], len(curves) // 2
+        curves += [Curve(periods, ends, law, "line", hue), Curve(periods, ends, "", "points", hue)]
     return Figure([Panel("control period, s", "largest angle in the last quarter, rad", curves, log_x=True, log_y=True)])
 
 
 def noise_figure(desk: Desk, files: Mapping[str, str]) -> Figure:
     """|q| over time of each law, a panel each reading of the noise."""
-    panels: list[Panel] = []
-    for name, file in files.items():
-        curves: list[Curve] = []
-        for law in LAWS:
-            curves.append(Curve(desk.recording(file, law)["time"], _deviation(desk, file, law), law))
-        panels.append(Panel("time, s", "|q|", curves, name, y_span=(1e-4, 1.5), log_y=True))
-    return Figure(panels, columns=3)
+    lines = {name: [Curve(*_deviation(desk, file, law), law) for law in LAWS] for name, file in files.items()}
+    drawn = [Panel("time, s", "|q|", curves, name, y_span=(1e-4, 1.5), log_y=True) for name, curves in lines.items()]
+    return Figure(drawn, columns=3)

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from starhold.analysis.rigid_body import DECADES
 from starhold.publications.figure import Curve, Figure, Panel
 from starhold.publications.verdicts import Finding
-from starhold.scenario.building import build
 from starhold.simulation.abreast import Flying, fly_abreast
 from starhold.simulation.lane import Recording, label
 
@@ -42,19 +41,16 @@ def first_passages(desk: Desk, kind: str) -> dict[str, Array]:
     """The steps after which the error is within 10^-1 to 10^-6 for the first time, likewise, of the first starts."""
 
     def make() -> dict[str, dict[str, Array]]:
-        scenario = desk.scenario(FILE)
-        frame: Any = desk.campaign(FILE).frame()
+        steps, frame = desk.scenario(FILE).table.simulation.steps, desk.campaign(FILE).frame()
         found: dict[str, dict[str, Array]] = {"attitude": {}, "rate": {}}
         for law in LAWS:
-            loop = build(scenario, scenario.pick(law))
-            rows = frame[frame["law"] == law].head(PASSAGES)
-            attitudes = rows[[f"flown.state.attitude[{k}]" for k in (1, 2, 3, 4)]].to_numpy(dtype=float).tolist()
-            rates = rows[[f"flown.state.rate[{k}]" for k in (1, 2, 3)]].to_numpy(dtype=float).tolist()
+            loop, rows = desk.loop(FILE, law), frame[frame["law"] == law].head(PASSAGES)
+            drawn = [f"flown.state.{name}[{k}]" for name, size in (("attitude", 4), ("rate", 3)) for k in range(1, 1 + size)]
             starts = [
-                loop.start._replace(attitude=tuple(attitude), rate=tuple(rate))
-                for attitude, rate in zip(attitudes, rates, strict=True)
+                loop.start._replace(attitude=tuple(row[:4]), rate=tuple(row[4:]))
+                for row in rows[drawn].to_numpy(dtype=float).tolist()
             ]
-            flights = [Flying(replace(loop, start=start), scenario.table.simulation.steps, 1) for start in starts]
+            flights = [Flying(replace(loop, start=start), steps, 1) for start in starts]
 
             def passages(number: int, samples: Array, carry: Any, flights: Any = flights) -> list[list[float]]:
                 return _passages(label(flights[number].loop, samples, carry, 1))
@@ -87,14 +83,13 @@ def steps_figure(desk: Desk, kind: str) -> Figure:
     curves: list[Curve] = []
     shares: list[Curve] = []
     for hue, law in enumerate(LAWS):
-        low, middle, high = (np.quantile(found[law], share, axis=0, method="higher") for share in (0.1, 0.5, 0.9))
+        low, middle, high = (_quantile(found[law], share) for share in (0.1, 0.5, 0.9))
         there = np.isfinite(high)
         if there.any():
             outline = np.concatenate([orders[there], orders[there][::-1]])
             curves.append(Curve(outline, np.concatenate([low[there], high[there][::-1]]), "", "area", hue))
         curves.append(Curve(orders, _drawn(middle), law, "line", hue))
-        passed = np.quantile(first[law], 0.5, axis=0, method="higher")
-        curves.append(Curve(orders, _drawn(passed), "first passage" if hue == 0 else "", "dotted", hue))
+        curves.append(Curve(orders, _drawn(_quantile(first[law])), "first passage" if hue == 0 else "", "dotted", hue))
         shares.append(Curve(orders, 100.0 * np.isfinite(found[law]).mean(axis=0), law, "line", hue))
     symbol = "|q|" if kind == "attitude" else "|ω| in rad/s"
     across = f"k of {symbol} ≤ 10^-k"
@@ -108,7 +103,11 @@ def _drawn(steps: Array) -> Array:
 def medians(desk: Desk, kind: str, first: bool = False) -> dict[str, Array]:
     """The medians of the counts, (6,) by law."""
     found = first_passages(desk, kind) if first else counts(desk, kind)
-    return {law: np.quantile(found[law], 0.5, axis=0, method="higher") for law in LAWS}
+    return {law: _quantile(found[law]) for law in LAWS}
+
+
+def _quantile(steps: Array, share: float = 0.5) -> Array:
+    return np.quantile(steps, share, axis=0, method="higher")
 
 
 def fewest(desk: Desk, kind: str, law: str, against: Sequence[str], orders: Sequence[int], first: bool = False) -> Finding:

@@ -9,19 +9,18 @@ from typing import Any
 import numpy as np
 
 from starhold.algebra.cosines import to_angles
+from starhold.algebra.vector import ZERO
 from starhold.laws import wheel
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.craft import tensor
 from starhold.publications.desk import Desk
 from starhold.publications.figure import Curve, Figure, Panel
+from starhold.publications.measures import samples
 from starhold.publications.verdicts import Finding
-from starhold.studies.body import study_of
-from starhold.studies.compare import build
 from starhold.synthesis.stability_degree import boundary, brute_force, degree, design_gains, optimum
 
 RNG = 2012
 TRIALS = 400
-ZERO = (0.0, 0.0, 0.0)
 WEAK = 0.002
 """What the wheel about y has left after its fault (N m)."""
 EXAMPLE = ((1.0, 1.5, 2.0), 0.5, 0.3, 2.0)
@@ -30,8 +29,8 @@ EXAMPLE = ((1.0, 1.5, 2.0), 0.5, 0.3, 2.0)
 
 def closed_loop(desk: Desk, file: str, law: str) -> Finding:
     """Tell whether the flight of a law obeys (9), by differences of its recorded rates; the first wheel fault ends it."""
-    scenario = desk.scenario(file, {"fault": None})
-    run, loop = desk.recording(file, law, {"fault": None}), build(scenario, scenario.pick(law))
+    whole = {"fault": None}
+    run, loop = desk.recording(file, law, whole), desk.loop(file, law, whole)
     q, rate, time = (np.asarray(run[name]) for name in ("attitude_error", "rate_error", "time"))
     slope = (rate[2:] - rate[:-2]) / (time[2:] - time[:-2])[:, None]
     # The torque is held over a period, so what acts at a sample's middle is the mean of two commands.
@@ -92,8 +91,7 @@ def printed_optimum(desk: Desk) -> Finding:
     for order in permutations((1.0, 1.5, 2.0)):
         x, y, z = order
         ratios = np.array([1.0, y / x, z / x])
-        s2 = ratios[2] - 1.0
-        share = (1.0 + 2.0 * s2) / (8.0 * (1.0 + s2) ** 2)
+        share = _share(ratios[2])
         best, reached = brute_force(ratios, 0.5, 0.3, 2.0).eta, 0.0
         if share > 0.0:
             K_w = _on_line(share, 0.5, 0.3, 2.0)
@@ -116,21 +114,18 @@ def general_optimum(desk: Desk) -> Finding:
 def example(desk: Desk) -> Finding:
     """Tell whether (25) gives the optimum for moments of 1 : 1.5 : 2, an angle of 0.5, a rate of 0.3 and a budget of 2."""
     ratios, alpha, omega, budget = EXAMPLE
-    s2 = ratios[2] - 1.0
-    share = (1.0 + 2.0 * s2) / (8.0 * (1.0 + s2) ** 2)
+    share = _share(ratios[2])
     K_w = _on_line(share, alpha, omega, budget)
-    best = brute_force(ratios, alpha, omega, budget)
-    told = f"K_ω = {K_w:.4f}, K_a = {share * K_w**2:.4f}, degree of stability {K_w / (2.0 * (1.0 + s2)):.4f}"
-    return Finding(bool(abs(best.eta / (K_w / (2.0 * (1.0 + s2))) - 1.0) < 1e-8), told)
+    eta, best = K_w / (2.0 * ratios[2]), brute_force(ratios, alpha, omega, budget)
+    told = f"K_ω = {K_w:.4f}, K_a = {share * K_w**2:.4f}, degree of stability {eta:.4f}"
+    return Finding(bool(abs(best.eta / eta - 1.0) < 1e-8), told)
 
 
 def degree_after(desk: Desk, file: str, law: str) -> Finding:
     """Tell whether a retuned law is proved to converge, and what its degree of stability becomes."""
-    scenario = desk.scenario(file)
-    entry = scenario.pick(law)
-    found = study_of(scenario.body).certify(scenario, entry, build(scenario, entry))
-    kept = {issued.certificate.name: issued.certificate.claims[0].outcome == "proved" for issued in found}
-    moments = np.diagonal(tensor(scenario.craft.inertia))
+    issued = [one.certificate for one in desk.certificates(file, law)]
+    kept = {certificate.name: certificate.claims[0].outcome == "proved" for certificate in issued}
+    moments = np.diagonal(tensor(desk.scenario(file).craft.inertia))
     etas = [design_gains(moments, torque, 0.4, *np.radians([40.0, 0.3])).eta_per_second for torque in (0.02, WEAK)]
     return Finding(
         kept, f"degree of stability {etas[0]:.4f} 1/s with all of the torque, {etas[1]:.4f} 1/s with a tenth of it"
@@ -141,9 +136,8 @@ def within_torque(desk: Desk, file: str, laws: Sequence[str]) -> Finding:
     """Tell of which laws the weak wheel is asked for no more than it has, at every sample after the fault."""
     found, told = dict[str, bool](), list[str]()
     for law in laws:
-        run = desk.recording(file, law)
-        after = np.asarray(run["time"]) >= 6.0
-        asked = float(np.abs(np.asarray(run["wheel_command"])[after, 1]).max())
+        time, command = samples(desk, file, law, "wheel_command")
+        asked = float(np.abs(command[time >= 6.0, 1]).max())
         found[law] = asked <= WEAK
         told.append(f"{law} {1e3 * asked:.2f} mN m of {1e3 * WEAK:g}")
     return Finding(found, "; ".join(told))
@@ -159,8 +153,7 @@ def settles(desk: Desk, file: str, laws: Sequence[str]) -> Finding:
 def globally(desk: Desk) -> Finding:
     """Tell whether the law's torque vanishes at the required attitude alone: it does so at every half turn, too."""
     random, gains = np.random.default_rng(RNG), wheel.Gains(1.0, (1.0, 1.0, 1.0))
-    scenario = desk.scenario("three-wheels")
-    craft, torques = build(scenario, scenario.laws[0]).craft, []
+    craft, torques = desk.loop("three-wheels", desk.scenario("three-wheels").laws[0].name).craft, []
     for axis in random.normal(size=(50, 3)):
         half_turn: Any = (0.0, *(axis / np.linalg.norm(axis)))
         still = Measurement(half_turn, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.1)
@@ -172,12 +165,9 @@ def euler_krylov(desk: Desk, file: str, laws: Sequence[str], until: float) -> Fi
     """Yaw, pitch and roll from the orbital frame over time, a panel a law."""
     panels: list[Panel] = []
     for law in laws:
-        run = desk.recording(file, law)
-        time = np.asarray(run["time"])
-        shown = time <= until
-        angles = np.degrees([[float(a) for a in to_angles(tuple(q))] for q in np.asarray(run["attitude_error"])[shown][::5]])
-        names = ("yaw", "pitch", "roll")
-        curves = [Curve(time[shown][::5], angles[:, n], names[n]) for n in range(3)]
+        time, error = (part[::5] for part in samples(desk, file, law, "attitude_error", until))
+        angles = np.degrees([[float(a) for a in to_angles(tuple(q))] for q in error])
+        curves = [Curve(time, angles[:, n], name) for n, name in enumerate(("yaw", "pitch", "roll"))]
         panels.append(Panel("time, s", "angle, °", curves, law))
     return Figure(panels, columns=2)
 
@@ -186,11 +176,8 @@ def wheel_torques(desk: Desk, file: str, laws: Sequence[str], until: float) -> F
     """The commands to the wheels over time, a panel a law, with the weak wheel's limit."""
     panels: list[Panel] = []
     for law in laws:
-        run = desk.recording(file, law)
-        time = np.asarray(run["time"])
-        shown = time <= until
-        command = 1e3 * np.asarray(run["wheel_command"])[shown]
-        curves = [Curve(time[shown], command[:, n], f"wheel {'xyz'[n]}", "steps") for n in range(3)]
+        time, command = samples(desk, file, law, "wheel_command", until)
+        curves = [Curve(time, 1e3 * command[:, n], f"wheel {'xyz'[n]}", "steps") for n in range(3)]
         panels.append(Panel("time, s", "commanded torque, mN m", curves, law, levels=(-1e3 * WEAK, 1e3 * WEAK)))
     return Figure(panels, columns=2)
 
@@ -214,6 +201,11 @@ def regions(desk: Desk) -> Figure:
     curves.append(Curve([best.K_a], [best.K_w], "(25)", "points", 3))
     panel = Panel("K_a", "K_ω", curves, x_span=(0.0, 2.2 * best.K_a), y_span=(0.0, top))
     return Figure([panel])
+
+
+def _share(largest: float) -> float:
+    """K_a / K_w^2 of (25), as printed, where the last moment is so many times the first."""
+    return (2.0 * largest - 1.0) / (8.0 * largest**2)
 
 
 def _on_line(share: float, alpha: float, omega: float, budget: float) -> float:

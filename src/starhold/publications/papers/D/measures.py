@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,20 +19,6 @@ from starhold.certification.region import ENERGY, Shape
 from starhold.parts.craft import tensor
 from starhold.publications.desk import Desk
 from starhold.publications.figure import Curve, Figure, Panel
-from starhold.publications.papers.D.placement import at_rest as at_rest
-from starhold.publications.papers.D.placement import classical_algorithm as classical_algorithm
-from starhold.publications.papers.D.placement import controllable as controllable
-from starhold.publications.papers.D.placement import general_placement as general_placement
-from starhold.publications.papers.D.placement import gyroscopic_sign as gyroscopic_sign
-from starhold.publications.papers.D.placement import inverse_of_the_skeleton as inverse_of_the_skeleton
-from starhold.publications.papers.D.placement import loop_of_the_law as loop_of_the_law
-from starhold.publications.papers.D.placement import model_at_the_start_of_a_step as model_at_the_start_of_a_step
-from starhold.publications.papers.D.placement import placed_poles as placed_poles
-from starhold.publications.papers.D.placement import printed_levels as printed_levels
-from starhold.publications.papers.D.placement import pseudo_inverse_formulas as pseudo_inverse_formulas
-from starhold.publications.papers.D.placement import single_root as single_root
-from starhold.publications.papers.D.placement import stable_sign as stable_sign
-from starhold.publications.papers.D.placement import unstable_by_itself as unstable_by_itself
 from starhold.publications.verdicts import Finding
 from starhold.studies.modal_roots import Study, pick_modal, problem_of, study
 
@@ -270,7 +257,7 @@ def periods(desk: Desk, seconds: Sequence[float]) -> Finding:
 
 def period_of_linear_motion(desk: Desk, at_least: float) -> Finding:
     """Tell whether the linear motion near rest is proved stable for every period up to some seconds."""
-    claim = next(found for found in desk.certificate("landing", "rounded").claims if found.kind == "sampling")
+    claim = desk.claims("landing", "rounded")["sampling"]
     longest = claim.numbers["longest"]
     return Finding(
         bool(claim.outcome == "proved" and claim.numbers["every_shorter"] and longest > at_least), f"{longest:.3f} s"
@@ -280,16 +267,10 @@ def period_of_linear_motion(desk: Desk, at_least: float) -> Finding:
 def over_periods(desk: Desk, seconds: Sequence[float]) -> Figure:
     """Transient time and peaks of the printed turn over the control period."""
     flown = [_held(desk, h) for h in seconds]
-    times = [seen["transient_time"] for seen in flown]
-    rates = [seen["peak_rate"] * DEGREES for seen in flown]
-    first, second = Curve(seconds, times, hue=0), Curve(seconds, rates, hue=1)
-    return Figure(
-        [
-            Panel("h, s", "transient time, s", [first, Curve(seconds, times, "", "points", 0)], log_x=True),
-            Panel("h, s", "peak rate, deg/s", [second, Curve(seconds, rates, "", "points", 1)], log_x=True, levels=[30.0]),
-        ],
-        columns=2,
-    )
+    drawn = [seen["transient_time"] for seen in flown], [seen["peak_rate"] * DEGREES for seen in flown]
+    times, rates = ([Curve(seconds, y, "", style, n) for style in ("line", "points")] for n, y in enumerate(drawn))
+    above, below = Panel("h, s", "transient time, s", times), Panel("h, s", "peak rate, deg/s", rates, levels=[30.0])
+    return Figure([replace(above, log_x=True), replace(below, log_x=True)], columns=2)
 
 
 def known_torque(desk: Desk) -> Finding:
@@ -316,10 +297,9 @@ def unknown_torque(desk: Desk) -> Finding:
 
 def errors_under_torque(desk: Desk) -> Figure:
     """The error angle over time with a known and an unknown torque."""
-    curves: list[Curve] = []
-    for file, name in (("known-torque", "known: the gravity gradient"), ("unknown-torque", "not known: 23 N m")):
-        run = desk.recording(file, "modal")
-        curves.append(Curve(run["time"], error_angle(run["attitude_error"]) * DEGREES, name))
+    names = {"known-torque": "known: the gravity gradient", "unknown-torque": "not known: 23 N m"}
+    runs = {name: desk.recording(file, "modal") for file, name in names.items()}
+    curves = [Curve(run["time"], error_angle(run["attitude_error"]) * DEGREES, name) for name, run in runs.items()]
     return Figure([Panel("time, s", "error angle, deg", curves, log_y=True)])
 
 
@@ -330,7 +310,7 @@ def beyond_the_energy(desk: Desk) -> Finding:
     attitude, rate = np.array(run["attitude_error"])[0], np.array(run["rate_error"])[0]
     told: dict[str, tuple[float, float]] = {}
     for name, changes in sets.items():
-        claim = next(found for found in desk.certificate("landing", "rounded", changes).claims if found.kind == "region")
+        claim = desk.claims("landing", "rounded", changes)["region"]
         if claim.outcome != "proved":
             return Finding(False, f"{name}: {claim.outcome}")
         shape = Shape(**claim.witness)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra import vector
 from starhold.algebra.vector import ZERO
 from starhold.laws import modal
 from starhold.laws.interface import Measurement, NoMemory
@@ -73,7 +74,7 @@ class Spectra(NamedTuple):
 
 def skew(v: Array) -> Array:
     """[v]x (3, 3) of v (3,)."""
-    return np.cross(v, ONE, axisb=0, axisc=0)
+    return np.array(vector.skew(_numbers(v)))
 
 
 def cases(count: int = TRIALS) -> Iterator[tuple[Case, Spectra]]:

@@ -116,8 +116,7 @@ def _slope(state: Any) -> Any:
 def zone_ratio(desk: Desk) -> Finding:
     """The largest x at rest from which the craft comes back, over that within which the control is linear."""
     found = largest(lambda x: desk.flight(REST, "beside Y", {**_unit(desk), "initial.position": [x, 0.0, 0.0]}).lost is None)
-    claims = {claim.kind: claim for claim in desk.certificate(REST, "beside Y").claims}
-    shown = claims["saturated-axis"]
+    shown = desk.claims(REST, "beside Y")["saturated-axis"]
     share = shown.numbers["width"] / shown.numbers["boundary"]
     return Finding(found / 0.5, f"{shown.outcome}: {100.0 * share:.1f} % of the strip between the separatrices comes back")
 
@@ -178,7 +177,7 @@ def falls(desk: Desk) -> Finding:
 
 def indicator(desk: Desk) -> Finding:
     """Tell whether what the certificate of the law says is proved: the circle attracts, from which level of V on."""
-    found = {claim.kind: claim for claim in desk.certificate("l2-circle", "smooth").claims}["circle"]
+    found = desk.claims("l2-circle", "smooth")["circle"]
     told = f"{found.outcome} up to V = {found.numbers['level']:.7g}; on the axis, where V = 0.5, V' is zero too"
     return Finding(found.outcome == "proved", told)
 
@@ -186,8 +185,8 @@ def indicator(desk: Desk) -> Finding:
 def relay(desk: Desk) -> Finding:
     """Tell whether the relay brings the craft to the circle, with a layer in which it is proportional and without."""
     laws = {"with a layer": "relay with layer", "without one": "relay"}
-    off = {name: desk.flight("l2-circle", law).metrics["deviation"] / EARTH_DIAMETER for name, law in laws.items()}
-    outcome = {claim.kind: claim.outcome for claim in desk.certificate("l2-circle", "relay").claims}["circle"]
+    off = {name: _off(desk.flight("l2-circle", law)) for name, law in laws.items()}
+    outcome = desk.claims("l2-circle", "relay")["circle"].outcome
     told = f"off by {off['with a layer']:.4f} and {off['without one']:.4f} radii after two years; without a layer {outcome}"
     return Finding({name: value < 0.005 for name, value in off.items()}, told)
 
@@ -196,10 +195,7 @@ def steepest(desk: Desk) -> Finding:
     """Tell whether the control that makes V' least brings the craft to the circle: of (3.5), and of a V with a pull towards
     it."""
     changes = {"V with a pull towards the circle": None, "V of (3.5)": {"law.l2-optimal.pull": 1e-9}}
-    off = {
-        name: desk.flight("l2-circle", "l2-optimal", change).metrics["deviation"] / EARTH_DIAMETER
-        for name, change in changes.items()
-    }
+    off = {name: _off(desk.flight("l2-circle", "l2-optimal", change)) for name, change in changes.items()}
     told = "off by " + " and ".join(f"{value:.3f}" for value in off.values()) + " radii after two years"
     return Finding({name: value < 0.005 for name, value in off.items()}, told)
 
@@ -245,8 +241,7 @@ def holds_with(desk: Desk, law: str) -> Finding:
     flight = desk.flight(DEFICIT, law)
     if flight.lost is not None:
         return Finding(False, f"lost after {flight.lost / 86400.0:.0f} days")
-    off = flight.metrics["deviation"] / EARTH_DIAMETER
-    return Finding(off < 0.01, f"off by {off:.4f} radii")
+    return Finding(_off(flight) < 0.01, f"off by {_off(flight):.4f} radii")
 
 
 def coriolis_share(desk: Desk, C: float, least: float) -> Finding:
@@ -259,17 +254,15 @@ def coriolis_share(desk: Desk, C: float, least: float) -> Finding:
 def farthest(desk: Desk) -> Finding:
     """Tell whether the craft comes back to the circle from x near the largest that comes back, towards and away from the
     Sun."""
-    edge = {
-        name: largest(lambda x, s=side: _from(desk, s * x).lost is None, 1.0)
-        for name, side in (("dark", 1.0), ("Sun", -1.0))
-    }
-    ends = {name: _from(desk, sign * 0.99 * edge[name]) for name, sign in (("dark", 1.0), ("Sun", -1.0))}
-    off = {name: flight.metrics["deviation"] / EARTH_DIAMETER for name, flight in ends.items()}
-    told = (
-        f"from x = {-edge['Sun']:.3f} to {edge['dark']:.3f}; started 1 % within that, off by "
-        f"{max(off.values()):.4f} radii after two years"
-    )
-    return Finding(max(off.values()) < 0.001, told)
+    dark, sun = (side * largest(lambda x, s=side: _from(desk, s * x).lost is None, 1.0) for side in (1.0, -1.0))
+    off = max(_off(_from(desk, 0.99 * x)) for x in (dark, sun))
+    told = f"from x = {sun:.3f} to {dark:.3f}; started 1 % within that, off by {off:.4f} radii after two years"
+    return Finding(off < 0.001, told)
+
+
+def _off(flight: Any) -> float:
+    """By how many radii a flight is off the circle."""
+    return flight.metrics["deviation"] / EARTH_DIAMETER
 
 
 def _from(desk: Desk, x: float) -> Any:
@@ -354,10 +347,8 @@ def lag_figure(desk: Desk, lags: Sequence[float], after: float) -> Figure:
     """Figure 7 with and without lags, after a time."""
     runs = {"no lag": desk.recording(DEFICIT, "deficit 10")}
     runs |= {f"T = {lag:g}": desk.recording(DEFICIT, "deficit 10", _lagging("deficit 10", lag)) for lag in lags}
-    kept = {
-        name: {key: np.asarray(run[key])[run["time"] >= after] for key in ("position", "control")}
-        for name, run in runs.items()
-    }
+    both = ("position", "control")
+    kept = {name: {key: run[key][run["time"] >= after] for key in both} for name, run in runs.items()}
     return Figure(_planes(kept, desk.scenario(DEFICIT).pick("deficit 10").options.limit), 3)
 
 
@@ -369,11 +360,9 @@ def _planes(runs: dict[str, Any], limit: float) -> list[Panel]:
     found: list[Panel] = []
     for k, (quantity, i, j) in enumerate(pairs):
         name = "u_" if quantity == "control" else ""
-        lines = [
-            Curve(run[quantity][:, i], run[quantity][:, j], label, hue=n) for n, (label, run) in enumerate(runs.items())
-        ]
+        labels = runs if not k or len(runs) == 1 else [""] * len(runs)
+        paths = [run[quantity][:, [i, j]].T for run in runs.values()]
+        lines = [Curve.along(path, label, hue=n) for n, (path, label) in enumerate(zip(paths, labels, strict=True))]
         guides = ([], [Curve.along(round_, "circle", "dashed", 6)], [Curve.along(limit * round_, "limit", "dashed", 6)])[k]
-        if k and len(runs) > 1:
-            lines = [Curve(line.x, line.y, hue=line.hue) for line in lines]
         found.append(Panel(name + "xyz"[i], name + "xyz"[j], [*lines, *guides], equal=k > 0))
     return found
