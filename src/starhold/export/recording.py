@@ -17,9 +17,6 @@ from starhold.trace.handles import HANDLES, Handle
 from starhold.trace.program import Block, Call, Function, Program, Value, prune, renamed, writes
 from starhold.trace.recording import Cells, Recorder
 
-_SIZES = (3, 4, 6)
-"""Numbers that a tuple in a call may have."""
-
 
 class Parameter(NamedTuple):
     """A parameter of a function has a name, a type, leaves in order, and what joins its name and those of its members."""

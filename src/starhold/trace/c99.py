@@ -7,11 +7,10 @@ doubles are IEEE doubles and the compiler contracts nothing (`-std=c99 -ffp-cont
 
 from __future__ import annotations
 
-import math
 from typing import Any, ClassVar
 
 from starhold.algebra.operations import INDEX, NUMBER, TRUTH, UNIFORM, WORD
-from starhold.trace.program import Call, Function, Memory, Value
+from starhold.trace.program import Call, Function, Memory
 from starhold.trace.source import TIE, Source, names
 
 TYPES = {NUMBER: "double", TRUTH: "int", WORD: "uint64_t", INDEX: "long", UNIFORM: "int"}
@@ -56,6 +55,7 @@ class C99(Source):
     than one value."""
 
     language = "c"
+    special: ClassVar = {"nan": "NAN", "inf": "INFINITY", "-inf": "-INFINITY"}
     types: ClassVar[dict[str, str]] = TYPES
     taken = frozenset(name + end for name in _MATH.split() for end in ("", "f", "l")) | frozenset((*_STRING.split(), "main"))
 
@@ -114,29 +114,11 @@ class C99(Source):
                 self.put(f"*{pointer} = {self.text(value, kind)};")
         self.close()
 
-    def _constant(self, value: Any, kind: str) -> str:
-        if kind == WORD:
-            return f"UINT64_C(0x{value:X})"
-        if kind != NUMBER:
-            return str(int(value))
-        number = float(value)
-        if math.isnan(number):
-            return "NAN"
-        if math.isinf(number):
-            return "INFINITY" if number > 0.0 else "-INFINITY"
-        return repr(number)
+    def _integer(self, value: Any, kind: str) -> str:
+        return f"UINT64_C(0x{value:X})" if kind == WORD else str(int(value))
 
-    def _let(self, kind: str, name: str, text: str) -> None:
-        self.put(f"const {self.types[kind]} {name} = {text};")
-
-    def _variable(self, kind: str, name: str, value: Value) -> None:
-        self.put(f"{self.types[kind]} {name} = {self.text(value, kind)};")
-
-    def _assign(self, kind: str, name: str, value: Value) -> None:
-        self.put(f"{name} = {self.text(value, kind)};")
-
-    def _counted(self, counter: str, most: str) -> str:
-        return f"for ({self.types[INDEX]} {counter} = 0; {counter} < {most}; {counter}++)"
+    def _declared(self, kind: str, changes: bool = False) -> str:
+        return self.types[kind] if changes else f"const {self.types[kind]}"
 
     def _call(self, s: Call) -> None:
         function = self.functions[s.function.name]

@@ -7,11 +7,10 @@ is what a word is everywhere here. It needs neither a library nor a module, and 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, ClassVar
 
-from starhold.algebra.operations import NUMBER, STATIC, TRUTH, UNIFORM, WORD
+from starhold.algebra.operations import STATIC, TRUTH, UNIFORM, WORD
 from starhold.trace.program import Call, Function, Op, Value
 from starhold.trace.source import Source
 
@@ -42,6 +41,7 @@ class JavaScript(Source):
     """The printer makes the text of a program. A function gives a value, or an array of them where there are more."""
 
     language = "javascript"
+    special: ClassVar = {"nan": "NaN", "inf": "Infinity", "-inf": "-Infinity"}
     taken = frozenset(("double_view", "half_view", "high_place"))
 
     def _opening(self) -> list[str]:
@@ -54,42 +54,37 @@ class JavaScript(Source):
         memories = self.program.memories if main else self.memories[function.name]
         given = [memory.name for memory in memories]
         for name, kind in function.params:
-            given += [name] if main else _parts(name, kind)
+            given += [name] if main else self._parts(name, kind)
         self.lines.append("")
         self.remark(function.doc)
         self.open(f"function {self.titles[function.name]}({', '.join(given)})")
         for name, kind in function.params if main else ():
             if kind == WORD and name in self._read:
-                high, low = _parts(name, kind)
+                high, low = self._parts(name, kind)
                 self.put(f"const {high} = {name}[0] ^ 0, {low} = {name}[1] ^ 0;")
         self._block(function.body)
-        outs = [text for value, kind in function.outs for text in self._both(value, kind)]
+        outs = [text for value, kind in function.outs for text in self._texts_of_parts(value, kind)]
         if outs:
             self.put(f"return {outs[0]};" if len(outs) == 1 else f"return [{', '.join(outs)}];")
         self.close()
 
-    def _constant(self, value: Any, kind: str) -> str:
-        if kind in (TRUTH, UNIFORM):
-            return str(bool(value)).lower()
-        if kind != NUMBER:
-            return str(value)
-        number = float(value)
-        if math.isnan(number):
-            return "NaN"
-        if math.isinf(number):
-            return "Infinity" if number > 0.0 else "-Infinity"
-        return repr(number)
+    def _integer(self, value: Any, kind: str) -> str:
+        return str(bool(value)).lower() if kind in (TRUTH, UNIFORM) else str(value)
 
-    def _both(self, value: Value, kind: str) -> list[str]:
+    def _declared(self, kind: str, changes: bool = False) -> str:
+        return "let" if changes else "const"
+
+    def _parts(self, name: str, kind: str) -> list[str]:
+        # No name of a trace holds a dollar.
+        return [f"{name}$high", f"{name}$low"] if kind == WORD else [name]
+
+    def _texts_of_parts(self, value: Value, kind: str) -> list[str]:
         """Return the texts of a value: of a word that of each half."""
         if kind != WORD:
             return [self.text(value, kind)]
         if isinstance(value, str):
-            return _parts(value, kind)
+            return self._parts(value, kind)
         return [str(_signed(value >> 32)), str(_signed(value))]
-
-    def _halves(self, kind: str) -> int:
-        return 2 if kind == WORD else 1
 
     def _texts(self, s: Op) -> Sequence[str]:
         meaning: Any = s.operation.meanings["javascript"]
@@ -103,48 +98,25 @@ class JavaScript(Source):
         halves: dict[str, str] = {}
         for place, (value, kind) in enumerate(zip(s.args, s.operation.takes, strict=True)):
             if kind == WORD:
-                halves[f"{place}h"], halves[f"{place}l"] = self._both(value, kind)
+                halves[f"{place}h"], halves[f"{place}l"] = self._texts_of_parts(value, kind)
         if s.operation.gives != WORD:
             self._keep(s.ref, s.operation.gives, self.written(s, texts[0], halves))
             return
-        high, low = _parts(s.ref, WORD)
+        high, low = self._parts(s.ref, WORD)
         self.put(f"const {low} = {self.written(s, texts[1], halves).text};")
         self.put(f"const {high} = {self.written(s, texts[0], {**halves, 'low': low}).text};")
-
-    def _let(self, kind: str, name: str, text: str) -> None:
-        self.put(f"const {name} = {text};")
-
-    def _keep_slot(self, kind: str, name: str, end: str) -> None:
-        for part, of_end in zip(_parts(name, kind), _parts(end, kind), strict=True):
-            self._let(kind, part, of_end)
-
-    def _variable(self, kind: str, name: str, value: Value) -> None:
-        for part, text in zip(_parts(name, kind), self._both(value, kind), strict=True):
-            self.put(f"let {part} = {text};")
-
-    def _assign(self, kind: str, name: str, value: Value) -> None:
-        for part, text in zip(_parts(name, kind), self._both(value, kind), strict=True):
-            self.put(f"{part} = {text};")
-
-    def _counted(self, counter: str, most: str) -> str:
-        return f"for (let {counter} = 0; {counter} < {most}; {counter}++)"
 
     def _call(self, s: Call) -> None:
         function = self.functions[s.function.name]
         given = [memory.name for memory in self.memories[function.name]]
         for value, (_, kind) in zip(s.args, function.params, strict=True):
-            given += self._both(value, kind)
+            given += self._texts_of_parts(value, kind)
         call = f"{self.titles[function.name]}({', '.join(given)})"
-        parts = [part for name, kind in s.refs for part in _parts(name, kind)]
+        parts = [part for name, kind in s.refs for part in self._parts(name, kind)]
         if not parts:
             self.put(f"{call};")
         else:
             self.put(f"const {parts[0]} = {call};" if len(parts) == 1 else f"const [{', '.join(parts)}] = {call};")
-
-
-def _parts(name: str, kind: str) -> list[str]:
-    """Return the names of a value's parts; no name of a trace holds a dollar."""
-    return [f"{name}$high", f"{name}$low"] if kind == WORD else [name]
 
 
 def _signed(half: int) -> int:

@@ -147,17 +147,6 @@ def writes(block: Block) -> bool:
     return any(isinstance(s, Store) or (isinstance(s, Call) and writes(s.function.body)) for s in statements(block))
 
 
-def touched(program: Program, function: Function) -> list[Memory]:
-    """Return the memories that a function or those it calls use, in the program's order."""
-    names: set[str] = set()
-    for s in statements(function.body):
-        if isinstance(s, (Load, Store)):
-            names.add(s.memory)
-        elif isinstance(s, Call):
-            names |= {memory.name for memory in touched(program, s.function)}
-    return [memory for memory in program.memories if memory.name in names]
-
-
 def prune(block: Block, outs: Iterable[Value]) -> tuple[Block, dict[str, Value]]:
     """Return the block without operations and slots that nobody reads, and with slots that never change replaced by what
     they hold; and what stands for their names now."""

@@ -6,6 +6,7 @@ what reads memory that may be written to in between. Loops of the trace are loop
 
 from __future__ import annotations
 
+import math
 import re
 import textwrap
 from abc import ABC, abstractmethod
@@ -89,6 +90,8 @@ class Source(ABC):
     come last."""
 
     language: ClassVar[str]
+    special: ClassVar[dict[str, str]]
+    """Numbers that are not finite, by their names in Python."""
     taken: ClassVar[frozenset[str]]
     """What no function may be called, besides words of the language."""
 
@@ -136,30 +139,46 @@ class Source(ABC):
         """Add a function."""
 
     @abstractmethod
-    def _constant(self, value: Any, kind: str) -> str:
-        """Return a Python number as a constant."""
+    def _integer(self, value: Any, kind: str) -> str:
+        """Return a Python truth or integer as a constant."""
 
     @abstractmethod
-    def _let(self, kind: str, name: str, text: str) -> None:
-        """Name a value."""
-
-    @abstractmethod
-    def _variable(self, kind: str, name: str, value: Value) -> None:
-        """Declare what changes."""
-
-    @abstractmethod
-    def _assign(self, kind: str, name: str, value: Value) -> None:
-        """Change it."""
-
-    @abstractmethod
-    def _counted(self, counter: str, most: str) -> str:
-        """Return the head of a loop."""
+    def _declared(self, kind: str, changes: bool = False) -> str:
+        """Return what comes before the name of a value where it is declared."""
 
     @abstractmethod
     def _call(self, s: Call) -> None:
         """Call a function, and name what it gives."""
 
     # Text of the parts.
+
+    def _constant(self, value: Any, kind: str) -> str:
+        """Return a Python number as a constant."""
+        if kind != NUMBER:
+            return self._integer(value, kind)
+        number = float(value)
+        return repr(number) if math.isfinite(number) else self.special[str(number)]
+
+    def _parts(self, name: str, kind: str) -> list[str]:
+        """Return the names of a value's parts."""
+        return [name]
+
+    def _halves(self, kind: str) -> int:
+        """Tell how many parts a value has."""
+        return len(self._parts("", kind))
+
+    def _texts_of_parts(self, value: Value, kind: str) -> list[str]:
+        """Return the texts of a value's parts."""
+        return [self.text(value, kind)]
+
+    def _let(self, kind: str, name: str, text: str) -> None:
+        """Name a value."""
+        self.put(f"{self._declared(kind)} {name} = {text};")
+
+    def _set(self, declared: str, name: str, value: Value, kind: str) -> None:
+        """Declare what changes, or change it."""
+        for part, text in zip(self._parts(name, kind), self._texts_of_parts(value, kind), strict=True):
+            self.put(f"{declared}{part} = {text};")
 
     def put(self, line: str) -> None:
         """Add a line, broken where it is long, but not at `TIE`."""
@@ -250,10 +269,6 @@ class Source(ABC):
         """Yield the values that a function gives, and how often its text names them."""
         yield from ((out, self._halves(kind)) for out, kind in function.outs)
 
-    def _halves(self, kind: str) -> int:
-        """Tell how many texts a value is made of."""
-        return 1
-
     def _texts(self, s: Op) -> Sequence[str]:
         """Return the texts of an operation."""
         return (s.operation.meanings[self.language],)
@@ -306,14 +321,16 @@ class Source(ABC):
 
     def _loop(self, s: Loop) -> None:
         for slot in s.slots:
-            self._variable(slot.kind, slot.end, slot.before)
+            self._set(f"{self._declared(slot.kind, changes=True)} ", slot.end, slot.before, slot.kind)
         one, braces = s.most == 1, True
         if not one:
-            self.open(self._counted(s.counter, self.text(s.most, INDEX)))
+            begun, most = f"{self._declared(INDEX, changes=True)} {s.counter} = 0", self.text(s.most, INDEX)
+            self.open(f"for ({begun}; {s.counter} < {most}; {s.counter}++)")
             # What a turn begins with stays while the variables change one after another.
             for slot in s.slots:
-                if slot.name in self._read:
-                    self._keep_slot(slot.kind, slot.name, slot.end)
+                ends = zip(self._parts(slot.name, slot.kind), self._parts(slot.end, slot.kind), strict=True)
+                for part, end in ends if slot.name in self._read else ():
+                    self._let(slot.kind, part, end)
         self._block(s.head)
         if s.done is not None and one:
             self.open(f"if ({self._denied(self.use(s.done, TRUTH))})")
@@ -323,12 +340,9 @@ class Source(ABC):
             braces = not one
         self._block(s.body)
         for slot in s.slots:
-            self._assign(slot.kind, slot.end, slot.after)
+            self._set("", slot.end, slot.after, slot.kind)
         if braces:
             self.close()
-
-    def _keep_slot(self, kind: str, name: str, end: str) -> None:
-        self._let(kind, name, end)
 
     def _denied(self, truth: Expression) -> str:
         """Return the opposite of a truth."""
