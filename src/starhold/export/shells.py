@@ -97,7 +97,7 @@ def _fmu(code: Code) -> dict[str, bytes]:
         VARIABLES="\n".join(listed),
         STRUCTURE="\n".join(f'    <{kind} valueReference="{k}"/>' for kind, k in ends),
     )
-    files["sources/fmi.c"] = re.sub(r"^@REFUSED@ (\w+)\((.*)\)$", _refused, files["sources/fmi.c"], flags=re.MULTILINE)
+    files["sources/fmi.c"] = re.sub(r"^@REFUSED@ (\S+)\((.*)\)(.*)$", _refused, files["sources/fmi.c"], flags=re.MULTILINE)
     files |= {f"sources/{code.name}.c": text.source, f"sources/{code.name}.h": text.header}
     made = io.BytesIO()
     with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -108,10 +108,11 @@ def _fmu(code: Code) -> dict[str, bytes]:
 
 
 def _refused(found: re.Match[str]) -> str:
-    """Return a function of FMI 3.0 that refuses."""
+    """Return functions of FMI 3.0 that refuse: of one name, or with each of some words in place of ~."""
     words = [param.replace("[]", "").split()[-1].lstrip("*") for param in found[2].split(",")]
     unused = " ".join(f"(void){word};" for word in words)
-    return f"FMI3_Export fmi3Status {found[1]}({found[2]})\n{{\n    {unused}\n    return fmi3Error;\n}}"
+    text = f"FMI3_Export fmi3Status {found[1]}({found[2]})\n{{\n    {unused}\n    return fmi3Error;\n}}"
+    return "\n".join(text.replace("~", word) for word in found[3].split() or [""])
 
 
 SHELLS: dict[str, Callable[[Code], Mapping[str, str | bytes]]] = {
