@@ -28,7 +28,7 @@ SOURCES = {
 
 def filled(template: str, code: Code, **more: Any) -> dict[str, str]:
     """Return the files of a template by their places, each @KEY@ replaced; a line ==> begins a file with its place."""
-    given, told = variables(code)
+    inputs, outputs = variables(code)
     period, kept = code.flight.loop.period, len(numbers(code.flight.start))
     values = {
         "NAME": code.name,
@@ -37,10 +37,10 @@ def filled(template: str, code: Code, **more: Any) -> dict[str, str]:
         "TITLE": code.flight.loop.law.card.title,
         "PERIOD": repr(period),
         "PERIOD_G": f"{period:g}",
-        "INPUTS": len(given),
-        "OUTPUTS": len(told),
-        "GIVEN": ", ".join(given),
-        "TOLD": ", ".join(told),
+        "INPUTS": len(inputs),
+        "OUTPUTS": len(outputs),
+        "GIVEN": ", ".join(inputs),
+        "TOLD": ", ".join(outputs),
         "STATE": kept or 1,
         "STATES": kept,
         **more,
@@ -54,11 +54,11 @@ def filled(template: str, code: Code, **more: Any) -> dict[str, str]:
 
 def variables(code: Code) -> tuple[list[str], list[str]]:
     """Return the names of the inputs, and those of the command."""
-    given = [p.text.replace("input->", "") for p in code.signature.params[2].leaves if code.needs.reads(p)]
+    inputs = [p.text.replace("input->", "") for p in code.signature.params[2].leaves if code.needs.reads(p)]
     shape = code.signature.result
     assert shape is not None
-    told = [p.text.removeprefix(".") for p in paths(shape.members[0].type, "")]
-    return [name.replace(".e[", "[") for name in given], told
+    outputs = [p.text.removeprefix(".") for p in paths(shape.members[0].type, "")]
+    return [name.replace(".e[", "[") for name in inputs], outputs
 
 
 def _basilisk(code: Code) -> dict[str, str]:
@@ -82,12 +82,12 @@ def _fmu(code: Code) -> dict[str, bytes]:
 
     The standard wants every function of its interface in a binary; those that a sampled law has no use for refuse.
     """
-    given, told = variables(code)
-    inputs, outputs = 'causality="input" start="0.0"', 'causality="output" variability="discrete"'
-    roles = [*((name, inputs) for name in given), *((name, outputs) for name in told)]
+    inputs, outputs = variables(code)
+    taken, given = 'causality="input" start="0.0"', 'causality="output" variability="discrete"'
+    roles = [*((name, taken) for name in inputs), *((name, given) for name in outputs)]
     listed = [f'    <Float64 name="{name}" valueReference="{k}" {role}/>' for k, (name, role) in enumerate(roles, 1)]
     text = texts(code, "", code.flight.loop.law.name)
-    ends = [(kind, k) for kind in ("Output", "InitialUnknown") for k in range(1 + len(given), 1 + len(roles))]
+    ends = [(kind, k) for kind in ("Output", "InitialUnknown") for k in range(1 + len(inputs), 1 + len(roles))]
     files = filled(
         "fmu",
         code,
@@ -107,12 +107,12 @@ def _fmu(code: Code) -> dict[str, bytes]:
     return {f"{code.name}.fmu": made.getvalue()}
 
 
-def _refused(found: re.Match[str]) -> str:
+def _refused(match: re.Match[str]) -> str:
     """Return functions of FMI 3.0 that refuse: of one name, or with each of some words in place of ~."""
-    words = [param.replace("[]", "").split()[-1].lstrip("*") for param in found[2].split(",")]
+    words = [param.replace("[]", "").split()[-1].lstrip("*") for param in match[2].split(",")]
     unused = " ".join(f"(void){word};" for word in words)
-    text = f"FMI3_Export fmi3Status {found[1]}({found[2]})\n{{\n    {unused}\n    return fmi3Error;\n}}"
-    return "\n".join(text.replace("~", word) for word in found[3].split() or [""])
+    text = f"FMI3_Export fmi3Status {match[1]}({match[2]})\n{{\n    {unused}\n    return fmi3Error;\n}}"
+    return "\n".join(text.replace("~", word) for word in match[3].split() or [""])
 
 
 SHELLS: dict[str, Callable[[Code], Mapping[str, str | bytes]]] = {
@@ -126,9 +126,9 @@ SHELLS: dict[str, Callable[[Code], Mapping[str, str | bytes]]] = {
 
 def shell_files(code: Code, shells: Iterable[str]) -> dict[str, str | bytes]:
     """Return the files of shells. InputError for an unknown one, and where a law does not fit one."""
-    found: dict[str, str | bytes] = {}
+    files: dict[str, str | bytes] = {}
     for shell in shells:
         if shell not in SHELLS:
             raise InputError("export c", "shell", shell, f"one of {', '.join(SHELLS)}")
-        found |= SHELLS[shell](code)
-    return found
+        files |= SHELLS[shell](code)
+    return files

@@ -90,7 +90,7 @@ class Desk:
         return self.once(("certificates", file, law, changes), lambda: certify(scenario, scenario.pick(law), loop))
 
     def claims(self, file: str, law: str, changes: Mapping[str, Any] | None = None) -> dict[str, Claim]:
-        """What is claimed of a law as the flight starts, by kinds."""
+        """The claims about a law as the flight starts, by their kinds."""
         return {claim.kind: claim for claim in self.certificates(file, law, changes)[0].certificate.claims}
 
     def campaign(self, file: str) -> CampaignResult:

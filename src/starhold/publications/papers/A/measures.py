@@ -138,8 +138,8 @@ def channels(desk: Desk) -> Finding:
 def conditions(desk: Desk, file: str, laws: Sequence[str], claim: str) -> Finding:
     """Tell of which laws a claim is proved."""
     issued = {law: desk.claims(file, law).get(claim) for law in laws}
-    found = {law: one is not None and one.outcome == "proved" for law, one in issued.items()}
-    return Finding(found, f"{claim} proved by certificate")
+    proved = {law: one is not None and one.outcome == "proved" for law, one in issued.items()}
+    return Finding(proved, f"{claim} proved by certificate")
 
 
 def falling(desk: Desk, runs: Sequence[tuple[str, str]]) -> Finding:
