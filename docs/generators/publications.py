@@ -27,7 +27,7 @@ Verdicts are computed from what is measured and from the printed digits:
 
 TAIL = """
 What a publication says lies in `src/starhold/publications/papers/LETTER/paper.toml`, row by row, with who measures it;
-scenario files lie beside it, and `measures.py` has what no scenario holds. Only the texts of the publications were at hand,
+scenario files lie beside it, and modules with what no scenario holds. Only the texts of the publications were at hand,
 not their pictures: figures are compared with what the texts say of them.
 """
 
