@@ -33,7 +33,7 @@ def pytest_xdist_make_scheduler(config, log):
         return None
     from xdist.scheduler import LoadFileScheduling
 
-    seconds = config.cache.get(SECONDS, {})
+    seconds = config.cache.get(SECONDS, {}) if hasattr(config, "cache") else {}
 
     class LongestFirst(LoadFileScheduling):
         def _assign_work_unit(self, node):
@@ -60,5 +60,5 @@ class Stopwatch:
 
 def pytest_configure(config):
     # Of workers the one process that starts them counts.
-    if not hasattr(config, "workerinput") and config.cache is not None:
+    if not hasattr(config, "workerinput") and getattr(config, "cache", None) is not None:
         config.pluginmanager.register(Stopwatch(config.cache))

@@ -35,26 +35,39 @@ from starhold.scenario.checking import RENAMED
 from starhold.scenario.reading import load
 
 ROOT = Path(__file__).parents[1]
+BODIES = "src/starhold/scenario/bodies"
+
+
+def read(name):
+    return (ROOT / name).read_text(encoding="utf-8")
 
 
 def blocks(name, language):
-    return re.findall(rf"```{language}\n(.*?)```", (ROOT / name).read_text(encoding="utf-8"), flags=re.DOTALL)
+    return re.findall(rf"```{language}\n(.*?)```", read(name), flags=re.DOTALL)
 
 
-def test_readme_example_runs(capsys):
-    (example,) = blocks("README.md", "python")
-    exec(compile(example, "README.md", "exec"), {})
-    said = capsys.readouterr().out
+@pytest.fixture
+def run(capsys):
+    """Run a block of a page's Python; what it prints, and its names."""
+
+    def run(page, number=0):
+        names = {}
+        exec(compile(blocks(page, "python")[number], page, "exec"), names)
+        return capsys.readouterr().out, names
+
+    return run
+
+
+def test_readme_example_runs(run):
+    said, _ = run("README.md")
     assert said.startswith("from 180 to ")
     assert "mpc" in said
 
 
-def test_python_page_runs(monkeypatch, capsys):
+def test_python_page_runs(monkeypatch, run):
     drawn = []
     monkeypatch.setattr("pandas.DataFrame.plot", lambda table, **how: drawn.append((table.columns, how)))
-    (example,) = blocks("docs/python.md", "python")
-    exec(compile(example, "python.md", "exec"), {})
-    said = capsys.readouterr().out
+    said, _ = run("docs/python.md")
     settled = float(said.partition(" ")[0])
     assert 110.0 < settled <= 120.0
     assert "<Scenario cubesat: pd, lyapunov; 3000 control steps> [<Flight pd: settling" in said
@@ -70,16 +83,13 @@ def acceptance(monkeypatch, tmp_path):
     return load("acceptance.toml")
 
 
-def test_campaigns_page_runs(acceptance, capsys):
-    _, example, _ = blocks("docs/campaigns.md", "python")
-    told = {}
-    exec(compile(example, "campaigns.md", "exec"), told)
-    said = capsys.readouterr().out
+def test_campaigns_page_runs(acceptance, run):
+    said, names = run("docs/campaigns.md", 1)
     assert said.startswith("<campaign acceptance: pd: ")
     assert "settling_time: met" in said
-    assert told["again"].differs == ()
+    assert names["again"].differs == ()
     for sql in blocks("docs/campaigns.md", "sql"):
-        assert len(told["result"].query(sql)) in range(1, 10)
+        assert len(names["result"].query(sql)) in range(1, 10)
 
 
 @pytest.mark.slow
@@ -92,41 +102,72 @@ def test_script_with_workers_of_the_campaigns_page_runs(acceptance):
 
 def test_commands_of_the_campaigns_page_are_commands(acceptance):
     known = typer.main.get_command(app).commands
-    listed = re.findall(r"^starhold .*$", (ROOT / "docs" / "campaigns.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
-    lines = [shlex.split(line) for line in listed]
+    lines = [shlex.split(line) for line in re.findall(r"^starhold .*$", read("docs/campaigns.md"), flags=re.MULTILINE)]
     assert {name for _, name, *_ in lines} == {"campaign", "query", "rerun"}
     for _, name, *words in lines:
         known[name].make_context(name, words)
 
 
-def test_campaigns_page_names_every_distribution_and_metric(acceptance):
-    text = (ROOT / "docs" / "campaigns.md").read_text(encoding="utf-8")
-    for name in (*DISTRIBUTIONS, *SAMPLINGS):
-        assert f"| `{name}` |" in text
-    metrics = make_meter(1, 1.0, "axis", (1.0, 1.0), wheels=True).table
-    for metric in (*metrics, *EXTRAS, LOST, CONE):
-        assert f"`{metric}" in text
+def keys_of_the_templates():
+    """Templates name every key, in comments too, but for those of parts and laws."""
+    for body in ("rigid_body", "libration_point"):
+        tables = re.split(r"^(?:# )?\[+(\w+)\]+.*\n", read(f"{BODIES}/{body}/template.toml"), flags=re.MULTILINE)
+        for table, keys in zip(tables[1::2], tables[2::2], strict=True):
+            if table not in ("law", "part"):
+                yield from re.findall(r"^(?:# )?(\w+) = ", keys, flags=re.MULTILINE)
 
 
-def test_campaigns_page_tells_the_runs_that_verdicts_need():
-    text = (ROOT / "docs" / "campaigns.md").read_text(encoding="utf-8")
-    failures = (0, 1, 2, 5, 10)
-    for needed in (
-        [runs_needed(0.9973, 0.1, k) for k in failures],
-        [runs_to_meet(0.9973, 0.9, k) for k in failures],
-    ):
-        assert f"| {' | '.join(map(str, needed))} |" in text
+LAWS = [*catalogue(), *catalogue("libration-point")]
+COUNTED = {3: "three", 10: "ten", 11: "eleven", 12: "twelve", 13: "thirteen", 14: "fourteen", 15: "fifteen"}
+FAILURES = (0, 1, 2, 5, 10)
+FORMULAS = (
+    r"u = -k_{\mathrm{rate}}\,\omega - k_{\mathrm{attitude}}\,q - M + J a + \Omega \times J \Omega",
+    r"V = \frac{1}{2}\,\omega \cdot J \omega + 2 k_{\mathrm{attitude}}\,\left(1 - q_0\right)",
+    r"\dot V = -k_{\mathrm{rate}}\,|\omega|^2",
+    r"u = -\mathrm{switching\_gain}\,\operatorname{sign} s + J a + \Omega \times J \Omega",
+    # Without conditions that hold anyway.
+    r"\begin{cases} - \frac{u_{\max}}{c_{5}} & \text{for}\: c_{5} > 0 \\0 & \text{otherwise} \end{cases}",
+    r"- J\left(2 \lambda^{2} q - 2 \lambda \omega + c p\right)",
+)
+"""As the papers print them; Formula has compared each with the components of the equations."""
+NAMED = {
+    "README.md: laws": lambda: [f"| `{name}` |" for name in LAWS],
+    "docs/campaigns.md: distributions": lambda: [f"| `{name}` |" for name in (*DISTRIBUTIONS, *SAMPLINGS)],
+    "docs/campaigns.md: metrics": lambda: [
+        f"`{metric}" for metric in (*make_meter(1, 1.0, "axis", (1.0, 1.0), wheels=True).table, *EXTRAS, LOST, CONE)
+    ],
+    "docs/campaigns.md: runs that verdicts need": lambda: [
+        f"| {' | '.join(str(needed(0.9973, share, k)) for k in FAILURES)} |"
+        for needed, share in ((runs_needed, 0.1), (runs_to_meet, 0.9))
+    ],
+    "docs/laws.md: laws": lambda: [f"## {law}: " for law in LAWS],
+    "docs/laws.md: formulas": lambda: FORMULAS,
+    "docs/parts.md: parts": lambda: [f"### {name}: " for role in PACKAGES for name in parts(role)],
+    "docs/parts.md: numbers": lambda: ["| `bias_walk` | rad/s |"],
+    "docs/api.md: functions": lambda: [f"### sh.{name}\n" for name in set(sh.__all__) - {"InputError", "__version__"}],
+    "docs/keys.md: keys": lambda: [f"| `{key}` |" for key in keys_of_the_templates()],
+    "paper/paper.md: counts": lambda: [
+        f"{COUNTED[len(catalogue())].capitalize()} attitude laws are included",
+        f"and {COUNTED[len(catalogue('libration-point'))]} that hold a craft",
+        {10_000: "ten thousand flights each"}[FLIGHTS],
+    ],
+    "docs/comparison.md: ratios of the paper": lambda: re.findall(
+        r"\d+ to \d+ times", " ".join(read("paper/paper.md").split())
+    ),
+}
+"""What a page must name, by the page."""
 
 
-def test_readme_names_every_law():
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    for name in catalogue() | catalogue("libration-point"):
-        assert f"| `{name}` |" in text
+@pytest.mark.parametrize("rule", NAMED)
+def test_a_page_names_all_that_the_code_has(rule):
+    page, named = read(rule.partition(":")[0]), [*NAMED[rule]()]
+    assert named
+    assert [text for text in named if text not in page and " ".join(text.split()) not in " ".join(page.split())] == []
 
 
 def test_law_of_the_contributing_page_conforms(tmp_path):
     (example,) = blocks("CONTRIBUTING.md", "python")
-    assert example == (ROOT / "examples" / "rate_damping.py").read_text(encoding="utf-8")
+    assert example == read("examples/rate_damping.py")
     path = tmp_path / "rate_damping.py"
     path.write_text(example, encoding="utf-8")
     assert [v for v in examine(from_file(path)) if v.outcome == "failed"] == []
@@ -139,9 +180,7 @@ def test_files_stay_short():
 
 def commands():
     """What README lists, as printed, without what follows the sign of a comment."""
-    listed = re.search(
-        r"puts it on the path:\n\n```\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.DOTALL
-    )
+    listed = re.search(r"puts it on the path:\n\n```\n(.*?)```", read("README.md"), flags=re.DOTALL)
     assert listed is not None
     return [line.split(" # ")[0].strip() for line in listed[1].splitlines()]
 
@@ -172,7 +211,7 @@ def test_commands_of_the_readme_run_from_top_to_bottom(tmp_path):
 
 
 def test_readme_quotes_the_certificate():
-    text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    text = " ".join(read("README.md").split())
     scenario = load("three-laws")
     certificate = certify(build(scenario, scenario.pick("lyapunov")), "lyapunov")
     assert [claim.kind for claim in certificate.claims] == ["convergence", "torque-limit", "inertia", "sampling"]
@@ -209,29 +248,11 @@ def test_help_says_where_results_go(name):
     assert "else results/" in output.help
 
 
-@pytest.fixture(scope="module")
-def generated():
-    """Pages as the code writes them, by name; each is written once."""
-    return cache(lambda name: PAGES[name]())
-
-
 @pytest.mark.parametrize("name", PAGES)
-def test_generated_page_is_as_the_code_says(name, generated):
-    kept = (ROOT / "docs" / name).read_text(encoding="utf-8")
-    assert generated(name) == kept, f"docs/{name} is not what the code says; write it anew: python docs/generate.py"
-
-
-def test_page_of_laws_has_every_law_with_its_formula(generated):
-    for law in catalogue() | catalogue("libration-point"):
-        assert f"## {law}: " in generated("laws.md")
-    # As the papers print them; Formula has compared each with the components of the equations.
-    for formula in (
-        r"u = -k_{\mathrm{rate}}\,\omega - k_{\mathrm{attitude}}\,q - M + J a + \Omega \times J \Omega",
-        r"V = \frac{1}{2}\,\omega \cdot J \omega + 2 k_{\mathrm{attitude}}\,\left(1 - q_0\right)",
-        r"\dot V = -k_{\mathrm{rate}}\,|\omega|^2",
-        r"u = -\mathrm{switching\_gain}\,\operatorname{sign} s + J a + \Omega \times J \Omega",
-    ):
-        assert formula in generated("laws.md"), formula
+def test_generated_page_is_as_the_code_says(name):
+    assert PAGES[name]() == read(f"docs/{name}"), (
+        f"docs/{name} is not what the code says; write it anew: python docs/generate.py"
+    )
 
 
 def test_a_formula_that_is_not_the_law_is_not_found():
@@ -242,54 +263,17 @@ def test_a_formula_that_is_not_the_law_is_not_found():
     assert read.formula(read.torque).found
 
 
-def test_laws_are_printed_without_conditions_that_hold_anyway(generated):
-    page = generated("laws.md")
-    assert not [text for text in ("ITE", r"\tilde{\infty}", "not printed here") if text in page]
-    assert r"\begin{cases} - \frac{u_{\max}}{c_{5}} & \text{for}\: c_{5} > 0 \\0 & \text{otherwise} \end{cases}" in page
-    assert r"- J\left(2 \lambda^{2} q - 2 \lambda \omega + c p\right)" in page
+def test_laws_are_printed_without_conditions_that_hold_anyway():
+    assert not [text for text in ("ITE", r"\tilde{\infty}", "not printed here") if text in read("docs/laws.md")]
 
 
-def test_counts_of_the_paper_are_those_of_the_code():
-    numbers = {3: "three", 10: "ten", 11: "eleven", 12: "twelve", 13: "thirteen", 14: "fourteen", 15: "fifteen"}
-    paper = " ".join((ROOT / "paper" / "paper.md").read_text(encoding="utf-8").split())
-    assert f"{numbers[len(catalogue())].capitalize()} attitude laws are included" in paper
-    assert f"and {numbers[len(catalogue('libration-point'))]} that hold a craft" in paper
-    assert (FLIGHTS, "ten thousand flights each" in paper) == (10_000, True)
-    ratios = (ROOT / "docs" / "comparison.md").read_text(encoding="utf-8")
-    for ratio in re.findall(r"\d+ to \d+ times", paper):
-        assert ratio in ratios
-
-
-def test_page_of_parts_has_every_part(generated):
-    for role in PACKAGES:
-        for name in parts(role):
-            assert f"### {name}: " in generated("parts.md")
-    assert "| `bias_walk` | rad/s |" in generated("parts.md")
-
-
-def test_page_of_commands_has_every_option(generated):
+def test_page_of_commands_has_every_option():
     for name, command in typer.main.get_command(app).commands.items():
-        section = generated("commands.md").partition(f"## starhold {name}\n")[2].partition("\n## ")[0]
+        section = read("docs/commands.md").partition(f"## starhold {name}\n")[2].partition("\n## ")[0]
         assert section, name
         for parameter in command.params:
             for option in parameter.opts if parameter.param_type_name == "option" else []:
                 assert f"`{option}`" in section, (name, option)
-
-
-def test_page_of_the_api_has_every_function(generated):
-    for name in set(sh.__all__) - {"InputError", "__version__"}:
-        assert f"### sh.{name}\n" in generated("api.md")
-
-
-def test_page_of_keys_has_every_key_of_the_templates(generated):
-    """Templates name every key, in comments too, but for those of parts and laws."""
-    for body in ("rigid_body", "libration_point"):
-        text = (ROOT / "src" / "starhold" / "scenario" / "bodies" / body / "template.toml").read_text(encoding="utf-8")
-        tables = re.split(r"^(?:# )?\[+(\w+)\]+.*\n", text, flags=re.MULTILINE)
-        for table, keys in zip(tables[1::2], tables[2::2], strict=True):
-            if table not in ("law", "part"):
-                for key in re.findall(r"^(?:# )?(\w+) = ", keys, flags=re.MULTILINE):
-                    assert f"| `{key}` |" in generated("keys.md"), (body, table, key)
 
 
 def test_example_of_parts_flies(tmp_path):
@@ -351,8 +335,7 @@ BASE = {
 def fragments():
     """The tables that pages show by themselves."""
     for name in ("scenarios.md", "certificates.md", "pointing-budget.md"):
-        text = (ROOT / "docs" / name).read_text(encoding="utf-8")
-        for indent, block in re.findall(r"^( *)```toml\n(.*?)^ *```", text, flags=re.DOTALL | re.MULTILINE):
+        for indent, block in re.findall(r"^( *)```toml\n(.*?)^ *```", read(f"docs/{name}"), flags=re.DOTALL | re.MULTILINE):
             table = tomllib.loads(re.sub(f"^{indent}", "", block, flags=re.MULTILINE))
             yield pytest.param(BASE | table, id=f"{name}: {', '.join(table)}")
 
@@ -362,10 +345,8 @@ def test_table_of_a_page_is_read(tables):
     assert sh.scenario(tables).laws
 
 
-def test_code_of_the_page_about_machines_runs(capsys):
-    (example,) = blocks("docs/machines.md", "python")
-    exec(compile(example, "machines.md", "exec"), {})
-    assert "0.18257418583505536" in capsys.readouterr().out
+def test_code_of_the_page_about_machines_runs(run):
+    assert "0.18257418583505536" in run("docs/machines.md")[0]
 
 
 def names_in(content):
@@ -389,7 +370,7 @@ def test_certificate_of_its_page_has_the_keys_of_one(tmp_path):
 
 @pytest.mark.parametrize("body", ["rigid_body", "libration_point"])
 def test_commented_part_of_a_template_is_one(body):
-    text = (ROOT / "src" / "starhold" / "scenario" / "bodies" / body / "template.toml").read_text(encoding="utf-8")
+    text = read(f"{BODIES}/{body}/template.toml")
     table = re.search(r"^# \[\[part\]\].*?\n\n", text, flags=re.DOTALL | re.MULTILINE)
     assert table is not None
     there = re.sub("^# ", "", table[0], flags=re.MULTILINE)
@@ -400,9 +381,8 @@ def test_commented_part_of_a_template_is_one(body):
 
 def test_architecture_draws_the_layers_as_they_are():
     """In the picture each layer has a line, which begins with its packages."""
-    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    layers = settings["tool"]["importlinter"]["contracts"][0]["layers"]
-    picture, *_ = re.findall(r"```\n(.*?)```", (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8"), flags=re.DOTALL)
+    layers = tomllib.loads(read("pyproject.toml"))["tool"]["importlinter"]["contracts"][0]["layers"]
+    picture, *_ = blocks("ARCHITECTURE.md", "")
     assert [re.split(" {2,}", line)[0] for line in picture.splitlines()] == layers
     source = ROOT / "src" / "starhold"
     there = {path.stem for path in source.iterdir() if path.suffix == ".py" or (path / "__init__.py").is_file()}
@@ -410,7 +390,7 @@ def test_architecture_draws_the_layers_as_they_are():
 
 
 def test_files_that_architecture_names_are_there():
-    text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    text = read("ARCHITECTURE.md")
     named = {name for name in re.findall(r"`([\w/]+\.py)`", text) if "/" in name}
     assert len(named) > 10
     for name in named:
@@ -419,14 +399,13 @@ def test_files_that_architecture_names_are_there():
 
 
 def test_changelog_names_all_that_was_renamed():
-    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
-    assert dict(re.findall(r"^ *\| `([\w-]+)` \| `([\w-]+)` \|$", text, flags=re.MULTILINE)) == RENAMED
+    assert dict(re.findall(r"^ *\| `([\w-]+)` \| `([\w-]+)` \|$", read("CHANGELOG.md"), flags=re.MULTILINE)) == RENAMED
 
 
 def glossary():
     """Term, Russian term and meaning of every row."""
-    text = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("| ")]
+    lines = [line for line in read("docs/glossary.md").splitlines() if line.startswith("| ")]
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
     return [row for row in rows if row[0] not in ("term", "---")]
 
 
