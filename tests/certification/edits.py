@@ -84,3 +84,27 @@ def reasons(content):
 def faults(content):
     """Claim and obligation to the reason why it fails."""
     return {(f.claim, f.obligation): f.reason for f in check(content) if f.verdict == "fails"}
+
+
+def lists_are_exact(content, place, wrong):
+    """No obligation nor assumption of the claim at a place can be left out, told twice, moved to the end or changed; `wrong`
+    gives values that no obligation has."""
+    claim = content_at(content, place)
+    for part in ("obligations", "assumptions"):
+        listed = claim[part]
+        for k, item in enumerate(listed):
+            less = [*listed[:k], *listed[k + 1 :]]
+            assert faults(changed(content, (*place, part), less))
+            assert faults(changed(content, (*place, part), [*listed, item]))
+            assert faults(changed(content, (*place, part), [*less, item])) or k == len(listed) - 1
+            spoilt = [{**item, key: value} for key, value in wrong.items()] if part == "obligations" else ["position known"]
+            for value in spoilt:
+                assert faults(changed(content, (*place, part, k), value)), value
+
+
+def holds_unrefuted(content, place, names):
+    """Of a claim that holds no obligation is taken for refuted."""
+    for k, name in enumerate(names):
+        wrong = changed(content, ("certificates", 0, "claims", place, "obligations", k, "outcome"), "refuted")
+        wrong["certificates"][0]["outcome"] = wrong["certificates"][0]["claims"][place]["outcome"] = "refuted"
+        assert [finding.obligation for finding in check(wrong) if finding.verdict == "fails"] == [name]
