@@ -13,6 +13,7 @@ from typing import Any
 import sympy
 from flint import arb, ctx
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from starhold.algebra.cosines import from_axis_angle
 from starhold.loop.kernels import form
@@ -151,6 +152,16 @@ def reduced_by_unit_norm(expression: Any, q: Any) -> Any:
 def vanishes(expression: Any) -> bool:
     """Whether an expression with float constants is identically zero."""
     return sympy.cancel(sympy.together(sympy.nsimplify(sympy.expand(expression), rational=True))) == 0
+
+
+def zero(expression: Any) -> bool:
+    """Whether every component of an expression vanishes identically."""
+    return all(map(vanishes, leaves(expression)))
+
+
+def rotation(q: Any) -> Rotation:
+    """The same rotation in SciPy."""
+    return Rotation.from_quat(q, scalar_first=True)
 
 
 def symbols(names: str) -> Any:

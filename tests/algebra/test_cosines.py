@@ -20,24 +20,16 @@ from tests.algebra.readers import (
     angles,
     close,
     directions,
-    leaves,
     quaternions,
+    rotation,
     same,
     small_vectors,
     symbols,
-    vanishes,
+    zero,
 )
 
 P, Q, R = symbols("p0:4"), symbols("q0:4"), symbols("r1:4")
 N2 = sum(c * c for c in Q)
-
-
-def zero(expression):
-    return all(vanishes(part) for part in leaves(expression))
-
-
-def rotation(q):
-    return Rotation.from_quat(q, scalar_first=True)
 
 
 @settings(max_examples=30)

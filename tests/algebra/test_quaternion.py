@@ -9,7 +9,6 @@ import pytest
 import sympy
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 
 from starhold.algebra.cosines import from_axis_angle
 from starhold.algebra.quaternion import (
@@ -34,15 +33,15 @@ from tests.algebra.readers import (
     angles,
     close,
     directions,
-    leaves,
     numbers,
     quaternions,
     reduced_by_unit_norm,
+    rotation,
     same,
     small_vectors,
     symbols,
-    vanishes,
     vectors,
+    zero,
 )
 
 P, Q, S = (symbols(f"{name}0:4") for name in "pqs")
@@ -53,16 +52,8 @@ def length2(q):
     return sum(c * c for c in q)
 
 
-def zero(expression):
-    return all(vanishes(part) for part in leaves(expression))
-
-
 def minus(a, b):
     return tuple(x - y for x, y in zip(a, b, strict=True))
-
-
-def rotation(q):
-    return Rotation.from_quat(q, scalar_first=True)
 
 
 fours = st.tuples(numbers, numbers, numbers, numbers)

@@ -36,17 +36,12 @@ from starhold.algebra.vector import (
     transpose,
     unit,
 )
-from tests.algebra.readers import agree, close, leaves, matrices, numbers, positives, same, symbols, vanishes, vectors
+from tests.algebra.readers import agree, close, leaves, matrices, numbers, positives, same, symbols, vectors, zero
 
 A, B, C, D = (symbols(f"{name}1:4") for name in "abcd")
 M = (symbols("m1:4"), symbols("m4:7"), symbols("m7:10"))
 N = (symbols("n1:4"), symbols("n4:7"), symbols("n7:10"))
 SYMMETRIC = ((M[0][0], M[0][1], M[0][2]), (M[0][1], M[1][1], M[1][2]), (M[0][2], M[1][2], M[2][2]))
-
-
-def zero(expression):
-    """Whether every component of an expression vanishes identically."""
-    return all(vanishes(part) for part in leaves(expression))
 
 
 @settings(max_examples=40)
