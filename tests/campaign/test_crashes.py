@@ -21,11 +21,6 @@ from tests.campaign.toy import Toy, fly, manifest, missing
 
 
 @pytest.fixture
-def store(tmp_path):
-    return Store.create(tmp_path / "campaign", manifest())
-
-
-@pytest.fixture
 def trail(tmp_path):
     (tmp_path / "trail").mkdir()
     return tmp_path / "trail"

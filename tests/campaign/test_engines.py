@@ -20,11 +20,6 @@ from tests.campaign.cluster import ENVIRONMENT, cluster
 from tests.campaign.toy import LAWS, Toy, fly, manifest, missing
 
 
-@pytest.fixture
-def store(tmp_path):
-    return Store.create(tmp_path / "campaign", manifest())
-
-
 @pytest.fixture(scope="module")
 def running(tmp_path_factory):
     with cluster(tmp_path_factory.mktemp("cluster")) as (address, *_):

@@ -17,7 +17,7 @@ class Reader(HTMLParser):
         self.tags: list[tuple[str, dict[str, str | None]]] = []
         self.words: list[str] = []
         self.scripts: list[str] = []
-        self.inside = ""
+        self.inside, self.page = "", page
         self.feed(page)
         self.close()
 
@@ -37,6 +37,19 @@ class Reader(HTMLParser):
     @property
     def text(self) -> str:
         return " ".join(self.words)
+
+    def loads_nothing(self) -> None:
+        """Assert that the page has all it needs and may ask the network for nothing."""
+        for tag, attrs in self.tags:
+            assert tag not in {"link", "iframe", "img", "object", "embed", "base"}, tag
+            assert not {"src", "href", "srcset", "action", "data", "poster"} & set(attrs), (tag, attrs)
+        style = self.page.split("<style>")[1].split("</style>")[0]
+        assert "url(" not in style
+        assert "@import" not in style
+        policy = next(attrs["content"] for _, attrs in self.tags if attrs.get("http-equiv") == "Content-Security-Policy")
+        assert policy is not None
+        assert policy.startswith("default-src 'none'")
+        assert "http" not in policy
 
     def data(self) -> Any:
         """What the scripts read."""
