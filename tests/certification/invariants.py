@@ -8,6 +8,25 @@ from starhold.certification.invariant import System, WantedSet, certify, load, p
 from starhold.certification.invariant.text import read
 
 SQUARE = ((-2.0, 2.0), (-2.0, 2.0))
+ORIGIN = "equilibrium = { x = 0, y = 0 }"
+
+
+def file(x="-x", y="-y", V='"x**2 + y**2"', theorem="region", more=ORIGIN, name="mine", half=2):
+    """The text of a problem about two states and one claim, in a square of these half sides."""
+    return f"""
+name = "{name}"
+variables = ["x", "y"]
+[rates]
+x = "{x}"
+y = "{y}"
+[box]
+x = [-{half}, {half}]
+y = [-{half}, {half}]
+[[claim]]
+theorem = "{theorem}"
+V = {V}
+{more}
+"""
 
 
 def names(variables):

@@ -13,26 +13,11 @@ from starhold.checker.covering import Question, answer
 from starhold.checker.exact import CheckError
 from starhold.checker.reading import read, read_names
 from tests.certification.edits import with_kinds
-from tests.certification.invariants import proved
+from tests.certification.invariants import ORIGIN, file, proved
 from tests.running import starhold
 
-FILE = """
-name = "{name}"
-variables = ["x", "y"]
-[rates]
-x = "{x}"
-y = "{y}"
-[box]
-x = [-2, 2]
-y = [-2, 2]
-[[claim]]
-theorem = "{theorem}"
-V = {V}
-{more}
-"""
 # Together with all that needs the proofs of the built-in problems, which take long.
 
-ORIGIN = "equilibrium = { x = 0, y = 0 }"
 ROUND = '"x**2 + y**2"'
 
 
@@ -50,8 +35,7 @@ def made(tmp_path_factory):
 
 def of(folder, x, y, theorem, V=ROUND, more=ORIGIN, name="mine"):
     """The certificate of a problem that is written as texts."""
-    text = FILE.format(name=name, x=x, y=y, theorem=theorem, V=V, more=more)
-    return content(certify(parse(text, "mine.toml")), folder)
+    return content(certify(parse(file(x, y, V, theorem, more, name), "mine.toml")), folder)
 
 
 def changed(given, change):

@@ -12,22 +12,10 @@ from starhold.certification.invariant import InvariantProblem, System, WantedSet
 from starhold.certification.invariant.descent import Candidate, jumps, switches
 from starhold.certification.invariant.search import closed_cells
 from starhold.checker import check, covering, passed
-from tests.certification.invariants import SQUARE, claim, expression, fractions, outcomes, system
+from tests.certification.invariants import ORIGIN as AT_ORIGIN
+from tests.certification.invariants import SQUARE, claim, expression, file, fractions, outcomes, system
 
 ORIGIN, ROUND = (0, 0), "x**2 + y**2"
-FILE = """
-variables = ["x", "y"]
-[rates]
-x = "{x}"
-y = "{y}"
-[box]
-x = [-1.5, 1.5]
-y = [-1.5, 1.5]
-[[claim]]
-theorem = "{theorem}"
-V = "{V}"
-{equilibrium}
-"""
 ON = (
     "(1 if {0} <= 0 and {0} >= 0 else 0)",
     "(1 if {0} <= 0 <= {0} else 0)",
@@ -42,9 +30,9 @@ ON = (
 """Texts for what is 1 where something is zero, else 0."""
 
 
-def written(folder, x="-x", y="-y", V=ROUND, theorem="region", equilibrium="equilibrium = { x = 0, y = 0 }"):
+def written(folder, x="-x", y="-y", V=ROUND, theorem="region", equilibrium=AT_ORIGIN):
     """A certificate, as the file holds it."""
-    found = certify(parse(FILE.format(x=x, y=y, V=V, theorem=theorem, equilibrium=equilibrium), "mine.toml"))
+    found = certify(parse(file(x, y, f'"{V}"', theorem, equilibrium, half=1.5), "mine.toml"))
     write(found, folder / "c.json")
     return found, json.loads((folder / "c.json").read_text(encoding="utf-8"))
 

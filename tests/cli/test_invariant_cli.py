@@ -7,27 +7,13 @@ import pytest
 import starhold as sh
 from starhold.certification.invariant import enclosure
 from starhold.certification.invariant.problem import FORMAT
+from tests.certification.invariants import ORIGIN, file
+from tests.refusals import complains
 from tests.running import starhold
-
-FILE = """
-name = "mine"
-variables = ["x", "y"]
-[rates]
-x = "-x + x**3"
-y = "{y}"
-[box]
-x = [-2, 2]
-y = [-2, 2]
-[[claim]]
-theorem = "{theorem}"
-V = "x**2 + y**2"
-equilibrium = {{ x = 0, y = 0 }}
-{more}
-"""
 
 
 def written(folder, y="-y", theorem="region", more=""):
-    (folder / "mine.toml").write_text(FILE.format(y=y, theorem=theorem, more=more), encoding="utf-8")
+    (folder / "mine.toml").write_text(file("-x + x**3", y, theorem=theorem, more=f"{ORIGIN}\n{more}"), encoding="utf-8")
     return starhold("invariant", "mine.toml", "-o", "out", "--force", cwd=folder)
 
 
@@ -75,22 +61,16 @@ def test_an_undecided_claim_ends_with_four(tmp_path, monkeypatch):
     ],
 )
 def test_user_errors_are_one_line(tmp_path, words, said):
-    (tmp_path / "bad.toml").write_text(FILE.format(y="sin(x)", theorem="region", more=""), encoding="utf-8")
-    done = starhold(*words, cwd=tmp_path)
-    assert done.returncode == 2
-    assert said in done.stderr
-    assert done.stderr.count("\n") == 1
+    (tmp_path / "bad.toml").write_text(file(y="sin(x)"), encoding="utf-8")
+    complains(starhold(*words, cwd=tmp_path), said)
 
 
 def test_systems_that_come_with_it_are_listed(tmp_path):
-    done = starhold("invariant", cwd=tmp_path)
-    assert done.returncode == 0
+    done = starhold("invariant", cwd=tmp_path, code=0)
     for name in ("switching", "van-der-pol", "saturated-axis", "saturated-strip", "circle", "orbit", "spin", "dead-zone"):
         assert name in done.stdout
 
 
 def test_existing_results_are_refused(tmp_path):
     assert written(tmp_path).returncode == 0
-    again = starhold("invariant", "mine.toml", "-o", "out", cwd=tmp_path)
-    assert again.returncode == 2
-    assert "--force" in again.stderr
+    complains(starhold("invariant", "mine.toml", "-o", "out", cwd=tmp_path), "--force")

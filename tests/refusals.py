@@ -1,0 +1,27 @@
+"""A user's error is told in one line, in Python and by a command."""
+
+from contextlib import contextmanager
+
+import pytest
+
+from starhold.errors import InputError
+
+
+@contextmanager
+def refused(*words, start=""):
+    """What runs within is a user's error, told in one line that begins so and has all these words."""
+    with pytest.raises(InputError) as caught:
+        yield caught
+    line = str(caught.value)
+    assert line.startswith(start), line
+    assert "\n" not in line, line
+    assert [word for word in words if word not in line] == [], line
+
+
+def complains(done, *words):
+    """A command ended as on a user's error: with code 2, and one line that has all these words."""
+    assert done.returncode == 2, done.stderr or done.stdout
+    assert done.stderr.startswith("starhold: ")
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert "Traceback" not in (done.stdout or "")
+    assert [word for word in words if word not in done.stderr] == [], done.stderr
