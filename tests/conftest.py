@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+from importlib.metadata import EntryPoint
 
 # Before NumPy loads: on small matrices the library's threads only wait for one another.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -62,3 +63,26 @@ def pytest_configure(config):
     # Of workers the one process that starts them counts.
     if not hasattr(config, "workerinput") and getattr(config, "cache", None) is not None:
         config.pluginmanager.register(Stopwatch(config.cache))
+
+
+@pytest.fixture
+def offer(monkeypatch):
+    """Let modules in a folder be the parts of another package, by its entry points, until the test ends."""
+    from starhold.laws import catalogue as laws
+    from starhold.parts import catalogue as parts
+
+    def forget():
+        for remembered in (laws._installed, laws._of_body, laws._commands, parts.parts):
+            remembered.cache_clear()
+
+    def give(folder, *names):
+        points = [EntryPoint(name, name, "starhold.parts") for name in names]
+        monkeypatch.syspath_prepend(str(folder))
+        for name in names:
+            monkeypatch.delitem(sys.modules, name, raising=False)
+        monkeypatch.setattr(parts, "entry_points", lambda group: points if group == "starhold.parts" else [])
+        forget()
+
+    yield give
+    monkeypatch.undo()
+    forget()
