@@ -11,6 +11,7 @@ from starhold.parts.catalogue import find, fit
 from starhold.parts.effectors.wheels import ALLOCATIONS
 from starhold.parts.effectors.wheels import State as Rotors
 from starhold.parts.part import Fitted
+from starhold.simulation.lane import Recording, fly, label
 
 ORBIT = (fit("environment", "two-body"), fit("environment", "gravity-gradient"))
 ORBITAL = fit("target", "orbital")
@@ -51,6 +52,11 @@ def point_loop(
     return ClosedLoop(
         plant, law, gains, start, period, parts=(field, *surfaces), limit=kind, command_limit=limit, seed=0
     )  # fmt: skip
+
+
+def flown(loop: ClosedLoop, steps: int = 600, **how: Any) -> Recording:
+    """The recording of a flight."""
+    return label(loop, *fly(loop, steps, **how), 1)
 
 
 def wheels_after(event: Any) -> Any:

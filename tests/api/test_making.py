@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 import starhold as sh
 from starhold.scenario.reading import builtin_names, builtin_text
 from starhold.scenario.writing import toml_text
+from tests.refusals import refused
 
 BODY = {
     "name": "made",
@@ -137,10 +138,8 @@ def test_a_rotation_of_scipy_is_an_attitude():
     ],
 )
 def test_what_cannot_be_is_told_as_of_a_file(changes, said):
-    with pytest.raises(sh.InputError) as caught:
+    with refused(said):
         sh.scenario(BODY).with_(changes)
-    assert said in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def test_keys_of_tables_lists_and_laws_by_name_or_place():

@@ -11,6 +11,7 @@ from starhold.algebra.structure import flatten
 from starhold.simulation.abreast import Flying, fly_abreast
 from starhold.simulation.lane import fly
 from starhold.studies.compare import build, fly_law
+from tests.refusals import refused
 from tests.running import starhold
 
 SHORT = {"simulation.duration": 20.0, "simulation.record_every": 3}
@@ -81,8 +82,7 @@ def test_every_row_is_what_a_comparison_of_the_changed_scenario_measures(kind):
 def test_metrics_of_a_run_are_those_of_its_flight_and_of_its_file(tmp_path):
     for scenario in (THREE, POINT, sh.load("landing").with_({"simulation.duration": 5.0})):
         (tmp_path / "s.toml").write_text(scenario.text)
-        done = starhold("run", "s.toml", "--no-certify", "-o", "out", "--force", cwd=tmp_path)
-        assert done.returncode == 0, done.stderr
+        starhold("run", "s.toml", "--no-certify", "-o", "out", "--force", cwd=tmp_path, code=0)
         entry = scenario.laws[0]
         flight = fly_law(scenario, entry, build(scenario, entry))
         run = sh.simulate(scenario)
@@ -143,9 +143,8 @@ def test_pairs_are_flown_as_they_are_given_and_names_pick_the_laws():
     ],
 )
 def test_what_cannot_be_flown_is_one_line(changes, law, said):
-    with pytest.raises(sh.InputError) as caught:
+    with refused(said):
         sh.sweep(THREE, changes, law)
-    assert said in str(caught.value)
 
 
 def test_progress_is_told_to_the_end():

@@ -15,6 +15,7 @@ from starhold.errors import InputError
 from starhold.studies.body import study_of
 from starhold.studies.compare import build, record
 from tests.campaign.flown import ASKED, OVER, fly, same, small
+from tests.refusals import refused
 
 
 @pytest.fixture(scope="module")
@@ -274,12 +275,9 @@ BAD = [
 
 @pytest.mark.parametrize(("options", "told"), BAD)
 def test_bad_input_is_told_in_a_line(tmp_path, options, told):
-    with pytest.raises(InputError) as failure:
+    with refused(told) as failure:
         fly(tmp_path / "c", **options)
-    line = str(failure.value)
-    assert told in line
-    assert "\n" not in line
-    assert len(line) < 400
+    assert len(str(failure.value)) < 400
 
 
 def test_workers_give_the_same_bits(result, tmp_path):

@@ -13,6 +13,7 @@ from starhold.errors import InputError
 from starhold.report.campaign_files import write_campaign
 from tests.campaign.flown import SMALL, fly
 from tests.parts.files import ENVIRONMENT
+from tests.refusals import refused
 
 NORMAL = {"distribution": "normal", "sigma": 0.01}
 SHELL = {"distribution": "shell", "high": "2 deg/s"}
@@ -175,12 +176,9 @@ WRONG = [
 
 @pytest.mark.parametrize(("options", "told"), WRONG)
 def test_what_is_hostile_is_told_in_a_line(tmp_path, options, told):
-    with pytest.raises(InputError) as failure:
+    with refused(told) as failure:
         campaign(tmp_path / "c", **options)
-    line = str(failure.value)
-    assert told in line
-    assert "\n" not in line
-    assert len(line) < 600
+    assert len(str(failure.value)) < 600
     assert not (tmp_path / "c").exists()
 
 

@@ -2,7 +2,14 @@
 
 import copy
 
-from starhold.checker import check
+from starhold.certification.certificate import write
+from starhold.checker import check, check_file
+
+
+def checked(certificate, folder):
+    """What the checker finds in the file of a certificate."""
+    write([certificate], "made", folder / "certificate.json")
+    return check_file(folder / "certificate.json")
 
 
 def claims_of(content):

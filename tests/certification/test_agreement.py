@@ -11,26 +11,20 @@ from hypothesis import strategies as st
 
 from starhold.algebra.polynomial import exact
 from starhold.analysis.trial import draw, fly_claims
-from starhold.certification.certificate import write
 from starhold.certification.certify import Wanted, certify
 from starhold.certification.matrices import definite, identity, least, plus, rows
 from starhold.certification.motion import Motion, cases
 from starhold.certification.potential import Cosines, Spring
 from starhold.certification.refutation import rising_state
 from starhold.certification.subject import make_subject
-from starhold.checker import check_file, passed
 from starhold.checker import exact as checking
+from starhold.checker import passed
 from starhold.laws import pd, wheel
 from starhold.laws.catalogue import catalogue
 from starhold.parts.craft import make_craft
+from tests.certification.edits import checked
 from tests.certification.hunt import contradicted, fault_in, random_scenario
 from tests.certification.loops import free, loop_of, rotors
-
-
-def checked(certificate, tmp_path):
-    write([certificate], "made", tmp_path / "certificate.json")
-    return check_file(tmp_path / "certificate.json")
-
 
 FOUND = (12, 15, 22, 30, 58, 66, 71, 90, 91, 98, 111, 118, 196, 2102, 2489, 3239)
 """Seeds of scenarios that certifier, checker or flights once did not agree on."""

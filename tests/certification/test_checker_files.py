@@ -20,6 +20,7 @@ from starhold.laws import pd
 from tests.certification.by_hand import PD, by_hand, converging
 from tests.certification.edits import alone, claims_of, content_at, edited, reasons
 from tests.certification.loops import FULL, loop_of
+from tests.refusals import refused
 
 # Together: each worker would make the certificates of the textbook loops for itself.
 
@@ -41,14 +42,12 @@ def test_what_is_no_certificate_fails(content):
 
 
 def test_a_file_that_cannot_be_read_is_the_users_error(tmp_path):
-    with pytest.raises(InputError) as missing:
+    with refused():
         check_file(tmp_path / "none.json")
-    assert "\n" not in str(missing.value)
     for bad in (b"{", b"", b"\xff\xfe", b"[" * 100_000):
         (tmp_path / "bad.json").write_bytes(bad)
-        with pytest.raises(InputError) as error:
+        with refused():
             check_file(tmp_path / "bad.json")
-        assert "\n" not in str(error.value)
 
 
 def test_a_readable_file_with_a_fault_fails(tmp_path, made):

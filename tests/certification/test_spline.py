@@ -15,7 +15,6 @@ from starhold.algebra.polynomial import exact
 from starhold.algebra.quaternion import to_body
 from starhold.algebra.vector import ZERO, add, cross, subtract
 from starhold.analysis.trial import draw
-from starhold.certification.certificate import write
 from starhold.certification.certify import certify
 from starhold.certification.matrices import floats, number
 from starhold.certification.matrices import rows as rows_of
@@ -30,6 +29,7 @@ from starhold.laws import pd, wheel
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.craft import tensor
 from starhold.parts.targets.history import Knots, knots_of, tabulate
+from tests.certification.edits import checked
 from tests.certification.loops import FULL, free, loop_of
 
 
@@ -102,12 +102,7 @@ def test_a_history_of_one_attitude_is_a_target_at_rest(count, tmp_path):
     for law, gains in (("pd", pd.Gains(0.09, 0.009)), ("wheel", wheel.Gains(0.09, (0.0045,) * 3, 0.0))):
         certificate = certify(free(loop_of(law, gains, target=rows, knots=knots)), law)
         assert certificate.claim("convergence").outcome == "proved"
-        assert passed(check_certificate(certificate, tmp_path))
-
-
-def check_certificate(certificate, tmp_path):
-    write([certificate], "made", tmp_path / "certificate.json")
-    return check_file(tmp_path / "certificate.json")
+        assert passed(checked(certificate, tmp_path))
 
 
 def followed(period):
@@ -133,7 +128,7 @@ def test_claims_do_not_depend_on_how_often_the_law_looks(period, tmp_path):
     least = 4.0 * found[1]
     assert least > loop.craft.torque_limit
     assert claim is None
-    assert passed(check_certificate(certificate, tmp_path))
+    assert passed(checked(certificate, tmp_path))
 
 
 def test_what_a_sentence_assumes_of_the_target(tmp_path):
@@ -145,7 +140,7 @@ def test_what_a_sentence_assumes_of_the_target(tmp_path):
     claim = certificate.claim("torque-limit")
     assert claim.outcome == "proved"
     assert "rotation spline through its history" in sentence(claim, certificate.subject)
-    assert passed(check_certificate(certificate, tmp_path))
+    assert passed(checked(certificate, tmp_path))
 
 
 def test_rows_without_knots_are_knots_of_their_own(tmp_path):
@@ -154,7 +149,7 @@ def test_rows_without_knots_are_knots_of_their_own(tmp_path):
     certificate = certify(free(loop_of("pd", pd.Gains(0.09, 0.009), target=rows, period=1.0)), "pd")
     assert certificate.subject["history"]["times"] == list(range(8))
     assert certificate.subject["target_rate"] >= peaks(times, attitudes)[0] * (1.0 - 1e-9)
-    assert passed(check_certificate(certificate, tmp_path))
+    assert passed(checked(certificate, tmp_path))
 
 
 @pytest.mark.parametrize(
@@ -179,7 +174,7 @@ def test_the_checker_believes_no_bound(change, tmp_path):
     times, attitudes = history(5, 8, 0.3)
     rows = tabulate(times, attitudes, [0.0, 0.1])
     loop = free(loop_of("pd", pd.Gains(0.09, 0.009), target=rows, knots=knots_of(times, attitudes, times[-1])))
-    assert passed(check_certificate(certify(loop, "pd"), tmp_path))
+    assert passed(checked(certify(loop, "pd"), tmp_path))
     content = json.loads((tmp_path / "certificate.json").read_text())
     change(content["certificates"][0]["subject"])
     (tmp_path / "changed.json").write_text(json.dumps(content))

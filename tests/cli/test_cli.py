@@ -16,6 +16,7 @@ from starhold.laws.catalogue import catalogue
 from starhold.report.results import open_folder
 from starhold.scenario.reading import builtin_text
 from tests.cli.short import SHORT
+from tests.refusals import complains
 from tests.running import starhold
 
 
@@ -28,8 +29,7 @@ def short(tmp_path):
 
 
 def test_compare_writes_everything_and_prints_the_table(short):
-    done = starhold("compare", "short.toml", "-o", "out", cwd=short)
-    assert done.returncode == 0, done.stderr
+    done = starhold("compare", "short.toml", "-o", "out", cwd=short, code=0)
     out = short / "out"
     assert "Report: out/report.html" in done.stdout
     for name in ("lyapunov", "sliding", "mpc"):
@@ -48,32 +48,24 @@ def test_compare_writes_everything_and_prints_the_table(short):
     page = (out / "report.html").read_text()
     assert "</html>" in page
     assert not list(out.rglob(".writing-*"))
-    again = starhold("compare", "short.toml", "-o", "out", cwd=short)
-    assert again.returncode == 2
-    assert again.stderr.count("\n") == 1
-    assert "--force" in again.stderr
+    complains(starhold("compare", "short.toml", "-o", "out", cwd=short), "--force")
     (out / "mine.txt").write_text("keep")
-    forced = starhold("compare", "short.toml", "-o", "out", "--force", cwd=short)
-    assert forced.returncode == 0
+    starhold("compare", "short.toml", "-o", "out", "--force", cwd=short, code=0)
     assert (out / "mine.txt").read_text() == "keep"
 
 
 def test_run_flies_the_law_that_is_asked_for(short):
-    done = starhold("run", "short.toml", "--law", "sliding", cwd=short)
-    assert done.returncode == 0, done.stderr
+    starhold("run", "short.toml", "--law", "sliding", cwd=short, code=0)
     folder = short / "results" / "three-laws-sliding"
     assert (folder / "run.nc").exists()
     assert set(json.loads((folder / "summary.json").read_text())["laws"]) == {"sliding"}
-    wrong = starhold("run", "short.toml", "--law", "slidding", cwd=short)
-    assert wrong.returncode == 2
-    assert "did you mean sliding?" in wrong.stderr
+    complains(starhold("run", "short.toml", "--law", "slidding", cwd=short), "did you mean sliding?")
 
 
 def test_a_motion_that_is_lost_is_said_so(short):
     text = SHORT.replace("k_rate = 0.09", "k_rate = 900").replace('torque_limit = "0.01 N m"', "")
     (short / "wild.toml").write_text(text)
-    done = starhold("run", "wild.toml", "-o", "wild", cwd=short)
-    assert done.returncode == 1
+    done = starhold("run", "wild.toml", "-o", "wild", cwd=short, code=1)
     assert "lyapunov diverged at" in done.stdout
     row = json.loads((short / "wild" / "summary.json").read_text())["laws"]["lyapunov"]
     assert 0 < row["diverged_at"] < 20
@@ -83,8 +75,7 @@ def test_a_motion_that_is_lost_is_said_so(short):
 
 def test_a_craft_that_is_lost_at_once_is_said_so(short):
     (short / "spinning.toml").write_text(SHORT.replace("rate = [0.04", "rate = [100.04"))
-    done = starhold("compare", "spinning.toml", "-o", "spinning", "--no-certify", cwd=short)
-    assert done.returncode == 1, done.stderr
+    done = starhold("compare", "spinning.toml", "-o", "spinning", "--no-certify", cwd=short, code=1)
     assert "lyapunov diverged at 0 s" in done.stdout
     assert not (short / "spinning" / "certificate.json").exists()
 
@@ -114,31 +105,24 @@ def test_a_craft_that_is_lost_at_once_is_said_so(short):
 )
 def test_user_errors_are_one_line_and_exit_code_2(words, said, short):
     done = starhold(*words, cwd=short)
-    assert done.returncode == 2
-    assert said in done.stderr
+    complains(done, said)
     assert len(done.stderr) < 1000
-    assert done.stderr.count("\n") == 1
-    assert "Traceback" not in done.stderr + done.stdout
 
 
 def test_new_writes_a_file_that_runs(tmp_path):
     assert starhold("new", "my.toml", "--schema", cwd=tmp_path).returncode == 0
     assert (tmp_path / "my.toml").read_text().startswith("#:schema ./starhold.schema.json")
     assert json.loads((tmp_path / "starhold.schema.json").read_text())["title"] == "starhold scenario"
-    done = starhold("run", "my.toml", "-o", "out", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    starhold("run", "my.toml", "-o", "out", cwd=tmp_path, code=0)
 
 
 def test_design_prints_gains_and_what_they_are_judged_by(short):
     text = SHORT.split("[[law]]")[0] + '[[law]]\ntype = "lqr"\nform = "II"\nq = [1, 1, 1, 0.2, 0.2, 0.2]\nr = 50\n'
     (short / "lqr.toml").write_text(text)
-    done = starhold("design", "lqr.toml", cwd=short)
-    assert done.returncode == 0, done.stderr
+    done = starhold("design", "lqr.toml", cwd=short, code=0)
     for word in ("k_rate", "k_attitude", "Riccati residual", "P against SciPy", "degree of stability"):
         assert word in done.stdout
-    none = starhold("design", "short.toml", cwd=short)
-    assert none.returncode == 2
-    assert "form" in none.stderr
+    complains(starhold("design", "short.toml", cwd=short), "form")
 
 
 def test_lists(tmp_path):
@@ -156,14 +140,12 @@ def test_lists(tmp_path):
 def test_check_law_passes_a_good_law_and_fails_a_bad_one(tmp_path):
     text = Path(catalogue()["pd"].module.__file__).read_text()
     (tmp_path / "my_pd.py").write_text(text)
-    good = starhold("check-law", "my_pd.py", cwd=tmp_path)
-    assert good.returncode == 0, good.stdout + good.stderr
+    good = starhold("check-law", "my_pd.py", cwd=tmp_path, code=0)
     assert "failed" not in good.stdout
     (tmp_path / "bad_pd.py").write_text(
         text.replace("scale(gains.k_rate, measurement.rate)", "scale(-gains.k_rate, measurement.rate)")
     )
-    bad = starhold("check-law", "bad_pd.py", cwd=tmp_path)
-    assert bad.returncode == 1
+    bad = starhold("check-law", "bad_pd.py", cwd=tmp_path, code=1)
     assert "failed" in bad.stdout
 
 
@@ -184,10 +166,9 @@ def test_a_folder_that_another_process_writes_is_refused_until_that_ends(tmp_pat
     assert holder.stdout.readline() == "claimed\n"
     with pytest.raises(InputError, match="another starhold"):
         open_folder(tmp_path / "shared", force=True)
-    other = starhold("certify", "three-laws", "--law", "lyapunov", "-o", "shared", "--force", cwd=tmp_path)
-    assert other.returncode == 2
-    assert "another starhold" in other.stderr
-    assert other.stderr.count("\n") == 1
+    complains(
+        starhold("certify", "three-laws", "--law", "lyapunov", "-o", "shared", "--force", cwd=tmp_path), "another starhold"
+    )
     # Not even a crash leaves the claim behind.
     holder.kill()
     holder.communicate()
@@ -199,8 +180,7 @@ def test_a_folder_that_another_process_writes_is_refused_until_that_ends(tmp_pat
 def test_warnings_and_failures_of_the_system_are_single_lines(short):
     falling = SHORT.replace("velocity = [0, 7550, 0]", "velocity = [0, 6000, 0]")
     (short / "falling.toml").write_text(falling)
-    warned = starhold("run", "falling.toml", "-o", "falling", "--no-certify", cwd=short)
-    assert warned.returncode == 0, warned.stderr
+    warned = starhold("run", "falling.toml", "-o", "falling", "--no-certify", cwd=short, code=0)
     assert warned.stderr.startswith("starhold: warning: orbit.velocity: the orbit meets the Earth's surface")
     assert warned.stderr.count("\n") == 1
 
@@ -269,9 +249,7 @@ def test_python_interface_mirrors_the_commands(short):
 
 def test_meanings_keep_what_stands_in_brackets(tmp_path):
     """Tables name scenario tables, such as [settling], which are no markup."""
-    done = starhold("laws", "lyapunov", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    done = starhold("laws", "lyapunov", cwd=tmp_path, code=0)
     assert "that of [settling] if absent" in done.stdout
-    part = starhold("parts", "magnetorquers", cwd=tmp_path)
-    assert part.returncode == 0, part.stderr
+    part = starhold("parts", "magnetorquers", cwd=tmp_path, code=0)
     assert "[orbit]" in part.stdout

@@ -209,8 +209,7 @@ def test_a_run_leaves_as_a_message_and_comes_back_as_a_target(tmp_path):
 
 def test_the_command_writes_a_message(tmp_path):
     sh.simulate(sh.load("three-laws").with_({"simulation.duration": 2.0})).to_netcdf(tmp_path / "run.nc", engine="h5netcdf")
-    done = starhold("export", "aem", ".", "-o", "run.aem", "--object", "CUBE", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    starhold("export", "aem", ".", "-o", "run.aem", "--object", "CUBE", cwd=tmp_path, code=0)
     assert sh.read_aem(tmp_path / "run.aem").object_name == "CUBE"
     bad = starhold("export", "aem", "run.nc", "-o", "run.aem", cwd=tmp_path)
     assert (bad.returncode, bad.stderr.count("\n")) == (2, 1)

@@ -18,6 +18,7 @@ from starhold.export.source import texts
 from starhold.scenario.building import build
 from starhold.trace.program import Call, statements
 from tests.export.flown import LAWS, build_in, code_of, compiled, need
+from tests.refusals import complains
 from tests.running import starhold
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -77,18 +78,13 @@ def test_header_warns_loudly_of_what_is_not_proved(tmp_path):
     ],
 )
 def test_bad_input_is_one_line(arguments, said, tmp_path):
-    done = export(tmp_path / "out", *arguments)
-    assert done.returncode == 2
-    assert said in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
+    complains(export(tmp_path / "out", *arguments), said)
     assert not (tmp_path / "out").exists()
 
 
 def test_unwritable_folder(tmp_path):
     (tmp_path / "file").write_text("")
-    done = export(tmp_path / "file")
-    assert done.returncode == 2
-    assert "cannot write there" in done.stderr
+    complains(export(tmp_path / "file"), "cannot write there")
 
 
 def test_results_are_not_overwritten_unless_forced(tmp_path):

@@ -14,6 +14,7 @@ from starhold.algebra.vector import ZERO
 from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.craft import make_craft, tensor
+from tests.refusals import refused
 
 BODY = {
     "name": "slew_angle",
@@ -131,10 +132,9 @@ def test_lower_gains_settle_too_late(law):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_a_time_that_the_torque_does_not_allow_is_refused_with_one_that_it_does(law):
-    with pytest.raises(sh.InputError) as caught:
+    with refused("law[1]: 30 s to settle is too short: 0.05 N m of torque allow about") as caught:
         sh.scenario(BODY | {"law": [asked(law, 30)]})
     text = str(caught.value)
-    assert "law[1]: 30 s to settle is too short: 0.05 N m of torque allow about" in text
     least = float(re.search(r"about ([0-9.]+) s", text)[1])
     found = sh.metrics(sh.simulate(sh.scenario(BODY | {"law": [asked(law, 1.05 * least)]})))
     assert found["settling_time"] <= 1.05 * least
@@ -172,10 +172,8 @@ def test_wheels_bound_torque_and_momentum():
     ],
 )
 def test_what_cannot_be_designed_is_one_line(law, changes, said):
-    with pytest.raises(sh.InputError) as caught:
+    with refused(said):
         sh.scenario(BODY | {"law": [asked(law, 200)]}).with_(changes)
-    assert said in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def test_what_is_there_already_settles_at_once():

@@ -14,7 +14,8 @@ from starhold.parts.bodies.rigid_body import State
 from starhold.parts.catalogue import fit
 from starhold.parts.craft import make_craft
 from starhold.parts.random import Dice
-from starhold.simulation.lane import fly, label
+from starhold.simulation.lane import fly
+from tests.making import flown
 
 INERTIA = np.array([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]])
 LAW = catalogue()["pd"]
@@ -27,11 +28,6 @@ def free(*parts, rate=(0.02, -0.03, 0.05), period=0.1, substeps=4, limit=0.0, **
     own = LAW.gains(**({"k_rate": 0.9, "k_attitude": 0.09} | gains))
     craft = make_craft(INERTIA.tolist(), torque_limit=0.05)
     return ClosedLoop(craft, LAW, own, start, period, substeps, parts=parts, command_limit=limit)
-
-
-def flown(loop, steps, run=0):
-    """The recording of a flight."""
-    return label(loop, *fly(loop, steps, run=run), 1)
 
 
 def product(p, q):

@@ -78,8 +78,7 @@ def test_a_figure_is_drawn_the_same_each_time():
 
 
 def test_bad_words_on_the_command_line(tmp_path):
-    ended = starhold("reproduce", "Z", "-o", "r", cwd=tmp_path)
-    assert ended.returncode == 2
+    ended = starhold("reproduce", "Z", "-o", "r", cwd=tmp_path, code=2)
     assert ended.stderr.splitlines() == ["starhold: reproduce: publication: found Z; allowed: A, B, C, D, E or all"]
     assert not (tmp_path / "r").exists()
 

@@ -14,6 +14,7 @@ from starhold.scenario.making import make_scenario
 from starhold.scenario.reading import builtin_text, load, open_scenario, parse
 from starhold.scenario.schema import LawTable, ScenarioTable, Timing
 from starhold.scenario.writing import scenario_with
+from tests.refusals import refused
 
 BODY = "inertia = [2.0, 3.0, 4.0]\ntorque_limit = 0.01\n"
 SLEW = f"name = 's'\n[spacecraft]\n{BODY}[simulation]\nduration = 10.0\n"
@@ -22,9 +23,8 @@ POINT = "name = 'p'\n[libration]\n[control]\nlimit = 4.0\n[simulation]\nduration
 
 
 def message(text):
-    with pytest.raises(InputError) as caught:
+    with refused() as caught:
         parse(text, "my.toml")
-    assert "\n" not in str(caught.value)
     return str(caught.value)
 
 

@@ -14,6 +14,7 @@ from starhold.scenario.designing import design
 from starhold.scenario.json_schema import json_schema
 from starhold.scenario.reading import parse
 from tests.missions import BASE, DETUMBLE, POINT
+from tests.refusals import refused
 
 TURNED = """
 from typing import NamedTuple
@@ -67,11 +68,8 @@ def test_a_fault_is_told_in_one_line(old, new, told):
     assert old in TEXT
     text = TEXT.replace(old, new)
     text = text.partition("\nback")[0] if told.startswith("law[1].mode: ") else text
-    with pytest.raises(InputError) as caught:
+    with refused(told):
         read(text)
-    message = str(caught.value)
-    assert told in message
-    assert "\n" not in message
 
 
 def test_a_mode_that_nothing_leads_to_is_refused():
@@ -94,9 +92,8 @@ def test_a_mode_that_nothing_leads_to_is_refused():
     ],
 )
 def test_a_target_that_a_mode_cannot_have_is_told_in_one_line(given, told):
-    with pytest.raises(InputError) as caught:
+    with refused(told):
         read(TEXT + f"target = {given}\n")
-    assert told in str(caught.value)
 
 
 def test_a_mode_takes_a_target_from_a_file(tmp_path):
@@ -173,10 +170,8 @@ lever = 0.1
 def test_each_mode_has_one_effector_for_its_command(first, second, told):
     lines = [f"effectors = {given}\n" if given else "" for given in (first, second)]
     text = BASE.replace("[[law]]", RODS) + DETUMBLE + lines[0] + POINT + lines[1]
-    with pytest.raises(InputError) as caught:
+    with refused(told):
         read(text)
-    assert told in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def test_without_modes_two_effectors_for_a_command_are_refused_with_what_helps():

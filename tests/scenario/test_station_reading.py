@@ -16,6 +16,7 @@ from starhold.scenario.building import build
 from starhold.scenario.json_schema import json_schema
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.scenario.template import template_text
+from tests.refusals import refused
 
 BASE = builtin_text("l2-circle")
 OWN = 'larger = 1.327e20\nsmaller = 4.035e14\nseparation = "1.496e11 m"'
@@ -106,13 +107,8 @@ FAULTS = {
 def test_a_fault_is_one_line_with_file_key_and_what_is_allowed(name):
     old, new, words = FAULTS[name]
     assert old in BASE
-    with pytest.raises(InputError) as caught:
+    with refused(*words, start="my.toml: "):
         build_all(BASE.replace(old, new))
-    message = str(caught.value)
-    assert "\n" not in message
-    assert message.startswith("my.toml: ")
-    for word in words:
-        assert word in message
 
 
 def test_a_file_without_laws():

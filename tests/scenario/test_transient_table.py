@@ -9,6 +9,7 @@ from starhold.errors import InputError
 from starhold.scenario.designing import design
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.studies.modal_roots import pick_modal, study
+from tests.refusals import refused
 
 BASE = builtin_text("landing-limits")
 COARSE = BASE.replace('step = "5 deg"', 'step = "85 deg"').replace("step = 0.001", "step = 0.05")
@@ -81,13 +82,8 @@ FAULTS = {
 @pytest.mark.parametrize("name", sorted(FAULTS))
 def test_a_fault_is_one_line_with_file_key_and_what_is_allowed(name):
     old, new, words = FAULTS[name]
-    with pytest.raises(InputError) as caught:
+    with refused(*words, start="my.toml: "):
         parsed((old, new))
-    message = str(caught.value)
-    assert message.startswith("my.toml: ")
-    assert "\n" not in message
-    for word in words:
-        assert word in message
 
 
 UNREACHABLE = {
@@ -109,11 +105,8 @@ UNREACHABLE = {
 @pytest.mark.parametrize("name", sorted(UNREACHABLE))
 def test_a_limit_that_cannot_be_met_is_named(name):
     old, new, words = UNREACHABLE[name]
-    with pytest.raises(InputError) as caught:
+    with refused(*words):
         searched((old, new))
-    for word in words:
-        assert word in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def test_the_search_wants_a_modal_law_limits_and_a_target_at_rest():

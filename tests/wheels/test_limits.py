@@ -19,10 +19,10 @@ from starhold.scenario.bodies.rigid_body.craft import torque_limit
 from starhold.scenario.bodies.rigid_body.faults import fault_times
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
-from starhold.simulation.lane import fly, label
+from starhold.simulation.lane import fly
 from starhold.simulation.lanes import simulate_many
 from starhold.studies.flight import Flight
-from tests.making import wheels_after
+from tests.making import flown, wheels_after
 from tests.tiers import leading
 
 CRAFT = """
@@ -52,10 +52,6 @@ def made(*parts, law=0, limit="", layout="pyramid", momentum=4.0, allocation="le
     text = CRAFT.format(limit=limit, layout=layout, momentum=momentum, allocation=allocation) + "".join(parts)
     scenario = parse(text, "here")
     return scenario, build(scenario, scenario.laws[law])
-
-
-def flown(loop, steps=600):
-    return label(loop, *fly(loop, steps), 1)
 
 
 def share_on_limit(run):
