@@ -1,7 +1,5 @@
 """Drives headless Chromium through its DevTools pipe: opens pages, asks and photographs them, and notes their complaints."""
 
-from __future__ import annotations
-
 import base64
 import fcntl
 import json

@@ -3,8 +3,6 @@
 `agree` is the harness: it runs an equation with floats, compiled, with SymPy numbers and with balls, and compares.
 """
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Direction cosines and Euler-Krylov angles: exact identities, round trips at every attitude, scipy as a witness."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

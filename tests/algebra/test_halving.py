@@ -1,7 +1,5 @@
 """Roots by halving."""
 
-from __future__ import annotations
-
 import math
 
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Intervals hold what exact arithmetic finds between their ends, and a box is covered only where that is shown."""
 
-from __future__ import annotations
-
 import math
 import operator
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """Unit quaternions: the group, its action on vectors, its kinematics; scipy as an independent witness."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The scalar operations mean the same to every reader."""
 
-from __future__ import annotations
-
 import decimal
 import itertools
 import math

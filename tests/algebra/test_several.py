@@ -1,7 +1,5 @@
 """Operations on tuples of any length: what they give, and that compiled code gives the same."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

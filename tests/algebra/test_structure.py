@@ -1,7 +1,5 @@
 """Whole states: moved and flattened; compiled code does what plain Python does."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

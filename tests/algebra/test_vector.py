@@ -1,7 +1,5 @@
 """Vector and matrix algebra: the identities of the theory, and agreement of every reader."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """When flights leave what is claimed of their laws."""
 
-from __future__ import annotations
-
 import copy
 import json
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Loops that follow a circle round a libration point, for the tests of their certificates."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """Loops that hold a craft at an equilibrium beside a libration point, for the tests of their certificates."""
 
-from __future__ import annotations
-
 import json
 import math
 

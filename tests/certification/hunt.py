@@ -1,7 +1,5 @@
 """Random scenarios, certified, checked and flown: whatever breaks between certifier, checker and flights is a fault."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """The circle round a libration point: what is claimed, refuted, and what flights and random states say to it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

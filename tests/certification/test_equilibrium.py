@@ -1,7 +1,5 @@
 """Rest beside a libration point: what is claimed of the X axis with limited control, and what flights say to it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

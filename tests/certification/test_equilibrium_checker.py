@@ -1,8 +1,6 @@
 """The checker's reading of certificates about equilibria beside a libration point and about the X axis with limited
 control."""
 
-from __future__ import annotations
-
 import copy
 import json
 import math

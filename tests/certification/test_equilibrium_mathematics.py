@@ -1,8 +1,6 @@
 """The mathematics of the checker of equilibria beside a libration point: the loop it reads and the sets it accepts, against
 states and flights."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from types import ModuleType

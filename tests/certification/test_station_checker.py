@@ -1,7 +1,5 @@
 """The checker's reading of certificates about circles round a libration point: what holds, what fails, its mathematics."""
 
-from __future__ import annotations
-
 import copy
 import json
 import math

@@ -1,7 +1,5 @@
 """The mathematics of the checker of circles round a libration point: V' and the control, against the equations that fly."""
 
-from __future__ import annotations
-
 import math
 from types import ModuleType
 

@@ -1,7 +1,5 @@
 """What is printed of a campaign."""
 
-from __future__ import annotations
-
 import io
 import threading
 from dataclasses import replace

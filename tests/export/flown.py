@@ -1,7 +1,5 @@
 """Laws as C, compiled here, and what calls them."""
 
-from __future__ import annotations
-
 import ctypes
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """A closed loop with the compiled C inside flies as the simulated one, bit for bit."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

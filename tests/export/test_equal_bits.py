@@ -1,8 +1,6 @@
 """Each step of a law in C gives the bits that the simulation gives, whatever compiles it, from ordinary states and at the
 edges of numbers."""
 
-from __future__ import annotations
-
 import subprocess
 from functools import cache
 from pathlib import Path

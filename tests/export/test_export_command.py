@@ -1,7 +1,5 @@
 """`starhold export c` writes what an engineer can review, build and test, and says what is wrong in one line."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

@@ -1,7 +1,5 @@
 """Shells over the same C: a module of Basilisk flies the same loop there, an FMU gives the same commands."""
 
-from __future__ import annotations
-
 import importlib.util
 import math
 

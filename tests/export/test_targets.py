@@ -1,8 +1,6 @@
 """The self-test runs on processors that fly: SPARC V8 (LEON3), SPARC V9, ARM and RISC-V, emulated in user mode. Skipped,
 with the reason, where a compiler or the emulator is not installed."""
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The modal law against placement of the seven-state system at each step, its closed loop, and the published landing."""
 
-from __future__ import annotations
-
 import math
 import re
 

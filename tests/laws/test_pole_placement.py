@@ -1,7 +1,5 @@
 """Pole placement by levels: the eigenvalues reached, other methods, what is exact in rationals, and what is refused."""
 
-from __future__ import annotations
-
 import math
 import re
 import warnings

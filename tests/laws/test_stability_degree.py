@@ -1,7 +1,5 @@
 """The degree of stability against the roots, its optimum against searches that know only the roots and the budget."""
 
-from __future__ import annotations
-
 import math
 from itertools import permutations
 from typing import Any

@@ -1,7 +1,5 @@
 """What every station-keeping law must do, whatever it is for."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Random quadratic programs with limits, and their optimum by library solvers."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import clarabel

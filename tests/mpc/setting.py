@@ -1,7 +1,5 @@
 """What the tests of the predictive law share: crafts, published weights, and what the law sees of a target at rest."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from starhold.algebra.quaternion import normalise

@@ -1,7 +1,5 @@
 """Flights with the predictive law."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

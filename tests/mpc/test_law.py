@@ -1,7 +1,5 @@
 """The predictive law at single instants."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

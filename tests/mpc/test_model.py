@@ -1,7 +1,5 @@
 """The model of the predictive law against the true motion, and its sampling."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The predictive law and its solver give the same bits in plain Python, on one lane, on eight lanes, in C and JavaScript."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

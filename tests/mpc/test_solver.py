@@ -1,7 +1,5 @@
 """The solver of the predictive law against library solvers and the conditions of an optimum."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -5,8 +5,6 @@ What is left between them is the truncation error of the attitude, for starhold 
 modified Rodrigues parameters: it falls with the fourth power of the step, and is some 1e-11 rad here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -15,8 +15,6 @@ In these runs the hub is so heavy that air and light do not push it: starhold ha
 26 m and 4e-6 rad away after an orbit.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Actuators: limits never exceeded and never overdone, lag and ramp as their equations say."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

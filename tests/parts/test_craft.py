@@ -1,7 +1,5 @@
 """Which inertia tensors are accepted, and how they are kept."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,7 +1,5 @@
 """What wheels surely give, against linear programmes that know nothing of how torque is shared out."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

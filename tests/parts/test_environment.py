@@ -1,7 +1,5 @@
 """Gravity: the attraction and its torque, against point masses and as exact identities."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

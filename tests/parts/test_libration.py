@@ -1,7 +1,5 @@
 """Motion near libration points: against published numbers, many digits, and the three-body problem in inertial axes."""
 
-from __future__ import annotations
-
 import math
 
 import mpmath

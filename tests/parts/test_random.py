@@ -1,7 +1,5 @@
 """Counter-based random numbers: published answers, compiled code bit for bit, stated errors, the right distribution."""
 
-from __future__ import annotations
-
 import math
 import struct
 

@@ -1,7 +1,5 @@
 """Euler's equation and the kinematics: what they conserve, exactly and along a flight."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sensors: unit quaternions, errors of the stated size, and the same numbers for the same seed, run and step."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

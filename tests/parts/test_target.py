@@ -1,7 +1,5 @@
 """Targets: the orbital frame and tabulated attitudes, whose rates must be the derivatives of the attitudes they give."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Reaction wheels: allocation against linear algebra and linear programs, motion against the conservation laws."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,7 +1,5 @@
 """The published example near L2, flown: what it shows, what it misprints, and the same motion by another integrator."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Campaigns for the tests of their reports: made from random numbers, judged and searched for drivers as flown ones are."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Flights for the tests of the report: short runs of built-in scenarios."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Reads a page of the report back, for its tests."""
 
-from __future__ import annotations
-
 import json
 from html.parser import HTMLParser
 from typing import Any

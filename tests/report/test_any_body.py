@@ -1,7 +1,5 @@
 """A body that starhold has no study and no report of: it is flown, measured, drawn and told all the same."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from pathlib import Path
 

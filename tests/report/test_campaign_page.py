@@ -1,7 +1,5 @@
 """The page of a campaign opens offline, says what the results say, and takes nothing from files for markup."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

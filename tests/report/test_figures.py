@@ -1,7 +1,5 @@
 """The figures exist, show something, and survive odd names, lost runs and runs at rest."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The page flies again: in the browser's own engine, and in node, with the bits that Python gives of the same numbers."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import tempfile

@@ -1,7 +1,5 @@
 """The page opens offline, holds every number, and takes nothing from files for markup."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from importlib import resources

@@ -1,7 +1,5 @@
 """The page says of each law what is proved, what is not and why, and nothing of a certificate is taken for markup."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from functools import cache

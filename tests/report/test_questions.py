@@ -1,7 +1,5 @@
 """A page refuses what the program refuses, in its words: the recorded questions against the reader's own answer."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The map of the degree of stability shows what it should, alike each time, whatever bounds the gains."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

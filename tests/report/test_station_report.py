@@ -1,7 +1,5 @@
 """Report of station keeping: the page opens offline and is the same every time, the pictures show every law."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

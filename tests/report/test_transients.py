@@ -1,7 +1,5 @@
 """Runs against limits on rate and acceleration: metrics, plots and the section of the page."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

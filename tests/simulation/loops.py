@@ -1,7 +1,5 @@
 """Closed loops of every make: built-in scenarios, and one for each choice that a loop has."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Every loop gives the same bits in plain Python, on one lane, on every lane of many, in C and in JavaScript."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any, NamedTuple
 

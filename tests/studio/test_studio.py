@@ -1,7 +1,5 @@
 """The studio: who may ask, what it answers, and its page in a browser."""
 
-from __future__ import annotations
-
 import http.client
 import json
 import os

@@ -1,7 +1,5 @@
 """What a circle about a libration point asks of control and sail: formulas against the equations of motion."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

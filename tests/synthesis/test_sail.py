@@ -1,7 +1,5 @@
 """Forces of sunlight on a panel, the way back from a force to the panel, the set of forces, and the Sun behind a disc."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

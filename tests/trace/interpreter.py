@@ -1,7 +1,5 @@
 """Runs a program statement by statement by the plain meanings of its operations, and counts what it does."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

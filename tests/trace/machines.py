@@ -4,8 +4,6 @@ A `Subject` is an equation over buffers, counts and words. A `Job` is a program 
 its memories hold afterwards, by name. Where it costs much to start one, it takes many jobs at once.
 """
 
-from __future__ import annotations
-
 import ctypes
 import json
 import math

@@ -1,7 +1,5 @@
 """What other machines are given: every operation on numbers rounds to nearest, and none is fused with another."""
 
-from __future__ import annotations
-
 import ctypes
 import re
 from collections import Counter

@@ -1,7 +1,5 @@
 """Bounds of addresses and of work, against what is done where a program runs in plain Python."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from typing import Any

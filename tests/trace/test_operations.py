@@ -1,7 +1,5 @@
 """Every operation means something to every reader that it concerns, and the same."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable

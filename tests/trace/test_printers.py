@@ -1,7 +1,5 @@
 """What is printed of a program: readable text, the same bits on every machine, and nothing that a compiler warns of."""
 
-from __future__ import annotations
-
 import math
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Random programs leave the same bits on every machine."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st

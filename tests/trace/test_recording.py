@@ -1,7 +1,5 @@
 """What is recorded of an equation, what is left out of it, and what is refused."""
 
-from __future__ import annotations
-
 import builtins
 import math
 from collections.abc import Callable
