@@ -74,10 +74,7 @@ def test_weighted_sums(count):
 
 @pytest.mark.parametrize(
     ("function", "arguments"),
-    [
-        (affine, ((1.0, 2.0), ((1.0, 2.0, 3.0),), 1.0, (0.0, 0.0, 0.0))),
-        (weighted, ((1.0, 2.0), ((1.0, 2.0, 3.0),))),
-    ],
+    [(affine, ((1.0, 2.0), ((1.0, 2.0, 3.0),), 1.0, (0.0, 0.0, 0.0))), (weighted, ((1.0, 2.0), ((1.0, 2.0, 3.0),)))],
 )
 def test_tuples_of_different_lengths_are_refused(function, arguments):
     with pytest.raises(ValueError, match="zip"):

@@ -127,10 +127,7 @@ def test_a_rotation_of_scipy_is_an_attitude():
         ({"name.first": 1}, "name.first: found a value that is no table"),
         ({"spacecraft..inertia": 1}, "not a key"),
         ({3: 1}, "a key that is no string"),
-        (
-            {"spacecraft.inertia": {1, 2}},
-            "numbers, strings, truths, dates, rotations, and lists and tables of them",
-        ),
+        ({"spacecraft.inertia": {1, 2}}, "numbers, strings, truths, dates, rotations, and lists and tables of them"),
         ({"initial": {3: 1}}, "the key 3"),
         ({"law": None}, "law: found no law"),
         ({"simulation": None}, "simulation: found nothing; allowed: this key is required"),

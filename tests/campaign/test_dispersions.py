@@ -291,19 +291,10 @@ BAD = {
         '.sigma: found "10 %"; allowed: a quantity in N m; shares of what the file has take relative = true',
     ),
     "unit of sigma": ({"initial.rate": normal(sigma="1 m")}, ".sigma: found"),
-    "low above high": (
-        {"initial.rate": uniform(1, 0)},
-        ".low: found 1; allowed: below high",
-    ),
-    "low is high": (
-        {"initial.rate": uniform(1, 1)},
-        ".low: found 1; allowed: below high",
-    ),
+    "low above high": ({"initial.rate": uniform(1, 0)}, ".low: found 1; allowed: below high"),
+    "low is high": ({"initial.rate": uniform(1, 1)}, ".low: found 1; allowed: below high"),
     "low is refused": ({"law.lyapunov.k_rate": uniform(0, 1)}, ".low: found 0.0; allowed: above 0"),
-    "shares are refused": (
-        {"law.lyapunov.k_rate": uniform(0, 2, relative=True)},
-        ".low: found 0.0; allowed: above 0",
-    ),
+    "shares are refused": ({"law.lyapunov.k_rate": uniform(0, 2, relative=True)}, ".low: found 0.0; allowed: above 0"),
     "weights of another length": (
         {"spacecraft.limit": choice("axis", "norm", weights=[1])},
         ".weights: found 1 weights; allowed: one for each of the 2 values",
@@ -312,10 +303,7 @@ BAD = {
         {"spacecraft.limit": choice("axis", "norm", weights=[1, 0])},
         ".weights[2]: found 0; allowed: a number above 0",
     ),
-    "unknown word": (
-        {"spacecraft.limit": choice("axis", "norn")},
-        '.values[2]: found "norn"',
-    ),
+    "unknown word": ({"spacecraft.limit": choice("axis", "norn")}, '.values[2]: found "norn"'),
     "one choice": ({"spacecraft.limit": choice("axis", "axis")}, "two values that differ"),
     "a word is no number": ({"spacecraft.limit": normal(sigma=1)}, "choice, for the key holds a word"),
     "a whole number": ({"law.mpc.horizon": normal(sigma=1)}, "uniform or choice, for the key holds a whole number"),

@@ -123,12 +123,7 @@ def write_history(random, path, duration):
         rows.append([t, *(q / np.linalg.norm(q))])
         turn = step * (axis if step == 0.05 else random.normal(size=3))
         half = np.concatenate([[1.0], turn / 2.0])
-        q = np.array(
-            [
-                q[0] * half[0] - q[1:] @ half[1:],
-                *(q[0] * half[1:] + half[0] * q[1:] + np.cross(q[1:], half[1:])),
-            ]
-        )
+        q = np.array([q[0] * half[0] - q[1:] @ half[1:], *(q[0] * half[1:] + half[0] * q[1:] + np.cross(q[1:], half[1:]))])
     path.write_text("time,q0,q1,q2,q3\n" + "\n".join(",".join(repr(float(x)) for x in row) for row in rows) + "\n")
 
 

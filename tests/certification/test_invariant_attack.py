@@ -218,15 +218,7 @@ def test_no_strict_subset_of_the_loops_is_stable(c):
     assert outcomes(found)["falls"] == "refuted"
 
 
-KINKS = (
-    "sat(x + y)",
-    "abs(x)",
-    "max(x, y)",
-    "sign(x)/4",
-    "sign(y - x)/4",
-    "sign(x**2 + y**2 - 1)/8",
-    "max(y, 2*y)",
-)
+KINKS = ("sat(x + y)", "abs(x)", "max(x, y)", "sign(x)/4", "sign(y - x)/4", "sign(x**2 + y**2 - 1)/8", "max(y, 2*y)")
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -28,12 +28,7 @@ BODY = {
     "simulation": {"duration": 600.0, "control_period": 0.1},
     "settling": {"attitude_tolerance": "1 deg", "rate_tolerance": "0.1 deg/s"},
 }
-POINT = {
-    "name": "authors",
-    "libration": {},
-    "initial": {"position": [0, 0.5, 0.1]},
-    "simulation": {"duration": 2.0},
-}
+POINT = {"name": "authors", "libration": {}, "initial": {"position": [0, 0.5, 0.1]}, "simulation": {"duration": 2.0}}
 
 
 @pytest.fixture

@@ -19,10 +19,7 @@ from starhold.synthesis.stability_degree import (
     scale,
 )
 
-PUBLISHED = [
-    ((1.0, 1.5, 2.0), (1.0136, 3.2881, 0.8220)),
-    ((1.0, 0.75, 0.5), (1.2312, 2.5625, 1.2813)),
-]
+PUBLISHED = [((1.0, 1.5, 2.0), (1.0136, 3.2881, 0.8220)), ((1.0, 0.75, 0.5), (1.2312, 2.5625, 1.2813))]
 
 
 def by_roots(K_a: float, K_w: float, ratios: Any) -> float:

@@ -258,10 +258,7 @@ def test_a_panel_that_no_craft_has_is_refused_in_one_line(change, words):
     ("table", "words"),
     [
         # 8 kg at 1.1 m have more inertia than the whole, or leave the hub two moments whose sum is less than the third.
-        (
-            ("hinged-panels", "mass = 30.0\npanels = [{}]", {0: 8.0}),
-            "without its panels the craft of 30 kg is no body",
-        ),
+        (("hinged-panels", "mass = 30.0\npanels = [{}]", {0: 8.0}), "without its panels the craft of 30 kg is no body"),
         (("hinged-panels", "mass = 30.0\npanels = [{}]", {12: 6.0}), "no body has these principal moments"),
         (("flexible-modes", "modes = [[0.6, 0.005, 3.0, 0, 0, 0]]", {}), "the modes carry more inertia than the craft has"),
     ],

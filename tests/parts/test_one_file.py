@@ -19,11 +19,7 @@ from starhold.scenario.reading import parse
 from tests.parts.files import BODY, LAW, PARTS, PD, part
 from tests.running import starhold
 
-RECORDED = {
-    "effector": {"deflection", "speed"},
-    "sensor": {"mine_rate"},
-    "estimator": {"gyro_rate", "mine_rate"},
-}
+RECORDED = {"effector": {"deflection", "speed"}, "sensor": {"mine_rate"}, "estimator": {"gyro_rate", "mine_rate"}}
 """Beside what a loop without the part records."""
 
 

@@ -48,13 +48,7 @@ DEGENERATE = {
     "doubled in a plane": (*three_orthogonal(), (1.0, 1.0, 0.0), (1.0, 0.0, 0.0), (-1.0, -1.0, 0.0)),
     "nearly parallel": (*three_orthogonal(), (1.0, 1e-5, 0.0), (1.0, 1.0, 1e-6)),
 }
-LAYOUTS = {
-    "orthogonal": three_orthogonal(),
-    "pyramid": pyramid(),
-    "nasa": nasa_standard(),
-    "hexagon": HEXAGON,
-    **DEGENERATE,
-}
+LAYOUTS = {"orthogonal": three_orthogonal(), "pyramid": pyramid(), "nasa": nasa_standard(), "hexagon": HEXAGON, **DEGENERATE}
 
 
 def simple(axes, **more):

@@ -298,11 +298,7 @@ def subject(script: Script) -> Subject:
             out[6 + 2 * place], out[7 + 2 * place] = _numbers_of(scope.words[-1 - place])
         out[10], out[11] = number_of(scope.indices[-1]), scope.numbers[-5]
 
-    memories = (
-        Memory("cells", True, True, CELLS),
-        Memory("table", False, False, TABLE),
-        Memory("out", True, True, OUT),
-    )
+    memories = (Memory("cells", True, True, CELLS), Memory("table", False, False, TABLE), Memory("out", True, True, OUT))
     return Subject(equation, memories, {"count": INDEX, "seed": WORD})
 
 
