@@ -348,10 +348,8 @@ REFUSED = {
 @pytest.mark.parametrize("sql", list(REFUSED))
 def test_a_question_reaches_nothing_but_the_runs(flown, sql):
     before = sorted(flown.folder.rglob("*"))
-    with pytest.raises(InputError) as caught:
+    with refused(start=REFUSED[sql]):
         query(flown.folder, sql.format(folder=flown.folder))
-    assert str(caught.value).startswith(REFUSED[sql])
-    assert "\\n" not in str(caught.value)
     assert sorted(flown.folder.rglob("*")) == before
 
 

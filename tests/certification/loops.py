@@ -96,7 +96,3 @@ def random_craft(random):
 def gain_names(law):
     """The names of a law's gains."""
     return [item.name for item in fields(catalogue()[law].gains)]
-
-
-__all__ = ["FULL", "LOPSIDED", "PRINCIPAL", "UNEVEN", "certified", "free", "gain_names", "loop_of", "random_craft"]
-__all__ += ["rotors", "tensor", "textbook"]

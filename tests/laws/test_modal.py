@@ -1,7 +1,6 @@
 """The modal law against placement of the seven-state system at each step, its closed loop, and the published landing."""
 
 import math
-import re
 
 import numpy as np
 import pytest
@@ -131,10 +130,8 @@ def test_needs_no_rate():
 )
 def test_unstable_or_miscounted_spectra_are_refused(lines, reason):
     law = f'[[law]]\ntype = "modal"\n{lines}\n'
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(InputError, match=rf"^small\.toml: law\[1\].*{reason}"):
         parse(CRAFT + law, "small.toml")
-    assert re.search(reason, str(caught.value))
-    assert str(caught.value).startswith("small.toml: law[1]")
     if "not stable" in reason:
         assert parse(CRAFT + law, "small.toml", allow_unstable=True).laws[0].name == "modal"
 
