@@ -54,9 +54,9 @@ def point_loop(
     )  # fmt: skip
 
 
-def flown(loop: ClosedLoop, steps: int = 600, **how: Any) -> Recording:
+def flown(loop: ClosedLoop, steps: int = 600, run: int = 0) -> Recording:
     """The recording of a flight."""
-    return label(loop, *fly(loop, steps, **how), 1)
+    return label(loop, *fly(loop, steps, run=run), 1)
 
 
 def wheels_after(event: Any) -> Any:
