@@ -11,6 +11,7 @@ from starhold.parts.catalogue import find, fit
 from starhold.parts.effectors.wheels import ALLOCATIONS
 from starhold.parts.effectors.wheels import State as Rotors
 from starhold.parts.part import Fitted
+from starhold.scenario.building import build
 from starhold.simulation.lane import Recording, fly, label
 
 ORBIT = (fit("environment", "two-body"), fit("environment", "gravity-gradient"))
@@ -52,6 +53,11 @@ def point_loop(
     return ClosedLoop(
         plant, law, gains, start, period, parts=(field, *surfaces), limit=kind, command_limit=limit, seed=0
     )  # fmt: skip
+
+
+def built(scenario: Any) -> ClosedLoop:
+    """The loop of a scenario's first law."""
+    return build(scenario, scenario.laws[0])
 
 
 def flown(loop: ClosedLoop, steps: int = 600, run: int = 0) -> Recording:

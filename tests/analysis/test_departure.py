@@ -27,6 +27,7 @@ from starhold.studies import compare
 from starhold.studies.bodies.rigid_body import start_inside
 from starhold.studies.certificates import certify_scenario
 from starhold.studies.compare import fly_law, prove
+from tests.making import built
 from tests.missions import BASE as MISSION
 from tests.missions import DETUMBLE, POINT
 
@@ -176,8 +177,7 @@ def test_the_limit_is_kept_by_every_flight_that_does_not_leave_the_claim(turn, r
 
 @cache
 def kept_loop():
-    scenario = parse(quiet(BASE) + LAW, "here")
-    loop = build(scenario, scenario.laws[0])
+    loop = built(parse(quiet(BASE) + LAW, "here"))
     return loop, certify(loop, "lyapunov")
 
 
@@ -297,8 +297,7 @@ def test_a_hand_over_is_left_where_the_next_mode_holds_its_torque_for_too_long()
 @given(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=60), st.floats(0.05, 0.9))
 @settings(deadline=None, max_examples=60)
 def test_the_quaternion_that_is_fed_back_is_that_of_the_loop(cosines, width):
-    scenario = parse(BASE + LAW, "here")
-    loop = replace(build(scenario, scenario.laws[0]), sign_policy="hysteresis", hysteresis_width=width)
+    loop = replace(built(parse(BASE + LAW, "here")), sign_policy="hysteresis", hysteresis_width=width)
     errors = np.array([(q0, np.sqrt(max(0.0, 1.0 - q0 * q0)), 0.0, 0.0) for q0 in cosines])
     h, expected = side(cosines[0]), []
     for error in errors:
@@ -358,8 +357,7 @@ def test_no_limit_no_word_of_it():
 def test_the_linear_loop_alone_proves_no_certificate(tmp_path):
     """A law of which nothing but the sampling claim is made: the checker, too, refuses that to be called proved."""
     text = BASE + LAW
-    scenario = parse(text, "here")
-    whole = certify(build(scenario, scenario.laws[0]), "lyapunov")
+    whole = certify(built(parse(text, "here")), "lyapunov")
     assert whole.outcome == "proved"
     alone = Certificate(whole.name, whole.subject, tuple(claim for claim in whole.claims if claim.kind == "sampling"))
     assert alone.claims[0].outcome == "proved"

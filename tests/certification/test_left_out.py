@@ -21,10 +21,10 @@ from starhold.laws import modal
 from starhold.parts.catalogue import PACKAGES, fit, parts
 from starhold.parts.craft import make_craft
 from starhold.parts.part import Fitted
-from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, parse
 from tests.certification import circles, equilibria
 from tests.certification.loops import FULL, certified, loop_of, textbook
+from tests.making import built
 
 # Together: each worker would make the certificates of the textbook loops for itself.
 pytestmark = pytest.mark.xdist_group("textbook")
@@ -111,8 +111,7 @@ def test_the_checker_wants_a_bounded_torque_named_but_where_it_is_taken_in(tmp_p
 )
 def test_a_margin_of_sampling_says_what_it_does_without(old, new, told):
     base = builtin_text("three-laws").split("[[law]]")[0].replace(old, new, 1)
-    scenario = parse(base + '[[law]]\ntype = "lyapunov"\nk_rate = 0.09\nk_attitude = 0.009\n', "here")
-    certificate = certify(build(scenario, scenario.laws[0]))
+    certificate = certify(built(parse(base + '[[law]]\ntype = "lyapunov"\nk_rate = 0.09\nk_attitude = 0.009\n', "here")))
     assert sentence(certificate.claim("sampling"), certificate.subject).startswith(told)
 
 

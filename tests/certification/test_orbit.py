@@ -6,16 +6,15 @@ import numpy as np
 import pytest
 
 from starhold.certification.subject import perigee
-from starhold.scenario.building import build
 from starhold.scenario.reading import load
 from starhold.simulation.lane import fly
+from tests.making import built
 
 
 @pytest.mark.parametrize("steps", [0, 1, 50, 3000])
 def test_perigee_is_the_same_all_along_an_orbit(steps):
     """An orbit through the x axis: the momentum about it is a rounding around zero once it has moved on."""
-    scenario = load("wheels-orbital")
-    loop = build(scenario, scenario.laws[0])
+    loop = built(load("wheels-orbital"))
     moved = replace(loop, start=fly(loop, steps)[1].state) if steps else loop
     r, v = np.array(loop.start.position), np.array(loop.start.velocity)
     h, mu = np.cross(r, v), loop.craft.gravity

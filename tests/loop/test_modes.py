@@ -8,16 +8,15 @@ import numpy as np
 from starhold.algebra.structure import flatten
 from starhold.loop.kernels import fly_plainly
 from starhold.loop.modes import loop_of_mode
-from starhold.scenario.building import build
 from starhold.scenario.reading import parse
 from starhold.simulation.lane import fly, recorded
 from starhold.simulation.lanes import simulate_many
+from tests.making import built
 from tests.missions import BASE, DETUMBLE, POINT
 
 
 def loop_of(modes=DETUMBLE + POINT, text=BASE):
-    scenario = parse(text + modes, "mission.toml")
-    return build(scenario, scenario.laws[0])
+    return built(parse(text + modes, "mission.toml"))
 
 
 def flown(loop, steps=600):
@@ -161,8 +160,7 @@ until = { after = "1 s", to = "hold" }
 
 def test_a_memory_and_its_buffers_begin_anew_each_time(tmp_path):
     (tmp_path / "delayed.py").write_text(DELAYED)
-    scenario = parse(BASE + TURN + HOLD, "mission.toml", tmp_path)
-    loop = build(scenario, scenario.laws[0])
+    loop = built(parse(BASE + TURN + HOLD, "mission.toml", tmp_path))
     both, carry = flown(loop, 60)
     assert both["mode"][0].tolist() == [1.0] * 10 + [2.0] * 20 + [1.0] * 10 + [2.0] * 20 + [1.0]
     state, done = loop.start, []

@@ -13,11 +13,10 @@ from starhold.parts.catalogue import fit
 from starhold.parts.craft import make_craft
 from starhold.parts.effectors.layouts import pyramid
 from starhold.parts.effectors.wheels import fastest, make_wheels
-from starhold.scenario.building import build
 from starhold.scenario.checking import RESOLVED, check_substeps
 from starhold.scenario.reading import builtin_text, parse
 from starhold.simulation.lane import fly
-from tests.making import on_wheels
+from tests.making import built, on_wheels
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -56,8 +55,7 @@ def test_friction_of_wheels_counts():
     wheels = make_wheels(pyramid(), 1e-4, 0.02, 0.4, viscous=1e-3, coulomb=1e-4)
     assert fastest(wheels) == pytest.approx(11.0)
     text = builtin_text("wheels-orbital")
-    scenario = parse(text, "here")
-    loop = build(scenario, scenario.laws[0])
+    loop = built(parse(text, "here"))
     check_substeps(loop, "here")
     sticky = on_wheels(loop, viscous=tuple(100.0 * j for j in loop.wheels.inertia))
     with pytest.raises(InputError, match="at least 20 substeps"):

@@ -19,6 +19,7 @@ from starhold.scenario.building import build
 from starhold.scenario.json_schema import json_schema
 from starhold.simulation.lane import fly
 from starhold.simulation.lanes import simulate_many
+from tests.making import built
 from tests.refusals import refused
 from tests.running import starhold
 
@@ -190,8 +191,7 @@ def test_it_flies_as_an_independent_integration_does(folder: Path) -> None:
 
 
 def test_plain_python_one_lane_and_many_lanes_have_equal_bits(folder: Path) -> None:
-    scenario = sh.load(folder / "pull.toml")
-    loop = build(scenario, scenario.laws[0])
+    loop = built(sh.load(folder / "pull.toml"))
     one, plain = fly(loop, 60)[1], fly_plainly(loop, 60)
     assert flatten(one.state) == flatten(plain.state)
     assert flatten(one.state) != flatten(loop.start)
@@ -308,8 +308,7 @@ def test_a_law_for_another_body_is_refused(folder: Path) -> None:
 
 
 def test_each_loop_keeps_the_body_that_it_was_read_with(folder: Path) -> None:
-    scenario = sh.load(folder / "pull.toml")
-    loop = build(scenario, scenario.laws[0])
+    loop = built(sh.load(folder / "pull.toml"))
     before = flatten(fly(loop, 40)[1].state)
     (folder / "sledge.py").write_text(BODY.replace("-craft.drag * norm", "-2.0 * craft.drag * norm"))
     other = sh.load(folder / "pull.toml")

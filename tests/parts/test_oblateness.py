@@ -10,9 +10,9 @@ from scipy.integrate import solve_ivp
 
 from starhold.parts.environments import oblateness
 from starhold.parts.orbit import BODIES, Elements, from_elements
-from starhold.scenario.building import build
 from starhold.scenario.reading import parse
 from starhold.simulation.lane import fly
+from tests.making import built
 
 GRAVITY, RADIUS = BODIES["Earth"]
 SPHERE = sympy.symbols("x y z", real=True)
@@ -48,8 +48,7 @@ type = "pd"
 k_rate = 0.004
 k_attitude = 0.0008
 """
-    scenario = parse(text, "flattened")
-    loop = build(scenario, scenario.laws[0])
+    loop = built(parse(text, "flattened"))
     return fly(loop, round(duration / period), round(duration / period))[1].state, (*place, *velocity)
 
 

@@ -14,6 +14,7 @@ from starhold.report.page import render
 from starhold.report.proved import section
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
+from tests.making import built
 from tests.report import flown
 from tests.report.reader import Reader
 from tests.small import CRAFT, MPC, PD, WEAK
@@ -151,8 +152,7 @@ def test_every_kind_of_claim_can_be_told_where_it_is_undecided(kind: str) -> Non
 
 def test_every_law_that_comes_with_starhold_is_told() -> None:
     """Whatever certificates the examples of all laws give can be shown."""
-    scenario = parse(CRAFT + PD + WEAK + MPC, "test")
-    base = build(scenario, scenario.laws[0])
+    base = built(parse(CRAFT + PD + WEAK + MPC, "test"))
     made = [
         certify(replace(base, law=law, gains=gains), law.name)
         for law in catalogue().values()

@@ -13,6 +13,7 @@ from starhold.scenario.building import build
 from starhold.scenario.designing import design
 from starhold.scenario.json_schema import json_schema
 from starhold.scenario.reading import parse
+from tests.making import built
 from tests.missions import BASE, DETUMBLE, POINT
 from tests.refusals import refused
 
@@ -99,8 +100,7 @@ def test_a_target_that_a_mode_cannot_have_is_told_in_one_line(given, told):
 def test_a_mode_takes_a_target_from_a_file(tmp_path):
     (tmp_path / "turned.py").write_text(TURNED)
     text = TEXT + 'target = { file = "turned.py" }\n'
-    scenario = parse(text, "mission.toml", tmp_path)
-    loop = build(scenario, scenario.laws[0])
+    loop = built(parse(text, "mission.toml", tmp_path))
     assert loop_of_mode(loop, 0).target.part.name == "inertial"
     assert loop_of_mode(loop, 1).target.part.name == "turned"
     (tmp_path / "turned.py").write_text(TURNED.replace("return Goal", "return 1 / 0, Goal"))

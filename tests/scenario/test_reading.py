@@ -25,6 +25,7 @@ from starhold.scenario.quantity import reader
 from starhold.scenario.reading import builtin_names, builtin_text, load, parse
 from starhold.scenario.template import template_text
 from starhold.scenario.writing import law_table
+from tests.making import built
 from tests.refusals import refused
 
 BASE = builtin_text("three-laws")
@@ -317,8 +318,7 @@ def test_design_form_gives_gains():
 
 
 def test_relative_start_is_relative_to_the_target():
-    scenario = load("geostationary")
-    loop = build(scenario, scenario.laws[0])
+    loop = built(load("geostationary"))
     from starhold.simulation.lane import fly
 
     samples, _ = fly(loop, 1)

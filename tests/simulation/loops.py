@@ -14,7 +14,7 @@ from starhold.parts.effectors.wheels import ALLOCATIONS
 from starhold.parts.targets.history import tabulate
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_names, builtin_text, load, parse
-from tests.making import ORBITAL, aimed, noise, on_wheels, point_loop
+from tests.making import ORBITAL, aimed, built, noise, on_wheels, point_loop
 
 NOISE = noise(1e-4, 1e-3, 1e-4)
 FAULT = """
@@ -65,8 +65,7 @@ def choices() -> dict[str, Any]:
     found["lag"] = replace(plain.with_parts(fit("actuator", "lag", 0.3)), substeps=2)
     found["rate limit"] = replace(plain.with_parts(fit("actuator", "rate-limit", 0.02)), substeps=2, seed=-5)
     found["free space"] = plain.without("environment")
-    scenario = parse(builtin_text("wheels-orbital") + FAULT, "here")
-    wheeled = build(scenario, scenario.laws[0])
+    wheeled = built(parse(builtin_text("wheels-orbital") + FAULT, "here"))
     for allocation in ("least-squares", "least-peak"):
         place = ALLOCATIONS.index(allocation)
         events = tuple(event._replace(parts=tuple(_shared(f, place) for f in event.parts)) for event in wheeled.events)

@@ -16,7 +16,7 @@ from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import fly, label
 from starhold.simulation.lanes import simulate_many
-from tests.making import rotors, wheels_after
+from tests.making import built, rotors, wheels_after
 from tests.refusals import refused
 
 BUILTIN = builtin_text("wheels-orbital")
@@ -74,8 +74,7 @@ def test_locked_rotors_fall_through_gravity_like_one_body():
     text = BUILTIN.replace("inertia = 1.0e-3 ", "inertia = 1.0 ").replace('"10 min"', '"20 min"')
     text = text.replace("# viscous = 1e-6", "viscous = 10.0").replace('"pyramid"', '"nasa-standard"')
     text = text.replace("control_period = 0.1", "control_period = 0.1\nsubsteps = 2")
-    scenario = parse(text, "here")
-    loop = build(scenario, scenario.laws[0])
+    loop = built(parse(text, "here"))
     # So small a limit leaves no torque of the law.
     idle = replace(loop, command_limit=5e-324, limit="axis")
     speeds = np.array(loop.wheels.axes) @ loop.start.rate
@@ -142,8 +141,7 @@ def test_authority_is_the_torque_that_every_direction_can_have():
 
 
 def test_lanes_agree_with_single_flights_through_a_fault():
-    scenario = parse(BUILTIN + STRUCK, "here")
-    loop = build(scenario, scenario.laws[0])
+    loop = built(parse(BUILTIN + STRUCK, "here"))
     start = loop.start
     starts = [start._replace(rate=tuple(f * w for w in start.rate)) for f in (1.0, 0.5, -1.0)]
     batch = simulate_many(loop, starts, 400, threads=2)

@@ -22,7 +22,7 @@ from starhold.scenario.reading import parse
 from starhold.simulation.lane import fly
 from starhold.simulation.lanes import simulate_many
 from starhold.studies.flight import Flight
-from tests.making import flown, wheels_after
+from tests.making import built, flown, wheels_after
 from tests.tiers import leading
 
 CRAFT = """
@@ -233,7 +233,6 @@ def test_too_many_wheels_are_refused_in_one_line():
 @pytest.mark.parametrize("slow", ["actuator_lag = 0.3", "torque_rate_limit = 0.02"])
 def test_a_command_on_the_limit_counts_though_the_actuator_lags_behind(slow):
     text = CRAFT.split("[wheels]", maxsplit=1)[0].format(limit=f"torque_limit = 0.01\n{slow}")
-    scenario = parse(text + "[simulation]\nduration = 60\n" + STIFF, "here")
-    run = flown(build(scenario, scenario.laws[0]))
+    run = flown(built(parse(text + "[simulation]\nduration = 60\n" + STIFF, "here")))
     at = (np.abs(run["command"]) == 0.01).any(axis=1)
     assert share_on_limit(run) == at.mean() > 0.1
