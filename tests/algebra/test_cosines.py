@@ -13,7 +13,18 @@ from starhold.algebra import vector
 from starhold.algebra.cosines import from_angles, from_axis_angle, from_quaternion, to_angles, to_quaternion
 from starhold.algebra.quaternion import multiply, nearer, normalise, stretch, to_body
 from starhold.algebra.vector import apply, combine, determinant, transpose
-from tests.algebra.readers import agree, angles, close, directions, quaternions, rotation, same, small_vectors, symbols, zero
+from tests.algebra.readers import (
+    agree,
+    angles,
+    close,
+    directions,
+    quaternions,
+    rotation,
+    same,
+    small_vectors,
+    symbols,
+    zero,
+)
 
 P, Q, R = symbols("p0:4"), symbols("q0:4"), symbols("r1:4")
 N2 = sum(c * c for c in Q)

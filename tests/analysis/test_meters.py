@@ -81,7 +81,16 @@ def compare_metrics(scenario, law):
     phases, observers = loop.phases(steps), meter.observers(loop.composition())
     with Crew(2) as crew:
         flown = begin_metered(
-            loop, carries, phases, 5, observers, meter.begun(20), meter.cuts(), meter.marks[-1], rows, crew
+            loop,
+            carries,
+            phases,
+            5,
+            observers,
+            meter.begun(20),
+            meter.cuts(),
+            meter.marks[-1],
+            rows,
+            crew,
         )()
     assert (flown.ends[-1] < 0.0).all()
     found = meter.metrics(flown.notes, flown.windows, flown.ends[-1])

@@ -64,6 +64,8 @@ def test_correlations_are_those_of_scipy(rng):
     driver = found["words", "m"]
     assert driver.correlation**2 * (there.sum() - 1) == pytest.approx(kruskal.statistic)
     assert driver.p == pytest.approx(kruskal.pvalue)
+    # Words that are all the same where there is a metric tell nothing of it.
+    assert find_drivers({"words": words}, np.zeros(400, bool), {"m": np.where(words == "a", metric, np.nan)}).metrics == ()
 
 
 @settings(max_examples=25, deadline=None)

@@ -17,9 +17,10 @@ from starhold.certification.region import ENERGY, SHAPES, Shape, holds
 from starhold.certification.subject import make_subject
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.bodies.rigid_body import angular_acceleration
+from starhold.scenario.building import build
 from starhold.scenario.reading import parse
 from starhold.studies.bodies.rigid_body import start_inside
-from tests.making import built, noise
+from tests.making import noise
 from tests.small import CRAFT
 
 ROOT = -0.428
@@ -27,7 +28,8 @@ ROOT = -0.428
 
 def loop_of(lines=f"a = {ROOT}", craft=CRAFT):
     form = "" if "phi_0" in lines else 'form = "equal"\n'
-    return built(parse(f'{craft}[[law]]\ntype = "modal"\n{form}{lines}\n', "small"))
+    scenario = parse(f'{craft}[[law]]\ntype = "modal"\n{form}{lines}\n', "small")
+    return build(scenario, scenario.laws[0])
 
 
 def claim_of(loop):

@@ -15,9 +15,9 @@ from starhold.algebra.vector import scale, subtract
 from starhold.conformance.bench import CRAFT
 from starhold.loop.kernels import Observer, numbers_of
 from starhold.parts.estimators import mekf
+from starhold.scenario.building import build
 from starhold.scenario.reading import parse
 from starhold.simulation.lanes import Crew, Fleet
-from tests.making import built
 
 ARCSEC = math.radians(1.0 / 3600.0)
 PERIOD = 0.5
@@ -194,7 +194,8 @@ def between(one, other):
 def flown_by_many(outage, lanes, steps):
     """At each of these control steps: errors (lanes, 6) in many flights and the filter's deviations of them, and the errors
     of what is remembered with their covariances (lanes, 6, 6)."""
-    loop = built(parse(SCENARIO, "kalman").with_({"part.star-tracker.outage": outage}))
+    scenario = parse(SCENARIO, "kalman").with_({"part.star-tracker.outage": outage})
+    loop = build(scenario, scenario.laws[0])
     like = loop.carry()
     rows = places(like)
     columns = np.repeat(np.array(numbers_of(like))[:, None], lanes, axis=1)

@@ -19,7 +19,16 @@ from starhold.parts.bodies.rigid_body import (
     renormalised,
 )
 from starhold.parts.craft import Craft, make_craft
-from tests.algebra.readers import agree, close, quaternions, reduced_by_unit_norm, same, small_vectors, symbols, vanishes
+from tests.algebra.readers import (
+    agree,
+    close,
+    quaternions,
+    reduced_by_unit_norm,
+    same,
+    small_vectors,
+    symbols,
+    vanishes,
+)
 from tests.equations import two_body_gravity_gradient
 
 DIAGONAL = make_craft([2.0, 3.0, 4.0], 1.0)

@@ -12,7 +12,16 @@ import pytest
 from starhold.algebra.operations import INDEX, WORD
 from starhold.algebra.scalar import absolute, both, divide, either, less, less_equal, negative, opposite, select, sqrt, where
 from starhold.algebra.structured import Buffer, at, function, repeat, unless, until, when
-from starhold.algebra.words import bits_of, number_of, rotate_left, shift_right, small_number, word_add, word_of, word_xor
+from starhold.algebra.words import (
+    bits_of,
+    number_of,
+    rotate_left,
+    shift_right,
+    small_number,
+    word_add,
+    word_of,
+    word_xor,
+)
 from starhold.trace.c99 import C99
 from starhold.trace.javascript import JavaScript
 from starhold.trace.llvm import Llvm
