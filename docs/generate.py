@@ -1,5 +1,5 @@
 """Writes the pages that tell what is in the code: commands, the Python interface, keys of scenarios, laws, parts; and the
-tables of the pages for authors and of that on what is not claimed. A test says that they are as the code is."""
+tables and lists that stand inside pages written by hand. A test says that they are as the code is."""
 
 from __future__ import annotations
 
@@ -15,14 +15,20 @@ PAGES = {
     "gallery.md": gallery.page,
     "keys.md": scenario_keys.page,
     "laws.md": laws.page,
-    "parts.md": parts.page_of_parts,
+    "parts.md": parts.page,
     "publications.md": publications.page,
+    **laws.pages(),
+    **parts.pages(),
 }
-FILLED = ("law-authors.md", "not-claimed.md", "part-authors.md")
+FILLED = ("../README.md", "index.md", "law-authors.md", "not-claimed.md", "part-authors.md")
 
 
 if __name__ == "__main__":
     here = Path(__file__).parent
+    for folder in ("laws", "parts"):
+        (here / folder).mkdir(exist_ok=True)
+        for old in (here / folder).glob("*.md"):
+            old.unlink()
     for name, page in PAGES.items():
         (here / name).write_text(page(), encoding="utf-8")
     for name in FILLED:

@@ -14,8 +14,9 @@ import pytest
 import typer
 
 import starhold as sh
-from generate import PAGES
+from generate import FILLED, PAGES
 from generators import formulas
+from generators.authors import filled
 from starhold.analysis.rigid_body import EXTRAS, make_meter
 from starhold.analysis.trial import FLIGHTS
 from starhold.campaign.requirements import CONE, LOST
@@ -120,18 +121,20 @@ def keys_of_the_templates():
 LAWS = [*catalogue(), *catalogue("libration-point")]
 COUNTED = {3: "three", 10: "ten", 11: "eleven", 12: "twelve", 13: "thirteen", 14: "fourteen", 15: "fifteen"}
 FAILURES = (0, 1, 2, 5, 10)
-FORMULAS = (
-    r"u = -k_{\mathrm{rate}}\,\omega - k_{\mathrm{attitude}}\,q - M + J a + \Omega \times J \Omega",
-    r"V = \frac{1}{2}\,\omega \cdot J \omega + 2 k_{\mathrm{attitude}}\,\left(1 - q_0\right)",
-    r"\dot V = -k_{\mathrm{rate}}\,|\omega|^2",
-    r"u = -\mathrm{switching\_gain}\,\operatorname{sign} s + J a + \Omega \times J \Omega",
+FORMULAS = {
+    "lyapunov": (
+        r"u = -k_{\mathrm{rate}}\,\omega - k_{\mathrm{attitude}}\,q - M + J a + \Omega \times J \Omega",
+        r"V = \frac{1}{2}\,\omega \cdot J \omega + 2 k_{\mathrm{attitude}}\,\left(1 - q_0\right)",
+        r"\dot V = -k_{\mathrm{rate}}\,|\omega|^2",
+    ),
+    "sliding": (r"u = -\mathrm{switching\_gain}\,\operatorname{sign} s + J a + \Omega \times J \Omega",),
     # Without conditions that hold anyway.
-    r"\begin{cases} - \frac{u_{\max}}{c_{5}} & \text{for}\: c_{5} > 0 \\0 & \text{otherwise} \end{cases}",
-    r"- J\left(2 \lambda^{2} q - 2 \lambda \omega + c p\right)",
-)
+    "l2-optimal": (r"\begin{cases} - \frac{u_{\max}}{c_{5}} & \text{for}\: c_{5} > 0 \\0 & \text{otherwise} \end{cases}",),
+    "modal": (r"- J\left(2 \lambda^{2} q - 2 \lambda \omega + c p\right)",),
+}
 """As the papers print them; Formula has compared each with the components of the equations."""
 NAMED = {
-    "README.md: laws": lambda: [f"| `{name}` |" for name in LAWS],
+    "README.md: laws": lambda: [f"| [`{name}`](docs/laws/{name}.md) |" for name in LAWS],
     "docs/campaigns.md: distributions": lambda: [f"| `{name}` |" for name in (*DISTRIBUTIONS, *SAMPLINGS)],
     "docs/campaigns.md: metrics": lambda: [
         f"`{metric}" for metric in (*make_meter(1, 1.0, "axis", (1.0, 1.0), wheels=True).table, *EXTRAS, LOST, CONE)
@@ -140,10 +143,10 @@ NAMED = {
         f"| {' | '.join(str(needed(0.9973, share, k)) for k in FAILURES)} |"
         for needed, share in ((runs_needed, 0.1), (runs_to_meet, 0.9))
     ],
-    "docs/laws.md: laws": lambda: [f"## {law}: " for law in LAWS],
-    "docs/laws.md: formulas": lambda: FORMULAS,
-    "docs/parts.md: parts": lambda: [f"### {name}: " for role in PACKAGES for name in parts(role)],
-    "docs/parts.md: numbers": lambda: ["| `bias_walk` | rad/s |"],
+    "docs/laws.md: laws": lambda: [f"[`{law}`](laws/{law}.md)" for law in LAWS],
+    **{f"docs/laws/{law}.md: formulas": lambda law=law: FORMULAS[law] for law in FORMULAS},
+    "docs/parts.md: parts": lambda: [f"[`{name}`](parts/{name}.md)" for role in PACKAGES for name in parts(role)],
+    "docs/parts/gyro.md: numbers": lambda: ["| `bias_walk` | rad/s |"],
     "docs/api.md: functions": lambda: [f"### sh.{name}\n" for name in set(sh.__all__) - {"InputError", "__version__"}],
     "docs/keys.md: keys": lambda: [f"| `{key}` |" for key in keys_of_the_templates()],
     "paper/paper.md: counts": lambda: [
@@ -255,6 +258,31 @@ def test_generated_page_is_as_the_code_says(name):
     )
 
 
+@pytest.mark.parametrize("name", FILLED)
+def test_tables_inside_a_page_are_as_the_code_says(name):
+    page = read(f"docs/{name}")
+    assert "<!-- written by docs/generate.py: " in page
+    assert filled(page) == page, f"docs/{name} is not what the code says; write it anew: python docs/generate.py"
+
+
+@pytest.mark.parametrize("folder", ["laws", "parts"])
+def test_no_page_is_left_of_what_is_gone(folder):
+    kept = {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs" / folder).iterdir()}
+    assert kept == {name for name in PAGES if name.startswith(f"{folder}/")}
+
+
+@pytest.mark.parametrize("name", ["ARCHITECTURE.md", "CONTRIBUTING.md", "docs/changing.md"])
+def test_files_that_pages_for_maintainers_name_are_there(name):
+    named = re.findall(r"`((?:src|tests|docs|examples)/[\w./-]+)`", read(name))
+    assert [path for path in named if not (ROOT / path).exists()] == []
+
+
+def test_each_law_and_part_has_a_page():
+    for kind, names in (("laws", LAWS), ("parts", [name for role in PACKAGES for name in parts(role)])):
+        for name in names:
+            assert read(f"docs/{kind}/{name}.md").startswith(f"# {name}: ")
+
+
 def test_a_formula_that_is_not_the_law_is_not_found():
     """What a formula leaves of the components is not printed away."""
     read = formulas.Read(catalogue()["lyapunov"])
@@ -264,7 +292,8 @@ def test_a_formula_that_is_not_the_law_is_not_found():
 
 
 def test_laws_are_printed_without_conditions_that_hold_anyway():
-    assert not [text for text in ("ITE", r"\tilde{\infty}", "not printed here") if text in read("docs/laws.md")]
+    page = "".join(read(f"docs/{name}") for name in PAGES if name.startswith("laws/"))
+    assert not [text for text in ("ITE", r"\tilde{\infty}", "not printed here") if text in page]
 
 
 def test_page_of_commands_has_every_option():

@@ -48,7 +48,7 @@ def site(tmp_path_factory):
 
 def test_every_page_is_there(site):
     built = {path.stem for path in site}
-    assert {path.stem for path in (ROOT / "docs").rglob("*.md")} <= built
+    assert {path.stem for path in (ROOT / "docs").rglob("*.md")} | {"architecture", "contributing"} <= built
 
 
 def test_nothing_is_fetched_from_elsewhere(site):
@@ -76,7 +76,6 @@ def test_every_link_of_the_site_leads_somewhere(site):
 
 
 def test_formulas_are_mathml(site):
-    (laws,) = (page for path, page in site.items() if path.name == "laws.html")
-    assert laws.formulas > 30
+    assert sum(page.formulas for path, page in site.items() if "laws" in (path.stem, path.parent.name)) > 30
     for path in site:
         assert "arithmatex" not in path.read_text(encoding="utf-8"), path.name

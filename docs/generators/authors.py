@@ -1,19 +1,26 @@
-"""The tables on the pages for authors of laws and of other parts, and on the one about what is not claimed."""
+"""The tables and lists that stand inside pages written by hand, and in README."""
 
 from __future__ import annotations
 
 import ast
 import inspect
 import re
+from collections.abc import Mapping
 from dataclasses import is_dataclass
 from itertools import pairwise
 from textwrap import dedent
 from types import ModuleType
 from typing import Any
 
+import typer
+
+from generators.laws import POINT, laws_table
 from generators.tables import fields_table, first_sentence, signature, table
 from starhold.algebra import quaternion, scalar, several, structured
 from starhold.algebra import vector as vectors
+from starhold.analysis import libration_point, rigid_body
+from starhold.analysis.ranking import Measure
+from starhold.cli.main import app
 from starhold.laws.interface import Card, Gain, Measurement, Start
 from starhold.laws.point import PointMeasurement
 from starhold.parts import roles
@@ -106,7 +113,25 @@ def limits_table() -> str:
     return table(["role", "part", "assumes or leaves out"], rows)
 
 
+def metrics_table(measures: Mapping[str, Measure]) -> str:
+    """The metrics that a comparison shows, by their headings and by their names in files."""
+    rows = [[m.heading, f"`{name}`", m.unit or "1", m.meaning] for name, m in measures.items()]
+    return table(["column", "metric", "unit", "meaning"], rows)
+
+
+def commands_table() -> str:
+    """The commands with the first sentence of their help."""
+    known = typer.main.get_command(app).commands.items()  # type: ignore[attr-defined]
+    rows = [[f"`starhold {name}`", re.split(r"(?<=[.:])\s|\.$", command.help)[0].rstrip(":.")] for name, command in known]
+    return table(["command", "purpose"], rows)
+
+
 TABLES = {
+    "laws": lambda: laws_table("rigid-body", "docs/laws/"),
+    "laws of station keeping": lambda: laws_table(POINT, "docs/laws/"),
+    "metrics": lambda: metrics_table(rigid_body.MEASURES),
+    "metrics of station keeping": lambda: metrics_table(libration_point.MEASURES),
+    "commands": commands_table,
     "card": lambda: attributes_table(Card),
     "measurement": lambda: fields_table(Measurement),
     "craft": lambda: fields_table(Craft),

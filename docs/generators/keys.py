@@ -13,7 +13,7 @@ HEAD = """# Scenario keys
 
 Written from the JSON Schema of scenario files by `make docs`; `starhold schema` prints it, for completion and checks in
 editors. [Scenario files](scenarios.md) explains how the tables belong together. The gains of `[[law]]` tables stand on
-[the page of laws](laws.md), the parameters of `[[part]]` tables on [the page of parts](parts.md).
+the pages of [laws](laws.md), the parameters of `[[part]]` tables on those of [parts](parts.md).
 
 Plain numbers are in the unit given here, strings carry their own: `"20 mNm"`. *scaled*: a plain number counts in the units
 of the scenario's libration point. A default of `none` means that the key may be left out.
