@@ -1,6 +1,6 @@
 /* lyapunov: Lyapunov
 
-   u = -k_rate w - k_attitude q + w x Jw - M_ext: V falls whatever the modelled torque
+   u = -k_rate w - k_attitude q + w x Jw - M_ext: V is non-increasing whatever the modelled torque
 
    Made by starhold 0.1.0 from the scenario three-laws, law lyapunov.
    Source: published comparison of Lyapunov, sliding-mode and predictive attitude control, eq. (9)
@@ -67,10 +67,10 @@ typedef struct {
 /* Sets the state to that of the scenario's start. */
 void lyapunov_init(lyapunov_state_t *state);
 
-/* One control step: u = -k_rate w - k_attitude q + w x Jw - M_ext: V falls whatever the modelled torque.
-   Takes what was measured at this instant, gives what to command until the next, and changes the state. It
-   calls nothing but sqrt and keeps nothing outside the state. It does not check what it is given: a NaN
-   that the law uses comes out as one. */
+/* One control step: u = -k_rate w - k_attitude q + w x Jw - M_ext: V is non-increasing whatever the
+   modelled torque. Takes what was measured at this instant, gives what to command until the next, and
+   changes the state. It calls nothing but sqrt and keeps nothing outside the state. It does not check what
+   it is given: a NaN that the law uses comes out as one. */
 void lyapunov_step(lyapunov_state_t *state, const lyapunov_input_t *input, lyapunov_command_t *command);
 
 #ifdef __cplusplus

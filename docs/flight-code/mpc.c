@@ -31,7 +31,7 @@ typedef struct {
     double gravity; /* m^3/s^2: gravitational parameter of the body that it orbits */
 } craft_t;
 
-/* Which attitude. */
+/* The attitude of the target. */
 typedef struct {
     quaternion_t attitude; /* unit quaternion, scalar first */
 } inertial_params_t;
@@ -190,7 +190,7 @@ typedef struct {
     bool shaped;
 } progress_t;
 
-/* An attempt tells what a Newton step gave, and whether the interior-point method is asked for. */
+/* The result of a Newton step, and whether the interior-point method is to be used. */
 typedef struct {
     progress_t progress;
     bool rescue;
@@ -350,7 +350,7 @@ static quaternion_t relative(quaternion_t target, quaternion_t q)
 
 /* ------------------------------- parts.bodies.rigid_body -------------------------------- */
 
-/* The measurement that a law is told of a state as sensors or estimators tell it. */
+/* The law's measurement of a state as sensors or estimators give it. */
 static measurement_t observe(const state_t *state, const scene_t *scene)
 {
     const quaternion_t error = relative(scene->goal.attitude, state->attitude);
@@ -2068,8 +2068,8 @@ static void unroll(double *numbers)
 
 /* -------------------------------- laws.predictive.solver -------------------------------- */
 
-/* Search along the projection arc of the step (Armijo), halved so many times at most, until the cost falls
-   enough. */
+/* Search along the projection arc of the step (Armijo), halved so many times at most, until the cost
+   decreases enough. */
 static double shorten(double *numbers, double halvings)
 {
     double length_ = 1.0;
@@ -2624,7 +2624,7 @@ static vector_t mpc_torque(double *numbers, const measurement_t *measurement, co
 
 /* -------------------------------- parts.actuators.limits -------------------------------- */
 
-/* Each component within +-limit, as wheels or thruster pairs along the axes give. */
+/* Saturate each component at +-limit, as wheels or thruster pairs along the axes do. */
 static vector_t limit_axis(vector_t command, double limit)
 {
     return clip_axes(command, limit);

@@ -27,7 +27,7 @@ typedef struct {
     vector_t inertia; /* kg m^2: of a craft with wheels without their rotors' about their axes */
 } craft_t;
 
-/* Which attitude. */
+/* The attitude of the target. */
 typedef struct {
     quaternion_t attitude; /* unit quaternion, scalar first */
 } inertial_params_t;
@@ -161,7 +161,7 @@ static quaternion_t relative(quaternion_t target, quaternion_t q)
 
 /* ------------------------------- parts.bodies.rigid_body -------------------------------- */
 
-/* The measurement that a law is told of a state as sensors or estimators tell it. */
+/* The law's measurement of a state as sensors or estimators give it. */
 static measurement_t observe(const state_t *state, const scene_t *scene)
 {
     const quaternion_t error = relative(scene->goal.attitude, state->attitude);
@@ -261,7 +261,7 @@ static vector_t clip_axes(vector_t a, double limit)
 
 /* -------------------------------- parts.actuators.limits -------------------------------- */
 
-/* Each component within +-limit, as wheels or thruster pairs along the axes give. */
+/* Saturate each component at +-limit, as wheels or thruster pairs along the axes do. */
 static vector_t limit_axis(vector_t command, double limit)
 {
     return clip_axes(command, limit);

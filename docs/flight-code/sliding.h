@@ -14,15 +14,21 @@
    Bits are those of the simulation where doubles are IEEE and nothing is contracted or reassociated:
    compile with -std=c99 -ffp-contract=off, never with -ffast-math.
 
+   ****************************************************************************************************
+   WARNING  NOT DECIDED: torque held between samples: the linear loop is stable with the torque held for
+   0.1 s.
+   ****************************************************************************************************
 
    Certificate: certificate.json, sha256 b5a1cd468a18a5c2675eb5b3692d5abbb0782e38648d345b068794b386cb146f:
-   proved
+   undecided
    Claims:
      proved: reaches its surface: with unlimited torque, from every attitude and rate the motion reaches
      the surface against any torque from outside of up to 3.486e-06 N m on an axis and slides to rest on
      target
+     undecided: torque held between samples: the linear loop is stable with the torque held for 0.1 s
    These claims assume: rigid body; inertia exactly as given; exact measurement and ideal actuators; torque
-   applied continuously; torque not limited; torque from outside bounded on each axis.
+   applied continuously; torque not limited; torque from outside bounded on each axis; linear motion near
+   rest on a target at rest; no torque from outside.
    Check it independently: starhold check certificate.json */
 
 #ifndef SLIDING_H

@@ -359,7 +359,7 @@ static vector_t subtract(vector_t a, vector_t b)
 
 /* ------------------------------- parts.bodies.rigid_body -------------------------------- */
 
-/* The measurement that a law is told of a state as sensors or estimators tell it. */
+/* The law's measurement of a state as sensors or estimators give it. */
 static measurement_t observe(const state_t *state, const scene_t *scene)
 {
     const quaternion_t error = relative(scene->goal.attitude, state->attitude);

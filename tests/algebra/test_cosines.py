@@ -1,4 +1,4 @@
-"""Direction cosines and Euler-Krylov angles: exact identities, round trips at every attitude, scipy as a witness."""
+"""Direction cosines and Tait-Bryan angles: exact identities, round trips at every attitude, scipy as a witness."""
 
 import itertools
 import math

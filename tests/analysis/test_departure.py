@@ -334,7 +334,7 @@ def test_a_flight_on_its_control_limit_leaves_the_claim_that_it_ends_at_the_equi
     flight = proved_flight(text)
     run, left = flight.recording, flight.departures[0]["equilibrium"]
     assert flight.certificates[0].claim("equilibrium").outcome == "proved"
-    on = np.abs(run["command"]).max(axis=1) >= build(parse(text, "here"), parse(text, "here").laws[0]).cutoff()
+    on = np.abs(run["command"]).max(axis=1) >= build(parse(text, "here"), parse(text, "here").laws[0]).saturation_limit()
     assert left[0].how == "the control reaches its limit"
     assert left[0].time == pytest.approx(run["time"][np.argmax(on)] * run.attrs["time_unit_s"])
 

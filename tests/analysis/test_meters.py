@@ -18,7 +18,7 @@ from starhold.parts.bodies.libration_point import Units
 from starhold.scenario.building import build
 from starhold.scenario.reading import load
 from starhold.simulation.lane import fly
-from starhold.simulation.lanes import Crew, carry_columns
+from starhold.simulation.lanes import ThreadPool, carry_columns
 from starhold.simulation.metered import begin_metered
 from starhold.studies.body import study_of
 from starhold.studies.compare import name_samples
@@ -79,7 +79,7 @@ def compare_metrics(scenario, law):
     begun = starts(loop, 20)
     carries, rows = carry_columns(loop, begun), [window.row for window in meter.windows.values()]
     phases, observers = loop.phases(steps), meter.observers(loop.composition())
-    with Crew(2) as crew:
+    with ThreadPool(2) as pool:
         flown = begin_metered(
             loop,
             carries,
@@ -90,7 +90,7 @@ def compare_metrics(scenario, law):
             meter.cuts(),
             meter.marks[-1],
             rows,
-            crew,
+            pool,
         )()
     assert (flown.ends[-1] < 0.0).all()
     found = meter.metrics(flown.notes, flown.windows, flown.ends[-1])

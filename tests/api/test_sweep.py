@@ -8,7 +8,7 @@ import xarray as xr
 
 import starhold as sh
 from starhold.algebra.structure import flatten
-from starhold.simulation.abreast import Flying, fly_abreast
+from starhold.simulation.batched import Flying, fly_batched
 from starhold.simulation.lane import fly
 from starhold.studies.compare import build, fly_law
 from tests.refusals import refused
@@ -98,7 +98,7 @@ def test_metrics_of_a_run_are_those_of_its_flight_and_of_its_file(tmp_path):
         assert "diverged_at" not in run.attrs
 
 
-def test_flights_abreast_have_the_samples_of_single_ones_lost_ones_included():
+def test_batched_flights_have_the_samples_of_single_ones_lost_ones_included():
     # Too fast to follow from the start, or soon, for a gain that the held torque cannot bear.
     rates = {0.0: 0.09, 0.04: 60.0, 70.0: 0.09, 0.02: 100.0, 0.01: 200.0}
     changed = [
@@ -108,7 +108,7 @@ def test_flights_abreast_have_the_samples_of_single_ones_lost_ones_included():
     loops = [build(one, one.laws[0]) for one in changed]
     lost = set()
     for every in (1, 7):
-        together = fly_abreast([Flying(loop, 50, every) for loop in loops], lambda _, samples, carry: (samples, carry))
+        together = fly_batched([Flying(loop, 50, every) for loop in loops], lambda _, samples, carry: (samples, carry))
         for loop, (samples, carry) in zip(loops, together, strict=True):
             wanted, end = fly(loop, 50, every)
             assert np.array_equal(samples, wanted, equal_nan=True)

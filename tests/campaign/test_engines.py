@@ -168,9 +168,9 @@ def test_threads_have_the_next_block_at_hand_and_no_more(store):
     ahead, stored = [], []
 
     class Told(Toy):
-        def __call__(self, law, first, count, crew):
+        def __call__(self, law, first, count, pool):
             ahead.append(len(ahead) + 1 - len(stored))
-            return super().__call__(law, first, count, crew)
+            return super().__call__(law, first, count, pool)
 
     fly(store, Threads(1), Told(), stored.append)
     assert ahead == [1, *[2] * 13]

@@ -17,7 +17,7 @@ from starhold.parts.catalogue import parts
 from starhold.parts.part import Fitted
 from starhold.scenario.building import build
 from starhold.scenario.writing import part_table
-from starhold.simulation.lanes import Crew
+from starhold.simulation.lanes import ThreadPool
 from starhold.studies.compare import record
 from tests.campaign.flown import SMALL, fly
 from tests.certification.hunt import random_inertia
@@ -130,8 +130,8 @@ def test_what_only_reading_refuses_is_left_out_too(brief):
     job, name, _ = job_of(short(orbit=orbit, environment={"gravity_gradient": True}), over)
     columns = {"orbit.position[1]": np.array([6.6e6, 6.3e6, 6.65e6])}
     refused = np.zeros(3, dtype=bool)
-    with Crew(1) as crew:
-        found = job.measure(name, columns, np.zeros(3, dtype=np.int64), crew, refused=refused)()
+    with ThreadPool(1) as pool:
+        found = job.measure(name, columns, np.zeros(3, dtype=np.int64), pool, refused=refused)()
     assert refused.tolist() == [False, True, False]
     assert np.isnan(found["effort"]).tolist() == refused.tolist()
 
@@ -143,8 +143,8 @@ def test_the_search_finds_worse_than_many_flights_at_random():
     found = [worst.search(job, name, asked, 1, seed=seed) for seed in (0, 1)]
     low, high = np.array(worst.box(job)).T
     unit = np.random.default_rng(5).uniform(low, high, (20_000, len(low))).T
-    with Crew(1) as crew:
-        others = job.measure(name, job.plan.values(unit), np.zeros(20_000, dtype=np.int64), crew)()["effort"]
+    with ThreadPool(1) as pool:
+        others = job.measure(name, job.plan.values(unit), np.zeros(20_000, dtype=np.int64), pool)()["effort"]
     assert found[0].value == pytest.approx(found[1].value, rel=2e-3)
     assert min(one.value for one in found) > others.max()
 

@@ -30,7 +30,7 @@ class Toy:
     trail: Path | None = None
     refused: int = -1
 
-    def __call__(self, law, first, count, crew):
+    def __call__(self, law, first, count, pool):
         return lambda: self.fly(law, first, count)
 
     def fly(self, law, first, count):

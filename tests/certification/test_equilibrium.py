@@ -54,7 +54,7 @@ def test_flights_return_from_inside_and_from_nowhere_else():
         # The Coriolis acceleration that X makes along Y is undone, within the limit, while x' is small enough.
         states = states[:, 2.0 * np.abs(states[3]) + (PLANT.stiffness - 1.0) < limit]
         assert states.shape[1] > 20
-        batch = simulate_many(replace(loop_of(limit=limit), far=50.0), states, 12_000)
+        batch = simulate_many(replace(loop_of(limit=limit), divergence_bound=50.0), states, 12_000)
         if returns:
             assert (batch.lost_at < 0.0).all()
             np.testing.assert_allclose(batch.states[0], 0.0, atol=1e-6)

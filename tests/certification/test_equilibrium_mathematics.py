@@ -194,6 +194,6 @@ def test_rest_along_y_at_the_start_is_not_enough():
     states = np.zeros((9, 1))
     states[0] = 10.0 * limit / STEEP
     states[3] = -STEEPNESS * states[0]
-    assert simulate_many(replace(loop_of(gains, limit), far=1e3), states, 20_000).lost_at[0] >= 0.0
+    assert simulate_many(replace(loop_of(gains, limit), divergence_bound=1e3), states, 20_000).lost_at[0] >= 0.0
     assert abs(flown_along_x(gains, limit, states[0], states[3])[0][0]) < 1e-3
     assert not refused(lambda: axis(gains, limit).stays(rational(0.4), rational(float(states[0, 0]))))

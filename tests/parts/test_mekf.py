@@ -17,7 +17,7 @@ from starhold.loop.kernels import Observer, numbers_of
 from starhold.parts.estimators import mekf
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
-from starhold.simulation.lanes import Crew, Fleet
+from starhold.simulation.lanes import RunningBatch, ThreadPool
 
 ARCSEC = math.radians(1.0 / 3600.0)
 PERIOD = 0.5
@@ -209,14 +209,14 @@ def flown_by_many(outage, lanes, steps):
     first = (ERRORS, ERRORS[:2], SQUARE, SQUARE, SQUARE, (0.0,) * 3)
     begin = np.zeros((len(flatten(first)), lanes))
     begin[-3:] = biases
-    fleet = Fleet(loop, columns, 0, 8, Observer(noted, first, ()), begin)
+    batch = RunningBatch(loop, columns, 0, 8, Observer(noted, first, ()), begin)
     (phase,) = loop.phases(160)
     flown = 0
     for step in steps:
-        with Crew(2) as crew:
-            crew.share(lambda piece, flown=flown, step=step: fleet.fly(phase, piece, flown, step + 1 - flown), fleet.count)()
+        with ThreadPool(2) as pool:
+            pool.share(lambda piece, flown=flown, step=step: batch.fly(phase, piece, flown, step + 1 - flown), batch.count)()
         flown = step + 1
-        notes = fleet.notes().T
+        notes = batch.notes().T
         turn, mixed, walk = notes[:, 15:42].reshape(lanes, 3, 3, 3).swapaxes(0, 1)
         covariance = np.block([[turn, mixed], [mixed.swapaxes(1, 2), walk]])
         yield notes[:, :6], notes[:, 9:15], notes[:, [6, 7, 8, 3, 4, 5]], covariance

@@ -85,7 +85,7 @@ def renormalised(state):
 
 
 def is_sound(state, setup):
-    near = less(dot(state.position, state.position), setup.far * setup.far)
+    near = less(dot(state.position, state.position), setup.divergence_bound * setup.divergence_bound)
     return both(is_finite(dot(state.velocity, state.velocity)), near)
 
 

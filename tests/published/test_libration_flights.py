@@ -156,7 +156,7 @@ def test_scipy_flies_the_same_in_the_limit_of_small_periods(scenario_name, law, 
     loop = build(scenario, scenario.pick(law))
     plant, length = loop.craft, years * 2.0 * math.pi
     motion = linear if loop.has("linear-gravity") else nonlinear
-    limit, size = LIMITS[loop.limit], loop.cutoff()
+    limit, size = LIMITS[loop.limit], loop.saturation_limit()
 
     def slope(_, state):
         position, velocity = tuple(state[:3]), tuple(state[3:])

@@ -70,7 +70,7 @@ def slide(browser: Browser, name: str, share: float) -> None:
 
 def landed(browser: Browser) -> None:
     browser.wait(
-        "[...crews.values()].every((crew) => !crew.busy && !crew.again) && state.arrived.length === 0"
+        "[...runners.values()].every((runner) => !runner.busy && !runner.again) && state.arrived.length === 0"
         " && fates.every((found, number) => !found.flies || state.results.has(number))"
     )
 

@@ -12,7 +12,7 @@ from starhold.loop.kernels import fly_plainly
 from starhold.parts.catalogue import fit
 from starhold.parts.craft import make_craft
 from starhold.simulation.lane import fly, simulate
-from starhold.simulation.lanes import alongside, carry_columns, simulate_many
+from starhold.simulation.lanes import carry_columns, simulate_many, stacked
 from tests.making import ORBITAL, aimed, noise
 
 STEPS, LANES = 60, 300
@@ -84,7 +84,7 @@ def test_lanes_may_differ_in_any_number():
         start = flown().start._replace(rate=tuple(random.normal(scale=0.05, size=3).tolist()))
         loop = flown().with_parts(*random_parts, lag, aimed(TURNED))
         loops.append(replace(loop, craft=craft, gains=gains, start=start))
-    phases = alongside([loop.phases(STEPS) for loop in loops])
+    phases = stacked([loop.phases(STEPS) for loop in loops])
     batch = simulate_many(loops[0], [loop.start for loop in loops], STEPS, phases=phases, width=4)
     for lane, loop in enumerate(loops):
         assert batch.states[:, lane].tolist() == flatten(fly(loop, STEPS, run=lane)[1].state)
@@ -95,9 +95,9 @@ def test_what_is_a_constant_of_the_kernel_may_not_differ():
     plain = flown("pd")
     clipped = replace(plain, gains=law.gains(0.09, 0.009, 1))
     with pytest.raises(ValueError, match="constant of their kernel"):
-        alongside([plain.phases(5), clipped.phases(5)])
+        stacked([plain.phases(5), clipped.phases(5)])
     with pytest.raises(ValueError, match="more than numbers"):
-        alongside([plain.phases(5), replace(plain, craft=make_craft([2.0, 3.0, 4.0])).phases(5)])
+        stacked([plain.phases(5), replace(plain, craft=make_craft([2.0, 3.0, 4.0])).phases(5)])
 
 
 def test_chunks_and_recording_change_nothing():

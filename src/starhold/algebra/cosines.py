@@ -1,6 +1,6 @@
-"""Direction cosines take reference axes to body axes; Euler-Krylov angles serve for input and plots.
+"""Direction cosines take reference axes to body axes; Tait-Bryan angles serve for input and plots.
 
-Euler-Krylov angles are yaw, pitch, roll: turns about the third, the new second, the new first axis.
+Tait-Bryan (3-2-1) angles are yaw, pitch, roll: turns about the third, the new second, the new first axis.
 Trigonometric functions appear only in the angle conversions, which are never part of a simulation step.
 """
 
@@ -63,7 +63,7 @@ def to_quaternion(a: Matrix) -> Quaternion:
 
 
 def from_angles(yaw: float, pitch: float, roll: float) -> Quaternion:
-    """Return the quaternion of Euler-Krylov angles (rad)."""
+    """Return the quaternion of Tait-Bryan (3-2-1) angles (rad)."""
 
     def turn(axis: int, angle: float) -> Quaternion:
         s = math.sin(0.5 * angle)
@@ -73,7 +73,7 @@ def from_angles(yaw: float, pitch: float, roll: float) -> Quaternion:
 
 
 def to_angles(q: Quaternion) -> Vector:
-    """Return Euler-Krylov angles (yaw, pitch, roll; rad) of a quaternion; at pitch = +-90 degrees roll is set to zero."""
+    """Return the Tait-Bryan (3-2-1) angles yaw, pitch, roll (rad) of a quaternion; at pitch = +-90 degrees roll is zero."""
     a = from_quaternion(q)
     pitch = math.asin(max(-1.0, min(1.0, -a[0][2])))
     if abs(a[0][2]) > 1.0 - 1e-14:

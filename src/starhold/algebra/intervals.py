@@ -75,7 +75,7 @@ class Intervals:
         return Intervals(np.maximum(found.low, 0.0), found.high)
 
     def clipped(self, low: float, high: float) -> Intervals:
-        """The result is what is known to lie in low .. high as well."""
+        """Return the intersection with low .. high, for numbers that are known to lie there."""
         return Intervals(np.clip(self.low, low, high), np.clip(self.high, low, high))
 
 

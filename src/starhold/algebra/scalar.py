@@ -19,7 +19,7 @@ from starhold.algebra.operations import EXACT, library, operation
 Scalar: TypeAlias = float
 """A number of any reader; typed as float, the reader that type checkers can follow."""
 Truth: TypeAlias = Any
-"""What a comparison yields: a bool, a SymPy relation, a recorded truth, or True, False or None of balls."""
+"""The type of a comparison: a bool, a SymPy relation, a recorded truth, or True, False or None of balls."""
 
 
 def _native(operator: Any) -> dict[str, Any]:

@@ -1,8 +1,7 @@
-"""Operations on tuples of any length apply an equation to every element, or form a weighted sum.
+"""Operations on tuples of any length: an equation applied to every element, or a weighted sum.
 
-Recorded, they are written out for the lengths of their arguments: a step with any number of wheels costs what one written by
-hand does. The elements may differ in shape from one to the next.
-"""
+When recorded they are unrolled for the lengths of their arguments: a step with any number of wheels costs what one written
+by hand does. The elements may differ in shape from one to the next."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ def make_meter(recorded: Mapping[str, Quantity], steps: int, period: float, cloc
 
 def measure(run: Recording) -> dict[str, Any]:
     """Metrics of a run: for each recorded quantity its largest norm in the last quarter, and of the command the peak of its
-    components and the integral of its norm. What is final is None for a motion that was lost, at `diverged_at`."""
+    components and the integral of its norm. Final values are None for a motion that diverged, at `diverged_at`."""
     # Nothing here is about a limit.
     return _meter_of(run).of_recording(run, np.inf)
 

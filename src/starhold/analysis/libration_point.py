@@ -158,9 +158,9 @@ def _of_place(rows: Any, length: float) -> dict[str, Metric]:
 
 
 def measure(run: Recording, units: Units, goal: CircleGoal | EquilibriumGoal, tolerance: float) -> dict[str, Any]:
-    """Metrics of a run as `simulate` gives it; `tolerance` (scaled) is the distance that counts as near. Times that
-    are never reached are None, as are all final values of a motion that was lost; `diverged_at` (s) is None for one that
-    was not; `cut_off` names a time that is None because it lies within the last quarter of the run."""
+    """Metrics of a run as `simulate` gives it; `tolerance` (scaled) is the distance within which it has settled. Times that
+    are never reached are None, as are all final values of a motion that diverged; `diverged_at` (s) is None for one that
+    did not; `cut_off` names a time that is None because it lies within the last quarter of the run."""
     limit, kind = float(run.attrs["control_limit"]), run.attrs["limit"]
     period = run.attrs["control_period"] * run.attrs["record_every"]
     found = make_meter(len(run["time"]) - 1, period, kind, units, goal, tolerance).of_recording(run, limit)

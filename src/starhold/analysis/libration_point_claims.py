@@ -66,9 +66,11 @@ def _unmet(claim: Claim, loop: ClosedLoop, command: NDArray[np.float64]) -> list
         if assumed.startswith(WITHOUT):
             found.append((np.ones(len(command), dtype=bool), f"{HAS}{assumed.removeprefix(WITHOUT)}"))
         elif assumed == UNLIMITED:
-            found.append((on_limit(command, loop.cutoff(), loop.limit), "the control reaches its limit"))
+            found.append((on_limit(command, loop.saturation_limit(), loop.limit), "the control reaches its limit"))
         elif assumed == HELD:
-            found.append((on_limit(command[:, 1:], loop.cutoff(), loop.limit), "the control along Y or Z reaches its limit"))
+            found.append(
+                (on_limit(command[:, 1:], loop.saturation_limit(), loop.limit), "the control along Y or Z reaches its limit")
+            )
         elif assumed not in MET:
             raise KeyError(assumed)
     return found
@@ -122,9 +124,11 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
         need = max(need, float(_size(states[ROWS.control], loop.limit).max()))
     if claim.kind == "circle":
         return Trial(flights, level, highest, None)
-    if need > loop.cutoff() * (1.0 + 1e-12):
-        raise BrokenClaimError(f"{certificate.name}: a flight from the certified set needs {need:g} of {loop.cutoff():g}")
-    return Trial(flights, level, highest, need / loop.cutoff())
+    if need > loop.saturation_limit() * (1.0 + 1e-12):
+        raise BrokenClaimError(
+            f"{certificate.name}: a flight from the certified set needs {need:g} of {loop.saturation_limit():g}"
+        )
+    return Trial(flights, level, highest, need / loop.saturation_limit())
 
 
 def draw(gains: Any, level: float, count: int, random: np.random.Generator) -> NDArray[np.float64]:

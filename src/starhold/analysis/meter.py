@@ -58,7 +58,7 @@ class Metric(NamedTuple):
 
     over: the count of instants it is a mean over, "samples" or "tail" (changes between those of the last quarter), with a
     factor; since: the rows are of windows, and the largest counts from here on, "start", "half" or "tail"; final: it says
-    how a flight ends, so that one whose motion is lost has none; kept: the share of the flight, at its end, in which nothing
+    how a flight ends, so that one that diverges has none; kept: the share of the flight, at its end, in which nothing
     counts as settled.
     """
 
@@ -87,7 +87,7 @@ KINDS: Mapping[str, Callable[..., Array]] = {
     # From which on values stay within their bounds, of the last instants outside (-1: never).
     INSTANT: lambda *x: np.maximum.reduce(x) + 1.0,
 }
-"""What is made of noted numbers (lanes,). `report/assets/flight.js` makes the same of one flight."""
+"""Functions from noted numbers (lanes,) to a metric. `report/assets/flight.js` makes the same of one flight."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class Meter:
         return {name: metric.unit for name, metric in self.table.items()}
 
     def observers(self, parts: Composition) -> tuple[Observer, Observer]:
-        """Return what takes the notes inside a kernel of these parts, before the last of `marks` and from it on."""
+        """Return the observers of a kernel of these parts: one before the last of `marks`, and one from it on."""
         early, late = (Observer(_observing(note, parts), self.first, self.numbers) for note in self.notes)
         return early, late
 
@@ -126,8 +126,8 @@ class Meter:
 
     def metrics(self, noted: Array, windows: Array, lost: Array) -> Metrics:
         """Metrics of lanes from what is noted of them, (numbers, lanes), of windows (windows, quantities, lanes), and the
-        control step at which each was lost (lanes,), -1 for those that were not, whose `diverged_at` is NaN. All others of a
-        lost motion are."""
+        control step at which each diverged (lanes,), -1 for those that did not, whose `diverged_at` is NaN. All other
+        metrics of a motion that diverged are NaN."""
         kept = lost < 0.0
         found = {"diverged_at": np.where(kept, np.nan, lost * self.instant)}
         for name, metric in self.table.items():
@@ -139,7 +139,7 @@ class Meter:
 
     def of_recording(self, run: Recording, limit: float) -> dict[str, Any]:
         """Metrics of a recording whose samples are the instants. Those without a value are None; `cut_off` names the times
-        that come too late to count, `diverged_at` is the time at which the motion was lost."""
+        that come too late to count, `diverged_at` is the time at which the motion diverged."""
         lost, ends = run.attrs.get("diverged_at"), [*self.marks, self.steps + 1]
         noted, windows = self._replayed(run, limit, ends)
         found: dict[str, Any] = {"diverged_at": lost, "cut_off": []}
@@ -164,7 +164,7 @@ class Meter:
         return instants > (1.0 - metric.kept) * self.steps
 
     def _values(self, metric: Metric, noted: Array, windows: Array, ends: Sequence[int]) -> Array:
-        """Return the metric before it is scaled (lanes,); `ends` are those of the windows."""
+        """Apply the metric's kind to the notes; returns (lanes,). `ends` are those of the windows."""
         if metric.since is None:
             given = [noted[row] for row in metric.rows]
         else:
@@ -183,7 +183,7 @@ class Meter:
         return values / (count * metric.over[1])
 
     def _replayed(self, run: Recording, limit: float, ends: Sequence[int]) -> tuple[Array, Array]:
-        """Take the notes of a recording, (numbers, 1), and in windows, (windows, quantities, 1)."""
+        """Return the notes of a recording, (numbers, 1), and of its windows, (windows, quantities, 1)."""
         columns = tuple((name, values.shape[1:]) for name, values in run.arrays.items() if name != "time")
         kernels = [_replay(note, self.first, (self.numbers, limit), columns) for note in self.notes]
         shared = Arguments(self.numbers, limit).shared

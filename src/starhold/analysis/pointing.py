@@ -62,7 +62,7 @@ def indices(errors: Array, length: int, apart: int) -> dict[str, Array]:
 
 
 def spacing(runs: int, instants: int, length: int) -> int:
-    """How many instants apart the windows begin in which errors are relative to the mean."""
+    """The number of instants between the starts of the windows of relative errors."""
     wanted = -(-runs * (instants - length + 1) * length // MOST)
     return min(wanted, max(1, length // OVERLAP))
 

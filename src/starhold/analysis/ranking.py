@@ -1,4 +1,4 @@
-"""Who is best at what."""
+"""Ranks laws by their metrics."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ COSTS = {
     **dict.fromkeys(("cost_median", "cost_worst"), "s"),
     **dict.fromkeys(("solver_calls", "solver_iterations_mean", "solver_iterations_worst", "solver_budget_hits"), "1"),
 }
-"""What is told of a law's calls, with its units."""
+"""Metrics of a law's calls, with their units."""
 LATE = " †"
 """Stands by the dash of a time that a run is too short for."""
 
 
 @dataclass(frozen=True)
 class Measure:
-    """How a metric is shown: its heading, unit, what it means, and whether less is better."""
+    """The presentation of a metric: heading, unit, meaning, and the factor from SI to that unit; less is better."""
 
     heading: str
     unit: str

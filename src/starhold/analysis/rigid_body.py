@@ -280,7 +280,7 @@ AGAINST_LIMITS = {
     "rate_limit": "rad/s",
     **dict.fromkeys(("peak_acceleration", "peak_accelerations", "acceleration_limit"), "rad/s^2"),
 }
-"""What a transient is measured by besides, with its units."""
+"""Further metrics of a transient, with their units."""
 UNITS = {
     "diverged_at": "s",
     **make_meter(0, 1.0, "none", (0.0, 0.0), EXTRAS, wheels=True).units,

@@ -24,7 +24,7 @@ def halved(loop: Loop) -> Loop:
 
 def step_error(run: Recording, finer: Recording, names: Iterable[str]) -> dict[str, float | None]:
     """Largest differences of some quantities between a run and the one of the `halved` loop: of quaternions the angle
-    between them (rad), else norms in the units of the recording. All are None where one of the two was lost before the
+    between them (rad), else norms in the units of the recording. All are None if one of the two diverged before the
     other, for from then on there is nothing to compare."""
     same = len(run["time"]) == len(finer["time"])
     return {name: _difference(run, finer, name) if same else None for name in names}

@@ -1,4 +1,4 @@
-"""How long a turn takes, and how fast and how sharply the body turns on the way: of one run, or of many lanes."""
+"""The duration of a slew and its peak rate and acceleration, of one run or of many lanes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import Observer
 from starhold.loop.watch import Ends, Watched, watch
 from starhold.simulation.lane import Recording
-from starhold.simulation.lanes import Crew, Fleet, carry_columns
+from starhold.simulation.lanes import RunningBatch, ThreadPool, carry_columns
 from starhold.trace.machine import widest
 
 Array: TypeAlias = NDArray[np.float64]
@@ -59,7 +59,7 @@ class Transients:
     peak_acceleration: Array
 
     def within(self, limits: Limits) -> NDArray[np.bool_]:
-        """Which lanes stay within limits, (lanes,)."""
+        """A mask (lanes,) of the lanes that stay within limits."""
         return (self.peak_rate <= limits.rate) & (self.peak_acceleration.max(axis=0) <= limits.acceleration)
 
     def __getitem__(self, lane: int) -> Transient:
@@ -71,7 +71,7 @@ def of_run(run: Recording, angle_end: float, rate_end: float) -> Transient:
     """The transient of a recorded run, the same bits as a `Watcher` notes where every control step is recorded; of fewer
     samples it knows no more than they tell.
 
-    angle_end: rad; rate_end: rad/s. The time is None too for a run that was lost.
+    angle_end: rad; rate_end: rad/s. The time is None too for a run that diverged.
     """
     ends, step = _ends(angle_end, rate_end), run.attrs["control_period"]
     squares = ends.angle * _square(run["attitude_error"][:, 1:]), ends.rate * _square(run["rate_error"])
@@ -133,7 +133,7 @@ class Flown(NamedTuple):
 
     @property
     def outside(self) -> NDArray[np.bool_]:
-        """Which lanes are not at their end now."""
+        """A mask (lanes,) of the lanes outside their ends now."""
         return (self.seen[0] > 1.0) | (self.seen[1] > 1.0) | self.lost
 
     def transients(self, period: float) -> Transients:
@@ -152,24 +152,24 @@ class Watcher:
     def fly(self, starts: Array, gains: Any, steps: int, threads: int | None = None) -> Transients:
         """starts: (numbers of a state, lanes); gains: the law's, with an array (lanes,) in place of every number that
         differs between lanes; steps: control steps."""
-        fleet, phase = self._fleet(starts, gains, steps)
-        fleet.prepare(phase)
-        with Crew(threads) as crew:
-            crew.share(lambda piece: fleet.fly(phase, piece), fleet.count)()
-        return self._flown(fleet, steps).transients(self.loop.period)
+        batch, phase = self._batch(starts, gains, steps)
+        batch.prepare(phase)
+        with ThreadPool(threads) as pool:
+            pool.share(lambda piece: batch.fly(phase, piece), batch.count)()
+        return self._flown(batch, steps).transients(self.loop.period)
 
     def search(self, starts: Array, gains: Any, steps: int, enough: Callable[[Flown], bool]) -> Transients:
         """Fly likewise on this thread, and end early once `enough` says so. Lanes that are then still outside their
         end have no time."""
-        fleet, phase = self._fleet(starts, gains, steps)
-        flown = self._flown(fleet, 0)
+        batch, phase = self._batch(starts, gains, steps)
+        flown = self._flown(batch, 0)
         while flown.steps < steps and not enough(flown):
             leg = min(self._leg, steps - flown.steps)
-            fleet.fly(phase, range(fleet.count), flown.steps, leg)
-            flown = self._flown(fleet, flown.steps + leg)
+            batch.fly(phase, range(batch.count), flown.steps, leg)
+            flown = self._flown(batch, flown.steps + leg)
         return flown.transients(self.loop.period)
 
-    def _fleet(self, starts: Array, gains: Any, steps: int) -> tuple[Fleet, Any]:
+    def _batch(self, starts: Array, gains: Any, steps: int) -> tuple[RunningBatch, Any]:
         state, target = unflatten(list(starts), self.loop.start), self.loop.target
         if not target.part.flag("STILL"):
             raise ValueError("transients are watched towards a target at rest alone")
@@ -180,7 +180,7 @@ class Watcher:
         (phase,) = self.loop.phases(max(steps, 1))
         phase = phase._replace(last=steps, gains=gains)
         carries = carry_columns(self.loop, starts, phase)
-        return Fleet(self.loop, carries, 0, widest(len(carries)), observer, noted), phase
+        return RunningBatch(self.loop, carries, 0, widest(len(carries)), observer, noted), phase
 
-    def _flown(self, fleet: Fleet, steps: int) -> Flown:
-        return Flown(steps, fleet.notes(), fleet.carries()[fleet.rows.lost_at] >= 0.0)
+    def _flown(self, batch: RunningBatch, steps: int) -> Flown:
+        return Flown(steps, batch.notes(), batch.carries()[batch.rows.lost_at] >= 0.0)

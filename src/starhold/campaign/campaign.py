@@ -27,7 +27,7 @@ from starhold.scenario.building import build
 from starhold.scenario.campaign import CampaignTable
 from starhold.scenario.checking import nearest, read_toml, show
 from starhold.scenario.reading import Scenario
-from starhold.simulation.lanes import Crew
+from starhold.simulation.lanes import ThreadPool
 from starhold.studies.compare import fly_law
 from starhold.studies.flight import Flight
 
@@ -185,8 +185,8 @@ def fly_again(folder: Path, run: int, law: str | None = None) -> FlownAgain:
         if now_there[file] != then[file]:
             raise InputError(str(where / file), "", "a file that was changed since the campaign", "the file that was flown")
     job = _job_of(Source(manifest.text, str(folder), where, manifest.allow_unstable))
-    with Crew(1) as crew:
-        now = job(name, run, 1, crew)().rows
+    with ThreadPool(1) as pool:
+        now = job(name, run, 1, pool)().rows
     differs = tuple(column for column, value in stored.items() if not _equal(value, now[column][0]))
     own = scenario_of(job, job.plan.columns(run, 1), run)
     entry = own.pick(name)

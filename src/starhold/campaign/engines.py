@@ -28,7 +28,7 @@ from starhold.campaign.chunk import Chunk
 from starhold.campaign.extras import extra
 from starhold.campaign.workers import Team
 from starhold.errors import InputError
-from starhold.simulation.lanes import Crew
+from starhold.simulation.lanes import ThreadPool
 from starhold.version import __version__
 
 Block: TypeAlias = tuple[str, int, int]
@@ -46,7 +46,7 @@ class Job(Protocol):
     """Begins to fly a block, and returns what waits for its results; pickled for engines of other processes, which keep it
     from block to block."""
 
-    def __call__(self, law: str, first: int, count: int, crew: Crew, /) -> Callable[[], Chunk]: ...
+    def __call__(self, law: str, first: int, count: int, pool: ThreadPool, /) -> Callable[[], Chunk]: ...
 
 
 @dataclass(frozen=True)
@@ -91,8 +91,8 @@ def flying(job: Job, engine: Engine, most: int) -> Generator[Fly]:
     it is after KeyboardInterrupt.
     """
     if isinstance(engine, Threads):
-        with Crew(engine.count) as crew:
-            yield lambda blocks: _fly_here(job, blocks, crew)
+        with ThreadPool(engine.count) as pool:
+            yield lambda blocks: _fly_here(job, blocks, pool)
         return
     packed = extra("cloudpickle").dumps(job)
     if isinstance(engine, Workers):
@@ -104,10 +104,10 @@ def flying(job: Job, engine: Engine, most: int) -> Generator[Fly]:
             yield lambda blocks: _believed(job, cluster.fly(packed, blocks), engine.address)
 
 
-def _fly_here(job: Job, blocks: list[Block], crew: Crew) -> Iterator[Chunk]:
+def _fly_here(job: Job, blocks: list[Block], pool: ThreadPool) -> Iterator[Chunk]:
     begun = deque[Callable[[], Chunk]]()
     for block in blocks:
-        begun.append(job(*block, crew))
+        begun.append(job(*block, pool))
         if len(begun) == _AHEAD:
             yield begun.popleft()()
     while begun:
@@ -119,7 +119,7 @@ def _believed(job: Job, results: Iterator[tuple[Block, _Told]], name: str) -> It
     takes little time, the first run is flown here again, to the same bits. InputError where anything is otherwise."""
     begun, spent, seen = time.monotonic(), 0.0, set[str]()
     columns: dict[str, dict[str, str]] = {}
-    with Crew(1) as crew:
+    with ThreadPool(1) as pool:
         for (law, first, count), (who, result) in results:
             runs = f"runs {first} to {first + count - 1} of {law}"
             if isinstance(result, _Refusal):
@@ -129,7 +129,7 @@ def _believed(job: Job, results: Iterator[tuple[Block, _Told]], name: str) -> It
             if who not in seen or spent < _CHECKED * (time.monotonic() - begun):
                 seen.add(who)
                 started = time.monotonic()
-                again = job(law, first, 1, crew)()
+                again = job(law, first, 1, pool)()
                 spent += time.monotonic() - started
                 if told := _differing(result, again):
                     raise InputError(
@@ -203,8 +203,8 @@ def _fly(packed: bytes, version: str, law: str, first: int, count: int) -> _Told
         told = f"cannot read the campaign: {error}; it needs the packages that are here"
         return _Told(who, _Refusal("a worker", "", "", told))
     try:
-        with Crew(1) as crew:
-            return _Told(who, job(law, first, count, crew)())
+        with ThreadPool(1) as pool:
+            return _Told(who, job(law, first, count, pool)())
     except InputError as error:
         return _Told(who, _Refusal(error.where, error.key, error.found, error.allowed))
     except Exception as error:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from starhold.loop.closed_loop import ClosedLoop, Phase
 from starhold.loop.kernels import Numbers, numbers_of
-from starhold.simulation.abreast import Flying, kernel_key
+from starhold.simulation.batched import Flying, kernel_key
 from starhold.trace.handles import Handle
 
 Array: TypeAlias = NDArray[np.float64]

@@ -23,7 +23,7 @@ from starhold.errors import InputError
 from starhold.scenario.building import build
 from starhold.scenario.campaign import CampaignTable
 from starhold.scenario.reading import Scenario, parse
-from starhold.simulation.lanes import Crew
+from starhold.simulation.lanes import ThreadPool
 from starhold.simulation.metered import begin_metered
 from starhold.studies.body import study_of
 
@@ -109,7 +109,7 @@ class Job:
         """The requirements that runs of a law must keep."""
         return read_requirements(self.table.requirement, self.meter(law).units, self.source.where)
 
-    def __call__(self, law: str, first: int, count: int, crew: Crew) -> Callable[[], Chunk]:
+    def __call__(self, law: str, first: int, count: int, pool: ThreadPool) -> Callable[[], Chunk]:
         """Begin to fly runs first .. first+count-1 of a law; what is returned waits for their results."""
         runs = np.arange(first, first + count)
         columns = self.plan.columns(first, count)
@@ -123,7 +123,7 @@ class Job:
             histogram = histogram + bins
             extremes.append((least, most))
 
-        measured = self.measure(law, columns, runs, crew, take, self._telling(law))
+        measured = self.measure(law, columns, runs, pool, take, self._telling(law))
 
         def finish() -> Chunk:
             rows: dict[str, NDArray[Any]] = {"run": runs, **columns, **measured()}
@@ -159,7 +159,7 @@ class Job:
         law: str,
         columns: Mapping[str, NDArray[Any]],
         runs: NDArray[np.int64],
-        crew: Crew,
+        pool: ThreadPool,
         take: Callable[[Metrics, Any], None] = lambda metrics, windows: None,
         progress: Progress | None = None,
         refused: NDArray[np.bool_] | None = None,
@@ -167,7 +167,7 @@ class Job:
         """Begin to fly runs of a law. What is returned waits for their metrics and the numbers read back, (lanes,), by name.
         columns: what was drawn; runs: their numbers, which number their random ones; take: called with metrics and windows
         of each lot; refused: as `Lanes.lots` takes it, without numbers for lanes marked there."""
-        under_way = [(at, told, self._begin(lot, crew)) for lot, at, told in self.lanes(law).lots(columns, runs, refused)]
+        under_way = [(at, told, self._begin(lot, pool)) for lot, at, told in self.lanes(law).lots(columns, runs, refused)]
 
         def finish() -> Metrics:
             found: Metrics = {}
@@ -180,7 +180,7 @@ class Job:
 
         return finish
 
-    def _begin(self, lot: Lot, crew: Crew) -> Callable[[Progress | None], tuple[Metrics, Any]]:
+    def _begin(self, lot: Lot, pool: ThreadPool) -> Callable[[Progress | None], tuple[Metrics, Any]]:
         """Begin to fly a lot; what is returned waits for its metrics (lanes,), and for what was noted in windows (windows,
         quantities, lanes)."""
         meter = self._meter_of(lot.loop, lot.phases[0].gains)
@@ -196,7 +196,7 @@ class Job:
             meter.cuts(),
             meter.marks[-1],
             [window.row for window in meter.windows.values()],
-            crew,
+            pool,
         )
 
         def finish(progress: Progress | None) -> tuple[Metrics, Any]:

@@ -22,7 +22,7 @@ from starhold.loop.closed_loop import ClosedLoop, Phase
 from starhold.loop.kernels import Numbers, numbers_of
 from starhold.scenario.building import build
 from starhold.scenario.making import variants
-from starhold.simulation.lanes import alongside, carry_columns
+from starhold.simulation.lanes import carry_columns, stacked
 from starhold.trace.calling import Compiled
 from starhold.trace.handles import Handle
 
@@ -239,7 +239,7 @@ class Lanes:
 
     def _apart(self, flats: Sequence[Flat], runs: NDArray[np.int64]) -> Lot:
         """Lanes of one form, each made by itself."""
-        loop, phases = flats[0].loop, alongside([flat.loop.phases(self.steps) for flat in flats])
+        loop, phases = flats[0].loop, stacked([flat.loop.phases(self.steps) for flat in flats])
         carries = np.array([flat.numbers[: len(numbers_of(loop.carry()))] for flat in flats]).T
         return Lot(runs, loop, np.ascontiguousarray(carries), tuple(phases))
 

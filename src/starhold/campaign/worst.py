@@ -15,7 +15,7 @@ from starhold.campaign.job import scenario_of
 from starhold.campaign.requirements import LOST, Requirement
 from starhold.campaign.results import Bracket, LawResult
 from starhold.files import atomic_write
-from starhold.simulation.lanes import Crew
+from starhold.simulation.lanes import ThreadPool
 
 if TYPE_CHECKING:
     from starhold.campaign.job import Job
@@ -103,7 +103,7 @@ def search(
         found = np.full(len(points), -np.inf)
         there = np.flatnonzero(job.plan.possible(unit))
         refused, runs = np.zeros(len(there), dtype=bool), np.zeros(len(there), dtype=np.int64)
-        measured = job.measure(law, job.plan.values(unit[:, there]), runs, crew, refused=refused)()
+        measured = job.measure(law, job.plan.values(unit[:, there]), runs, pool, refused=refused)()
         if refused.all():
             return found
         values = side * measured[requirement.column]
@@ -111,7 +111,7 @@ def search(
         found[there] = np.where(refused, -np.inf, np.where(np.isnan(values), np.inf, values))
         return found
 
-    with Crew(threads) as crew:
+    with ThreadPool(threads) as pool:
         points = sought.uniform(low, high, (effort.spread, len(low)))
         corners = int(CORNERS * effort.spread)
         points[:corners] = np.where(sought.random((corners, len(low))) < 0.5, low, high)

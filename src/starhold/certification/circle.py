@@ -93,7 +93,7 @@ def attracts(loop: ClosedLoop) -> Claim:
 def control_limit(loop: ClosedLoop) -> Claim:
     """That the control stays within its limit on motions from a smaller set, in the plane x = 0."""
     found, circle = Obligations(), _numbers(loop)
-    told: dict[str, Any] = {"limit": loop.cutoff(), "kind": loop.limit}
+    told: dict[str, Any] = {"limit": loop.saturation_limit(), "kind": loop.limit}
 
     def finish() -> Claim:
         return Claim("control-limit", told, {}, assumed(loop, IN_PLANE), tuple(found))
@@ -102,10 +102,10 @@ def control_limit(loop: ClosedLoop) -> Claim:
         found.add("control", BALLS, None, {"reason": "only for a law that undoes the linear model alone"})
         return finish()
     asked = _on_circle(circle, loop.limit)
-    if asked[0] > exact(loop.cutoff()) ** 2 * (1 + exact(1e-12)):
+    if asked[0] > exact(loop.saturation_limit()) ** 2 * (1 + exact(1e-12)):
         found.add("control", BALLS, False, {"control": math.sqrt(number(asked[0])), "angle": asked[1]})
         return finish()
-    demand = _Demand(circle, loop.cutoff(), loop.limit)
+    demand = _Demand(circle, loop.saturation_limit(), loop.limit)
     guess = demand.guess()
     for level in (guess * (1.0 - less) for less in LESS):
         if level > 0.0 and demand.within(level):

@@ -70,14 +70,14 @@ def saturated_axis(loop: ClosedLoop) -> Claim:
     """From where the X axis returns although its control is limited, and that it does from nowhere else."""
     found, told, witness = Obligations(), dict[str, Any](), dict[str, Any]()
     axis = _axis(loop)
-    if _demand(loop) > exact(loop.cutoff()):
+    if _demand(loop) > exact(loop.saturation_limit()):
         found.add("stays", BALLS, None, {"reason": "the other axes cannot be held with so little control"})
-        return Claim("saturated-axis", {"limit": loop.cutoff()}, {}, assumed(loop, HELD), tuple(found))
+        return Claim("saturated-axis", {"limit": loop.saturation_limit()}, {}, assumed(loop, HELD), tuple(found))
     bound = axis.limit / axis.p
     width = below(exact(number(bound)) * exact(SHARE))
     far = below(exact(number(bound)) * exact(FAR))
     told |= {
-        "limit": loop.cutoff(),
+        "limit": loop.saturation_limit(),
         "width": width,
         "reach": far,
         "boundary": above(exact(number(bound)) * exact(1 + 1e-15)),
@@ -98,7 +98,7 @@ def saturated_axis(loop: ClosedLoop) -> Claim:
 def _axis(loop: ClosedLoop) -> Axis:
     p = exact(loop.craft.rate) ** 2 + 2 * exact(loop.craft.stiffness)
     k, c = exact(loop.gains.k_x), exact(loop.gains.k_velocity[0])
-    return Axis(arb(p), arb(p).sqrt(), arb(k), arb(c), arb(loop.cutoff()))
+    return Axis(arb(p), arb(p).sqrt(), arb(k), arb(c), arb(loop.saturation_limit()))
 
 
 def _demand(loop: ClosedLoop) -> Any:

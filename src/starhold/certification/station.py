@@ -33,7 +33,7 @@ def certify_station(loop: ClosedLoop, name: str = "") -> Certificate:
 
 def _claims(loop: ClosedLoop) -> list[Claim]:
     claims: list[Claim] = []
-    limited = loop.limit != "none" and math.isfinite(loop.cutoff())
+    limited = loop.limit != "none" and math.isfinite(loop.saturation_limit())
     if loop.law.name == "l2-circle":
         claims.append(attracts(loop))
         if limited and claims[0].outcome == "proved":
@@ -53,7 +53,7 @@ def described_station(loop: ClosedLoop) -> dict[str, Any]:
         "plant": loop.craft._asdict(),
         "model": model_of(loop),
         "limit": loop.limit,
-        "control_limit": loop.cutoff() if math.isfinite(loop.cutoff()) else None,
+        "control_limit": loop.saturation_limit() if math.isfinite(loop.saturation_limit()) else None,
         "lag": lag_of(loop),
         "control_period": loop.period,
         "assumed_away": assumed_away(loop),

@@ -132,7 +132,7 @@ def _limit(loop: Any) -> str:
     return (
         "none"
         if loop.limit == "none"
-        else f"{loop.cutoff():.12g} {unit} by {loop.limit}".replace(" by axis", " on each axis").replace(
+        else f"{loop.saturation_limit():.12g} {unit} by {loop.limit}".replace(" by axis", " on each axis").replace(
             "by norm", "in norm"
         )
     )

@@ -14,7 +14,7 @@ from starhold.synthesis.circle import demand
 
 CARD = Card(
     title="Circle round a libration point",
-    summary="V = (alpha f1^2 + f2^2 + f3^2)/2 falls to zero on y^2 + z^2 = radius^2, run through at a constant rate; a "
+    summary="V = (alpha f1^2 + f2^2 + f3^2)/2 decreases to zero on y^2 + z^2 = radius^2, run through at a constant rate; a "
     "relay without a layer holds a whole band of circles",
     sources=("published study of the direct Lyapunov method for compact invariant sets: a limit cycle round L2",),
     assumptions=("linear motion near the point", "control not limited"),

@@ -30,8 +30,8 @@ class Gains(NamedTuple):
 
 
 class Degree(NamedTuple):
-    """The form takes the feedback of the largest degree of stability that leaves the natural stiffness along Y and Z
-    alone."""
+    """The form gives the feedback of the largest decay rate (degree of stability) that leaves the natural stiffness along Y
+    and Z alone."""
 
     y: Annotated[float, Gain(dimension="length", text="place of rest along Y, lengths")] = 0.0
     z: Annotated[float, Gain(dimension="length", text="place of rest along Z, lengths")] = 0.0

@@ -1,8 +1,8 @@
-"""The control is, of all within the limit, the one that makes a chosen V fall fastest.
+"""The control is, of all within the limit, the one under which a chosen V decreases fastest.
 
 V weighs the velocity against one that leads to the circle, y' = -rate z - pull f1 y and z' = rate y - pull f1 z with
 f1 = y^2 + z^2 - radius^2. With pull = 0 it would be the V of `l2-circle`, and a control of full size would hold any circle
-near the wanted one: there that V neither falls nor says where to go.
+near the wanted one: there that V is constant whatever the control.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from starhold.parts.bodies.libration_point import Libration
 
 CARD = Card(
     title="Steepest descent to a circle",
-    summary="u = -limit g/|g|, g = dV/dv: V of the circle and of X falls as fast as the limit lets it",
+    summary="u = -limit g/|g|, g = dV/dv: V of the circle and of X decreases as fast as the limit allows",
     sources=("published study of the direct Lyapunov method for compact invariant sets: the law that is best for a V",),
     assumptions=("linear motion near the point", "control limited in norm"),
     claims="none",

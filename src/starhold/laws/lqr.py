@@ -164,8 +164,8 @@ def riccati_problem(craft: Craft, spec: FormI | FormII | FormIII) -> tuple[Array
 
 
 def explain(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> list[tuple[str, Any]]:
-    """A design can be judged by P, its residual, how far it is from the numerical solution, the closed loop's eigenvalues,
-    and whether the gyroscopic torque leaves V alone."""
+    """Return figures to judge a design by: P, its residual, how far it is from the numerical solution, the closed loop's
+    eigenvalues, and whether the gyroscopic torque leaves V alone."""
     inertia, gains = tensor(craft.inertia), design(craft, spec)
     k_rate, k_attitude = tensor(gains.k_rate), tensor(gains.k_attitude)
     found: list[tuple[str, Any]] = []

@@ -13,7 +13,7 @@ from starhold.synthesis import response
 
 CARD = Card(
     title="Lyapunov",
-    summary="u = -k_rate w - k_attitude q + w x Jw - M_ext: V falls whatever the modelled torque",
+    summary="u = -k_rate w - k_attitude q + w x Jw - M_ext: V is non-increasing whatever the modelled torque",
     sources=("published comparison of Lyapunov, sliding-mode and predictive attitude control, eq. (9)",),
     assumptions=("rigid body", "inertia known", "external torque known", "torque not limited"),
     claims="almost-global",

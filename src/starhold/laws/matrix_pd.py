@@ -56,7 +56,7 @@ FORMS: dict[str, Any] = {"inertial": Inertial, "diagonal": Diagonal}
 
 
 def design(craft: Craft, spec: Inertial | Diagonal) -> Gains:
-    """Return gains of one of the two classical families; ValueError when its condition fails."""
+    """Return the gains of one of the two classical families; ValueError if its stability condition is violated."""
     inertia = tensor(craft.inertia)
     if spec.a == 0.0 and spec.b == 0.0:
         raise ValueError("a and b must not both be zero")

@@ -47,7 +47,7 @@ class Gains(NamedTuple):
 
 
 class Equal(NamedTuple):
-    """The form takes one real root for rates and attitude alike."""
+    """The form places one real root on all axes, for the rates and for the quaternion's vector part."""
 
     a: Annotated[float, Gain("1/s", text="the root, on all axes")]
     b: Annotated[float, Gain("s", text="of the quaternion's scalar part, over |w|2")] = -0.01

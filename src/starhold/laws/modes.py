@@ -1,8 +1,7 @@
-"""A law made of laws: each mode has one, and conditions on what it is told say when another mode begins.
+"""A law made of laws: each mode has one, and conditions on the measurement say when another mode begins.
 
-At a control instant the conditions of the mode that flew until then are looked at, and the law of the mode that they give
-commands: so the state with which a mode begins is one that fulfils the condition of the switch. A mode's law begins with its
-first memory each time.
+At a control instant the conditions of the present mode are evaluated, and the law of the mode that they give commands: so
+the state in which a mode begins fulfils the condition of the switch. A mode's law begins with its initial memory each time.
 """
 
 from __future__ import annotations
@@ -174,8 +173,8 @@ class Modes:
         """The torque (N m, body) of the mode that is due."""
         return self.command(told, gains, craft, self.decide(told, gains, memory))
 
-    def rests(self, effector: str, memory: Memory) -> Truth | None:
-        """Whether an effector of this name rests in the mode that commands; None for one that works in all."""
+    def inactive(self, effector: str, memory: Memory) -> Truth | None:
+        """Whether an effector of this name is inactive in the present mode; None for one that is active in all."""
         found: Truth | None = None
         for place, mode in enumerate(self.modes):
             if not mode.has(effector):
@@ -211,7 +210,7 @@ def mode_laws(law: Law, gains: Any) -> list[tuple[str, Law, Any]]:
 
 
 class _Told:
-    """The numbers that conditions look at, each computed once where it is asked for."""
+    """The quantities in the conditions, each computed once when it is needed."""
 
     def __init__(self, told: Measurement) -> None:
         self.told = told

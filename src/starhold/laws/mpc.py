@@ -88,8 +88,8 @@ def counters(memory: Memory) -> tuple[int, ...]:
 
 @np.errstate(all="ignore")
 def terminal_weight(gains: Gains, craft: Craft, period: float) -> tuple[Any, Any]:
-    """Return the weight P (6, 6) of the state after the last move, and the feedback (3, 6) that is best before it: u =
-    -feedback x. For "riccati" they are those of the endless horizon at w = 0 without gravity.
+    """Return the weight P (6, 6) of the state after the last move, and the feedback (3, 6) that is optimal for that move: u
+    = -feedback x. For "riccati" they are those of the infinite horizon at w = 0 without gravity.
 
     Raises ValueError where the Riccati equation has no solution in double precision.
     """

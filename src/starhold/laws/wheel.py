@@ -35,7 +35,7 @@ class Gains(NamedTuple):
 
 
 class Stability(NamedTuple):
-    """The form asks for the largest degree of stability within the torque of the wheels, in closed form."""
+    """The form gives the largest decay rate (degree of stability) within the torque of the wheels, in closed form."""
 
     torque: Annotated[float, Gain("N m", above=0.0, text="largest torque about an axis")]
     momentum: Annotated[float, Gain("N m s", above=0.0, text="largest stored momentum about an axis; sets the unit of time")]
@@ -50,8 +50,8 @@ FORMS: dict[str, Any] = {"degree-of-stability": Stability}
 
 
 def design(craft: Craft, spec: Stability) -> Gains:
-    """Return gains of the largest degree of stability; ValueError where angle and rate are zero, so that nothing bounds
-    them."""
+    """Return the gains of the largest decay rate (degree of stability); ValueError if angle and rate are zero, for then
+    nothing bounds them."""
     found = _optimum(craft, spec)
     k = found.k_attitude
     return Gains(found.k_rate, (k, k, k), spec.compensation)
@@ -75,7 +75,7 @@ def explain(craft: Craft, spec: Stability) -> list[tuple[str, Any]]:
 
 
 def map_inputs(craft: Craft, spec: Stability) -> tuple[Any, float, float, float]:
-    """Return ratios, scaled angle and rate, and budget, which a map of the degree of stability is drawn from."""
+    """Return ratios, scaled angle and rate, and budget, from which a map of the decay rate is drawn."""
     found = _optimum(craft, spec)
     return found.ratios, spec.angle, spec.rate * found.t0, found.L
 
@@ -108,7 +108,7 @@ def lyapunov(measurement: Measurement, gains: Gains, craft: Craft) -> Scalar:
     """Return V = w.Jw/2 + sum k_i (1 - a_ii) = w.Jw/2 + 2 q.Mq (J); V' = -k_rate |w|2 with full compensation.
 
     At rest S = 0 also at half turns: about the three axes, or, where weights are equal, about any axis in their plane. V
-    falls from each of them in some direction, so that they are unstable.
+    decreases from each of them in some direction, so that they are unstable.
     """
     q = vector_part(measurement.attitude)
     return 0.5 * dot(measurement.rate, apply(craft.inertia, measurement.rate)) + 2.0 * dot(q, _twist(gains.k_attitude, q))

@@ -25,14 +25,14 @@ ON_TARGET = Fitted(find("target", "inertial"), Inertial())
 
 class Setup(NamedTuple):
     """The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. Those of parts
-    stand in the order in which a loop has them; limit: of the command; far: the distance at which the motion counts as
-    lost."""
+    stand in the order in which a loop has them; limit: the saturation limit of the command; divergence_bound: the distance
+    beyond which the motion has diverged."""
 
     period: float
     substep: float
     limit: float
     width: float
-    far: float
+    divergence_bound: float
     target: Any
     environments: tuple[Any, ...]
     effectors: tuple[Any, ...]
@@ -58,8 +58,8 @@ class Composition(NamedTuple):
 
 
 class Memories(NamedTuple):
-    """The memories of parts from control step to control step, in the order in which a loop has them; `followed` is the
-    target's attitude at the last one, where it is continued from that."""
+    """The memories of parts from one control step to the next, in the order in which a loop has them; `followed` is the
+    target's attitude at the previous step, for a target that is continued from it."""
 
     followed: Any
     environments: tuple[Any, ...]
@@ -72,7 +72,7 @@ class Memories(NamedTuple):
 class Carry(NamedTuple):
     """A trajectory carries this from step to step: the states of the body, of the effectors, and of actuators that another
     one follows; the law's memory, those of other parts, the sign h = +-1 of the quaternion policy, the command, and the
-    control step at which the motion was lost (-1: not lost)."""
+    control step at which the motion diverged (-1: it has not)."""
 
     state: Any
     effectors: tuple[Any, ...]
@@ -85,7 +85,8 @@ class Carry(NamedTuple):
 
 
 class Event(NamedTuple):
-    """From a control step on: other parts, gains or craft than before, and the nominal model that the law then has."""
+    """A change at a control step: the parts, gains and craft that fly from then on, and the law's nominal model of the
+    craft."""
 
     step: int
     parts: tuple[Fitted, ...]
@@ -95,7 +96,7 @@ class Event(NamedTuple):
 
 
 class Phase(NamedTuple):
-    """Control steps first .. last-1 of a run, and the numbers they are flown with."""
+    """Control steps first .. last-1 of a run, and the numbers with which they are flown."""
 
     first: int
     last: int
@@ -104,7 +105,7 @@ class Phase(NamedTuple):
     craft: Any
     setup: Setup
     before: Any
-    """What the craft was until this phase."""
+    """The craft before this phase."""
 
     @property
     def jumps(self) -> bool:
@@ -113,8 +114,8 @@ class Phase(NamedTuple):
         return hasattr(self.craft, "inertia") and not all(np.array_equal(*pair) for pair in pairs)
 
     def rate_from(self, rate: Vector) -> Vector:
-        """The body's rate (rad/s) as the phase begins, from that at the end of the one before: what moves inside the craft
-        leaves its angular momentum."""
+        """The body's rate (rad/s) at the start of the phase, from that at the end of the previous one: a change of the
+        inertia conserves the angular momentum."""
         pairs = zip(leaves(self.craft.inertia), leaves(self.before.inertia), strict=True)
         if all(np.array_equal(*pair) for pair in pairs):
             return rate
@@ -127,10 +128,10 @@ class Phase(NamedTuple):
 
 @dataclass(frozen=True)
 class ClosedLoop:
-    """One law on one body in one setting; SI units and radians, or the body's scaled ones.
+    """One law on one body in one environment; SI units and radians, or the body's scaled ones.
 
-    craft: the numbers of the body; start: its state; parts: whatever else the loop is made of, in any order of roles and in
-    the order within a role in which torques add up and a command passes through actuators.
+    craft: the numbers of the body; start: its state; parts: all other parts of the loop. The order of roles does not matter;
+    within a role, torques add up and the command passes through actuators in the order given.
     """
 
     craft: Any
@@ -142,27 +143,27 @@ class ClosedLoop:
     parts: tuple[Fitted, ...] = ()
     limit: Limit = "axis"
     command_limit: float | None = None
-    """Where the command is cut off, in the way of `limit` (N m); None: at the torque limit that the law sees, the craft's.
-    Beside wheels the law sees what they surely give together, and the wheels cut off what is more."""
+    """The limit at which the command saturates (N m), per axis or in norm as `limit` says; None: the torque limit that the
+    law sees, the craft's. With wheels the law sees what they give together in every direction; beyond it they saturate."""
     sign_policy: SignPolicy = "as_published"
     hysteresis_width: float = 0.5
-    far: float = 1e3
+    divergence_bound: float = 1e3
     seed: int = 1
     run: int = 0
-    """Which of many runs it flies where nothing else is said: with the seed it fixes the random numbers."""
+    """The number of the run; with the seed it fixes the random numbers."""
     events: tuple[Event, ...] = ()
-    """What changes during a run, in order of time."""
+    """Changes during a run, in order of time."""
     nominal: Any = None
-    """The craft as the law takes it to be; None: as it is."""
+    """The law's nominal model of the craft; None: the true craft."""
 
     @property
     def known(self) -> Any:
-        """The craft as the law takes it to be at the start."""
+        """The law's nominal model of the craft at the start."""
         return self.craft if self.nominal is None else self.nominal
 
     @property
     def body(self) -> Part:
-        """The part that moves: one among the parts, else that of the name that the law says."""
+        """The part that moves: the body among the parts, else the installed one for which the law is made."""
         own = self.used("body")
         return own[0].part if own else find("body", self.law.body)
 
@@ -209,8 +210,8 @@ class ClosedLoop:
         """The attitude that the body is to reach; the inertial axes where nothing else is said."""
         return next(iter(self.used("target")), ON_TARGET)
 
-    def cutoff(self) -> float:
-        """Where the command is cut off (infinite for nowhere)."""
+    def saturation_limit(self) -> float:
+        """The limit at which the command saturates; infinite for none."""
         return getattr(self.craft, "torque_limit", np.inf) if self.command_limit is None else self.command_limit
 
     def composition(self) -> Composition:
@@ -237,13 +238,13 @@ class ClosedLoop:
 
     @property
     def fastest(self) -> Fitted | None:
-        """The part that comes to rest by itself, or swings, fastest, which the integration must resolve."""
+        """The part with the fastest dynamics of its own, which the integration must resolve."""
         every = (*self.parts, *(fitted for event in self.events for fitted in event.parts))
         return max((fitted for fitted in every if fitted.fastest > 0.0), key=lambda fitted: fitted.fastest, default=None)
 
     @property
     def remembers(self) -> bool:
-        """Whether the law keeps anything from call to call."""
+        """Whether the law has a memory from one call to the next."""
         return any(True for _ in leaves(self.law.remember(self.gains, self.known, self.period)))
 
     def setup(self) -> Setup:
@@ -255,9 +256,9 @@ class ClosedLoop:
         return Setup(
             self.period,
             self.period / self.substeps,
-            self.cutoff(),
+            self.saturation_limit(),
             self.hysteresis_width,
-            self.far,
+            self.divergence_bound,
             self.target.prepared(self.period) if self.aims else (),
             prepared("environment"),
             prepared("effector"),
@@ -267,7 +268,7 @@ class ClosedLoop:
         )
 
     def phases(self, steps: int) -> list[Phase]:
-        """A run of so many control steps, cut where something changes."""
+        """The phases of a run of so many control steps, divided at the events."""
         events = (Event(0, self.parts, self.gains, self.craft, self.known), *self.events)
         # Of one form in all phases, so that one kernel flies them all.
         gains = alike([event.gains for event in events])
@@ -307,24 +308,24 @@ class ClosedLoop:
         return self._goal(self.start, self.setup()).attitude
 
     def _goal(self, start: Any, setup: Setup) -> Goal:
-        """The goal at the start, from whichever of equal attitudes."""
+        """The goal at the start."""
         mode = (0.0,) if self.target.part.flag("BY_MODE") else ()
         return self.target.part.module.goal(setup.target, start, 0, (1.0, 0.0, 0.0, 0.0), *mode)
 
 
 def is_recorded(sensor: Part) -> bool:
-    """Whether what a sensor measures is recorded."""
+    """Whether a sensor's readings are recorded."""
     return getattr(sensor.module, "RECORDED", True)
 
 
-def can_rest(effector: Part) -> bool:
-    """Whether an effector may rest while a mode flies without it: one that takes the command, or that acts from outside."""
+def can_be_inactive(effector: Part) -> bool:
+    """Whether a mode can fly without an effector: one that takes the command, or one that acts from outside."""
     return effector.flag("ACTS") or effector.flag("OUTSIDE")
 
 
 def before_first(part: Part, state: Any) -> Any:
-    """A sensor's reading or an estimator's estimate before the first: what is so called of the state, else what the part
-    says in `FIRST`. ValueError where it says nothing."""
+    """The value of a sensor's reading or an estimator's estimate before the first one: the fields of the body's state of the
+    same names, else the part's `FIRST`. ValueError if there is neither."""
     kind: Any = part.module.Estimate if part.role == "estimator" else part.module.Reading
     own = getattr(part.module, "FIRST", {})
     for name in kind._fields:

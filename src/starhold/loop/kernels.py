@@ -37,7 +37,7 @@ class Numbers(NamedTuple):
 
     @classmethod
     def of(cls, phase: Phase) -> Numbers:
-        """The numbers that a phase is flown with."""
+        """The numbers of a phase."""
         return cls(phase.gains, phase.nominal, phase.craft, phase.setup)
 
 
@@ -139,12 +139,12 @@ class Arguments:
         return part(self.values)
 
     def rows(self, lanes: int) -> Array:
-        """The numbers that differ between lanes, (numbers, lanes)."""
+        """The arguments that differ between lanes, as an array (arguments, lanes)."""
         return np.array([np.broadcast_to(row, (lanes,)) for row in self.own]).reshape(len(self.own), lanes)
 
 
 def numbers_of(state: Any) -> list[float]:
-    """A state's numbers in order, then what its buffers hold."""
+    """A state's scalars in order, followed by the contents of its buffers."""
     return [*flatten(state), *(buffer[k] for buffer in buffers(state) for k in range(buffer.size))]
 
 
@@ -203,7 +203,7 @@ def make_kernel(kind: Callable[..., Program], parts: Composition, width: int, *a
 def one(step: Step, carry: Any, numbers: Numbers, substeps: int) -> Program:
     """The flight of one lane, or of a vector of lanes that draw the same random numbers, recorded: `groups` times `each`
     control steps from `first` on, with a sample of the step number `place` of every group, written to the row `row` and
-    those after it. A lane stops where its motion is lost; what is carried on stays in `carry`."""
+    those after it. A lane stops when its motion diverges; its last carry stays in `carry`."""
     recorder = Recorder()
     with recorder.recording():
         cells = recorder.memory("carry", lanes=True, writable=True)
@@ -238,7 +238,7 @@ def one(step: Step, carry: Any, numbers: Numbers, substeps: int) -> Program:
 
 def many(step: Step, carry: Any, numbers: Numbers, substeps: int, observer: Observer | None, runs: Any = ()) -> Program:
     """The flight of many lanes, recorded: control steps first .. first+count-1 of every lane of `blocks` blocks of lanes, in
-    place. Lane 0 is run number `run` and the others follow, or each lane has its own of `runs`. What an observer notes lies
+    place. Lane 0 is run number `run` and the others follow, or each lane has its own of `runs`. The observer's notes lie
     in `noted`."""
     recorder = Recorder()
     with recorder.recording():
@@ -306,7 +306,7 @@ def over_samples(
 
 
 def replay(step: Step, carry: Any, numbers: Numbers) -> Program:
-    """The control calls of a run, recorded, to time them: updates on states first .. first+count-1, one after another."""
+    """The control calls of a run, recorded for timing: updates on the states first .. first+count-1, one after another."""
     recorder = Recorder()
     with recorder.recording():
         cells, states = recorder.memory("carry", lanes=True, writable=True), recorder.memory("states")

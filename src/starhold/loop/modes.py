@@ -1,4 +1,4 @@
-"""A law of modes in a loop: each mode may have its own target, and its law can fly alone."""
+"""A law of modes in a loop: each mode may have a target of its own, and its law can be flown by itself."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from starhold.algebra.scalar import absolute, less
 from starhold.algebra.structure import chosen
 from starhold.algebra.vector import ZERO
 from starhold.laws.modes import mode_laws
-from starhold.loop.closed_loop import ClosedLoop, can_rest
+from starhold.loop.closed_loop import ClosedLoop, can_be_inactive
 from starhold.parts.contract import Card
 from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import Goal
@@ -18,7 +18,7 @@ from starhold.parts.roles import Goal
 
 @dataclass(frozen=True)
 class ModeTargets:
-    """The module of the target that is that of the mode which commands; `goal` is told the mode, counted from 0."""
+    """The module of a target that is the target of the present mode; `goal` takes the mode, counted from 0."""
 
     parts: tuple[Part, ...]
     ROLE = "target"
@@ -55,7 +55,7 @@ class ModeTargets:
         return tuple(Fitted(part, own).prepared(period) for part, own in zip(self.parts, params, strict=True))
 
     def goal(self, params: tuple[Any, ...], state: Any, step: Any, before: Any, mode: Any) -> Goal:
-        """The goal of the mode that commands."""
+        """The goal of the present mode."""
         goals = [part.module.goal(own, state, step, before) for part, own in zip(self.parts, params, strict=True)]
         found = goals[0]
         for place, goal in enumerate(goals[1:], 1):
@@ -72,8 +72,8 @@ def join_targets(targets: Sequence[Fitted]) -> Fitted:
 
 
 @dataclass(frozen=True)
-class Resting:
-    """The module of an effector that is given no torque to make, while a mode flies without it."""
+class Inactive:
+    """The module of an effector that is inactive in a mode: its command is zero."""
 
     module: Any
 
@@ -89,8 +89,8 @@ class Resting:
 
 
 def loop_of_mode(loop: ClosedLoop, place: int) -> ClosedLoop:
-    """The loop of the law of one mode, counted from 0, as if that flew alone towards its target with the effectors that work
-    in it."""
+    """The loop of the law of one mode, counted from 0, as if it flew alone towards its target with the effectors that are
+    active in it."""
     _, law, gains = mode_laws(loop.law, loop.gains)[place]
     alone, target = replace(loop, law=law, gains=gains, events=()), loop.target
     if target.part.flag("BY_MODE"):
@@ -100,9 +100,9 @@ def loop_of_mode(loop: ClosedLoop, place: int) -> ClosedLoop:
     mode = loop.law.module.modes[place]
     found: list[Fitted] = []
     for fitted in alone.parts:
-        if not can_rest(fitted.part) or mode.has(fitted.part.name):
+        if not can_be_inactive(fitted.part) or mode.has(fitted.part.name):
             found.append(fitted)
         elif not fitted.part.flag("OUTSIDE"):
-            module = Resting(fitted.part.module)
-            found.append(replace(fitted, part=Part(f"resting-{fitted.part.name}", module, fitted.part.file)))
+            module = Inactive(fitted.part.module)
+            found.append(replace(fitted, part=Part(f"inactive-{fitted.part.name}", module, fitted.part.file)))
     return replace(alone, parts=tuple(found))

@@ -1,5 +1,5 @@
-"""The equations of one control step, which all readers share: `measure` (what a law is told), `update` (what it commands at
-a control instant) and `propagate` (the motion under the held command), composed of the equations of a loop's parts."""
+"""The equations of one control step, which all interpreters share: `measure` (the law's measurement), `update` (its command
+at a control instant) and `propagate` (the motion under the held command), composed of the equations of a loop's parts."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from starhold.algebra.structure import chosen, move
 from starhold.algebra.vector import ZERO, add
 from starhold.algebra.words import number_of, word_of
 from starhold.laws.modes import Modes
-from starhold.loop.closed_loop import Carry, Composition, can_rest, is_recorded
+from starhold.loop.closed_loop import Carry, Composition, can_be_inactive, is_recorded
 from starhold.parts.actuators.limits import LIMITS
 from starhold.parts.part import Part
 from starhold.parts.random import RANGE, Dice
@@ -22,7 +22,7 @@ from starhold.parts.roles import Loads, Scene
 
 
 class Step(NamedTuple):
-    """The equations of one control step. `measure` gives what the law is told, before the quaternion sign policy chooses;
+    """The equations of one control step. `measure` gives the law's measurement before the quaternion sign policy is applied;
     `slope` the rates of (state, effectors, outputs of actuators that another one follows), which `propagate` integrates."""
 
     measure: Callable[..., Any]
@@ -34,7 +34,7 @@ class Step(NamedTuple):
 
 
 def runge_kutta(slope: Callable[..., Any]) -> Callable[..., Any]:
-    """The classical method of fourth order over a substep, for d(state)/dt = slope(state, *more)."""
+    """The classical Runge-Kutta method of fourth order over a substep, for d(state)/dt = slope(state, *more)."""
 
     def advance(state, h, *more):
         a = slope(state, *more)
@@ -55,7 +55,7 @@ def total(vectors: Any) -> Any:
 
 
 def make_equations(parts: Composition) -> Step:
-    """The equations of a control step made of these parts."""
+    """Compose the equations of a control step of these parts."""
     body, target = parts.body.module, parts.target
     limit = LIMITS[parts.limit]
     policy = getattr(body, "SIGN_POLICIES", {}).get(parts.sign_policy)
@@ -72,8 +72,8 @@ def make_equations(parts: Composition) -> Step:
         return target.module.goal(setup.target, state, step, carry.memories.followed, *mode)
 
     def observed(carry, step, key, craft, setup):
-        """A function that shows the law a measurement towards a goal, with what sensors and estimator keep of it; and the
-        goal."""
+        """Return a function that gives the law's measurement towards a goal and the memories of sensors and estimator; and
+        the goal."""
         state, memories = carry.state, carry.memories
         goal = goal_of(carry, state, step, setup)
         readings, kept = SimpleNamespace(), []
@@ -152,18 +152,18 @@ def make_equations(parts: Composition) -> Step:
         return Carry(state, effectors, carry.actuators, memory, memories, h, passed, carry.lost_at)
 
     def switched(effector, own, wanted, told, state, params, step, memory):
-        """The own state of an effector as a control step begins; of one that rests in the present mode that for no command,
-        or, where it takes none, the state in which it begins."""
-        rests = named.rests(effector, memory)
+        """The own state of an effector as a control step begins. For one that is inactive in the present mode it is the
+        state for a zero command or, if the effector takes no command, its initial state."""
+        inactive = named.inactive(effector, memory)
         switch = effector.module.switch
-        if rests is None:
+        if inactive is None:
             return switch(own, wanted, told, state, params, step)
         if effector.flag("ACTS"):
-            return switch(own, chosen(rests, ZERO, wanted), told, state, params, step)
-        return chosen(rests, effector.module.remember(params), switch(own, wanted, told, state, params, step))
+            return switch(own, chosen(inactive, ZERO, wanted), told, state, params, step)
+        return chosen(inactive, effector.module.remember(params), switch(own, wanted, told, state, params, step))
 
     def outside(kind, state, craft, memories, setup):
-        """The sum of what environments give of a kind."""
+        """The sum of the environments' torques or accelerations."""
         found = named.torques if kind == "torque" else named.accelerations
         return total(
             getattr(one.part.module, kind)(state, setup.environments[one.place], craft, memories.environments[one.place])
@@ -202,13 +202,14 @@ def make_equations(parts: Composition) -> Step:
             if effector.hook("pulse") is not None:
                 yield effector.module.pulse(own, setup.substep, params)
             elif effector.flag("ACTS") and effector.hook("switch") is None:
-                rests = named.rests(effector, memory)
-                yield effector.module.command(applied if rests is None else chosen(rests, ZERO, applied), params)
+                inactive = named.inactive(effector, memory)
+                yield effector.module.command(applied if inactive is None else chosen(inactive, ZERO, applied), params)
             else:
                 yield ()
 
     def _driven(outputs, applied, carry, begun, setup):
-        """d(output)/dt of the actuators that lag: of those before the last, and of the last, whose output acts."""
+        """d(output)/dt of the actuators with dynamics: of all but the last, and of the last, whose output acts on the
+        body."""
         if not named.dynamic:
             return (), None
         inputs, values = (carry.command, *outputs), (*outputs, applied)
@@ -235,7 +236,8 @@ def make_equations(parts: Composition) -> Step:
         return carry._replace(state=body.renormalised(state), effectors=effectors, actuators=outputs)
 
     def check(carry, step, setup):
-        """Note the step at which the motion is lost: no longer finite, or beyond what the integration can follow."""
+        """Note the step at which the motion diverges: it is no longer finite, or too fast or too distant for the
+        integration."""
         sound = body.is_sound(carry.state, setup)
         lost = where(both(opposite(sound), less(carry.lost_at, 0.0)), number_of(step), carry.lost_at)
         return carry._replace(lost_at=lost)
@@ -261,7 +263,7 @@ def make_equations(parts: Composition) -> Step:
 
 
 class _Begun(NamedTuple):
-    """A substep begins with: the effectors' commands where they are held, and what actuators put out."""
+    """The inputs of a substep: the effectors' commands where they are held, and the actuators' outputs."""
 
     commands: Any
     applied: Any
@@ -276,7 +278,7 @@ class _Placed(NamedTuple):
 
 
 class _Named:
-    """Facts that are told of a composition before any equation runs."""
+    """Properties of a composition that are known before any equation runs."""
 
     def __init__(self, parts: Composition) -> None:
         environments = [_Placed(part, place) for place, part in enumerate(parts.environments)]
@@ -290,13 +292,14 @@ class _Named:
         ranges = _ranges([*parts.environments, *parts.sensors])
         self.environments, self.sensors = ranges[: len(environments)], ranges[len(environments) :]
 
-    def rests(self, effector: Part, memory: Any) -> Any:
-        """Whether an effector rests in the mode that commands; None for one that never does."""
-        return self.modes.rests(effector.name, memory) if self.modes is not None and can_rest(effector) else None
+    def inactive(self, effector: Part, memory: Any) -> Any:
+        """Whether an effector is inactive in the present mode; None for one that never is."""
+        return self.modes.inactive(effector.name, memory) if self.modes is not None and can_be_inactive(effector) else None
 
 
 def _ranges(parts: list[Part]) -> list[int]:
-    """The first random number of each part: what it asks for where it is the first of its name, else a range of its own."""
+    """The index of the first random number of each part: the one it requests if it is the first of its name, else one that
+    begins a range of its own."""
     found: list[int] = []
     for place, part in enumerate(parts):
         own = getattr(part.module, "NUMBERS_FROM", None)

@@ -1,4 +1,4 @@
-"""Notes along a flight how long a turn takes, and how fast the body gets on the way."""
+"""Records along a flight the duration of a slew and the peaks of rate and acceleration."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from starhold.loop.closed_loop import Composition
 
 
 class Ends(NamedTuple):
-    """When a transient counts as over: one over sin2(angle / 2) and one over rate2 ((rad/s)^-2)."""
+    """The ends of a transient: the inverse of sin2(angle / 2), and of rate2 ((rad/s)^-2)."""
 
     angle: float
     rate: float

@@ -34,7 +34,7 @@ PACKAGES = {
     "target": "starhold.parts.targets",
     "actuator": "starhold.parts.actuators",
 }
-"""Where starhold's own parts of a role stand."""
+"""The packages of starhold's own parts, by role."""
 DEMANDED: dict[str, tuple[str, ...]] = {
     "body": ("COMMAND", "State", "Measurement", "Sample", "rates", "renormalised", "is_sound", "observe", "sample"),
     "effector": ("Params", "examples", "reaction", "rates", "momentum"),
@@ -44,7 +44,7 @@ DEMANDED: dict[str, tuple[str, ...]] = {
     "target": ("Params", "examples", "goal"),
     "actuator": ("Params", "examples"),
 }
-"""What a part of a role holds at least, beside `CARD` and `ROLE`."""
+"""The attributes that a part of each role must define, beside `CARD` and `ROLE`."""
 EITHER: dict[str, tuple[str, ...]] = {"environment": ("torque", "acceleration"), "actuator": ("command", "rates")}
 """Equations of which a part of a role has at least one."""
 
@@ -221,7 +221,7 @@ def read_module(path: Path) -> ModuleType:
 
 
 def _real(path: Path) -> Path:
-    """The path without links; one of a loop of links as it is, so that opening it tells what is wrong."""
+    """The path with links resolved; a loop of links is left as it is, so that opening it reports the error."""
     return Path(os.path.realpath(path))
 
 

@@ -34,9 +34,9 @@ class Card:
     summary: str
     """One line: the part as a formula."""
     sources: tuple[str, ...]
-    """Where it comes from."""
+    """The publications that describe it."""
     assumptions: tuple[str, ...]
-    """Where it holds, for its readers and for claims that rely on it."""
+    """The conditions under which it is valid, for readers and for claims that rely on it."""
 
 
 @dataclass(frozen=True)
@@ -59,19 +59,19 @@ class Parameter:
     choices: tuple[str, ...] = ()
     """Words, of which the part gets the place of the one that is chosen: 0, 1, ...; a constant as well."""
     text: str = ""
-    """What it means, for listings and pages."""
+    """The meaning, for listings and pages."""
     spread: bool = True
     """Whether a number stands for a vector of equal numbers."""
     columns: tuple[str, ...] = ()
     """Of a table: the names of its columns. It is given as rows, or as the name of a CSV file of them."""
     dimension: Literal["", "length", "velocity", "acceleration", "time", "rate"] = ""
-    """What a scaled number is one of: a file may then give a string with a unit of it too."""
+    """The physical dimension of a scaled number, which a file may also give as a string with a unit."""
     shared: str = ""
     """The key of a scenario, "orbit.epoch", that gives the number to all parts that declare so, in place of keys of their
     own tables; scenarios of bodies that lack it leave it to those."""
 
     def check(self, value: Any) -> Any:
-        """Convert a value to the form that equations take; ValueError says what is allowed."""
+        """Validate a value and convert it to the form that equations take; the ValueError says what is allowed."""
         if self.choices:
             if value not in self.choices:
                 raise ValueError(f"must be one of {', '.join(self.choices)}")

@@ -24,11 +24,11 @@ EPOCH = Parameter(
     text="when the flight begins, UTC: year, month, day, hour, minute, second; scenarios give it by epoch in [orbit]",
     shared="orbit.epoch",
 )
-"""How parts declare it, in the same words; a scenario gives it to all of them."""
+"""The declaration of the epoch, common to all parts; a scenario gives it to all of them."""
 START: Date = (2026.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 """The epoch of a flight that is given none."""
 WRITTEN = 'a date as "2026-03-20T12:00:00Z", or as whole year, month, day, hour, minute and a second below 60, UTC'
-"""How an epoch may be written."""
+"""The accepted forms of an epoch."""
 OF_DATE, OF_J2000 = "MOD_EARTH", "EME2000"
 """What CCSDS calls the Earth's mean equator and equinox of date, and those of J2000."""
 DAY = 86400.0

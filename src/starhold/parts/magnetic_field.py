@@ -20,7 +20,7 @@ ASSUMPTIONS = (
     "inertial axes of the equator and equinox of date",
 )
 RADIUS = 6.3712e6
-"""Which the coefficients refer to, m."""
+"""The reference radius of the coefficients, m."""
 FIRST, LAST = (days_of((year, 1.0, 1.0, 0.0, 0.0, 0.0)) for year in (2025.0, 2030.0))
 """Days since J2000 that the coefficients are for."""
 Row: TypeAlias = tuple[int, int, float, float, float, float]

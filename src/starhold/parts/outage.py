@@ -10,7 +10,7 @@ from starhold.parts.contract import Parameter
 
 Window: TypeAlias = tuple[Scalar, Scalar]
 OUTAGE = Parameter("s", shape=(2,), spread=False, at_least=0.0, text="from when to when it gives nothing; none if the same")
-"""How sensors declare it, in the same words."""
+"""The declaration of outages, common to all sensors."""
 NEVER: Window = (0.0, 0.0)
 
 

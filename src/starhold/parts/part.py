@@ -19,7 +19,7 @@ class Part:
     name: str
     module: ModuleType
     file: Path | None = None
-    """Where it was read from; None for a part that is installed."""
+    """The file from which it was read; None for an installed part."""
 
     @property
     def role(self) -> str:

@@ -57,8 +57,8 @@ class Scene(NamedTuple):
 
 class Body(Protocol):
     """The part that moves. `State` has a field named `COMMAND` for the command that acts, three numbers; `Measurement` is
-    what laws are told, `Sample` what is recorded, its fields annotated with `Quantity`. `SIGN_POLICIES`: by name, which of
-    equivalent measurements a law is shown; none where there is no choice. `TIME_UNIT`: "s" unless it is said.
+    the input of laws, `Sample` the recorded quantities, with fields annotated with `Quantity`. `SIGN_POLICIES`: by name, the
+    choice among equivalent measurements; none if there is no choice. `TIME_UNIT`: "s" by default.
 
     A body that scenarios have no tables for is given by a [body] table: the fields of its `Params`, if it has any, are the
     keys of that, and those of its `State` but the command, annotated with `Parameter`, the keys of [initial]. Its craft is
@@ -72,7 +72,7 @@ class Body(Protocol):
     Sample: type
 
     def rates(self, state: State, loads: Loads, command_rate: Vector | None, craft: Any, /) -> Any:
-        """d(state)/dt; command_rate is that of the command that acts, None where it is held."""
+        """d(state)/dt; command_rate is the rate of the acting command, None if it is held."""
         ...
 
     def renormalised(self, state: State, /) -> State:
@@ -80,11 +80,11 @@ class Body(Protocol):
         ...
 
     def is_sound(self, state: State, setup: Any, /) -> Truth:
-        """Whether the motion is finite and slow enough for the integration; setup has `substep` and `far`."""
+        """Whether the motion is finite and slow enough for the integration; setup has `substep` and `divergence_bound`."""
         ...
 
     def observe(self, state: State, scene: Scene, /) -> Any:
-        """The measurement of a state as sensors or estimators tell it."""
+        """The measurement of a state as sensors or estimators give it."""
         ...
 
     def sample(self, state: State, goal: Any, applied: Vector, command: Vector, /) -> Any:
@@ -93,8 +93,8 @@ class Body(Protocol):
 
 
 class Environment(Protocol):
-    """A torque (N m, body), a force or a field; at least one of `torque` and `acceleration`. `MODELLED`: whether laws are
-    told of the torque. With a memory, `remember` and `update` renew it at each control step."""
+    """A torque (N m, body), a force or a field; at least one of `torque` and `acceleration`. `MODELLED`: whether laws know
+    the torque. With a memory, `remember` and `update` renew it at each control step."""
 
     MODELLED: bool
 
@@ -116,26 +116,26 @@ class Environment(Protocol):
 
 
 class Effector(Protocol):
-    """A mechanism that moves with the body and shares its momentum. None knows another: each adds its reaction, and inertia
-    if it has to, and gets the body's angular acceleration for its own rates. With `ACTS` it takes the command of the law.
-    One that decides at control instants alone, or without the law, has `switch`; `OUTSIDE`: whether its torque comes from
-    outside, as of a field or of mass that is expelled, and not from momentum of its own. In a mode that does without it, one
-    with `ACTS` gets no command, and one that is `OUTSIDE` alone the state in which it starts."""
+    """A mechanism that moves with the body and shares its momentum. Effectors are independent: each adds its reaction and,
+    if needed, its inertia, and takes the body's angular acceleration for its own rates. With `ACTS` it takes the law's
+    command. One that decides only at control instants, or without the law, has `switch`; `OUTSIDE`: whether its torque comes
+    from outside, as of a field or of mass that is expelled, and not from momentum of its own. In a mode in which it is
+    inactive, one with `ACTS` gets a zero command, and one with `OUTSIDE` alone has its initial state."""
 
     ACTS: bool
     OUTSIDE: bool
 
     def command(self, applied: Vector, params: Any, /) -> Any:
-        """The commands of its motors for a wanted torque on the body (N m)."""
+        """The commands of its motors for a desired torque on the body (N m)."""
         ...
 
     def switch(self, own: Any, wanted: Vector, told: Any, state: State, params: Any, step: int, /) -> Any:
-        """The own state as a control step begins, in place of `command`; wanted: the command (N m), told: the measurement
-        that the law is told."""
+        """The own state at the start of a control step, in place of `command`; wanted: the command (N m), told: the law's
+        measurement."""
         ...
 
     def pulse(self, own: Any, substep: Scalar, params: Any, /) -> Any:
-        """The command for a substep that begins, of one with `switch`; without it there is none."""
+        """The command for the next substep, of an effector with `switch`; none if it is absent."""
         ...
 
     def reaction(self, own: Any, command: Any, body: State, params: Any, /) -> Vector:

@@ -18,7 +18,7 @@ START = Parameter(
     spread=False,
     text="attitude that is taken for true at the start: quaternion, inertial to body, scalar first",
 )
-"""How estimators declare where they begin, in the same words."""
+"""The declaration of the initial estimate, common to all estimators."""
 
 
 def unit_quaternion(stated: Quaternion) -> Quaternion:

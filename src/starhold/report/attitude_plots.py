@@ -46,7 +46,7 @@ KNOWN = (*rigid_body.Sample._fields, *wheels.Sample._fields, "error_angle")
 
 @dataclass(frozen=True)
 class AttitudePlots:
-    """All plots over time, with the times (s) that all curves share; a run that was lost has shorter curves."""
+    """All plots over time, with the times (s) that all curves share; a run that diverged has shorter curves."""
 
     times: Curve
     scalar: Plot

@@ -30,7 +30,7 @@ class PageParts(NamedTuple):
     measured: str = ""
     """A section below the ranking."""
     transient: float | None = None
-    """How long the transient is (s) that the page shows alone if asked, None for none."""
+    """The length of the transient (s) that the page can show by itself, None for none."""
     settings: str = "Settings"
     """The heading of the settings."""
     units: str = ""
@@ -38,7 +38,7 @@ class PageParts(NamedTuple):
     scripts: Sequence[str] = ()
     footer: str = ""
     sampling: Sampling | None = None
-    """How curves are thinned on a page that flies again, None for one that does not."""
+    """The thinning of curves on a page that flies again, None for one that does not."""
 
 
 class BodyReport(Protocol):

@@ -1,4 +1,4 @@
-"""The page that tells what a campaign comes to; it opens offline and loads nothing."""
+"""The page with the outcome of a campaign; it opens offline and loads nothing."""
 
 from __future__ import annotations
 

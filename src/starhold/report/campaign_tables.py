@@ -225,7 +225,7 @@ def _bracket(bracket: Bracket, number: int, law: LawResult, words: Wording) -> s
 
 
 def dispersions(result: CampaignResult) -> str:
-    """List what was dispersed and how."""
+    """List the dispersed keys with their distributions."""
     rows = [f"<tr><td>{escape(key)}</td><td>{escape(how)}</td></tr>" for key, how in result.over.items()]
     if not rows:
         return ""

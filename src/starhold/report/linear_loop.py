@@ -29,9 +29,9 @@ NOTE = (
 DASHES = {"x": "none", "y": "7 3", "z": "2 3"}
 DIGITS = 4
 POINTS = 4
-"""A point of a curve stands for so many frequencies of the response."""
+"""The number of frequencies of the response for each point of a curve."""
 DEEPEST = 60.0
-"""How far below the crossover (dB) plots reach."""
+"""The depth below the crossover (dB) to which plots reach."""
 WIDTH, HEIGHT, LEFT, BOTTOM = 430.0, 250.0, 52.0, 36.0
 
 

@@ -115,7 +115,7 @@ def _law(law: Reflown) -> dict[str, Any]:
 
 
 def _measured(law: Reflown, flight: Flight, table: Any) -> dict[str, Any]:
-    """The page measures a law's flights by these; numbers that depend on the flight's length, or are moved, are named."""
+    """Give the page the metrics of a law's flights; numbers that a slider or the flight's length changes go by name."""
     run, settling = flight.recording, table.settling
     every, limit = table.simulation.record_every, run.attrs["limit"]
     meter = recorded_meter(0, law.period, every, limit, settling.attitude_tolerance, settling.rate_tolerance)

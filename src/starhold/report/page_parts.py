@@ -168,7 +168,7 @@ def over_time(plot: Plot, flights: Sequence[Flight], marks: Sequence[Mark] = ())
 
 
 def lost_alarm(flights: Sequence[Flight]) -> str:
-    """Which motions were lost, and what of others is no number; empty where nothing is wrong."""
+    """List the motions that diverged, and the metrics that are not numbers; empty if there are none."""
     lost = [f"{flight.name} (at {lost_text(flight)})" for flight in flights if flight.lost is not None]
     told = [f"Diverged, and so without final values: {', '.join(lost)}"] if lost else []
     told += [said for flight in flights if (said := unknown_text(flight))]
@@ -212,7 +212,7 @@ def ranking(flights: Sequence[Flight]) -> str:
 
 
 def plot_box(plot: Mapping[str, Any]) -> str:
-    """The place of a plot, which a script fills."""
+    """The box of a plot, which a script fills."""
     dashed = f"<span>– – {escape(plot['dashed'])}</span>" if plot["dashed"] else ""
     return f'<div class="plot"><h3>{escape(plot["title"])}{dashed}</h3><div id="{plot["name"]}"></div></div>'
 

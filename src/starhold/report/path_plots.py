@@ -82,7 +82,7 @@ def _path(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _away(flights: Sequence[Flight], entries: Sequence[LawEntry], factor: int, scenario: Scenario, clock: str) -> Plot:
-    """How far from the circle in its plane and across it, or from the place of rest."""
+    """The distance from the circle, in its plane and across it, or from the equilibrium."""
     length = scenario.table.libration.units.length / 1e3
     x = [thin(flight.recording["position"][:, 0] * length, factor) for flight in flights]
     goals = [goal_of(entry.gains) for entry in entries]

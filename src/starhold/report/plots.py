@@ -35,7 +35,7 @@ class Panel:
     for curves that stay."""
 
     def decades(self) -> float:
-        """How many powers of ten a logarithmic panel spans."""
+        """The number of decades that a logarithmic panel spans."""
         if not self.log:
             return 0.0
         levels = [np.array(self.levels)] if self.levels else []

@@ -1,4 +1,4 @@
-"""The part of the page that tells what is proved of each law, what is not, and why."""
+"""The section of the page on claims: which are proved of each law, which are not, and why."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def index_page(made: Sequence[Reproduction]) -> str:
 
 
 def tally(rows: Any) -> str:
-    """How often each verdict was given."""
+    """The count of each verdict."""
     counted = Counter(judged.verdict for judged in rows)
     given = [verdict for verdict in VERDICTS if counted[verdict]]
     return " ".join(f'<span class="count">{badge(verdict)} {counted[verdict]}</span>' for verdict in given)

@@ -1,4 +1,5 @@
-"""The degree of stability over the gains, with what decides it, the torque budget and the optimum, as a PNG file."""
+"""The decay rate (degree of stability) over the gains, with the mode that decides it, the torque budget and the optimum: a
+PNG file."""
 
 from __future__ import annotations
 
@@ -72,7 +73,7 @@ def paint(what: StabilityMap, path: Path) -> Path:
     drawn = axis.contourf(what.K_a, what.K_w, what.eta, levels=16, cmap="cividis")
     axis.contour(what.K_a, what.K_w, what.eta, levels=drawn.levels, colors="white", linewidths=0.35, alpha=0.6)
     bar = figure.colorbar(drawn, cax=scale)
-    bar.set_label("degree of stability η, 1/t₀", fontsize=9)
+    bar.set_label("decay rate (degree of stability) η, 1/t₀", fontsize=9)
     bar.ax.tick_params(labelsize=8.5)
     _budget(axis, what)
     handles = _curves(axis, what)
@@ -83,7 +84,7 @@ def paint(what: StabilityMap, path: Path) -> Path:
     axis.set_ylabel("damping K_w = t₀ k_rate / Jx", fontsize=9.5)
     axis.tick_params(labelsize=8.5)
     x, y, z = (f"{ratio:.4g}" for ratio in what.ratios)
-    figure.text(0.085, 0.96, "degree of stability over the gains", fontsize=11, fontweight="bold")
+    figure.text(0.085, 0.96, "decay rate (degree of stability) over the gains", fontsize=11, fontweight="bold")
     given = f"moments {x} : {y} : {z},  α = {what.alpha:.4g} rad,  ω = {what.omega:.4g} / t₀,  L = {what.budget:.4g}"
     figure.text(0.085, 0.922, given, fontsize=8.5, color="0.3")
     figure.legend(

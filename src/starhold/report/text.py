@@ -46,7 +46,7 @@ def value_text(value: Any, unit: str) -> str:
 
 
 def left_text(flight: Flight, certificate: int, kind: str) -> str:
-    """How a flight leaves a claim of one of its certificates, for reading; empty where it does not."""
+    """The way in which a flight leaves a claim of one of its certificates, as text; empty if it does not."""
     left, moment = flight.left(certificate, kind), flight.metric_set.moment
     groups = {time: _how([one.how for one in left if one.time == time]) for time in (one.time for one in left)}
     return "; ".join(f"{'from the start' if time == 0.0 else f'at {moment(time, 4)}'} {how}" for time, how in groups.items())
@@ -66,5 +66,5 @@ def unknown_text(flight: Flight) -> str:
 
 
 def lost_text(flight: Flight, digits: int = 6) -> str:
-    """When the motion of a flight was lost, for reading; empty where it was not."""
+    """The time at which a flight diverged, as text; empty if it did not."""
     return "" if flight.lost is None else flight.metric_set.moment(flight.lost, digits)

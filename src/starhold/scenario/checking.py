@@ -199,7 +199,7 @@ def try_law(loop: Any, where: str, key: str) -> None:
 
 
 def refuse_unstable(check: Callable[[], None], where: str, key: str) -> None:
-    """InputError where a law's own check tells its gains to be unstable."""
+    """Raise InputError if a law's own check finds its gains unstable."""
     try:
         check()
     except ValueError as error:

@@ -70,7 +70,7 @@ def _named(items: Iterable[Field], values: Iterable[Any]) -> dict[str, Any]:
 
 
 def map_inputs(scenario: Scenario, law: str | None = None) -> tuple[Any, float, float, float]:
-    """The numbers that a map of the degree of stability is drawn from: inertia ratios, scaled angle and rate, budget; of the
+    """The numbers from which a map of the decay rate is drawn: inertia ratios, scaled angle and rate, budget; of the
     first law that is designed for it. InputError where there is none."""
     entries = scenario.laws if law is None else (scenario.pick(law),)
     for entry in entries:

@@ -71,8 +71,8 @@ EPOCH_KEY = (
 
 
 class Orbit(Table):
-    """Where the spacecraft starts, by position and velocity or by the elements of its orbit; without this table it floats in
-    free space."""
+    """The initial orbit, as position and velocity or as orbital elements; without this table the spacecraft is in free
+    space."""
 
     position: Annotated[Any, *quantity(Gain("m", shape=(3,), spread=False, text="inertial position"))] = None
     velocity: Annotated[Any, *quantity(Gain("m/s", shape=(3,), spread=False, text="inertial velocity"))] = None

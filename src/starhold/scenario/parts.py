@@ -19,7 +19,7 @@ from starhold.errors import InputError, is_interrupt
 from starhold.files import read_text
 from starhold.laws.catalogue import Law
 from starhold.laws.modes import Modes
-from starhold.loop.closed_loop import ClosedLoop, before_first, can_rest, is_recorded
+from starhold.loop.closed_loop import ClosedLoop, before_first, can_be_inactive, is_recorded
 from starhold.loop.step import make_equations
 from starhold.parts.catalogue import PACKAGES, as_part, from_file, parts, read_module, role_of, told
 from starhold.parts.orbit import body_of
@@ -212,7 +212,7 @@ def _acting(loop: ClosedLoop) -> list[Fitted]:
 
 def _check_effectors(loop: ClosedLoop, where: str) -> None:
     """InputError where not one effector takes the command, of those that a mode has where the law is made of modes."""
-    acting, known = _acting(loop), [f.part.name for f in loop.used("effector") if can_rest(f.part)]
+    acting, known = _acting(loop), [f.part.name for f in loop.used("effector") if can_be_inactive(f.part)]
     module: Any = loop.law.module
     if not isinstance(module, Modes):
         if len(acting) > 1:

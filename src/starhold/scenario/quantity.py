@@ -66,8 +66,8 @@ def scaled(kind: Literal["length", "velocity", "acceleration", "time", "rate"], 
 
 
 def reader(gain: Gain) -> Callable[..., Any]:
-    """A function from what the file holds, and what a unit is worth in SI if it is not one, to numbers of the declared shape
-    and bounds."""
+    """Return a function that converts a value of a file to numbers of the declared shape and bounds; its second argument is
+    the SI value of the unit of plain numbers, 1 by default."""
 
     def read(value: Any, worth: float = 1.0) -> Any:
         try:

@@ -190,7 +190,7 @@ def read_tables(data: Mapping[str, Any], text: str, where: str, folder: Path, al
 
 
 def _tables(body: Body, data: Mapping[str, Any], where: str, context: Any) -> Any:
-    """The raw tables, validated, but for those of laws and parts."""
+    """Validate all raw tables except those of laws and parts."""
     rest = {key: value for key, value in data.items() if key not in APART}
     return validate(body.tables, rest, where, "", extra=APART, context=context)
 

@@ -53,7 +53,7 @@ class LawTable(Table):
 
 
 class Timing(Table):
-    """How long and how finely; a body's own class says in what units."""
+    """The duration of a run and its steps; a body's own class gives the units."""
 
     unit: ClassVar[str] = ""
     """The unit of times in errors: a space and its name."""
@@ -81,7 +81,7 @@ class Timing(Table):
 
 
 class SeededTiming(Timing):
-    """How long and how finely, in whole control periods, and which random numbers."""
+    """The duration in whole control periods, the steps, and the seed of the random numbers."""
 
     seed: Annotated[int, *quantity(Gain("1", at_least=0, at_most=2**53, whole=True, text="of all random numbers"))] = 1
     run: Annotated[

@@ -34,6 +34,6 @@ def refuse_own(table: Mapping[str, Any], declared: Iterable[Field], shared: Coll
 
 
 def told(shared: str) -> str:
-    """How errors name a shared key: "epoch in [orbit]"."""
+    """The name of a shared key in errors: "epoch in [orbit]"."""
     table, _, name = shared.rpartition(".")
     return f"{name} in [{table}], which gives it to all parts"

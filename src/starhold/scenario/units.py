@@ -37,7 +37,7 @@ def to_number(text: str, unit: str) -> float:
 
 
 def shown(unit: str) -> str:
-    """How messages call a unit."""
+    """The name of a unit in messages."""
     return "no unit" if unit == "1" else unit
 
 

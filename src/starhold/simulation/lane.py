@@ -85,7 +85,7 @@ def simulate(
     """Fly a closed loop for `steps` control periods.
 
     Returns an xarray Dataset over `time` (s), a sample every `record_every` control steps, the state before and the torque
-    after each. `run` numbers the random numbers, in place of the loop's. A motion that was lost (not finite, or faster than
+    after each. `run` numbers the random numbers, in place of the loop's. A motion that diverged (not finite, or faster than
     the integration can follow) ends the samples, and its time stands in `attrs["diverged_at"]` (s); else that attribute is
     absent."""
     samples, carry = fly(loop, steps, record_every, run, progress)
@@ -169,7 +169,7 @@ def label(loop: ClosedLoop, samples: NDArray[np.float64], carry: Carry, record_e
         "law": loop.law.name,
         "control_period": loop.period,
         "record_every": record_every,
-        f"{loop.body.module.COMMAND}_limit": loop.cutoff(),
+        f"{loop.body.module.COMMAND}_limit": loop.saturation_limit(),
         "limit": loop.limit,
         "parts": ", ".join(fitted.called for fitted in loop.parts if fitted.part.role != "body"),
     }
@@ -204,8 +204,8 @@ def recorded(loop: ClosedLoop) -> list[tuple[str, Quantity, int]]:
 
 
 def _room(steps: int, record_every: int, width: int) -> NDArray[np.float64]:
-    """Where the samples of a run are written, a row each: in memory or, where they are many, in a nameless file, of which
-    memory holds as much as it can spare. Refused where that file's disk has no room, or measuring them would fill memory."""
+    """Return the storage of a run's samples, a row each: memory or, for many samples, an unnamed file that the system caches
+    as far as memory allows. Refused if the disk has no room for that file, or if measuring the samples would fill memory."""
     count = steps // record_every + 1
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 2**33
     # Measuring holds a dozen numbers of each sample at a time.

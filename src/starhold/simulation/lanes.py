@@ -1,4 +1,4 @@
-"""Flies many trajectories at once: blocks of lanes, shared out over threads."""
+"""Flies many trajectories at once: blocks of lanes, divided among threads."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from starhold.simulation.lane import Progress
 from starhold.trace.machine import aligned, widest
 
 PIECES = 16
-"""Pieces of a batch for each thread, between which progress is told and an interrupt is heeded."""
+"""Pieces of a batch for each thread; between them progress is reported and an interrupt takes effect."""
 
 
-class Crew:
-    """Threads that fly, until the `with` is left; what none of them has begun by then is dropped."""
+class ThreadPool:
+    """A pool of threads for the time of a `with` block; work that has not begun at its end is dropped."""
 
     def __init__(self, threads: int | None = None) -> None:
         self.threads = max(1, os.cpu_count() or 1 if threads is None else threads)
@@ -36,8 +36,8 @@ class Crew:
         self._pool.shutdown(cancel_futures=True)
 
     def share(self, work: Callable[[range], None], count: int, pieces_each: int = PIECES) -> Callable[..., None]:
-        """Have work(piece) called for all of so many blocks, in so many pieces for each thread. What is returned waits for
-        the end, and tells progress until then."""
+        """Call work(piece) on `count` blocks, divided into `pieces_each` pieces for each thread. The function returned waits
+        for the end and reports progress."""
         size = max(1, -(-count // (self.threads * pieces_each)))
         begun: list[Future[None]] = [
             self._pool.submit(work, range(at, min(at + size, count))) for at in range(0, count, size)
@@ -54,8 +54,8 @@ class Crew:
 
 @dataclass(frozen=True)
 class Batch:
-    """Where many trajectories ended. states: (numbers of a state, lanes), rows in the order of the loop's `start` and then
-    of its effectors; lost_at: (lanes,) control step at which the motion was lost, -1 where it was not."""
+    """The final states of many trajectories. states: (numbers of a state, lanes), rows in the order of the loop's `start`
+    and then of its effectors; lost_at: (lanes,) control step at which the motion diverged, -1 if it did not."""
 
     states: NDArray[np.float64]
     lost_at: NDArray[np.float64]
@@ -80,33 +80,33 @@ def simulate_many(
 
     starts: states of the body, or an array (numbers of a state, lanes), with the effectors' below or without; first_run:
     the run number of lane 0, which with the seed fixes its random numbers; phases: those of the loop, `loop.phases(steps)`,
-    with an array (lanes,) in place of every number that differs between lanes, whole numbers excepted, see `alongside`;
+    with an array (lanes,) in place of every number that differs between lanes, whole numbers excepted, see `stacked`;
     width: lanes in flight at once on a core.
 
     The result is the same, bit for bit, for any number of threads and any width, and equals that of `simulate` lane by lane
-    while the motion is not lost.
+    until the motion diverges.
     """
     start = np.asarray(starts if isinstance(starts, np.ndarray) else [flatten(s) for s in starts], dtype=float)
     start = start if isinstance(starts, np.ndarray) else start.T
     cut = list(loop.phases(steps) if phases is None else phases)
     carries = carry_columns(loop, start, cut[0] if cut else None)
-    fleet = Fleet(loop, carries, first_run, width or widest(len(carries)))
+    batch = RunningBatch(loop, carries, first_run, width or widest(len(carries)))
     for phase in cut:
-        fleet.prepare(phase)
+        batch.prepare(phase)
 
     def work(piece: range) -> None:
         for now in cut:
-            fleet.fly(now, piece)
+            batch.fly(now, piece)
 
-    with Crew(threads) as crew:
-        crew.share(work, fleet.count)(progress)
-    ends = fleet.carries()
-    moving = len(flatten((fleet.like.state, fleet.like.effectors)))
-    return Batch(ends[:moving], ends[fleet.rows.lost_at], loop.start)
+    with ThreadPool(threads) as pool:
+        pool.share(work, batch.count)(progress)
+    ends = batch.carries()
+    moving = len(flatten((batch.like.state, batch.like.effectors)))
+    return Batch(ends[:moving], ends[batch.rows.lost_at], loop.start)
 
 
-class Fleet:
-    """Many lanes on their way: what each carries, in blocks of `width`, and what an observer has noted of it.
+class RunningBatch:
+    """A batch of lanes in flight: the carry of each, in blocks of `width` lanes, and the observer's notes on it.
 
     carries: (numbers, lanes), see `carry_columns`; first_run: the run number of lane 0, or those of all lanes (lanes,);
     noted: (numbers, lanes).
@@ -160,7 +160,7 @@ class Fleet:
         observer: Observer | None = None,
     ) -> None:
         """Fly the blocks of a piece through a phase, or through `count` control steps of it from `first` on. observer: in
-        place of the fleet's, with notes of the same shape."""
+        place of the batch's, with notes of the same shape."""
         _, kernel, arguments, own, turn = self.prepare(phase, observer)
         part = self.x[piece.start : piece.stop]
         if turn is not None and first in (None, phase.first):
@@ -186,7 +186,7 @@ class Fleet:
         return rows.reshape(len(rows), count, self.width).swapaxes(0, 1)
 
     def prepare(self, phase: Phase, observer: Observer | None = None) -> Any:
-        """Compile what flies a phase, once, before threads share it out."""
+        """Compile the kernel of a phase once, before threads use it."""
         observer = observer or self.observer
         key = (id(phase), id(observer))
         if key not in self._ready:
@@ -201,7 +201,7 @@ class Fleet:
         return self._ready[key]
 
     def _turned(self, phase: Phase) -> Any:
-        """The body's rates in the lanes of a piece, as the phase makes them when it begins."""
+        """A function that gives the body's rates in the lanes of a piece at the start of a phase."""
         size = self.count * self.width
 
         def whole(leaf: Any) -> Any:
@@ -247,14 +247,14 @@ def carry_columns(loop: ClosedLoop, start: NDArray[np.float64], phase: Any = Non
 
 
 def _differ(loop: ClosedLoop) -> bool:
-    """Whether what a loop carries at its start, beside the body's state and h, depends on that state."""
+    """Whether the initial memories of a loop depend on the body's initial state."""
     starting = [f.part for f in (*loop.used("sensor"), *loop.used("estimator")) if f.part.hook("remember")]
     return bool(starting or loop.carry().memories.readings or loop.carry().memories.estimate) or (
         loop.aims and loop.target.part.flag("FOLLOWS")
     )
 
 
-def alongside(values: Sequence[Any]) -> Any:
+def stacked(values: Sequence[Any]) -> Any:
     """One structure for many lanes from one of each: numbers that differ become arrays (lanes,).
 
     Raises ValueError where more than numbers differ: the form, whole numbers, tables.
@@ -263,7 +263,7 @@ def alongside(values: Sequence[Any]) -> Any:
     if isinstance(first, (tuple, list)):
         if any(type(value) is not type(first) or len(value) != len(first) for value in values):
             raise ValueError("lanes differ in more than numbers")
-        parts: list[Any] = [alongside(parts) for parts in zip(*values, strict=True)]
+        parts: list[Any] = [stacked(parts) for parts in zip(*values, strict=True)]
         return parts if isinstance(first, list) else rebuild(first, parts)
     if isinstance(first, float):
         return first if len(set(values)) == 1 else np.array(values)

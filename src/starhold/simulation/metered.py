@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from starhold.loop.closed_loop import ClosedLoop, Phase
 from starhold.loop.kernels import Observer
 from starhold.simulation.lane import Progress
-from starhold.simulation.lanes import Crew, Fleet
+from starhold.simulation.lanes import RunningBatch, ThreadPool
 from starhold.trace.machine import widest
 
 Array = NDArray[np.float64]
 
 
 PIECES = 2
-"""Pieces of a batch for each thread: few, for each is called once a window."""
+"""Pieces of a batch for each thread; few, for each is called once a window."""
 
 
 class Metered(NamedTuple):
@@ -40,7 +40,7 @@ def begin_metered(
     cuts: Sequence[int],
     late: int,
     rows: Sequence[int],
-    crew: Crew,
+    pool: ThreadPool,
 ) -> Callable[..., Metered]:
     """Begin to fly lanes through phases, and note the instant after the last step too, at which a command is decided and
     not flown. What is returned waits for the end, and tells progress until then.
@@ -50,11 +50,11 @@ def begin_metered(
     last, which takes the last instant in, at the end of the flight or after it; rows: noted numbers that begin anew in each
     window, at 0.
     """
-    fleet = Fleet(loop, carries, first_run, widest(len(carries), len(noted)), observers[0], noted)
+    batch = RunningBatch(loop, carries, first_run, widest(len(carries), len(noted)), observers[0], noted)
     for phase in phases:
         for observer in observers:
-            fleet.prepare(phase, observer)
-    found = np.empty((len(cuts), len(rows), fleet.count, fleet.width))
+            batch.prepare(phase, observer)
+    found = np.empty((len(cuts), len(rows), batch.count, batch.width))
     end, kept = phases[-1].last, list(rows)
 
     def work(piece: range) -> None:
@@ -64,21 +64,21 @@ def begin_metered(
             for phase in phases:
                 first, last = max(done, phase.first), min(cut, phase.last)
                 if first < last:
-                    fleet.fly(phase, piece, first, last - first, observer)
+                    batch.fly(phase, piece, first, last - first, observer)
             done = cut
             if window == len(cuts) - 1:
-                carried = fleet.x[span].copy()
-                fleet.fly(phases[-1], piece, end, 1, observers[1])
-                fleet.x[span] = carried
-            seen = fleet.noted[span]
+                carried = batch.x[span].copy()
+                batch.fly(phases[-1], piece, end, 1, observers[1])
+                batch.x[span] = carried
+            seen = batch.noted[span]
             found[window, :, span] = seen[:, kept].swapaxes(0, 1)
             seen[:, kept] = 0.0
 
-    wait = crew.share(work, fleet.count, PIECES)
+    wait = pool.share(work, batch.count, PIECES)
 
     def finish(progress: Progress | None = None) -> Metered:
         wait(progress)
         windows = found.reshape(len(cuts), len(rows), -1)[:, :, : carries.shape[1]]
-        return Metered(fleet.carries(), fleet.notes(), windows)
+        return Metered(batch.carries(), batch.notes(), windows)
 
     return finish

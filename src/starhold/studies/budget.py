@@ -39,7 +39,7 @@ from starhold.parts.contract import Parameter
 from starhold.parts.part import Fitted
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.building import build
-from starhold.simulation.lanes import Crew, Fleet, carry_columns
+from starhold.simulation.lanes import RunningBatch, ThreadPool, carry_columns
 from starhold.trace.machine import widest
 
 if TYPE_CHECKING:
@@ -327,22 +327,22 @@ def _flown(scenario: Scenario, loop: ClosedLoop, entry: LawEntry, clock: _Clock,
     start = np.repeat(np.array(flatten(loop.start), dtype=float)[:, None], runs, axis=1)
     observer = Observer(_note(loop.composition(), knows), first, ())
     width = widest(len(numbers_of(loop.carry())), size)
-    fleet = Fleet(loop, carry_columns(loop, start), loop.run, width, observer, np.zeros((size, runs)))
-    fleet.prepare(phase)
+    batch = RunningBatch(loop, carry_columns(loop, start), loop.run, width, observer, np.zeros((size, runs)))
+    batch.prepare(phase)
     instants = range(clock.first * clock.every, clock.steps, clock.every)
-    noted = np.empty((fleet.count, fleet.width, len(instants), size))
+    noted = np.empty((batch.count, batch.width, len(instants), size))
 
     def work(piece: range) -> None:
         done, span = 0, slice(piece.start, piece.stop)
         for place, instant in enumerate(instants):
             # Up to the instant and the step that begins there, of which the notes are left.
-            fleet.fly(phase, piece, done, instant + 1 - done)
+            batch.fly(phase, piece, done, instant + 1 - done)
             done = instant + 1
-            noted[span, :, place] = fleet.noted[span].swapaxes(1, 2)
+            noted[span, :, place] = batch.noted[span].swapaxes(1, 2)
 
-    with Crew() as crew:
-        crew.share(work, fleet.count, 1)()
-    lost = fleet.carries()[places(fleet.like).lost_at]
+    with ThreadPool() as pool:
+        pool.share(work, batch.count, 1)()
+    lost = batch.carries()[places(batch.like).lost_at]
     if (lost >= 0.0).any():
         found = f"{name}: the motion is lost at {lost[lost >= 0.0].min() * loop.period:g} s"
         raise InputError(scenario.where, f"law.{entry.name}", found, "a law that holds the attitude")

@@ -12,7 +12,7 @@ from starhold.errors import InputError
 from starhold.scenario.checking import show
 from starhold.scenario.making import variants
 from starhold.scenario.reading import Scenario
-from starhold.simulation.abreast import Flying, fly_abreast
+from starhold.simulation.batched import Flying, fly_batched
 from starhold.simulation.lane import Progress
 from starhold.studies.compare import build, metrics_of, name_samples
 from starhold.studies.frames import frame_of
@@ -46,7 +46,7 @@ def sweep(
     def measured(number: int, samples: Any, carry: Any) -> dict[str, Any]:
         return metrics_of(name_samples(flown[number], flights[number].loop, samples, carry))
 
-    found = fly_abreast(flights, measured, threads, progress)
+    found = fly_batched(flights, measured, threads, progress)
     return frame_of([row | metrics for row, metrics in zip(rows, found, strict=True)])
 
 

@@ -245,7 +245,7 @@ def _roots(spectra: Sequence[Array]) -> list[acb]:
 def _decomposed(
     a: Array, b: Array, annihilators: Choice | None, directions: Choice | None
 ) -> tuple[list[_Level], Array, Array]:
-    """Return the levels, and the units of the states (n,) and of the inputs (m,) in which they are written."""
+    """Return the levels, and the scales of the states (n,) and of the inputs (m,) in which they are given."""
     # By name, for the types of the library are too loose for a strict checker.
     library: Any = import_module("scipy.linalg")
     a, (units, _) = library.matrix_balance(a, permute=False, separate=True)

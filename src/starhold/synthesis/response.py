@@ -32,7 +32,7 @@ MOST = 64
 RESOLVED = 0.4
 """Part of the fastest time constant that a step may be."""
 IN_HAND = 0.99
-"""Share of the time asked for that designs use up: a torque that is held settles a little later."""
+"""Share of the required settling time that designs use: with a held torque the loop settles a little later."""
 
 
 class Bandwidth(NamedTuple):

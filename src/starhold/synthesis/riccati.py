@@ -136,7 +136,7 @@ def _stable_feedback(inertia: Array, q: Array, r: Array) -> arb_mat:
 
 def riccati_residual(p: Array, inertia: Array, q: Array, r: Array) -> float:
     """Return the largest entry of A'P + PA - P B R^-1 B'P + Q, relative to the terms on the diagonal of its row and column,
-    so that units do not matter; without rounding but that of P itself."""
+    which makes it independent of units; without rounding but that of P itself."""
     from flint import ctx
 
     with ctx.workprec(BITS):

@@ -64,7 +64,7 @@ def make_sail(pressure: float, area: float, mass: float, specular: float = 1.0, 
 
 
 def check_optics(specular: float, diffuse: float) -> None:
-    """Raise ValueError unless the two are parts of the light that leave something to control with."""
+    """Raise ValueError unless both reflectivities lie in 0 .. 1 and their sum in (0, 1], so that some light is reflected."""
     for name, number in {"specular": specular, "diffuse": diffuse}.items():
         if not 0.0 <= number <= 1.0:
             raise ValueError(f"the {name} reflectivity must be between 0 and 1, not {number:g}")

@@ -1,12 +1,13 @@
-"""Gains of u = -k_rate w - k_attitude S, S = 4 q0 q, are designed for the largest degree of stability that a wheel's torque
-allows.
+"""Gains of u = -k_rate w - k_attitude S, S = 4 q0 q, are designed for the largest decay rate (degree of stability)
+within the torque limit of a wheel.
 
 With the gyroscopic torque compensated, each axis obeys, near the target and with time in units of t0,
 
     i l^2 + K_w l + 2 K_a = 0,    i = J_axis / J_x,  K_a = t0^2 k_attitude / J_x,  K_w = t0 k_rate / J_x,
 
-and the degree of stability is eta = -max Re l over the axes. The initial error (alpha, rad) and the initial rate (omega,
-1/t0) may ask for no more than the wheel's torque: 2 K_a alpha + K_w omega <= L. The torque that compensates is not counted.
+and the decay rate (degree of stability) is eta = -max Re l over the axes. The initial error (alpha, rad) and the initial
+rate (omega, 1/t0) must not demand more than the wheel's torque: 2 K_a alpha + K_w omega <= L. The torque that compensates is
+not counted.
 
 Why `optimum` is the optimum. Every root lies left of -h exactly where i (m - h)^2 + K_w (m - h) + 2 K_a has no root with a
 positive real part, that is, where K_w >= 2 i h and 2 K_a >= K_w h - i h^2. Over all axes, with a the smallest and b the
@@ -40,7 +41,7 @@ OUT_OF_RANGE = "the gains leave the range of floating-point numbers"
 
 
 class Optimum(NamedTuple):
-    """An optimum is scaled gains and the scaled degree of stability that they give."""
+    """An optimum is a pair of scaled gains and the scaled decay rate that they give."""
 
     K_a: float
     K_w: float
@@ -84,7 +85,7 @@ class Designed(NamedTuple):
 
 
 def degree(K_a: ArrayLike, K_w: ArrayLike, ratios: ArrayLike) -> Array:
-    """Return the degree of stability, -max Re l over the axes (1/t0), of scaled gains of any sign.
+    """Return the decay rate (degree of stability), -max Re l over the axes (1/t0), of scaled gains of any sign.
 
     K_a and K_w have any shapes (...) that broadcast; ratios is (n,), or (..., n) with one set of ratios for each pair of
     gains. Returns (...). ValueError where a ratio is not positive.
@@ -110,7 +111,7 @@ def boundary(ratios: ArrayLike) -> float:
 
 
 def optimum(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> Optimum:
-    """Return the scaled gains with the largest degree of stability within 2 K_a alpha + K_w omega <= budget.
+    """Return the scaled gains of the largest decay rate within 2 K_a alpha + K_w omega <= budget.
 
     ratios: (3,), J_axis / J_x in any order; alpha: largest initial error (rad); omega: largest initial rate (1/t0);
     budget: L. ValueError where ratios or the budget are not positive, where alpha or omega are negative or both zero, for
@@ -175,7 +176,7 @@ def scale(moments: ArrayLike, torque: float, momentum: float) -> Scale:
 
 
 def design_gains(moments: ArrayLike, torque: float, momentum: float, angle: float, rate: float) -> Designed:
-    """Return the gains with the largest degree of stability that ask, in the initial state, for no more than the torque.
+    """Return the gains of the largest decay rate whose demand in the initial state is within the torque limit.
 
     moments: principal, (3,) (kg m2); torque: Hdot_max (N m) and momentum: H_max (N m s) of each axis' wheel; angle: largest
     initial error (rad, at most pi); rate: largest initial rate (rad/s). ValueError as `scale` and `optimum` raise it. A

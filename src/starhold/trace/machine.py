@@ -15,7 +15,7 @@ from starhold.trace.llvm import Llvm
 from starhold.trace.program import Call, Program, statements
 
 ALIGNMENT = 64
-"""Bytes: the widest vector of any processor that is met today."""
+"""Alignment of memories in bytes: the width of the widest vector registers of present processors."""
 
 
 @cache

@@ -301,7 +301,7 @@ class Source(ABC):
         self._keep(s.ref, s.operation.gives, self.written(s, text))
 
     def written(self, s: Op, text: str, names: Mapping[str, str] = MappingProxyType({})) -> Expression:
-        """Return an operation with its operands in place; names: what else its text speaks of."""
+        """Return the expression of an operation with its operands substituted; names: further names that its text uses."""
         if s.operation.name == "same_index" and (s.args[0] == s.args[1] or not any(isinstance(x, str) for x in s.args)):
             # Compilers warn of what is known.
             return Expression(self._constant(s.args[0] == s.args[1], UNIFORM))

@@ -19,7 +19,7 @@ from starhold.laws.predictive.limits import Limits, make_limits
 from starhold.laws.predictive.sixes import Rows, Weight, matrix, triple
 
 COUNTERS = 5
-"""How many counters there are."""
+"""The number of counters."""
 
 
 class Problem(NamedTuple):
@@ -37,7 +37,7 @@ class Store(NamedTuple):
     rest is written before it is read. Matrices lie row after row, of a diagonal Q or R the diagonal alone."""
 
     counters: Any
-    """Numbers of the law's own; they come first."""
+    """Counters of the law; they come first."""
     weights: Any
     """Q, R, R^-1, P (36)."""
     tail: Any
@@ -47,19 +47,19 @@ class Store(NamedTuple):
     limits: Any
     """The centre (3) and the bound."""
     mean: Any
-    """A matrix (36), column after column, of the sampling of the motion."""
+    """Workspace: a matrix (36), column by column, for discretising the motion."""
     term: Any
-    """Another."""
+    """A second such matrix (36)."""
     plan: Any
     """The moves (3 each)."""
     states: Any
     """The states (6 each) under the plan, from the first to the one after the last move."""
     gradient: Any
-    """Of half the cost (3 each)."""
+    """The gradient of half the cost with respect to each move (3 each)."""
     step: Any
     """A step of each move (3 each), to which the feedback adds."""
     feedback: Any
-    """What a move answers to a change of the state before it (18 each)."""
+    """The feedback of each move to a change of the state before it (18 each)."""
     stiffness: Any
     """The trace of each move's curvature."""
     trial: Any

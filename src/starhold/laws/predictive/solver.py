@@ -60,7 +60,7 @@ class Progress(NamedTuple):
 
 
 class Attempt(NamedTuple):
-    """An attempt tells what a Newton step gave, and whether the interior-point method is asked for."""
+    """The result of a Newton step, and whether the interior-point method is to be used."""
 
     progress: Progress
     rescue: Truth
@@ -203,8 +203,8 @@ def _gradient_step(problem: Problem) -> Scalar:
 
 @function
 def shorten(problem: Problem, halvings: Scalar) -> Scalar:
-    """Search along the projection arc of the step (Armijo), halved so many times at most, until the cost falls enough.
-    Gives the change of half the cost, zero where it never did."""
+    """Search along the projection arc of the step (Armijo), halved so many times at most, until the cost decreases enough.
+    Gives the change of half the cost, zero if it never does."""
     store = carve(problem)
 
     def over(_length: Scalar, change: Scalar, left: Scalar) -> Truth:

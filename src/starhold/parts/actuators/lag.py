@@ -20,7 +20,7 @@ BODY = ""
 
 
 class Params(NamedTuple):
-    """How fast the output follows."""
+    """The time constant of the lag."""
 
     lag: Annotated[float, Parameter("s", above=0.0, text="time constant")]
     rate_limit: Annotated[float, Parameter("N m/s", above=0.0, text="largest rate of each component; none if absent")] = (

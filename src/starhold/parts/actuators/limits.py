@@ -1,4 +1,4 @@
-"""The limit of a command: of each axis, of the norm, or none."""
+"""Saturation of a command: per axis, in norm, or none."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from starhold.algebra.vector import Vector, clip_axes, clip_norm
 
 
 def limit_none(command: Vector, limit: Scalar) -> Vector:
-    """The command as it is."""
+    """Return the command unchanged."""
     return command
 
 
 def limit_axis(command: Vector, limit: Scalar) -> Vector:
-    """Each component within +-limit, as wheels or thruster pairs along the axes give."""
+    """Saturate each component at +-limit, as wheels or thruster pairs along the axes do."""
     return clip_axes(command, limit)
 
 
 def limit_norm(command: Vector, limit: Scalar) -> Vector:
-    """The vector shortened to the limit, its direction kept."""
+    """Saturate the norm at the limit; the direction is kept."""
     return clip_norm(command, limit)
 
 

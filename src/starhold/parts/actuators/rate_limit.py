@@ -19,7 +19,7 @@ BODY = ""
 
 
 class Params(NamedTuple):
-    """How fast the output may change."""
+    """The limit of the output's rate of change."""
 
     rate_limit: Annotated[float, Parameter("N m/s", above=0.0, text="largest rate of each component")]
 

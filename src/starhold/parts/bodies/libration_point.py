@@ -78,7 +78,7 @@ class Sample(NamedTuple):
 
 State, Measurement = PointState, PointMeasurement
 ROWS: Any = rows(PointState(ZERO, ZERO, ZERO))
-"""Where each field stands in a table of states."""
+"""The rows of each field in a table of states."""
 
 
 def linear(position: Vector, velocity: Vector, plant: Libration) -> Vector:
@@ -161,13 +161,13 @@ def renormalised(state: PointState) -> PointState:
 
 
 def is_sound(state: PointState, setup: Any) -> Truth:
-    """Whether the motion is finite and near enough."""
-    near = less(dot(state.position, state.position), setup.far * setup.far)
+    """Whether the motion is finite and within the divergence bound."""
+    near = less(dot(state.position, state.position), setup.divergence_bound * setup.divergence_bound)
     return both(is_finite(dot(state.velocity, state.velocity)), near)
 
 
 def observe(state: PointState, scene: Scene) -> PointMeasurement:
-    """The measurement that a law is told of a state as sensors or estimators tell it."""
+    """The law's measurement of a state as sensors or estimators give it."""
     return PointMeasurement(state.position, state.velocity, scene.period, scene.limit)
 
 

@@ -37,7 +37,7 @@ class State(NamedTuple):
 
 
 ROWS: Any = rows(State((1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO, ZERO))
-"""Where each field stands in a table of states."""
+"""The rows of each field in a table of states."""
 
 
 class Measurement(NamedTuple):
@@ -119,7 +119,7 @@ def side_of(state: State, goal: Goal) -> float:
 
 
 def observe(state: State, scene: Scene) -> Measurement:
-    """The measurement that a law is told of a state as sensors or estimators tell it."""
+    """The law's measurement of a state as sensors or estimators give it."""
     goal = scene.goal
     error = relative(goal.attitude, state.attitude)
     position = to_body(state.attitude, state.position)

@@ -332,7 +332,7 @@ def inertia(own: State, params: Prepared) -> Matrix:
 
 
 def inertia_change(own: State, params: Prepared) -> Matrix:
-    """How much more inertia the whole has than with the gimbals at angle zero (kg m2)."""
+    """The inertia of the whole less that with all gimbals at angle zero (kg m2)."""
     found: Matrix = (ZERO, ZERO, ZERO)
     for one in turned(own, ZERO, params):
         more = combine(1.0, _gram((one.spin,)), -1.0, _gram((one.unit.spin,)))
@@ -373,7 +373,7 @@ def record(own: State, command: Vector, body: Any, params: Prepared) -> Sample:
 
 
 def fastest(params: Params) -> float:
-    """The fastest rate (1/s) at which a gimbal comes to the rate that is asked for."""
+    """The bandwidth (1/s) of the fastest gimbal servo."""
     return params.bandwidth
 
 

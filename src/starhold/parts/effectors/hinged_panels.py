@@ -227,7 +227,7 @@ def _point(mass: Scalar, place: Vector) -> Matrix:
 
 
 def _moving(swung: list[_Swung], params: Numbers) -> Vector:
-    """How fast the panels shift the centre of mass (m/s)."""
+    """The velocity of the centre of mass due to the panels (m/s)."""
     found = ZERO
     for one in swung:
         found = add(found, scale(one.rate * params.inverse, one.pushed))
@@ -308,7 +308,7 @@ def inertia(own: State, params: Numbers) -> Matrix:
 
 
 def inertia_change(own: State, params: Numbers) -> Matrix:
-    """How much more inertia the whole has than with the panels at their rest (kg m2)."""
+    """The inertia of the whole less that with the panels in their rest positions (kg m2)."""
     return combine(1.0, _whole(*_swung(own, params), params), -1.0, params.rest)
 
 

@@ -31,7 +31,7 @@ READS = ("magnetic_field",)
 
 
 class Params(NamedTuple):
-    """How fast momentum is taken out, what the magnetorquers give, and when they fly."""
+    """The unloading gain, the dipoles of the magnetorquers, and the epoch."""
 
     gain: Annotated[float, Parameter("1/s", above=0.0, text="share of the momentum across the field taken out in a second")]
     dipole_limit: Annotated[Vector, LIMIT]

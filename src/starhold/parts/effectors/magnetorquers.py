@@ -34,11 +34,11 @@ LIMITED = Parameter(
     choices=("together", "each"),
     text="dipoles beyond the limit are reduced together, so that the torque keeps its line, or each",
 )
-"""How parts with magnetorquers declare what they give, in the same words."""
+"""The declaration of the dipole limit, common to all parts with magnetorquers."""
 
 
 class Params(NamedTuple):
-    """How strong the magnetorquers are, and when they fly."""
+    """The dipole limit of the magnetorquers, and the epoch."""
 
     dipole_limit: Annotated[Vector, LIMIT]
     limited: Annotated[int, LIMITED] = 0

@@ -68,7 +68,7 @@ class Wheels(NamedTuple):
     coulomb: Numbers
     least: Rows
     allocation: int = 0
-    """Which of ALLOCATIONS shares out a torque."""
+    """The allocation rule, an index into ALLOCATIONS."""
     facets: Buffer | tuple[()] = ()
     """The pieces of `allocate_peak`, of 6 + 3 N numbers each: a normal, an edge, and a row for each wheel. Torques in the
     cone above a facet of the envelope cost the peak |normal . torque|, and pieces of one facet are told apart by the
@@ -134,7 +134,7 @@ def record(own: State, command: Numbers, body: Any, params: Wheels) -> Sample:
 
 
 def applied(own: State, command: Numbers, body: Any, params: Wheels) -> Vector:
-    """The torque that motors and friction give the body (N m)."""
+    """The torque of motors and friction on the body (N m)."""
     return scale(-1.0, weighted(motor(command, own.momentum, body.rate, params), params.axes))
 
 

@@ -21,7 +21,7 @@ ROLE = "environment"
 
 
 class Params(NamedTuple):
-    """How much, and in which axes."""
+    """The torque and its axes."""
 
     torque: Annotated[Vector, Parameter("N m", shape=(3,), spread=False, text="on the body")]
     axes: Annotated[int, Parameter(choices=("body", "inertial"), text="in which it stays the same")] = 0

@@ -68,7 +68,7 @@ class Numbers(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """Where the craft moves to in the air (unit vector, inertial axes), and the dynamic pressure (N/m2)."""
+    """The direction of motion relative to the air (unit vector, inertial axes), and the dynamic pressure (N/m2)."""
 
     course: Vector
     pressure: Scalar

@@ -22,7 +22,7 @@ NEEDS = ("two-body",)
 
 
 class Params(NamedTuple):
-    """How flat the body is; by default the Earth."""
+    """The oblateness of the central body; the Earth's by default."""
 
     j2: Annotated[float, Parameter("1", text="second zonal harmonic, not normalised")] = 1.08262668e-3
     radius: Annotated[float, Parameter("m", above=0.0, text="equatorial radius that it refers to")] = BODIES["Earth"].radius

@@ -19,7 +19,7 @@ NUMBERS_FROM = 0
 
 
 class Params(NamedTuple):
-    """How strong it is."""
+    """The standard deviation of the torque."""
 
     deviation: Annotated[float, Parameter("N m", at_least=0.0, text="standard deviation on each body axis")]
 

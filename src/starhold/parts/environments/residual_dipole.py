@@ -29,7 +29,7 @@ BOUND_FROM = magnetic_field.RADIUS
 
 
 class Params(NamedTuple):
-    """How magnetic the craft is, and when it flies."""
+    """The craft's residual dipole, and the epoch."""
 
     dipole: Annotated[Vector, Parameter("A m^2", shape=(3,), spread=False, text="magnetic moment, body axes")]
     epoch: Annotated[Date, EPOCH] = START

@@ -29,7 +29,7 @@ FIRST = {"gyro_bias": ZERO}
 
 
 class Params(NamedTuple):
-    """How fast the estimate follows."""
+    """The gains of the filter, and its initial attitude."""
 
     attitude_gain: Annotated[
         float, Parameter("1", above=0.0, at_most=1.0, text="share of an attitude's error put right at once")

@@ -56,7 +56,7 @@ UNKNOWN = math.sqrt(math.pi**2 / 9.0 + 2.0 / 3.0)
 
 
 class Params(NamedTuple):
-    """How good the filter takes the gyro and the star tracker to be, in the words of these."""
+    """The noise of gyro and star tracker that the filter assumes, in the terms of those sensors."""
 
     noise: Annotated[float, Parameter("rad/s", at_least=0.0, text="of the gyro: deviation of the mean over a second")]
     bias_walk: Annotated[float, Parameter("rad/s", at_least=0.0, text="of the gyro: deviation of the bias's change in 1 h")]

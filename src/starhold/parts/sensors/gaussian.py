@@ -22,7 +22,7 @@ NUMBERS_FROM = 3
 
 
 class Params(NamedTuple):
-    """How large the errors are."""
+    """The standard deviations of the errors."""
 
     attitude: Annotated[float, Parameter("rad", at_least=0.0, text="standard deviation of the angle about each body axis")]
     rate: Annotated[float, Parameter("rad/s", at_least=0.0, text="standard deviation of each component")]

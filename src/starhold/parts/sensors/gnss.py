@@ -20,7 +20,7 @@ NEEDS = ("two-body",)
 
 
 class Params(NamedTuple):
-    """How good it is."""
+    """The errors of the receiver."""
 
     position: Annotated[float, Parameter("m", at_least=0.0, text="standard deviation of each component")] = 0.0
     velocity: Annotated[float, Parameter("m/s", at_least=0.0, text="standard deviation of each component")] = 0.0

@@ -22,7 +22,7 @@ HOUR = 3600.0
 
 
 class Params(NamedTuple):
-    """How good it is."""
+    """The errors of the gyro."""
 
     noise: Annotated[
         float,

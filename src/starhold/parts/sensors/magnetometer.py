@@ -32,7 +32,7 @@ FIRST = {"magnetic_field": ZERO, "magnetic_field_is_new": 0.0}
 
 
 class Params(NamedTuple):
-    """How good it is, and when it flies."""
+    """The errors of the magnetometer, and the epoch."""
 
     noise: Annotated[float, Parameter("T", at_least=0.0, text="standard deviation of each component")] = 0.0
     bias: Annotated[Vector, Parameter("T", shape=(3,), spread=False, text="added to the field, body axes")] = ZERO
@@ -79,6 +79,6 @@ def measure(state: Any, memory: Vector, params: Numbers, dice: Dice, step: int) 
 
 
 def examples() -> list[Params]:
-    """One of a CubeSat, and an exact one that is out for a while, at another time."""
+    """Return the magnetometer of a CubeSat, and an exact one with an outage and another epoch."""
     small = Params(noise=5e-8, bias=(2e-7, -1e-7, 3e-7), scale_error=0.002)
     return [small, Params(epoch=(2027.0, 6.0, 21.0, 12.0, 30.0, 15.0), outage=(0.5, 1.5))]

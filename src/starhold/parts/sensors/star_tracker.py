@@ -31,7 +31,7 @@ MOST = 64
 
 
 class Params(NamedTuple):
-    """How good it is."""
+    """The errors of the star tracker."""
 
     cross: Annotated[float, Parameter("rad", at_least=0.0, text="standard deviation about each axis across the boresight")]
     roll: Annotated[float, Parameter("rad", at_least=0.0, text="standard deviation about the boresight")]

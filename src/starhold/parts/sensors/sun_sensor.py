@@ -34,7 +34,7 @@ FIRST = {"sun": ZERO, "sun_is_seen": 0.0}
 
 
 class Params(NamedTuple):
-    """How good it is, where it looks, and when it flies."""
+    """The errors of the sensor, its boresight, and the epoch."""
 
     noise: Annotated[float, Parameter("rad", at_least=0.0, text="standard deviation about each axis")] = 0.0
     boresight: Annotated[Vector, Parameter("1", shape=(3,), spread=False, text="where it looks, body axes")] = (

@@ -19,7 +19,7 @@ from starhold.parts.roles import Goal
 AXIS = Parameter("1", shape=(3,), spread=False, text="body axis that points there")
 OTHER = Parameter("1", shape=(3,), spread=False, text="body axis that points as near as it can to the second direction")
 GRAVITY = Parameter("m^3/s^2", above=0.0, text="gravitational parameter of the body that it orbits")
-"""How targets declare their axes, in the same words."""
+"""The declaration of the axes, common to all targets."""
 
 
 class Moving(NamedTuple):

@@ -45,7 +45,7 @@ SPIN = math.tau * SIDEREAL / DAY
 
 
 class Params(NamedTuple):
-    """Where the station is, which axes point where, and when they fly."""
+    """The position of the station, the body axes that point at it, and the epoch."""
 
     latitude: Annotated[
         float, Parameter("rad", at_least=-0.5 * math.pi, at_most=0.5 * math.pi, text="geodetic, of the station")

@@ -16,7 +16,7 @@ STILL = True
 
 
 class Params(NamedTuple):
-    """Which attitude."""
+    """The attitude of the target."""
 
     attitude: Annotated[Quaternion, Parameter("1", shape=(4,), spread=False, text="unit quaternion, scalar first")] = NO_TURN
 

@@ -26,7 +26,7 @@ FOLLOWS = True
 
 
 class Params(NamedTuple):
-    """Which axes point where, and when they fly."""
+    """The body axes to be aligned, their directions, and the epoch."""
 
     axis: Annotated[Vector, AXIS] = (0.0, 0.0, 1.0)
     other: Annotated[Vector, OTHER] = (1.0, 0.0, 0.0)

@@ -27,22 +27,22 @@ const sources = new Map(Object.entries(living.laws).map(([number, law]) => {
   return [Number(number), `"use strict";\nconst law = ${JSON.stringify({ ...told, every: living.every })};\n`
     + `const fly = ${program(fly)};\nconst derive = ${derive ? program(derive) : "null"};\nconst note = ${program(note)};\n${document.getElementById("flight").textContent}`];
 }));
-const crews = new Map();
+const runners = new Map();
 const state = { asked: 0, flown: 0, arrived: [], results: new Map(), wanted: false };
 
-function crewOf(number) {
-  if (!crews.has(number)) {
+function runnerOf(number) {
+  if (!runners.has(number)) {
     const place = URL.createObjectURL(new Blob([sources.get(number)], { type: "text/javascript" }));
-    const crew = { worker: new Worker(place), busy: false, again: false };
-    crew.worker.onmessage = ({ data }) => {
-      crew.busy = false;
+    const runner = { worker: new Worker(place), busy: false, again: false };
+    runner.worker.onmessage = ({ data }) => {
+      runner.busy = false;
       state.arrived.push([number, data]);
       requestAnimationFrame(show);
-      if (crew.again) send(number);
+      if (runner.again) send(number);
     };
-    crews.set(number, crew);
+    runners.set(number, runner);
   }
-  return crews.get(number);
+  return runners.get(number);
 }
 
 // Whether a law flies again with what is moved: it does not where nothing of it is, or where it cannot follow.
@@ -72,13 +72,13 @@ function request(number) {
 }
 
 function send(number) {
-  const crew = crewOf(number);
-  crew.again = crew.busy;
-  if (crew.busy) return;
-  crew.busy = true;
+  const runner = runnerOf(number);
+  runner.again = runner.busy;
+  if (runner.busy) return;
+  runner.busy = true;
   const asked = request(number);
-  crew.early = transient;
-  crew.worker.postMessage(asked);
+  runner.early = transient;
+  runner.worker.postMessage(asked);
 }
 
 // --- what follows a move ---
@@ -123,7 +123,7 @@ function show() {
     if (!fates[number] || !fates[number].flies) continue;
     state.results.set(number, found);
     state.flown += 1;
-    if (crews.get(number).early === transient) {
+    if (runners.get(number).early === transient) {
       for (const [name, curves] of Object.entries(found.curves)) setCurves(name, number, curves, found.lost >= 0);
     }
     const steps = charts.get("accuracy");

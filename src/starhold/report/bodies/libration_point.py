@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 FRAMES = 1200
 """Places of the craft in the three-dimensional views."""
 SECONDS = 30.0
-"""How long the animation plays."""
+"""The duration of the animation."""
 TURNS = 10.0
 """Revolutions of the two bodies that are played at most; what follows is left out of the views."""
 

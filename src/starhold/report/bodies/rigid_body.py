@@ -35,7 +35,7 @@ EARLY = 1.6
 """Frame k of n shows the time T (k/n)^EARLY: most of the motion is at the start. Of a run that is long beside its transient
 half of the frames show that."""
 SECONDS = 14.0
-"""How long the animation plays."""
+"""The duration of the animation."""
 
 _VIEWS = (
     "Measurement in the axes of the target (dashed, x* y* z*); solid axes are the body's, and the angle "

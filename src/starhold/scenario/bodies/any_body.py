@@ -38,10 +38,10 @@ MARKER = "body"
 
 
 class AnyTiming(SeededTiming):
-    """How long and how finely."""
+    """The duration of a run, its control period and its integration steps."""
 
     lost_beyond: Annotated[
-        float | None, *quantity(Gain(above=0.0, text="distance at which the body counts its motion as lost; none if absent"))
+        float | None, *quantity(Gain(above=0.0, text="distance beyond which the motion has diverged; none if absent"))
     ] = None
 
 
@@ -136,7 +136,7 @@ class AnyBody(Body):
             parts=(Fitted(self.part, cast(Made, scenario.made).params), *scenario.parts),
             limit="none" if limit is None else table.control.limit_kind,
             command_limit=math.inf if limit is None else limit,
-            far=timing.lost_beyond or math.inf,
+            divergence_bound=timing.lost_beyond or math.inf,
             seed=timing.seed,
             run=timing.run,
         )

@@ -1,4 +1,4 @@
-"""How a body is told to scenarios: a module of this package holds a `BODY` with these members."""
+"""The interface between bodies and scenarios: a module of this package holds a `BODY` with these members."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Made(Protocol):
 
 class Moved(NamedTuple):
     """The numbers of a loop that values of a file's keys give: the body's first state as its motion begins and as the loop
-    is made with it, the craft that flies, the nominal model that the law has, and where the command is cut off."""
+    is made with it, the craft that flies, the nominal model that the law has, and the saturation limit of the command."""
 
     start: Any
     made_with: Any
@@ -96,8 +96,8 @@ class Body(Protocol):
         raise InputError(scenario.where, key, "a target", "none, for this body has no attitude")
 
     def options(self, scenario: Scenario, own: Any, gains: Any, key: str) -> Any:
-        """The options that a law's validated table, called `key` in errors, or the scenario for all laws gives beside the
-        gains. InputError where they do not fit the gains."""
+        """The options of a law beside its gains, from its validated table (called `key` in errors) or else from the
+        scenario. InputError if they do not fit the gains."""
         ...
 
     def build(self, scenario: Scenario, entry: LawEntry) -> Any:
@@ -120,7 +120,7 @@ class Body(Protocol):
     def moved(self, scenario: Scenario, loop: Any, values: Mapping[str, Any]) -> Moved:
         """The numbers of a law's loop under other values of the keys of `dials`: an equation, with the bits that `build`
         gives of the scenario that `changes` tells."""
-        return Moved(loop.start, loop.start, loop.craft, loop.craft, loop.cutoff())
+        return Moved(loop.start, loop.start, loop.craft, loop.craft, loop.saturation_limit())
 
     def admitted(self, scenario: Scenario, values: Mapping[str, Any]) -> Any:
         """The body's numbers as laws know them under these values of the keys of `dials`, which may be recorded numbers;

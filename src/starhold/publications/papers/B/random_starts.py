@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from starhold.analysis.rigid_body import DECADES
 from starhold.publications.figure import Curve, Figure, Panel
 from starhold.publications.verdicts import Finding
-from starhold.simulation.abreast import Flying, fly_abreast
+from starhold.simulation.batched import Flying, fly_batched
 from starhold.simulation.lane import Recording, label
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def first_passages(desk: Desk, kind: str) -> dict[str, Array]:
             def passages(number: int, samples: Array, carry: Any, flights: Any = flights) -> list[list[float]]:
                 return _passages(label(flights[number].loop, samples, carry, 1))
 
-            flown = fly_abreast(flights, passages)
+            flown = fly_batched(flights, passages)
             for number, name in enumerate(found):
                 found[name][law] = np.array([each[number] for each in flown])
         return found

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
 
 NEAR = 0.4
-"""Share of the nearer body's distance at which a motion counts as lost unless the file says where."""
+"""The divergence bound as a share of the nearer body's distance, unless the file gives one."""
 
 
 def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
@@ -38,16 +38,19 @@ def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
         limit="none" if math.isinf(entry.options.limit) else table.control.limit_kind,
         command_limit=entry.options.limit,
         seed=0,
-        far=table.simulation.lost_beyond or NEAR * nearer,
+        divergence_bound=table.simulation.lost_beyond or NEAR * nearer,
     )
 
 
 def check_start(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> None:
     """InputError where the law starts too far away, or asks for all the control there is where that has no limit."""
     away = norm(loop.start.position)
-    if away >= loop.far:
+    if away >= loop.divergence_bound:
         raise InputError(
-            scenario.where, "initial.position", f"a start {away:.6g} away", f"less than lost_beyond, {loop.far:.6g}"
+            scenario.where,
+            "initial.position",
+            f"a start {away:.6g} away",
+            f"less than lost_beyond, {loop.divergence_bound:.6g}",
         )
     measurement = PointMeasurement(loop.start.position, loop.start.velocity, loop.period, entry.options.limit)
     command, _ = loop.law.command(measurement, entry.gains, loop.known, loop.carry().memory)

@@ -23,7 +23,7 @@ def _known_pair(value: Any) -> Any:
 
 
 class LibrationTable(Table):
-    """Which point of which two bodies, what acts there, and the unit of length. Two bodies of one's own take the place of
+    """The libration point, its two bodies, the model of the motion, and the unit of length. Two bodies of one's own replace
     `primaries`."""
 
     primaries: Annotated[
@@ -87,7 +87,7 @@ class LibrationTable(Table):
 
 
 class Resources(Table):
-    """How much control there is, given in one of three ways, and how fast it follows."""
+    """The limit of the control, given in one of three ways, and its lag."""
 
     limit: Annotated[float | None, *scaled("acceleration", Gain("m/s^2", above=0.0, text="largest control"))] = None
     margin: Annotated[
@@ -115,7 +115,7 @@ class Resources(Table):
 
 
 class ControlTable(Resources):
-    """The control of every law that does not say otherwise."""
+    """The default control limits and lag of all laws."""
 
     limit_kind: Annotated[
         Literal["norm", "axis", "none"],
@@ -124,7 +124,7 @@ class ControlTable(Resources):
 
 
 class PointInitial(Table):
-    """Where the craft starts: from the libration point, or from the law's circle or place of rest."""
+    """The initial state, relative to the libration point, or to the law's circle or equilibrium."""
 
     relative_to: Annotated[
         Literal["point", "target"],
@@ -138,7 +138,7 @@ class PointInitial(Table):
 
 
 class PointTiming(Timing):
-    """How long and how finely."""
+    """The duration of a run, its control period and its integration steps."""
 
     duration: Annotated[float, *scaled("time", Gain("s", above=0.0, text="length of the run, in whole control periods"))]
     control_period: Annotated[float, *scaled("time", Gain("s", above=0.0, text="for which a control is held"))] = 0.001
@@ -146,7 +146,8 @@ class PointTiming(Timing):
     lost_beyond: Annotated[
         float | None,
         *scaled(
-            "length", Gain("m", above=0.0, text="distance at which the motion is lost; 0.4 of the nearer body's if absent")
+            "length",
+            Gain("m", above=0.0, text="distance beyond which the motion has diverged; 0.4 of the nearer body's if absent"),
         ),
     ] = None
 

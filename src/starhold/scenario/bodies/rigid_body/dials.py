@@ -67,7 +67,7 @@ class Dials(Body):
     def moved(self, scenario: Scenario, loop: ClosedLoop, values: Mapping[str, Any]) -> Moved:
         """The numbers of a loop under these values, as `build` and `make_events` give them."""
         nominal, flown = _crafts(scenario, values)
-        cutoff = values.get(LIMIT, loop.cutoff())
+        cutoff = values.get(LIMIT, loop.saturation_limit())
         attitude = unit_of(values[ATTITUDE]) if ATTITUDE in values else values.get(ANGLES)
         begun = start_of(scenario, target_of(scenario), attitude, values.get(RATE))
         # An inertia that changes as the motion begins leaves the angular momentum, as in `Phase.rate_from`.

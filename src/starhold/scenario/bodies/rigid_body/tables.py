@@ -21,7 +21,7 @@ from starhold.scenario.schema import LawTable, ScenarioTable, SeededTiming
 from starhold.scenario.tables import Flag, Table, at_key, refuse
 
 QUATERNION = Gain("1", shape=(4,), spread=False, text="quaternion, scalar first, normalised on reading")
-ANGLES = Gain("rad", shape=(3,), spread=False, text="Euler-Krylov angles yaw, pitch, roll")
+ANGLES = Gain("rad", shape=(3,), spread=False, text="Tait-Bryan (3-2-1) angles yaw, pitch, roll")
 
 
 MOMENTS = Gain("kg m^2", shape=(3, 3))

@@ -1,4 +1,4 @@
-"""Flies loops that differ in numbers side by side, a vector of lanes at a time, and records each as `fly` does."""
+"""Flies loops that differ only in numbers as batches, a vector of lanes at a time, and records each as `fly` does."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from starhold.algebra.structure import buffers, flatten, mapped, places
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import Arguments, Kernel, Numbers, form, make_kernel, make_step, numbers_of, one, state_of
 from starhold.simulation.lane import Progress, fly
-from starhold.simulation.lanes import alongside
+from starhold.simulation.lanes import stacked
 from starhold.trace.machine import aligned, widest
 
 FEW = 3
-"""So many loops fly one after another sooner than a kernel for lanes is compiled."""
+"""Up to this many loops are flown one by one, which takes less time than compiling a kernel for lanes."""
 MOST = 2**26
-"""Numbers that the samples of lanes abreast may have; longer flights are flown one by one."""
+"""Numbers that the samples of a vector of lanes may have; longer flights are flown one by one."""
 
 
 class Flying(NamedTuple):
@@ -32,7 +32,7 @@ class Flying(NamedTuple):
     record_every: int
 
 
-def fly_abreast(
+def fly_batched(
     flights: Sequence[Flying],
     use: Callable[[int, NDArray[np.float64], Any], Any],
     threads: int | None = None,
@@ -96,7 +96,7 @@ def _together(group: Sequence[Flying], numbers: Sequence[int], use: Callable[...
         return _one_by_one(group, numbers, use)
     phases = [flight.loop.phases(steps) for flight in group]
     # Of all lanes at once, so that one kernel flies every block of them.
-    whole = [Numbers.of(phase) for phase in alongside(phases)]
+    whole = [Numbers.of(phase) for phase in stacked(phases)]
     kernels = [make_kernel(one, loop.composition(), width, loop.carry(), values, loop.substeps) for values in whole]
 
     def block(first: int) -> list[tuple[int, Any]]:
