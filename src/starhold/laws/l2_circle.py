@@ -57,8 +57,8 @@ FORMS: dict[str, Any] = {"best": Best}
 def design(plant: Libration, spec: Best) -> Gains:
     """Take rate = sqrt(C - 2 Omega^2), at which the peak demand is 2 Omega sqrt(C - Omega^2) radius. ValueError for less
     C."""
-    rate, steep = least_rate(plant), plant.rate**2 + 2.0 * plant.stiffness
-    x = (2.0 * steep, 2.0 * math.sqrt(steep))
+    rate, growth = least_rate(plant), plant.rate**2 + 2.0 * plant.stiffness
+    x = (2.0 * growth, 2.0 * math.sqrt(growth))
     return Gains(spec.radius, rate, spec.alpha, spec.k, *x, spec.feedback, spec.boundary_layer, spec.model)
 
 

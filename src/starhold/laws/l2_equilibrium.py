@@ -44,10 +44,9 @@ FORMS: dict[str, Any] = {"degree": Degree}
 def design(plant: Libration, spec: Degree) -> Gains:
     """Place the double root -s along X, x'' = s^2 x + u; along Y and Z the natural frequency, critically damped."""
     square = plant.rate**2
-    steep = square + 2.0 * plant.stiffness
-    slow, out = plant.stiffness - square, plant.stiffness
-    velocity = (2.0 * math.sqrt(steep), 2.0 * math.sqrt(slow), 2.0 * math.sqrt(out))
-    return Gains(spec.y, spec.z, 2.0 * steep, velocity, spec.model)
+    x, y, z = square + 2.0 * plant.stiffness, plant.stiffness - square, plant.stiffness
+    velocity = (2.0 * math.sqrt(x), 2.0 * math.sqrt(y), 2.0 * math.sqrt(z))
+    return Gains(spec.y, spec.z, 2.0 * x, velocity, spec.model)
 
 
 def check(gains: Gains, plant: Libration) -> None:

@@ -33,9 +33,9 @@ def nonlinear_remainder(measurement: PointMeasurement, plant: Libration, model: 
 
 def check_x(k_position: float, k_velocity: float, plant: Libration) -> None:
     """ValueError where the feedback of `hold_x` leaves the motion along X unstable, x'' = (Omega^2 + 2 C) x + control."""
-    steep = plant.rate**2 + 2.0 * plant.stiffness
-    if k_position <= steep or k_velocity <= 0.0:
-        raise ValueError(f"k_x must be above {steep:.6g} and the velocity along X fed back, or X is unstable")
+    least = plant.rate**2 + 2.0 * plant.stiffness
+    if k_position <= least or k_velocity <= 0.0:
+        raise ValueError(f"k_x must be above {least:.6g} and the velocity along X fed back, or X is unstable")
 
 
 def hold_x(measurement: PointMeasurement, k_position: Scalar, k_velocity: Scalar, plant: Libration) -> Scalar:

@@ -295,8 +295,8 @@ def with_units(written: Any, value: Any) -> str:
 
 
 def _part(fitted: Fitted, shared: Collection[str], written: Mapping[str, Any]) -> str:
-    """The parameters of a part, with their units and meanings, numbers with units as the file has them; without those that
-    these keys of the scenario give."""
+    """The parameters of a part with their units and meanings; numbers that the file gives with units are shown as written
+    there. Parameters that these shared keys of the scenario give are left out."""
     rows: list[str] = []
     for item, value in zip(fitted.part.fields(), fitted.params, strict=True):
         if item.gain.shared in shared:

@@ -1,4 +1,4 @@
-"""Reads a scenario file; whatever is wrong with it becomes one line."""
+"""Reads a scenario file; every error in it is reported in one line."""
 
 from __future__ import annotations
 

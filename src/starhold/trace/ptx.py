@@ -66,8 +66,8 @@ def ptx(program: Program, processor: str = "sm_80") -> str:
 
 
 def assembly(text: Llvm, triple: str, processor: str = "", features: str = "") -> str:
-    """Return the assembly of a printed program for a machine, with LLVM's passes run over it. RuntimeError where LLVM was
-    built without that machine."""
+    """Return the assembly of a printed program for a target machine, optimised by LLVM. RuntimeError if this LLVM does not
+    support the target."""
     llvm: Any = import_module("llvmlite.binding")
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()

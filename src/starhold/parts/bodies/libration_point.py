@@ -184,7 +184,7 @@ class Units(NamedTuple):
 
     @property
     def time(self) -> float:
-        """Seconds in a unit of time."""
+        """The unit of time in seconds."""
         return 1.0 / self.rate
 
     @property
