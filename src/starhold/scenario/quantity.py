@@ -67,7 +67,7 @@ def scaled(kind: Literal["length", "velocity", "acceleration", "time", "rate"], 
 
 def reader(gain: Gain) -> Callable[..., Any]:
     """Return a function that converts a value of a file to numbers of the declared shape and bounds; its second argument is
-    the SI value of the unit of plain numbers, 1 by default."""
+    the SI value of the unit of the result, 1 for SI."""
 
     def read(value: Any, worth: float = 1.0) -> Any:
         try:
