@@ -4,7 +4,8 @@ import math
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
-from starhold.algebra.vector import ZERO
+from starhold.algebra.quaternion import to_reference
+from starhold.algebra.vector import ZERO, apply
 from starhold.parts.actuators import lag, rate_limit
 from starhold.parts.environments import gravity_gradient as gradient
 from starhold.parts.environments import random_torque
@@ -32,6 +33,11 @@ class Dynamics(NamedTuple):
 
     lag: float
     rate_limit: float = math.inf
+
+
+def angular_momentum(state: Any, craft: Any) -> Any:
+    """Angular momentum about the centre of mass in inertial axes (N m s)."""
+    return to_reference(state.attitude, apply(craft.inertia, state.rate))
 
 
 def _at(position: Any, attitude: Any = None, velocity: Any = None) -> Any:

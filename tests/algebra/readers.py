@@ -13,7 +13,6 @@ from flint import arb, ctx
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from starhold.algebra.cosines import from_axis_angle
 from starhold.loop.kernels import form
 from starhold.trace.calling import Compiled
 
@@ -137,6 +136,14 @@ angles = st.one_of(
 axis_turns = st.sampled_from(
     [(1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, -1.0, 0.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.6, -0.8, 0.0)]
 )
+
+
+def from_axis_angle(axis: Any, angle: float) -> Any:
+    """The quaternion of a rotation by `angle` (rad) about `axis` (any length but zero)."""
+    s = math.sin(0.5 * angle) / math.sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2)
+    return (math.cos(0.5 * angle), s * axis[0], s * axis[1], s * axis[2])
+
+
 quaternions = st.builds(from_axis_angle, directions, angles) | axis_turns
 """Unit quaternions: any, next to no turn, next to 180 degrees, and exact ones."""
 

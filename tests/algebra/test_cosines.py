@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from starhold.algebra import vector
-from starhold.algebra.cosines import from_angles, from_axis_angle, from_quaternion, to_angles, to_quaternion
+from starhold.algebra.cosines import from_angles, from_quaternion, to_angles, to_quaternion
 from starhold.algebra.quaternion import multiply, nearer, normalise, stretch, to_body
 from starhold.algebra.vector import apply, combine, determinant, transpose
 from tests.algebra.readers import (
@@ -18,6 +18,7 @@ from tests.algebra.readers import (
     angles,
     close,
     directions,
+    from_axis_angle,
     quaternions,
     rotation,
     same,

@@ -8,12 +8,10 @@ import sympy
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from starhold.algebra.cosines import from_axis_angle
 from starhold.algebra.quaternion import (
     NO_TURN,
     conjugate,
     derivative,
-    half_angle_cosine,
     half_angle_sine,
     multiply,
     nearer,
@@ -31,6 +29,7 @@ from tests.algebra.readers import (
     angles,
     close,
     directions,
+    from_axis_angle,
     numbers,
     quaternions,
     reduced_by_unit_norm,
@@ -62,8 +61,11 @@ fours = st.tuples(numbers, numbers, numbers, numbers)
 def test_every_reader_gives_the_same(p, q, r, c):
     for operation in (multiply, relative, nearer):
         agree(operation, p, q)
-    for operation in (conjugate, normalise, renormalise, vector_part, half_angle_sine, half_angle_cosine):
+    for operation in (conjugate, normalise, renormalise, vector_part):
         agree(operation, q)
+    # Squares of less vanish.
+    if all(x == 0.0 or abs(x) > 1e-150 for x in q):
+        agree(half_angle_sine, q)
     for operation in (to_body, to_reference, derivative):
         agree(operation, q, r)
     agree(stretch, c, q)
@@ -129,7 +131,7 @@ def test_half_turns(axis, short_by, r):
     mirrored = subtract(scale(2.0 * dot(n, r), n), r)
     assert close(to_body(q, r), mirrored, 4e-15 + 2.0 * abs(short_by))
     assert close(to_reference(q, r), mirrored, 4e-15 + 2.0 * abs(short_by))
-    assert half_angle_cosine(q) <= 1e-15 + abs(short_by)
+    assert abs(q[0]) <= 1e-15 + abs(short_by)
 
 
 @given(quaternions, small_vectors, small_vectors)
@@ -239,10 +241,7 @@ def test_normalise(q):
 def test_half_angle(axis, angle):
     q = from_axis_angle(axis, angle)
     assert half_angle_sine(q) == pytest.approx(abs(math.sin(0.5 * angle)), rel=1e-14, abs=1e-150)
-    assert half_angle_cosine(q) == abs(math.cos(0.5 * angle))
-    assert 2.0 * math.atan2(half_angle_sine(q), half_angle_cosine(q)) == pytest.approx(
-        rotation(q).magnitude(), rel=1e-14, abs=1e-15
-    )
+    assert 2.0 * math.atan2(half_angle_sine(q), abs(q[0])) == pytest.approx(rotation(q).magnitude(), rel=1e-14, abs=1e-15)
 
 
 def test_batches_of_scipy_rotations():

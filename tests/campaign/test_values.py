@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from starhold.campaign.dispersions import read_dispersions
-from starhold.campaign.values import locate, number_at, value_at, width_at
+from starhold.campaign.values import _filled, accepted, locate, width_at
 from starhold.scenario.building import build
 from starhold.scenario.json_schema import json_schema
 from starhold.scenario.reading import builtin_text, load, parse
@@ -23,6 +23,15 @@ WHEELS = load("wheels-orbital")
 SLEW = load("cubesat-slew")
 CIRCLE = load("l2-circle")
 FULL = [[2.0, 0.1, 0.0], [0.1, 3.0, 0.0], [0.0, 0.0, 4.0]]
+
+
+def value_at(scenario, key):
+    return locate(scenario, key).value
+
+
+def number_at(scenario, key, raw, name=""):
+    place = locate(scenario, key)
+    return accepted(scenario, place, _filled(place, raw, place.shape, name), name)
 
 
 def test_values_are_those_of_the_validated_tables():

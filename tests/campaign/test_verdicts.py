@@ -10,11 +10,10 @@ from scipy import stats
 
 from starhold.campaign import sequence
 from starhold.campaign.verdicts import (
+    acceptance,
     allowed_failures,
-    consumer_risk,
     failure_bounds,
     judge,
-    producer_risk,
     quantile_bound,
     runs_needed,
 )
@@ -36,7 +35,7 @@ def test_hanson_and_beard(failures, runs):
     assert runs_needed(0.9973, 0.1, failures) == runs
     assert allowed_failures(0.9973, 0.1, runs) == failures
     assert allowed_failures(0.9973, 0.1, runs - 1) == (failures - 1 if failures else None)
-    assert consumer_risk(0.9973, runs, failures) <= 0.1 < consumer_risk(0.9973, runs - 1, failures)
+    assert acceptance(0.9973, runs, failures) <= 0.1 < acceptance(0.9973, runs - 1, failures)
 
 
 @given(counts, probabilities)
@@ -52,8 +51,8 @@ def test_bounds_are_those_of_scipy(pair, confidence):
 @given(counts, probabilities)
 def test_risks_are_those_of_scipy(pair, share):
     failures, runs = pair
-    assert consumer_risk(share, runs, failures) == pytest.approx(stats.binom.cdf(failures, runs, 1.0 - share), abs=1e-10)
-    assert producer_risk(share, runs, failures) == pytest.approx(stats.binom.sf(failures, runs, 1.0 - share), abs=1e-10)
+    assert acceptance(share, runs, failures) == pytest.approx(stats.binom.cdf(failures, runs, 1.0 - share), abs=1e-10)
+    assert 1.0 - acceptance(share, runs, failures) == pytest.approx(stats.binom.sf(failures, runs, 1.0 - share), abs=1e-10)
 
 
 @given(st.integers(0, 60), st.floats(0.3, 0.999), st.floats(0.01, 0.5))

@@ -10,12 +10,13 @@ from scipy.integrate import solve_ivp
 from starhold.algebra.structure import flatten, unflatten
 from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.bodies.rigid_body import State, angular_momentum, kinetic_energy
+from starhold.parts.bodies.rigid_body import State, kinetic_energy
 from starhold.parts.catalogue import fit
 from starhold.parts.craft import make_craft
 from starhold.parts.targets import orbital
 from starhold.parts.targets.history import tabulate
 from starhold.simulation.lane import fly
+from tests.equations import angular_momentum
 from tests.making import ORBIT, ORBITAL, aimed
 
 J = np.array([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]])

@@ -12,10 +12,11 @@ from scipy.special import ndtr
 
 from starhold.algebra.words import bits_of, with_bits
 from starhold.parts.random import (
+    _joined,
+    _reduced,
     cosine_and_sine,
     normal_vector,
     normals,
-    squared_radius,
     threefry,
     to_angle,
     to_unit,
@@ -67,6 +68,10 @@ def same_bits(found, wanted):
 def shown(function):
     """The words that a function of words gives, as the doubles with their bits."""
     return lambda *given: tuple(with_bits(w) for w in function(*given))
+
+
+def squared_radius(x):
+    return _joined(*_reduced(x))
 
 
 FOUR, TWO = (0.0,) * 4, (0.0,) * 2

@@ -13,7 +13,6 @@ from starhold.algebra.vector import ZERO, add, apply, cross, dot, inverse, norm,
 from starhold.parts.bodies.rigid_body import (
     State,
     angular_acceleration,
-    angular_momentum,
     kinetic_energy,
     motion,
     renormalised,
@@ -29,7 +28,7 @@ from tests.algebra.readers import (
     symbols,
     vanishes,
 )
-from tests.equations import two_body_gravity_gradient
+from tests.equations import angular_momentum, two_body_gravity_gradient
 
 DIAGONAL = make_craft([2.0, 3.0, 4.0], 1.0)
 FULL = make_craft([[2.0, 0.1, -0.3], [0.1, 3.0, 0.2], [-0.3, 0.2, 4.0]], 1.0)

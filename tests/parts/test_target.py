@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from starhold.algebra.cosines import from_axis_angle
 from starhold.algebra.quaternion import NO_TURN, derivative, relative, stretch, to_body, to_reference
 from starhold.algebra.structure import move
 from starhold.algebra.structured import Buffer
@@ -17,7 +16,7 @@ from starhold.algebra.vector import ZERO, cross, dot, scale, unit
 from starhold.parts.craft import EARTH, make_craft
 from starhold.parts.roles import Goal
 from starhold.parts.targets.history import tabulate
-from tests.algebra.readers import agree, angles, close, directions, quaternions, same
+from tests.algebra.readers import agree, angles, close, directions, from_axis_angle, quaternions, same
 from tests.equations import history, inertial, orbital, two_body
 
 CRAFT = make_craft([1.0, 1.0, 1.0])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import starhold as sh
-from starhold.campaign.values import value_at
+from starhold.campaign.values import locate
 from starhold.errors import InputError
 from starhold.parts.catalogue import PACKAGES, parts
 from starhold.parts.epoch import EPOCH, START, date_of
@@ -335,7 +335,7 @@ def test_a_sweep_over_dates():
 
 def test_a_campaign_chooses_among_dates_and_draws_no_others():
     read = scenario("2026-03-20")
-    assert value_at(read, "orbit.epoch") == (2026.0, 3.0, 20.0, 0.0, 0.0, 0.0)
+    assert locate(read, "orbit.epoch").value == (2026.0, 3.0, 20.0, 0.0, 0.0, 0.0)
     over = {"orbit.epoch": {"distribution": "choice", "values": ["2026-03-20T12:00:00Z", [2026, 6, 21, 0, 0, 0]]}}
     for bad, told in (
         (

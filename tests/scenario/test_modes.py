@@ -5,7 +5,7 @@ import tomllib
 import jsonschema
 import pytest
 
-from starhold.campaign.values import value_at
+from starhold.campaign.values import locate
 from starhold.errors import InputError
 from starhold.laws.modes import mode_laws
 from starhold.loop.modes import loop_of_mode
@@ -118,11 +118,11 @@ def test_a_mode_changes_by_its_key_and_designs_its_gains():
     assert numbers["mode[1].until.rate_below"] == pytest.approx(0.017453292519943295)
     assert numbers["mode[1].until.dwell"] == 2.0
     assert numbers["mode[2].integral_limit"] == 1e-4
-    assert value_at(scenario, "law.mission.mode[1].until.dwell") == 2.0
-    assert value_at(scenario, "law.mission.mode[2].k_rate") == 0.006
+    assert locate(scenario, "law.mission.mode[1].until.dwell").value == 2.0
+    assert locate(scenario, "law.mission.mode[2].k_rate").value == 0.006
     for key in ("law.mission.mode[1].until", "law.mission.mode[3].k_rate", "law.mission.mode[1].gain"):
         with pytest.raises(InputError):
-            value_at(scenario, key)
+            locate(scenario, key)
     designed, _ = read(TEXT.replace("k_rate = 0.02\nk_attitude = 1e-6", 'form = "bandwidth"\nbandwidth = "0.1 rad/s"'))
     name, law, gains = mode_laws(designed.laws[0].law, designed.laws[0].gains)[0]
     assert (name, law.name) == ("detumble", "pd")

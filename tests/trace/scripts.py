@@ -42,7 +42,6 @@ from starhold.algebra.words import (
     number_of,
     rotate_left,
     shift_right,
-    small_number,
     with_bits,
     word_add,
     word_and,
@@ -51,7 +50,7 @@ from starhold.algebra.words import (
     word_xor,
 )
 from starhold.trace.program import Memory
-from tests.trace.machines import Subject
+from tests.trace.machines import Subject, small_number
 
 SPECIAL = (0.0, -0.0, 1.0, -1.0, 5e-324, -5e-324, 2.2250738585072014e-308, 1e308, -1e308, math.inf, -math.inf, math.nan)
 CONSTANTS = (*SPECIAL, 0.1, -2.5, 3.0, 1e-3)

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from starhold.algebra.operations import INDEX, WORD
 from starhold.algebra.scalar import less, sqrt, where
 from starhold.algebra.structured import Buffer, function, repeat, until
-from starhold.algebra.words import number_of, small_number, word_add, word_and
+from starhold.algebra.words import number_of, word_add, word_and
 from starhold.trace.llvm import Llvm
 from starhold.trace.machine import word
 from starhold.trace.program import Memory
 from starhold.trace.ptx import Threads, assembly, ptx
-from tests.trace.machines import Job, Subject, column, same
+from tests.trace.machines import Job, Subject, column, same, small_number
 from tests.trace.scripts import Script, scripts, subject, values
 
 FUSED = re.compile(r"\b(?:v?f(?:n?m(?:add|sub|la|ls)|ma)\w*|f64x2\.\w*madd|fmaf?|__fma)\b", re.I)

@@ -17,7 +17,7 @@ from starhold.algebra.polynomial import Polynomial, exact, pieces
 from starhold.algebra.structured import Buffer, at, repeat
 from starhold.trace.bounds import KINDS, Work
 from starhold.trace.program import Memory
-from tests.trace.machines import MACHINES, Subject, agree, need
+from tests.trace.machines import MACHINES, Subject, agree, need, small_number
 from tests.trace.scripts import SPECIAL
 
 NUMBERS = (*SPECIAL, 0.1, -2.5)
@@ -49,7 +49,7 @@ def put(out: Buffer, place: Any, kind: str, made: Any) -> None:
     """Write what an operation gives."""
     if kind == WORD:
         high, low = words.shift_right(made, 32), words.word_and(made, 0xFFFFFFFF)
-        out.put(place, (words.small_number(high), words.small_number(low)))
+        out.put(place, (small_number(high), small_number(low)))
     elif kind == TRUTH:
         out[place] = scalar.where(made, 1.0, 0.0)
     else:

@@ -17,7 +17,6 @@ from starhold.algebra.words import (
     number_of,
     rotate_left,
     shift_right,
-    small_number,
     word_add,
     word_of,
     word_xor,
@@ -27,7 +26,7 @@ from starhold.trace.javascript import JavaScript
 from starhold.trace.llvm import Llvm
 from starhold.trace.program import Memory
 from starhold.trace.recording import Recorder
-from tests.trace.machines import MACHINES, STRICT, Job, Subject, agree, need, on_c, on_lanes, on_node, same
+from tests.trace.machines import MACHINES, STRICT, Job, Subject, agree, need, on_c, on_lanes, on_node, same, small_number
 from tests.trace.scripts import SPECIAL
 
 CELLS = Memory("cells", True, True, 24)

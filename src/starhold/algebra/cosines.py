@@ -79,10 +79,3 @@ def to_angles(q: Quaternion) -> Vector:
     if abs(a[0][2]) > 1.0 - 1e-14:
         return (math.atan2(-a[1][0], a[1][1]), pitch, 0.0)
     return (math.atan2(a[0][1], a[0][0]), pitch, math.atan2(a[1][2], a[2][2]))
-
-
-def from_axis_angle(axis: Vector, angle: float) -> Quaternion:
-    """Return the quaternion of a rotation by `angle` (rad) about `axis` (any length but zero)."""
-    length = math.sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2)
-    s = math.sin(0.5 * angle) / length
-    return (math.cos(0.5 * angle), s * axis[0], s * axis[1], s * axis[2])

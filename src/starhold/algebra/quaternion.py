@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
-from starhold.algebra.scalar import Scalar, absolute, side, sqrt
+from starhold.algebra.scalar import Scalar, side, sqrt
 from starhold.algebra.vector import Vector, add, cross, dot, scale
 
 Quaternion: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar]
@@ -85,8 +85,3 @@ def nearer(q: Quaternion, other: Quaternion) -> Quaternion:
 def half_angle_sine(q: Quaternion) -> Scalar:
     """Return |sin(angle/2)|, the length of the vector part."""
     return sqrt(dot(vector_part(q), vector_part(q)))
-
-
-def half_angle_cosine(q: Quaternion) -> Scalar:
-    """Return cos(angle/2) of the shorter rotation."""
-    return absolute(q[0])

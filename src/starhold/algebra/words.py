@@ -128,13 +128,8 @@ def word_of(index: int) -> int:
     return index & MASK
 
 
-def small_number(word: Any) -> Scalar:
-    """Return a word below 2^52 as a number, by its place in a double's bits: vector units convert no 64-bit integers."""
-    return with_bits(word_or(word, 0x4330000000000000)) - 4503599627370496.0
-
-
 def whole_word(number: Any) -> Any:
-    """Return a whole number from 0 to 2^52 as a word, the other way round."""
+    """Return a whole number from 0 to 2^52 as a word: vector units convert no 64-bit integers."""
     return word_and(bits_of(number + 4503599627370496.0), 0x000FFFFFFFFFFFFF)
 
 

@@ -93,20 +93,6 @@ class Place:
         return InputError(self.where, f"{told}.{name}" if name else told, found, allowed)
 
 
-def value_at(scenario: Scenario, key: str) -> Any:
-    """The validated value of a key: a number, a tuple of numbers, rows of them, a word or a truth; None where neither the
-    file nor a default gives one. Of a matrix that the file gives by a number or a diagonal, the diagonal. InputError where
-    there is no such key, where it is that of a whole table, or where all runs of a campaign share it."""
-    return locate(scenario, key).value
-
-
-def number_at(scenario: Scenario, key: str, raw: Any, name: str = "") -> Any:
-    """The value that a raw one, a number or a string with a unit or a list of them, has at a key; a single one is that of
-    every component of a vector. InputError, which calls it `name`, where the key's own rules refuse it."""
-    place = locate(scenario, key)
-    return accepted(scenario, place, _filled(place, raw, place.shape, name), name)
-
-
 def accepted(scenario: Scenario, place: Place, value: Any, name: str = "") -> Any:
     """The validated form of a value that fits the key's shape. InputError where the scenario refuses it there."""
     try:

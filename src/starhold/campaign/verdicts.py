@@ -50,18 +50,6 @@ def acceptance(share: float, runs: int, failures: int) -> float:
     return 1.0 if failures == runs else float(special.betainc(runs - failures, failures + 1, share))
 
 
-def consumer_risk(share: float, runs: int, failures: int) -> float:
-    """Return the risk to accept, with at most so many failures allowed, a design that only just does not keep the share
-    asked."""
-    return acceptance(share, runs, failures)
-
-
-def producer_risk(share: float, runs: int, failures: int) -> float:
-    """Return the risk to refuse, with at most so many failures allowed, a design whose flights keep the requirement with the
-    probability `share`, which is better than the share that is asked."""
-    return 1.0 - acceptance(share, runs, failures)
-
-
 def runs_needed(share: float, risk: float, failures: int) -> int:
     """Return the least number of runs with which at most so many failures are accepted at a consumer's risk of at most
     `risk`.

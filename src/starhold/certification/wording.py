@@ -359,12 +359,6 @@ def _numbers(value: Any) -> str:
     return f"{value:.5g}"
 
 
-def brief(certificate: Certificate) -> str:
-    """All that is proved, in one line."""
-    proved = [sentence(c, certificate.subject) for c in certificate.claims if c.outcome == "proved"]
-    return "; ".join(proved) or "nothing is proved"
-
-
 def recheck(certificates: Sequence[Certificate], path: Path | None = None) -> str:
     """The command that checks a file of certificates again, with the files of the laws that it speaks of; without a path
     all files by their names alone, for a page or a header that is moved."""

@@ -113,11 +113,6 @@ def _joined(e: Scalar, s: Scalar) -> Scalar:
     return e * -1.3862943611198906 + s * _series(_LOGARITHM, s * s)
 
 
-def squared_radius(x: Scalar) -> Scalar:
-    """-2 log(x) for x > 0 (neither subnormal nor infinite), with a relative error below 3e-14 up to 1."""
-    return _joined(*_reduced(x))
-
-
 def cosine_and_sine(x: Scalar) -> tuple[Scalar, Scalar]:
     """cos(x pi / 2) and sin(x pi / 2) for -1/2 <= x <= 1/2, with relative errors below 7e-14 and 6e-15."""
     square = x * x

@@ -128,22 +128,6 @@ def _stretch(position: Vector, distance: Scalar) -> tuple[Scalar, Scalar]:
     return q, sqrt(1.0 + q)
 
 
-def jacobi(position: Vector, velocity: Vector, plant: Libration) -> Scalar:
-    """The Jacobi constant 2 U - v2 of `nonlinear`, less its value for rest at the point (scaled); likewise without
-    cancellation."""
-    flat = position[0] * position[0] + position[1] * position[1]
-    larger = _potential(position, plant.from_larger, plant.pull_larger)
-    smaller = _potential(position, plant.from_smaller, plant.pull_smaller)
-    return plant.rate * plant.rate * flat + 2.0 * (larger + smaller) - dot(velocity, velocity)
-
-
-def _potential(position: Vector, distance: Scalar, pull: Scalar) -> Scalar:
-    """The potential of `_tide`, zero at the origin."""
-    q, s = _stretch(position, distance)
-    bent = distance * position[0] * q * (s + 2.0) / (1.0 + s)
-    return pull * (bent - dot(position, position)) / (s * (1.0 + s))
-
-
 def motion(state: PointState, acceleration: Vector, control_rate: Vector | None) -> tuple[Vector, Vector, Vector | None]:
     """d(state)/dt under the acceleration of `linear` or `nonlinear` and the control the state holds, which changes at the
     given rate (None: held)."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quantity import Quantity
-from starhold.algebra.quaternion import Quaternion, derivative, relative, renormalise, to_body, to_reference
+from starhold.algebra.quaternion import Quaternion, derivative, relative, renormalise, to_body
 from starhold.algebra.scalar import Scalar, Truth, both, is_finite, less, side
 from starhold.algebra.structure import rows
 from starhold.algebra.vector import ZERO, Vector, add, apply, cross, dot, gyroscopic_torque, scale, subtract
@@ -159,8 +159,3 @@ def solve_symmetric(m: Any, v: Vector) -> Vector:
 def kinetic_energy(rate: Vector, craft: Craft) -> Scalar:
     """Rotational energy (J)."""
     return 0.5 * dot(rate, apply(craft.inertia, rate))
-
-
-def angular_momentum(state: State, craft: Craft) -> Vector:
-    """Angular momentum about the centre of mass in inertial axes (N m s)."""
-    return to_reference(state.attitude, apply(craft.inertia, state.rate))
