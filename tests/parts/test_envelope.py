@@ -8,9 +8,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from starhold.parts.effectors.envelope import authority, with_facets
+from starhold.parts.effectors.envelope import authority
 from starhold.parts.effectors.layouts import nasa_standard, pyramid, three_orthogonal
-from starhold.parts.effectors.wheels import MOST, allocate, allocate_peak, lose, make_wheels
+from starhold.parts.effectors.wheels import MOST, allocate, allocate_peak, lose, make_wheels, with_facets
 
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 COPLANAR = (*three_orthogonal(), (1.0, 1.0, 0.0), (1.0, -2.0, 0.0))

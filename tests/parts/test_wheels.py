@@ -16,7 +16,6 @@ from starhold.algebra.structure import flatten, leaves, move, unflatten
 from starhold.algebra.structured import Buffer, repeat
 from starhold.algebra.vector import add, apply, dot, gyroscopic_torque, inverse, scale, subtract
 from starhold.parts.craft import matrix
-from starhold.parts.effectors.envelope import with_facets
 from starhold.parts.effectors.layouts import nasa_standard, pyramid, three_orthogonal
 from starhold.parts.effectors.wheel_units import WHEEL_UNITS
 from starhold.parts.effectors.wheels import (
@@ -31,6 +30,7 @@ from starhold.parts.effectors.wheels import (
     motor,
     on_body,
     wheel_momentum,
+    with_facets,
 )
 from starhold.trace.calling import Compiled
 from starhold.trace.machine import load

@@ -1,35 +1,29 @@
-"""Flies a campaign into a folder, goes on with one, and flies single runs of it again."""
+"""Flies a campaign into a folder, or goes on with one."""
 
 from __future__ import annotations
 
-import hashlib
 import os
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
+from starhold.campaign.again import hashes
 from starhold.campaign.digest import digest
 from starhold.campaign.engines import Block, Engine, Threads, Workers, flying
-from starhold.campaign.job import Job, Source, scenario_of
+from starhold.campaign.job import Job, Source
 from starhold.campaign.manifest import FILE, Manifest
 from starhold.campaign.results import CampaignResult
 from starhold.campaign.store import Store
 from starhold.campaign.summary import summarise, verdicts_of
 from starhold.campaign.worst import brackets
 from starhold.errors import InputError
-from starhold.files import read_bytes
-from starhold.scenario.building import build
 from starhold.scenario.campaign import CampaignTable
-from starhold.scenario.checking import nearest, read_toml, show
+from starhold.scenario.checking import show
 from starhold.scenario.reading import Scenario
-from starhold.simulation.lanes import ThreadPool
-from starhold.studies.compare import fly_law
-from starhold.studies.flight import Flight
 
 if TYPE_CHECKING:
     from starhold.campaign.dispersions import Dispersion
@@ -103,7 +97,7 @@ def fly_campaign(
     manifest = Manifest(
         scenario=scenario.name,
         text=scenario.text,
-        settings={"files": _hashes(scenario.text, scenario.where, scenario.folder)}
+        settings={"files": hashes(scenario.text, scenario.where, scenario.folder)}
         | ({"until_decided": True} if options.until_decided else {}),
         laws=laws,
         runs=table.runs,
@@ -162,47 +156,6 @@ def fly_campaign(
     return CampaignResult(scenario.name, folder, runs, table.sampling, over, results, told, seconds, flown, asked)
 
 
-class FlownAgain(NamedTuple):
-    """A run of a campaign, flown again: its scenario, its flight, and the columns in which the campaign holds other bits
-    than come out now, which are none unless the machine computes otherwise."""
-
-    scenario: Scenario
-    flight: Flight
-    differs: tuple[str, ...]
-
-
-def fly_again(folder: Path, run: int, law: str | None = None) -> FlownAgain:
-    """Fly one run of a campaign again, by its own scenario, and record it. InputError where there is no such run."""
-    store = Store.open(folder)
-    manifest = store.manifest
-    name = manifest.laws[0] if law is None else law
-    if name not in manifest.laws:
-        raise InputError(str(folder), "law", show(name), nearest(name, list(manifest.laws)))
-    stored = store.row(name, run)
-    where = Path(manifest.folder)
-    now_there, then = _hashes(manifest.text, str(folder), where), manifest.settings.get("files", {})
-    for file in sorted({*now_there} & {*then}):
-        if now_there[file] != then[file]:
-            raise InputError(str(where / file), "", "a file that was changed since the campaign", "the file that was flown")
-    job = _job_of(Source(manifest.text, str(folder), where, manifest.allow_unstable))
-    with ThreadPool(1) as pool:
-        now = job(name, run, 1, pool)().rows
-    differs = tuple(column for column, value in stored.items() if not _equal(value, now[column][0]))
-    own = scenario_of(job, job.plan.columns(run, 1), run)
-    entry = own.pick(name)
-    return FlownAgain(own, fly_law(own, entry, build(own, entry)), differs)
-
-
-@lru_cache(maxsize=1)
-def _job_of(source: Source) -> Job:
-    """The job that flew a campaign, kept from one of its runs to the next."""
-    return Job(source, source.read().table.campaign)
-
-
-def _equal(a: Any, b: Any) -> bool:
-    return bool(a == b or (a != a and b != b))
-
-
 def _fly_until_decided(store: Store, job: Job, take: Callable[[Sequence[Block]], None]) -> int:
     """Fly on until every requirement of every law is decided, and return the number of runs. Looks are taken at numbers of
     runs that depend on nothing, so that every engine ends at the same one."""
@@ -243,31 +196,6 @@ def _chunk(runs: int, engine: Engine, at_once: bool) -> int:
     if isinstance(engine, Workers):
         most = min(most, -(-runs // (4 * engine.count)))
     return max(1, min(most, runs))
-
-
-def _hashes(text: str, where: str, folder: Path) -> dict[str, str]:
-    """SHA-256 of the files that a scenario's text names, as modules or as tables of numbers."""
-    found: dict[str, str] = {}
-
-    def look(value: Any) -> None:
-        if isinstance(value, str) and value not in found:
-            # Many strings are words, and some cannot name a file.
-            with suppress(OSError, ValueError):
-                found[value] = hashlib.sha256(read_bytes(folder / value)).hexdigest()
-        elif isinstance(value, dict):
-            for key, item in value.items():
-                if key not in WORDS:
-                    look(item)
-        elif isinstance(value, list):
-            for item in value:
-                look(item)
-
-    look(read_toml(text, where))
-    return found
-
-
-WORDS = ("name", "description", "type", "campaign")
-"""Keys of what names no file."""
 
 
 _SAID = {"judged_apart": "known before flight", "known_to_law": "known to the law"}

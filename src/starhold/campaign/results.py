@@ -15,8 +15,9 @@ from starhold.errors import shortly
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from starhold.campaign.campaign import FlownAgain
+    from starhold.campaign.again import FlownAgain
     from starhold.campaign.drivers import Drivers
+    from starhold.campaign.envelopes import Envelope
     from starhold.campaign.requirements import Requirement
     from starhold.campaign.sensitivity import Morris, Refused, Sobol
     from starhold.campaign.verdicts import Verdict
@@ -44,24 +45,6 @@ class Spread:
     quantiles: tuple[float, ...]
     edges: Array = field(repr=False)
     counts: NDArray[np.int64] = field(repr=False)
-
-
-@dataclass(frozen=True)
-class Envelope:
-    """How a quantity goes over time: in each window that ends at `times` (s), of the largest value in it of each run that
-    was not lost: the least, the 5 % quantile, the median, the 95 % quantile, the largest; all (windows,). The quantiles are
-    read off a histogram and right to within 3 %, of angles beyond 150 degrees to within 15 degrees; the extremes are
-    exact."""
-
-    name: str
-    unit: str
-    meaning: str
-    times: Array = field(repr=False)
-    least: Array = field(repr=False)
-    low: Array = field(repr=False)
-    median: Array = field(repr=False)
-    high: Array = field(repr=False)
-    most: Array = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -162,7 +145,7 @@ class CampaignResult:
     @shortly
     def again(self, run: int, law: str | None = None) -> FlownAgain:
         """One run, flown again and recorded. InputError where there is no such run."""
-        from starhold.campaign.campaign import fly_again
+        from starhold.campaign.again import fly_again
 
         return fly_again(self.folder, run, law)
 

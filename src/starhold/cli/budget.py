@@ -29,7 +29,7 @@ def budget(
     """Tell the pointing error by source, each alone and all together: a table, budget.csv, budget.png and summary.json."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-    from starhold.cli.show import console
+    from starhold.cli.console import console
     from starhold.report.budget_picture import draw
     from starhold.report.results import BUDGET, SUMMARY, open_folder, write_summary
     from starhold.report.tables import write_budget
@@ -73,7 +73,7 @@ def print_budget(found: Budget) -> None:
     from rich.table import Table
 
     from starhold.analysis.pointing import MEANINGS
-    from starhold.cli.show import console
+    from starhold.cli.console import console
     from starhold.report.budget_picture import setting_text, unit_of
     from starhold.studies.budget import COMBINED, TOGETHER
 

@@ -49,7 +49,7 @@ def campaign(
     """Fly many runs with numbers drawn from distributions: verdicts, what drives failures, the worst runs, report.html."""
     from starhold.campaign.campaign import Options, fly_campaign, with_campaign
     from starhold.campaign.engines import engine_of
-    from starhold.cli.show import console
+    from starhold.cli.console import console
     from starhold.cli.show_campaign import flying_campaign, print_campaign
     from starhold.report.campaign_files import write_campaign
     from starhold.scenario.reading import load
@@ -80,7 +80,7 @@ def query(
     from rich.table import Table
 
     from starhold.campaign.query import query as ask
-    from starhold.cli.show import console
+    from starhold.cli.console import console
 
     frame = ask(folder, sql, lambda line: print(f"starhold: {line}", file=sys.stderr))
     if csv:
@@ -114,8 +114,9 @@ def rerun(
     force: Force = False,
 ) -> None:
     """Fly one run of a campaign again, bit for bit: run.nc, its scenario file, pictures and report.html."""
-    from starhold.campaign.campaign import fly_again
-    from starhold.cli.show import console, print_outcome
+    from starhold.campaign.again import fly_again
+    from starhold.cli.console import console
+    from starhold.cli.show import print_outcome
     from starhold.files import atomic_write
     from starhold.report.body import report_of
     from starhold.report.figures import paint

@@ -22,7 +22,7 @@ def certify(
     Exit code 0: all that is claimed is proved; 3: something is refuted, with the state that does; 4: not decided.
     """
     from starhold.certification.wording import recheck
-    from starhold.cli.show import console
+    from starhold.cli.console import console
     from starhold.cli.show_certificates import print_certificate
     from starhold.report.results import open_folder, write_proofs
     from starhold.scenario.reading import load

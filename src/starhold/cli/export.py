@@ -61,7 +61,7 @@ def aem(
 ) -> None:
     """Write the attitudes of a run as a CCSDS attitude ephemeris message."""
     from starhold.api import export_aem
-    from starhold.cli.show import console
+    from starhold.cli.console import console
     from starhold.errors import InputError
 
     if output.exists() and not force:
@@ -74,7 +74,7 @@ def print_exported(exported: Exported, folder: Path) -> None:
     """The files, what a step costs, what is proved, and how to test them."""
     from rich.markup import escape
 
-    from starhold.cli.show import console
+    from starhold.cli.console import console
 
     code, work = exported.code, exported.code.work
     console.print(f"[bold]{code.name}[/bold]: {', '.join(exported.files)} in {folder}", highlight=False, soft_wrap=True)

@@ -24,7 +24,7 @@ def failures(
     """Tell what is left after the loss of any one or two wheels: a table, failures.csv and failures.png."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-    from starhold.cli.show import console
+    from starhold.cli.console import console
     from starhold.report.failures_picture import draw
     from starhold.report.results import FAILURES, open_folder
     from starhold.report.tables import write_failures
@@ -53,7 +53,7 @@ def print_failures(found: Sequence[Failure]) -> None:
     """One row a loss; of the gains those that were designed anew."""
     from rich.table import Table
 
-    from starhold.cli.show import console
+    from starhold.cli.console import console
     from starhold.report.text import number_text
 
     flown = [failure.gains for failure in found if failure.gains is not None]

@@ -25,7 +25,7 @@ def invariant(file: SystemFile = None, output: InvariantOutput = None, force: Fo
     """
     from starhold.certification import invariant as sets
     from starhold.certification.certificate import FILE
-    from starhold.cli.show import console
+    from starhold.cli.console import console
     from starhold.files import atomic_write
     from starhold.report.invariant_picture import PICTURE, draw
     from starhold.report.results import open_folder
@@ -56,7 +56,7 @@ def _print(certificate: Certificate, portraits: list[Portrait]) -> None:
     from rich.table import Table
 
     from starhold.certification.invariant.wording import HEADINGS, OBLIGATIONS, evidence, limit, sentence, size
-    from starhold.cli.show import console
+    from starhold.cli.console import console
     from starhold.cli.show_certificates import COLOURS
 
     console.print(f"\n[bold]{certificate.name}[/bold]", highlight=False)

@@ -102,7 +102,8 @@ def _fly(
 
     # First of all, for it takes as long to get ready as the flight takes.
     with Painter() as painter:
-        from starhold.cli.show import console, flying, print_outcome
+        from starhold.cli.console import console
+        from starhold.cli.show import flying, print_outcome
         from starhold.report.body import report_of
         from starhold.report.results import open_folder, write_results, write_run
         from starhold.scenario.reading import load
@@ -155,7 +156,8 @@ def design(
     allow_unstable: Unstable = False,
 ) -> None:
     """Print the gains that formulas give: every law of a file that has a `form`."""
-    from starhold.cli.show import console, print_design
+    from starhold.cli.console import console
+    from starhold.cli.show import print_design
     from starhold.scenario import designing
     from starhold.scenario.reading import load
 
@@ -226,7 +228,7 @@ def wheels() -> None:
 @app.command()
 def scenarios(name: Annotated[str | None, typer.Argument(help="print this scenario's text")] = None) -> None:
     """List the built-in scenarios, or print one."""
-    from starhold.cli.show import console
+    from starhold.cli.console import console
     from starhold.scenario.reading import builtin_names, builtin_text, load, nearest
 
     if name is None:
@@ -248,7 +250,7 @@ def new(
     force: Force = False,
 ) -> None:
     """Write a commented scenario file that runs as it is."""
-    from starhold.cli.show import console
+    from starhold.cli.console import console
     from starhold.files import atomic_write
     from starhold.scenario.reading import builtin_names, builtin_text, nearest
     from starhold.scenario.template import template_text

@@ -24,7 +24,7 @@ def modal_roots(
     """The root of the modal law that turns fastest within limits, over the initial angle: a table, a fit and a picture."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-    from starhold.cli.show import console
+    from starhold.cli.console import console
     from starhold.report.modal_roots_picture import draw
     from starhold.report.results import ROOTS, open_folder
     from starhold.report.tables import write_modal_roots
@@ -52,7 +52,7 @@ def print_roots(found: Study) -> None:
     """One row an angle, then how good the fits are."""
     from rich.table import Table
 
-    from starhold.cli.show import console
+    from starhold.cli.console import console
 
     heads = ["angle\n[dim]°[/dim]", "root\n[dim]1/s[/dim]", "time\n[dim]s[/dim]"]
     heads += ["peak rate\n[dim]°/s[/dim]", "peak accel.\n[dim]°/s²[/dim]"]

@@ -51,7 +51,7 @@ def check_part(
     """Run the conformance suite over a part or a law of your own."""
     from rich.markup import escape
 
-    from starhold.cli.show import console
+    from starhold.cli.console import console
     from starhold.conformance.parts import examine_part, find_part
     from starhold.conformance.suite import examine
     from starhold.laws.catalogue import Law
@@ -88,7 +88,7 @@ def _print_roles(groups: dict[str, Iterable[Part]]) -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    from starhold.cli.show import console
+    from starhold.cli.console import console
 
     for role, known in groups.items():
         table = Table(show_edge=False, pad_edge=False)
@@ -108,7 +108,8 @@ def print_part(part: Part) -> None:
     from rich.table import Table
 
     from starhold.algebra.quantity import quantities
-    from starhold.cli.show import console, print_fields
+    from starhold.cli.console import console
+    from starhold.cli.show import print_fields
 
     card = part.card
     console.print(f"[bold]{part.name}[/bold], {part.role}: {card.title}", highlight=False)

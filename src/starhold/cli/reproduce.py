@@ -29,9 +29,9 @@ def reproduce(
     processes: Annotated[int | None, typer.Option(min=1, help="side by side; all cores if nothing is said")] = None,
 ) -> None:
     """Make every figure, table and number of the publications again, beside what they print: a page each, with verdicts."""
-    from starhold.cli.show import console
+    from starhold.cli.console import console
     from starhold.publications.paper import papers_of
-    from starhold.report.reproduction import write_index
+    from starhold.publications.writing import write_index
     from starhold.report.results import open_folder
 
     letters = papers_of(paper)
@@ -51,7 +51,7 @@ def _make(letters: list[str], folder: Path, processes: int | None) -> list[Repro
 
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    from starhold.cli.show import console
+    from starhold.cli.console import console
 
     context = get_context("spawn")
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
@@ -104,7 +104,7 @@ def _begin(told: Any) -> None:
 def _work(letter: str, folder: Path) -> Reproduction:
     from dataclasses import replace
 
-    from starhold.report.reproduction import write_paper
+    from starhold.publications.writing import write_paper
 
     made = write_paper(letter, folder, lambda done, whole: _told.put((letter, done, whole)))
     # What is drawn by now need not travel.
@@ -116,7 +116,7 @@ def _print(made: list[Reproduction]) -> None:
 
     from rich.table import Table
 
-    from starhold.cli.show import console
+    from starhold.cli.console import console
     from starhold.publications.verdicts import VERDICTS
 
     table = Table(show_edge=False, pad_edge=False)

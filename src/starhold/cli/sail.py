@@ -100,7 +100,7 @@ def _read(option: str, text: str, gain: Any) -> float:
 
 
 def _write(station: Station, path: Path) -> None:
-    from starhold.cli.show import console
+    from starhold.cli.console import console
     from starhold.report.tables import write_sail
 
     write_sail(station, path)
@@ -109,7 +109,7 @@ def _write(station: Station, path: Path) -> None:
 
 def print_sail(station: Station, point: str, mass: float, area: float | None) -> None:
     """The design in words, then the tables."""
-    from starhold.cli.show import console
+    from starhold.cli.console import console
     from starhold.studies.sail import dearer
     from starhold.synthesis.circle import demand
 
@@ -152,7 +152,7 @@ def _margin(station: Station, area: float, mass: float) -> str:
 def _print_rates(station: Station) -> None:
     from rich.table import Table
 
-    from starhold.cli.show import console
+    from starhold.cli.console import console
     from starhold.studies.sail import reflectivities, rows
 
     columns = reflectivities(station)
@@ -172,7 +172,7 @@ def _print_deficits(station: Station, own: float | None) -> None:
     """Tell what deficits leave of what the circle asks; `own` is that of the sail there is, negative for a margin."""
     from rich.table import Table
 
-    from starhold.cli.show import console
+    from starhold.cli.console import console
     from starhold.studies.sail import DEFICITS
 
     table = Table(show_edge=False, pad_edge=False, title="What a deficit of control leaves", title_justify="left")

@@ -6,10 +6,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 from rich.table import Table
+
+from starhold.cli.console import WIDE, console
 
 if TYPE_CHECKING:
     from starhold.laws.catalogue import Law
@@ -19,13 +20,8 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry
     from starhold.studies.flight import Flight
 
-WIDE = 132
 COLUMN = 11
 """Characters that a metric takes."""
-console = Console()
-if not console.is_terminal:
-    # A file or a pipe has no width to keep to.
-    console = Console(width=WIDE)
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from starhold.campaign.verdicts import percent
-from starhold.cli.show import console
+from starhold.cli.console import console
 from starhold.errors import InputError
 from starhold.report.campaign_units import (
     CONTRADICTED,

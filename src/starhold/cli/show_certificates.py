@@ -10,7 +10,7 @@ from rich.table import Table
 
 from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.wording import HEADINGS, OBLIGATIONS, eigenvalues, evidence, methods, sentence, unclaimed
-from starhold.cli.show import console
+from starhold.cli.console import console
 from starhold.report.text import left_text
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ def studio(
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open the page in the browser")] = True,
 ) -> None:
     """Serve a page on this machine: edit a scenario, certify, design, fly and compare, and see results beside each other."""
-    from starhold.cli.show import console
+    from starhold.cli.console import console
     from starhold.files import read_text
     from starhold.scenario.reading import builtin_names, builtin_text, nearest
     from starhold.scenario.template import template_text

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from starhold.campaign.campaign import fly_again
+from starhold.campaign.again import fly_again
 from starhold.files import atomic_write
 from starhold.report.campaign_page import write_page
 from starhold.report.results import PAGE, write_run

@@ -13,7 +13,8 @@ from starhold.report.campaign_units import Wording, count_text, headings_of, pla
 from starhold.report.page_parts import rounded
 
 if TYPE_CHECKING:
-    from starhold.campaign.results import CampaignResult, Envelope, Spread
+    from starhold.campaign.envelopes import Envelope
+    from starhold.campaign.results import CampaignResult, Spread
 
 FLAT = 1e-3
 """Edges of bins whose ratios agree to this are those of a logarithmic scale."""

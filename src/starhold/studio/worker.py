@@ -187,7 +187,7 @@ def _document(scenario: Scenario, folder: Path, parts: list[str]) -> str:
 
 
 def _rerun(campaign: Path, law: str, run: int, folder: Path, tell: Tell) -> str:
-    from starhold.campaign.campaign import fly_again
+    from starhold.campaign.again import fly_again
     from starhold.report.results import write_results
 
     tell(0, 0, f"run {run} of {law} flies")

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 from starhold.algebra.operations import INDEX, NUMBER, OPERATIONS, TRUTH, UNIFORM, WORD, written_at
 from starhold.errors import InputError
-
-if TYPE_CHECKING:
-    from starhold.trace.recording import Recorder
 
 INSTEAD = "+ - * /, sqrt and the other operations of starhold.algebra.scalar"
 
@@ -25,7 +22,7 @@ class Handle:
     kind = ""
     __hash__ = object.__hash__
 
-    def __init__(self, recorder: Recorder, ref: str) -> None:
+    def __init__(self, recorder: Any, ref: str) -> None:
         self.recorder, self.ref = recorder, ref
 
     def __bool__(self) -> bool:

@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.structured import Buffer
 from starhold.algebra.vector import Vector
-from starhold.parts.effectors.wheels import COPLANAR, Wheels
+
+if TYPE_CHECKING:
+    from starhold.parts.effectors.wheels import Wheels
 
 Array = NDArray[np.float64]
+COPLANAR = 1e-9
+"""Sine of the angle below which axes count as parallel, or as lying in a plane."""
 
 
-def with_facets(wheels: Wheels) -> Wheels:
-    """The wheels with what `allocate_peak` needs. The facets are as many for any wheels of that number, so that one kernel
-    serves them before a loss and after."""
-    return wheels._replace(facets=_facets(wheels.axes, _counted(wheels)))
+def facets_of(axes: tuple[Vector, ...], least: tuple[Vector, ...]) -> Buffer:
+    """The facets that `allocate_peak` needs, of wheels with these axes and shares by least squares."""
+    return _facets(axes, _counted(least))
 
 
 def authority(wheels: Wheels, kind: Literal["axis", "norm"] = "norm", *, peak: bool = False) -> float:
@@ -29,11 +32,11 @@ def authority(wheels: Wheels, kind: Literal["axis", "norm"] = "norm", *, peak: b
     Shared out by least squares it is the largest such ball or box. With the least peak it is the largest within the
     envelope of wheels that all have the least of the limits: the largest, where the limits are equal.
     """
-    limits = [wheels.torque_limit[k] for k in _counted(wheels)]
+    limits = [wheels.torque_limit[k] for k in _counted(wheels.least)]
     if peak:
-        pieces = np.array(_facets(wheels.axes, _counted(wheels)).cells).reshape(-1, 6 + 3 * len(wheels.axes))
+        pieces = np.array(facets_of(wheels.axes, wheels.least).cells).reshape(-1, 6 + 3 * len(wheels.axes))
         return min(limits) / float(_sizes(pieces[:, :3], kind).max())
-    shares = _sizes(np.array(wheels.least)[list(_counted(wheels))], kind)
+    shares = _sizes(np.array(wheels.least)[list(_counted(wheels.least))], kind)
     return min(limit / share for limit, share in zip(limits, shares.tolist(), strict=True))
 
 
@@ -42,9 +45,9 @@ def _sizes(rows: Array, kind: str) -> Array:
     return np.linalg.norm(rows, axis=1, ord=1 if kind == "axis" else 2)
 
 
-def _counted(wheels: Wheels) -> tuple[int, ...]:
+def _counted(least: tuple[Vector, ...]) -> tuple[int, ...]:
     """The wheels that torque is shared out among."""
-    return tuple(k for k, row in enumerate(wheels.least) if any(row))
+    return tuple(k for k, row in enumerate(least) if any(row))
 
 
 @cache

@@ -23,6 +23,7 @@ from starhold.algebra.structured import Buffer, repeat
 from starhold.algebra.vector import Vector, add, cross, dot, scale
 from starhold.parts.contract import Card
 from starhold.parts.craft import check_inertia, check_rest, compact, vector
+from starhold.parts.effectors.envelope import COPLANAR, facets_of
 from starhold.parts.effectors.layouts import pyramid, three_orthogonal
 
 CARD = Card(
@@ -49,15 +50,13 @@ would make any integrator of fixed step chatter about standstill."""
 
 ALLOCATIONS, MOST = ("least-squares", "least-peak"), 24
 """Ways to share out a torque, and how many wheels a craft has at most: the work of the second grows with their cube."""
-COPLANAR = 1e-9
-"""Sine of the angle below which axes count as parallel, or as lying in a plane."""
 _WORST_CONDITION = 1e3
 
 
 class Wheels(NamedTuple):
     """N wheels: unit spin axes (body), rotor inertias about them (kg m2), largest motor torques (N m; 0 for a lost wheel),
     largest axial momenta (N m s), viscous (N m s) and Coulomb friction (N m); and how to share out a torque, by least
-    squares (one row a wheel, zero for one that takes no part) or with the least peak (see `envelope.with_facets`, without
+    squares (one row a wheel, zero for one that takes no part) or with the least peak (see `with_facets`, without
     which there is nothing to share it out with)."""
 
     axes: tuple[Vector, ...]
@@ -97,9 +96,13 @@ class Sample(NamedTuple):
 
 def prepare(params: Wheels, period: float) -> Wheels:
     """The wheels with what their allocation needs."""
-    from starhold.parts.effectors.envelope import with_facets
-
     return with_facets(params) if params.allocation else params
+
+
+def with_facets(wheels: Wheels) -> Wheels:
+    """The wheels with what `allocate_peak` needs. The facets are as many for any wheels of that number, so that one kernel
+    serves them before a loss and after."""
+    return wheels._replace(facets=facets_of(wheels.axes, wheels.least))
 
 
 def remember(params: Wheels) -> State:
@@ -166,7 +169,7 @@ def allocate_peak(torque: Vector, wheels: Wheels) -> Numbers:
     """
     facets, width = wheels.facets, 6 + 3 * len(wheels.axes)
     if not isinstance(facets, Buffer):
-        raise TypeError("these wheels have no facets: see parts.effectors.envelope.with_facets")
+        raise TypeError("these wheels have no facets: see parts.effectors.wheels.with_facets")
 
     def piece(k: Any) -> tuple[Any, ...]:
         n0, n1, n2, e0, e1, e2, *rows = facets.row(k, width)

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from starhold.files import atomic_write
+from starhold.publications.drawing import draw
+from starhold.publications.page import index_page, paper_page
 from starhold.publications.reproduction import Reproduction, reproduce
-from starhold.report.reproduction_figures import draw
-from starhold.report.reproduction_page import index_page, paper_page
 from starhold.report.results import INDEX, SUMMARY
 from starhold.version import __version__
 

@@ -1,0 +1,85 @@
+"""Flies single runs of a campaign again, each by its own scenario."""
+
+from __future__ import annotations
+
+import hashlib
+from contextlib import suppress
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from starhold.campaign.job import Job, Source, scenario_of
+from starhold.campaign.store import Store
+from starhold.errors import InputError
+from starhold.files import read_bytes
+from starhold.scenario.building import build
+from starhold.scenario.checking import nearest, read_toml, show
+from starhold.scenario.reading import Scenario
+from starhold.simulation.lanes import ThreadPool
+from starhold.studies.compare import fly_law
+from starhold.studies.flight import Flight
+
+WORDS = ("name", "description", "type", "campaign")
+"""Keys of what names no file."""
+
+
+class FlownAgain(NamedTuple):
+    """A run of a campaign, flown again: its scenario, its flight, and the columns in which the campaign holds other bits
+    than come out now, which are none unless the machine computes otherwise."""
+
+    scenario: Scenario
+    flight: Flight
+    differs: tuple[str, ...]
+
+
+def fly_again(folder: Path, run: int, law: str | None = None) -> FlownAgain:
+    """Fly one run of a campaign again, by its own scenario, and record it. InputError where there is no such run."""
+    store = Store.open(folder)
+    manifest = store.manifest
+    name = manifest.laws[0] if law is None else law
+    if name not in manifest.laws:
+        raise InputError(str(folder), "law", show(name), nearest(name, list(manifest.laws)))
+    stored = store.row(name, run)
+    where = Path(manifest.folder)
+    now_there, then = hashes(manifest.text, str(folder), where), manifest.settings.get("files", {})
+    for file in sorted({*now_there} & {*then}):
+        if now_there[file] != then[file]:
+            raise InputError(str(where / file), "", "a file that was changed since the campaign", "the file that was flown")
+    job = _job_of(Source(manifest.text, str(folder), where, manifest.allow_unstable))
+    with ThreadPool(1) as pool:
+        now = job(name, run, 1, pool)().rows
+    differs = tuple(column for column, value in stored.items() if not _equal(value, now[column][0]))
+    own = scenario_of(job, job.plan.columns(run, 1), run)
+    entry = own.pick(name)
+    return FlownAgain(own, fly_law(own, entry, build(own, entry)), differs)
+
+
+@lru_cache(maxsize=1)
+def _job_of(source: Source) -> Job:
+    """The job that flew a campaign, kept from one of its runs to the next."""
+    return Job(source, source.read().table.campaign)
+
+
+def _equal(a: Any, b: Any) -> bool:
+    return bool(a == b or (a != a and b != b))
+
+
+def hashes(text: str, where: str, folder: Path) -> dict[str, str]:
+    """SHA-256 of the files that a scenario's text names, as modules or as tables of numbers."""
+    found: dict[str, str] = {}
+
+    def look(value: Any) -> None:
+        if isinstance(value, str) and value not in found:
+            # Many strings are words, and some cannot name a file.
+            with suppress(OSError, ValueError):
+                found[value] = hashlib.sha256(read_bytes(folder / value)).hexdigest()
+        elif isinstance(value, dict):
+            for key, item in value.items():
+                if key not in WORDS:
+                    look(item)
+        elif isinstance(value, list):
+            for item in value:
+                look(item)
+
+    look(read_toml(text, where))
+    return found

@@ -1,0 +1,9 @@
+"""Commands print here."""
+
+from rich.console import Console
+
+WIDE = 132
+console = Console()
+if not console.is_terminal:
+    # A file or a pipe has no width to keep to.
+    console = Console(width=WIDE)
