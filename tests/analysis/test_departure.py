@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from starhold.algebra.scalar import side
-from starhold.analysis.departure import CHANGES, LOST, MET, departures, fed_back
+from starhold.analysis.departure import CHANGES, LOST, MET, departures, fed_back, start_inside
 from starhold.certification.certificate import BESIDE, Certificate, Claim, Obligation, write
 from starhold.certification.certify import certify
 from starhold.certification.wording import HEADINGS, sentence
@@ -24,7 +24,6 @@ from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import Recording, fly, label
 from starhold.studies import compare
-from starhold.studies.bodies.rigid_body import start_inside
 from starhold.studies.certificates import certify_scenario
 from starhold.studies.compare import fly_law, prove
 from tests.making import built

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from starhold.analysis.departure import start_inside
 from starhold.analysis.trial import fly_claims
 from starhold.certification.certificate import write
 from starhold.certification.certify import certify
@@ -16,7 +17,7 @@ from starhold.errors import InputError
 from starhold.parts.craft import check_inertia
 from starhold.scenario.building import build
 from starhold.scenario.reading import load, parse
-from starhold.studies.bodies.rigid_body import certify_law, start_inside
+from starhold.studies.bodies.rigid_body import certify_law
 from starhold.studies.compare import fly_law, prove
 
 EARTH, RADIUS = 3.986e14, 6.4e6

@@ -9,6 +9,7 @@ from scipy.optimize import minimize
 
 from starhold.algebra.quaternion import derivative
 from starhold.algebra.vector import ZERO, add
+from starhold.analysis.departure import start_inside
 from starhold.analysis.trial import fly_claims
 from starhold.certification import region
 from starhold.certification.certify import Wanted, certify
@@ -19,7 +20,6 @@ from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.bodies.rigid_body import angular_acceleration
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
-from starhold.studies.bodies.rigid_body import start_inside
 from tests.making import noise
 from tests.small import CRAFT
 

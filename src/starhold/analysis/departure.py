@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.scalar import side
-from starhold.algebra.vector import ZERO
+from starhold.algebra.vector import ZERO, add, apply, subtract
 from starhold.analysis.metrics import ALMOST, on_limit
 from starhold.certification.certificate import WHEELS
 from starhold.certification.openness import WITHOUT
@@ -18,7 +19,6 @@ from starhold.certification.region import Shape
 from starhold.laws.interface import Measurement
 from starhold.loop.kernels import make_step
 from starhold.parts.bodies.rigid_body import kinetic_energy
-from starhold.parts.craft import tensor
 from starhold.parts.effectors.wheels import BAND, Wheels
 from starhold.parts.quaternion_sign import SIGN_POLICIES
 
@@ -56,6 +56,16 @@ class Span:
     def begun(self) -> float:
         """Return the time of the first sample (s)."""
         return float(self["time"][0])
+
+    @cached_property
+    def shown(self) -> Measurement:
+        """The measurements that the law is shown, but for noise and torque from outside: numbers are columns (n,)."""
+        wheels = self.loop.wheels
+        stored: Any = ZERO if wheels is None else tuple((self["wheel_momentum"] @ np.array(wheels.axes)).T)
+        attitude: Any = tuple(fed_back(self.loop, self["attitude_error"]).T)
+        rate, error_rate = (cast(Any, tuple(self[name].T)) for name in ("rate", "rate_error"))
+        turning = subtract(rate, error_rate)
+        return Measurement(attitude, error_rate, rate, turning, ZERO, ZERO, ZERO, self.loop.period, stored)
 
     def first(self, held: Any, how: str) -> list[Departure]:
         """Return a departure at the first sample at which something holds (n,)."""
@@ -201,49 +211,64 @@ def _set(claim: Claim, span: Span) -> list[Departure]:
     found: list[Departure] = []
     momentum = claim.numbers.get("momentum")
     if momentum is not None:
-        rigid = span["rate"] @ tensor(span.loop.craft.inertia)
-        total = np.linalg.norm(rigid + _stored(span), axis=1)
+        total = momentum_of(span.loop, span.shown)
         found += span.first(total > momentum * (1.0 + 1e-9), "the total momentum is more than told")
-    value = _function(claim, span)
+    start, level = _levels(claim)
+    value = None if start is None or level is None else value_of(claim, span.loop, span.shown)
     if value is None:
         return found
-    start, level = _levels(claim)
-    assert start is not None
-    assert level is not None
     if value[0] > start:
         return [*found, *span.always("it is outside the set")]
     # The integration lets V of a motion along the border rise by its own error.
-    return [*found, *span.first(value > level * (1.0 + 1e-6), "it leaves the set")]
+    return [*found, *span.first(value > cast(float, level) * (1.0 + 1e-6), "it leaves the set")]
 
 
-def _function(claim: Claim, span: Span) -> Array | None:
-    """Return V over time; None for a claim about every state."""
-    loop = span.loop
-    if None in _levels(claim):
-        return None
-    q, rate = fed_back(loop, span["attitude_error"]).T, tuple(span["rate_error"].T)
+def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
+    """Tell whether the loop's start lies in the sets of the proved claims that are about a level of V."""
+    if loop.remembers:
+        return {}
+    # The true start, whatever the sensors make of it.
+    loop, found = loop.without("sensor", "estimator"), dict[str, bool]()
+    shown = shown_at(loop, loop.start)
+    momentum = momentum_of(loop, shown)
+    for claim in _left(certificate):
+        if claim.kind == "region" or (loop.law.lyapunov is not None and "start" in claim.numbers):
+            level, value = _levels(claim)[0], value_of(claim, loop, shown)
+            inside = momentum <= claim.numbers.get("momentum", np.inf) and (level is None or value <= level)
+            found[claim.kind] = bool(inside)
+    return found
+
+
+def shown_at(loop: ClosedLoop, state: Any) -> Measurement:
+    """Return the measurement that the law is shown at a state as a flight begins; numbers may be columns (n,)."""
+    carry = loop.carry()._replace(state=state)
+    shown = make_step(loop.composition()).measure(carry, 0, 0, loop.craft, loop.setup())
+    error = np.array(shown.attitude)
+    attitude: Any = tuple(fed_back(loop, np.atleast_2d(error.T)).T.reshape(error.shape))
+    return shown._replace(attitude=attitude)
+
+
+def value_of(claim: Claim, loop: ClosedLoop, shown: Measurement) -> Any:
+    """Return the claim's V at measurements; None where the law has none. Polynomials take whole columns at once."""
+    function, stiffness = loop.law.lyapunov, claim.witness.get("stiffness")
     if claim.kind == "region":
-        return Shape(**claim.witness).value(loop.law.module.single_root(loop.gains)[0], q, rate)
-    stiffness, function = claim.witness.get("stiffness"), loop.law.lyapunov
-    if stiffness is not None:
-        return np.asarray(kinetic_energy(cast(Any, rate), loop.craft) + 2.0 * stiffness * (1.0 - q[0]))
-    # What has been read as a polynomial takes whole columns at once.
-    columns: Any = [tuple(x.T) for x in (span["rate"], span["rate"] - span["rate_error"], _stored(span))]
-    measurement = Measurement(tuple(q), cast(Any, rate), columns[0], columns[1], ZERO, ZERO, ZERO, loop.period, columns[2])
+        return Shape(**claim.witness).value(loop.law.module.single_root(loop.gains)[0], shown.attitude, shown.rate)
     if claim.kind == "sliding":
-        return np.asarray(kinetic_energy(loop.law.module.surface(measurement, loop.gains), loop.craft))
-    return None if function is None else np.asarray(function(measurement, loop.gains, loop.craft))
+        return kinetic_energy(loop.law.module.surface(shown, loop.gains), loop.craft)
+    if stiffness is not None:
+        return kinetic_energy(shown.rate, loop.craft) + 2.0 * stiffness * (1.0 - shown.attitude[0])
+    return None if function is None else function(shown, loop.gains, loop.craft)
+
+
+def momentum_of(loop: ClosedLoop, shown: Measurement) -> Any:
+    """Return the norm of the angular momentum of body and wheels (N m s)."""
+    return np.linalg.norm(add(apply(loop.craft.inertia, shown.body_rate), shown.wheel_momentum), axis=0)
 
 
 def _levels(claim: Claim) -> tuple[float | None, float | None]:
     """Return the most that V is at the start, and from then on; None for no bound."""
     start = claim.numbers.get("start", claim.numbers.get("level"))
     return start, claim.numbers.get("level", start)
-
-
-def _stored(span: Span) -> Array:
-    wheels = span.loop.wheels
-    return np.zeros_like(span["rate"]) if wheels is None else span["wheel_momentum"] @ np.array(wheels.axes)
 
 
 def fed_back(loop: ClosedLoop, error: Array) -> Array:

@@ -5,15 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
-from starhold.algebra.vector import ZERO
+from starhold.algebra.quaternion import vector_part
+from starhold.algebra.structure import unflatten
+from starhold.algebra.vector import ZERO, apply, dot
+from starhold.analysis.departure import shown_at, value_of
 from starhold.certification.certificate import Certificate, Claim
-from starhold.certification.frame import Frame, take_apart
+from starhold.certification.frame import take_apart
 from starhold.certification.matrices import floats, number
 from starhold.certification.motion import Motion
 from starhold.certification.potential import Potential, Spring
@@ -79,7 +82,7 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
     random = np.random.default_rng(seed)
     states = draw(flights, floats(frame.P), frame.potential, level, random)
     free, states = _paced(free, certificate, states, random)
-    value, floor = _value(free, frame, claim.witness["epsilon"]), 1e-15 * number(frame.potential.top)
+    value, floor = _value(free, claim), 1e-15 * number(frame.potential.top)
     highest, torque = 0.0, 0.0
     for batch, share in _falling(free, certificate, claim, states, value, floor):
         highest = max(highest, share)
@@ -94,13 +97,9 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
 def _fly_region(loop: ClosedLoop, certificate: Certificate, claim: Claim, flights: int, seed: int) -> Trial:
     free, shape, level = _undisturbed(loop, certificate), Shape(**claim.witness), claim.numbers["level"]
     a = free.law.module.single_root(free.gains)[0]
-    sign: Callable[[Array], Any] = lambda q0: np.where(q0 < 0.0, -1.0, 1.0) if free.sign_policy == "shortest" else 1.0  # noqa: E731
-
-    def value(states: Array) -> Array:
-        return shape.value(a, states[ROWS.attitude] * sign(states[0]), states[ROWS.rate])
-
     states = shape.draw(a, level, flights, np.random.default_rng(seed))
     free, states = _paced(free, certificate, states, np.random.default_rng(seed + 1))
+    value = _value(free, claim)
     shares = [share for _, share in _falling(free, certificate, claim, states, value, 1e-15 * a * a)]
     return Trial(flights, level, max(shares), None)
 
@@ -146,13 +145,9 @@ def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, fl
     states = draw(flights, J, Spring(1), 2.0 + level, np.random.default_rng(seed))
     if not claim.numbers["everything"]:
         states[ROWS.attitude] *= np.where(states[0] < 0.0, -1.0, 1.0)
-    surface = loop.law.module.surface
 
     def s_of(states: Array) -> Array:
-        w: Any = tuple(states[ROWS.rate])
-        return np.array(
-            surface(Measurement(tuple(states[ROWS.attitude]), w, w, ZERO, ZERO, ZERO, ZERO, free.period), loop.gains)
-        )  # type: ignore
+        return np.array(loop.law.module.surface(_shown(free, states), loop.gains))
 
     # Drawn as rates, s is taken as what was drawn: w = s - Kq.
     wanted = np.sqrt(level / (2.0 + level)) * states[ROWS.rate]
@@ -274,18 +269,21 @@ def _rotors(loop: ClosedLoop, certificate: Certificate, states: Array, random: n
     return kept[:, None] - shares @ (total - tensor(loop.craft.inertia) @ states[ROWS.rate])
 
 
-def _value(loop: ClosedLoop, frame: Frame, epsilon: float) -> Callable[[Array], Array]:
-    """Return V + epsilon q.Jw of the states in the columns of an array, of the quaternion that is fed back."""
-    P, J, potential = floats(frame.P), tensor(loop.craft.inertia), frame.potential
+def _value(loop: ClosedLoop, claim: Claim) -> Callable[[Array], Array]:
+    """Return the claim's V + epsilon q.Jw of the states in the columns of an array."""
+    epsilon = claim.witness.get("epsilon", 0.0)
 
     def value(states: Array) -> Array:
-        q, w = (
-            states[ROWS.attitude] * (np.where(states[0] < 0.0, -1.0, 1.0) if loop.sign_policy == "shortest" else 1.0),
-            states[ROWS.rate],
-        )
-        return np.einsum("ik,ij,jk->k", w, P, w) / 2.0 + potential.of(q) + epsilon * np.einsum("ik,ij,jk->k", q[1:], J, w)
+        shown = _shown(loop, states)
+        mixed = dot(vector_part(shown.attitude), apply(loop.craft.inertia, shown.rate))
+        return value_of(claim, loop, shown) + epsilon * mixed
 
     return value
+
+
+def _shown(loop: ClosedLoop, states: Array) -> Measurement:
+    """Return the measurements that the law is shown at the states in the columns of an array."""
+    return shown_at(loop, unflatten(list(states[: ROWS.torque.stop]), loop.start))
 
 
 def _need(states: Array, loop: ClosedLoop, claim: Claim) -> float:

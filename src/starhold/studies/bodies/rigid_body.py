@@ -4,20 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, cast, final
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, final
 
 from starhold.algebra.quantity import Quantity
 from starhold.analysis.rigid_body import EXTRAS, METRICS, error_angle, make_meter, measure
 from starhold.analysis.transient import Limits, against_limits
 from starhold.laws.modes import mode_laws
-from starhold.loop.kernels import make_step
-from starhold.parts.bodies.rigid_body import kinetic_energy
-from starhold.parts.craft import tensor
 from starhold.parts.effectors.wheels import gives_what_is_asked
 from starhold.parts.epoch import OF_DATE, iso_text
-from starhold.parts.quaternion_sign import SIGN_POLICIES
 from starhold.scenario.bodies.rigid_body.start import date_of_axes
 from starhold.simulation.lane import fly, label
 from starhold.studies.body import NO_CONES, BodyStudy, Cones, Issued, Values
@@ -28,7 +22,6 @@ if TYPE_CHECKING:
     from starhold.analysis.meter import Meter
     from starhold.analysis.ranking import MetricSet
     from starhold.analysis.trial import Trial
-    from starhold.certification.certificate import Certificate
     from starhold.loop.closed_loop import ClosedLoop, Event
     from starhold.scenario.reading import LawEntry, Scenario
     from starhold.simulation.lane import Recording
@@ -115,6 +108,8 @@ class RigidBodyStudy:
         return fly_claims(issued.loop, issued.certificate)
 
     def start_inside(self, issued: Issued) -> dict[str, bool]:
+        from starhold.analysis.departure import start_inside
+
         return start_inside(issued.certificate, issued.loop) if issued.mode in (None, 1) and issued.before is None else {}
 
 
@@ -170,34 +165,4 @@ def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:
                 table = loop.target.params.table[step:]
                 now = now.with_parts(replace(loop.target, params=loop.target.params._replace(table=table)))
         found = [(step, now)] if step == 0 else [*found, (step, now)]
-    return found
-
-
-def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
-    """Whether the loop's start lies in the sets of the proved claims that are about a level of V."""
-    if loop.remembers:
-        return {}
-    from starhold.certification.region import Shape
-
-    # The true start, whatever the sensors make of it.
-    loop = loop.without("sensor", "estimator")
-    measurement = make_step(loop.composition()).measure(loop.carry(), 0, 0, loop.craft, loop.setup())
-    shown = measurement._replace(
-        attitude=SIGN_POLICIES[loop.sign_policy](measurement.attitude, loop.carry().h, loop.hysteresis_width)[0]
-    )
-    total = tensor(loop.craft.inertia) @ measurement.body_rate + np.array(measurement.wheel_momentum)
-    function, found = loop.law.lyapunov, dict[str, bool]()
-    for claim in certificate.claims:
-        if claim.outcome != "proved":
-            continue
-        if claim.kind == "region":
-            a = cast(float, loop.law.module.single_root(loop.gains)[0])
-            found[claim.kind] = bool(Shape(**claim.witness).value(a, shown.attitude, shown.rate) <= claim.numbers["level"])
-        elif function is not None and "start" in claim.numbers:
-            level, stiffness = claim.numbers["start"], claim.witness.get("stiffness")
-            value = function(shown, loop.gains, loop.craft)
-            if stiffness is not None:
-                value = kinetic_energy(shown.rate, loop.craft) + 2.0 * stiffness * (1.0 - shown.attitude[0])
-            held = float(np.linalg.norm(total)) <= claim.numbers.get("momentum", np.inf)
-            found[claim.kind] = held and (level is None or value <= level)
     return found
