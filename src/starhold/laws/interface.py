@@ -14,9 +14,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-import numpy as np
-
-from starhold.algebra.quaternion import Quaternion
 from starhold.algebra.vector import Vector, add, apply, gyroscopic_torque, subtract
 from starhold.parts import contract
 from starhold.parts.bodies.rigid_body import Measurement as Measurement
@@ -25,28 +22,7 @@ from starhold.parts.contract import NoMemory as NoMemory
 from starhold.parts.contract import Parameter
 from starhold.parts.contract import fields as fields
 from starhold.parts.craft import Craft
-
-
-@dataclass(frozen=True)
-class Start:
-    """A scenario tells a design the rotation from the target axes to the body axes, the rate relative to the target (rad/s)
-    and the wheel momentum (N m s, body axes; None for a craft without) at the start; the torque (N m) and, of wheels, the
-    angular momentum (N m s) that there is about every axis, infinite for no limit; and the angle (rad) and rate (rad/s) at
-    which the target counts as reached."""
-
-    attitude: Quaternion
-    rate: Vector
-    wheel_momentum: Vector | None
-    torque: float
-    momentum: float
-    attitude_tolerance: float
-    rate_tolerance: float
-
-    @property
-    def angle(self) -> float:
-        """The error angle (rad, 0..pi)."""
-        return 2.0 * float(np.arctan2(np.linalg.norm(self.attitude[1:]), abs(self.attitude[0])))
-
+from starhold.synthesis.start import Start as Start
 
 Claim: TypeAlias = Literal["global", "almost-global", "local", "none"]
 

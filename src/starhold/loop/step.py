@@ -10,7 +10,7 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 from starhold.algebra.scalar import both, less, opposite, side, where
-from starhold.algebra.structure import chosen, move
+from starhold.algebra.structure import chosen, runge_kutta
 from starhold.algebra.vector import ZERO, add
 from starhold.algebra.words import number_of, word_of
 from starhold.laws.modes import Modes
@@ -31,19 +31,6 @@ class Step(NamedTuple):
     check: Callable[..., Any]
     sample: Callable[..., Any]
     slope: Callable[..., Any]
-
-
-def runge_kutta(slope: Callable[..., Any]) -> Callable[..., Any]:
-    """The classical Runge-Kutta method of fourth order over a substep, for d(state)/dt = slope(state, *more)."""
-
-    def advance(state, h, *more):
-        a = slope(state, *more)
-        b = slope(move(state, 0.5 * h, a), *more)
-        c = slope(move(state, 0.5 * h, b), *more)
-        d = slope(move(state, h, c), *more)
-        return move(state, h / 6.0, move(move(move(a, 2.0, b), 2.0, c), 1.0, d))
-
-    return advance
 
 
 def total(vectors: Any) -> Any:

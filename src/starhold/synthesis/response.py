@@ -17,13 +17,15 @@ import numpy as np
 
 from starhold.algebra.quaternion import Quaternion, derivative, renormalise, vector_part
 from starhold.algebra.scalar import Scalar, either, less, maximum, where
-from starhold.algebra.structure import move
+from starhold.algebra.structure import runge_kutta
 from starhold.algebra.structured import repeat
 from starhold.algebra.vector import ZERO, Vector, cross, dot, scale, subtract
 from starhold.algebra.words import number_of
-from starhold.laws.interface import Gain, Measurement, NoMemory, Start
-from starhold.parts.bodies.rigid_body import angular_acceleration
+from starhold.parts.bodies.rigid_body import Measurement, angular_acceleration
+from starhold.parts.contract import NoMemory
+from starhold.parts.contract import Parameter as Gain
 from starhold.parts.craft import Craft, tensor
+from starhold.synthesis.start import Start
 from starhold.trace.calling import Compiled
 
 STEPS = 4000
@@ -226,23 +228,25 @@ def _flight(torque: Callable[..., Any], count: int, wheels: bool, like: _Like) -
     """Compile the slew: gains, craft, start, step and squared ends give the last step at which angle or rate was outside
     (-1: at none), and the largest squares of torque and of the wheel momentum."""
 
+    def command(state: Any, gains: Any, craft: Craft, step: Scalar) -> Vector:
+        attitude, rate, stored = state
+        return torque(Measurement(attitude, rate, rate, ZERO, ZERO, ZERO, ZERO, step, stored), gains, craft, NoMemory())[0]
+
     def motion(state: Any, gains: Any, craft: Craft, step: Scalar) -> Any:
         attitude, rate, stored = state
-        given = torque(Measurement(attitude, rate, rate, ZERO, ZERO, ZERO, ZERO, step, stored), gains, craft, NoMemory())[0]
+        given = command(state, gains, craft, step)
         felt = subtract(given, cross(rate, stored)) if wheels else given
         taken = scale(-1.0, given) if wheels else ZERO
-        return given, (derivative(attitude, rate), angular_acceleration(rate, felt, craft), taken)
+        return derivative(attitude, rate), angular_acceleration(rate, felt, craft), taken
+
+    advance = runge_kutta(motion)
 
     def whole(gains: Any, craft: Craft, begun: Any, step: Scalar, ends: Any) -> Any:
         def turn(k: Any, state: Any, last: Scalar, most: Scalar, momentum: Scalar) -> Any:
-            given, a = motion(state, gains, craft, step)
-            b = motion(move(state, 0.5 * step, a), gains, craft, step)[1]
-            c = motion(move(state, 0.5 * step, b), gains, craft, step)[1]
-            d = motion(move(state, step, c), gains, craft, step)[1]
-            q, w, stored = state
+            given, (q, w, stored) = command(state, gains, craft, step), state
             # Not so written that a NaN, which is neither, would count as within.
             inside = either(less(ends[0], dot(vector_part(q), vector_part(q))), less(ends[1], dot(w, w)))
-            after = move(state, step / 6.0, move(move(move(a, 2.0, b), 2.0, c), 1.0, d))
+            after = advance(state, step, gains, craft, step)
             notes = (
                 where(inside, number_of(k), last),
                 maximum(most, dot(given, given)),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.quaternion import derivative, multiply, normalise, stretch, to_reference
+from starhold.algebra.quaternion import multiply, normalise, stretch, to_reference
 from starhold.algebra.structure import move
 from starhold.algebra.vector import ZERO
 from starhold.analysis.cost import call_costs
@@ -31,7 +31,8 @@ from starhold.conformance.verdicts import (
 from starhold.laws.catalogue import Law, catalogue
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.bodies.rigid_body import angular_acceleration
+from starhold.loop.kernels import make_step
+from starhold.parts.bodies.rigid_body import State
 from starhold.parts.catalogue import PACKAGES, fit, parts, telling
 from starhold.parts.part import Fitted, Part
 from starhold.scenario.building import build
@@ -246,8 +247,9 @@ def flies_a_scenario(law: Law) -> None:
 
 def _slope(law: Law, measurement: Measurement, gains: Any) -> float:
     """dV/dt along the closed loop, by a central difference."""
-    rates = angular_acceleration(measurement.body_rate, call(law, measurement, gains), CRAFT)
-    turning = derivative(measurement.attitude, measurement.rate)
+    state = State(measurement.attitude, measurement.rate, ZERO, ZERO, call(law, measurement, gains))
+    loop = ClosedLoop(CRAFT, law, gains, state, measurement.period)
+    turning, rates, *_ = make_step(loop.composition()).slope(loop.carry(), CRAFT, loop.setup())[0]
     function = law.lyapunov
     assert function is not None
 
