@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from starhold.algebra.vector import ZERO
 from starhold.analysis.libration_point import goal_of, measure
 from starhold.certification.station import certify_station
-from starhold.conformance.verdicts import STEPS, agree, declares_itself, require, round_trips
+from starhold.conformance.bodies.any_body import is_pure, reads_alike, stays_finite, survives_toml
+from starhold.conformance.verdicts import STEPS, declares_itself, require
 from starhold.laws.catalogue import Law, catalogue
-from starhold.laws.point import PointMeasurement
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.libration_point import PRIMARIES, PointState
 from starhold.parts.catalogue import fit
@@ -37,44 +35,6 @@ def loop_with(part: Part, params: Any) -> ClosedLoop:
     law = catalogue("libration-point")["l2-circle"]
     field = () if part.hook("acceleration") else PARTS[:1]
     return replace(_loop(law, law.examples()[0]), parts=(*field, Fitted(part, params)))
-
-
-def _states(count: int) -> Any:
-    random = np.random.default_rng(1)
-    for _ in range(count):
-        x, v = random.normal(size=(2, 3)) * 10.0 ** random.uniform(-9.0, 1.0)
-        yield PointMeasurement(tuple(x.tolist()), tuple(v.tolist()), 1e-3, LIMIT)
-
-
-def _call(law: Any, measurement: PointMeasurement, gains: Any) -> Any:
-    return law.command(measurement, gains, PLANT, law.remember(gains, PLANT, measurement.period))[0]
-
-
-def is_pure(law: Law) -> None:
-    """The control depends on nothing but its arguments."""
-    for gains in law.examples():
-        for measurement in _states(10):
-            require(_call(law, measurement, gains) == _call(law, measurement, gains), f"two calls differ at {measurement}")
-
-
-def stays_finite(law: Law) -> None:
-    """Finite control near the point and far away."""
-    rest = PointMeasurement(ZERO, ZERO, 1e-3, LIMIT)
-    for gains in law.examples():
-        for measurement in (rest, *_states(200)):
-            require(bool(np.isfinite(_call(law, measurement, gains)).all()), f"not finite at {measurement}")
-
-
-def reads_alike(law: Law) -> None:
-    """Plain Python, one lane and every lane of a batch agree bit for bit."""
-    for gains in law.examples():
-        loop = _loop(law, gains)
-        agree(loop, [loop.start] * 3, range(3))
-
-
-def survives_toml(law: Law) -> None:
-    """Gains written to a scenario file and read back are the same; unknown keys are refused."""
-    round_trips(law, scenario_with, parse)
 
 
 def flies_a_scenario(law: Law) -> None:

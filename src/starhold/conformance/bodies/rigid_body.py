@@ -19,6 +19,7 @@ from starhold.analysis.rigid_body import measure
 from starhold.analysis.trial import fly_claims
 from starhold.certification.certify import certify
 from starhold.conformance.bench import CRAFT, call, random_measurements, random_quaternions, sample_loop
+from starhold.conformance.bodies.any_body import survives_toml
 from starhold.conformance.units import rescaled, times
 from starhold.conformance.verdicts import (
     STEPS,
@@ -26,7 +27,6 @@ from starhold.conformance.verdicts import (
     agree,
     declares_itself,
     require,
-    round_trips,
 )
 from starhold.laws.catalogue import Law, catalogue
 from starhold.laws.interface import Measurement
@@ -130,11 +130,6 @@ def stays_finite(law: Law) -> None:
             for rate in (ZERO, (0.1, -0.2, 0.05)):
                 measurement = ON_TARGET._replace(attitude=attitude, rate=rate, body_rate=rate)
                 require(bool(np.isfinite(call(law, measurement, gains)).all()), f"not finite at {attitude}, rate {rate}")
-
-
-def survives_toml(law: Law) -> None:
-    """Gains written to a scenario file and read back are the same; unknown keys are refused."""
-    round_trips(law, scenario_with, parse)
 
 
 def keeps_units(law: Law) -> None:
