@@ -48,7 +48,7 @@ def simulate(
     """Fly one law of a scenario, the first if `law` is None. Returns the Dataset that `starhold run` writes to run.nc, with
     the same attributes; `attrs["diverged_at"]` (s) is there only when the motion was lost."""
     opened = _opened(scenario)
-    entry = opened.laws[0] if law is None else opened.pick(law)
+    entry = opened.pick(law)
     return studies.record(opened, studies.build(opened, entry), progress).dataset()
 
 
@@ -219,7 +219,7 @@ def export_c(
     from starhold.studies.certificates import certify_scenario
 
     opened = _opened(scenario)
-    entry = opened.laws[0] if law is None else opened.pick(law)
+    entry = opened.pick(law)
     code = make_code(studies.build(opened, entry), check_name(re.sub(r"\W", "_", entry.name) if name is None else name))
     more = shell_files(code, shells)
     into, proof = open_folder(Path(folder), force), UNPROVED
@@ -302,7 +302,7 @@ def failures(scenario: reading.Scenario | str | Path, law: str | None = None) ->
     from starhold.studies.failures import study
 
     opened = _turning(scenario)
-    return study(opened, opened.laws[0] if law is None else opened.pick(law))
+    return study(opened, opened.pick(law))
 
 
 @shortly
@@ -313,7 +313,7 @@ def budget(scenario: reading.Scenario | str | Path, law: str | None = None) -> B
     from starhold.studies.budget import study
 
     opened = _turning(scenario)
-    return study(opened, opened.laws[0] if law is None else opened.pick(law))
+    return study(opened, opened.pick(law))
 
 
 @shortly
@@ -325,7 +325,7 @@ def linearise(scenario: reading.Scenario | str | Path, law: str | None = None, d
     from starhold.studies.linear import linear_of, systems_of
 
     opened = _turning(scenario)
-    return systems_of(linear_of(opened, opened.laws[0] if law is None else opened.pick(law), delay))
+    return systems_of(linear_of(opened, opened.pick(law), delay))
 
 
 @shortly
@@ -335,7 +335,7 @@ def margins(scenario: reading.Scenario | str | Path, law: str | None = None, del
     from starhold.studies.linear import margins_of
 
     opened = _turning(scenario)
-    return margins_of(opened, opened.laws[0] if law is None else opened.pick(law), delay)
+    return margins_of(opened, opened.pick(law), delay)
 
 
 @shortly

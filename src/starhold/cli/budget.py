@@ -41,7 +41,7 @@ def budget(
     told = {key: _time(text) for key, text in given.items() if text is not None} | ({} if runs is None else {"runs": runs})
     if told:
         scenario = scenario.with_({f"budget.{key}": value for key, value in told.items()})
-    entry = scenario.laws[0] if law is None else scenario.pick(law)
+    entry = scenario.pick(law)
     folder = open_folder(output or Path("results") / f"{scenario.name}-budget", force)
     table, picture = (folder / name for name in BUDGET)
     with Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), console=console) as bars:

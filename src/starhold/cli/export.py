@@ -36,7 +36,7 @@ def c(
     from starhold.scenario.reading import load
 
     scenario = load(file, allow_unstable)
-    entry = scenario.laws[0] if law is None else scenario.pick(law)
+    entry = scenario.pick(law)
     folder = output or Path("results") / f"{scenario.name}-{entry.name}-c"
     print_exported(
         export_c(scenario, folder, entry.name, name=name, shells=shell or (), certify=certify, force=force), folder

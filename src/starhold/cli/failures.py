@@ -32,7 +32,7 @@ def failures(
     from starhold.studies.failures import require_wheels, study
 
     scenario = load(file).about("rigid-body")
-    entry = scenario.laws[0] if law is None else scenario.pick(law)
+    entry = scenario.pick(law)
     require_wheels(scenario)
     folder = open_folder(output or Path("results") / f"{scenario.name}-failures", force)
     table, picture = (folder / name for name in FAILURES)

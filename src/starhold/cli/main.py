@@ -110,7 +110,7 @@ def _fly(
         from starhold.studies import compare as studies
 
         scenario = load(file, allow_unstable)
-        entries = list(scenario.laws) if nested else [scenario.laws[0] if law is None else scenario.pick(law)]
+        entries = list(scenario.laws) if nested else [scenario.pick(law)]
         # All of them before the first flight, so that what is wrong with the last is said at once.
         loops = [studies.build(scenario, entry) for entry in entries]
         name = scenario.name if nested else f"{scenario.name}-{entries[0].name}"

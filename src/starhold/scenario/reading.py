@@ -114,12 +114,12 @@ class Scenario:
         return changed(self, changes)
 
     @shortly
-    def pick(self, name: str) -> LawEntry:
-        """The law of this name; InputError names the nearest when there is none."""
-        for entry in self.laws:
-            if entry.name == name:
-                return entry
-        raise InputError(self.where, "law", name, nearest(name, [entry.name for entry in self.laws]))
+    def pick(self, name: str | None) -> LawEntry:
+        """The law of this name, the first without one; InputError names the nearest when there is none."""
+        names = [entry.name for entry in self.laws]
+        if name is not None and name not in names:
+            raise InputError(self.where, "law", name, nearest(name, names))
+        return self.laws[0 if name is None else names.index(name)]
 
     def about(self, body: str) -> Scenario:
         """The scenario itself; InputError unless it is about the body of this name."""
