@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 from starhold.algebra.quantity import Quantity
 from starhold.errors import InputError, shortly
 from starhold.scenario import designing, reading
-from starhold.scenario.making import make_scenario as make_scenario
+from starhold.scenario.reading import make_scenario as make_scenario
 from starhold.simulation.lane import Recording
 from starhold.studies import compare as studies
 from starhold.synthesis.pole_placement import place as place

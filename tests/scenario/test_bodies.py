@@ -10,8 +10,7 @@ from starhold.scenario import bodies as package
 from starhold.scenario.bodies import bodies, body_for
 from starhold.scenario.building import build
 from starhold.scenario.json_schema import json_schema
-from starhold.scenario.making import make_scenario
-from starhold.scenario.reading import builtin_text, load, open_scenario, parse
+from starhold.scenario.reading import builtin_text, load, make_scenario, open_scenario, parse
 from starhold.scenario.schema import LawTable, ScenarioTable, Timing
 from starhold.scenario.writing import scenario_with
 from tests.refusals import refused

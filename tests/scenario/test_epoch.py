@@ -14,9 +14,8 @@ from starhold.parts.catalogue import PACKAGES, parts
 from starhold.parts.epoch import EPOCH, START, date_of
 from starhold.report.page_parts import settings
 from starhold.scenario.json_schema import json_schema
-from starhold.scenario.making import make_scenario
 from starhold.scenario.parts import part_schemas
-from starhold.scenario.reading import parse
+from starhold.scenario.reading import make_scenario, parse
 from starhold.simulation.lane import fly
 from starhold.studies.compare import build
 from starhold.studio.editing import check, choices, words

@@ -9,7 +9,7 @@ from typing import Any
 
 class _Making(ModuleType):
     def __call__(self, *args: Any, **keywords: Any) -> Any:
-        from starhold.scenario.making import make_scenario
+        from starhold.scenario.reading import make_scenario
 
         return make_scenario(*args, **keywords)
 

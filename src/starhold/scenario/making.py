@@ -1,4 +1,4 @@
-"""Scenarios made in Python, and changed ones: written as TOML and read as a file is, so that both mean the same."""
+"""Changed scenarios, and tables from Python in what TOML has: written and read as a file is, so that both mean the same."""
 
 from __future__ import annotations
 
@@ -8,29 +8,17 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from datetime import date
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from starhold.errors import InputError, shortly
+from starhold.errors import InputError
 from starhold.scenario.checking import nearest, read_toml, show
-from starhold.scenario.reading import Scenario, read_tables
-from starhold.scenario.writing import toml_text
 
-WHERE = "scenario"
-"""The name that errors call one by that comes from no file."""
+if TYPE_CHECKING:
+    from starhold.scenario.reading import Scenario
+
 _PART = re.compile(r"([^.\[\]]+)(?:\[(\d+)\])?")
-
-
-@shortly
-def make_scenario(tables: Mapping[str, Any], folder: str | Path = ".", allow_unstable: bool = False) -> Scenario:
-    """The scenario of tables as a file would hold them, {"name": "mine", "spacecraft": {"inertia": [2, 3, 4]}, ..., "law":
-    [{"type": "pd", ...}]}: strings, numbers, truths, dates, lists and tables; tuples and NumPy arrays count as lists, a
-    Rotation of SciPy as the quaternion of an attitude, and what is None as left out. `folder`: what file names in it are
-    relative to. InputError says what is wrong, as of a file. A scenario's `with_` gives others like it, and its `text` is
-    the file."""
-    written = plain(tables, WHERE, "")
-    return read_tables(written, toml_text(written), WHERE, Path(folder), allow_unstable)
 
 
 def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
@@ -52,8 +40,7 @@ def variants(scenario: Scenario, changes: Iterable[Mapping[str, Any]]) -> Iterat
             other = deepcopy(tables)
             for key, value in change.items():
                 _put(other, path_of(key, names, where), value, where, scenario.table)
-            written = plain(other, where, "")
-            yield read_tables(written, toml_text(written), scenario.where, scenario.folder, scenario.allow_unstable)
+            yield scenario.of(plain(other, where, ""))
         except InputError as error:
             raise InputError(where, error.key, error.found, error.allowed) from None
 

@@ -24,12 +24,16 @@ from starhold.scenario.checking import (
 )
 from starhold.scenario.checking import nearest as nearest
 from starhold.scenario.gains import read_gains
+from starhold.scenario.making import changed, plain
 from starhold.scenario.modes import has_modes, read_modes
 from starhold.scenario.parts import read_parts
 from starhold.scenario.schema import APART
+from starhold.scenario.writing import toml_text
 
 LONGEST_PATH = 200
 """Characters of a path that errors show whole."""
+WHERE = "scenario"
+"""The name that errors call one by that comes from no file."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -108,10 +112,11 @@ class Scenario:
         """The scenario with other values at some keys: {"spacecraft.inertia": [2, 3, 4], "law.pd.k_rate": "0.1 N m s"}; the
         key of a law's or a part's table is its name, or "law[1]" by its place; None takes away what is there. InputError as
         of a file."""
-        # Loaded here, for it reads scenarios.
-        from starhold.scenario.making import changed
-
         return changed(self, changes)
+
+    def of(self, tables: Mapping[str, Any]) -> Scenario:
+        """The scenario of other raw tables, read where this one was."""
+        return read_tables(tables, toml_text(tables), self.where, self.folder, self.allow_unstable)
 
     @shortly
     def pick(self, name: str | None) -> LawEntry:
@@ -170,6 +175,17 @@ def _read_text(source: str | Path) -> tuple[str, str, Path]:
 def parse(text: str, where: str, folder: Path = Path(), allow_unstable: bool = False) -> Scenario:
     """The scenario of a TOML text; `where` names it in errors."""
     return read_tables(read_toml(text, where), text, where, folder, allow_unstable)
+
+
+@shortly
+def make_scenario(tables: Mapping[str, Any], folder: str | Path = ".", allow_unstable: bool = False) -> Scenario:
+    """The scenario of tables as a file would hold them, {"name": "mine", "spacecraft": {"inertia": [2, 3, 4]}, ..., "law":
+    [{"type": "pd", ...}]}: strings, numbers, truths, dates, lists and tables; tuples and NumPy arrays count as lists, a
+    Rotation of SciPy as the quaternion of an attitude, and what is None as left out. `folder`: what file names in it are
+    relative to. InputError says what is wrong, as of a file. A scenario's `with_` gives others like it, and its `text` is
+    the file."""
+    written = plain(tables, WHERE, "")
+    return read_tables(written, toml_text(written), WHERE, Path(folder), allow_unstable)
 
 
 def read_tables(data: Mapping[str, Any], text: str, where: str, folder: Path, allow_unstable: bool) -> Scenario:
