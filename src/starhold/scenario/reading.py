@@ -114,7 +114,7 @@ class Scenario:
         of a file."""
         return changed(self, changes)
 
-    def of(self, tables: Mapping[str, Any]) -> Scenario:
+    def _of(self, tables: Mapping[str, Any]) -> Scenario:
         """The scenario of other raw tables, read where this one was."""
         return read_tables(tables, toml_text(tables), self.where, self.folder, self.allow_unstable)
 

@@ -1,4 +1,4 @@
-"""What a scenario tells a design of the start."""
+"""A scenario gives designs the start and what there is of torque and momentum."""
 
 from __future__ import annotations
 
