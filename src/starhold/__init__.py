@@ -81,6 +81,7 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     # Loaded on first use, so that `import starhold` and the command line start at once.
+    from functools import partial
     from importlib import import_module
 
     if name == "InputError":
@@ -90,4 +91,7 @@ def __getattr__(name: str) -> Any:
         return import_module(f"starhold.{name}")
     if name in __all__:
         return getattr(import_module("starhold.api"), name)
+    if (command := name.replace("_", "-")) in import_module("starhold.report.commands").names():
+        # One that has no types of its own.
+        return partial(import_module("starhold.api").studied, command)
     raise AttributeError(f"module 'starhold' has no attribute {name!r}")

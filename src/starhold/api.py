@@ -299,10 +299,7 @@ def _read_run(run: xr.Dataset | str | Path) -> xr.Dataset:
 def failures(scenario: reading.Scenario | str | Path, law: str | None = None) -> list[Failure]:
     """Tell what is left of a scenario on wheels after the loss of any one or two of them, under a law, the first if not
     given."""
-    from starhold.studies.failures import study
-
-    opened = _turning(scenario)
-    return study(opened, opened.pick(law))
+    return studied("failures", scenario, law)
 
 
 @shortly
@@ -310,10 +307,7 @@ def budget(scenario: reading.Scenario | str | Path, law: str | None = None) -> B
     """Tell a law's pointing error by source: the first law if not given, at the times and windows of the [budget] table.
     Each source flies alone, and all together, in as many runs as the table says; `level(source, index)` is in rad, `table()`
     a DataFrame with every axis. InputError where nothing disturbs the loop, windows do not fit, or a motion is lost."""
-    from starhold.studies.budget import study
-
-    opened = _turning(scenario)
-    return study(opened, opened.pick(law))
+    return studied("budget", scenario, law)
 
 
 @shortly
@@ -341,10 +335,16 @@ def margins(scenario: reading.Scenario | str | Path, law: str | None = None, del
 @shortly
 def modal_roots(scenario: reading.Scenario | str | Path, law: str | None = None) -> Study:
     """The roots of the modal law that turn fastest within the limits of a scenario's [transient] table, and the fit."""
-    from starhold.studies.modal_roots import pick_modal, study
+    return studied("modal-roots", scenario, law)
 
-    opened = _turning(scenario)
-    return study(opened, pick_modal(opened, law))
+
+@shortly
+def studied(name: str, scenario: reading.Scenario | str | Path, law: str | None = None) -> Any:
+    """Study a law of a scenario as the command of a name does."""
+    from starhold.report.commands import command
+
+    declared = command(name)
+    return declared.study(*declared.prepare(_opened(scenario), law))
 
 
 def _opened(scenario: reading.Scenario | str | Path) -> reading.Scenario:

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from starhold.analysis.transient import Limits
-from starhold.report.modal_roots_picture import draw
-from starhold.report.tables import write_modal_roots
+from starhold.report.commands.modal_roots import present
+from starhold.report.figures import save
+from starhold.report.tables import write_table
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.studies.compare import compare
 from starhold.studies.modal_roots import law_lines, pick_modal, problem_of, study
@@ -95,12 +96,13 @@ def test_what_is_printed_is_read_back(found, tmp_path):
     text = builtin_text("landing-limits")
     scenario = parse(text[: text.index("[[law]]")] + "\n".join(law_lines(found.own, found.b)), "pasted")
     assert scenario.laws[0].gains.phi_0[0] == pytest.approx(float(found.own.at(math.radians(90.0))), rel=1e-4)
-    write_modal_roots(found, tmp_path / "roots.csv")
+    result = present(scenario, scenario.laws[0], found)
+    write_table(result.numbers, tmp_path / "roots.csv")
     with (tmp_path / "roots.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [float(row["root"]) for row in rows] == found.roots.tolist()
     assert {"peak_acceleration_z", "eased_root", "eased_time", "fit_root", "published_root"} <= set(rows[0])
-    one, other = (draw(found, tmp_path / f"{name}.png", "roots").read_bytes() for name in "ab")
+    one, other = (save(result.figure(), tmp_path / f"{name}.png").read_bytes() for name in "ab")
     assert one == other
 
 

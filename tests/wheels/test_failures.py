@@ -10,13 +10,14 @@ import pytest
 from scipy.optimize import linprog
 
 from starhold.analysis.rigid_body import measure
-from starhold.cli.failures import print_failures
+from starhold.cli.study import print_result
 from starhold.errors import InputError
 from starhold.parts.effectors.layouts import pyramid
 from starhold.parts.effectors.wheels import lose, make_wheels
-from starhold.report.failures_picture import draw
+from starhold.report.commands.failures import draw, present
+from starhold.report.figures import save
 from starhold.report.results import open_folder
-from starhold.report.tables import write_failures
+from starhold.report.tables import write_table
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
@@ -195,7 +196,7 @@ def test_directions_lacking():
 
 
 def test_the_table_reads_back(scenario, found, tmp_path):
-    write_failures(found, scenario.laws[0], tmp_path / "failures.csv")
+    write_table(present(scenario, scenario.laws[0], found).numbers, tmp_path / "failures.csv")
     rows = list(csv.DictReader((tmp_path / "failures.csv").read_text(encoding="utf-8").splitlines()))
     assert len(rows) == len(found)
     for row, failure in zip(rows, found, strict=True):
@@ -215,8 +216,8 @@ def test_the_table_reads_back(scenario, found, tmp_path):
 def test_the_picture_shows_something_and_is_the_same_again(found, tmp_path):
     from matplotlib.image import imread
 
-    first = draw(found, tmp_path / "a.png", "a $title").read_bytes()
-    assert first == draw(found, tmp_path / "b.png", "a $title").read_bytes()
+    one, other = (save(draw(found, "a $title"), tmp_path / f"{name}.png").read_bytes() for name in "ab")
+    assert one == other
     pixels = imread(tmp_path / "a.png")[..., :3]
     assert pixels.shape[0] > 300
     assert 0.05 < (pixels.std(axis=2) > 0.05).mean() < 0.9
@@ -255,9 +256,10 @@ def test_names_among_the_gains_are_told_as_they_are_written(tmp_path, capsys):
     entry, table = scenario.laws[-1], scenario.table.simulation.model_copy(update={"duration": 0.2})
     short = replace(scenario, table=scenario.table.model_copy(update={"simulation": table}))
     found = [_flown(short, entry, _left(wheels_of(short), lost, 0.02)) for lost in ((), (1,))]
-    print_failures(found)
+    result = present(short, entry, found)
+    print_result(result)
     assert "The gains are the same in all of them." in capsys.readouterr().out
-    write_failures(found, entry, tmp_path / "table.csv")
+    write_table(result.numbers, tmp_path / "table.csv")
     with (tmp_path / "table.csv").open(encoding="utf-8") as file:
         assert [row["limit (1)"] for row in csv.DictReader(file)] == ["norm", "norm"]
 
@@ -272,12 +274,13 @@ def test_a_law_that_what_is_left_does_not_suit_leaves_the_rest_of_the_study(tmp_
     assert intact.refused == ""
     assert struck.gains is None
     assert struck.authority > 0.0
-    print_failures([intact, struck])
+    result = present(short, entry, [intact, struck])
+    print_result(result)
     said = " ".join(capsys.readouterr().out.split())
     assert (
         'without 1 not flown: limit = "axis" needs k_attitude below the torque limit of 0.011547 N m, not 0.013 N m' in said
     )
-    write_failures([intact, struck], entry, tmp_path / "table.csv")
+    write_table(result.numbers, tmp_path / "table.csv")
     with (tmp_path / "table.csv").open(encoding="utf-8") as file:
         assert [bool(row["not flown because"]) for row in csv.DictReader(file)] == [False, True]
-    assert draw([intact, struck], tmp_path / "picture.png", "one").is_file()
+    assert save(result.figure(), tmp_path / "picture.png").is_file()

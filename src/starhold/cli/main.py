@@ -15,17 +15,15 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from starhold.cli import (
-    budget,
     campaign,
     certifying,
     export,
-    failures,
     invariant,
-    modal_roots,
     parts,
     reproduce,
     sail,
     studio,
+    study,
 )
 from starhold.cli.arguments import (
     DIVERGED,
@@ -41,6 +39,7 @@ from starhold.cli.arguments import (
 )
 from starhold.cli.outlet import Outlet, open_outlets
 from starhold.errors import InputError, InterruptedByUserError
+from starhold.report.commands import names
 
 if TYPE_CHECKING:
     from starhold.studies.flight import Flight
@@ -178,9 +177,8 @@ app.command()(campaign.query)
 app.command()(campaign.rerun)
 app.command()(certifying.certify)
 app.command()(certifying.check)
-app.command()(failures.failures)
-app.command()(budget.budget)
-app.command("modal-roots")(modal_roots.modal_roots)
+for studied in names():
+    app.command(studied)(study.command_of(studied))
 app.command()(invariant.invariant)
 app.command()(sail.sail)
 app.command()(reproduce.reproduce)

@@ -10,6 +10,7 @@ import typer
 
 from starhold.cli.arguments import FAILED_CHECK
 from starhold.errors import InputError
+from starhold.report.commands import Column, Table
 
 if TYPE_CHECKING:
     from starhold.parts.part import Part
@@ -86,30 +87,27 @@ def _find(given: str, find_part: Any) -> Any:
 
 def _print_roles(groups: dict[str, Iterable[Part]]) -> None:
     from rich.markup import escape
-    from rich.table import Table
 
     from starhold.cli.console import console
+    from starhold.cli.show import print_rows
 
     for role, known in groups.items():
-        table = Table(show_edge=False, pad_edge=False)
-        for head in (role, "body", "given by", "summary"):
-            table.add_column(head)
+        rows: list[list[str]] = []
         for part in known:
             given = {"law": "[[law]]", "body": "its table"}.get(role, f"[{part.table}]" if part.table else "[[part]]")
             of = part.name if role == "body" else part.body or "any"
-            table.add_row(*map(escape, (part.name, of, given, part.card.summary)))
-        console.print(table)
+            rows.append([*map(escape, (part.name, of, given, part.card.summary))])
+        print_rows(Table([*map(Column, (role, "body", "given by", "summary"))], rows))
         console.print()
 
 
 def print_part(part: Part) -> None:
     """The card of a part, its parameters and what it records."""
     from rich.markup import escape
-    from rich.table import Table
 
     from starhold.algebra.quantity import quantities
     from starhold.cli.console import console
-    from starhold.cli.show import print_fields
+    from starhold.cli.show import print_fields, print_rows
 
     card = part.card
     console.print(f"[bold]{part.name}[/bold], {part.role}: {card.title}", highlight=False)
@@ -126,11 +124,6 @@ def print_part(part: Part) -> None:
         print_fields("Parameters", part.fields())
     kinds = [getattr(part.module, kind) for kind in ("Reading", "Estimate", "Sample") if hasattr(part.module, kind)]
     if kinds and getattr(part.module, "RECORDED", True):
-        table = Table(show_edge=False, pad_edge=False)
-        for head in ("recorded", "unit", "meaning"):
-            table.add_column(head)
-        for kind in kinds:
-            for name, told in quantities(kind).items():
-                table.add_row(*map(escape, (name, told.unit, told.text)))
+        recorded = [(name, told.unit, told.text) for kind in kinds for name, told in quantities(kind).items()]
         console.print()
-        console.print(table)
+        print_rows(Table([*map(Column, ("recorded", "unit", "meaning"))], [[*map(escape, row)] for row in recorded]))

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from starhold.cli.arguments import Force
+from starhold.cli.arguments import Force, number_or_text
 from starhold.errors import InputError
+from starhold.report.commands import Column, Table
 
 if TYPE_CHECKING:
     from starhold.synthesis.circle import Station
@@ -31,7 +32,9 @@ def sail(
     force: Force = False,
 ) -> None:
     """How large a sail keeps a craft on a circle about a libration point: best rate, peak demand, area, margin, deficits."""
+    from starhold.cli.console import console
     from starhold.parts.bodies.libration_point import PRIMARIES
+    from starhold.report.tables import write_sail
     from starhold.scenario.reading import nearest
     from starhold.synthesis.circle import Station
     from starhold.synthesis.sail import check_optics
@@ -62,7 +65,8 @@ def sail(
         raise InputError(str(output), "", "a file that exists", "another name, or --force")
     print_sail(station, point, kilograms, there_is)
     if output is not None:
-        _write(station, output)
+        write_sail(station, output)
+        console.print(f"Table: {output}", soft_wrap=True)
 
 
 def _solar() -> list[str]:
@@ -90,26 +94,15 @@ def _read(option: str, text: str, gain: Any) -> float:
     from starhold.scenario.quantity import reader
 
     try:
-        value: float | str = float(text)
-    except ValueError:
-        value = text
-    try:
-        return reader(gain)(value)
+        return reader(gain)(number_or_text(text))
     except PydanticCustomError as error:
         raise InputError("sail", option, text, error.message()) from None
-
-
-def _write(station: Station, path: Path) -> None:
-    from starhold.cli.console import console
-    from starhold.report.tables import write_sail
-
-    write_sail(station, path)
-    console.print(f"Table: {path}", soft_wrap=True)
 
 
 def print_sail(station: Station, point: str, mass: float, area: float | None) -> None:
     """The design in words, then the tables."""
     from starhold.cli.console import console
+    from starhold.cli.show import print_rows
     from starhold.studies.sail import dearer
     from starhold.synthesis.circle import demand
 
@@ -129,8 +122,13 @@ def print_sail(station: Station, point: str, mass: float, area: float | None) ->
     if area is not None:
         lines.append(_margin(station, area, mass))
     console.print("\n".join(lines), highlight=False, markup=False, soft_wrap=True)
-    _print_rates(station)
-    _print_deficits(station, None if area is None else 1.0 - station.margin(area, mass))
+    for table in (_rates(station), _deficits(station, None if area is None else 1.0 - station.margin(area, mass))):
+        console.print()
+        print_rows(table)
+    console.print(
+        "largest radius: held at the best rate by what is left; whether the full circle then bends or is lost, flights"
+    )
+    console.print("tell. radius in that light: where the sail loses with the Sun what the body hides.")
 
 
 def _light(station: Station) -> str:
@@ -149,44 +147,27 @@ def _margin(station: Station, area: float, mass: float) -> str:
     return f"margin of {area:g} m²: {margin:.4g}; {rates}"
 
 
-def _print_rates(station: Station) -> None:
-    from rich.table import Table
-
-    from starhold.cli.console import console
+def _rates(station: Station) -> Table:
     from starhold.studies.sail import reflectivities, rows
 
-    columns = reflectivities(station)
-    table = Table(show_edge=False, pad_edge=False, title="Sail over the rate and the reflectivity", title_justify="left")
-    heads = ["rate\n[dim]Ω[/dim]", "period\n[dim]days[/dim]", "peak/radius\n[dim]Ω²[/dim]", "peak\n[dim]m/s²[/dim]"]
-    for head in (*heads, *(f"{mirror:g}\n[dim]m²/kg[/dim]" for mirror in columns)):
-        table.add_column(head, justify="right")
-    for row in rows(station, columns):
-        style = "bold" if row.rate == station.rate else None
-        begun = [f"{row.rate:.4g}", f"{row.period / _DAY:.4g}", f"{row.scaled:.4g}", f"{row.peak:.4g}"]
-        table.add_row(*begun, *(f"{area:.4g}" for area in row.areas), style=style)
-    console.print()
-    console.print(table)
+    mirrors = reflectivities(station)
+    columns = [Column("rate", "Ω", ".4g"), Column("period", "days", ".4g"), Column("peak/radius", "Ω²", ".4g")]
+    columns += [Column("peak", "m/s²", ".4g"), *(Column(f"{mirror:g}", "m²/kg", ".4g") for mirror in mirrors)]
+    found = rows(station, mirrors)
+    cells = [[row.rate, row.period / _DAY, row.scaled, row.peak, *row.areas] for row in found]
+    best = [number for number, row in enumerate(found) if row.rate == station.rate]
+    return Table(columns, cells, "Sail over the rate and the reflectivity", bold=best)
 
 
-def _print_deficits(station: Station, own: float | None) -> None:
+def _deficits(station: Station, own: float | None) -> Table:
     """Tell what deficits leave of what the circle asks; `own` is that of the sail there is, negative for a margin."""
-    from rich.table import Table
-
-    from starhold.cli.console import console
     from starhold.studies.sail import DEFICITS
 
-    table = Table(show_edge=False, pad_edge=False, title="What a deficit of control leaves", title_justify="left")
-    heads = ["deficit\n[dim]%[/dim]", "largest radius\n[dim]km[/dim]", "Sun seen there\n[dim]%[/dim]"]
-    heads += ["radius in that light\n[dim]km[/dim]", "on its limit, full circle\n[dim]% of the time[/dim]"]
-    for head in heads:
-        table.add_column(head, justify="right")
+    columns = [Column("deficit", "%", ".4g"), Column("largest radius", "km", ".6g"), Column("Sun seen there", "%", ".4g")]
+    columns += [Column("radius in that light", "km", ".6g"), Column("on its limit, full circle", "% of the time", ".3g")]
+    rows: list[list[float]] = []
     for missing in sorted({*DEFICITS, 0.0 if own is None else own}):
         left = station.deficit(missing)
-        shown = [f"{100.0 * missing:.4g}", f"{1e-3 * left.radius:.6g}", f"{100.0 * left.light:.4g}"]
-        table.add_row(*shown, f"{1e-3 * left.radius_dimmed:.6g}", f"{100.0 * left.on_limit:.3g}")
-    console.print()
-    console.print(table)
-    console.print(
-        "largest radius: held at the best rate by what is left; whether the full circle then bends or is lost, flights"
-    )
-    console.print("tell. radius in that light: where the sail loses with the Sun what the body hides.")
+        shown = [100.0 * missing, 1e-3 * left.radius, 100.0 * left.light, 1e-3 * left.radius_dimmed, 100.0 * left.on_limit]
+        rows.append(shown)
+    return Table(columns, rows, "What a deficit of control leaves")

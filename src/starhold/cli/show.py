@@ -11,6 +11,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 from rich.table import Table
 
 from starhold.cli.console import WIDE, console
+from starhold.report.commands import Column
+from starhold.report.commands import Table as Rows
 
 if TYPE_CHECKING:
     from starhold.laws.catalogue import Law
@@ -124,6 +126,21 @@ def _cell(text: str, best: bool) -> str:
     return f"[bold green]{text}*[/bold green]" if best else text
 
 
+def print_rows(what: Rows) -> None:
+    """Print a table; what is nothing is a dash."""
+    table = Table(show_edge=False, pad_edge=False, title=what.title or None, title_justify="left")
+    for column in what.columns:
+        head = f"{column.name}\n[dim]{column.unit}[/dim]" if column.unit else column.name
+        table.add_column(head, justify="right" if column.format else "left")
+    for number, row in enumerate(what.rows):
+        cells = [
+            value if isinstance(value, str) else "—" if value is None else format(value, column.format)
+            for value, column in zip(row, what.columns, strict=True)
+        ]
+        table.add_row(*cells, style="bold" if number in what.bold else None, end_section=number in what.ends)
+    console.print(table)
+
+
 def print_design(design: Design, law: Law) -> None:
     """The inputs of a design, its gains, and what it can be judged by."""
     import numpy as np
@@ -153,12 +170,8 @@ def print_design(design: Design, law: Law) -> None:
 
 def print_laws(group: str, known: Mapping[str, Law]) -> None:
     """Name, claim and summary of each law of a group."""
-    table = Table(show_edge=False, pad_edge=False)
-    for head in (group, "claims", "summary"):
-        table.add_column(head)
-    for law in known.values():
-        table.add_row(*map(escape, (law.name, law.card.claims, law.card.summary)))
-    console.print(table)
+    rows = [[*map(escape, (law.name, law.card.claims, law.card.summary))] for law in known.values()]
+    print_rows(Rows([*map(Column, (group, "claims", "summary"))], rows))
 
 
 def print_modes() -> None:
@@ -169,13 +182,9 @@ def print_modes() -> None:
 
 def print_wheels(units: Mapping[str, WheelUnit]) -> None:
     """Print what is known of each wheel; a dash where the maker does not say."""
-    table = Table(show_edge=False, pad_edge=False)
-    for head in ("unit", "maker", "torque, N m", "momentum, N m s", "rotor inertia, kg m²", "mass, kg", "source"):
-        table.add_column(head, justify="left" if head in ("unit", "maker", "source") else "right")
-    for unit in units.values():
-        numbers = (unit.torque_limit, unit.momentum_limit, unit.inertia, unit.mass)
-        table.add_row(unit.name, unit.maker, *("—" if x is None else f"{x:.4g}" for x in numbers), unit.source)
-    console.print(table)
+    numbers = [Column(name, "", ".4g") for name in ("torque, N m", "momentum, N m s", "rotor inertia, kg m²", "mass, kg")]
+    rows = [[u.name, u.maker, u.torque_limit, u.momentum_limit, u.inertia, u.mass, u.source] for u in units.values()]
+    print_rows(Rows([Column("unit"), Column("maker"), *numbers, Column("source")], rows))
 
 
 def print_law(law: Law) -> None:
@@ -195,16 +204,14 @@ def print_law(law: Law) -> None:
 def print_fields(title: str, fields: Iterable[Field]) -> None:
     """Parameters with their units, bounds and defaults under a title."""
     console.print(f"\n[bold]{title}[/bold]", highlight=False)
-    table = Table(show_edge=False, pad_edge=False)
-    for head in ("key", "unit", "allowed", "default", "meaning"):
-        table.add_column(head)
+    rows: list[list[str]] = []
     for item in fields:
         allowed = ", ".join(item.gain.choices) or _bounds(item.gain)
         default = (
             "required" if item.required else str(item.gain.choices[item.default] if item.gain.choices else item.default)
         )
-        table.add_row(*map(escape, (item.name, item.gain.unit, allowed, default, item.gain.text)))
-    console.print(table)
+        rows.append([*map(escape, (item.name, item.gain.unit, allowed, default, item.gain.text))])
+    print_rows(Rows([*map(Column, ("key", "unit", "allowed", "default", "meaning"))], rows))
 
 
 def _bounds(gain: Any) -> str:

@@ -42,7 +42,7 @@ def paint(what: Picture, folder: Path, part: slice = slice(None)) -> list[Path]:
     with warnings.catch_warnings():
         # A name in a script that the font lacks is drawn as boxes; that is no news to whoever runs a simulation.
         warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
-        return [_save(make(), folder / f"{key}.png") for key, make in list(what.makers().items())[part]]
+        return [save(make(), folder / f"{key}.png") for key, make in list(what.makers().items())[part]]
 
 
 def warm_up() -> None:
@@ -190,7 +190,32 @@ def width_of(number: int, count: int, thin: bool = False) -> float:
     return (1.2 if thin else 2.4) - (0.5 if thin else 1.3) * number / max(count - 1, 1)
 
 
-def _save(figure: Any, path: Path) -> Path:
+def framed(
+    size: tuple[float, float],
+    title: str,
+    rows: int,
+    columns: int,
+    sides: tuple[float, float, float, float],
+    sharex: bool = False,
+    sharey: bool = False,
+    **grid: Any,
+) -> tuple[Any, Any]:
+    """A figure of a size with its title, and a grid of axes with room for sides: left, right, below, above (all inches)."""
+    from matplotlib.figure import Figure
+
+    (width, height), (left, right, below, above) = size, sides
+    figure = Figure(figsize=size, dpi=DPI)
+    # All is placed by fixed distances, for layout engines draw everything twice.
+    figure.set_layout_engine("none")
+    grid |= {"left": left / width, "right": 1.0 - right / width, "bottom": below / height, "top": 1.0 - above / height}
+    axes = figure.subplots(rows, columns, sharex=sharex, sharey=sharey, squeeze=False, gridspec_kw=grid)
+    heading = shortened(title, round(11.9 * (width - left)))
+    figure.text(left / width, 1.0 - 0.27 / height, heading, fontsize=11, fontweight="bold", parse_math=False)
+    return figure, axes
+
+
+def save(figure: Any, path: Path) -> Path:
+    """Write a figure to `path`, in a folder that exists, and return the path."""
     # Fast compression: the files are small either way. No software entry, lest equal figures differ between releases.
     with atomic_write(path) as hidden:
         figure.savefig(hidden, metadata={"Software": None}, pil_kwargs={"compress_level": 3})

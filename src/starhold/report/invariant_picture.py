@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from starhold.certification.invariant.wording import down
-from starhold.files import atomic_write
 from starhold.report.colours import COLOURS
+from starhold.report.figures import framed, save
 from starhold.studies.phase_portraits import Portrait
 
 PICTURE = "invariant.png"
-DPI = 110
 INSIDE, SET, AGAINST, TRUE = COLOURS[5], COLOURS[0], COLOURS[1], COLOURS[2]
 
 
@@ -23,26 +22,14 @@ def draw(portraits: Sequence[Portrait], path: Path, title: str) -> Path | None:
     drawn = [item for item in portraits if item.V is not None]
     if not drawn:
         return None
-    from matplotlib.figure import Figure
-
     across = min(len(drawn), 2)
     down = -(-len(drawn) // across)
     # Panels as wide as they are drawn where both axes have one scale.
     shares = [max(_share(item) for item in drawn[k::across]) for k in range(across)]
     wide, height = 4.1 * sum(shares) + 0.75 * (across - 1), 4.1 * down + 0.75 * (down - 1) + 1.45
     width = max(wide + 0.85, 5.2)
-    figure = Figure(figsize=(width, height), dpi=DPI)
-    figure.set_layout_engine("none")
-    axes: Any = figure.subplots(down, across, squeeze=False, gridspec_kw={"width_ratios": shares})
-    figure.subplots_adjust(
-        left=0.62 / width,
-        right=(0.62 + wide) / width,
-        bottom=0.5 / height,
-        top=1.0 - 0.95 / height,
-        wspace=0.75 * across / (wide - 0.75 * (across - 1)),
-        hspace=0.75 / 4.1,
-    )
-    figure.text(0.62 / width, 1.0 - 0.27 / height, title, fontsize=11, fontweight="bold", parse_math=False)
+    sides, gap = (0.62, width - 0.62 - wide, 0.5, 0.95), 0.75 * across / (wide - 0.75 * (across - 1))
+    figure, axes = framed((width, height), title, down, across, sides, width_ratios=shares, wspace=gap, hspace=0.75 / 4.1)
     for axis, item in zip(axes.ravel(), drawn, strict=False):
         _panel(axis, item)
     for axis in axes.ravel()[len(drawn) :]:
@@ -57,9 +44,7 @@ def draw(portraits: Sequence[Portrait], path: Path, title: str) -> Path | None:
         borderpad=0.0,
         columnspacing=1.4,
     )
-    with atomic_write(path) as hidden:
-        figure.savefig(hidden, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
-    return path
+    return save(figure, path)
 
 
 def _share(item: Portrait) -> float:

@@ -13,6 +13,7 @@ from starhold.certification.certificate import FILE as CERTIFICATES
 from starhold.certification.certificate import write as write_certificates
 from starhold.errors import InputError
 from starhold.files import atomic_write, claim, clear_unfinished
+from starhold.report import commands
 from starhold.report.netcdf import write_netcdf
 from starhold.scenario.checking import cut
 from starhold.scenario.reading import LONGEST_PATH
@@ -25,12 +26,10 @@ if TYPE_CHECKING:
     from starhold.studies.flight import Flight
 
 SUMMARY, PAGE = "summary.json", "report.html"
-FAILURES = ("failures.csv", "failures.png")
-ROOTS = ("modal-roots.csv", "modal-roots.png")
-BUDGET = ("budget.csv", "budget.png")
 INDEX = "index.html"
 EXPORT = "export.json"
-MARKS = (SUMMARY, EXPORT, "run.nc", PAGE, INDEX, CERTIFICATES, "invariant.png", *FAILURES, *ROOTS, *BUDGET)
+STUDIED = tuple(f"{name}.{kind}" for name in commands.names() for kind in ("csv", "png"))
+MARKS = (SUMMARY, EXPORT, "run.nc", PAGE, INDEX, CERTIFICATES, "invariant.png", *STUDIED)
 """A folder with one of these holds results."""
 
 
@@ -107,6 +106,19 @@ def _finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_finite(item) for item in cast(list[Any], value)]
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def write_result(result: commands.Result, name: str, scenario: Scenario, law: str, folder: Path) -> tuple[Path, Path]:
+    """What a study gives into an existing folder; returns the paths of its table and its picture."""
+    from starhold.report.figures import save
+    from starhold.report.tables import write_table
+
+    table, picture = folder / f"{name}.csv", folder / f"{name}.png"
+    write_table(result.numbers, table)
+    save(result.figure(), picture)
+    if result.summary is not None:
+        write_summary(scenario, {law: dict(result.summary)}, folder / SUMMARY)
+    return table, picture
 
 
 def write_proofs(certificates: Sequence[Certificate], name: str, folder: Path) -> Path:

@@ -9,10 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from starhold.files import atomic_write
+from starhold.report.figures import DPI, save
 from starhold.synthesis.stability_degree import Optimum, boundary, degree, optimum
 
-DPI = 110
 POINTS = 400
 """Gains each way at which the map is computed, about two pixels apart."""
 DASHES = ((1, 1.2), (5, 2), (7, 2, 1, 2))
@@ -97,7 +96,7 @@ def paint(what: StabilityMap, path: Path) -> Path:
         handlelength=2.6,
         columnspacing=1.6,
     )
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def _budget(axis: Any, what: StabilityMap) -> None:
@@ -202,10 +201,3 @@ def _axes(ratios: tuple[float, ...]) -> list[tuple[str, float]]:
         else:
             groups.append((name, ratio))
     return [(f"{'axes' if ',' in names else 'axis'} {names}", ratio) for names, ratio in groups]
-
-
-def _save(figure: Any, path: Path) -> Path:
-    # No software entry, lest equal figures differ between releases.
-    with atomic_write(path) as hidden:
-        figure.savefig(hidden, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
-    return path

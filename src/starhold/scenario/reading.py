@@ -133,6 +133,11 @@ class Scenario:
         return self
 
 
+def first_law(scenario: Scenario, law: str | None) -> LawEntry:
+    """The law of this name, the first of a scenario if None."""
+    return scenario.laws[0] if law is None else scenario.pick(law)
+
+
 def builtin_names() -> list[str]:
     """The scenarios that come with starhold."""
     folder = resources.files("starhold.scenario") / "builtin"

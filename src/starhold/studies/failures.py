@@ -19,6 +19,7 @@ from starhold.parts.effectors.wheels import Wheels, lose
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.bodies.rigid_body.tables import FaultTable
 from starhold.scenario.building import build
+from starhold.scenario.reading import first_law
 from starhold.simulation.lane import Recording, fly, label
 from starhold.studies.bodies.rigid_body import certify_law
 from starhold.synthesis.stability_degree import degree, scale
@@ -127,6 +128,13 @@ def directions_lacking(axes: Array) -> Array:
     lacking = directions[:, sizes <= WEAK * sizes[0]].T
     leading = np.take_along_axis(lacking, np.abs(lacking.round(9)).argmax(axis=1)[:, None], axis=1)
     return np.sign(leading) * lacking
+
+
+def pick(scenario: Scenario, law: str | None) -> LawEntry:
+    """The law of this name, the first if None; InputError where the scenario has no wheels."""
+    entry = first_law(scenario, law)
+    require_wheels(scenario)
+    return entry
 
 
 def require_wheels(scenario: Scenario) -> Wheels:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from starhold.scenario.bodies.rigid_body.transient import TransientTable
     from starhold.scenario.reading import LawEntry, Scenario
 
+Notice: TypeAlias = Callable[[int, int, str], None]
 DIGITS = 6
 """Digits of the fit as it is printed; the roots have three or four."""
 PUBLISHED_FOR: dict[str, Any] = {
@@ -72,13 +73,13 @@ def pick_modal(scenario: Scenario, law: str | None) -> LawEntry:
     return entry
 
 
-def study(scenario: Scenario, entry: LawEntry, notice: Callable[[int, int], None] = lambda done, total: None) -> Study:
+def study(scenario: Scenario, entry: LawEntry, notice: Notice = lambda done, total, what: None) -> Study:
     """The search of a scenario, with a law that `pick_modal` gives, of which only b counts. `notice` hears how many angles
     are done. InputError where no root keeps the limits from some angle."""
     table: Any = scenario.table.transient
     limits, eased = _limits(table)
     problem = problem_of(scenario, entry)
-    found = search(problem, table.angles, table.roots, limits, eased, notice)
+    found = search(problem, table.angles, table.roots, limits, eased, lambda done, total: notice(done, total, "angles"))
     for item in found:
         if item.hard is None:
             raise _unreachable(scenario, problem, item.angle, limits)

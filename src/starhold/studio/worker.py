@@ -5,7 +5,6 @@ standard input does."""
 from __future__ import annotations
 
 import base64
-import csv
 import json
 import os
 import shutil
@@ -13,11 +12,13 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from starhold.errors import InputError
+from starhold.report import commands
 from starhold.scenario.reading import parse
 
 if TYPE_CHECKING:
@@ -100,31 +101,29 @@ def _shown(value: Any) -> str:
     return "—" if value is None else number_text(value)
 
 
-def _failures(scenario: Scenario, folder: Path, tell: Tell) -> str:
-    from starhold.report.failures_picture import draw
-    from starhold.report.results import FAILURES
-    from starhold.report.tables import write_failures
-    from starhold.studies.failures import require_wheels, study
+def _studied(name: str, scenario: Scenario, folder: Path, tell: Tell) -> str:
+    """A page of a study: its picture, its sentences and its table, without the columns that are empty throughout."""
+    from starhold.report.results import write_result
+    from starhold.report.tables import lines
 
-    entry = scenario.about("rigid-body").laws[0]
-    require_wheels(scenario)
-    found = study(scenario, entry, lambda done, total, name: tell(done, total, f"lost: {name}" if name else "flown"))
-    write_failures(found, entry, folder / FAILURES[0])
-    draw(found, folder / FAILURES[1], f"{scenario.name}, {entry.name}: loss of wheels")
-    return _shown_table(scenario, folder, f"Loss of wheels under {entry.name}", *FAILURES)
-
-
-def _budget(scenario: Scenario, folder: Path, tell: Tell) -> str:
-    from starhold.report.budget_picture import draw, setting_text
-    from starhold.report.results import BUDGET
-    from starhold.report.tables import write_budget
-    from starhold.studies.budget import study
-
-    entry = scenario.about("rigid-body").laws[0]
-    found = study(scenario, entry, lambda done, total, name: tell(done, total, name or "flown"))
-    write_budget(found, folder / BUDGET[0])
-    draw(found, folder / BUDGET[1])
-    return _shown_table(scenario, folder, f"Pointing error by source under {entry.name}", *BUDGET, setting_text(found))
+    command = commands.command(name)
+    scenario, entry = command.prepare(scenario)
+    result = command.result(scenario, entry, tell)
+    table, picture = write_result(result, name, scenario, entry.name, folder)
+    head, *rows = lines(result.numbers)
+    kept = [place for place, _ in enumerate(head) if any(row[place] for row in rows)]
+    shown = "".join(f"<tr>{''.join(f'<td>{escape(_short(row[place]))}</td>' for place in kept)}</tr>" for row in rows)
+    drawn = base64.b64encode(picture.read_bytes()).decode()
+    parts = [
+        f"<h2>{escape(result.title)}</h2>",
+        f'<p><img src="data:image/png;base64,{drawn}" alt="{escape(result.title)}" style="max-width:100%"></p>',
+        *(f'<p style="white-space:pre-line">{escape(text)}</p>' for text in result.sentences),
+        f'<div class="wide"><table class="text"><thead><tr>{"".join(f"<th>{escape(head[place])}</th>" for place in kept)}'
+        f"</tr></thead><tbody>{shown}</tbody></table></div>",
+        f'<p>All digits: <a href="{table.name}" download>{table.name}</a>. '
+        f'Picture: <a href="{picture.name}" download>{picture.name}</a>.</p>',
+    ]
+    return _document(scenario, folder, parts)
 
 
 def _export(scenario: Scenario, folder: Path, tell: Tell) -> str:
@@ -148,27 +147,6 @@ def _export(scenario: Scenario, folder: Path, tell: Tell) -> str:
             f'<p><a href="{escape(Path(archive).name)}" download>{escape(Path(archive).name)}</a>: '
             f"{escape(', '.join(made.files))}</p><p>{escape(said)}</p><ul>{costs}</ul>"
         )
-    return _document(scenario, folder, parts)
-
-
-def _shown_table(scenario: Scenario, folder: Path, title: str, table: str, picture: str, note: str = "") -> str:
-    """A page of a picture and the table beside it, without the columns that are empty throughout."""
-    with (folder / table).open(encoding="utf-8", newline="") as file:
-        rows = list(csv.reader(file))
-    kept = [place for place, _ in enumerate(rows[0]) if any(row[place] for row in rows[1:])]
-    lines = [
-        "".join(f"<{cell}>{escape(_short(row[place]))}</{cell}>" for place in kept)
-        for row, cell in zip(rows, ["th", *["td"] * (len(rows) - 1)], strict=True)
-    ]
-    drawn = base64.b64encode((folder / picture).read_bytes()).decode()
-    parts = [
-        f"<h2>{escape(title)}</h2>",
-        f'<p><img src="data:image/png;base64,{drawn}" alt="{escape(title)}" style="max-width:100%"></p>',
-        f"<p>{escape(note)}</p>" if note else "",
-        f'<div class="wide"><table class="text"><thead><tr>{lines[0]}</tr></thead>'
-        f"<tbody>{''.join(f'<tr>{line}</tr>' for line in lines[1:])}</tbody></table></div>",
-        f'<p>All digits: <a href="{table}" download>{table}</a>. Picture: <a href="{picture}" download>{picture}</a>.</p>',
-    ]
     return _document(scenario, folder, parts)
 
 
@@ -221,8 +199,7 @@ KINDS = {
     "compare": _compare,
     "certify": _certify,
     "design": _design,
-    "failures": _failures,
-    "budget": _budget,
+    **{name: partial(_studied, name) for name in commands.names()},
     "campaign": _campaign,
     "export": _export,
 }

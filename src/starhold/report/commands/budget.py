@@ -1,0 +1,109 @@
+"""The pointing error by source."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from starhold.report.commands import Column, Command, Option, Result, Table, later
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import LawEntry, Scenario
+    from starhold.studies.budget import Budget
+UNITS = (("deg", math.radians(1.0)), ("arcsec", math.radians(1.0 / 3600.0)), ("mas", math.radians(1.0 / 3.6e6)))
+LEAST = 0.1
+"""The largest level is no less in the unit that it is told in."""
+SMALL = 1e-4
+"""Levels below this share of the largest of their panel are told as nothing."""
+INTERPRETED = {
+    "mixed": "of all instants of all runs",
+    "temporal": "of the instants of the worst run",
+    "ensemble": "of the runs, at their worst instants",
+}
+
+
+def present(scenario: Scenario, entry: LawEntry, found: Budget) -> Result:
+    """One row a source, one column an index."""
+    from starhold.analysis.pointing import MEANINGS, Figures
+
+    records = found.records()
+    heads = [Column(name.replace("deviation", "standard deviation"), "rad") for name in Figures._fields]
+    numbers = Table([*map(Column, list(records[0])[: -len(heads)]), *heads], [list(row.values()) for row in records])
+    sentences = [_setting_text(found), *(f"{index}: {MEANINGS[index]}." for index in found.indices)]
+    title = f"{found.scenario}, {found.law}: pointing error by source"
+    return Result(title, numbers, lambda: draw(found, title), _table(found), sentences, found.summary(), found.met)
+
+
+def _table(found: Budget) -> Table:
+    from starhold.studies.budget import COMBINED, TOGETHER
+
+    units = {index: _unit_of(found, index) for index in found.indices}
+    rows: list[list[Any]] = [
+        [row.name, *(found.level(row.name, index) / size for index, (_, size) in units.items())] for row in found.rows
+    ]
+    count, ends = len(rows), {len(rows) - 3, len(rows) - 1}
+    bold = [place for place, row in enumerate(found.rows) if row.name == TOGETHER]
+    ratios = [found.level(TOGETHER, index) / max(found.level(COMBINED, index), 1e-300) for index in found.indices]
+    rows.append(["together / root sum square", *(f"{ratio:.3g}" for ratio in ratios)])
+    if found.required:
+        verdicts = {True: "[green]met[/green]", False: "[red]missed[/red]"}
+        shown = {
+            index: f"{most / units[index][1]:.4g} {verdicts[found.level(TOGETHER, index) <= most]}"
+            for index, most in found.required.items()
+        }
+        rows.append(["required, at most", *(shown.get(index, "") for index in found.indices)])
+        ends.add(count)
+    columns = [Column("source"), *(Column(index, unit, ".4g") for index, (unit, _) in units.items())]
+    return Table(columns, rows, bold=bold, ends=ends)
+
+
+def _unit_of(budget: Budget, index: str) -> tuple[str, float]:
+    """The unit that the levels of an index are told in, and its size (rad)."""
+    largest = max(budget.level(row.name, index) for row in budget.rows)
+    return next((unit for unit in UNITS if largest >= LEAST * unit[1]), UNITS[-1])
+
+
+def _setting_text(budget: Budget) -> str:
+    """How the errors were taken, in a sentence or two."""
+    told = budget.settings
+    about = "about whatever axis" if told.boresight is None else "half the cone of the line of sight"
+    runs = "run" if told.runs == 1 else "runs"
+    return (
+        f"Levels that {100.0 * told.confidence:.6g} % {INTERPRETED[told.interpretation]} keep, {about}; {told.runs} {runs}. "
+        f"Errors from {told.start:g} s on, windows of {told.window:g} s, for drift {told.separation:g} s apart."
+    )
+
+
+def draw(budget: Budget, title: str) -> Any:
+    """A panel for each index, in it a bar for each source."""
+    from starhold.analysis.pointing import MEANINGS
+    from starhold.report.bars import Bars, draw_bars
+    from starhold.studies.budget import COMBINED, LOOP, TOGETHER
+
+    shown = [row.name for row in budget.rows if row.name != COMBINED]
+    panels: list[Bars] = []
+    for index in budget.indices:
+        unit, size = _unit_of(budget, index)
+        levels = [budget.level(name, index) / size for name in shown]
+        combined, required = budget.level(COMBINED, index) / size, budget.required.get(index)
+        most = None if required is None else required / size
+        words = [f"{value:.3g}" if value > SMALL * max(levels) else "≈ 0" for value in levels]
+        panels.append(Bars(f"{index}, {unit}", levels, words, combined, MEANINGS[index].partition(":")[0], most))
+    kinds = {LOOP: 2, "a source alone": 0, TOGETHER: 1}
+    hues = [kinds.get(name, 0) for name in shown]
+    return draw_bars(title, _setting_text(budget), shown, hues, panels, kinds, COMBINED)
+
+
+COMMAND = Command(
+    "Tell the pointing error by source, each alone and all together: a table, budget.csv, budget.png and summary.json.",
+    "budget",
+    later("studies.budget.study"),
+    present,
+    options={
+        "start": Option("budget.start", "errors count from here; else as the file says"),
+        "window": Option("budget.window", "length of windows; else as the file says"),
+        "separation": Option("budget.separation", "of the two windows of a drift; else as the file says"),
+        "runs": Option("budget.runs", "with random numbers of their own; else what the file says", whole=True),
+    },
+    unstable=True,
+)

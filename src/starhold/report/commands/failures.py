@@ -1,0 +1,148 @@
+"""A study of what is left after the loss of any one or two wheels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from starhold.report.commands import Column, Command, Result, Table, later
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import LawEntry, Scenario
+    from starhold.studies.failures import Failure
+
+
+def present(scenario: Scenario, entry: LawEntry, found: Sequence[Failure]) -> Result:
+    """One row a loss; of the gains those that were designed anew."""
+    from starhold.report.text import number_text
+
+    flown = [failure.gains for failure in found if failure.gains is not None]
+    retuned = [name for name in flown[0] if any(number_text(g[name]) != number_text(flown[0][name]) for g in flown)]
+    sentences: list[str] = []
+    if any(not failure.controllable for failure in found):
+        sentences.append("not (x, y, z): no torque is left about this body direction.")
+    sentences += [f"without {failure.name} not flown: {failure.refused}" for failure in found if failure.refused]
+    if any(failure.certified is not None for failure in found):
+        sentences.append("certified: turns from rest on which no motor or wheel is proved to meet its limit.")
+    if not retuned:
+        sentences.append("The gains are the same in all of them.")
+    if any(failure.saturation is not None and failure.saturation.known == "extrapolated" for failure in found):
+        sentences.append("~ extrapolated from the growth of the momentum late in the flight.")
+    title = f"{scenario.name}, {entry.name}: loss of wheels"
+    return Result(title, _numbers(found, entry), lambda: draw(found, title), _table(found, retuned), sentences)
+
+
+def _numbers(found: Sequence[Failure], entry: LawEntry) -> Table:
+    """All numbers, with every gain."""
+    gains = [Column(item.name, item.gain.unit) for item in entry.law.fields()]
+    rows = [[*_cells(failure).values(), *((failure.gains or {}).get(gain.name) for gain in gains)] for failure in found]
+    return Table([*_cells(found[0]), *gains], rows)
+
+
+def _cells(failure: Failure) -> dict[Any, Any]:
+    from starhold.report.tables import cell
+
+    known = failure.saturation
+    certified = failure.certified or (None, None)
+    return {
+        Column("lost wheels"): failure.lost,
+        Column("controllable axes"): 3 - len(failure.lacking),
+        Column("directions without authority"): "; ".join(map(cell, failure.lacking)),
+        Column("condition number"): failure.condition,
+        Column("torque authority", "N m"): failure.authority,
+        Column("share of intact authority"): failure.share,
+        Column("degree of stability intact", "1/s"): failure.eta_intact,
+        Column("degree of stability after", "1/s"): failure.eta,
+        Column("settling time", "s"): failure.settling,
+        Column("diverged at", "s"): failure.diverged_at,
+        Column("certified turn", "rad"): certified[0],
+        Column("certified rate", "rad/s"): certified[1],
+        Column("saturation time", "s"): known and known.time,
+        Column("saturating wheel"): known and known.wheel,
+        Column("saturation known from"): known and known.known,
+        Column("window of momentum growth", "s"): known and known.window,
+        Column("largest share of momentum limit"): failure.momentum_share,
+        Column("time flown", "s"): failure.flown,
+        Column("not flown because"): failure.refused,
+    }
+
+
+def _table(found: Sequence[Failure], retuned: Sequence[str]) -> Table:
+    designed = found[0].eta is not None
+    columns = [Column("lost"), Column("axes"), Column("cond.", "", ".3g")]
+    columns += [Column("authority", "N m", ".4g"), Column("share", "%", ".1f"), *(Column(name, "", ">") for name in retuned)]
+    columns += [Column("stability", "1/s, before → after", ">")] * designed
+    columns += [Column("certified", "turn, °", ">"), Column("settling", "s", ".4g"), Column("wheel full", "min", ">")]
+    return Table(columns, [[failure.name, *_row(failure, retuned, designed)] for failure in found])
+
+
+def _row(failure: Failure, retuned: Sequence[str], designed: bool) -> list[Any]:
+    from starhold.certification.wording import shown
+    from starhold.report.text import number_text
+
+    axes = "three" if failure.controllable else f"[red]not {_directions(failure)}[/red]"
+    begun = [axes, failure.condition, failure.authority, 100.0 * failure.share]
+    if failure.gains is None:
+        return [*begun, *[None] * (len(retuned) + designed + 3)]
+    eta = [f"{failure.eta_intact:.4g} → {failure.eta:.4g}"] if designed else []
+    certified = None if failure.certified is None else shown(math.degrees(failure.certified[0]))
+    settling = "not settled" if failure.settling is None else failure.settling
+    if failure.diverged_at is not None:
+        settling = f"[red]diverged at {failure.diverged_at:.4g}[/red]"
+    return [*begun, *(number_text(failure.gains[name], 4) for name in retuned), *eta, certified, settling, _full(failure)]
+
+
+def _full(failure: Failure) -> str | None:
+    from starhold.studies.failures import HORIZON
+
+    known: Any = failure.saturation
+    if known is None:
+        return None
+    if known.time is None:
+        return f"> {HORIZON} orbits" if failure.orbit else f"> {HORIZON * known.window / 60.0:.4g}"
+    return f"{'~' if known.known == 'extrapolated' else ''}{known.time / 60.0:.4g} (wheel {known.wheel})"
+
+
+def _directions(failure: Failure) -> str:
+    """The body directions without authority."""
+    if len(failure.lacking) == 3:
+        return "any axis"
+    return " and ".join(f"({', '.join(f'{x:.3g}' for x in direction)})" for direction in failure.lacking)
+
+
+def draw(found: Sequence[Failure], title: str) -> Any:
+    """One row a loss, one panel a quantity."""
+    from starhold.report.bars import draw_bars
+
+    panels = [_bars("authority left, % of intact", found, [100.0 * failure.share for failure in found])]
+    if any(failure.eta is not None for failure in found):
+        panels.append(_bars("degree of stability, 1/s", found, [failure.eta for failure in found]))
+    panels.append(_bars("settling time, s", found, [failure.settling for failure in found]))
+    if any(failure.certified is not None for failure in found):
+        # Rounded down, so as not to say more than is proved.
+        turns = [None if f.certified is None else math.floor(10.0 * math.degrees(f.certified[0])) / 10.0 for f in found]
+        panels.append(_bars("certified turn, °", found, turns, "not proved"))
+    rows, hues = [failure.name for failure in found], [0 if failure.lost else 2 for failure in found]
+    struck = {k: f"no torque about {_directions(failure)}" for k, failure in enumerate(found) if not failure.controllable}
+    kinds = {"intact": 2, "three axes left": 0}
+    return draw_bars(title, "", rows, hues, panels, kinds, "as intact", "lost wheels", struck, "an axis without torque")
+
+
+def _bars(label: str, found: Sequence[Failure], values: Sequence[float | None], missing: str = "not settled") -> Any:
+    """A panel with the number at the end of each bar, or why there is none."""
+    from starhold.report.bars import Bars
+
+    lost = ["diverged" if f.diverged_at is not None else "not flown" if f.refused else missing for f in found]
+    words = [why if value is None else f"{value:.3g}" for value, why in zip(values, lost, strict=True)]
+    return Bars(label, [value or 0.0 for value in values], words, values[0])
+
+
+COMMAND = Command(
+    "Tell what is left after the loss of any one or two wheels: a table, failures.csv and failures.png.",
+    "failures",
+    later("studies.failures.study"),
+    present,
+    later("studies.failures.pick"),
+    doing="lost: {}",
+)
