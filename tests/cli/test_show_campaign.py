@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 
 from starhold.campaign.verdicts import percent
-from starhold.cli import show_campaign
+from starhold.cli import show, show_campaign
 from starhold.cli.show_campaign import flying_campaign, print_campaign
 from starhold.errors import InputError
 from starhold.report.campaign_units import figure
@@ -22,7 +22,8 @@ def printed(monkeypatch: pytest.MonkeyPatch) -> Any:
 
     def to_text(work: Any, width: int = 160, terminal: bool = False) -> str:
         console = Console(file=io.StringIO(), width=width, record=True, force_terminal=terminal, legacy_windows=False)
-        monkeypatch.setattr(show_campaign, "console", console)
+        for module in (show, show_campaign):
+            monkeypatch.setattr(module, "console", console)
         work()
         return console.export_text()
 

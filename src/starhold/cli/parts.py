@@ -125,5 +125,5 @@ def print_part(part: Part) -> None:
     kinds = [getattr(part.module, kind) for kind in ("Reading", "Estimate", "Sample") if hasattr(part.module, kind)]
     if kinds and getattr(part.module, "RECORDED", True):
         recorded = [(name, told.unit, told.text) for kind in kinds for name, told in quantities(kind).items()]
-        console.print()
-        print_rows(Table([*map(Column, ("recorded", "unit", "meaning"))], [[*map(escape, row)] for row in recorded]))
+        rows = [[*map(escape, row)] for row in recorded]
+        print_rows(Table([*map(Column, ("recorded", "unit", "meaning"))], rows), apart=True)

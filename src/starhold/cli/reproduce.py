@@ -114,19 +114,19 @@ def _work(letter: str, folder: Path) -> Reproduction:
 def _print(made: list[Reproduction]) -> None:
     from collections import Counter
 
-    from rich.table import Table
+    from rich.markup import escape
 
     from starhold.cli.console import console
+    from starhold.cli.show import print_rows
     from starhold.publications.verdicts import VERDICTS
+    from starhold.report.commands import Column, Table
 
-    table = Table(show_edge=False, pad_edge=False)
-    for number, head in enumerate(("publication", "figures", "rows", *VERDICTS)):
-        table.add_column(head, justify="right" if number else "left")
+    rows: list[list[Any]] = []
     for one in made:
         counted = Counter(judged.verdict for judged in one.rows.values())
-        cells = [str(counted[verdict] or "") for verdict in VERDICTS]
-        table.add_row(f"{one.paper.letter}. {one.paper.title}", str(len(one.figures)), str(len(one.rows)), *cells)
-    console.print(table, markup=False)
+        cells = [counted[verdict] or "" for verdict in VERDICTS]
+        rows.append([escape(f"{one.paper.letter}. {one.paper.title}"), len(one.figures), len(one.rows), *cells])
+    print_rows(Table([Column("publication"), *(Column(head, "", ">") for head in ("figures", "rows", *VERDICTS))], rows))
     for one in made:
         for judged in one.changed:
             text = f"{one.paper.letter}/{judged.row.name}: recorded {judged.row.verdict}, now {judged.verdict}"

@@ -122,9 +122,8 @@ def print_sail(station: Station, point: str, mass: float, area: float | None) ->
     if area is not None:
         lines.append(_margin(station, area, mass))
     console.print("\n".join(lines), highlight=False, markup=False, soft_wrap=True)
-    for table in (_rates(station), _deficits(station, None if area is None else 1.0 - station.margin(area, mass))):
-        console.print()
-        print_rows(table)
+    print_rows(_rates(station), apart=True)
+    print_rows(_deficits(station, None if area is None else 1.0 - station.margin(area, mass)), apart=True)
     console.print(
         "largest radius: held at the best rate by what is left; whether the full circle then bends or is lost, flights"
     )

@@ -126,18 +126,22 @@ def _cell(text: str, best: bool) -> str:
     return f"[bold green]{text}*[/bold green]" if best else text
 
 
-def print_rows(what: Rows) -> None:
-    """Print a table; what is nothing is a dash."""
+def print_rows(what: Rows, apart: bool = False) -> None:
+    """Print a table, after an empty line if `apart`; what is nothing is a dash."""
     table = Table(show_edge=False, pad_edge=False, title=what.title or None, title_justify="left")
     for column in what.columns:
         head = f"{column.name}\n[dim]{column.unit}[/dim]" if column.unit else column.name
-        table.add_column(head, justify="right" if column.format else "left")
+        table.add_column(
+            head, justify="right" if column.format else "left", overflow="ellipsis" if column.format else "fold"
+        )
     for number, row in enumerate(what.rows):
         cells = [
             value if isinstance(value, str) else "—" if value is None else format(value, column.format)
             for value, column in zip(row, what.columns, strict=True)
         ]
         table.add_row(*cells, style="bold" if number in what.bold else None, end_section=number in what.ends)
+    if apart:
+        console.print()
     console.print(table)
 
 
@@ -152,14 +156,8 @@ def print_design(design: Design, law: Law) -> None:
         ("from", law.fields(design.form), design.inputs),
         ("gains", law.fields(), design.gains),
     ):
-        table = Table(show_edge=False, pad_edge=False)
-        for head in (title, "value", "unit", "meaning"):
-            table.add_column(head, overflow="fold")
-        for item in items:
-            value = values[item.name]
-            shown = value if isinstance(value, str) else number_text(value)
-            table.add_row(*map(escape, (item.name, shown, item.gain.unit, item.gain.text)))
-        console.print(table)
+        cells = [(item.name, number_text(values[item.name]), item.gain.unit, item.gain.text) for item in items]
+        print_rows(Rows([*map(Column, (title, "value", "unit", "meaning"))], [[*map(escape, row)] for row in cells]))
     # Digits, not decimals: entries of P may be far apart in size.
     digits: Any = {"float_kind": lambda number: f"{number:12.6g}", "complex_kind": lambda number: f"{number:.6g}"}
     for name, value in design.figures.items():

@@ -14,6 +14,7 @@ from rich.text import Text
 
 from starhold.campaign.verdicts import percent
 from starhold.cli.console import console
+from starhold.cli.show import print_rows
 from starhold.errors import InputError
 from starhold.report.campaign_units import (
     CONTRADICTED,
@@ -29,6 +30,8 @@ from starhold.report.campaign_units import (
     worst_text,
 )
 from starhold.report.campaign_words import headline, outcome_of
+from starhold.report.commands import Column
+from starhold.report.commands import Table as Rows
 
 if TYPE_CHECKING:
     from starhold.campaign.results import CampaignResult, LawResult
@@ -97,13 +100,11 @@ def print_campaign(result: CampaignResult, body: str) -> None:
         shown = f"[{COLOURS[outcome]}]{outcome}[/{COLOURS[outcome]}]  " if outcome else ""
         told = escape(_plain(headline(law, result.sampling, words)))
         console.print(f"{shown}[bold]{_safe(law.law)}[/bold] {told}", highlight=False)
-    if (verdicts := _verdicts(result, words)) is not None:
-        console.print()
-        console.print(verdicts)
+    if (verdicts := _verdicts(result, words)).rows:
+        print_rows(verdicts, apart=True)
         _conditions(result)
-    if (metrics := _metrics(result, words)) is not None:
-        console.print()
-        console.print(metrics)
+    if (metrics := _metrics(result, words)).rows:
+        print_rows(metrics, apart=True)
     _brackets(result, words)
     for law in result.laws:
         _drivers(law)
@@ -115,23 +116,11 @@ def print_campaign(result: CampaignResult, body: str) -> None:
         console.print(flown, highlight=False)
 
 
-def _verdicts(result: CampaignResult, words: Wording) -> Table | None:
-    rows = [(law, verdict) for law in result.laws for verdict in law.verdicts]
-    if not rows:
-        return None
-    table = Table(show_edge=False, pad_edge=False)
-    for head in ("law", "requirement", "verdict"):
-        table.add_column(head, overflow="fold")
-    for head in (
-        "keep it\n[dim]and must[/dim]",
-        "miss it\n[dim]and may[/dim]",
-        "failure\n[dim]probability[/dim]",
-        "worst\n[dim]margin, run[/dim]",
-    ):
-        table.add_column(head, justify="right")
-    for law, verdict in rows:
-        table.add_row(*_verdict(law, verdict, words))
-    return table
+def _verdicts(result: CampaignResult, words: Wording) -> Rows:
+    rows = [_verdict(law, verdict, words) for law in result.laws for verdict in law.verdicts]
+    numbers = {"keep it": "and must", "miss it": "and may", "failure": "probability", "worst": "margin, run"}
+    heads = [*map(Column, ("law", "requirement", "verdict")), *(Column(head, below, ">") for head, below in numbers.items())]
+    return Rows(heads, rows)
 
 
 def _verdict(law: LawResult, verdict: Verdict, words: Wording) -> list[str]:
@@ -160,18 +149,12 @@ def _conditions(result: CampaignResult) -> None:
                 console.print(told, highlight=False)
 
 
-def _metrics(result: CampaignResult, words: Wording) -> Table | None:
+def _metrics(result: CampaignResult, words: Wording) -> Rows:
     """The first metrics, those that something is required of before all."""
     found = headings_of(result, words)
     asked = {item.column for item in words.asked.values()}
     chosen = sorted(found, key=lambda metric: (metric not in asked, found.index(metric)))[:METRICS]
-    if not chosen:
-        return None
-    table = Table(show_edge=False, pad_edge=False)
-    for head in ("metric", "unit", "law"):
-        table.add_column(head, overflow="fold")
-    for head in ("5 %", "median", "95 %", "largest", "without"):
-        table.add_column(head, justify="right")
+    rows: list[list[str]] = []
     for metric in chosen:
         measure, head = words.measure(metric), True
         for law in result.laws:
@@ -180,9 +163,10 @@ def _metrics(result: CampaignResult, words: Wording) -> Table | None:
                     _, low, _, median, _, high, most = (figure(measure.scale * value) for value in spread.quantiles)
                     told = (_safe(measure.heading), _safe(measure.unit)) if head else ("", "")
                     missing = count_text(spread.missing) if spread.missing else DASH
-                    table.add_row(*told, _safe(law.law), low, median, high, most, missing)
+                    rows.append([*told, _safe(law.law), low, median, high, most, missing])
                     head = False
-    return table
+    numbers = [Column(head, "", ">") for head in ("5 %", "median", "95 %", "largest", "without")]
+    return Rows([*map(Column, ("metric", "unit", "law")), *numbers], rows)
 
 
 def _brackets(result: CampaignResult, words: Wording) -> None:

@@ -11,6 +11,9 @@ from rich.table import Table
 from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.wording import HEADINGS, OBLIGATIONS, eigenvalues, evidence, methods, sentence, unclaimed
 from starhold.cli.console import console
+from starhold.cli.show import print_rows
+from starhold.report.commands import Column
+from starhold.report.commands import Table as Rows
 from starhold.report.text import left_text
 
 if TYPE_CHECKING:
@@ -106,18 +109,16 @@ def assumptions(certificate: Certificate) -> str:
 
 def print_findings(findings: Sequence[Finding]) -> None:
     """Print what an independent check found, claim by claim; every obligation that fails."""
-    table = Table(show_edge=False, pad_edge=False)
-    for head in ("certificate", "claim", "obligations", "verdict"):
-        table.add_column(head, overflow="fold")
     groups: dict[tuple[str, str], list[Finding]] = {}
     for finding in findings:
         groups.setdefault((finding.certificate, finding.claim), []).append(finding)
+    rows: list[list[str]] = []
     for (name, claim), group in groups.items():
         verdicts = {finding.verdict for finding in group}
         worst = next(v for v in ("fails", "not checked", "not claimed", "holds") if v in verdicts)
         obligations = ", ".join(f.obligation for f in group if f.obligation)
-        table.add_row(_safe(name), _safe(claim), _safe(obligations), _coloured(worst))
-    console.print(table)
+        rows.append([_safe(name), _safe(claim), _safe(obligations), _coloured(worst)])
+    print_rows(Rows([*map(Column, ("certificate", "claim", "obligations", "verdict"))], rows))
     failed = [finding for finding in findings if finding.verdict == "fails"]
     for f in failed:
         console.print(f"[red]fails[/red]  {_where(f)}", highlight=False)

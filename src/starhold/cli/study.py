@@ -60,7 +60,6 @@ def print_result(result: Result) -> None:
     from starhold.cli.console import console
     from starhold.cli.show import print_rows
 
-    console.print()
-    print_rows(result.table)
+    print_rows(result.table, apart=True)
     for text in result.sentences:
         console.print(text, highlight=False, markup=False)

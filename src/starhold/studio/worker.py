@@ -11,7 +11,7 @@ import shutil
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from html import escape
 from pathlib import Path
@@ -78,21 +78,21 @@ def _design(scenario: Scenario, folder: Path, tell: Tell) -> str:
         law = scenario.pick(found.name).law
         parts.append(f'<h2>{escape(found.name)}: {escape(law.card.title)}, form "{escape(found.form)}"</h2>')
         for title, items, values in (("from", law.fields(found.form), found.inputs), ("gains", law.fields(), found.gains)):
-            rows = "".join(
-                f"<tr><td>{escape(item.name)}</td><td>{escape(_shown(values[item.name]))}</td><td>{escape(item.gain.unit)}</td>"
-                f"<td>{escape(item.gain.text)}</td></tr>"
-                for item in items
-            )
-            head = "".join(f"<th>{name}</th>" for name in (title, "value", "unit", "meaning"))
-            parts.append(
-                f'<div class="wide"><table class="text"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
-            )
+            rows = [(item.name, _shown(values[item.name]), item.gain.unit, item.gain.text) for item in items]
+            parts.append(_table((title, "value", "unit", "meaning"), rows))
         figures = "".join(
             f"<dt>{escape(name)}</dt><dd>{escape(number_text(value) if isinstance(value, float) else str(value))}</dd>"
             for name, value in found.figures.items()
         )
         parts.append(f"<dl>{figures}</dl>")
     return _document(scenario, folder, parts)
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = ["".join(f"<td>{escape(text)}</td>" for text in row) for row in rows]
+    heads = "".join(f"<th>{escape(text)}</th>" for text in head)
+    body = "".join(f"<tr>{line}</tr>" for line in lines)
+    return f'<div class="wide"><table class="text"><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table></div>'
 
 
 def _shown(value: Any) -> str:
@@ -112,14 +112,12 @@ def _studied(name: str, scenario: Scenario, folder: Path, tell: Tell) -> str:
     table, picture = write_result(result, name, scenario, entry.name, folder)
     head, *rows = lines(result.numbers)
     kept = [place for place, _ in enumerate(head) if any(row[place] for row in rows)]
-    shown = "".join(f"<tr>{''.join(f'<td>{escape(_short(row[place]))}</td>' for place in kept)}</tr>" for row in rows)
     drawn = base64.b64encode(picture.read_bytes()).decode()
     parts = [
         f"<h2>{escape(result.title)}</h2>",
         f'<p><img src="data:image/png;base64,{drawn}" alt="{escape(result.title)}" style="max-width:100%"></p>',
         *(f'<p style="white-space:pre-line">{escape(text)}</p>' for text in result.sentences),
-        f'<div class="wide"><table class="text"><thead><tr>{"".join(f"<th>{escape(head[place])}</th>" for place in kept)}'
-        f"</tr></thead><tbody>{shown}</tbody></table></div>",
+        _table([head[place] for place in kept], [[_short(row[place]) for place in kept] for row in rows]),
         f'<p>All digits: <a href="{table.name}" download>{table.name}</a>. '
         f'Picture: <a href="{picture.name}" download>{picture.name}</a>.</p>',
     ]
