@@ -134,11 +134,7 @@ def print_rows(what: Rows, apart: bool = False) -> None:
         table.add_column(
             head, justify="right" if column.format else "left", overflow="ellipsis" if column.format else "fold"
         )
-    for number, row in enumerate(what.rows):
-        cells = [
-            value if isinstance(value, str) else "—" if value is None else format(value, column.format)
-            for value, column in zip(row, what.columns, strict=True)
-        ]
+    for number, cells in enumerate(what.texts()):
         table.add_row(*cells, style="bold" if number in what.bold else None, end_section=number in what.ends)
     if apart:
         console.print()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,13 +20,7 @@ def write_table(table: Table, path: Path) -> None:
     """Write a table with all digits, units in the header; what does not exist is an empty cell, vectors are separated by
     blanks."""
     with atomic_write(path) as hidden, hidden.open("w", encoding="utf-8", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerows(lines(table))
-
-
-def lines(table: Table) -> Iterable[list[str]]:
-    """The header and the rows of a table, as files have them."""
-    yield [f"{column.name} ({column.unit})" if column.unit else column.name for column in table.columns]
-    yield from ([cell(value) for value in row] for row in table.rows)
+        csv.writer(file, lineterminator="\n").writerows([table.heads(), *(map(cell, row) for row in table.rows)])
 
 
 def cell(value: Any) -> str:

@@ -102,22 +102,21 @@ def _shown(value: Any) -> str:
 
 
 def _studied(name: str, scenario: Scenario, folder: Path, tell: Tell) -> str:
-    """A page of a study: its picture, its sentences and its table, without the columns that are empty throughout."""
+    """A page of a study: its picture, its sentences and its table."""
+    from rich.text import Text
+
     from starhold.report.results import write_result
-    from starhold.report.tables import lines
 
     command = commands.command(name)
     scenario, entry = command.prepare(scenario)
     result = command.result(scenario, entry, tell)
     table, picture = write_result(result, name, scenario, entry.name, folder)
-    head, *rows = lines(result.numbers)
-    kept = [place for place, _ in enumerate(head) if any(row[place] for row in rows)]
     drawn = base64.b64encode(picture.read_bytes()).decode()
     parts = [
         f"<h2>{escape(result.title)}</h2>",
         f'<p><img src="data:image/png;base64,{drawn}" alt="{escape(result.title)}" style="max-width:100%"></p>',
         *(f'<p style="white-space:pre-line">{escape(text)}</p>' for text in result.sentences),
-        _table([head[place] for place in kept], [[_short(row[place]) for place in kept] for row in rows]),
+        _table(result.table.heads(), [[Text.from_markup(text).plain for text in row] for row in result.table.texts()]),
         f'<p>All digits: <a href="{table.name}" download>{table.name}</a>. '
         f'Picture: <a href="{picture.name}" download>{picture.name}</a>.</p>',
     ]
@@ -146,14 +145,6 @@ def _export(scenario: Scenario, folder: Path, tell: Tell) -> str:
             f"{escape(', '.join(made.files))}</p><p>{escape(said)}</p><ul>{costs}</ul>"
         )
     return _document(scenario, folder, parts)
-
-
-def _short(text: str) -> str:
-    """Numbers of a cell to a few digits; all else as it stands."""
-    try:
-        return " ".join(f"{float(word):.5g}" for word in text.split())
-    except ValueError:
-        return text
 
 
 def _document(scenario: Scenario, folder: Path, parts: list[str]) -> str:

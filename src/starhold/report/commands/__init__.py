@@ -30,6 +30,20 @@ class Table(NamedTuple):
     bold: Collection[int] = ()
     ends: Collection[int] = ()
 
+    def heads(self) -> list[str]:
+        """The headings, each with its unit."""
+        return [f"{column.name} ({column.unit})" if column.unit else column.name for column in self.columns]
+
+    def texts(self) -> list[list[str]]:
+        """The cells for reading; what is nothing is a dash, and words keep their marks of style."""
+        return [
+            [
+                value if isinstance(value, str) else "—" if value is None else format(value, column.format)
+                for value, column in zip(row, self.columns, strict=True)
+            ]
+            for row in self.rows
+        ]
+
 
 class Result(NamedTuple):
     """A study gives this. numbers: all that it computed, SI and radians, for a file. figure: makes the figure with the
