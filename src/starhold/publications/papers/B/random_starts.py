@@ -44,7 +44,8 @@ def first_passages(desk: Desk, kind: str) -> dict[str, Array]:
         steps, frame = desk.scenario(FILE).table.simulation.steps, desk.campaign(FILE).frame()
         found: dict[str, dict[str, Array]] = {"attitude": {}, "rate": {}}
         for law in LAWS:
-            loop, rows = desk.loop(FILE, law), frame[frame["law"] == law].head(PASSAGES)
+            loop = desk.loop(FILE, law)
+            rows: Any = frame[frame["law"] == law].head(PASSAGES)
             drawn = [f"flown.state.{name}[{k}]" for name, size in (("attitude", 4), ("rate", 3)) for k in range(1, 1 + size)]
             starts = [
                 loop.start._replace(attitude=tuple(row[:4]), rate=tuple(row[4:]))
