@@ -170,7 +170,7 @@ def inverse(m: Matrix) -> Matrix:
 
 
 SWEEPS = 6
-"""Of Jacobi's rotations, after which nothing is left beside the diagonal."""
+"""Sweeps of Jacobi's rotations, after which the matrix is diagonal to rounding."""
 
 
 def principal_moments(m: Matrix | Vector) -> Vector:

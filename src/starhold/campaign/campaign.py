@@ -199,7 +199,7 @@ def _chunk(runs: int, engine: Engine, at_once: bool) -> int:
 
 
 _SAID = {"judged_apart": "known before flight", "known_to_law": "known to the law"}
-"""What is said of a dispersion beside its distribution."""
+"""Options of a dispersion beside its distribution."""
 
 
 def in_words(dispersion: Dispersion, table: CampaignTable) -> str:

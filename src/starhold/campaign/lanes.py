@@ -205,7 +205,7 @@ class Lanes:
 
     @cached_property
     def _equation(self) -> tuple[Compiled, list[str]]:
-        """What the body makes of drawn values, and the names of these numbers in a carry or in a phase."""
+        """Return the loop's numbers that follow from drawn values, and their names in a carry or in a phase."""
         hooks, names = self.scenario.hooks, list[str]()
         drawn = hooks.drawn(self.scenario, self._by_key(self.first))
         first = {key: mapped(value, lambda lanes: float(lanes[0])) for key, value in drawn.items()}

@@ -54,7 +54,7 @@ ENDS = (
 )
 """Kinds of claims about where the motion ends, one of which a certificate that counts as proved must hold."""
 READ_BY = {"disturbance": {"disturbance", "sliding"}, "switch": {"hand-over"}}
-"""What a subject may hold only beside a claim of one of these kinds, the only ones that are about it."""
+"""Entries of a subject that are allowed only beside a claim of one of these kinds, which alone read them."""
 BITS = 192
 """Precision of balls: enough that they are far narrower than the margins of a certificate."""
 

@@ -20,11 +20,11 @@ from starhold.trace.source import TIE, Expression, names
 SHORT = 130
 """Characters of a call that is written where its value is used, other than in `return`."""
 _ROWS = [kind for count in (6, 3) if (kind := Types().of((0.0,) * count)) is not None]
-"""What Python reads at once from a memory."""
+"""Numbers that an equation reads from a memory at once."""
 _MANY = 2
 """Values that one name has; of more, as a loop makes them, none is what the name says but one that is not known here."""
 _IN_STEP = {"state": "body_state", "command": "wanted"}
-"""What the step calls its own values of names that its parameters have."""
+"""Names that the step gives its own values where its parameters have the same ones."""
 
 
 class Readable(C99):
@@ -82,7 +82,7 @@ class Readable(C99):
         self._variables: dict[str, Type] = {}
         """Types of variables and of members of such, by how they are reached."""
         self._texts_of: dict[str, str] = {}
-        """What stands for values whose names in the program are others."""
+        """Texts that stand for values with other names in the program."""
         self._structs: dict[Any, str] = {}
         """Variables that were made of numbers, by their types and these."""
         self._symbols: list[str] = []

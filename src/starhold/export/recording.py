@@ -46,7 +46,7 @@ class Recording(Recorder):
         self.types = Types()
         self.copies = Copies(self._called)
         self.parts: dict[str, dict[int, str]] = {}
-        """What Python calls the parts of memories, by their first places."""
+        """Names in the Python source of the parts of memories, by their first places."""
         self._inlined: set[Any] = set()
         self._hints: dict[Any, tuple[int, str]] = {}
         self._locals: dict[tuple[int, str], Any] = {}

@@ -121,7 +121,7 @@ SHELLS: dict[str, Callable[[Code], Mapping[str, str | bytes]]] = {
     "cfs": lambda code: filled("cfs", code),
     "fprime": lambda code: filled("fprime", code),
 }
-"""What makes the files of a shell over the C, by its name."""
+"""Functions that make the files of a shell over the C, by its name."""
 
 
 def shell_files(code: Code, shells: Iterable[str]) -> dict[str, str | bytes]:

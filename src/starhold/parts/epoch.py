@@ -30,7 +30,7 @@ START: Date = (2026.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 WRITTEN = 'a date as "2026-03-20T12:00:00Z", or as whole year, month, day, hour, minute and a second below 60, UTC'
 """The accepted forms of an epoch."""
 OF_DATE, OF_J2000 = "MOD_EARTH", "EME2000"
-"""What CCSDS calls the Earth's mean equator and equinox of date, and those of J2000."""
+"""CCSDS's names of the Earth's mean equator and equinox of date, and of those of J2000."""
 DAY = 86400.0
 SIDEREAL = 360.98564736629 / 360.0
 """Turns of the Earth in a day of Universal Time."""

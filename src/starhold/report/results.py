@@ -109,7 +109,7 @@ def _finite(value: Any) -> Any:
 
 
 def write_result(result: commands.Result, name: str, scenario: Scenario, law: str, folder: Path) -> tuple[Path, Path]:
-    """What a study gives into an existing folder; returns the paths of its table and its picture."""
+    """Write the results of a study into an existing folder; returns the paths of its table and its picture."""
     from starhold.report.figures import save
     from starhold.report.tables import write_table
 

@@ -71,7 +71,7 @@ class Scenario:
     parts: tuple[Fitted, ...] = ()
     """The parts that [[part]] tables give."""
     supposed: Scenario | None = None
-    """What laws take for true and are designed for, without laws, where [nominal] gives other tables."""
+    """The tables that laws take for true and are designed for, without laws, where [nominal] gives others."""
 
     @property
     def name(self) -> str:

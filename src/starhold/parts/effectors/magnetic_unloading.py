@@ -19,7 +19,7 @@ CARD = Card(
     sources=(magnetic_field.SOURCE, "Spacecraft Dynamics and Control (1997): momentum unloading, cross-product law"),
     assumptions=(
         *magnetorquers.CARD.assumptions[:-1],
-        "no law is told of its torque, which wheels take up as they hold the attitude",
+        "no law knows of its torque, which wheels take up as they hold the attitude",
         "what lies along the field is left until the field has turned",
     ),
 )

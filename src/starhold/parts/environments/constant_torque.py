@@ -15,7 +15,7 @@ CARD = Card(
     title="Constant torque",
     summary="M = constant",
     sources=("definition",),
-    assumptions=("no law is told of it",),
+    assumptions=("no law knows of it",),
 )
 ROLE = "environment"
 

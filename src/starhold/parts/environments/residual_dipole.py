@@ -19,7 +19,7 @@ CARD = Card(
     assumptions=(
         *magnetic_field.ASSUMPTIONS,
         "the field in inertial axes is held for a control period",
-        "no law is told of it",
+        "no law knows of it",
     ),
 )
 ROLE = "environment"

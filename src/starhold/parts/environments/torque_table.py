@@ -20,7 +20,7 @@ CARD = Card(
     title="Torque from a table",
     summary="M(t) along straight lines between the rows of a table, none before the first and after the last",
     sources=("definition",),
-    assumptions=("no law is told of it", "held for a control period at what it is at its start"),
+    assumptions=("no law knows of it", "held for a control period at what it is at its start"),
 )
 ROLE = "environment"
 Row: TypeAlias = tuple[float, float, float, float]

@@ -97,8 +97,8 @@ class Dials(Body):
         return crafts[0]
 
     def drawn(self, scenario: Scenario, columns: Mapping[str, Array]) -> dict[str, Any]:
-        """What `moved` takes, with an array (lanes,) in place of each number; columns: values (components..., lanes) by
-        key, of whole vectors or of single components. An inertia beside wheels is left out."""
+        """Return the arguments of `moved`, with an array (lanes,) in place of each number; columns: values (components...,
+        lanes) by key, of whole vectors or of single components. An inertia beside wheels is left out."""
         initial, found = scenario.table.initial, dict[str, Any]()
         for key, given in ((ATTITUDE, initial.attitude), (ANGLES, initial.angles), (RATE, initial.rate)):
             values = _whole(columns, key, given)
