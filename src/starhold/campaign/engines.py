@@ -6,6 +6,7 @@ for each worker are under way at once, so that memory stays bounded for any numb
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import pkgutil
@@ -299,11 +300,16 @@ def _existing(engine: Scheduler) -> Generator[_Cluster]:
     """A cluster that lives on after the block; InputError where it is out of reach, or of other versions."""
     distributed = extra("distributed")
     with _quiet():
+        failure = ""
         try:
             client = distributed.Client(engine.address, set_as_default=False, timeout=min(engine.patience, 10.0))
         except (OSError, ValueError, TimeoutError, RuntimeError) as error:
-            told = f"{error}".splitlines()[0] if f"{error}" else type(error).__name__
-            raise InputError(engine.address, "", "", f"no Dask scheduler answers: {told}") from None
+            failure, client = f"{error}".partition("\n")[0] or type(error).__name__, None
+            error.__traceback__ = None
+        if client is None:
+            # What did not start ends as it is collected: now, for during the start of another both would wait for ever.
+            gc.collect()
+            raise InputError(engine.address, "", "", f"no Dask scheduler answers: {failure}")
         with client:
             cluster = _Cluster(client, engine.address, engine.patience)
             _check_versions(cluster)

@@ -110,7 +110,8 @@ class Body(Protocol):
 
     def drawn(self, scenario: Scenario, columns: Mapping[str, Any]) -> dict[str, Any]:
         """Return the arguments of `moved` for many runs, an array (lanes,) in place of each number, where they differ in the
-        values of some keys, or components of theirs, (components..., lanes) by key; without those of which only `build` can tell."""
+        values of some keys, or components of theirs, (components..., lanes) by key; without those of which only `build`
+        can tell."""
         return {}
 
     def dials(self, scenario: Scenario) -> dict[str, Any]:
