@@ -15,7 +15,7 @@
    compile with -std=c99 -ffp-contract=off, never with -ffast-math.
 
 
-   Certificate: certificate.json, sha256 f709f51a74f766b29ebcf9d17ea10cddcd7b37d1621f9ec06bb15936e715504f:
+   Certificate: certificate.json, sha256 2dd3f8bc56f4dbdb08ca24f4d5defa62224ce4b82438386db656dcf0372f7288:
    proved
    Claims:
      proved: converges: with unlimited torque, from every attitude and rate the body comes to rest on

@@ -13,7 +13,7 @@
    compile with -std=c99 -ffp-contract=off, never with -ffast-math.
 
 
-   Certificate: certificate.json, sha256 8b5d6dfed5aee0e2958972df6532592dc2d4cfb016a749519496632932ac0885:
+   Certificate: certificate.json, sha256 c55afd773a8c7d4ec6f3f8a39f2636126bf6d056b24ae6cdaacc4ad32f17a859:
    proved
    Claims:
      proved: converges: with unlimited torque, from every attitude and rate the body comes to rest on

@@ -14,7 +14,7 @@
    compile with -std=c99 -ffp-contract=off, never with -ffast-math.
 
 
-   Certificate: certificate.json, sha256 0de794bb8b09e05d9b178b702766cf5a411280f17bf928bf2702baff950dc8b4:
+   Certificate: certificate.json, sha256 6dbbd42bcfe10e359856024e89fb3fe1babb0cec7e7c369f623ca11489ffbd4e:
    proved
    Claims:
      proved: region of attraction: from the level set of V that holds rest at every attitude told by the

@@ -19,7 +19,7 @@
    wheels.
    ****************************************************************************************************
 
-   Certificate: certificate.json, sha256 cdc8969afac304d60e954e0ecf60fbfcf1281b44b7a30076a5576c7911c9d91c:
+   Certificate: certificate.json, sha256 87fcf48769836739be82749cd554f4a13a37b5fb5282251caa0acaed29fc1daf:
    undecided
    Claims:
    Check it independently: starhold check certificate.json */

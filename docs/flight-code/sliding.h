@@ -19,7 +19,7 @@
    0.1 s.
    ****************************************************************************************************
 
-   Certificate: certificate.json, sha256 b5a1cd468a18a5c2675eb5b3692d5abbb0782e38648d345b068794b386cb146f:
+   Certificate: certificate.json, sha256 cc71803e5225da180974cec32c1c96af676fdd8c0444ae78852df860c8d79638:
    undecided
    Claims:
      proved: reaches its surface: with unlimited torque, from every attitude and rate the motion reaches

@@ -43,7 +43,7 @@ typedef struct {
 /* N wheels: unit spin axes (body), rotor inertias about them (kg m2), largest motor torques (N m; 0 for a
    lost wheel), largest axial momenta (N m s), viscous (N m s) and Coulomb friction (N m); and how to share
    out a torque, by least squares (one row a wheel, zero for one that takes no part) or with the least peak
-   (see `envelope.with_facets`, without which there is nothing to share it out with). */
+   (see `with_facets`, without which there is nothing to share it out with). */
 typedef struct {
     vectors4_t axes;
 } wheels_t;

@@ -13,7 +13,7 @@
    compile with -std=c99 -ffp-contract=off, never with -ffast-math.
 
 
-   Certificate: certificate.json, sha256 28ca2d5571893bfa7158d983ec90f99f9526c933ce9b4a6c3b70a814336f0024:
+   Certificate: certificate.json, sha256 1a33a2de3f0dc1e0ccc0c058116f1043977da056490d8f1eaf6d35512ed1dbe3:
    proved
    Claims:
      proved: converges: with wheels that have neither limits nor friction, from every attitude and rate the
