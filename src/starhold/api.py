@@ -69,7 +69,7 @@ def metrics(run: xr.Dataset | Flight) -> Metrics:
         str(name): Quantity(values.attrs["units"], values.attrs["long_name"], *map(str, values.dims[1:]))
         for name, values in dataset.data_vars.items()
     }
-    recording = Recording(arrays, dict(dataset.attrs), columns)
+    recording = Recording(arrays, dict(dataset.attrs), columns, dataset["time"].attrs.get("units", "s"))
     return studies.metric_set_of(recording).measured(studies.metrics_of(recording))
 
 

@@ -59,3 +59,17 @@ def test_a_campaign_tells_in_words_that_a_user_knows():
     flown = {name.partition("[")[0] for name in frame.columns if name.startswith("flown.")}
     assert flown == {"flown.gyro.memory", "flown.star-tracker.cross", "flown.wheels.state.momentum"}
     np.testing.assert_array_equal(frame["flown.gyro.memory[2]"], frame["part.gyro.bias[2]"])
+
+
+def test_metrics_are_of_the_numbers_of_samples_whatever_else_a_dataset_holds():
+    run = sh.simulate(sh.load("three-laws").with_({"simulation.duration": 30.0}), "lyapunov")
+    wanted = sh.metrics(run)
+    for other in (
+        run.map(np.asfortranarray).assign_attrs(run.attrs),
+        run.assign(note=("time", ["a word"] * run.sizes["time"], {"units": "1", "long_name": "note"})),
+        run.assign(mass=((), 3.0, {"units": "kg", "long_name": "mass"})),
+        run.drop_vars("rate"),
+    ):
+        assert sh.metrics(other) == wanted
+    single = sh.metrics(run.astype("f4", keep_attrs=True))
+    assert single["peak_torque"] == pytest.approx(wanted["peak_torque"], rel=1e-6)

@@ -167,3 +167,12 @@ def test_a_scenario_may_say_what_its_laws_suppose():
     found = fly(scenario=supposed, over={"spacecraft.inertia": INERTIA}, requirement=[], runs=3)
     again = found.again(1).scenario
     assert build(again, again.laws[0]).known.inertia == (2.5, 3.0, 4.0)
+
+
+def test_after_a_diagnosed_loss_a_law_keeps_to_the_limit_that_it_takes_for_true():
+    inertia = sh.load("wheels-orbital").table.spacecraft.inertia
+    told = {"nominal": {"spacecraft": {"inertia": inertia, "torque_limit": 1e-4}}}
+    lost = {"time": 2.0, "wheel": 2, "lost": True, "action": "reallocate", "delay": 1.0}
+    scenario = sh.load("wheels-orbital").with_({**told, "fault": [lost], "simulation.duration": 10.0})
+    events = build(scenario, scenario.laws[0]).events
+    assert {event.nominal.torque_limit for event in events} == {1e-4}

@@ -15,9 +15,6 @@ from tests.certification.handed import POINT, bounded, handed
 from tests.certification.loops import certified, free, loop_of, rotors, textbook
 from tests.making import ORBITAL
 
-# Together: each worker would make the certificates of the textbook loops for itself.
-pytestmark = pytest.mark.xdist_group("textbook")
-
 QUICK = {
     "pd": lambda: certified("pd-0", "shortest", 1e-4),
     "sliding": lambda: certified("sliding-1", "shortest", 1e-4),

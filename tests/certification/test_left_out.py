@@ -6,6 +6,7 @@ from functools import cache
 
 import pytest
 
+import starhold as sh
 from starhold.analysis.libration_point_claims import MET
 from starhold.certification.certificate import write
 from starhold.certification.certify import certify
@@ -25,9 +26,6 @@ from starhold.scenario.reading import builtin_text, parse
 from tests.certification import circles, equilibria
 from tests.certification.loops import FULL, certified, loop_of, textbook
 from tests.making import built
-
-# Together: each worker would make the certificates of the textbook loops for itself.
-pytestmark = pytest.mark.xdist_group("textbook")
 
 LAWS = ("pd-0", "lyapunov-0", "lqr-I", "lqr-II", "lqr-III", "lqr-numeric", "matrix-pd-inertial", "sliding-0", "wheel-0")
 TAKEN = {"two-body", "gravity-gradient", "linear-gravity", "three-body-gravity", "wheels", "inertial", "orbital", "history"}
@@ -156,3 +154,14 @@ def test_a_bound_enters_only_where_it_holds():
         assert bounded_torque(loop) == 0.0
         (claim,) = named([certified("pd-0").claim("disturbance") or certified("pd-0").claims[0]], loop)
         assert "without the environment residual-dipole" in claim.assumptions
+
+
+def test_a_lag_cannot_be_told_as_a_torque_with_a_bound(tmp_path):
+    path = tmp_path / "certificate.json"
+    write(sh.certify(sh.load("three-laws").with_({"spacecraft.actuator_lag": 1.0}), "lyapunov"), "made", path)
+    assert passed(check_file(path))
+    content = json.loads(path.read_text(encoding="utf-8"))
+    subject = content["certificates"][0]["subject"]
+    subject["bounded_away"], subject["assumed_away"] = subject["assumed_away"], []
+    path.write_text(json.dumps(content), encoding="utf-8")
+    assert any("only environments" in finding.reason for finding in check_file(path))

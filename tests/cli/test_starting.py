@@ -8,7 +8,6 @@ import pytest
 
 from tests.cli.short import SHORT
 
-pytestmark = pytest.mark.xdist_group("cli")
 COUNTED = """
 import json, sys
 from starhold.cli import main, show

@@ -6,6 +6,7 @@ import pytest
 
 from starhold import files
 from starhold.laws.catalogue import catalogue
+from starhold.parts.catalogue import read_module
 from starhold.parts.contract import Parameter
 from starhold.scenario.writing import law_table
 from tests.parts.files import ACTUATOR, BODY, EFFECTOR, ENVIRONMENT, LAW, PARTS, PD, SENSOR, TARGET, part
@@ -250,3 +251,10 @@ def test_a_table_that_is_none(kind, tmp_path):
 def test_rows_of_other_lengths_in_the_scenario_itself(tmp_path):
     rows = part('type = "torque-table"\ntable = [[0, 0, 0, 1e-4], [1, 0, 0]]\n')
     assert "allowed: rows of time, x, y, z, or the name of a CSV file" in told(tmp_path, BODY + rows + PD)
+
+
+def test_a_link_that_hides_a_file_of_python_is_not_run(tmp_path):
+    (tmp_path / "own.py").write_text("raise SystemExit")
+    (tmp_path / "table.csv").symlink_to("own.py")
+    with pytest.raises(ValueError, match=r"ends in \.py"):
+        read_module(tmp_path / "table.csv")

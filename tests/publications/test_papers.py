@@ -83,7 +83,6 @@ def test_bad_words_on_the_command_line(tmp_path):
     assert not (tmp_path / "r").exists()
 
 
-@pytest.mark.xdist_group("browser")
 @pytest.mark.parametrize("width", [1400, 390])
 def test_all_verdicts_of_the_index_can_be_seen(tmp_path, width):
     """Of a publication with a long title and every verdict."""

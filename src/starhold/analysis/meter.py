@@ -184,7 +184,8 @@ class Meter:
 
     def _replayed(self, run: Recording, limit: float, ends: Sequence[int]) -> tuple[Array, Array]:
         """Return the notes of a recording, (numbers, 1), and of its windows, (windows, quantities, 1)."""
-        columns = tuple((name, values.shape[1:]) for name, values in run.arrays.items() if name != "time")
+        sampled = {name: values for name, values in run.arrays.items() if name != "time" and _is_sampled(values, run)}
+        columns = tuple((name, values.shape[1:]) for name, values in sampled.items())
         kernels = [_replay(note, self.first, (self.numbers, limit), columns) for note in self.notes]
         shared = Arguments(self.numbers, limit).shared
         rows = [window.row for window in self.windows.values()]
@@ -192,13 +193,20 @@ class Meter:
         for window, end in enumerate(ends):
             while done < end:
                 last = min(end, done + PIECE)
-                record = np.column_stack([run[name][done:last] for name, _ in columns])
+                # The kernel reads doubles, sample by sample.
+                rows_of = np.column_stack([sampled[name][done:last] for name, _ in columns])
+                record = np.ascontiguousarray(rows_of, dtype=float)
                 memories = {"record": record, "noted": noted, "shared": shared, "own": shared, "tables": shared}
                 kernels[done >= self.marks[-1]](memories, done, last - done)
                 done = last
             found[window] = noted[rows]
             noted[rows] = 0.0
         return noted, found
+
+
+def _is_sampled(values: Any, run: Recording) -> bool:
+    """Tell whether values are numbers of each sample: a Dataset may hold whatever a user puts there."""
+    return values.dtype.kind in "fiu" and values.ndim in (1, 2) and len(values) == len(run["time"])
 
 
 _KERNELS: dict[Any, Kernel] = {}

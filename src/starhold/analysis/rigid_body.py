@@ -215,6 +215,8 @@ def _note(limit: str, still: bool, late: bool, overshoot: bool, iterations: bool
         q, torque, command = (quantities[name] for name in ("attitude_error", "torque", "command"))
         # Of a target at rest the rate error is the rate; the arithmetic on its zeros is spared here, as in `observe`.
         rate = quantities["rate" if still else "rate_error"]
+        # A recording need not have the body's own rate, of which no metric of a recording is made.
+        turning = quantities.get("rate", rate)
         angle_square = q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
         rate_square, torque_square = dot(rate, rate), dot(torque, torque)
         size, chatter, tail = sqrt(torque_square), seen.chatter_sum, (seen.first_error, seen.error, seen.torque)
@@ -234,7 +236,7 @@ def _note(limit: str, still: bool, late: bool, overshoot: bool, iterations: bool
             outside(seen.attitude_outside, angle_square, bounds.angle, now),
             outside(seen.rate_outside, rate_square, bounds.rate, now),
             maximum(seen.peak_torque, most(torque)),
-            maximum(seen.peak_rate_square, dot(quantities["rate"], quantities["rate"])),
+            maximum(seen.peak_rate_square, dot(turning, turning)),
             peak_wheel,
             seen.torque_sum + size,
             seen.limited + where(bound, 1.0, 0.0),

@@ -22,7 +22,7 @@ from starhold.laws.modes import ENDS
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.effectors.wheels import gives_what_is_asked
 
-ROUNDING = 2.0**-48
+ROUNDING = 2.0**-45
 """Share by which a rate or an angle that a law computes is off at most, for angles up to `WIDEST`."""
 WIDEST = 3.0
 """Angles (rad) up to which sines tell them apart."""

@@ -37,7 +37,7 @@ from starhold.laws.catalogue import Law, catalogue
 from starhold.parts.craft import EARTH, Craft, check_inertia, compact
 from starhold.parts.environments.gravity_gradient import gravity_gradient
 
-ROUNDING = fmpq(1, 2**49)
+ROUNDING = fmpq(1, 2**46)
 """Share by which a law's comparison of a rate or an angle with a level is off at most."""
 
 

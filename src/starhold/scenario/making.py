@@ -39,7 +39,7 @@ def variants(scenario: Scenario, changes: Iterable[Mapping[str, Any]]) -> Iterat
         try:
             other = deepcopy(tables)
             for key, value in change.items():
-                _put(other, path_of(key, names, where), value, where, scenario.table)
+                _put(other, path_of(key, names, where), deepcopy(value), where, scenario.table)
             yield scenario._of(plain(other, where, ""))  # pyright: ignore[reportPrivateUsage]
         except InputError as error:
             raise InputError(where, error.key, error.found, error.allowed) from None

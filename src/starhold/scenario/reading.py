@@ -135,7 +135,7 @@ class Scenario:
 
 def first_law(scenario: Scenario, law: str | None) -> LawEntry:
     """The law of this name, the first of a scenario if None."""
-    return scenario.laws[0] if law is None else scenario.pick(law)
+    return scenario.pick(law)
 
 
 def builtin_names() -> list[str]:

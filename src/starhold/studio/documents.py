@@ -81,7 +81,10 @@ class Documents:
 
 
 def _text(content: bytes) -> str:
-    return content.decode("utf-8", errors="replace").replace("\r\n", "\n")
+    try:
+        return content.decode("utf-8").replace("\r\n", "\n")
+    except UnicodeDecodeError:
+        raise RefusedError("the file is no longer text in UTF-8; nothing of it is shown or saved") from None
 
 
 def _version(content: bytes) -> str:

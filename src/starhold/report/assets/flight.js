@@ -167,7 +167,8 @@ function metrics(n, lost, asked) {
       continue;
     }
     for (const factor of times) value *= factor;
-    found[name] = over ? value / (counts[over[0]] * over[1]) : value;
+    if (over) value /= counts[over[0]] * over[1];
+    found[name] = Number.isNaN(value) ? null : value;
   }
   return asked.transient ? { ...found, ...againstLimits(n, lost < 0, asked.transient, found.cut_off) } : found;
 }

@@ -63,7 +63,7 @@ def make_events(scenario: Scenario, entry: LawEntry, parts: tuple[Fitted, ...]) 
                 now, learnt = now._replace(nominal=body), (fault.time, place)
             if wheels is not None and fault.strikes_wheel:
                 left = _left(scenario, wheels, place, fault)
-                share, limit = authority(left) / begun, torque_limit(table, left)
+                share, limit = authority(left) / begun, torque_limit(scenario.known.table, left)
                 wheels = wheels if action == "retune" else left
                 now = now._replace(parts=_on(now.parts, wheels))
             # The law's limit is nothing that the body feels, so both crafts have it.
