@@ -22,8 +22,6 @@ from tests.certification.edits import alone, claims_of, content_at, edited, reas
 from tests.certification.loops import FULL, loop_of
 from tests.refusals import refused
 
-# Together: each worker would make the certificates of the textbook loops for itself.
-
 
 def test_unknown_keys_fail_everywhere(made):
     content = made("pd-0")

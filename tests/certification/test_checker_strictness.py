@@ -14,7 +14,6 @@ from starhold.checker import check, passed
 from tests.certification.edits import alone, claims_of, content_at, edited, replaced, spots
 from tests.certification.loops import loop_of, textbook
 
-# Together: each worker would make the certificates of the textbook loops for itself.
 
 UP, DOWN = 1.0 + 1e-4, 1.0 - 1e-4
 

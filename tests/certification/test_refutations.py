@@ -20,7 +20,6 @@ from tests.certification.edits import alone, claims_of, content_at, edited, reas
 from tests.certification.loops import FULL, LOPSIDED, PRINCIPAL, UNEVEN, certified, loop_of, rotors
 from tests.making import ORBITAL
 
-# Together: each worker would make all refutations and proofs for itself.
 
 SKEWED = ((0.01, 0.02, 0.0), (0.02, 0.01, 0.0), (0.0, 0.0, 0.01))
 CASES = {

@@ -23,7 +23,6 @@ from starhold.parts.bodies.rigid_body import angular_acceleration
 from starhold.trace.calling import Compiled
 from tests.certification.loops import free, tensor, textbook
 
-# Together: each worker would make the certificates of the textbook loops for itself.
 
 LOOPS = textbook()
 STEPS = 1500
