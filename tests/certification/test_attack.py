@@ -21,7 +21,6 @@ from starhold.parts.bodies.rigid_body import angular_acceleration
 from starhold.trace.calling import Compiled
 from tests.certification.loops import certified, textbook
 
-
 LOOPS = textbook()
 NAMES = sorted(name for name in LOOPS if not name.startswith("sliding"))
 STATES = -(-10_000_000 // len(LOOPS))

@@ -15,7 +15,6 @@ from tests.certification.edits import claims_of, edited, reasons
 from tests.certification.loops import FULL, LOPSIDED, PRINCIPAL, loop_of, textbook
 from tests.making import ORBITAL, aimed
 
-
 LOOPS = textbook()
 NAMES = sorted(LOOPS)
 

@@ -14,7 +14,6 @@ from starhold.checker import check, passed
 from tests.certification.edits import alone, claims_of, content_at, edited, replaced, spots
 from tests.certification.loops import loop_of, textbook
 
-
 UP, DOWN = 1.0 + 1e-4, 1.0 - 1e-4
 
 # --- every number in the stronger direction ---------------------------------------------------------------------------

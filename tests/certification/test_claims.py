@@ -19,7 +19,6 @@ from starhold.parts.craft import make_craft
 from tests.certification.loops import FULL, PRINCIPAL, UNEVEN, certified, loop_of, random_craft, tensor, textbook
 from tests.equations import two_body_gravity_gradient
 
-
 LOOPS = textbook()
 ANY = {"wheel-0", "wheel-1", "lqr-I", "lqr-II", "lqr-III", "pd-0", "pd-1", "pd-2", "lyapunov-0", "lyapunov-1"}
 

@@ -20,7 +20,6 @@ from tests.certification.edits import alone, claims_of, content_at, edited, reas
 from tests.certification.loops import FULL, LOPSIDED, PRINCIPAL, UNEVEN, certified, loop_of, rotors
 from tests.making import ORBITAL
 
-
 SKEWED = ((0.01, 0.02, 0.0), (0.02, 0.01, 0.0), (0.0, 0.0, 0.01))
 CASES = {
     "rises": ("matrix-pd", matrix_pd.Gains((0.09, -0.09, 0.09), (0.01,) * 3), Wanted(), "convergence"),

@@ -23,7 +23,6 @@ from starhold.parts.bodies.rigid_body import angular_acceleration
 from starhold.trace.calling import Compiled
 from tests.certification.loops import free, tensor, textbook
 
-
 LOOPS = textbook()
 STEPS = 1500
 
