@@ -155,7 +155,7 @@ def _subject(given: Any) -> LoopSubject | StationSubject:
     demand(given["outcome"] == follows, "the outcome does not follow from the claims")
     demand(len(set(kinds)) == len(kinds), "two claims are of one kind")
     away = given["subject"].get("bounded_away")
-    bounded = away if isinstance(away, list) else []
+    bounded: list[Any] = [*away] if isinstance(away, list) else []
     demand(all(f"{name}".startswith("environment ") for name in bounded), "only environments have torques with a bound")
     for name, readers in READ_BY.items():
         demand(bool(given["subject"].get(name)) <= bool(readers & set(kinds)), f"no claim is about the {name}")
