@@ -24,7 +24,7 @@ from starhold.campaign.store import Store
 from starhold.campaign.verdicts import Verdict, judge
 
 BARS, WIDE = 60, 100.0
-"""Of a histogram, at the most; and how many times the least the largest of a metric is that is shown on a logarithmic
+"""A histogram has at most so many bars; a metric whose largest value is so many times its least is shown on a logarithmic
 scale."""
 MOST_DRIVEN = 200_000
 """Runs, the first ones, that drivers are looked for among."""

@@ -297,8 +297,8 @@ def over_samples(
         def turn(k: Any, seen: Any) -> Any:
             place, quantities = k * width, dict[str, Any]()
             for name, shape in columns:
-                numbers = tuple(record[place + i] for i in range(shape[0] if shape else 1))
-                quantities[name], place = numbers if shape else numbers[0], place + len(numbers)
+                values = tuple(record[place + i] for i in range(shape[0] if shape else 1))
+                quantities[name], place = values if shape else values[0], place + len(values)
             return (note(seen, quantities, number_of(begin + k), limit, given),)
 
         _put(noted, 0, repeat(count, turn, _state(first, noted, 0))[0])

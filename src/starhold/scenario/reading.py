@@ -133,11 +133,6 @@ class Scenario:
         return self
 
 
-def first_law(scenario: Scenario, law: str | None) -> LawEntry:
-    """The law of this name, the first of a scenario if None."""
-    return scenario.pick(law)
-
-
 def builtin_names() -> list[str]:
     """The scenarios that come with starhold."""
     folder = resources.files("starhold.scenario") / "builtin"

@@ -73,6 +73,10 @@ def later(path: str) -> Callable[..., Any]:
     return lambda *given: getattr(import_module(f"starhold.{module}"), name)(*given)
 
 
+def _named(scenario: Scenario, law: str | None) -> LawEntry:
+    return scenario.pick(law)
+
+
 class Command(NamedTuple):
     """A study of one law of a rigid body.
 
@@ -86,7 +90,7 @@ class Command(NamedTuple):
     suffix: str
     study: Callable[..., Any]
     present: Callable[[Scenario, LawEntry, Any], Result]
-    pick: Callable[[Scenario, str | None], LawEntry] = later("scenario.reading.first_law")
+    pick: Callable[[Scenario, str | None], LawEntry] = _named
     law: str = "which law of the file; the first if not given"
     doing: str = "{}"
     options: Mapping[str, Option] = {}
