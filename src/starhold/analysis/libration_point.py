@@ -172,8 +172,7 @@ def measure(run: Recording, units: Units, goal: CircleGoal | EquilibriumGoal, to
 
 @cache
 def _note(limit: str, circle: bool, late: bool) -> Any:
-    """The equation of the notes, before the middle or, as throughout a recording, from it on; one function for loops that
-    one kernel flies."""
+    """Return the equation of the notes, before the last mark or from it on; one function for loops that one kernel flies."""
 
     def note(seen: Noted, quantities: Mapping[str, Any], now: Any, most_command: Any, goal: Goal) -> Noted:
         position, control, command = quantities["position"], quantities["control"], quantities["command"]
