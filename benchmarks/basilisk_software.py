@@ -98,7 +98,7 @@ class FlightCode:
             flags = ["-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC", "-o", f"{folder}/flight.so"]
             subprocess.run([os.environ.get("CC", "cc"), *flags, f"{folder}/flight.c", "-lm"], check=True)
             self.library = ctypes.CDLL(f"{folder}/flight.so")
-        self.names = [member.name for member in code.members(2)]
+        self.names = [member.name for member in code.inputs]
         self.state = (ctypes.c_double * max(1, len(flatten(code.flight.start))))()
         self.library.flight_init(self.state)
 

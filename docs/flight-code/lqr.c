@@ -237,10 +237,10 @@ void lqr_init(lqr_state_t *state)
 void lqr_step(lqr_state_t *state, const lqr_input_t *input, lqr_command_t *command)
 {
     (void)state;
-    const goal_t goal = inertial_goal(&parameters.setup.target);
-    const state_t body_state = {.attitude = input->attitude, .rate = input->rate};
-    const scene_t scene = {.goal = goal};
-    const measurement_t told = observe(&body_state, &scene);
-    const vector_t wanted = lqr_torque(&told, &parameters.gains, &parameters.craft);
-    command->torque = limit_axis(wanted, parameters.setup.limit);
+    const state_t found = {.attitude = input->attitude, .rate = input->rate};
+    const scene_t scene = {.goal = inertial_goal(&parameters.setup.target)};
+    const measurement_t told = observe(&found, &scene);
+    const vector_t wanted = limit_axis(lqr_torque(&told, &parameters.gains, &parameters.craft),
+        parameters.setup.limit);
+    command->torque = wanted;
 }

@@ -10,12 +10,12 @@
 
    Command limit: 0.01 N m on each axis. Quaternion sign: as published.
 
-   A step does at most 112 additions, multiplications, divisions and roots, and 6 comparisons.
+   A step does at most 82 additions, multiplications, divisions and roots, and 6 comparisons.
    Bits are those of the simulation where doubles are IEEE and nothing is contracted or reassociated:
    compile with -std=c99 -ffp-contract=off, never with -ffast-math.
 
 
-   Certificate: certificate.json, sha256 2dd3f8bc56f4dbdb08ca24f4d5defa62224ce4b82438386db656dcf0372f7288:
+   Certificate: certificate.json, sha256 172fe596a5566b13e339d707e790a4e522068dd00d373d54a9a4d46e2772a155:
    proved
    Claims:
      proved: converges: with unlimited torque, from every attitude and rate the body comes to rest on

@@ -299,12 +299,11 @@ void lyapunov_init(lyapunov_state_t *state)
 void lyapunov_step(lyapunov_state_t *state, const lyapunov_input_t *input, lyapunov_command_t *command)
 {
     (void)state;
-    const goal_t goal = inertial_goal(&parameters.setup.target);
-    const state_t body_state = {.attitude = input->attitude, .rate = input->rate,
-        .position = input->position};
-    const vector_t torque = gravity_gradient_torque(&body_state, &parameters.craft);
-    const scene_t scene = {.goal = goal, .torque = torque};
-    const measurement_t told = observe(&body_state, &scene);
-    const vector_t wanted = lyapunov_torque(&told, &parameters.gains, &parameters.craft);
-    command->torque = limit_axis(wanted, parameters.setup.limit);
+    const state_t found = {.attitude = input->attitude, .rate = input->rate, .position = input->position};
+    const scene_t scene = {.goal = inertial_goal(&parameters.setup.target),
+        .torque = gravity_gradient_torque(&found, &parameters.craft)};
+    const measurement_t told = observe(&found, &scene);
+    const vector_t wanted = limit_axis(lyapunov_torque(&told, &parameters.gains, &parameters.craft),
+        parameters.setup.limit);
+    command->torque = wanted;
 }

@@ -8,7 +8,7 @@
 
    Command limit: 0.01 N m on each axis. Quaternion sign: as published.
 
-   A step does at most 141 additions, multiplications, divisions and roots, and 6 comparisons.
+   A step does at most 111 additions, multiplications, divisions and roots, and 6 comparisons.
    Bits are those of the simulation where doubles are IEEE and nothing is contracted or reassociated:
    compile with -std=c99 -ffp-contract=off, never with -ffast-math.
 

@@ -259,10 +259,9 @@ void modal_init(modal_state_t *state)
 void modal_step(modal_state_t *state, const modal_input_t *input, modal_command_t *command)
 {
     (void)state;
-    const goal_t goal = inertial_goal(&parameters.setup.target);
-    const state_t body_state = {.attitude = input->attitude, .rate = input->rate};
-    const scene_t scene = {.goal = goal, .torque = {0.0, 0.0, 0.0}, .momentum = {0.0, 0.0, 0.0}};
-    const measurement_t told = observe(&body_state, &scene);
-    const vector_t wanted = modal_torque(&told, &parameters.gains, &parameters.craft);
-    command->torque = wanted;
+    const state_t found = {.attitude = input->attitude, .rate = input->rate};
+    const scene_t scene = {.goal = inertial_goal(&parameters.setup.target), .torque = {0.0, 0.0, 0.0},
+        .momentum = {0.0, 0.0, 0.0}};
+    const measurement_t told = observe(&found, &scene);
+    command->torque = modal_torque(&told, &parameters.gains, &parameters.craft);
 }

@@ -9,7 +9,7 @@
 
    Command limit: none. Quaternion sign: as published.
 
-   A step does at most 340 additions, multiplications, divisions and roots, and 0 comparisons.
+   A step does at most 310 additions, multiplications, divisions and roots, and 0 comparisons.
    Bits are those of the simulation where doubles are IEEE and nothing is contracted or reassociated:
    compile with -std=c99 -ffp-contract=off, never with -ffast-math.
 

@@ -124,7 +124,7 @@ typedef struct {
 
 /* What project gives. */
 typedef struct {
-    vector_t w;
+    vector_t vector;
     bool truth;
 } project_result_t;
 
@@ -354,9 +354,9 @@ static quaternion_t relative(quaternion_t target, quaternion_t q)
 static measurement_t observe(const state_t *state, const scene_t *scene)
 {
     const quaternion_t error = relative(scene->goal.attitude, state->attitude);
+    const vector_t position = to_body(state->attitude, state->position);
     return (measurement_t){.attitude = error, .rate = state->rate, .body_rate = state->rate,
-        .target_acceleration = {0.0, 0.0, 0.0}, .position = to_body(state->attitude, state->position),
-        .period = scene->period};
+        .target_acceleration = {0.0, 0.0, 0.0}, .position = position, .period = scene->period};
 }
 
 /* ------------------------------------ algebra.vector ------------------------------------ */
@@ -421,8 +421,8 @@ static linear_t linearise(const measurement_t *measurement, const craft_t *craft
     const vector_t scale_result_2 = scale(strength, apply(craft->inverse_inertia,
         subtract(cross(measurement->position, apply(total_inertia(craft), lever_2)), cross(pull, lever_2))));
     const vector_t lever_3 = cross(measurement->position, (vector_t){0.0, 0.0, 1.0});
-    const vector_t scale_result_3 = scale(strength, apply(craft->inverse_inertia,
-        subtract(cross(measurement->position, apply(total_inertia(craft), lever_3)), cross(pull, lever_3))));
+    const vector_t tilt = subtract(cross(measurement->position, apply(total_inertia(craft), lever_3)),
+        cross(pull, lever_3));
     const vector_t apply_result = apply(craft->inverse_inertia,
         subtract(cross(momentum, (vector_t){1.0, 0.0, 0.0}), cross(measurement->rate,
         apply(craft->inertia, (vector_t){1.0, 0.0, 0.0}))));
@@ -432,13 +432,13 @@ static linear_t linearise(const measurement_t *measurement, const craft_t *craft
     const vector_t apply_result_3 = apply(craft->inverse_inertia,
         subtract(cross(momentum, (vector_t){0.0, 0.0, 1.0}), cross(measurement->rate,
         apply(craft->inertia, (vector_t){0.0, 0.0, 1.0}))));
-    const matrix_t transpose_result =
-        transpose((matrix_t){{apply(craft->inverse_inertia, (vector_t){1.0, 0.0, 0.0}),
+    const matrix_t push = transpose((matrix_t){{apply(craft->inverse_inertia, (vector_t){1.0, 0.0, 0.0}),
         apply(craft->inverse_inertia, (vector_t){0.0, 1.0, 0.0}),
         apply(craft->inverse_inertia, (vector_t){0.0, 0.0, 1.0})}});
     return (linear_t){.turning = transpose(skew(measurement->rate)), .stiffness =
-        transpose((matrix_t){{scale_result, scale_result_2, scale_result_3}}), .damping =
-        transpose((matrix_t){{apply_result, apply_result_2, apply_result_3}}), .push = transpose_result};
+        transpose((matrix_t){{scale_result, scale_result_2,
+        scale(strength, apply(craft->inverse_inertia, tilt))}}), .damping =
+        transpose((matrix_t){{apply_result, apply_result_2, apply_result_3}}), .push = push};
 }
 
 static matrix_t scaled(matrix_t m, double c)
@@ -502,9 +502,11 @@ static share_result_t share_1(const rates_t *rates)
         absolute(rows_result.e[4].e[5]);
     const double t33 = 0.0 + absolute(rows_result.e[5].e[0]) + absolute(rows_result.e[5].e[1]) +
         absolute(rows_result.e[5].e[2]);
-    const double t36 = t33 + absolute(rows_result.e[5].e[3]) + absolute(rows_result.e[5].e[4]) +
+    const double total = t33 + absolute(rows_result.e[5].e[3]) + absolute(rows_result.e[5].e[4]) +
         absolute(rows_result.e[5].e[5]);
-    double size_ = maximum(t36, maximum(t30, maximum(t24, maximum(t18, maximum(t12, maximum(t6, 0.0))))));
+    const double size_2 = maximum(total, maximum(t30,
+        maximum(t24, maximum(t18, maximum(t12, maximum(t6, 0.0))))));
+    double size_ = size_2;
     double share_ = 1.0;
     double count_ = 0.0;
     for (int32_t turn = 0; turn < 60; turn++) {
@@ -551,15 +553,16 @@ static doubles6_t times1(doubles6_t row, double c)
 /* Return start + a'b. */
 static double dot1(vector_t a, vector_t b)
 {
-    const double total = 0.0 + a.x * b.x + a.y * b.y;
-    return total + a.z * b.z;
+    const double total = 0.0 + a.x * b.x + a.y * b.y + a.z * b.z;
+    return total;
 }
 
 /* Return start + a'b. */
 static double dot2(doubles6_t a, doubles6_t b)
 {
     const double t8 = 0.0 + a.e[0] * b.e[0] + a.e[1] * b.e[1] + a.e[2] * b.e[2] + a.e[3] * b.e[3];
-    return t8 + a.e[4] * b.e[4] + a.e[5] * b.e[5];
+    const double total = t8 + a.e[4] * b.e[4] + a.e[5] * b.e[5];
+    return total;
 }
 
 /* -------------------------------- laws.predictive.motion -------------------------------- */
@@ -685,41 +688,35 @@ static void sum_up(double *numbers, const rates_t *rates)
         bool small1_ = 1;
         for (int32_t j = 0; j < 6; j++) {
             const bool small1 = small1_;
-            const double t9 = numbers[TERM_AT + 6 * j];
-            const double t12 = numbers[TERM_AT + 6 * j + 1];
-            const double t15 = numbers[TERM_AT + 6 * j + 2];
-            const double t18 = numbers[TERM_AT + 6 * j + 3];
-            const double t21 = numbers[TERM_AT + 6 * j + 4];
-            const double t24 = numbers[TERM_AT + 6 * j + 5];
-            const doubles6_t product_result = product(rates, (doubles6_t){{t9, t12, t15, t18, t21, t24}});
-            const double t25 = product_result.e[0] / divisor;
-            const double t26 = product_result.e[1] / divisor;
-            const double t27 = product_result.e[2] / divisor;
-            const double t28 = product_result.e[3] / divisor;
-            const double t29 = product_result.e[4] / divisor;
-            const double t30 = product_result.e[5] / divisor;
-            numbers[TERM_AT + 6 * j] = t25;
-            numbers[TERM_AT + 6 * j + 1] = t26;
-            numbers[TERM_AT + 6 * j + 2] = t27;
-            numbers[TERM_AT + 6 * j + 3] = t28;
-            numbers[TERM_AT + 6 * j + 4] = t29;
-            numbers[TERM_AT + 6 * j + 5] = t30;
-            const double t32 = numbers[MEAN_AT + 6 * j];
-            const double t34 = numbers[MEAN_AT + 6 * j + 1];
-            const double t36 = numbers[MEAN_AT + 6 * j + 2];
-            const double t38 = numbers[MEAN_AT + 6 * j + 3];
-            const double t40 = numbers[MEAN_AT + 6 * j + 4];
-            const double t42 = numbers[MEAN_AT + 6 * j + 5];
-            const doubles6_t entries = {{t25, t26, t27, t28, t29, t30}};
-            const doubles6_t plus_result = plus((doubles6_t){{t32, t34, t36, t38, t40, t42}}, entries);
+            const doubles6_t doubles6 = {{numbers[TERM_AT + 6 * j], numbers[TERM_AT + 6 * j + 1],
+                numbers[TERM_AT + 6 * j + 2], numbers[TERM_AT + 6 * j + 3], numbers[TERM_AT + 6 * j + 4],
+                numbers[TERM_AT + 6 * j + 5]}};
+            const doubles6_t product_result = product(rates, doubles6);
+            const double t26 = product_result.e[0] / divisor;
+            const double t27 = product_result.e[1] / divisor;
+            const double t28 = product_result.e[2] / divisor;
+            const double t29 = product_result.e[3] / divisor;
+            const double t30 = product_result.e[4] / divisor;
+            const double t31 = product_result.e[5] / divisor;
+            numbers[TERM_AT + 6 * j] = t26;
+            numbers[TERM_AT + 6 * j + 1] = t27;
+            numbers[TERM_AT + 6 * j + 2] = t28;
+            numbers[TERM_AT + 6 * j + 3] = t29;
+            numbers[TERM_AT + 6 * j + 4] = t30;
+            numbers[TERM_AT + 6 * j + 5] = t31;
+            const doubles6_t doubles6_2 = {{numbers[MEAN_AT + 6 * j], numbers[MEAN_AT + 6 * j + 1],
+                numbers[MEAN_AT + 6 * j + 2], numbers[MEAN_AT + 6 * j + 3], numbers[MEAN_AT + 6 * j + 4],
+                numbers[MEAN_AT + 6 * j + 5]}};
+            const doubles6_t entries = {{t26, t27, t28, t29, t30, t31}};
+            const doubles6_t plus_result = plus(doubles6_2, entries);
             numbers[MEAN_AT + 6 * j] = plus_result.e[0];
             numbers[MEAN_AT + 6 * j + 1] = plus_result.e[1];
             numbers[MEAN_AT + 6 * j + 2] = plus_result.e[2];
             numbers[MEAN_AT + 6 * j + 3] = plus_result.e[3];
             numbers[MEAN_AT + 6 * j + 4] = plus_result.e[4];
             numbers[MEAN_AT + 6 * j + 5] = plus_result.e[5];
-            const double largest = maximum(maximum(maximum(maximum(maximum(t25, t26), t27), t28), t29), t30);
-            const double least = minimum(minimum(minimum(minimum(minimum(t25, t26), t27), t28), t29), t30);
+            const double largest = maximum(maximum(maximum(maximum(maximum(t26, t27), t28), t29), t30), t31);
+            const double least = minimum(minimum(minimum(minimum(minimum(t26, t27), t28), t29), t30), t31);
             small1_ = small1 && (largest < 1e-21 && -1e-21 < least);
         }
         divisor_ = divisor + 1.0;
@@ -742,13 +739,10 @@ static doubles6_t apply1(doubles6s6_t m, doubles6_t x)
 static void double_of(double *numbers, const rates_t *rates)
 {
     for (int32_t j = 0; j < 6; j++) {
-        const double t3 = numbers[MEAN_AT + 6 * j];
-        const double t6 = numbers[MEAN_AT + 6 * j + 1];
-        const double t9 = numbers[MEAN_AT + 6 * j + 2];
-        const double t12 = numbers[MEAN_AT + 6 * j + 3];
-        const double t15 = numbers[MEAN_AT + 6 * j + 4];
-        const double t18 = numbers[MEAN_AT + 6 * j + 5];
-        const doubles6_t product_result = product(rates, (doubles6_t){{t3, t6, t9, t12, t15, t18}});
+        const doubles6_t doubles6 = {{numbers[MEAN_AT + 6 * j], numbers[MEAN_AT + 6 * j + 1],
+            numbers[MEAN_AT + 6 * j + 2], numbers[MEAN_AT + 6 * j + 3], numbers[MEAN_AT + 6 * j + 4],
+            numbers[MEAN_AT + 6 * j + 5]}};
+        const doubles6_t product_result = product(rates, doubles6);
         numbers[TERM_AT + 6 * j] = product_result.e[0];
         numbers[TERM_AT + 6 * j + 1] = product_result.e[1];
         numbers[TERM_AT + 6 * j + 2] = product_result.e[2];
@@ -756,56 +750,35 @@ static void double_of(double *numbers, const rates_t *rates)
         numbers[TERM_AT + 6 * j + 4] = product_result.e[4];
         numbers[TERM_AT + 6 * j + 5] = product_result.e[5];
     }
-    const double t25 = numbers[TERM_AT];
-    const double t26 = numbers[TERM_AT + 1];
-    const double t27 = numbers[TERM_AT + 2];
-    const double t28 = numbers[TERM_AT + 3];
-    const double t29 = numbers[TERM_AT + 4];
-    const double t30 = numbers[TERM_AT + 5];
-    const double t31 = numbers[TERM_AT + 6];
-    const double t32 = numbers[TERM_AT + 7];
-    const double t33 = numbers[TERM_AT + 8];
-    const double t34 = numbers[TERM_AT + 9];
-    const double t35 = numbers[TERM_AT + 10];
-    const double t36 = numbers[TERM_AT + 11];
-    const double t37 = numbers[TERM_AT + 12];
-    const double t38 = numbers[TERM_AT + 13];
-    const double t39 = numbers[TERM_AT + 14];
-    const double t40 = numbers[TERM_AT + 15];
-    const double t41 = numbers[TERM_AT + 16];
-    const double t42 = numbers[TERM_AT + 17];
-    const double t43 = numbers[TERM_AT + 18];
-    const double t44 = numbers[TERM_AT + 19];
-    const double t45 = numbers[TERM_AT + 20];
-    const double t46 = numbers[TERM_AT + 21];
-    const double t47 = numbers[TERM_AT + 22];
-    const double t48 = numbers[TERM_AT + 23];
-    const double t49 = numbers[TERM_AT + 24];
-    const double t50 = numbers[TERM_AT + 25];
-    const double t51 = numbers[TERM_AT + 26];
-    const double t52 = numbers[TERM_AT + 27];
-    const double t53 = numbers[TERM_AT + 28];
-    const double t54 = numbers[TERM_AT + 29];
-    const double t55 = numbers[TERM_AT + 30];
-    const double t56 = numbers[TERM_AT + 31];
-    const double t57 = numbers[TERM_AT + 32];
-    const double t58 = numbers[TERM_AT + 33];
-    const double t59 = numbers[TERM_AT + 34];
-    const double t60 = numbers[TERM_AT + 35];
-    const doubles6s6_t turned = transposed((doubles6s6_t){{{{t25, t26, t27, t28, t29, t30}},
-        {{t31, t32, t33, t34, t35, t36}}, {{t37, t38, t39, t40, t41, t42}}, {{t43, t44, t45, t46, t47, t48}},
-        {{t49, t50, t51, t52, t53, t54}}, {{t55, t56, t57, t58, t59, t60}}}});
+    const doubles6_t doubles6_2 = {{numbers[TERM_AT], numbers[TERM_AT + 1], numbers[TERM_AT + 2],
+        numbers[TERM_AT + 3], numbers[TERM_AT + 4], numbers[TERM_AT + 5]}};
+    const doubles6_t doubles6_3 = {{numbers[TERM_AT + 6], numbers[TERM_AT + 7], numbers[TERM_AT + 8],
+        numbers[TERM_AT + 9], numbers[TERM_AT + 10], numbers[TERM_AT + 11]}};
+    const doubles6_t doubles6_4 = {{numbers[TERM_AT + 12], numbers[TERM_AT + 13], numbers[TERM_AT + 14],
+        numbers[TERM_AT + 15], numbers[TERM_AT + 16], numbers[TERM_AT + 17]}};
+    const doubles6_t doubles6_5 = {{numbers[TERM_AT + 18], numbers[TERM_AT + 19], numbers[TERM_AT + 20],
+        numbers[TERM_AT + 21], numbers[TERM_AT + 22], numbers[TERM_AT + 23]}};
+    const doubles6_t doubles6_6 = {{numbers[TERM_AT + 24], numbers[TERM_AT + 25], numbers[TERM_AT + 26],
+        numbers[TERM_AT + 27], numbers[TERM_AT + 28], numbers[TERM_AT + 29]}};
+    const doubles6_t doubles6_7 = {{numbers[TERM_AT + 30], numbers[TERM_AT + 31], numbers[TERM_AT + 32],
+        numbers[TERM_AT + 33], numbers[TERM_AT + 34], numbers[TERM_AT + 35]}};
+    const doubles6s6_t turned = transposed((doubles6s6_t){{doubles6_2, doubles6_3, doubles6_4, doubles6_5,
+        doubles6_6, doubles6_7}});
     for (int32_t j1 = 0; j1 < 6; j1++) {
-        const doubles6_t before = {{numbers[MEAN_AT + 6 * j1], numbers[MEAN_AT + 6 * j1 + 1],
-            numbers[MEAN_AT + 6 * j1 + 2], numbers[MEAN_AT + 6 * j1 + 3], numbers[MEAN_AT + 6 * j1 + 4],
-            numbers[MEAN_AT + 6 * j1 + 5]}};
+        const double t71 = numbers[MEAN_AT + 6 * j1];
+        const double t74 = numbers[MEAN_AT + 6 * j1 + 1];
+        const double t77 = numbers[MEAN_AT + 6 * j1 + 2];
+        const double t80 = numbers[MEAN_AT + 6 * j1 + 3];
+        const double t83 = numbers[MEAN_AT + 6 * j1 + 4];
+        const double t86 = numbers[MEAN_AT + 6 * j1 + 5];
+        const doubles6_t before = {{t71, t74, t77, t80, t83, t86}};
         const doubles6_t apply1_result = apply1(turned, before);
-        numbers[MEAN_AT + 6 * j1] = before.e[0] + 0.5 * apply1_result.e[0];
-        numbers[MEAN_AT + 6 * j1 + 1] = before.e[1] + 0.5 * apply1_result.e[1];
-        numbers[MEAN_AT + 6 * j1 + 2] = before.e[2] + 0.5 * apply1_result.e[2];
-        numbers[MEAN_AT + 6 * j1 + 3] = before.e[3] + 0.5 * apply1_result.e[3];
-        numbers[MEAN_AT + 6 * j1 + 4] = before.e[4] + 0.5 * apply1_result.e[4];
-        numbers[MEAN_AT + 6 * j1 + 5] = before.e[5] + 0.5 * apply1_result.e[5];
+        numbers[MEAN_AT + 6 * j1] = t71 + 0.5 * apply1_result.e[0];
+        numbers[MEAN_AT + 6 * j1 + 1] = t74 + 0.5 * apply1_result.e[1];
+        numbers[MEAN_AT + 6 * j1 + 2] = t77 + 0.5 * apply1_result.e[2];
+        numbers[MEAN_AT + 6 * j1 + 3] = t80 + 0.5 * apply1_result.e[3];
+        numbers[MEAN_AT + 6 * j1 + 4] = t83 + 0.5 * apply1_result.e[4];
+        numbers[MEAN_AT + 6 * j1 + 5] = t86 + 0.5 * apply1_result.e[5];
     }
 }
 
@@ -817,12 +790,6 @@ static vector_t times2(vector_t row, double c)
 /* Set A and B from S, back in the units of time. */
 static void put_motion(double *numbers, const rates_t *rates, matrix_t push, double period)
 {
-    const double t1 = numbers[MEAN_AT];
-    const double t2 = numbers[MEAN_AT + 1];
-    const double t3 = numbers[MEAN_AT + 2];
-    const double t4 = numbers[MEAN_AT + 3];
-    const double t5 = numbers[MEAN_AT + 4];
-    const double t6 = numbers[MEAN_AT + 5];
     const double t7 = numbers[MEAN_AT + 6];
     const double t8 = numbers[MEAN_AT + 7];
     const double t9 = numbers[MEAN_AT + 8];
@@ -853,21 +820,36 @@ static void put_motion(double *numbers, const rates_t *rates, matrix_t push, dou
     const double t34 = numbers[MEAN_AT + 33];
     const double t35 = numbers[MEAN_AT + 34];
     const double t36 = numbers[MEAN_AT + 35];
-    const doubles6s6_t a = transposed((doubles6s6_t){{product(rates, (doubles6_t){{t1, t2, t3, t4, t5, t6}}),
-        product(rates, (doubles6_t){{t7, t8, t9, t10, t11, t12}}),
-        product(rates, (doubles6_t){{t13, t14, t15, t16, t17, t18}}),
-        product(rates, (doubles6_t){{t19, t20, t21, t22, t23, t24}}),
-        product(rates, (doubles6_t){{t25, t26, t27, t28, t29, t30}}),
-        product(rates, (doubles6_t){{t31, t32, t33, t34, t35, t36}})}});
-    const doubles6s6_t transposed_result = transposed((doubles6s6_t){{{{t1, t2, t3, t4, t5, t6}},
-        {{t7, t8, t9, t10, t11, t12}}, {{t13, t14, t15, t16, t17, t18}}, {{t19, t20, t21, t22, t23, t24}},
-        {{t25, t26, t27, t28, t29, t30}}, {{t31, t32, t33, t34, t35, t36}}}});
+    const doubles6_t column = {{numbers[MEAN_AT], numbers[MEAN_AT + 1], numbers[MEAN_AT + 2],
+        numbers[MEAN_AT + 3], numbers[MEAN_AT + 4], numbers[MEAN_AT + 5]}};
+    const doubles6_t column_2 = {{t7, t8, t9, t10, t11, t12}};
+    const doubles6_t column_3 = {{t13, t14, t15, t16, t17, t18}};
+    const doubles6_t column_4 = {{t19, t20, t21, t22, t23, t24}};
+    const doubles6_t column_5 = {{t25, t26, t27, t28, t29, t30}};
+    const doubles6_t column_6 = {{t31, t32, t33, t34, t35, t36}};
+    const doubles6s6_t a = transposed((doubles6s6_t){{product(rates, column), product(rates, column_2),
+        product(rates, column_3), product(rates, column_4), product(rates, column_5),
+        product(rates, column_6)}});
+    const doubles6s6_t transposed_result = transposed((doubles6s6_t){{column, column_2, column_3, column_4,
+        column_5, column_6}});
     const matrix_t transpose_result = transpose(push);
+    const vector_t vector = {transposed_result.e[0].e[3], transposed_result.e[0].e[4],
+        transposed_result.e[0].e[5]};
     const matrix_t transpose_result_2 = transpose(push);
+    const vector_t vector_2 = {transposed_result.e[1].e[3], transposed_result.e[1].e[4],
+        transposed_result.e[1].e[5]};
     const matrix_t transpose_result_3 = transpose(push);
+    const vector_t vector_3 = {transposed_result.e[2].e[3], transposed_result.e[2].e[4],
+        transposed_result.e[2].e[5]};
     const matrix_t transpose_result_4 = transpose(push);
+    const vector_t vector_4 = {transposed_result.e[3].e[3], transposed_result.e[3].e[4],
+        transposed_result.e[3].e[5]};
     const matrix_t transpose_result_5 = transpose(push);
+    const vector_t vector_5 = {transposed_result.e[4].e[3], transposed_result.e[4].e[4],
+        transposed_result.e[4].e[5]};
     const matrix_t transpose_result_6 = transpose(push);
+    const vector_t vector_6 = {transposed_result.e[5].e[3], transposed_result.e[5].e[4],
+        transposed_result.e[5].e[5]};
     const double per = 1.0 / period;
     const vector_t times2_result = times2((vector_t){a.e[0].e[3], a.e[0].e[4], a.e[0].e[5]}, period);
     const vector_t times2_result_2 = times2((vector_t){a.e[1].e[3], a.e[1].e[4], a.e[1].e[5]}, period);
@@ -875,21 +857,13 @@ static void put_motion(double *numbers, const rates_t *rates, matrix_t push, dou
     const vector_t times2_result_4 = times2((vector_t){a.e[3].e[0], a.e[3].e[1], a.e[3].e[2]}, per);
     const vector_t times2_result_5 = times2((vector_t){a.e[4].e[0], a.e[4].e[1], a.e[4].e[2]}, per);
     const vector_t times2_result_6 = times2((vector_t){a.e[5].e[0], a.e[5].e[1], a.e[5].e[2]}, per);
-    const vector_t times2_result_7 = times2((vector_t){dot1((vector_t){transposed_result.e[3].e[3],
-        transposed_result.e[3].e[4], transposed_result.e[3].e[5]}, transpose_result_4.row[0]),
-        dot1((vector_t){transposed_result.e[3].e[3], transposed_result.e[3].e[4],
-        transposed_result.e[3].e[5]}, transpose_result_4.row[1]), dot1((vector_t){transposed_result.e[3].e[3],
-        transposed_result.e[3].e[4], transposed_result.e[3].e[5]}, transpose_result_4.row[2])}, per);
-    const vector_t times2_result_8 = times2((vector_t){dot1((vector_t){transposed_result.e[4].e[3],
-        transposed_result.e[4].e[4], transposed_result.e[4].e[5]}, transpose_result_5.row[0]),
-        dot1((vector_t){transposed_result.e[4].e[3], transposed_result.e[4].e[4],
-        transposed_result.e[4].e[5]}, transpose_result_5.row[1]), dot1((vector_t){transposed_result.e[4].e[3],
-        transposed_result.e[4].e[4], transposed_result.e[4].e[5]}, transpose_result_5.row[2])}, per);
-    const vector_t times2_result_9 = times2((vector_t){dot1((vector_t){transposed_result.e[5].e[3],
-        transposed_result.e[5].e[4], transposed_result.e[5].e[5]}, transpose_result_6.row[0]),
-        dot1((vector_t){transposed_result.e[5].e[3], transposed_result.e[5].e[4],
-        transposed_result.e[5].e[5]}, transpose_result_6.row[1]), dot1((vector_t){transposed_result.e[5].e[3],
-        transposed_result.e[5].e[4], transposed_result.e[5].e[5]}, transpose_result_6.row[2])}, per);
+    const vector_t times2_result_7 = times2((vector_t){dot1(vector_4, transpose_result_4.row[0]),
+        dot1(vector_4, transpose_result_4.row[1]), dot1(vector_4, transpose_result_4.row[2])}, per);
+    const vector_t times2_result_8 = times2((vector_t){dot1(vector_5, transpose_result_5.row[0]),
+        dot1(vector_5, transpose_result_5.row[1]), dot1(vector_5, transpose_result_5.row[2])}, per);
+    const vector_t row = {dot1(vector_6, transpose_result_6.row[0]),
+        dot1(vector_6, transpose_result_6.row[1]), dot1(vector_6, transpose_result_6.row[2])};
+    const vector_t times2_result_9 = times2(row, per);
     numbers[MOTION_AT] = 1.0 + a.e[0].e[0];
     numbers[MOTION_AT + 1] = a.e[0].e[1];
     numbers[MOTION_AT + 2] = a.e[0].e[2];
@@ -926,24 +900,15 @@ static void put_motion(double *numbers, const rates_t *rates, matrix_t push, dou
     numbers[MOTION_AT + 33] = a.e[5].e[3];
     numbers[MOTION_AT + 34] = a.e[5].e[4];
     numbers[MOTION_AT + 35] = 1.0 + a.e[5].e[5];
-    numbers[MOTION_AT + 36] = dot1((vector_t){transposed_result.e[0].e[3], transposed_result.e[0].e[4],
-        transposed_result.e[0].e[5]}, transpose_result.row[0]);
-    numbers[MOTION_AT + 37] = dot1((vector_t){transposed_result.e[0].e[3], transposed_result.e[0].e[4],
-        transposed_result.e[0].e[5]}, transpose_result.row[1]);
-    numbers[MOTION_AT + 38] = dot1((vector_t){transposed_result.e[0].e[3], transposed_result.e[0].e[4],
-        transposed_result.e[0].e[5]}, transpose_result.row[2]);
-    numbers[MOTION_AT + 39] = dot1((vector_t){transposed_result.e[1].e[3], transposed_result.e[1].e[4],
-        transposed_result.e[1].e[5]}, transpose_result_2.row[0]);
-    numbers[MOTION_AT + 40] = dot1((vector_t){transposed_result.e[1].e[3], transposed_result.e[1].e[4],
-        transposed_result.e[1].e[5]}, transpose_result_2.row[1]);
-    numbers[MOTION_AT + 41] = dot1((vector_t){transposed_result.e[1].e[3], transposed_result.e[1].e[4],
-        transposed_result.e[1].e[5]}, transpose_result_2.row[2]);
-    numbers[MOTION_AT + 42] = dot1((vector_t){transposed_result.e[2].e[3], transposed_result.e[2].e[4],
-        transposed_result.e[2].e[5]}, transpose_result_3.row[0]);
-    numbers[MOTION_AT + 43] = dot1((vector_t){transposed_result.e[2].e[3], transposed_result.e[2].e[4],
-        transposed_result.e[2].e[5]}, transpose_result_3.row[1]);
-    numbers[MOTION_AT + 44] = dot1((vector_t){transposed_result.e[2].e[3], transposed_result.e[2].e[4],
-        transposed_result.e[2].e[5]}, transpose_result_3.row[2]);
+    numbers[MOTION_AT + 36] = dot1(vector, transpose_result.row[0]);
+    numbers[MOTION_AT + 37] = dot1(vector, transpose_result.row[1]);
+    numbers[MOTION_AT + 38] = dot1(vector, transpose_result.row[2]);
+    numbers[MOTION_AT + 39] = dot1(vector_2, transpose_result_2.row[0]);
+    numbers[MOTION_AT + 40] = dot1(vector_2, transpose_result_2.row[1]);
+    numbers[MOTION_AT + 41] = dot1(vector_2, transpose_result_2.row[2]);
+    numbers[MOTION_AT + 42] = dot1(vector_3, transpose_result_3.row[0]);
+    numbers[MOTION_AT + 43] = dot1(vector_3, transpose_result_3.row[1]);
+    numbers[MOTION_AT + 44] = dot1(vector_3, transpose_result_3.row[2]);
     numbers[MOTION_AT + 45] = times2_result_7.x;
     numbers[MOTION_AT + 46] = times2_result_7.y;
     numbers[MOTION_AT + 47] = times2_result_7.z;
@@ -959,22 +924,19 @@ static void put_motion(double *numbers, const rates_t *rates, matrix_t push, dou
 static void sample(double *numbers, const linear_t *linear, double period)
 {
     const double square = period * period;
-    const matrix_t scaled_result = scaled(linear->turning, period);
-    const matrix_t scaled_result_2 = scaled(linear->stiffness, square);
-    const matrix_t scaled_result_3 = scaled(linear->damping, period);
-    const rates_t rates = {.turning = scaled_result, .half = 0.5, .stiffness = scaled_result_2,
-        .damping = scaled_result_3};
+    const rates_t rates = {.turning = scaled(linear->turning, period), .half = 0.5,
+        .stiffness = scaled(linear->stiffness, square), .damping = scaled(linear->damping, period)};
     const share_result_t share_1_result = share_1(&rates);
-    const rates_t during_result = during(&rates, share_1_result.scalar);
-    sum_up(numbers, &during_result);
+    const rates_t rates_2 = during(&rates, share_1_result.scalar);
+    sum_up(numbers, &rates_2);
     double share_ = share_1_result.scalar;
     double left_ = share_1_result.scalar1;
     for (int32_t turn = 0; turn < 60; turn++) {
         const double share = share_;
         const double left = left_;
         if (left <= 0.0) break;
-        const rates_t during_result_2 = during(&rates, share);
-        double_of(numbers, &during_result_2);
+        const rates_t rates_3 = during(&rates, share);
+        double_of(numbers, &rates_3);
         share_ = 2.0 * share;
         left_ = left - 1.0;
     }
@@ -997,22 +959,21 @@ static void put_limits(double *numbers, vector_t centre, double bound)
 /* Return the k-th three numbers of a buffer. */
 static vector_t triple(double *numbers)
 {
-    const double t1 = numbers[LIMITS_AT];
-    const double t2 = numbers[LIMITS_AT + 1];
-    const double t3 = numbers[LIMITS_AT + 2];
-    return (vector_t){t1, t2, t3};
+    const vector_t vector = {numbers[LIMITS_AT], numbers[LIMITS_AT + 1], numbers[LIMITS_AT + 2]};
+    return vector;
 }
 
 /* ------------------------------- laws.predictive.problem -------------------------------- */
 
 /* Return the limits of every move. */
-static limits_t limits(double *numbers)
+static limits_t limits_1(double *numbers)
 {
     const vector_t centre = triple(numbers);
     const double bound = numbers[LIMITS_AT + 3];
     const vector_t wide = {bound, bound, bound};
-    return (limits_t){.centre = centre, .bound = bound, .low = subtract(centre, wide),
+    const limits_t limits = {.centre = centre, .bound = bound, .low = subtract(centre, wide),
         .high = add(centre, wide)};
+    return limits;
 }
 
 /* -------------------------------- laws.predictive.limits -------------------------------- */
@@ -1022,10 +983,10 @@ static project_result_t project(const limits_t *limits, vector_t v)
 {
     const bool t10 = limits->low.x <= v.x && v.x <= limits->high.x && (limits->low.y <= v.y && v.y <=
         limits->high.y);
-    const vector_t w = {minimum(limits->high.x, maximum(limits->low.x, v.x)),
+    return (project_result_t){.vector = {minimum(limits->high.x, maximum(limits->low.x, v.x)),
         minimum(limits->high.y, maximum(limits->low.y, v.y)),
-        minimum(limits->high.z, maximum(limits->low.z, v.z))};
-    return (project_result_t){.w = w, .truth = !(t10 && (limits->low.z <= v.z && v.z <= limits->high.z))};
+        minimum(limits->high.z, maximum(limits->low.z, v.z))}, .truth = !(t10 && (limits->low.z <= v.z && v.z
+        <= limits->high.z))};
 }
 
 /* -------------------------------- laws.predictive.solver -------------------------------- */
@@ -1033,38 +994,47 @@ static project_result_t project(const limits_t *limits, vector_t v)
 /* Shift a solved plan by one move; the last is what the tail gives at its end. */
 static void advance(double *numbers)
 {
-    const limits_t bounds = limits(numbers);
+    const limits_t bounds = limits_1(numbers);
     const double t1 = numbers[STATES_AT + 60];
     const double t2 = numbers[STATES_AT + 61];
     const double t3 = numbers[STATES_AT + 62];
     const double t4 = numbers[STATES_AT + 63];
     const double t5 = numbers[STATES_AT + 64];
     const double t6 = numbers[STATES_AT + 65];
-    const doubles6_t a = {{numbers[TAIL_AT], numbers[TAIL_AT + 1], numbers[TAIL_AT + 2], numbers[TAIL_AT + 3],
-        numbers[TAIL_AT + 4], numbers[TAIL_AT + 5]}};
-    const double t28 = 0.0 + a.e[0] * -t1 + a.e[1] * -t2 + a.e[2] * -t3 + a.e[3] * -t4 + a.e[4] * -t5;
-    const doubles6_t a_2 = {{numbers[TAIL_AT + 6], numbers[TAIL_AT + 7], numbers[TAIL_AT + 8],
-        numbers[TAIL_AT + 9], numbers[TAIL_AT + 10], numbers[TAIL_AT + 11]}};
-    const double t46 = 0.0 + a_2.e[0] * -t1 + a_2.e[1] * -t2 + a_2.e[2] * -t3 + a_2.e[3] * -t4 + a_2.e[4] *
-        -t5;
-    const doubles6_t a_3 = {{numbers[TAIL_AT + 12], numbers[TAIL_AT + 13], numbers[TAIL_AT + 14],
-        numbers[TAIL_AT + 15], numbers[TAIL_AT + 16], numbers[TAIL_AT + 17]}};
-    const double t64 = 0.0 + a_3.e[0] * -t1 + a_3.e[1] * -t2 + a_3.e[2] * -t3 + a_3.e[3] * -t4 + a_3.e[4] *
-        -t5;
+    const double t13 = numbers[TAIL_AT];
+    const double t14 = numbers[TAIL_AT + 1];
+    const double t15 = numbers[TAIL_AT + 2];
+    const double t16 = numbers[TAIL_AT + 3];
+    const double t17 = numbers[TAIL_AT + 4];
+    const double t18 = numbers[TAIL_AT + 5];
+    const double t30 = 0.0 + t13 * -t1 + t14 * -t2 + t15 * -t3 + t16 * -t4 + t17 * -t5 + t18 * -t6;
+    const double t31 = numbers[TAIL_AT + 6];
+    const double t32 = numbers[TAIL_AT + 7];
+    const double t33 = numbers[TAIL_AT + 8];
+    const double t34 = numbers[TAIL_AT + 9];
+    const double t35 = numbers[TAIL_AT + 10];
+    const double t36 = numbers[TAIL_AT + 11];
+    const double t48 = 0.0 + t31 * -t1 + t32 * -t2 + t33 * -t3 + t34 * -t4 + t35 * -t5 + t36 * -t6;
+    const double t49 = numbers[TAIL_AT + 12];
+    const double t50 = numbers[TAIL_AT + 13];
+    const double t51 = numbers[TAIL_AT + 14];
+    const double t52 = numbers[TAIL_AT + 15];
+    const double t53 = numbers[TAIL_AT + 16];
+    const double t54 = numbers[TAIL_AT + 17];
+    const double total = 0.0 + t49 * -t1 + t50 * -t2 + t51 * -t3 + t52 * -t4 + t53 * -t5 + t54 * -t6;
     for (int32_t k = 0; k < 9; k++) {
-        const double t70 = numbers[PLAN_AT + 3 * k + 3];
-        const double t73 = numbers[PLAN_AT + 3 * k + 4];
-        const double t76 = numbers[PLAN_AT + 3 * k + 5];
-        const project_result_t project_result = project(&bounds, (vector_t){t70, t73, t76});
-        numbers[PLAN_AT + 3 * k] = project_result.w.x;
-        numbers[PLAN_AT + 3 * k + 1] = project_result.w.y;
-        numbers[PLAN_AT + 3 * k + 2] = project_result.w.z;
+        const vector_t vector = {numbers[PLAN_AT + 3 * (k + 1)], numbers[PLAN_AT + 3 * (k + 1) + 1],
+            numbers[PLAN_AT + 3 * (k + 1) + 2]};
+        const project_result_t project_result = project(&bounds, vector);
+        numbers[PLAN_AT + 3 * k] = project_result.vector.x;
+        numbers[PLAN_AT + 3 * k + 1] = project_result.vector.y;
+        numbers[PLAN_AT + 3 * k + 2] = project_result.vector.z;
     }
-    const vector_t last = {t28 + a.e[5] * -t6, t46 + a_2.e[5] * -t6, t64 + a_3.e[5] * -t6};
+    const vector_t last = {t30, t48, total};
     const project_result_t project_result_2 = project(&bounds, last);
-    numbers[PLAN_AT + 27] = project_result_2.w.x;
-    numbers[PLAN_AT + 28] = project_result_2.w.y;
-    numbers[PLAN_AT + 29] = project_result_2.w.z;
+    numbers[PLAN_AT + 27] = project_result_2.vector.x;
+    numbers[PLAN_AT + 28] = project_result_2.vector.y;
+    numbers[PLAN_AT + 29] = project_result_2.vector.z;
 }
 
 /* -------------------------------- laws.predictive.sixes --------------------------------- */
@@ -1072,70 +1042,31 @@ static void advance(double *numbers)
 /* A buffer holds a matrix row after row. */
 static doubles6s6_t matrix(double *numbers)
 {
-    const double t1 = numbers[MOTION_AT];
-    const double t2 = numbers[MOTION_AT + 1];
-    const double t3 = numbers[MOTION_AT + 2];
-    const double t4 = numbers[MOTION_AT + 3];
-    const double t5 = numbers[MOTION_AT + 4];
-    const double t6 = numbers[MOTION_AT + 5];
-    const double t7 = numbers[MOTION_AT + 6];
-    const double t8 = numbers[MOTION_AT + 7];
-    const double t9 = numbers[MOTION_AT + 8];
-    const double t10 = numbers[MOTION_AT + 9];
-    const double t11 = numbers[MOTION_AT + 10];
-    const double t12 = numbers[MOTION_AT + 11];
-    const double t13 = numbers[MOTION_AT + 12];
-    const double t14 = numbers[MOTION_AT + 13];
-    const double t15 = numbers[MOTION_AT + 14];
-    const double t16 = numbers[MOTION_AT + 15];
-    const double t17 = numbers[MOTION_AT + 16];
-    const double t18 = numbers[MOTION_AT + 17];
-    const double t19 = numbers[MOTION_AT + 18];
-    const double t20 = numbers[MOTION_AT + 19];
-    const double t21 = numbers[MOTION_AT + 20];
-    const double t22 = numbers[MOTION_AT + 21];
-    const double t23 = numbers[MOTION_AT + 22];
-    const double t24 = numbers[MOTION_AT + 23];
-    const double t25 = numbers[MOTION_AT + 24];
-    const double t26 = numbers[MOTION_AT + 25];
-    const double t27 = numbers[MOTION_AT + 26];
-    const double t28 = numbers[MOTION_AT + 27];
-    const double t29 = numbers[MOTION_AT + 28];
-    const double t30 = numbers[MOTION_AT + 29];
-    const double t31 = numbers[MOTION_AT + 30];
-    const double t32 = numbers[MOTION_AT + 31];
-    const double t33 = numbers[MOTION_AT + 32];
-    const double t34 = numbers[MOTION_AT + 33];
-    const double t35 = numbers[MOTION_AT + 34];
-    const double t36 = numbers[MOTION_AT + 35];
-    return (doubles6s6_t){{{{t1, t2, t3, t4, t5, t6}}, {{t7, t8, t9, t10, t11, t12}},
-        {{t13, t14, t15, t16, t17, t18}}, {{t19, t20, t21, t22, t23, t24}}, {{t25, t26, t27, t28, t29, t30}},
-        {{t31, t32, t33, t34, t35, t36}}}};
+    const doubles6_t doubles6 = {{numbers[MOTION_AT], numbers[MOTION_AT + 1], numbers[MOTION_AT + 2],
+        numbers[MOTION_AT + 3], numbers[MOTION_AT + 4], numbers[MOTION_AT + 5]}};
+    const doubles6_t doubles6_2 = {{numbers[MOTION_AT + 6], numbers[MOTION_AT + 7], numbers[MOTION_AT + 8],
+        numbers[MOTION_AT + 9], numbers[MOTION_AT + 10], numbers[MOTION_AT + 11]}};
+    const doubles6_t doubles6_3 = {{numbers[MOTION_AT + 12], numbers[MOTION_AT + 13], numbers[MOTION_AT + 14],
+        numbers[MOTION_AT + 15], numbers[MOTION_AT + 16], numbers[MOTION_AT + 17]}};
+    const doubles6_t doubles6_4 = {{numbers[MOTION_AT + 18], numbers[MOTION_AT + 19], numbers[MOTION_AT + 20],
+        numbers[MOTION_AT + 21], numbers[MOTION_AT + 22], numbers[MOTION_AT + 23]}};
+    const doubles6_t doubles6_5 = {{numbers[MOTION_AT + 24], numbers[MOTION_AT + 25], numbers[MOTION_AT + 26],
+        numbers[MOTION_AT + 27], numbers[MOTION_AT + 28], numbers[MOTION_AT + 29]}};
+    const doubles6_t doubles6_6 = {{numbers[MOTION_AT + 30], numbers[MOTION_AT + 31], numbers[MOTION_AT + 32],
+        numbers[MOTION_AT + 33], numbers[MOTION_AT + 34], numbers[MOTION_AT + 35]}};
+    return (doubles6s6_t){{doubles6, doubles6_2, doubles6_3, doubles6_4, doubles6_5, doubles6_6}};
 }
 
 /* A buffer holds a matrix row after row. */
 static vectors6_t matrix1(double *numbers)
 {
-    const double t1 = numbers[MOTION_AT + 36];
-    const double t2 = numbers[MOTION_AT + 37];
-    const double t3 = numbers[MOTION_AT + 38];
-    const double t4 = numbers[MOTION_AT + 39];
-    const double t5 = numbers[MOTION_AT + 40];
-    const double t6 = numbers[MOTION_AT + 41];
-    const double t7 = numbers[MOTION_AT + 42];
-    const double t8 = numbers[MOTION_AT + 43];
-    const double t9 = numbers[MOTION_AT + 44];
-    const double t10 = numbers[MOTION_AT + 45];
-    const double t11 = numbers[MOTION_AT + 46];
-    const double t12 = numbers[MOTION_AT + 47];
-    const double t13 = numbers[MOTION_AT + 48];
-    const double t14 = numbers[MOTION_AT + 49];
-    const double t15 = numbers[MOTION_AT + 50];
-    const double t16 = numbers[MOTION_AT + 51];
-    const double t17 = numbers[MOTION_AT + 52];
-    const double t18 = numbers[MOTION_AT + 53];
-    return (vectors6_t){{{t1, t2, t3}, {t4, t5, t6}, {t7, t8, t9}, {t10, t11, t12}, {t13, t14, t15},
-        {t16, t17, t18}}};
+    const vector_t vector = {numbers[MOTION_AT + 36], numbers[MOTION_AT + 37], numbers[MOTION_AT + 38]};
+    const vector_t vector_2 = {numbers[MOTION_AT + 39], numbers[MOTION_AT + 40], numbers[MOTION_AT + 41]};
+    const vector_t vector_3 = {numbers[MOTION_AT + 42], numbers[MOTION_AT + 43], numbers[MOTION_AT + 44]};
+    const vector_t vector_4 = {numbers[MOTION_AT + 45], numbers[MOTION_AT + 46], numbers[MOTION_AT + 47]};
+    const vector_t vector_5 = {numbers[MOTION_AT + 48], numbers[MOTION_AT + 49], numbers[MOTION_AT + 50]};
+    const vector_t vector_6 = {numbers[MOTION_AT + 51], numbers[MOTION_AT + 52], numbers[MOTION_AT + 53]};
+    return (vectors6_t){{vector, vector_2, vector_3, vector_4, vector_5, vector_6}};
 }
 
 /* ------------------------------- laws.predictive.problem -------------------------------- */
@@ -1143,9 +1074,9 @@ static vectors6_t matrix1(double *numbers)
 /* Return A (6, 6) and B (6, 3). */
 static motion_result_t motion(double *numbers)
 {
-    const doubles6s6_t matrix_result = matrix(numbers);
-    const vectors6_t matrix1_result = matrix1(numbers);
-    return (motion_result_t){.rows = matrix_result, .rows1 = matrix1_result};
+    const doubles6s6_t rows_2 = matrix(numbers);
+    const vectors6_t rows1 = matrix1(numbers);
+    return (motion_result_t){.rows = rows_2, .rows1 = rows1};
 }
 
 /* -------------------------------- laws.predictive.sixes --------------------------------- */
@@ -1153,45 +1084,25 @@ static motion_result_t motion(double *numbers)
 /* A buffer holds a matrix row after row. */
 static doubles6s6_t matrix2(double *numbers)
 {
-    const double t1 = numbers[WEIGHTS_AT + 12];
-    const double t2 = numbers[WEIGHTS_AT + 13];
-    const double t3 = numbers[WEIGHTS_AT + 14];
-    const double t4 = numbers[WEIGHTS_AT + 15];
-    const double t5 = numbers[WEIGHTS_AT + 16];
-    const double t6 = numbers[WEIGHTS_AT + 17];
-    const double t7 = numbers[WEIGHTS_AT + 18];
-    const double t8 = numbers[WEIGHTS_AT + 19];
-    const double t9 = numbers[WEIGHTS_AT + 20];
-    const double t10 = numbers[WEIGHTS_AT + 21];
-    const double t11 = numbers[WEIGHTS_AT + 22];
-    const double t12 = numbers[WEIGHTS_AT + 23];
-    const double t13 = numbers[WEIGHTS_AT + 24];
-    const double t14 = numbers[WEIGHTS_AT + 25];
-    const double t15 = numbers[WEIGHTS_AT + 26];
-    const double t16 = numbers[WEIGHTS_AT + 27];
-    const double t17 = numbers[WEIGHTS_AT + 28];
-    const double t18 = numbers[WEIGHTS_AT + 29];
-    const double t19 = numbers[WEIGHTS_AT + 30];
-    const double t20 = numbers[WEIGHTS_AT + 31];
-    const double t21 = numbers[WEIGHTS_AT + 32];
-    const double t22 = numbers[WEIGHTS_AT + 33];
-    const double t23 = numbers[WEIGHTS_AT + 34];
-    const double t24 = numbers[WEIGHTS_AT + 35];
-    const double t25 = numbers[WEIGHTS_AT + 36];
-    const double t26 = numbers[WEIGHTS_AT + 37];
-    const double t27 = numbers[WEIGHTS_AT + 38];
-    const double t28 = numbers[WEIGHTS_AT + 39];
-    const double t29 = numbers[WEIGHTS_AT + 40];
-    const double t30 = numbers[WEIGHTS_AT + 41];
-    const double t31 = numbers[WEIGHTS_AT + 42];
-    const double t32 = numbers[WEIGHTS_AT + 43];
-    const double t33 = numbers[WEIGHTS_AT + 44];
-    const double t34 = numbers[WEIGHTS_AT + 45];
-    const double t35 = numbers[WEIGHTS_AT + 46];
-    const double t36 = numbers[WEIGHTS_AT + 47];
-    return (doubles6s6_t){{{{t1, t2, t3, t4, t5, t6}}, {{t7, t8, t9, t10, t11, t12}},
-        {{t13, t14, t15, t16, t17, t18}}, {{t19, t20, t21, t22, t23, t24}}, {{t25, t26, t27, t28, t29, t30}},
-        {{t31, t32, t33, t34, t35, t36}}}};
+    const doubles6_t doubles6 = {{numbers[WEIGHTS_AT + 12], numbers[WEIGHTS_AT + 13],
+        numbers[WEIGHTS_AT + 14], numbers[WEIGHTS_AT + 15], numbers[WEIGHTS_AT + 16],
+        numbers[WEIGHTS_AT + 17]}};
+    const doubles6_t doubles6_2 = {{numbers[WEIGHTS_AT + 18], numbers[WEIGHTS_AT + 19],
+        numbers[WEIGHTS_AT + 20], numbers[WEIGHTS_AT + 21], numbers[WEIGHTS_AT + 22],
+        numbers[WEIGHTS_AT + 23]}};
+    const doubles6_t doubles6_3 = {{numbers[WEIGHTS_AT + 24], numbers[WEIGHTS_AT + 25],
+        numbers[WEIGHTS_AT + 26], numbers[WEIGHTS_AT + 27], numbers[WEIGHTS_AT + 28],
+        numbers[WEIGHTS_AT + 29]}};
+    const doubles6_t doubles6_4 = {{numbers[WEIGHTS_AT + 30], numbers[WEIGHTS_AT + 31],
+        numbers[WEIGHTS_AT + 32], numbers[WEIGHTS_AT + 33], numbers[WEIGHTS_AT + 34],
+        numbers[WEIGHTS_AT + 35]}};
+    const doubles6_t doubles6_5 = {{numbers[WEIGHTS_AT + 36], numbers[WEIGHTS_AT + 37],
+        numbers[WEIGHTS_AT + 38], numbers[WEIGHTS_AT + 39], numbers[WEIGHTS_AT + 40],
+        numbers[WEIGHTS_AT + 41]}};
+    const doubles6_t doubles6_6 = {{numbers[WEIGHTS_AT + 42], numbers[WEIGHTS_AT + 43],
+        numbers[WEIGHTS_AT + 44], numbers[WEIGHTS_AT + 45], numbers[WEIGHTS_AT + 46],
+        numbers[WEIGHTS_AT + 47]}};
+    return (doubles6s6_t){{doubles6, doubles6_2, doubles6_3, doubles6_4, doubles6_5, doubles6_6}};
 }
 
 /* ------------------------------- laws.predictive.problem -------------------------------- */
@@ -1211,9 +1122,9 @@ static weights_t weights(double *numbers)
     const double t10 = numbers[WEIGHTS_AT + 9];
     const double t11 = numbers[WEIGHTS_AT + 10];
     const double t12 = numbers[WEIGHTS_AT + 11];
-    const doubles6s6_t matrix2_result = matrix2(numbers);
+    const doubles6s6_t p = matrix2(numbers);
     return (weights_t){.q = {{t1, t2, t3, t4, t5, t6}}, .r = {t7, t8, t9}, .r_inverse = {t10, t11, t12},
-        .p = matrix2_result};
+        .p = p};
 }
 
 /* -------------------------------- laws.predictive.sixes --------------------------------- */
@@ -1266,7 +1177,8 @@ static double entry(vector_t m)
 static double dot3(doubles6_t a, doubles6_t b, double start)
 {
     const double t8 = start + a.e[0] * b.e[0] + a.e[1] * b.e[1] + a.e[2] * b.e[2] + a.e[3] * b.e[3];
-    return t8 + a.e[4] * b.e[4] + a.e[5] * b.e[5];
+    const double total = t8 + a.e[4] * b.e[4] + a.e[5] * b.e[5];
+    return total;
 }
 
 /* Return the number in row i and column j. */
@@ -1321,8 +1233,8 @@ static bools3_t held(const limits_t *limits, vector_t v, vector_t g)
 {
     const bool t7 = (g.x < 0.0 && limits->high.x <= v.x) || (0.0 < g.x && v.x <= limits->low.x);
     const bool t14 = (g.y < 0.0 && limits->high.y <= v.y) || (0.0 < g.y && v.y <= limits->low.y);
-    const bool t21 = (g.z < 0.0 && limits->high.z <= v.z) || (0.0 < g.z && v.z <= limits->low.z);
-    return (bools3_t){{t7, t14, t21}};
+    const bool above = g.z < 0.0 && limits->high.z <= v.z;
+    return (bools3_t){{t7, t14, above || (0.0 < g.z && v.z <= limits->low.z)}};
 }
 
 /* Return the inverse of a symmetric matrix. */
@@ -1380,8 +1292,8 @@ static double entry3(doubles6_t m)
 /* Return start + a'b. */
 static double dot4(vector_t a, vector_t b, double start)
 {
-    const double total = start + a.x * b.x + a.y * b.y;
-    return total + a.z * b.z;
+    const double total = start + a.x * b.x + a.y * b.y + a.z * b.z;
+    return total;
 }
 
 /* Return the number in row i and column j. */
@@ -1443,47 +1355,47 @@ static doubles6s6_t symmetric(doubles6s6_t m)
 static sweep_result_t sweep(double *numbers, double barrier)
 {
     const motion_result_t motion_result = motion(numbers);
-    const weights_t weights_result = weights(numbers);
-    const limits_t bounds = limits(numbers);
+    const weights_t weight = weights(numbers);
+    const limits_t bounds = limits_1(numbers);
     const doubles6s6_t columns = transposed(motion_result.rows);
     const doubles6s3_t pushes = transposed1(motion_result.rows1);
     const bool holds = barrier <= 0.0;
-    double curvature_ = weights_result.p.e[0].e[0];
-    double curvature1_ = weights_result.p.e[0].e[1];
-    double curvature2_ = weights_result.p.e[0].e[2];
-    double curvature3_ = weights_result.p.e[0].e[3];
-    double curvature4_ = weights_result.p.e[0].e[4];
-    double curvature5_ = weights_result.p.e[0].e[5];
-    double curvature6_ = weights_result.p.e[1].e[0];
-    double curvature7_ = weights_result.p.e[1].e[1];
-    double curvature8_ = weights_result.p.e[1].e[2];
-    double curvature9_ = weights_result.p.e[1].e[3];
-    double curvature10_ = weights_result.p.e[1].e[4];
-    double curvature11_ = weights_result.p.e[1].e[5];
-    double curvature12_ = weights_result.p.e[2].e[0];
-    double curvature13_ = weights_result.p.e[2].e[1];
-    double curvature14_ = weights_result.p.e[2].e[2];
-    double curvature15_ = weights_result.p.e[2].e[3];
-    double curvature16_ = weights_result.p.e[2].e[4];
-    double curvature17_ = weights_result.p.e[2].e[5];
-    double curvature18_ = weights_result.p.e[3].e[0];
-    double curvature19_ = weights_result.p.e[3].e[1];
-    double curvature20_ = weights_result.p.e[3].e[2];
-    double curvature21_ = weights_result.p.e[3].e[3];
-    double curvature22_ = weights_result.p.e[3].e[4];
-    double curvature23_ = weights_result.p.e[3].e[5];
-    double curvature24_ = weights_result.p.e[4].e[0];
-    double curvature25_ = weights_result.p.e[4].e[1];
-    double curvature26_ = weights_result.p.e[4].e[2];
-    double curvature27_ = weights_result.p.e[4].e[3];
-    double curvature28_ = weights_result.p.e[4].e[4];
-    double curvature29_ = weights_result.p.e[4].e[5];
-    double curvature30_ = weights_result.p.e[5].e[0];
-    double curvature31_ = weights_result.p.e[5].e[1];
-    double curvature32_ = weights_result.p.e[5].e[2];
-    double curvature33_ = weights_result.p.e[5].e[3];
-    double curvature34_ = weights_result.p.e[5].e[4];
-    double curvature35_ = weights_result.p.e[5].e[5];
+    double curvature_ = weight.p.e[0].e[0];
+    double curvature1_ = weight.p.e[0].e[1];
+    double curvature2_ = weight.p.e[0].e[2];
+    double curvature3_ = weight.p.e[0].e[3];
+    double curvature4_ = weight.p.e[0].e[4];
+    double curvature5_ = weight.p.e[0].e[5];
+    double curvature6_ = weight.p.e[1].e[0];
+    double curvature7_ = weight.p.e[1].e[1];
+    double curvature8_ = weight.p.e[1].e[2];
+    double curvature9_ = weight.p.e[1].e[3];
+    double curvature10_ = weight.p.e[1].e[4];
+    double curvature11_ = weight.p.e[1].e[5];
+    double curvature12_ = weight.p.e[2].e[0];
+    double curvature13_ = weight.p.e[2].e[1];
+    double curvature14_ = weight.p.e[2].e[2];
+    double curvature15_ = weight.p.e[2].e[3];
+    double curvature16_ = weight.p.e[2].e[4];
+    double curvature17_ = weight.p.e[2].e[5];
+    double curvature18_ = weight.p.e[3].e[0];
+    double curvature19_ = weight.p.e[3].e[1];
+    double curvature20_ = weight.p.e[3].e[2];
+    double curvature21_ = weight.p.e[3].e[3];
+    double curvature22_ = weight.p.e[3].e[4];
+    double curvature23_ = weight.p.e[3].e[5];
+    double curvature24_ = weight.p.e[4].e[0];
+    double curvature25_ = weight.p.e[4].e[1];
+    double curvature26_ = weight.p.e[4].e[2];
+    double curvature27_ = weight.p.e[4].e[3];
+    double curvature28_ = weight.p.e[4].e[4];
+    double curvature29_ = weight.p.e[4].e[5];
+    double curvature30_ = weight.p.e[5].e[0];
+    double curvature31_ = weight.p.e[5].e[1];
+    double curvature32_ = weight.p.e[5].e[2];
+    double curvature33_ = weight.p.e[5].e[3];
+    double curvature34_ = weight.p.e[5].e[4];
+    double curvature35_ = weight.p.e[5].e[5];
     double slope_ = 0.0;
     double slope1_ = 0.0;
     double slope2_ = 0.0;
@@ -1537,60 +1449,57 @@ static sweep_result_t sweep(double *numbers, double barrier)
         const double slope5 = slope5_;
         const double decrement = decrement_;
         const double holding = holding_;
-        const doubles6s6_t product1_result = product1((doubles6s6_t){{{{curvature, curvature1, curvature2,
-            curvature3, curvature4, curvature5}}, {{curvature6, curvature7, curvature8, curvature9,
-            curvature10, curvature11}}, {{curvature12, curvature13, curvature14, curvature15, curvature16,
-            curvature17}}, {{curvature18, curvature19, curvature20, curvature21, curvature22, curvature23}},
-            {{curvature24, curvature25, curvature26, curvature27, curvature28, curvature29}}, {{curvature30,
-            curvature31, curvature32, curvature33, curvature34, curvature35}}}}, motion_result.rows);
-        const doubles6s6_t onward = transposed(product1_result);
-        const vectors6_t product2_result = product2((doubles6s6_t){{{{curvature, curvature1, curvature2,
-            curvature3, curvature4, curvature5}}, {{curvature6, curvature7, curvature8, curvature9,
-            curvature10, curvature11}}, {{curvature12, curvature13, curvature14, curvature15, curvature16,
-            curvature17}}, {{curvature18, curvature19, curvature20, curvature21, curvature22, curvature23}},
-            {{curvature24, curvature25, curvature26, curvature27, curvature28, curvature29}}, {{curvature30,
-            curvature31, curvature32, curvature33, curvature34, curvature35}}}}, motion_result.rows1);
-        const doubles6s3_t pushed = transposed1(product2_result);
+        const doubles6s6_t doubles6s6 = {{{{curvature, curvature1, curvature2, curvature3, curvature4,
+            curvature5}}, {{curvature6, curvature7, curvature8, curvature9, curvature10, curvature11}},
+            {{curvature12, curvature13, curvature14, curvature15, curvature16, curvature17}}, {{curvature18,
+            curvature19, curvature20, curvature21, curvature22, curvature23}}, {{curvature24, curvature25,
+            curvature26, curvature27, curvature28, curvature29}}, {{curvature30, curvature31, curvature32,
+            curvature33, curvature34, curvature35}}}};
+        const doubles6s6_t onward = transposed(product1(doubles6s6, motion_result.rows));
+        const doubles6s3_t pushed = transposed1(product2(doubles6s6, motion_result.rows1));
         const vectors6_t cross_2 = transposed2((doubles6s3_t){{apply1(onward, pushes.e[0]),
             apply1(onward, pushes.e[1]), apply1(onward, pushes.e[2])}});
-        const doubles6_t m_2 = curvature_1(weights_result.r, pushes, pushed);
-        numbers[STIFFNESS_AT + (9 - back)] = m_2.e[0] + m_2.e[3] + m_2.e[5];
-        const vector_t v = {numbers[PLAN_AT + 3 * (9 - back)], numbers[PLAN_AT + 3 * (9 - back) + 1],
-            numbers[PLAN_AT + 3 * (9 - back) + 2]};
-        const vector_t pull = {numbers[GRADIENT_AT + 3 * (9 - back)],
-            numbers[GRADIENT_AT + 3 * (9 - back) + 1], numbers[GRADIENT_AT + 3 * (9 - back) + 2]};
-        const vector_t add_result = add(apply2(pushes,
-            (doubles6_t){{slope, slope1, slope2, slope3, slope4, slope5}}), pull);
+        const doubles6_t m_2 = curvature_1(weight.r, pushes, pushed);
+        numbers[STIFFNESS_AT + 9 - back] = m_2.e[0] + m_2.e[3] + m_2.e[5];
+        const double t16 = numbers[PLAN_AT + 3 * (9 - back)];
+        const double t19 = numbers[PLAN_AT + 3 * (9 - back) + 1];
+        const double t22 = numbers[PLAN_AT + 3 * (9 - back) + 2];
+        const double t24 = numbers[GRADIENT_AT + 3 * (9 - back)];
+        const double t26 = numbers[GRADIENT_AT + 3 * (9 - back) + 1];
+        const double t28 = numbers[GRADIENT_AT + 3 * (9 - back) + 2];
+        const doubles6_t doubles6 = {{slope, slope1, slope2, slope3, slope4, slope5}};
+        const vector_t pull = {t24, t26, t28};
+        const vector_t g_2 = add(apply2(pushes, doubles6), pull);
         double m_ = m_2.e[0];
         double m1_ = m_2.e[1];
         double m2_ = m_2.e[2];
         double m3_ = m_2.e[3];
         double m4_ = m_2.e[4];
         double m5_ = m_2.e[5];
-        double g_ = add_result.x;
-        double g1_ = add_result.y;
-        double g2_ = add_result.z;
+        double g_ = g_2.x;
+        double g1_ = g_2.y;
+        double g2_ = g_2.z;
         if (!holds) {
-            const double t22 = numbers[MULTIPLIERS_AT + 3 * (9 - back)];
-            const double t24 = numbers[MULTIPLIERS_AT + 3 * (9 - back) + 1];
-            const double t26 = numbers[MULTIPLIERS_AT + 3 * (9 - back) + 2];
-            const repelled_result_t repelled_result = repelled(&bounds, v, (vector_t){t22, t24, t26}, barrier,
-                m_2);
-            const vector_t add_result_2 = add(add_result, repelled_result.push);
+            const vector_t vector = {numbers[MULTIPLIERS_AT + 3 * (9 - back)],
+                numbers[MULTIPLIERS_AT + 3 * (9 - back) + 1], numbers[MULTIPLIERS_AT + 3 * (9 - back) + 2]};
+            const repelled_result_t repelled_result = repelled(&bounds, (vector_t){t16, t19, t22}, vector,
+                barrier, (doubles6_t){{m_2.e[0], m_2.e[1], m_2.e[2], m_2.e[3], m_2.e[4], m_2.e[5]}});
+            const vector_t add_result = add((vector_t){g_2.x, g_2.y, g_2.z}, repelled_result.push);
             m_ = repelled_result.symmetric.e[0];
             m1_ = repelled_result.symmetric.e[1];
             m2_ = repelled_result.symmetric.e[2];
             m3_ = repelled_result.symmetric.e[3];
             m4_ = repelled_result.symmetric.e[4];
             m5_ = repelled_result.symmetric.e[5];
-            g_ = add_result_2.x;
-            g1_ = add_result_2.y;
-            g2_ = add_result_2.z;
+            g_ = add_result.x;
+            g1_ = add_result.y;
+            g2_ = add_result.z;
         }
+        const vector_t v = {t16, t19, t22};
         const doubles6_t m_3 = {{m_, m1_, m2_, m3_, m4_, m5_}};
         const held_inverse_result_t held_inverse_result = held_inverse(&bounds, v, pull, m_3, holds);
-        const vector_t g_2 = {g_, g1_, g2_};
-        const vector_t step_2 = minus(held_inverse_result.symmetric, g_2);
+        const vector_t g_3 = {g_, g1_, g2_};
+        const vector_t step_2 = minus(held_inverse_result.symmetric, g_3);
         const vector_t minus_result = minus(held_inverse_result.symmetric, cross_2.e[0]);
         const vector_t minus_result_2 = minus(held_inverse_result.symmetric, cross_2.e[1]);
         const vector_t minus_result_3 = minus(held_inverse_result.symmetric, cross_2.e[2]);
@@ -1622,42 +1531,42 @@ static sweep_result_t sweep(double *numbers, double barrier)
         numbers[FEEDBACK_AT + 18 * (9 - back) + 16] = transposed1_result.e[2].e[4];
         numbers[FEEDBACK_AT + 18 * (9 - back) + 17] = transposed1_result.e[2].e[5];
         const doubles6s6_t curvature_2 = {{{{dot3(columns.e[0], onward.e[0],
-            dot4(cross_2.e[0], minus_result, entry3(weights_result.q))), dot3(columns.e[0], onward.e[1],
+            dot4(cross_2.e[0], minus_result, entry3(weight.q))), dot3(columns.e[0], onward.e[1],
             dot4(cross_2.e[0], minus_result_2, 0.0)), dot3(columns.e[0], onward.e[2],
             dot4(cross_2.e[0], minus_result_3, 0.0)), dot3(columns.e[0], onward.e[3],
             dot4(cross_2.e[0], minus_result_4, 0.0)), dot3(columns.e[0], onward.e[4],
             dot4(cross_2.e[0], minus_result_5, 0.0)), dot3(columns.e[0], onward.e[5],
             dot4(cross_2.e[0], minus_result_6, 0.0))}}, {{dot3(columns.e[1], onward.e[0],
             dot4(cross_2.e[1], minus_result, 0.0)), dot3(columns.e[1], onward.e[1],
-            dot4(cross_2.e[1], minus_result_2, entry4(weights_result.q))), dot3(columns.e[1], onward.e[2],
+            dot4(cross_2.e[1], minus_result_2, entry4(weight.q))), dot3(columns.e[1], onward.e[2],
             dot4(cross_2.e[1], minus_result_3, 0.0)), dot3(columns.e[1], onward.e[3],
             dot4(cross_2.e[1], minus_result_4, 0.0)), dot3(columns.e[1], onward.e[4],
             dot4(cross_2.e[1], minus_result_5, 0.0)), dot3(columns.e[1], onward.e[5],
             dot4(cross_2.e[1], minus_result_6, 0.0))}}, {{dot3(columns.e[2], onward.e[0],
             dot4(cross_2.e[2], minus_result, 0.0)), dot3(columns.e[2], onward.e[1],
             dot4(cross_2.e[2], minus_result_2, 0.0)), dot3(columns.e[2], onward.e[2],
-            dot4(cross_2.e[2], minus_result_3, entry5(weights_result.q))), dot3(columns.e[2], onward.e[3],
+            dot4(cross_2.e[2], minus_result_3, entry5(weight.q))), dot3(columns.e[2], onward.e[3],
             dot4(cross_2.e[2], minus_result_4, 0.0)), dot3(columns.e[2], onward.e[4],
             dot4(cross_2.e[2], minus_result_5, 0.0)), dot3(columns.e[2], onward.e[5],
             dot4(cross_2.e[2], minus_result_6, 0.0))}}, {{dot3(columns.e[3], onward.e[0],
             dot4(cross_2.e[3], minus_result, 0.0)), dot3(columns.e[3], onward.e[1],
             dot4(cross_2.e[3], minus_result_2, 0.0)), dot3(columns.e[3], onward.e[2],
             dot4(cross_2.e[3], minus_result_3, 0.0)), dot3(columns.e[3], onward.e[3],
-            dot4(cross_2.e[3], minus_result_4, entry6(weights_result.q))), dot3(columns.e[3], onward.e[4],
+            dot4(cross_2.e[3], minus_result_4, entry6(weight.q))), dot3(columns.e[3], onward.e[4],
             dot4(cross_2.e[3], minus_result_5, 0.0)), dot3(columns.e[3], onward.e[5],
             dot4(cross_2.e[3], minus_result_6, 0.0))}}, {{dot3(columns.e[4], onward.e[0],
             dot4(cross_2.e[4], minus_result, 0.0)), dot3(columns.e[4], onward.e[1],
             dot4(cross_2.e[4], minus_result_2, 0.0)), dot3(columns.e[4], onward.e[2],
             dot4(cross_2.e[4], minus_result_3, 0.0)), dot3(columns.e[4], onward.e[3],
             dot4(cross_2.e[4], minus_result_4, 0.0)), dot3(columns.e[4], onward.e[4],
-            dot4(cross_2.e[4], minus_result_5, entry7(weights_result.q))), dot3(columns.e[4], onward.e[5],
+            dot4(cross_2.e[4], minus_result_5, entry7(weight.q))), dot3(columns.e[4], onward.e[5],
             dot4(cross_2.e[4], minus_result_6, 0.0))}}, {{dot3(columns.e[5], onward.e[0],
             dot4(cross_2.e[5], minus_result, 0.0)), dot3(columns.e[5], onward.e[1],
             dot4(cross_2.e[5], minus_result_2, 0.0)), dot3(columns.e[5], onward.e[2],
             dot4(cross_2.e[5], minus_result_3, 0.0)), dot3(columns.e[5], onward.e[3],
             dot4(cross_2.e[5], minus_result_4, 0.0)), dot3(columns.e[5], onward.e[4],
             dot4(cross_2.e[5], minus_result_5, 0.0)), dot3(columns.e[5], onward.e[5],
-            dot4(cross_2.e[5], minus_result_6, entry8(weights_result.q)))}}}};
+            dot4(cross_2.e[5], minus_result_6, entry8(weight.q)))}}}};
         const doubles6s6_t symmetric_result = symmetric(curvature_2);
         curvature_ = symmetric_result.e[0].e[0];
         curvature1_ = symmetric_result.e[0].e[1];
@@ -1695,19 +1604,13 @@ static sweep_result_t sweep(double *numbers, double barrier)
         curvature33_ = symmetric_result.e[5].e[3];
         curvature34_ = symmetric_result.e[5].e[4];
         curvature35_ = symmetric_result.e[5].e[5];
-        slope_ = dot3(columns.e[0], (doubles6_t){{slope, slope1, slope2, slope3, slope4, slope5}},
-            dot(cross_2.e[0], step_2));
-        slope1_ = dot3(columns.e[1], (doubles6_t){{slope, slope1, slope2, slope3, slope4, slope5}},
-            dot(cross_2.e[1], step_2));
-        slope2_ = dot3(columns.e[2], (doubles6_t){{slope, slope1, slope2, slope3, slope4, slope5}},
-            dot(cross_2.e[2], step_2));
-        slope3_ = dot3(columns.e[3], (doubles6_t){{slope, slope1, slope2, slope3, slope4, slope5}},
-            dot(cross_2.e[3], step_2));
-        slope4_ = dot3(columns.e[4], (doubles6_t){{slope, slope1, slope2, slope3, slope4, slope5}},
-            dot(cross_2.e[4], step_2));
-        slope5_ = dot3(columns.e[5], (doubles6_t){{slope, slope1, slope2, slope3, slope4, slope5}},
-            dot(cross_2.e[5], step_2));
-        decrement_ = decrement - dot(step_2, g_2);
+        slope_ = dot3(columns.e[0], doubles6, dot(cross_2.e[0], step_2));
+        slope1_ = dot3(columns.e[1], doubles6, dot(cross_2.e[1], step_2));
+        slope2_ = dot3(columns.e[2], doubles6, dot(cross_2.e[2], step_2));
+        slope3_ = dot3(columns.e[3], doubles6, dot(cross_2.e[3], step_2));
+        slope4_ = dot3(columns.e[4], doubles6, dot(cross_2.e[4], step_2));
+        slope5_ = dot3(columns.e[5], doubles6, dot(cross_2.e[5], step_2));
+        decrement_ = decrement - dot(step_2, g_3);
         holding_ = holding + held_inverse_result.scalar;
     }
     return (sweep_result_t){.scalar = decrement_, .scalar1 = holding_};
@@ -1726,16 +1629,16 @@ static doubles6_t transition(doubles6s6_t a, vectors6_t b, doubles6_t x, vector_
 /* Return x'm x. */
 static double form(vector_t m, vector_t x)
 {
-    const double total = 0.0 + m.x * x.x * x.x + m.y * x.y * x.y;
-    return total + m.z * x.z * x.z;
+    const double total = 0.0 + m.x * x.x * x.x + m.y * x.y * x.y + m.z * x.z * x.z;
+    return total;
 }
 
 /* Return x'm x. */
 static double form1(doubles6_t m, doubles6_t x)
 {
     const double t12 = 0.0 + m.e[0] * x.e[0] * x.e[0] + m.e[1] * x.e[1] * x.e[1] + m.e[2] * x.e[2] * x.e[2];
-    const double t18 = t12 + m.e[3] * x.e[3] * x.e[3] + m.e[4] * x.e[4] * x.e[4] + m.e[5] * x.e[5] * x.e[5];
-    return t18;
+    const double total = t12 + m.e[3] * x.e[3] * x.e[3] + m.e[4] * x.e[4] * x.e[4] + m.e[5] * x.e[5] * x.e[5];
+    return total;
 }
 
 /* Return x'm x. */
@@ -1750,8 +1653,8 @@ static double form2(doubles6s6_t m, doubles6_t x)
 static trial_t follow(double *numbers, doubles6_t start)
 {
     const motion_result_t motion_result = motion(numbers);
-    const weights_t weights_result = weights(numbers);
-    const limits_t bounds = limits(numbers);
+    const weights_t weight = weights(numbers);
+    const limits_t bounds = limits_1(numbers);
     bool cut_ = 0;
     double slope_ = 0.0;
     double change_ = 0.0;
@@ -1773,50 +1676,42 @@ static trial_t follow(double *numbers, doubles6_t start)
         const double x5 = x5_;
         const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1],
             numbers[PLAN_AT + 3 * k + 2]};
-        const double t11 = numbers[STEP_AT + 3 * k];
-        const double t13 = numbers[STEP_AT + 3 * k + 1];
-        const double t15 = numbers[STEP_AT + 3 * k + 2];
-        const vector_t start_2 = add(v, (vector_t){t11, t13, t15});
-        const double t18 = numbers[FEEDBACK_AT + 18 * k];
-        const double t21 = numbers[FEEDBACK_AT + 18 * k + 1];
-        const double t24 = numbers[FEEDBACK_AT + 18 * k + 2];
-        const double t27 = numbers[FEEDBACK_AT + 18 * k + 3];
-        const double t30 = numbers[FEEDBACK_AT + 18 * k + 4];
-        const double t33 = numbers[FEEDBACK_AT + 18 * k + 5];
+        const vector_t vector = {numbers[STEP_AT + 3 * k], numbers[STEP_AT + 3 * k + 1],
+            numbers[STEP_AT + 3 * k + 2]};
+        const vector_t add_result = add(v, vector);
+        const doubles6_t doubles6 = {{numbers[FEEDBACK_AT + 6 * (3 * k)],
+            numbers[FEEDBACK_AT + 6 * (3 * k) + 1], numbers[FEEDBACK_AT + 6 * (3 * k) + 2],
+            numbers[FEEDBACK_AT + 6 * (3 * k) + 3], numbers[FEEDBACK_AT + 6 * (3 * k) + 4],
+            numbers[FEEDBACK_AT + 6 * (3 * k) + 5]}};
         const doubles6_t x_2 = {{x, x1, x2, x3, x4, x5}};
-        const double t36 = numbers[FEEDBACK_AT + 18 * k + 6];
-        const double t39 = numbers[FEEDBACK_AT + 18 * k + 7];
-        const double t42 = numbers[FEEDBACK_AT + 18 * k + 8];
-        const double t45 = numbers[FEEDBACK_AT + 18 * k + 9];
-        const double t48 = numbers[FEEDBACK_AT + 18 * k + 10];
-        const double t51 = numbers[FEEDBACK_AT + 18 * k + 11];
-        const double t54 = numbers[FEEDBACK_AT + 18 * k + 12];
-        const double t57 = numbers[FEEDBACK_AT + 18 * k + 13];
-        const double t60 = numbers[FEEDBACK_AT + 18 * k + 14];
-        const double t63 = numbers[FEEDBACK_AT + 18 * k + 15];
-        const double t66 = numbers[FEEDBACK_AT + 18 * k + 16];
-        const double t69 = numbers[FEEDBACK_AT + 18 * k + 17];
-        const project_result_t project_result = project(&bounds,
-            (vector_t){dot3((doubles6_t){{t18, t21, t24, t27, t30, t33}}, x_2, start_2.x),
-            dot3((doubles6_t){{t36, t39, t42, t45, t48, t51}}, x_2, start_2.y),
-            dot3((doubles6_t){{t54, t57, t60, t63, t66, t69}}, x_2, start_2.z)});
-        const vector_t d = subtract(project_result.w, v);
+        const doubles6_t doubles6_2 = {{numbers[FEEDBACK_AT + 6 * (3 * k + 1)],
+            numbers[FEEDBACK_AT + 6 * (3 * k + 1) + 1], numbers[FEEDBACK_AT + 6 * (3 * k + 1) + 2],
+            numbers[FEEDBACK_AT + 6 * (3 * k + 1) + 3], numbers[FEEDBACK_AT + 6 * (3 * k + 1) + 4],
+            numbers[FEEDBACK_AT + 6 * (3 * k + 1) + 5]}};
+        const doubles6_t doubles6_3 = {{numbers[FEEDBACK_AT + 6 * (3 * k + 2)],
+            numbers[FEEDBACK_AT + 6 * (3 * k + 2) + 1], numbers[FEEDBACK_AT + 6 * (3 * k + 2) + 2],
+            numbers[FEEDBACK_AT + 6 * (3 * k + 2) + 3], numbers[FEEDBACK_AT + 6 * (3 * k + 2) + 4],
+            numbers[FEEDBACK_AT + 6 * (3 * k + 2) + 5]}};
+        const project_result_t project_result = project(&bounds, (vector_t){dot3(doubles6, x_2, add_result.x),
+            dot3(doubles6_2, x_2, add_result.y), dot3(doubles6_3, x_2, add_result.z)});
+        const vector_t d = subtract(project_result.vector, v);
         const doubles6_t after = transition(motion_result.rows, motion_result.rows1, x_2, d);
-        numbers[TRIAL_AT + 3 * k] = project_result.w.x;
-        numbers[TRIAL_AT + 3 * k + 1] = project_result.w.y;
-        numbers[TRIAL_AT + 3 * k + 2] = project_result.w.z;
+        numbers[TRIAL_AT + 3 * k] = project_result.vector.x;
+        numbers[TRIAL_AT + 3 * k + 1] = project_result.vector.y;
+        numbers[TRIAL_AT + 3 * k + 2] = project_result.vector.z;
         numbers[BEND_AT + 6 * k] = after.e[0];
         numbers[BEND_AT + 6 * k + 1] = after.e[1];
         numbers[BEND_AT + 6 * k + 2] = after.e[2];
         numbers[BEND_AT + 6 * k + 3] = after.e[3];
         numbers[BEND_AT + 6 * k + 4] = after.e[4];
         numbers[BEND_AT + 6 * k + 5] = after.e[5];
-        const double t86 = numbers[GRADIENT_AT + 3 * k];
-        const double t88 = numbers[GRADIENT_AT + 3 * k + 1];
-        const double t90 = numbers[GRADIENT_AT + 3 * k + 2];
+        const vector_t vector_2 = {numbers[GRADIENT_AT + 3 * k], numbers[GRADIENT_AT + 3 * k + 1],
+            numbers[GRADIENT_AT + 3 * k + 2]};
+        const double slope_2 = slope + dot(vector_2, d);
+        const double curvature = change + (form(weight.r, d) + form1(weight.q, x_2));
         cut_ = cut || project_result.truth;
-        slope_ = slope + dot((vector_t){t86, t88, t90}, d);
-        change_ = change + (form(weights_result.r, d) + form1(weights_result.q, x_2));
+        slope_ = slope_2;
+        change_ = curvature;
         x_ = after.e[0];
         x1_ = after.e[1];
         x2_ = after.e[2];
@@ -1825,7 +1720,7 @@ static trial_t follow(double *numbers, doubles6_t start)
         x5_ = after.e[5];
     }
     const doubles6_t x_3 = {{x_, x1_, x2_, x3_, x4_, x5_}};
-    return (trial_t){.cut = cut_, .change = slope_ + 0.5 * (change_ + form2(weights_result.p, x_3))};
+    return (trial_t){.cut = cut_, .change = slope_ + 0.5 * (change_ + form2(weight.p, x_3))};
 }
 
 /* -------------------------------- laws.predictive.solver -------------------------------- */
@@ -1842,23 +1737,19 @@ static bool fly_freely(double *numbers)
         numbers[GRADIENT_AT + 3 * k + 1] = 0.0;
         numbers[GRADIENT_AT + 3 * k + 2] = 0.0;
     }
-    (void)sweep(numbers, 0.0);
-    const double t10 = numbers[STATES_AT];
-    const double t11 = numbers[STATES_AT + 1];
-    const double t12 = numbers[STATES_AT + 2];
-    const double t13 = numbers[STATES_AT + 3];
-    const double t14 = numbers[STATES_AT + 4];
-    const double t15 = numbers[STATES_AT + 5];
-    const trial_t follow_result = follow(numbers, (doubles6_t){{t10, t11, t12, t13, t14, t15}});
+    sweep(numbers, 0.0);
+    const doubles6_t doubles6 = {{numbers[STATES_AT], numbers[STATES_AT + 1], numbers[STATES_AT + 2],
+        numbers[STATES_AT + 3], numbers[STATES_AT + 4], numbers[STATES_AT + 5]}};
+    const trial_t trial = follow(numbers, doubles6);
     for (int32_t k1 = 0; k1 < 10; k1++) {
-        const double t18 = numbers[TRIAL_AT + 3 * k1];
-        const double t21 = numbers[TRIAL_AT + 3 * k1 + 1];
-        const double t24 = numbers[TRIAL_AT + 3 * k1 + 2];
-        numbers[PLAN_AT + 3 * k1] = t18;
-        numbers[PLAN_AT + 3 * k1 + 1] = t21;
-        numbers[PLAN_AT + 3 * k1 + 2] = t24;
+        const double t19 = numbers[TRIAL_AT + 3 * k1];
+        const double t22 = numbers[TRIAL_AT + 3 * k1 + 1];
+        const double t25 = numbers[TRIAL_AT + 3 * k1 + 2];
+        numbers[PLAN_AT + 3 * k1] = t19;
+        numbers[PLAN_AT + 3 * k1 + 1] = t22;
+        numbers[PLAN_AT + 3 * k1 + 2] = t25;
     }
-    return follow_result.cut;
+    return trial.cut;
 }
 
 /* ------------------------------- laws.predictive.horizon -------------------------------- */
@@ -1867,7 +1758,7 @@ static bool fly_freely(double *numbers)
 static double rollout(double *numbers)
 {
     const motion_result_t motion_result = motion(numbers);
-    const weights_t weights_result = weights(numbers);
+    const weights_t weight = weights(numbers);
     const double t1 = numbers[STATES_AT];
     const double t2 = numbers[STATES_AT + 1];
     const double t3 = numbers[STATES_AT + 2];
@@ -1889,17 +1780,17 @@ static double rollout(double *numbers)
         const double x3 = x3_;
         const double x4 = x4_;
         const double x5 = x5_;
+        const doubles6_t x_2 = {{x, x1, x2, x3, x4, x5}};
         const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1],
             numbers[PLAN_AT + 3 * k + 2]};
-        const doubles6_t x_2 = {{x, x1, x2, x3, x4, x5}};
         const doubles6_t after = transition(motion_result.rows, motion_result.rows1, x_2, v);
-        numbers[STATES_AT + 6 * k + 6] = after.e[0];
-        numbers[STATES_AT + 6 * k + 7] = after.e[1];
-        numbers[STATES_AT + 6 * k + 8] = after.e[2];
-        numbers[STATES_AT + 6 * k + 9] = after.e[3];
-        numbers[STATES_AT + 6 * k + 10] = after.e[4];
-        numbers[STATES_AT + 6 * k + 11] = after.e[5];
-        cost_ = cost + (form1(weights_result.q, x_2) + form(weights_result.r, v));
+        numbers[STATES_AT + 6 * (k + 1)] = after.e[0];
+        numbers[STATES_AT + 6 * (k + 1) + 1] = after.e[1];
+        numbers[STATES_AT + 6 * (k + 1) + 2] = after.e[2];
+        numbers[STATES_AT + 6 * (k + 1) + 3] = after.e[3];
+        numbers[STATES_AT + 6 * (k + 1) + 4] = after.e[4];
+        numbers[STATES_AT + 6 * (k + 1) + 5] = after.e[5];
+        cost_ = cost + (form1(weight.q, x_2) + form(weight.r, v));
         x_ = after.e[0];
         x1_ = after.e[1];
         x2_ = after.e[2];
@@ -1908,7 +1799,7 @@ static double rollout(double *numbers)
         x5_ = after.e[5];
     }
     const doubles6_t x_3 = {{x_, x1_, x2_, x3_, x4_, x5_}};
-    return 0.5 * (cost_ + form2(weights_result.p, x_3));
+    return 0.5 * (cost_ + form2(weight.p, x_3));
 }
 
 /* Return R v. */
@@ -1949,10 +1840,10 @@ static doubles6_t costate(doubles6_t q, doubles6s6_t columns, doubles6_t x, doub
     const double t68 = t62 + columns.e[4].e[3] * y.e[3] + (entry7(q) * x.e[4] + columns.e[4].e[4] * y.e[4]);
     const double t76 = 0.0 + columns.e[5].e[0] * y.e[0] + columns.e[5].e[1] * y.e[1] + columns.e[5].e[2] *
         y.e[2];
-    const double t84 = t76 + columns.e[5].e[3] * y.e[3] + columns.e[5].e[4] * y.e[4] + (entry8(q) * x.e[5] +
-        columns.e[5].e[5] * y.e[5]);
+    const double term = entry8(q) * x.e[5] + columns.e[5].e[5] * y.e[5];
+    const double total = t76 + columns.e[5].e[3] * y.e[3] + columns.e[5].e[4] * y.e[4] + term;
     return (doubles6_t){{t12 + columns.e[0].e[5] * y.e[5], t26 + columns.e[1].e[5] * y.e[5], t42,
-        t54 + columns.e[3].e[5] * y.e[5], t68 + columns.e[4].e[5] * y.e[5], t84}};
+        t54 + columns.e[3].e[5] * y.e[5], t68 + columns.e[4].e[5] * y.e[5], total}};
 }
 
 /* Find the gradient of half the cost, and a bound on its gap to the optimum if all that is held has to be. */
@@ -1960,16 +1851,12 @@ static double adjoint(double *numbers)
 {
     const motion_result_t motion_result = motion(numbers);
     const weights_t weight = weights(numbers);
-    const limits_t bounds = limits(numbers);
+    const limits_t bounds = limits_1(numbers);
     const doubles6s6_t columns = transposed(motion_result.rows);
     const doubles6s3_t pushes = transposed1(motion_result.rows1);
-    const double t1 = numbers[STATES_AT + 60];
-    const double t2 = numbers[STATES_AT + 61];
-    const double t3 = numbers[STATES_AT + 62];
-    const double t4 = numbers[STATES_AT + 63];
-    const double t5 = numbers[STATES_AT + 64];
-    const double t6 = numbers[STATES_AT + 65];
-    const doubles6_t apply1_result = apply1(weight.p, (doubles6_t){{t1, t2, t3, t4, t5, t6}});
+    const doubles6_t doubles6 = {{numbers[STATES_AT + 60], numbers[STATES_AT + 61], numbers[STATES_AT + 62],
+        numbers[STATES_AT + 63], numbers[STATES_AT + 64], numbers[STATES_AT + 65]}};
+    const doubles6_t apply1_result = apply1(weight.p, doubles6);
     double gap_ = 0.0;
     double y_ = apply1_result.e[0];
     double y1_ = apply1_result.e[1];
@@ -1985,11 +1872,14 @@ static double adjoint(double *numbers)
         const double y3 = y3_;
         const double y4 = y4_;
         const double y5 = y5_;
+        const double t20 = numbers[STATES_AT + 6 * (9 - back)];
+        const double t23 = numbers[STATES_AT + 6 * (9 - back) + 1];
+        const double t26 = numbers[STATES_AT + 6 * (9 - back) + 2];
+        const double t29 = numbers[STATES_AT + 6 * (9 - back) + 3];
+        const double t32 = numbers[STATES_AT + 6 * (9 - back) + 4];
+        const double t35 = numbers[STATES_AT + 6 * (9 - back) + 5];
         const vector_t v = {numbers[PLAN_AT + 3 * (9 - back)], numbers[PLAN_AT + 3 * (9 - back) + 1],
             numbers[PLAN_AT + 3 * (9 - back) + 2]};
-        const doubles6_t x = {{numbers[STATES_AT + 6 * (9 - back)], numbers[STATES_AT + 6 * (9 - back) + 1],
-            numbers[STATES_AT + 6 * (9 - back) + 2], numbers[STATES_AT + 6 * (9 - back) + 3],
-            numbers[STATES_AT + 6 * (9 - back) + 4], numbers[STATES_AT + 6 * (9 - back) + 5]}};
         const vector_t weighed_result = weighed(weight.r, v);
         const doubles6_t y_2 = {{y, y1, y2, y3, y4, y5}};
         const double dot3_result = dot3(pushes.e[0], y_2, weighed_result.x);
@@ -1999,6 +1889,7 @@ static double adjoint(double *numbers)
         numbers[GRADIENT_AT + 3 * (9 - back) + 1] = dot3_result_2;
         numbers[GRADIENT_AT + 3 * (9 - back) + 2] = dot3_result_3;
         const vector_t g = {dot3_result, dot3_result_2, dot3_result_3};
+        const doubles6_t x = {{t20, t23, t26, t29, t32, t35}};
         const doubles6_t costate_result = costate(weight.q, columns, x, y_2);
         gap_ = gap + form(weight.r_inverse, loose(&bounds, v, g));
         y_ = costate_result.e[0];
@@ -2028,30 +1919,25 @@ static void unroll(double *numbers)
         const double x3 = x3_;
         const double x4 = x4_;
         const double x5 = x5_;
-        const vector_t start = {numbers[STEP_AT + 3 * k], numbers[STEP_AT + 3 * k + 1],
-            numbers[STEP_AT + 3 * k + 2]};
-        const double t12 = numbers[FEEDBACK_AT + 18 * k];
-        const double t15 = numbers[FEEDBACK_AT + 18 * k + 1];
-        const double t18 = numbers[FEEDBACK_AT + 18 * k + 2];
-        const double t21 = numbers[FEEDBACK_AT + 18 * k + 3];
-        const double t24 = numbers[FEEDBACK_AT + 18 * k + 4];
-        const double t27 = numbers[FEEDBACK_AT + 18 * k + 5];
+        const double t3 = numbers[STEP_AT + 3 * k];
+        const double t6 = numbers[STEP_AT + 3 * k + 1];
+        const double t9 = numbers[STEP_AT + 3 * k + 2];
+        const doubles6_t doubles6 = {{numbers[FEEDBACK_AT + 6 * (3 * k)],
+            numbers[FEEDBACK_AT + 6 * (3 * k) + 1], numbers[FEEDBACK_AT + 6 * (3 * k) + 2],
+            numbers[FEEDBACK_AT + 6 * (3 * k) + 3], numbers[FEEDBACK_AT + 6 * (3 * k) + 4],
+            numbers[FEEDBACK_AT + 6 * (3 * k) + 5]}};
         const doubles6_t x_2 = {{x, x1, x2, x3, x4, x5}};
-        const double dot3_result = dot3((doubles6_t){{t12, t15, t18, t21, t24, t27}}, x_2, start.x);
-        const double t30 = numbers[FEEDBACK_AT + 18 * k + 6];
-        const double t33 = numbers[FEEDBACK_AT + 18 * k + 7];
-        const double t36 = numbers[FEEDBACK_AT + 18 * k + 8];
-        const double t39 = numbers[FEEDBACK_AT + 18 * k + 9];
-        const double t42 = numbers[FEEDBACK_AT + 18 * k + 10];
-        const double t45 = numbers[FEEDBACK_AT + 18 * k + 11];
-        const double dot3_result_2 = dot3((doubles6_t){{t30, t33, t36, t39, t42, t45}}, x_2, start.y);
-        const double t48 = numbers[FEEDBACK_AT + 18 * k + 12];
-        const double t51 = numbers[FEEDBACK_AT + 18 * k + 13];
-        const double t54 = numbers[FEEDBACK_AT + 18 * k + 14];
-        const double t57 = numbers[FEEDBACK_AT + 18 * k + 15];
-        const double t60 = numbers[FEEDBACK_AT + 18 * k + 16];
-        const double t63 = numbers[FEEDBACK_AT + 18 * k + 17];
-        const double dot3_result_3 = dot3((doubles6_t){{t48, t51, t54, t57, t60, t63}}, x_2, start.z);
+        const double dot3_result = dot3(doubles6, x_2, t3);
+        const doubles6_t doubles6_2 = {{numbers[FEEDBACK_AT + 6 * (3 * k + 1)],
+            numbers[FEEDBACK_AT + 6 * (3 * k + 1) + 1], numbers[FEEDBACK_AT + 6 * (3 * k + 1) + 2],
+            numbers[FEEDBACK_AT + 6 * (3 * k + 1) + 3], numbers[FEEDBACK_AT + 6 * (3 * k + 1) + 4],
+            numbers[FEEDBACK_AT + 6 * (3 * k + 1) + 5]}};
+        const double dot3_result_2 = dot3(doubles6_2, x_2, t6);
+        const doubles6_t doubles6_3 = {{numbers[FEEDBACK_AT + 6 * (3 * k + 2)],
+            numbers[FEEDBACK_AT + 6 * (3 * k + 2) + 1], numbers[FEEDBACK_AT + 6 * (3 * k + 2) + 2],
+            numbers[FEEDBACK_AT + 6 * (3 * k + 2) + 3], numbers[FEEDBACK_AT + 6 * (3 * k + 2) + 4],
+            numbers[FEEDBACK_AT + 6 * (3 * k + 2) + 5]}};
+        const double dot3_result_3 = dot3(doubles6_3, x_2, t9);
         numbers[STEP_AT + 3 * k] = dot3_result;
         numbers[STEP_AT + 3 * k + 1] = dot3_result_2;
         numbers[STEP_AT + 3 * k + 2] = dot3_result_3;
@@ -2081,8 +1967,8 @@ static double shorten(double *numbers, double halvings)
         const double left = left_;
         if (change < 0.0 || left <= 0.0) break;
         const motion_result_t motion_result = motion(numbers);
-        const weights_t weights_result = weights(numbers);
-        const limits_t bounds = limits(numbers);
+        const weights_t weight = weights(numbers);
+        const limits_t bounds = limits_1(numbers);
         double slope_ = 0.0;
         double change1_ = 0.0;
         double x_ = 0.0;
@@ -2100,30 +1986,31 @@ static double shorten(double *numbers, double halvings)
             const double x3 = x3_;
             const double x4 = x4_;
             const double x5 = x5_;
-            const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1],
-                numbers[PLAN_AT + 3 * k + 2]};
-            const double t14 = numbers[STEP_AT + 3 * k];
-            const double t16 = numbers[STEP_AT + 3 * k + 1];
-            const double t18 = numbers[STEP_AT + 3 * k + 2];
-            const project_result_t project_result = project(&bounds,
-                add(v, scale(length, (vector_t){t14, t16, t18})));
-            const vector_t d = subtract(project_result.w, v);
+            const double t6 = numbers[PLAN_AT + 3 * k];
+            const double t9 = numbers[PLAN_AT + 3 * k + 1];
+            const double t12 = numbers[PLAN_AT + 3 * k + 2];
+            const vector_t vector = {numbers[STEP_AT + 3 * k], numbers[STEP_AT + 3 * k + 1],
+                numbers[STEP_AT + 3 * k + 2]};
+            const vector_t v = {t6, t9, t12};
+            const project_result_t project_result = project(&bounds, add(v, scale(length, vector)));
+            const vector_t d = subtract(project_result.vector, v);
             const doubles6_t x_2 = {{x, x1, x2, x3, x4, x5}};
             const doubles6_t after = transition(motion_result.rows, motion_result.rows1, x_2, d);
-            numbers[TRIAL_AT + 3 * k] = project_result.w.x;
-            numbers[TRIAL_AT + 3 * k + 1] = project_result.w.y;
-            numbers[TRIAL_AT + 3 * k + 2] = project_result.w.z;
+            numbers[TRIAL_AT + 3 * k] = project_result.vector.x;
+            numbers[TRIAL_AT + 3 * k + 1] = project_result.vector.y;
+            numbers[TRIAL_AT + 3 * k + 2] = project_result.vector.z;
             numbers[BEND_AT + 6 * k] = after.e[0];
             numbers[BEND_AT + 6 * k + 1] = after.e[1];
             numbers[BEND_AT + 6 * k + 2] = after.e[2];
             numbers[BEND_AT + 6 * k + 3] = after.e[3];
             numbers[BEND_AT + 6 * k + 4] = after.e[4];
             numbers[BEND_AT + 6 * k + 5] = after.e[5];
-            const double t35 = numbers[GRADIENT_AT + 3 * k];
-            const double t37 = numbers[GRADIENT_AT + 3 * k + 1];
-            const double t39 = numbers[GRADIENT_AT + 3 * k + 2];
-            slope_ = slope + dot((vector_t){t35, t37, t39}, d);
-            change1_ = change1 + (form(weights_result.r, d) + form1(weights_result.q, x_2));
+            const vector_t vector_2 = {numbers[GRADIENT_AT + 3 * k], numbers[GRADIENT_AT + 3 * k + 1],
+                numbers[GRADIENT_AT + 3 * k + 2]};
+            const double slope_2 = slope + dot(vector_2, d);
+            const double curvature = change1 + (form(weight.r, d) + form1(weight.q, x_2));
+            slope_ = slope_2;
+            change1_ = curvature;
             x_ = after.e[0];
             x1_ = after.e[1];
             x2_ = after.e[2];
@@ -2132,10 +2019,10 @@ static double shorten(double *numbers, double halvings)
             x5_ = after.e[5];
         }
         const doubles6_t x_3 = {{x_, x1_, x2_, x3_, x4_, x5_}};
-        const double t46 = slope_ + 0.5 * (change1_ + form2(weights_result.p, x_3));
-        const bool falls = slope_ < 0.0 && t46 <= 0.0001 * slope_;
+        const double t51 = slope_ + 0.5 * (change1_ + form2(weight.p, x_3));
+        const bool falls = slope_ < 0.0 && t51 <= 0.0001 * slope_;
         length_ = 0.5 * length;
-        change_ = falls ? t46 : 0.0;
+        change_ = falls ? t51 : 0.0;
         left_ = left - 1.0;
     }
     return change_;
@@ -2161,10 +2048,9 @@ static double gradient_step(double *numbers)
 {
     for (int32_t k = 0; k < 10; k++) {
         const double t2 = numbers[STIFFNESS_AT + k];
-        const double t6 = numbers[GRADIENT_AT + 3 * k];
-        const double t9 = numbers[GRADIENT_AT + 3 * k + 1];
-        const double t12 = numbers[GRADIENT_AT + 3 * k + 2];
-        const vector_t scale_result = scale(-1.0 / t2, (vector_t){t6, t9, t12});
+        const vector_t vector = {numbers[GRADIENT_AT + 3 * k], numbers[GRADIENT_AT + 3 * k + 1],
+            numbers[GRADIENT_AT + 3 * k + 2]};
+        const vector_t scale_result = scale(-1.0 / t2, vector);
         numbers[STEP_AT + 3 * k] = scale_result.x;
         numbers[STEP_AT + 3 * k + 1] = scale_result.y;
         numbers[STEP_AT + 3 * k + 2] = scale_result.z;
@@ -2185,26 +2071,19 @@ static void take_over(double *numbers)
         numbers[PLAN_AT + 3 * k] = t3;
         numbers[PLAN_AT + 3 * k + 1] = t6;
         numbers[PLAN_AT + 3 * k + 2] = t9;
-        const double t16 = numbers[STATES_AT + 6 * k + 6];
-        const double t19 = numbers[STATES_AT + 6 * k + 7];
-        const double t22 = numbers[STATES_AT + 6 * k + 8];
-        const double t25 = numbers[STATES_AT + 6 * k + 9];
-        const double t28 = numbers[STATES_AT + 6 * k + 10];
-        const double t31 = numbers[STATES_AT + 6 * k + 11];
-        const double t34 = numbers[BEND_AT + 6 * k];
-        const double t37 = numbers[BEND_AT + 6 * k + 1];
-        const double t40 = numbers[BEND_AT + 6 * k + 2];
-        const double t43 = numbers[BEND_AT + 6 * k + 3];
-        const double t46 = numbers[BEND_AT + 6 * k + 4];
-        const double t49 = numbers[BEND_AT + 6 * k + 5];
-        const doubles6_t plus_result = plus((doubles6_t){{t16, t19, t22, t25, t28, t31}},
-            (doubles6_t){{t34, t37, t40, t43, t46, t49}});
-        numbers[STATES_AT + 6 * k + 6] = plus_result.e[0];
-        numbers[STATES_AT + 6 * k + 7] = plus_result.e[1];
-        numbers[STATES_AT + 6 * k + 8] = plus_result.e[2];
-        numbers[STATES_AT + 6 * k + 9] = plus_result.e[3];
-        numbers[STATES_AT + 6 * k + 10] = plus_result.e[4];
-        numbers[STATES_AT + 6 * k + 11] = plus_result.e[5];
+        const doubles6_t doubles6 = {{numbers[STATES_AT + 6 * (k + 1)], numbers[STATES_AT + 6 * (k + 1) + 1],
+            numbers[STATES_AT + 6 * (k + 1) + 2], numbers[STATES_AT + 6 * (k + 1) + 3],
+            numbers[STATES_AT + 6 * (k + 1) + 4], numbers[STATES_AT + 6 * (k + 1) + 5]}};
+        const doubles6_t doubles6_2 = {{numbers[BEND_AT + 6 * k], numbers[BEND_AT + 6 * k + 1],
+            numbers[BEND_AT + 6 * k + 2], numbers[BEND_AT + 6 * k + 3], numbers[BEND_AT + 6 * k + 4],
+            numbers[BEND_AT + 6 * k + 5]}};
+        const doubles6_t plus_result = plus(doubles6, doubles6_2);
+        numbers[STATES_AT + 6 * (k + 1)] = plus_result.e[0];
+        numbers[STATES_AT + 6 * (k + 1) + 1] = plus_result.e[1];
+        numbers[STATES_AT + 6 * (k + 1) + 2] = plus_result.e[2];
+        numbers[STATES_AT + 6 * (k + 1) + 3] = plus_result.e[3];
+        numbers[STATES_AT + 6 * (k + 1) + 4] = plus_result.e[4];
+        numbers[STATES_AT + 6 * (k + 1) + 5] = plus_result.e[5];
     }
 }
 
@@ -2229,19 +2108,19 @@ static attempt_t newton(double *numbers, const progress_t *now)
     const bool failed = !free && is_zero(change_);
     const bool hopeful = 1e-12 * now->half < sweep_result.scalar && sweeps < 50.0;
     const bool rescue = failed && (hopeful && !now->rescued);
-    const bool t19 = !rescue;
+    const bool t20 = !rescue;
     double change1_ = change_;
-    if (failed && t19) {
+    if (failed && t20) {
         const double gradient_step_result = gradient_step(numbers);
         change1_ = gradient_step_result;
     }
     const bool moves = free || !is_zero(change1_);
-    const bool t24 = !moves;
-    if (!t24) {
+    const bool t25 = !moves;
+    if (!t25) {
         take_over(numbers);
     }
     const double half = now->half + (moves ? change1_ : 0.0);
-    const bool stuck = t24 && t19;
+    const bool stuck = t25 && t20;
     const bool unshaped = free && none_held;
     const bool exact = free && (none_held || sweep_result.scalar <= 1e-16 * half);
     const bool solved = exact || (stuck && sweep_result.scalar <= 1e-12 * half);
@@ -2254,13 +2133,15 @@ static attempt_t newton(double *numbers, const progress_t *now)
 /* Put the plan aside, and start well inside. */
 static void begin(double *numbers, double barrier)
 {
-    const limits_t bounds = limits(numbers);
+    const limits_t bounds = limits_1(numbers);
     for (int32_t k = 0; k < 10; k++) {
-        const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1],
-            numbers[PLAN_AT + 3 * k + 2]};
-        numbers[SPARE_AT + 3 * k] = v.x;
-        numbers[SPARE_AT + 3 * k + 1] = v.y;
-        numbers[SPARE_AT + 3 * k + 2] = v.z;
+        const double t3 = numbers[PLAN_AT + 3 * k];
+        const double t6 = numbers[PLAN_AT + 3 * k + 1];
+        const double t9 = numbers[PLAN_AT + 3 * k + 2];
+        numbers[SPARE_AT + 3 * k] = t3;
+        numbers[SPARE_AT + 3 * k + 1] = t6;
+        numbers[SPARE_AT + 3 * k + 2] = t9;
+        const vector_t v = {t3, t6, t9};
         const vector_t w = add(bounds.centre, scale(0.9, subtract(v, bounds.centre)));
         numbers[PLAN_AT + 3 * k] = w.x;
         numbers[PLAN_AT + 3 * k + 1] = w.y;
@@ -2276,36 +2157,43 @@ static void begin(double *numbers, double barrier)
    `trial`. */
 static double length_1(double *numbers, double barrier)
 {
-    const limits_t bounds = limits(numbers);
+    const limits_t bounds = limits_1(numbers);
     double length_ = 1.0;
     for (int32_t k = 0; k < 10; k++) {
         const double length = length_;
+        const double t11 = numbers[STEP_AT + 3 * k];
+        const double t13 = numbers[STEP_AT + 3 * k + 1];
+        const double t15 = numbers[STEP_AT + 3 * k + 2];
         const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1],
             numbers[PLAN_AT + 3 * k + 2]};
-        const vector_t d = {numbers[STEP_AT + 3 * k], numbers[STEP_AT + 3 * k + 1],
-            numbers[STEP_AT + 3 * k + 2]};
         const vector_t room = slack(&bounds, v);
         const vector_t away = subtract(v, bounds.centre);
-        const vector_t inner = times(away, d);
-        const vector_t square = times(d, d);
-        const double old = numbers[MULTIPLIERS_AT + 3 * k];
-        const double step_2 = barrier / room.x - old + old / room.x * inner.x;
+        const vector_t d = {t11, t13, t15};
+        const vector_t times_result = times(away, d);
+        const vector_t times_result_2 = times(d, d);
+        const double t23 = numbers[MULTIPLIERS_AT + 3 * k];
+        const double step_2 = barrier / room.x - t23 + t23 / room.x * times_result.x;
         numbers[TRIAL_AT + 3 * k] = step_2;
-        const double length_2 = step_2 < 0.0 ? minimum(-0.95 * old / step_2, length) : length;
-        const double ahead = inner.x + sqrt(inner.x * inner.x + 2.0 * room.x * square.x);
+        const double length_2 = step_2 < 0.0 ? minimum(-0.95 * t23 / step_2, length) : length;
+        const double ahead = times_result.x + sqrt(times_result.x * times_result.x + 2.0 * room.x *
+            times_result_2.x);
         const double length_3 = 0.0 < ahead ? minimum(1.9 * room.x / ahead, length_2) : length_2;
-        const double old_2 = numbers[MULTIPLIERS_AT + 3 * k + 1];
-        const double step_3 = barrier / room.y - old_2 + old_2 / room.y * inner.y;
+        const double t45 = numbers[MULTIPLIERS_AT + 3 * k + 1];
+        const double step_3 = barrier / room.y - t45 + t45 / room.y * times_result.y;
         numbers[TRIAL_AT + 3 * k + 1] = step_3;
-        const double length_4 = step_3 < 0.0 ? minimum(-0.95 * old_2 / step_3, length_3) : length_3;
-        const double ahead_2 = inner.y + sqrt(inner.y * inner.y + 2.0 * room.y * square.y);
+        const double length_4 = step_3 < 0.0 ? minimum(-0.95 * t45 / step_3, length_3) : length_3;
+        const double ahead_2 = times_result.y + sqrt(times_result.y * times_result.y + 2.0 * room.y *
+            times_result_2.y);
         const double length_5 = 0.0 < ahead_2 ? minimum(1.9 * room.y / ahead_2, length_4) : length_4;
-        const double old_3 = numbers[MULTIPLIERS_AT + 3 * k + 2];
-        const double step_4 = barrier / room.z - old_3 + old_3 / room.z * inner.z;
+        const double t67 = numbers[MULTIPLIERS_AT + 3 * k + 2];
+        const double step_4 = barrier / room.z - t67 + t67 / room.z * times_result.z;
         numbers[TRIAL_AT + 3 * k + 2] = step_4;
-        const double length_6 = step_4 < 0.0 ? minimum(-0.95 * old_3 / step_4, length_5) : length_5;
-        const double ahead_3 = inner.z + sqrt(inner.z * inner.z + 2.0 * room.z * square.z);
-        length_ = 0.0 < ahead_3 ? minimum(1.9 * room.z / ahead_3, length_6) : length_6;
+        const double length_6 = step_4 < 0.0 ? minimum(-0.95 * t67 / step_4, length_5) : length_5;
+        const double ahead_3 = times_result.z + sqrt(times_result.z * times_result.z + 2.0 * room.z *
+            times_result_2.z);
+        const double shorter = minimum(1.9 * room.z / ahead_3, length_6);
+        const double length_7 = 0.0 < ahead_3 ? shorter : length_6;
+        length_ = length_7;
     }
     return length_;
 }
@@ -2313,35 +2201,34 @@ static double length_1(double *numbers, double barrier)
 /* Take the step at that length; gives the sum of slack times multiplier. */
 static double go(double *numbers, double length)
 {
-    const limits_t bounds = limits(numbers);
+    const limits_t bounds = limits_1(numbers);
     double gap_ = 0.0;
     for (int32_t k = 0; k < 10; k++) {
         const double gap = gap_;
         const double t3 = numbers[PLAN_AT + 3 * k];
         const double t6 = numbers[PLAN_AT + 3 * k + 1];
         const double t9 = numbers[PLAN_AT + 3 * k + 2];
-        const double t11 = numbers[STEP_AT + 3 * k];
-        const double t13 = numbers[STEP_AT + 3 * k + 1];
-        const double t15 = numbers[STEP_AT + 3 * k + 2];
-        const vector_t w = add((vector_t){t3, t6, t9}, scale(length, (vector_t){t11, t13, t15}));
+        const vector_t vector = {numbers[STEP_AT + 3 * k], numbers[STEP_AT + 3 * k + 1],
+            numbers[STEP_AT + 3 * k + 2]};
+        const vector_t w = add((vector_t){t3, t6, t9}, scale(length, vector));
         numbers[PLAN_AT + 3 * k] = w.x;
         numbers[PLAN_AT + 3 * k + 1] = w.y;
         numbers[PLAN_AT + 3 * k + 2] = w.z;
         const vector_t room = slack(&bounds, w);
-        const double t17 = numbers[MULTIPLIERS_AT + 3 * k];
-        const double t19 = numbers[TRIAL_AT + 3 * k];
-        const double multiplier = t17 + length * t19;
+        const double t19 = numbers[MULTIPLIERS_AT + 3 * k];
+        const double t21 = numbers[TRIAL_AT + 3 * k];
+        const double multiplier = t19 + length * t21;
         numbers[MULTIPLIERS_AT + 3 * k] = multiplier;
-        const double t25 = numbers[MULTIPLIERS_AT + 3 * k + 1];
-        const double t27 = numbers[TRIAL_AT + 3 * k + 1];
-        const double multiplier_2 = t25 + length * t27;
+        const double t27 = numbers[MULTIPLIERS_AT + 3 * k + 1];
+        const double t29 = numbers[TRIAL_AT + 3 * k + 1];
+        const double multiplier_2 = t27 + length * t29;
         numbers[MULTIPLIERS_AT + 3 * k + 1] = multiplier_2;
-        const double t33 = numbers[MULTIPLIERS_AT + 3 * k + 2];
-        const double t35 = numbers[TRIAL_AT + 3 * k + 2];
-        const double multiplier_3 = t33 + length * t35;
+        const double t35 = numbers[MULTIPLIERS_AT + 3 * k + 2];
+        const double t37 = numbers[TRIAL_AT + 3 * k + 2];
+        const double multiplier_3 = t35 + length * t37;
         numbers[MULTIPLIERS_AT + 3 * k + 2] = multiplier_3;
-        const double t39 = gap + multiplier * room.x + multiplier_2 * room.y + multiplier_3 * room.z;
-        gap_ = t39;
+        const double gap_2 = gap + multiplier * room.x + multiplier_2 * room.y + multiplier_3 * room.z;
+        gap_ = gap_2;
     }
     return gap_;
 }
@@ -2349,8 +2236,8 @@ static double go(double *numbers, double length)
 /* Take one step: towards the optimum that the barrier allows, which is then lowered. */
 static turn_t turn_1(double *numbers, const turn_t *now, double count, double most)
 {
-    (void)adjoint(numbers);
-    (void)sweep(numbers, now->barrier);
+    adjoint(numbers);
+    sweep(numbers, now->barrier);
     unroll(numbers);
     const double length = length_1(numbers, now->barrier);
     const double gap = go(numbers, length);
@@ -2365,19 +2252,21 @@ static turn_t turn_1(double *numbers, const turn_t *now, double count, double mo
 /* Put moves near a limit on it. */
 static void settle(double *numbers)
 {
-    const limits_t bounds = limits(numbers);
+    const limits_t bounds = limits_1(numbers);
     const double near = 1e-05 * bounds.bound * bounds.bound;
     for (int32_t k = 0; k < 10; k++) {
         const vector_t v = {numbers[PLAN_AT + 3 * k], numbers[PLAN_AT + 3 * k + 1],
             numbers[PLAN_AT + 3 * k + 2]};
         const vector_t room = slack(&bounds, v);
-        const vector_t b = subtract(v, bounds.centre);
-        const vector_t add_result = add(bounds.centre, (vector_t){(room.x < near ? 2.0 : 1.0) * b.x,
-            (room.y < near ? 2.0 : 1.0) * b.y, (room.z < near ? 2.0 : 1.0) * b.z});
+        const vector_t subtract_result = subtract(v, bounds.centre);
+        const vector_t add_result = add(bounds.centre,
+            (vector_t){(room.x < near ? 2.0 : 1.0) * subtract_result.x,
+            (room.y < near ? 2.0 : 1.0) * subtract_result.y,
+            (room.z < near ? 2.0 : 1.0) * subtract_result.z});
         const project_result_t project_result = project(&bounds, add_result);
-        numbers[PLAN_AT + 3 * k] = project_result.w.x;
-        numbers[PLAN_AT + 3 * k + 1] = project_result.w.y;
-        numbers[PLAN_AT + 3 * k + 2] = project_result.w.z;
+        numbers[PLAN_AT + 3 * k] = project_result.vector.x;
+        numbers[PLAN_AT + 3 * k + 1] = project_result.vector.y;
+        numbers[PLAN_AT + 3 * k + 2] = project_result.vector.z;
     }
 }
 
@@ -2403,7 +2292,7 @@ static interior_result_t interior(double *numbers, double half, double most)
 {
     const double barrier_2 = 0.1 * half / 30.0;
     begin(numbers, barrier_2);
-    (void)rollout(numbers);
+    rollout(numbers);
     double barrier_ = barrier_2;
     double sweeps_ = 0.0;
     bool done_ = most <= 0.0;
@@ -2511,13 +2400,13 @@ static solved_t descend(double *numbers, double sweeps)
     bool shaped_ = 1;
     for (int32_t turn = 0; turn < 51; turn++) {
         const double half = half_;
-        const double sweeps1 = sweeps1_;
+        const double sweeps_2 = sweeps1_;
         const bool rescued = rescued_;
         const bool over = over_;
         const bool solved = solved_;
         const bool shaped = shaped_;
         if (over) break;
-        const progress_t now = {.half = half, .sweeps = sweeps1, .rescued = rescued, .over = over,
+        const progress_t now = {.half = half, .sweeps = sweeps_2, .rescued = rescued, .over = over,
             .solved = solved, .shaped = shaped};
         const progress_t turn1_1_result = turn1_1(numbers, &now);
         half_ = turn1_1_result.half;
@@ -2573,10 +2462,8 @@ static void count_1(double *numbers, const solved_t *end)
 /* Return the k-th three numbers of a buffer. */
 static vector_t triple1(double *numbers)
 {
-    const double t1 = numbers[PLAN_AT];
-    const double t2 = numbers[PLAN_AT + 1];
-    const double t3 = numbers[PLAN_AT + 2];
-    return (vector_t){t1, t2, t3};
+    const vector_t vector = {numbers[PLAN_AT], numbers[PLAN_AT + 1], numbers[PLAN_AT + 2]};
+    return vector;
 }
 
 /* ------------------------------------ algebra.scalar ------------------------------------ */
@@ -2601,8 +2488,8 @@ static vector_t clip_axes(vector_t a, double limit)
 static vector_t mpc_torque(double *numbers, const measurement_t *measurement, const craft_t *craft)
 {
     const vector_t ahead = tracking_torque(measurement, craft);
-    const linear_t linearise_result = linearise(measurement, craft);
-    sample(numbers, &linearise_result, measurement->period);
+    const linear_t linear = linearise(measurement, craft);
+    sample(numbers, &linear, measurement->period);
     put_limits(numbers, scale(-1.0, ahead), craft->torque_limit);
     const double t1 = numbers[COUNTERS_AT + 4];
     const bool warm = 0.0 < t1;
@@ -2616,10 +2503,11 @@ static vector_t mpc_torque(double *numbers, const measurement_t *measurement, co
     numbers[STATES_AT + 3] = measurement->rate.x;
     numbers[STATES_AT + 4] = measurement->rate.y;
     numbers[STATES_AT + 5] = measurement->rate.z;
-    const solved_t improve_result = improve(numbers, warm);
-    count_1(numbers, &improve_result);
+    const solved_t end = improve(numbers, warm);
+    count_1(numbers, &end);
     const vector_t triple1_result = triple1(numbers);
-    return clip_axes(add(triple1_result, ahead), craft->torque_limit);
+    const vector_t command_2 = add(triple1_result, ahead);
+    return clip_axes(command_2, craft->torque_limit);
 }
 
 /* -------------------------------- parts.actuators.limits -------------------------------- */
@@ -2635,12 +2523,12 @@ static vector_t limit_axis(vector_t command, double limit)
 /* What numbers begin with; the rest are zeros. */
 static const double first_numbers[71] = {
     0.0, 0.0, 0.0, 0.0, 0.0, 0.2, 0.2, 0.2, 0.2, 0.2, 0.2, 50.0, 50.0, 50.0, 0.02, 0.02, 0.02,
-    22.9467734721486, 0.0, 0.0, 63.24563226095957, 0.0, 0.0, 0.0, 27.938050579458753, 0.0, 0.0,
-    94.86838250806161, 0.0, 0.0, 0.0, 32.161490412695684, 0.0, 0.0, 126.4911459354713, 63.24563226095957, 0.0,
-    0.0, 361.3396583401284, 0.0, 0.0, 0.0, 94.86838250806161, 0.0, 0.0, 660.3377076682774, 0.0, 0.0, 0.0,
-    126.4911459354713, 0.0, 0.0, 1013.9736656743705, 0.06267696292413753, 0.0, 0.0, 0.3595585175335371, 0.0,
-    0.0, 0.0, 0.06278328749574003, 0.0, 0.0, 0.43851066540382566, 0.0, 0.0, 0.0, 0.06284605433757424, 0.0,
-    0.0, 0.5053056935129779
+    22.946773472133042, 0.0, 0.0, 63.245632260866046, 0.0, 0.0, 0.0, 27.938050579455364, 0.0, 0.0,
+    94.86838250802516, 0.0, 0.0, 0.0, 32.16149041269614, 0.0, 0.0, 126.49114593545856, 63.245632260866046,
+    0.0, 0.0, 361.33965833959996, 0.0, 0.0, 0.0, 94.86838250802516, 0.0, 0.0, 660.337707668138, 0.0, 0.0, 0.0,
+    126.49114593545856, 0.0, 0.0, 1013.9736656741607, 0.06267696292404693, 0.0, 0.0, 0.3595585175330206, 0.0,
+    0.0, 0.0, 0.06278328749571621, 0.0, 0.0, 0.4385106654037334, 0.0, 0.0, 0.0, 0.06284605433756812, 0.0, 0.0,
+    0.5053056935128754
 };
 
 void mpc_init(mpc_state_t *state)
@@ -2653,11 +2541,11 @@ void mpc_init(mpc_state_t *state)
 void mpc_step(mpc_state_t *state, const mpc_input_t *input, mpc_command_t *command)
 {
     double *const numbers = state->numbers;
-    const goal_t goal = inertial_goal(&parameters.setup.target);
-    const state_t body_state = {.attitude = input->attitude, .rate = input->rate,
-        .position = input->position};
-    const scene_t scene = {.goal = goal, .period = parameters.setup.period};
-    const measurement_t told = observe(&body_state, &scene);
-    const vector_t wanted = mpc_torque(numbers, &told, &parameters.craft);
-    command->torque = limit_axis(wanted, parameters.setup.limit);
+    const state_t found = {.attitude = input->attitude, .rate = input->rate, .position = input->position};
+    const scene_t scene = {.goal = inertial_goal(&parameters.setup.target),
+        .period = parameters.setup.period};
+    const measurement_t told = observe(&found, &scene);
+    const vector_t mpc_torque_result = mpc_torque(numbers, &told, &parameters.craft);
+    const vector_t wanted = limit_axis(mpc_torque_result, parameters.setup.limit);
+    command->torque = wanted;
 }

@@ -10,7 +10,7 @@
 
    Command limit: 0.01 N m on each axis. Quaternion sign: as published.
 
-   A step does at most 112 additions, multiplications, divisions and roots, and 24 comparisons.
+   A step does at most 82 additions, multiplications, divisions and roots, and 24 comparisons.
    Bits are those of the simulation where doubles are IEEE and nothing is contracted or reassociated:
    compile with -std=c99 -ffp-contract=off, never with -ffast-math.
 

@@ -191,10 +191,10 @@ static quaternion_t to_quaternion(matrix_t a)
     const quaternion_t first = {x, t12, xy, zx};
     const quaternion_t scalar = {t9, x, y, z};
     const double size = t19 ? t12 : t9;
-    const bool t21 = size < t15;
+    const bool t23 = size < t15;
     const quaternion_t second = {y, xy, t15, yz};
-    const quaternion_t largest = choose(t21, second, choose(t19, first, scalar));
-    const double size_2 = t21 ? t15 : size;
+    const quaternion_t largest = choose(t23, second, choose(t19, first, scalar));
+    const double size_2 = t23 ? t15 : size;
     const quaternion_t third = {z, zx, yz, t18};
     return normalise(choose(size_2 < t18, third, largest));
 }
@@ -306,8 +306,9 @@ static vector_t gravity_gradient_torque(const state_t *state, const craft_t *cra
 /* Return the sum of weights[i] * vectors[i], from the first to the last; there is at least one. */
 static vector_t weighted(doubles4_t weights, vectors4_t vectors)
 {
-    return add(add(add(scale(weights.e[0], vectors.e[0]), scale(weights.e[1], vectors.e[1])),
+    const vector_t total = add(add(add(scale(weights.e[0], vectors.e[0]), scale(weights.e[1], vectors.e[1])),
         scale(weights.e[2], vectors.e[2])), scale(weights.e[3], vectors.e[3]));
+    return total;
 }
 
 /* -------------------------------- parts.effectors.wheels -------------------------------- */
@@ -364,11 +365,12 @@ static measurement_t observe(const state_t *state, const scene_t *scene)
 {
     const quaternion_t error = relative(scene->goal.attitude, state->attitude);
     const vector_t target_rate = to_body(error, scene->goal.rate);
-    const vector_t target_acceleration = to_body(error, scene->goal.acceleration);
     const vector_t error_rate = subtract(state->rate, target_rate);
+    const vector_t target_acceleration = subtract(to_body(error, scene->goal.acceleration),
+        cross(error_rate, target_rate));
     return (measurement_t){.attitude = error, .rate = error_rate, .body_rate = state->rate,
-        .target_acceleration = subtract(target_acceleration, cross(error_rate, target_rate)),
-        .external_torque = scene->torque, .wheel_momentum = scene->momentum};
+        .target_acceleration = target_acceleration, .external_torque = scene->torque,
+        .wheel_momentum = scene->momentum};
 }
 
 /* -------------------------------------- laws.wheel -------------------------------------- */
@@ -420,12 +422,10 @@ void wheel_step(wheel_state_t *state, const wheel_input_t *input, wheel_command_
     const state_t body_state = {.attitude = input->attitude, .rate = input->rate, .position = input->position,
         .velocity = input->velocity};
     const goal_t goal = orbital_goal(&body_state, state->followed);
-    const vector_t torque = gravity_gradient_torque(&body_state, &parameters.craft);
-    const vector_t momentum = wheels_momentum(&input->wheels, &parameters.setup.effectors.wheels);
-    const scene_t scene = {.goal = goal, .torque = torque, .momentum = momentum};
+    const scene_t scene = {.goal = goal, .torque = gravity_gradient_torque(&body_state, &parameters.craft),
+        .momentum = wheels_momentum(&input->wheels, &parameters.setup.effectors.wheels)};
     const measurement_t told = observe(&body_state, &scene);
-    const vector_t wanted = wheel_torque(&told, &parameters.gains, &parameters.craft);
     const quaternion_t followed = goal.attitude;
-    command->torque = wanted;
+    command->torque = wheel_torque(&told, &parameters.gains, &parameters.craft);
     state->followed = followed;
 }

@@ -8,12 +8,12 @@
 
    Command limit: none. Quaternion sign: as published.
 
-   A step does at most 356 additions, multiplications, divisions and roots, and 4 comparisons.
+   A step does at most 326 additions, multiplications, divisions and roots, and 4 comparisons.
    Bits are those of the simulation where doubles are IEEE and nothing is contracted or reassociated:
    compile with -std=c99 -ffp-contract=off, never with -ffast-math.
 
 
-   Certificate: certificate.json, sha256 1a33a2de3f0dc1e0ccc0c058116f1043977da056490d8f1eaf6d35512ed1dbe3:
+   Certificate: certificate.json, sha256 b50f164c94623e063597182845d80e33530a70e40001bad4abf47494b887d62a:
    proved
    Claims:
      proved: converges: with wheels that have neither limits nor friction, from every attitude and rate the

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from starhold.export.code import Code, make_code
+from starhold.export.shells import shell_files
 from starhold.export.source import texts
 from starhold.export.vectors import kept_inputs
 from starhold.parts.catalogue import fit
@@ -122,9 +123,7 @@ def compiled(name: str, compiler: str = "gcc", *flags: str) -> Flown:
     need(compiler)
     code = code_of(name)
     with tempfile.TemporaryDirectory() as folder:
-        text = texts(code, "test", name)
-        Path(folder, f"{code.name}.h").write_text(text.header)
-        Path(folder, f"{code.name}.c").write_text(text.source)
+        put(folder, code)
         Path(folder, "driver.c").write_text(_DRIVER.replace("NAME", code.name))
         build_in(folder, compiler, *STRICT, *flags, "-shared", "-fPIC", "-o", "law.so", f"{code.name}.c", "driver.c", "-lm")
         library = ctypes.CDLL(str(Path(folder, "law.so")))
@@ -132,9 +131,18 @@ def compiled(name: str, compiler: str = "gcc", *flags: str) -> Flown:
     return Flown(code, library)
 
 
-def build_in(folder: Any, *command: str) -> None:
+def put(folder: Any, code: Code, *shells: str) -> None:
+    """Write a law and shells over it into a folder."""
+    text = texts(code, "test", code.name)
+    made = {f"{code.name}.h": text.header, f"{code.name}.c": text.source, **shell_files(code, shells)}
+    for place, content in made.items():
+        Path(folder, place).parent.mkdir(parents=True, exist_ok=True)
+        Path(folder, place).write_bytes(content if isinstance(content, bytes) else content.encode())
+
+
+def build_in(folder: Any, *command: Any) -> None:
     """Run a compiler in a folder."""
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    done = subprocess.run([*map(str, command)], cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, (command, done.stderr[:2000])
 
 

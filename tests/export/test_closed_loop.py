@@ -11,6 +11,7 @@ from starhold.loop.kernels import make_step, numbers_of
 from starhold.loop.step import make_equations
 from starhold.simulation.lane import fly
 from tests.export.flown import code_of, compiled, loop_of, read, same
+from tests.tiers import fewer
 
 STEPS, COSTLY = 200, 12
 
@@ -67,7 +68,7 @@ LOOPS = ["lyapunov", "sliding", "wheel", "modal", "pd", "l2", "mpc", "estimator"
 
 @pytest.mark.parametrize("name", LOOPS)
 def test_equals_the_simulation(name):
-    steps = COSTLY if name == "mpc" else STEPS
+    steps = fewer(COSTLY if name == "mpc" else STEPS, 3)
     found, expected = flown_with(name, steps), fly(loop_of(name), steps)[1]
     same(numbers_of((found.state, found.effectors)), numbers_of((expected.state, expected.effectors)))
     assert np.isfinite(found.state.position).all()

@@ -50,7 +50,7 @@ def test_header_has_the_digest_of_a_certificate_that_checks(tmp_path):
     assert "WARNING" not in header
     assert starhold("check", certificate, cwd=tmp_path).returncode == 0
     manifest = json.loads((tmp_path / "out" / "export.json").read_text())
-    assert manifest["operations_at_most"]["additions"] == 56
+    assert manifest["operations_at_most"]["additions"] == 44
     assert all(0 < cost["flash"] < 10_000 and 0 <= cost["stack"] < 2_000 for cost in manifest["measured"])
 
 

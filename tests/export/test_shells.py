@@ -9,11 +9,10 @@ import pytest
 from starhold.errors import InputError
 from starhold.export.code import make_code
 from starhold.export.shells import shell_files
-from starhold.export.source import texts
 from starhold.export.vectors import vectors
 from starhold.laws.catalogue import catalogue
 from starhold.simulation.lane import fly
-from tests.export.flown import code_of, need
+from tests.export.flown import code_of, need, put
 from tests.tiers import leading
 
 ATTITUDE = 1e-7
@@ -30,10 +29,7 @@ def test_basilisk_flies_the_same_loop(steps, tmp_path):
     law = catalogue()["lyapunov"]
     loop = common.problem(law, law.examples()[0], common.START, torque_limit=0.01, limit="axis")
     code = make_code(loop, "lyapunov")
-    text = texts(code, "test", "lyapunov")
-    (tmp_path / "lyapunov.h").write_text(text.header)
-    (tmp_path / "lyapunov.c").write_text(text.source)
-    (tmp_path / "lyapunov_basilisk.py").write_text(shell_files(code, ["basilisk"])["lyapunov_basilisk.py"])
+    put(tmp_path, code, "basilisk")
     spec = importlib.util.spec_from_file_location("lyapunov_basilisk", tmp_path / "lyapunov_basilisk.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -76,11 +72,11 @@ def test_fmu_gives_the_same_bits(name, tmp_path):
     from fmpy.validation import validate_fmu
 
     code = code_of(name)
-    (archive,) = shell_files(code, ["fmu"]).items()
-    assert archive[1] == shell_files(code, ["fmu"])[f"{name}.fmu"]
-    (tmp_path / archive[0]).write_bytes(archive[1])
-    assert not validate_fmu(str(tmp_path / archive[0]))
-    unzipped = fmpy.extract(str(tmp_path / archive[0]), str(tmp_path / "fmu"))
+    put(tmp_path, code, "fmu")
+    archive = tmp_path / f"{name}.fmu"
+    assert archive.read_bytes() == shell_files(code, ["fmu"])[archive.name]
+    assert not validate_fmu(str(archive))
+    unzipped = fmpy.extract(str(archive), str(tmp_path / "fmu"))
     (tmp_path / "build").mkdir()
     build_platform_binary(unzipped, tmp_path / "build")
     description = fmpy.read_model_description(unzipped)

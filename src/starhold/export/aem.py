@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from datetime import UTC, date, datetime, timedelta
 from itertools import pairwise
 from pathlib import Path
@@ -114,11 +114,13 @@ def read_aem(path: Path) -> Aem:
     version = lines.value("CCSDS_AEM_VERS")
     if version not in ("1.0", "2.0"):
         raise ValueError(f"line {lines.number}: CCSDS_AEM_VERS = {version}, of which 1.0 and 2.0 are read")
-    lines.until("META_START")
-    told = dict(lines.pairs("META_STOP"))
-    lines.until("DATA_START")
-    rows = list(lines.rows("DATA_STOP", _numbers(told)))
-    lines.nothing_more()
+    list(lines.before("META_START"))
+    told = dict(lines.pair(line) for line in lines.before("META_STOP"))
+    list(lines.before("DATA_START"))
+    count = _numbers(told)
+    rows = [lines.row(line, count) for line in lines.before("DATA_STOP")]
+    if lines.following() is not None:
+        raise ValueError(f"line {lines.number}: a second segment, of which one alone is read")
     if len(rows) < 2:
         raise ValueError(f"{len(rows)} attitudes")
     instants, table = [row[0] for row in rows], np.array([row[1] for row in rows])
@@ -158,60 +160,49 @@ class _Lines:
         self.number = 0
         self._left = iter(enumerate(text.splitlines(), 1))
 
-    def _next(self) -> str | None:
+    def following(self) -> str | None:
+        """The next line; None where there is no more."""
         for number, raw in self._left:
             self.number, line = number, raw.strip()
             if line and not line.startswith("COMMENT"):
                 return line
         return None
 
+    def before(self, end: str) -> Iterator[str]:
+        """The lines up to one, which is passed over."""
+        while (line := self.following()) != end:
+            if line is None:
+                raise ValueError(f"no {end}")
+            yield line
+
     def value(self, key: str) -> str:
         """The value of the next line, which has this key."""
-        line = self._next() or ""
+        line = self.following() or ""
         name, sign, value = line.partition("=")
         if not sign or name.strip() != key:
             raise ValueError(f"line {max(self.number, 1)}: {line[:40]!r} in place of {key} = …")
         return value.strip()
 
-    def until(self, word: str) -> None:
-        """Pass over all up to a line."""
-        while (line := self._next()) is not None:
-            if line == word:
-                return
-        raise ValueError(f"no {word}")
+    def pair(self, line: str) -> tuple[str, str]:
+        """The key and the value of a line."""
+        key, sign, value = line.partition("=")
+        if not sign:
+            raise ValueError(f"line {self.number}: {line!r} in place of key = value")
+        return key.strip(), value.strip()
 
-    def pairs(self, end: str) -> Iterator[tuple[str, str]]:
-        """Keys and values up to a line."""
-        while (line := self._next()) != end:
-            key, sign, value = (line or "").partition("=")
-            if not sign:
-                raise ValueError(f"line {self.number}: {line!r} in place of key = value" if line else f"no {end}")
-            yield key.strip(), value.strip()
-
-    def rows(self, end: str, count: int) -> Iterator[tuple[int, list[float]]]:
-        """Instants (ns) and quaternions up to a line."""
-        while (line := self._next()) != end:
-            if line is None:
-                raise ValueError(f"no {end}")
-            epoch, *cells = line.split()
-            try:
-                values = [float(cell) for cell in cells]
-                yield _instant(epoch), self._unit(values, count)[:4]
-            except ValueError as error:
-                raise ValueError(f"line {self.number}: {error}") from None
-
-    def _unit(self, values: Sequence[float], count: int) -> list[float]:
-        if len(values) != count:
-            raise ValueError(f"{len(values)} numbers behind the epoch, {count} are wanted")
-        length = math.hypot(*values[:4])
-        if not abs(length - 1.0) <= OFF_UNIT:
-            raise ValueError(f"a quaternion of length {length:.6g}")
-        return list(values)
-
-    def nothing_more(self) -> None:
-        """Refuse what stands behind."""
-        if self._next() is not None:
-            raise ValueError(f"line {self.number}: a second segment, of which one alone is read")
+    def row(self, line: str, count: int) -> tuple[int, list[float]]:
+        """The instant (ns) and the quaternion of a line of so many numbers."""
+        epoch, *cells = line.split()
+        try:
+            values, instant = [float(cell) for cell in cells], _instant(epoch)
+            if len(values) != count:
+                raise ValueError(f"{len(values)} numbers behind the epoch, {count} are wanted")
+            length = math.hypot(*values[:4])
+            if not abs(length - 1.0) <= OFF_UNIT:
+                raise ValueError(f"a quaternion of length {length:.6g}")
+        except ValueError as error:
+            raise ValueError(f"line {self.number}: {error}") from None
+        return instant, values[:4]
 
 
 def _instant(epoch: str) -> int:

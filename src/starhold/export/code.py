@@ -11,10 +11,9 @@ from starhold.algebra.structure import mapped
 from starhold.algebra.structured import Buffer
 from starhold.errors import InputError
 from starhold.export.law import FlightLaw, flight_law
-from starhold.export.needs import Needs
 from starhold.export.printing import Readable
-from starhold.export.recording import Recording, Signature
-from starhold.export.types import Member, Type
+from starhold.export.recording import Reads, Recording
+from starhold.export.types import Member, Type, Types
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.trace import bounds
 from starhold.trace.c99 import C99
@@ -34,14 +33,15 @@ def check_name(name: str) -> str:
 
 @dataclass(frozen=True)
 class Code:
-    """A law in C: what was recorded of it, and the texts. name: what its functions begin with."""
+    """A law in C: what was recorded of it, and the texts. name: what its functions begin with; given: the types of the
+    parameters, the state and the input (None for none), by their names."""
 
     flight: FlightLaw
     name: str
     program: Program
-    needs: Needs
-    types: dict[str, Type]
-    """All types of its values by name, those of members first."""
+    types: Types
+    given: dict[str, Type | None]
+    command: Type
     parts: dict[str, dict[int, str]]
     """Names of the parts of its arrays, by their first places."""
 
@@ -53,7 +53,7 @@ class Code:
     @cached_property
     def printed(self) -> Readable:
         """Return the functions as text; types that the header has are called without the name of the law in the source."""
-        return Readable(self.program, self.needs, self.parts)
+        return Readable(self.program, self.parts)
 
     @property
     def time_unit(self) -> str:
@@ -61,13 +61,10 @@ class Code:
         return getattr(self.flight.loop.body.module, "TIME_UNIT", "s")
 
     @property
-    def signature(self) -> Signature:
-        """Return what the step takes and gives."""
-        return self.program.main.shape
-
-    def members(self, place: int) -> tuple[Member, ...]:
-        """Return the members that are read of the parameters (0), the state (1) or the input (2)."""
-        return tuple(self.printed.members(self.signature.params[place].type))
+    def inputs(self) -> tuple[Member, ...]:
+        """Return the inputs that are read."""
+        kind = self.given["input"]
+        return () if kind is None else kind.members
 
     @property
     def buffers(self) -> dict[str, int]:
@@ -77,21 +74,28 @@ class Code:
 
 def make_code(loop: ClosedLoop, name: str) -> Code:
     """Return the flight code of a loop's law. InputError for what has no form in C."""
-    flight, recording = flight_law(loop), Recording()
+    flight = flight_law(loop)
     check_name(name)
+    values = {"parameters": flight.parameters, "state": flight.start, "input": flight.inputs}
+    reads = Reads()
+    recording = Recording(reads.read(_recorded(flight, reads, values)))
+    command, after = _recorded(flight, recording, values)
+    given = {word: recording.types.of(value) for word, value in values.items()}
+    program = recording.step(values, {"command": command, "state": after})
+    kind = recording.types.of(command)
+    assert kind is not None
+    return Code(flight, name, program, recording.types, given, kind, recording.parts)
+
+
+def _recorded(flight: FlightLaw, recorder: Reads | Recording, values: dict[str, Any]) -> Any:
+    """Record the step; return what it gives."""
 
     def in_memory(leaf: Any) -> Any:
         if not isinstance(leaf, Buffer):
             return leaf
-        return Buffer(recording.memory("numbers", writable=True, size=leaf.size), 0, leaf.size)
+        return Buffer(recorder.memory("numbers", writable=True, size=leaf.size), 0, leaf.size)
 
-    with recording.recording():
-        given = [
-            recording.parameter("parameters", flight.parameters, link="."),
-            recording.parameter("state", mapped(flight.start, in_memory)),
-            recording.parameter("input", flight.inputs),
-        ]
-        command, after = flight.equation(recording.copies)(*(handles for handles, _ in given))
-    program = recording.step([param for _, param in given], command, after)
-    needs = Needs(program)
-    return Code(flight, name, needs.program(program), needs, recording.types.known, recording.parts)
+    with recorder.recording():
+        # The buffers of parameters are tables.
+        given = [recorder.given(word, mapped(x, in_memory) if word == "state" else x) for word, x in values.items()]
+        return flight.equation(recorder.copies)(*given)

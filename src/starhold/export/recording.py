@@ -1,185 +1,274 @@
-"""Records equations with the calls among them kept as functions, and with the names that Python has for values."""
+"""Records equations with the calls among them kept as functions, with structs of C for their tuples, and with the names that
+the source has for values."""
 
 from __future__ import annotations
 
-import inspect
+import ast
+import linecache
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import cache
+from itertools import islice
+from math import nan
 from typing import Any, NamedTuple
 
 from starhold.algebra.operations import NUMBER, TRUTH, Operation
-from starhold.algebra.structure import leaves, mapped
+from starhold.algebra.structure import leaves, mapped, rebuild
 from starhold.algebra.structured import Buffer
 from starhold.export.copies import COPIED, Copies
-from starhold.export.types import BOOL, Member, Path, Type, Types, free, paths, title
-from starhold.trace.handles import HANDLES, Handle
-from starhold.trace.program import Block, Call, Function, Program, Value, prune, renamed, writes
+from starhold.export.types import Type, Types, free, sentence, wrapped
+from starhold.trace.handles import HANDLES, Handle, kind_of
+from starhold.trace.program import Call, Function, Op, Program, Value, live_names, prune, renamed, writes
 from starhold.trace.recording import Cells, Recorder
 
-
-class Parameter(NamedTuple):
-    """A parameter of a function has a name, a type, leaves in order, and what joins its name and those of its members."""
-
-    name: str
-    type: Type
-    leaves: tuple[Path, ...]
-    link: str
+MAKE, MEMBER = "make", "member"
+"""Operations of this trace alone: a struct of its members, and a member of a struct."""
 
 
 class Signature(NamedTuple):
-    """A function takes and gives values of these types (None: nothing). `hints`: what Python calls its values, by the key of
-    each; `module`: where the equation stands."""
+    """`addresses`: parameters that are passed by their address; `names`: what the source calls values; `module`: where the
+    equation stands; `places`: where what the step gives goes to."""
 
-    params: tuple[Parameter, ...]
-    result: Type | None
-    leaves: tuple[Path, ...]
-    hints: dict[Any, str]
-    module: str
+    addresses: frozenset[str]
+    names: dict[str, str]
+    module: str = ""
+    places: tuple[str, ...] = ()
 
 
-class Recording(Recorder):
-    """A recorder of equations that call each other."""
+class Reads(Recorder):
+    """A recorder of equations that finds which fields of tuples somebody reads that are handed from equation to equation."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.types = Types()
+        self.copies = Copies(self._called)
+        self._marks: dict[str, tuple[Any, ...]] = {}
+
+    def given(self, _: str, like: Any) -> Any:
+        """Return handles in the form of a value."""
+        return self._marked(like)
+
+    def read(self, out: Any) -> set[Any]:
+        """Return the fields that are read for the sake of what a program gives: pairs of a class and a name."""
+        live = {leaf.ref for leaf in leaves(self._marked(out)) if isinstance(leaf, Handle)}
+        block, read, before = tuple(self._open[0]), set[Any](), -1
+        # All structs of a class have the same members.
+        shared = {ref: fields for ref, fields in self._marks.items() if fields and type(fields[-1][0]) is type}
+        while before != (before := len(read)):
+            live = live_names(block, live)
+            read |= {field for ref in live if ref in self._marks for field in self._marks[ref]}
+            live |= {ref for ref, fields in shared.items() if read.issuperset(fields)}
+        return read
+
+    def _called(self, equation: Callable[..., Any], values: tuple[Any, ...]) -> Any:
+        if not _is_recordable(values):
+            return equation(*values)
+        return self._marked(equation(*self._marked(values)), equation.__code__)
+
+    def _marked(self, value: Any, owner: Any = None, through: tuple[Any, ...] = ()) -> Any:
+        """Return a value whose numbers are new ones, by which it is told that they are read."""
+        if isinstance(value, tuple):
+            fields: Any = getattr(value, "_fields", range(len(value)))  # pyright: ignore
+            owner = type(value) if hasattr(value, "_fields") else owner
+            more = [(*through, (owner, name)) if owner else through for name in fields]
+            return rebuild(value, [self._marked(part, None, tags) for part, tags in zip(value, more, strict=True)])  # pyright: ignore
+        if not _counts(value):
+            return value
+        ref = self._names.new("t")
+        given = value.ref if isinstance(value, Handle) else value
+        self._open[-1].append(Op(ref, _operation(MEMBER, ("",), "", ""), (given,)))
+        self._marks[ref] = through
+        return HANDLES[kind_of(value)](self, ref)
+
+
+class Recording(Recorder):
+    """A recorder of equations that call each other. read: fields of classes that somebody reads."""
+
+    def __init__(self, read: set[Any]) -> None:
+        super().__init__()
+        self.types = Types(read)
         self.copies = Copies(self._called)
         self.parts: dict[str, dict[int, str]] = {}
-        """Names in the Python source of the parts of memories, by their first places."""
-        self._inlined: set[Any] = set()
-        self._hints: dict[Any, tuple[int, str]] = {}
-        self._locals: dict[tuple[int, str], Any] = {}
+        """Names in the source of the parts of memories, by their first places."""
+        self._called_so: dict[str, str] = {}
+        """Names in the source of the values of the function that is recorded."""
 
-    def parameter(self, name: str, like: Any, annotation: str = "", link: str = "") -> tuple[Any, Parameter]:
-        """Return handles in the form of a value, which are the leaves of a variable of C, and what that is."""
-        kind = self.types.of(like, annotation)
-        link = link or ("->" if kind is not None and kind.named else ".")
-        places = tuple(paths(kind, name, link))
-        return self._shaped(like, places), Parameter(name, kind or BOOL, places, link)
+    def given(self, name: str, like: Any) -> Any:
+        """Return handles in the form of a value, which are the leaves of a variable of C."""
+        return self._shaped(like, self.types.of(like), name)
 
-    def step(self, params: list[Parameter], command: Any, state: Any) -> Program:
-        """Return the program whose main function, which has been recorded outside of others, gives a command and a state."""
-        members = {"command": self.types.of(command), "state": self.types.of(state)}
-        result = Type("step_t", tuple(Member(name, kind) for name, kind in members.items() if kind is not None))
-        main = self._function("step", "", params, (tuple(self._open[0]), (command, state)), result, "")
-        return Program((*(function for function, _, _ in self._functions.values()), main), tuple(self.memories))
+    def step(self, params: dict[str, Any], results: dict[str, Any]) -> Program:
+        """Return the program whose main function, which has been recorded outside of others, takes these values and writes
+        to the members of others."""
+        outs: dict[str, tuple[Value, str]] = {}
+        for name, value in results.items():
+            for m, part in self.types.members(self.types.of(value), value):
+                outs[f"{name}->{m.name}"] = self._whole(part, m.type), m.type.kind
+        body, _ = prune(tuple(self._open[0]), [out for out, _ in outs.values()])
+        given = tuple((name, kind.kind) for name, value in params.items() if (kind := self.types.of(value)) is not None)
+        names = {ref: {"state": "body_state", "command": "wanted"}.get(name, name) for ref, name in self._called_so.items()}
+        shape = Signature(frozenset({name for name, _ in given} - {"parameters"}), names, "", tuple(outs))
+        main = Function("step", "", given, body, tuple(outs.values()), shape)
+        return Program((*(found[0] for found in self._functions.values() if found), main), tuple(self.memories))
 
     # Calls.
 
-    def call(self, equation: Callable[..., Any], values: tuple[Any, ...]) -> Any:
-        """Record a call of an equation that is to be recorded once."""
-        return self._called(self.copies.copy(equation), values)
+    def _called(self, equation: Any, values: tuple[Any, ...]) -> Any:
+        here = _here()
+        key = (equation, self._form(values)) if _is_recordable(values) else None
+        if key is not None and key not in self._functions:
+            self._functions[key] = self._record(equation, values)
+        if key is None or self._functions[key] is None:
+            out = equation(*values)
+            self._note_parts(out)
+            return out
+        function, kept, (out, result, kinds) = self._functions[key]
+        args: list[Value] = []
+        for place, (word, _) in zip(kept, function.params, strict=True):
+            args.append(self._whole(values[place], kinds[place]))
+            name = here.given[place] if place < len(here.given) else ""
+            if kinds[place].members and (name or word in function.shape.addresses):
+                self._called_so.setdefault(args[-1], name or word)
+        ref = self._names.new("r")
+        if here.name:
+            self._called_so[ref] = here.name
+        self._open[-1].append(Call(((ref, result.kind),) if result is not None else (), function, tuple(args)))
+        return self._shaped(out, result, ref)
 
-    def _called(self, equation: Callable[..., Any], values: tuple[Any, ...]) -> Any:
-        self._look_up_names()
-        if not all(map(_is_part, leaves(values))) or not any(isinstance(leaf, (Handle, Buffer)) for leaf in leaves(values)):
-            return equation(*values)
-        key = (equation, self._form(values))
-        if key not in self._functions and key not in self._inlined:
-            self._record(equation, values, key)
-        if key in self._inlined:
-            return equation(*values)
-        function, _, out = self._functions[key]
-        places = tuple(paths(function.shape.result, self._names.new("r")))
-        self._open[-1].append(Call(tuple((path.text, path.kind) for path in places), function, tuple(_numbers(values))))
-        return self._shaped(out, places)
-
-    def _record(self, equation: Any, values: tuple[Any, ...], key: Any) -> None:
+    def _record(self, equation: Any, values: tuple[Any, ...]) -> Any:
         """Record a function, unless it only hands on arguments or what it gives has no type of C."""
-        outer = self._hints, self._locals
-        self._hints, self._locals = {}, {}
-        words = {word: str(equation.__annotations__.get(word, "")) for word in inspect.signature(equation).parameters}
+        outer, self._called_so, found = self._called_so, {}, None
+        nothing: Any = None, None, ()
+        words = equation.__code__.co_varnames[: len(values)]
+        says = [str(equation.__annotations__.get(word, "")) for word in words]
+        kinds: list[Any] = list(map(self.types.of, values, says))
         with self._alone():
-            given = [self.parameter(self._names.new(w), value, words[w]) for w, value in zip(words, values, strict=False)]
-            body, out = self._block(equation, *(handles for handles, _ in given))
-        if all(map(_is_part, leaves(out))) and (_numbers(out) or writes(body)):
-            params = [param for _, param in given if param.leaves]
-            doc, module = inspect.cleandoc(equation.__doc__ or ""), equation.__globals__["__name__"]
-            function = self._function("", doc, params, (body, out), self._result(equation, out), module)
-        else:
-            function = None
-        self._hints, self._locals = outer
-        if function is None or not (function.body or any(map(_is_picked, function.outs, function.shape.leaves))):
-            self._inlined.add(key)
-        else:
-            self._functions[key] = function._replace(name=self._titles.new(_title(equation))), [], out
+            names = [self._names.new(word) for word in words]
 
-    def _function(
-        self, name: str, doc: str, params: list[Parameter], recorded: tuple[Block, Any], result: Type | None, module: str
-    ) -> Function:
-        """Return a function without what nobody reads; recorded: its block, and what it gives."""
-        body, names = prune(recorded[0], _numbers(recorded[1]))
-        outs = tuple(renamed(x, names) for x in _numbers(recorded[1]))
-        hints = {(key[0], *(renamed(x, names) for x in key[1:])): hint for key, (_, hint) in self._hints.items()}
-        gives = tuple(paths(result, ""))
-        flat = tuple((path.text, path.kind) for param in params for path in param.leaves)
-        shape = Signature(tuple(params), result, gives, hints, module)
-        return Function(name, doc, flat, body, tuple(zip(outs, (path.kind for path in gives), strict=True)), shape)
+            def body() -> Any:
+                out = equation(*map(self._shaped, values, kinds, names))
+                if not all(map(_is_part, leaves(out))):
+                    return None
+                result = self._result(equation, out)
+                return out, result, () if result is None else (self._whole(out, result),)
+
+            block, gives = self._block(body)
+            out, result, outs = gives or nothing
+            block, new = prune(block, outs)
+        outs = tuple((renamed(x, new), result.kind) for x in outs)
+        acts = writes(block) or (outs and any(not isinstance(s, Op) or s.operation.name != MAKE for s in block))
+        if gives and acts:
+            live = live_names(block, [x for x, _ in outs])
+            kept = [k for k, name in enumerate(names) if name in live]
+            shape = Signature(
+                frozenset(names[k] for k in kept if kinds[k].named), self._called_so, equation.__globals__["__name__"]
+            )
+            doc = "\n".join(wrapped(sentence(equation.__doc__ or "")))
+            params = tuple((names[k], kinds[k].kind) for k in kept)
+            function = Function(self._titles.new(_title(equation)), doc, params, block, outs, shape)
+            found = function, kept, (out, result, kinds)
+        self._called_so = outer
+        return found
 
     def _result(self, equation: Any, out: Any) -> Type | None:
         """Return the type of what a function gives; of several values a struct whose members are called as they are."""
         says = str(equation.__annotations__.get("return", ""))
-        several = out if isinstance(out, tuple) and not hasattr(out, "_fields") else ()
+        several = list(out) if isinstance(out, tuple) and not hasattr(out, "_fields") else []  # pyright: ignore
         kinds = [self.types.of(part) for part in several]
         if sum(kind is not None for kind in kinds) < 2 or (len(kinds) > 2 and all(kind == kinds[0] for kind in kinds)):
             return self.types.of(out, says)
         inner = re.fullmatch(r"tuple\[(.*)\]", says)
         words = [] if inner is None else [re.sub(r"\W.*", "", word.strip()).lower() for word in inner[1].split(",")]
-        members: dict[str, Type] = {}
+        parts: dict[str, tuple[str, Type | None, int]] = {}
         for place, (part, kind) in enumerate(zip(several, kinds, strict=True)):
-            if kind is not None:
-                word = words[place] if place < len(words) else f"part{place}"
-                name = self._hints.get(_key(part), (0, word))[1]
-                members[name if name not in members else f"{name}{place}"] = kind
+            word = words[place] if place < len(words) else f"part{place}"
+            name = word if kind is None else self._called_so.get(str(self._whole(part, kind)), word)
+            name = name if name not in parts else f"{name}{place}"
+            parts[name] = name, kind if (equation.__code__, place) in self.types.read else None, place
         name = equation.__name__.strip("_")
-        text = f"What {name} gives."
-        return self.types.keep(Type(f"{name}_result_t", tuple(map(Member, members, members.values())), "", True, text))
+        return self.types.several(f"{name}_result_t", list(parts.values()), f"What {name} gives.")
 
-    def _shaped(self, like: Any, places: tuple[Path, ...]) -> Any:
-        """Return handles, called as the leaves of a variable, in the form of a value."""
-        source = iter(places)
+    # Structs.
 
-        def make(leaf: Any) -> Any:
-            if not _counts(leaf):
-                return leaf
-            path = next(source)
-            return HANDLES[path.kind](self, path.text)
+    def _whole(self, value: Any, kind: Type) -> Value:
+        """Return the variable that is a value: there is one, or it is made of its members."""
+        if not kind.members:
+            value = self.types.within(value)
+            return value.ref if isinstance(value, Handle) else float(value)
+        parts = tuple(self._whole(part, m.type) for m, part in self.types.members(kind, value))
+        operation = _operation(MAKE, tuple(m.type.kind for m in kind.members), kind.kind, kind)
+        return self._once(_made_of(kind, parts), lambda ref: Op(ref, operation, parts), NUMBER).ref
 
-        return mapped(like, make)
+    def _shaped(self, like: Any, kind: Type | None, ref: str) -> Any:
+        """Return the form of a value with the numbers of a variable; those that nobody reads have none."""
+        if kind is None:
+            return mapped(like, lambda leaf: HANDLES[kind_of(leaf)](self, _UNREAD[kind_of(leaf)]) if _counts(leaf) else leaf)
+        if not isinstance(like, tuple):
+            return HANDLES[kind.kind](self, ref)
+        if self.types.within(like) is not like:
+            return rebuild(like, [self._shaped(part, kind if self.types.of(part) else None, ref) for part in like])  # pyright: ignore
+        members = {m.place: (m.type, f"{ref}.{m.name}") for m in kind.members}
+        for m in kind.members:
+            self._open[-1].append(Op(f"{ref}.{m.name}", _operation(MEMBER, (kind.kind,), m.type.kind, m.name), (ref,)))
+        self._seen[-1][_made_of(kind, [name for _, name in members.values()])] = HANDLES[NUMBER](self, ref)
+        return rebuild(like, [self._shaped(part, *members.get(k, (None, ""))) for k, part in enumerate(like)])  # pyright: ignore
 
     # Names.
 
     def apply(self, operation: Operation, values: tuple[Any, ...]) -> Any:
         """Record an operation."""
-        self._look_up_names()
-        return super().apply(operation, values)
+        out = super().apply(operation, values)
+        if isinstance(out, Handle) and (name := _here().name):
+            self._called_so.setdefault(out.ref, name)
+        return out
 
-    def _look_up_names(self) -> None:
-        """Note what the equations that run now call their values; where several name one, the outermost does."""
-        frame: Any = sys._getframe(2)  # pyright: ignore[reportPrivateUsage]
-        frames: list[Any] = []
-        while frame is not None and frame.f_code is not Recorder._block.__code__:
-            if COPIED in frame.f_globals and not frame.f_code.co_name.startswith("<"):
-                frames.append(frame)
-            frame = frame.f_back
-        for depth, frame in enumerate(reversed(frames)):
-            for name, value in frame.f_locals.items():
-                # Values are kept, so that the place of one is not taken by another.
-                if self._locals.get((id(frame), name)) is not value:
-                    self._locals[id(frame), name] = value
-                    self._note(free(name), value, depth)
+    def _note_parts(self, value: Any) -> None:
+        """Note the names of the parts of a memory; the whole of one has a name already."""
+        for name in getattr(value, "_fields", ()):
+            part = getattr(value, name)
+            if isinstance(part, Buffer) and isinstance(part.cells, Cells) and part.size != part.cells.memory.size:
+                self.parts.setdefault(part.cells.memory.name, {}).setdefault(part.base, free(name))
 
-    def _note(self, name: str, value: Any, depth: int) -> None:
-        key = _key(value)
-        if key is not None and (key not in self._hints or depth < self._hints[key][0]):
-            self._hints[key] = depth, name
-        for field in getattr(value, "_fields", ()):
-            part = getattr(value, field)
-            lies = isinstance(part, Buffer) and isinstance(part.cells, Cells) and type(part.base) is int
-            # The whole of a memory has a name already.
-            if lies and part.size != part.cells.memory.size:
-                self.parts.setdefault(part.cells.memory.name, {}).setdefault(part.base, free(field))
+
+class _Here(NamedTuple):
+    """Names in the source for the value of an expression and for what a call is given; empty where there are none."""
+
+    name: str = ""
+    given: tuple[str, ...] = ()
+
+
+_THROUGH = ("starhold.trace.", "starhold.export.", "starhold.algebra.operations", "starhold.algebra.scalar")
+
+
+def _here() -> _Here:
+    """Return the names at the expression of an equation that runs now."""
+    frame: Any = sys._getframe(1)  # pyright: ignore[reportPrivateUsage]
+    while frame is not None and COPIED not in frame.f_globals and frame.f_globals["__name__"].startswith(_THROUGH):
+        frame = frame.f_back
+    if frame is None or COPIED not in frame.f_globals:
+        return _Here()
+    where = next(islice(frame.f_code.co_positions(), frame.f_lasti // 2, None))
+    return _names_in(frame.f_code.co_filename).get(where, _Here())
+
+
+@cache
+def _names_in(file: str) -> dict[Any, _Here]:
+    """Return the names at each expression of a file, by where that begins and ends."""
+    found: dict[Any, _Here] = {}
+    for node in ast.walk(ast.parse("".join(linecache.getlines(file)))):
+        if isinstance(node, ast.Call):
+            given = tuple(free(arg.id) if isinstance(arg, ast.Name) else "" for arg in node.args)
+            found[_span(node)] = found.get(_span(node), _Here())._replace(given=given)
+        elif isinstance(node, ast.Assign):
+            targets, values = [x.elts if isinstance(x, ast.Tuple) else [x] for x in (node.targets[0], node.value)]
+            for target, value in zip(targets, values, strict=False) if len(targets) == len(values) else ():
+                if isinstance(target, ast.Name):
+                    found[_span(value)] = found.get(_span(value), _Here())._replace(name=free(target.id))
+    return found
+
+
+def _span(node: ast.expr) -> tuple[int, int | None, int, int | None]:
+    return node.lineno, node.end_lineno, node.col_offset, node.end_col_offset
 
 
 _OF_ROLES = frozenset(("torque", "control", "acceleration", "goal", "estimate", "momentum", "inertia", "command"))
@@ -191,19 +280,17 @@ def _title(equation: Any) -> str:
     return f"{module['__name__'].rpartition('.')[2]}_{name}" if name in _OF_ROLES and "CARD" in module else name
 
 
-def _key(value: Any) -> Any:
-    """Return the title of a value's class, and its numbers; None for what needs no name."""
-    if not isinstance(value, (tuple, Handle)) or not all(map(_is_part, leaves(value))):
-        return None
-    numbers = _numbers(value)
-    known = not any(isinstance(number, str) for number in numbers)
-    return None if known else (title(type(value)) if hasattr(value, "_fields") else "", *numbers)
+_UNREAD: Any = {NUMBER: nan, TRUTH: False}
+"""In the place of a value that nobody reads."""
 
 
-def _is_picked(out: tuple[Value, str], path: Path) -> bool:
-    """Tell whether a number that a function gives is none of an argument that it hands on whole, nor a constant."""
-    name, dot, rest = out[0].partition(".") if isinstance(out[0], str) else ("", "", "")
-    return "->" in name or not path.text.endswith(dot + rest)
+def _operation(name: str, takes: tuple[str, ...], gives: str, about: Any) -> Operation:
+    """Return an operation that no equation has; what it is about stands in the place of its plain meaning."""
+    return Operation(name, takes, gives, about, {"c": "".join(f"{{{k}}}" for k in range(len(takes)))})
+
+
+def _made_of(kind: Type, parts: Sequence[Value]) -> Any:
+    return (MAKE, kind.name, *((type(part), repr(part)) for part in parts))
 
 
 def _counts(leaf: Any) -> bool:
@@ -211,8 +298,10 @@ def _counts(leaf: Any) -> bool:
     return isinstance(leaf, (Handle, float)) and not isinstance(leaf, bool)
 
 
-def _numbers(value: Any) -> list[Value]:
-    return [leaf.ref if isinstance(leaf, Handle) else leaf for leaf in leaves(value) if _counts(leaf)]
+def _is_recordable(values: tuple[Any, ...]) -> bool:
+    """Tell whether a call is one of a function of C."""
+    found = list(leaves(values))
+    return all(map(_is_part, found)) and any(isinstance(leaf, (Handle, Buffer)) for leaf in found)
 
 
 def _is_part(leaf: Any) -> bool:

@@ -14,7 +14,6 @@ from starhold.errors import InputError
 from starhold.export.code import Code
 from starhold.export.law import numbers
 from starhold.export.source import texts
-from starhold.export.types import paths
 from starhold.version import __version__
 
 SOURCES = {
@@ -54,16 +53,13 @@ def filled(template: str, code: Code, **more: Any) -> dict[str, str]:
 
 def variables(code: Code) -> tuple[list[str], list[str]]:
     """Return the names of the inputs, and those of the command."""
-    inputs = [p.text.replace("input->", "") for p in code.signature.params[2].leaves if code.needs.reads(p)]
-    shape = code.signature.result
-    assert shape is not None
-    outputs = [p.text.removeprefix(".") for p in paths(shape.members[0].type, "")]
-    return [name.replace(".e[", "[") for name in inputs], outputs
+    inputs = [name.replace(".e[", "[") for member in code.inputs for name in member.type.leaves(member.name)]
+    return inputs, [name.removeprefix(".") for name in code.command.leaves()]
 
 
 def _basilisk(code: Code) -> dict[str, str]:
     """Return a law as a module of Basilisk. InputError for inputs that no message of Basilisk tells of."""
-    wanted = [member.name for member in code.members(2)]
+    wanted = [member.name for member in code.inputs]
     for name in wanted:
         if name not in SOURCES:
             raise InputError(

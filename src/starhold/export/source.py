@@ -12,7 +12,6 @@ from starhold.algebra.operations import NUMBER
 from starhold.algebra.structure import leaves
 from starhold.algebra.structured import Buffer
 from starhold.export.code import Code
-from starhold.export.printing import Readable
 from starhold.export.proof import UNPROVED, Proof
 from starhold.export.types import Member, Type, comment
 from starhold.parts.contract import fields
@@ -39,18 +38,17 @@ def texts(code: Code, scenario: str, law: str, proof: Proof = UNPROVED) -> Text:
 
 def _interface(code: Code) -> str:
     """Return the names of the types that the step takes and gives."""
-    shape = code.signature
-    assert shape.result is not None
-    return f"{shape.params[1].type.name} {shape.params[2].type.name} {shape.result.members[0].type.name}"
+    kinds = code.given["state"], code.given["input"], code.command
+    return " ".join(kind.name for kind in kinds if kind is not None)
 
 
 def _spoken_of(code: Code, text: str) -> list[Type]:
     """Return the types that a text speaks of, those of members first."""
     types: list[Type] = []
-    for kind in reversed(code.types.values()):
+    for kind in reversed(code.types.known.values()):
         if re.search(rf"\b{kind.name}\b", text):
             types.insert(0, kind)
-            text += "".join(f" {member.type.name}" for member in code.printed.members(kind))
+            text += "".join(f" {member.type.name}" for member in kind.members)
     return types
 
 
@@ -67,7 +65,7 @@ def _header(code: Code, types: list[Type], public: dict[str, str], scenario: str
     ]
     for kind in types:
         if kind.name != STATE.name:
-            lines += [*_declaration(kind, code.printed, public), ""]
+            lines += [*_declaration(kind, public), ""]
     lines += [*_state(code, public), ""]
     lines += comment(
         "Sets the state to that of the scenario's start"
@@ -84,15 +82,15 @@ def _header(code: Code, types: list[Type], public: dict[str, str], scenario: str
     return "\n".join(lines)
 
 
-STATE = Type("flight_state_t", named=True)
+STATE = Type("flight_state_t", "", named=True)
 
 
 def _state(code: Code, public: dict[str, str]) -> Iterator[str]:
     """Yield the declaration of the state."""
     if code.flight.start._fields:
         yield from comment("What is remembered from step to step: set it by the function below, and leave it alone.")
-        kind = code.types.get(STATE.name, STATE)
-        yield from _declaration(kind, code.printed, {**public, STATE.name: f"{code.name}_state_t"}, code.buffers)
+        kind = code.given["state"] or STATE
+        yield from _declaration(kind, {**public, STATE.name: f"{code.name}_state_t"}, code.buffers)
     else:
         yield from comment("What the law remembers: nothing. C has no empty structs.")
         yield from ("typedef struct {", "    double unused;", f"}} {code.name}_state_t;")
@@ -154,8 +152,7 @@ def _source(code: Code, public: dict[str, str]) -> str:
     name, printed = code.name, code.printed
     banner = f"{name}.c: made by starhold {__version__}; see {name}.h. Do not edit: change the scenario and export it again."
     lines = [*comment(banner), "", f'#include "{name}.h"', ""]
-    parameters = code.signature.params[0].type
-    constants = list(_constants(code, parameters)) if printed.members(parameters) else []
+    constants = list(_constants(code))
     body = "\n".join([*constants, *printed.lines])
     needed = {"math": r"\bsqrt\(|\bINFINITY\b|\bNAN\b", "stdbool": r"\bbool\b", "stdint": r"\bint32_t\b"}
     includes = [f"#include <{file}.h>" for file, words in needed.items() if re.search(words, body)]
@@ -165,7 +162,7 @@ def _source(code: Code, public: dict[str, str]) -> str:
     lines += [*aliases, ""] if aliases else []
     for kind in _spoken_of(code, f"{body} {_interface(code)}"):
         if kind.name not in public:
-            lines += [*_declaration(kind, printed, {}), ""]
+            lines += [*_declaration(kind, {}), ""]
     lines += [*constants, ""] if constants else []
     for memory, parts in code.parts.items():
         lines += [*comment(f"Where the parts of {memory} begin."), "enum {"]
@@ -191,13 +188,11 @@ def _rule(title: str) -> str:
     return f"/* {f' {title} '.center(88, '-')} */"
 
 
-def _declaration(
-    kind: Type, printed: Readable, public: dict[str, str], arrays: Mapping[str, int] = MappingProxyType({})
-) -> Iterator[str]:
+def _declaration(kind: Type, public: dict[str, str], arrays: Mapping[str, int] = MappingProxyType({})) -> Iterator[str]:
     """Yield the lines of a struct; public: names of types that the header has; arrays: names and sizes of more members."""
     yield from comment(kind.text)
     yield "typedef struct {"
-    members = printed.members(kind)
+    members = kind.members
     first = public.get(members[0].type.name, members[0].type.name) if members else ""
     if kind.elements:
         yield f"    {first} {kind.elements}[{len(members)}];"
@@ -221,27 +216,30 @@ def _member(member: Member, public: dict[str, str]) -> Iterator[str]:
         yield line + note
 
 
-def _constants(code: Code, parameters: Type) -> Iterator[str]:
+def _constants(code: Code) -> Iterator[str]:
     """Yield the lines of the numbers that do not change in flight."""
-    values = [leaf for leaf in leaves(code.flight.parameters) if isinstance(leaf, float)]
-    yield "static const parameters_t parameters = {"
-    yield from _fields(parameters, values, code.printed, "    ")
-    yield "};"
+    if (kind := code.given["parameters"]) is not None:
+        yield "static const parameters_t parameters = {"
+        yield from _fields(code, kind, code.flight.parameters, "    ")
+        yield "};"
 
 
-def _fields(kind: Type, values: list[float], printed: Readable, indent: str) -> Iterator[str]:
-    for member, part in printed.split(kind, values):
+def _fields(code: Code, kind: Type, value: Any, indent: str) -> Iterator[str]:
+    for member, part in code.types.members(kind, value):
         if member.type.named:
             yield f"{indent}.{member.name} = {{"
-            yield from _fields(member.type, part, printed, indent + "    ")
+            yield from _fields(code, member.type, part, indent + "    ")
             yield f"{indent}}},"
         else:
             note = f" /* {member.text.partition(':')[0]} */" if ":" in member.text else ""
-            yield f"{indent}.{member.name} = {_text(printed.initialiser(member.type, part))},{note}"
+            yield f"{indent}.{member.name} = {_literal(code, member.type, part)},{note}".replace(TIE, " ")
 
 
-def _text(text: str) -> str:
-    return text.replace(TIE, " ")
+def _literal(code: Code, kind: Type, value: Any) -> str:
+    """Return the text of numbers that are known."""
+    if not kind.members:
+        return code.printed.text(code.types.within(value), NUMBER)
+    return kind.braced([_literal(code, member.type, part) for member, part in code.types.members(kind, value)])
 
 
 def _init(code: Code) -> Iterator[str]:
@@ -260,9 +258,9 @@ def _init(code: Code) -> Iterator[str]:
     yield "{"
     if not start._fields:
         yield "    state->unused = 0.0;"
-    kind, values = code.signature.params[1].type, [leaf for leaf in leaves(start) if isinstance(leaf, float)]
-    for member, part in printed.split(kind, values) if values else ():
-        yield f"    state->{member.name} = {_text(printed.whole(member.type, part))};"
+    for member, part in code.types.members(code.given["state"], start):
+        cast = f"({member.type.name})" if member.type.members else ""
+        yield f"    state->{member.name} = {cast}{_literal(code, member.type, part)};".replace(TIE, " ")
     for memory, first in firsts.items():
         value = f"k < {len(first)} ? first_{memory}[k] : 0.0" if first else "0.0"
         yield f"    for (int32_t k = 0; k < {code.buffers[memory]}; k++) {{"

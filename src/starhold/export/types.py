@@ -13,49 +13,67 @@ from starhold.algebra.structured import Buffer
 from starhold.parts.contract import Parameter
 from starhold.trace.handles import kind_of
 from starhold.trace.recording import RESERVED
+from starhold.trace.source import TIE
 
 
 class Member(NamedTuple):
-    """A member of a struct has a name and a type; those of an array are called by their places in it."""
+    """A member of a struct has a name (of an array its place in it), a type, and its place in the tuple in Python."""
 
     name: str
     type: Type
+    place: int
     text: str = ""
     """Unit and meaning."""
 
 
 class Type(NamedTuple):
-    """A scalar (no members), or a struct. `elements`: a struct of one array, of that name. `named`: one of a NamedTuple,
-    which is passed by its address and loses the members that nobody reads."""
+    """A scalar (no members), or a struct; `kind`: what a trace calls it. `elements`: a struct of one array, of that name.
+    `named`: one of a NamedTuple, which is passed by its address."""
 
     name: str
+    kind: str
     members: tuple[Member, ...] = ()
     elements: str = ""
     named: bool = False
     text: str = ""
 
+    def braced(self, parts: list[str]) -> str:
+        """Return what sets a variable to these values of its members."""
+        pairs = zip(self.members, parts, strict=True)
+        # A literal needs its type nowhere but where it stands alone.
+        texts = [text.removeprefix(f"({member.type.name})") for member, text in pairs]
+        if self.named:
+            texts = [f".{member.name} = {text}" for member, text in zip(self.members, texts, strict=True)]
+        inner = ", ".join(map(tied, texts))
+        return f"{{{{{inner}}}}}" if self.elements else f"{{{inner}}}"
 
-DOUBLE, BOOL = Type("double"), Type("bool")
-VECTOR = Type("vector_t", tuple(Member(axis, DOUBLE) for axis in "xyz"), text="Components along the axes.")
-QUATERNION = Type(
-    "quaternion_t", tuple(Member(f"q{k}", DOUBLE) for k in range(4)), text="Scalar part first, Hamilton product."
-)
-MATRIX = Type("matrix_t", tuple(Member(f"row[{k}]", VECTOR) for k in range(3)), "row", text="Rows of a 3x3 matrix.")
+    def leaves(self, base: str = "") -> Iterator[str]:
+        """Yield how the numbers of a variable are reached."""
+        if not self.members:
+            yield base
+        for member in self.members:
+            yield from member.type.leaves(f"{base}.{member.name}")
 
 
-class Path(NamedTuple):
-    """A leaf of a value: how it is reached from the value, its kind, and the members of named structs on the way."""
+DOUBLE, BOOL = Type("double", NUMBER), Type("bool", TRUTH)
 
-    text: str
-    kind: str
-    through: tuple[tuple[str, str], ...]
+
+def _struct(name: str, parts: list[tuple[str, Type]], elements: str = "", text: str = "") -> Type:
+    return Type(name, name, tuple(Member(*part, k) for k, part in enumerate(parts)), elements, text=text)
+
+
+VECTOR = _struct("vector_t", [(axis, DOUBLE) for axis in "xyz"], text="Components along the axes.")
+QUATERNION = _struct("quaternion_t", [(f"q{k}", DOUBLE) for k in range(4)], text="Scalar part first, Hamilton product.")
+MATRIX = _struct("matrix_t", [(f"row[{k}]", VECTOR) for k in range(3)], "row", "Rows of a 3x3 matrix.")
+_PLAIN = {(DOUBLE, 3): VECTOR, (DOUBLE, 4): QUATERNION, (VECTOR, 3): MATRIX}
 
 
 class Types:
-    """Types by their names, each with one form."""
+    """Types by their names, each with one form. read: the fields of classes that somebody reads: structs have no others."""
 
-    def __init__(self) -> None:
+    def __init__(self, read: set[Any]) -> None:
         self.known = {kind.name: kind for kind in (QUATERNION, VECTOR, MATRIX)}
+        self.read = read
 
     def of(self, value: Any, annotation: str = "") -> Type | None:
         """Return the type of a value; None where nothing of it is left once equations are recorded."""
@@ -64,35 +82,56 @@ class Types:
         if not isinstance(value, tuple):
             return BOOL if kind_of(value) == TRUTH else DOUBLE
         if hasattr(value, "_fields"):
-            return self._struct(value)
-        kinds = [self.of(part) for part in value]
-        members = tuple(Member(f"part{k}", kind) for k, kind in enumerate(kinds) if kind is not None)
-        if len(members) < 2:
-            return members[0].type if members else None
-        first, count = members[0].type, len(value)
+            return self._of_fields(value)
+        kinds = [kind for part in value if (kind := self.of(part)) is not None]  # pyright: ignore
+        if len(kinds) < 2:
+            return kinds[0] if kinds else None
+        first, count = kinds[0], len(value)  # pyright: ignore
         if any(kind != first for kind in kinds):
-            return self.keep(Type("several_t", members))
+            return self.several("several_t", [(f"part{k}", self.of(part), k) for k, part in enumerate(value)])  # pyright: ignore
         # Of what is not annotated four numbers are a quaternion.
-        turns = not annotation or "Quaternion" in annotation or "Any" in annotation
-        plain = {(DOUBLE, 3): VECTOR, (VECTOR, 3): MATRIX, (DOUBLE, 4): QUATERNION if turns else None}.get((first, count))
+        if (first, count) in _PLAIN and (count != 4 or not annotation or re.search("Quaternion|Any", annotation)):
+            return _PLAIN[first, count]
         name = f"{first.name.removesuffix('_t')}s{count}_t"
-        return plain or self.keep(Type(name, tuple(Member(f"e[{k}]", first) for k in range(count)), "e"))
+        return self._keep(_struct(name, [(f"e[{k}]", first) for k in range(count)], "e"))
 
-    def _struct(self, value: Any) -> Type | None:
+    def _of_fields(self, value: Any) -> Type | None:
         cls = type(value)
         words = getattr(cls, "__annotations__", {})
-        kinds = {name: self.of(part, str(words.get(name, ""))) for name, part in zip(value._fields, value, strict=True)}
-        members = tuple(Member(free(name), kind, _meaning(cls, name)) for name, kind in kinds.items() if kind is not None)
-        text = sentence(cls.__doc__ or "")
-        return self.keep(Type(f"{title(cls)}_t", members, named=True, text=text)) if members else None
+        members: list[Member] = []
+        for place, (name, part) in enumerate(zip(value._fields, value, strict=True)):
+            kind = self.of(part, str(words.get(name, ""))) if (cls, name) in self.read else None
+            if kind is not None:
+                members.append(Member(free(name), kind, place, _meaning(cls, name)))
+        name = f"{title(cls)}_t"
+        return self._keep(Type(name, name, tuple(members), "", True, sentence(cls.__doc__ or ""))) if members else None
 
-    def keep(self, kind: Type) -> Type:
+    def several(self, name: str, parts: list[tuple[str, Type | None, int]], text: str = "") -> Type | None:
+        """Return a struct of values that only stand together."""
+        members = tuple(Member(word, kind, place) for word, kind, place in parts if kind is not None)
+        return self._keep(Type(name, name, members, "", bool(text), text)) if members else None
+
+    def _keep(self, kind: Type) -> Type:
         """Return a type under a name that no other has."""
         base, count = kind.name.removesuffix("_t"), 1
         while self.known.get(kind.name, kind) != kind:
             count += 1
-            kind = kind._replace(name=f"{base}_{count}_t")
+            kind = kind._replace(name=f"{base}_{count}_t", kind=f"{base}_{count}_t")
         return self.known.setdefault(kind.name, kind)
+
+    def members(self, kind: Type | None, value: Any) -> Iterator[tuple[Member, Any]]:
+        """Yield the members of a struct and their values among those of a tuple, or of that within tuples of one value."""
+        for member in kind.members if kind is not None else ():
+            yield member, self.within(value)[member.place]
+
+    def within(self, value: Any) -> Any:
+        """Return what tuples of one value hold."""
+        while isinstance(value, tuple) and not hasattr(value, "_fields"):
+            held = [part for part in value if self.of(part) is not None]  # pyright: ignore
+            if len(held) != 1:
+                break
+            value = held[0]
+        return value
 
 
 def free(name: str) -> str:
@@ -104,9 +143,8 @@ def free(name: str) -> str:
 def title(cls: Any) -> str:
     """A struct is called as its class; parts have classes of the same names, which are called after the part too."""
     name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower().strip("_")
-    stem = cls.__module__.rpartition(".")[2]
     ambiguous = name in ("params", "memory", "numbers", "reading") or (name == "state" and ".bodies." not in cls.__module__)
-    return f"{stem}_{name}" if ambiguous else name
+    return f"{cls.__module__.rpartition('.')[2]}_{name}" if ambiguous else name
 
 
 def _meaning(cls: Any, name: str) -> str:
@@ -121,27 +159,29 @@ def _meaning(cls: Any, name: str) -> str:
     return ""
 
 
+def tied(text: str) -> str:
+    """Return a text that stays on one line where it is short."""
+    return text.replace(" ", TIE) if len(text) < 65 else text
+
+
 def sentence(doc: str) -> str:
     """Return the first sentence of a docstring, unless Python made it."""
     text = " ".join(doc.split())
     return "" if re.match(r"\w+\(.*\)$", text) else re.split(r"(?<=\.) (?=[A-Z])", text, maxsplit=1)[0]
 
 
-def paths(kind: Type | None, base: str, link: str = ".") -> Iterator[Path]:
-    """Yield the leaves of a value of this type in order, of which `base` is the name."""
-    if kind is not None and not kind.members:
-        yield Path(base, TRUTH if kind == BOOL else NUMBER, ())
-    for member in kind.members if kind is not None else ():
-        for path in paths(member.type, f"{base}{link}{member.name}"):
-            yield path._replace(through=((kind.name, member.name), *path.through)) if kind and kind.named else path
-
-
-def comment(text: str, width: int = 104) -> list[str]:
-    """Return a text as the lines of a comment; none of nothing."""
+def wrapped(text: str, width: int = 104) -> list[str]:
+    """Return a text in lines."""
     lines: list[str] = []
     for line in text.replace("*/", "* /").replace("/*", "/ *").splitlines():
         indent = " " * (len(line) - len(line.lstrip()))
         lines += textwrap.wrap(line, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False) or [""]
+    return lines
+
+
+def comment(text: str) -> list[str]:
+    """Return a text as the lines of a comment; none of nothing."""
+    lines = wrapped(text)
     if len(lines) < 2:
         return [f"/* {line} */" for line in lines]
     return [f"/* {lines[0]}", *(f"   {line}".rstrip() for line in lines[1:-1]), f"   {lines[-1]} */"]

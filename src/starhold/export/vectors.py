@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.structure import flatten, leaves, mapped
+from starhold.algebra.structure import flatten, leaves, mapped, places
 from starhold.algebra.structured import Buffer
 from starhold.export.code import Code
 from starhold.export.law import numbers
+from starhold.export.types import Type
 from starhold.trace.calling import bind
 from starhold.trace.machine import load
 from starhold.trace.recording import Recorder
@@ -34,9 +35,15 @@ class Vector(NamedTuple):
     digest: int
 
 
-def kept_inputs(code: Code) -> list[bool]:
-    """Tell of each number of the inputs whether the law reads it."""
-    return [code.needs.reads(path) for path in code.signature.params[2].leaves]
+def kept_inputs(code: Code) -> list[int]:
+    """Return the places of those of the inputs' numbers that the law reads."""
+
+    def those(kind: Type | None, value: Any) -> list[int]:
+        found = [place for member, part in code.types.members(kind, value) for place in those(member.type, part)]
+        return found or [code.types.within(value)]
+
+    kind = code.given["input"]
+    return [] if kind is None else those(kind, places(code.flight.inputs))
 
 
 def random_columns(
@@ -137,8 +144,8 @@ def vectors(code: Code, seed: int = 1) -> list[Vector]:
             column = random_columns(rng, code.flight.inputs, 1, edges=0.1 * (run % 2))[:, 0]
             inputs = with_numbers(code.flight.inputs, column)
             command, state = step(state, inputs)
-            flat = [x for x, kept in zip(numbers(inputs), keep, strict=True) if kept]
-            found.append(Vector(k == 0, flat, numbers(command), digest(numbers(state))))
+            given = numbers(inputs)
+            found.append(Vector(k == 0, [given[place] for place in keep], numbers(command), digest(numbers(state))))
     return found
 
 

@@ -274,7 +274,9 @@ class _Walk:
         total = _Part(Work(), {})
         for s in block:
             if isinstance(s, Op):
-                total = total.plus(_Part(Work(**{_KIND[s.operation.name]: 1}), {}))
+                # What makes structs of numbers is no work.
+                if (kind := _KIND.get(s.operation.name)) is not None:
+                    total = total.plus(_Part(Work(**{kind: 1}), {}))
                 self._note(s, known)
             elif isinstance(s, (Load, Store)):
                 self._place(function, s, self._form(s.index, known))

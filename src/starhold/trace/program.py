@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple, TypeAlias
 
 from starhold.algebra.operations import Operation
@@ -209,61 +209,51 @@ def _same(a: Value, b: Value) -> bool:
     return type(a) is type(b) and repr(a) == repr(b)
 
 
-def _arguments(s: Call, names: set[Value]) -> Sequence[Value] | None:
-    return s.args
-
-
-def live_names(
-    block: Block, outs: Iterable[Value], arguments: Callable[..., Sequence[Value] | None] = _arguments
-) -> set[Value]:
-    """Return what is read for the sake of the outs, of what is written, or of functions that are called. arguments(call,
-    names) gives what a call reads where these names are read; None where it is not needed."""
+def live_names(block: Block, outs: Iterable[Value]) -> set[Value]:
+    """Return what is read for the sake of the outs, or of what is written."""
     names, before = set(outs), -1
     # Backwards, so that what is read by what is read is mostly found at once.
     order = [*statements(block)][::-1]
-    acts = {id(s): _acts(s.body) for s in order if isinstance(s, (Loop, Branch))}
+    acts = {id(s): writes((s,)) for s in order if isinstance(s, (Loop, Branch, Call))}
     while before != (before := len(names)):
+        left: list[Any] = []
         for s in order:
-            if isinstance(s, (Op, Load)):
-                if s.ref in names:
-                    names.update(reads((s,)))
-            elif isinstance(s, Loop):
+            if isinstance(s, Loop):
                 slots = [slot for slot in s.slots if {slot.name, slot.end} & names]
                 if slots or acts[id(s)]:
                     names.update((s.most, s.done, *(x for slot in slots for x in (slot.before, slot.after))))
+                left.append(s)
             elif isinstance(s, Branch):
                 if acts[id(s)]:
                     names.add(s.truth)
-            elif isinstance(s, Call):
-                names.update(arguments(s, names) or ())
-            else:
+            elif isinstance(s, Store) or acts.get(id(s)) or any(ref in names for ref in _refs(s)):
                 names.update(reads((s,)))
+            else:
+                left.append(s)
+        order = left
     return names
 
 
-def _acts(block: Block) -> bool:
-    """Tell whether a block does anything but compute."""
-    return any(isinstance(s, (Store, Call)) for s in statements(block))
+def _refs(s: Op | Load | Call) -> list[str]:
+    return [ref for ref, _ in s.refs] if isinstance(s, Call) else [s.ref]
 
 
-def pruned(block: Block, names: set[Value], arguments: Callable[..., Sequence[Value] | None] = _arguments) -> Block:
-    """Return the block without what gives none of these names; arguments: as `live_names` takes it."""
+def pruned(block: Block, names: set[Value]) -> Block:
+    """Return the block without what gives none of these names."""
     found: list[Any] = []
     for s in block:
         if isinstance(s, Loop):
             slots = tuple(slot for slot in s.slots if {slot.name, slot.end} & names)
-            s = s._replace(slots=slots, head=pruned(s.head, names, arguments), body=pruned(s.body, names, arguments))
-            if not slots and not _acts(s.body):
+            s = s._replace(slots=slots, head=pruned(s.head, names), body=pruned(s.body, names))
+            if not slots and not writes(s.body):
                 continue
         elif isinstance(s, Branch):
-            s = s._replace(body=pruned(s.body, names, arguments))
-            if not _acts(s.body):
+            s = s._replace(body=pruned(s.body, names))
+            if not writes(s.body):
                 continue
         elif isinstance(s, Call):
-            given = arguments(s, names)
-            if given is None:
+            if not writes((s,)) and names.isdisjoint(_refs(s)):
                 continue
-            s = s._replace(args=tuple(given))
         elif isinstance(s, (Op, Load)) and s.ref not in names:
             continue
         found.append(s)
