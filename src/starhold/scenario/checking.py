@@ -10,7 +10,7 @@ from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import contextmanager
 from datetime import date, time
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import PydanticCustomError
@@ -20,7 +20,12 @@ from starhold.laws.catalogue import Law, from_file, told
 from starhold.loop.kernels import form, make_step
 from starhold.scenario.tables import check_name
 
+if TYPE_CHECKING:
+    from starhold.parts.part import Part
+    from starhold.scenario.bodies.interface import Body
+
 _Model = TypeVar("_Model", bound=BaseModel)
+_Part = TypeVar("_Part", bound="Part | Body")
 RENAMED = {
     "double_cover": "quaternion_sign",
     "slope": "surface_gain",
@@ -138,24 +143,33 @@ def _law_of(table: dict[str, Any], known: Mapping[str, Law], where: str, key: st
 
 
 def _law_in(table: dict[str, Any], known: Mapping[str, Law], body: str, folder: Path, where: str, key: str) -> Law:
+    def read(path: Path) -> Law:
+        law = from_file(path, known)
+        if law.body != body:
+            raise ValueError(f"a law for the body {law.body}, not for {body}")
+        return law
+
+    return in_file(table, read, "law", folder, where, key)
+
+
+def in_file(table: Mapping[str, Any], read: Callable[[Path], _Part], what: str, folder: Path, where: str, key: str) -> _Part:
+    """The law, body or other part (`what` in errors) that `read` finds in the `file` of a raw table, called `key` in errors.
+    InputError where there is none, or its name is none that a file may give."""
     given, key = table["file"], f"{key}.file"
     if not isinstance(given, str):
         raise InputError(where, key, show(given), 'the name of a Python file, such as "mine.py"')
     if "type" in table:
         raise InputError(where, key, show(given), "either a type or a file, not both")
     try:
-        law = from_file(folder / given, known)
-        if law.body != body:
-            raise ValueError(f"a law for the body {law.body}, not for {body}")
+        found = read(folder / given)
+        check_name(found.name)
+        return found
     except OSError as error:
-        raise InputError(where, key, f"{show(given)}: {error.strerror}", "a Python file that holds a law") from None
-    except ValueError as error:
-        raise InputError(where, key, "", f"{show(given)}: {error}") from None
-    try:
-        check_name(law.name)
+        raise InputError(where, key, f"{show(given)}: {error.strerror}", f"a Python file that holds a {what}") from None
     except PydanticCustomError as error:
         raise InputError(where, key, show(given), f"a file named with {error.message()}") from None
-    return law
+    except ValueError as error:
+        raise InputError(where, key, "", f"{show(given)}: {error}") from None
 
 
 def make_gains(law: Law, values: list[Any], spec: Any, craft: Any, where: str, key: str) -> Any:

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, cast
 
 from pydantic import Field, create_model
-from pydantic_core import PydanticCustomError
 
 from starhold.algebra.quantity import quantities
 from starhold.algebra.structured import Buffer
@@ -25,10 +24,10 @@ from starhold.parts.catalogue import PACKAGES, as_part, from_file, parts, read_m
 from starhold.parts.orbit import body_of
 from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import Goal
-from starhold.scenario.checking import free_name, nearest, show, try_law, validate
+from starhold.scenario.checking import free_name, in_file, nearest, show, try_law, validate
 from starhold.scenario.schema import columns
 from starhold.scenario.shared import own_fields, refuse_own, values_of
-from starhold.scenario.tables import Name, Table, check_name
+from starhold.scenario.tables import Name, Table
 
 ROLES = tuple(role for role in PACKAGES if role != "body")
 """Roles of parts that stand in [[part]] tables; a law has its own, and so has the body."""
@@ -81,7 +80,7 @@ def read_part(
     table: dict[str, Any], body: str, folder: Path, where: str, key: str, shared: Mapping[str, Any], units: Any = None
 ) -> Fitted:
     """The part of a raw table, called `key` in errors, under the name that this gives, if any."""
-    part = _in_file(table, folder, where, key) if "file" in table else _of_type(table, where, key)
+    part = in_file(table, _read, "part", folder, where, key) if "file" in table else _of_type(table, where, key)
     if part.body not in ("", body):
         raise InputError(where, key, f"{part.name}, for the body {part.body}", f"a part for {body}")
     table = {name: value for name, value in table.items() if name != "file"} | {"type": part.name}
@@ -108,25 +107,11 @@ def _of_type(table: dict[str, Any], where: str, key: str) -> Part:
     raise InputError(where, f"{key}.type", found, f"{nearest(str(name), list(known))}; or a file")
 
 
-def _in_file(table: dict[str, Any], folder: Path, where: str, key: str) -> Part:
-    given, key = table["file"], f"{key}.file"
-    if not isinstance(given, str):
-        raise InputError(where, key, show(given), 'the name of a Python file, such as "mine.py"')
-    if "type" in table:
-        raise InputError(where, key, show(given), "either a type or a file, not both")
-    try:
-        role = role_of(read_module(folder / given))
-        if role not in ROLES:
-            raise ValueError(f"its role must be one of {', '.join(ROLES)}, not {role}" if role else "it declares no ROLE")
-        part = from_file(folder / given, parts(role), as_part)
-        check_name(part.name)
-    except OSError as error:
-        raise InputError(where, key, f"{show(given)}: {error.strerror}", "a Python file that holds a part") from None
-    except PydanticCustomError as error:
-        raise InputError(where, key, show(given), f"a file named with {error.message()}") from None
-    except ValueError as error:
-        raise InputError(where, key, "", f"{show(given)}: {error}") from None
-    return part
+def _read(path: Path) -> Part:
+    role = role_of(read_module(path))
+    if role not in ROLES:
+        raise ValueError(f"its role must be one of {', '.join(ROLES)}, not {role}" if role else "it declares no ROLE")
+    return from_file(path, parts(role), as_part)
 
 
 def with_rows(part: Part, table: dict[str, Any], folder: Path, where: str, key: str) -> dict[str, Any]:

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, cast
 
 from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo, create_model
-from pydantic_core import PydanticCustomError
 
 from starhold.algebra.quantity import quantities
 from starhold.algebra.vector import ZERO
@@ -25,11 +24,11 @@ from starhold.parts.catalogue import body_from_file, parts, told
 from starhold.parts.part import Fitted, Part
 from starhold.scenario import bodies
 from starhold.scenario.bodies.interface import Body
-from starhold.scenario.checking import nearest, show
+from starhold.scenario.checking import in_file, nearest, show
 from starhold.scenario.parts import params_of, with_rows
 from starhold.scenario.quantity import quantity
 from starhold.scenario.schema import LawTable, ScenarioTable, SeededTiming, columns
-from starhold.scenario.tables import Table, check_name
+from starhold.scenario.tables import Table
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
@@ -166,7 +165,7 @@ class NamedByTable:
             raise InputError(where, MARKER, show(table), "a table")
         given = cast(dict[str, Any], table)
         if "file" in given:
-            return _from_file(given, where, folder)
+            return in_file(given, lambda path: _read(path, folder), "body", folder, where, MARKER)
         name, own = given.get("type"), bodies.bodies()
         if isinstance(name, str) and name in own:
             raise InputError(where, f"{MARKER}.type", show(name), f"the [{own[name].marker}] table, which gives it")
@@ -184,24 +183,11 @@ class NamedByTable:
 NAMED_BY_TABLE = NamedByTable()
 
 
-def _from_file(table: dict[str, Any], where: str, folder: Path) -> AnyBody:
-    given, key = table["file"], f"{MARKER}.file"
-    if not isinstance(given, str):
-        raise InputError(where, key, show(given), 'the name of a Python file, such as "mine.py"')
-    if "type" in table:
-        raise InputError(where, key, show(given), "either a type or a file, not both")
-    try:
-        part = body_from_file(folder / given)
-        check_name(part.name)
-        if part.file is None and part.name in bodies.bodies():
-            raise ValueError(f"the body {part.name}, which the [{bodies.bodies()[part.name].marker}] table gives")
-        return AnyBody(part, folder)
-    except OSError as error:
-        raise InputError(where, key, f"{show(given)}: {error.strerror}", "a Python file that holds a body") from None
-    except PydanticCustomError as error:
-        raise InputError(where, key, show(given), f"a file named with {error.message()}") from None
-    except ValueError as error:
-        raise InputError(where, key, "", f"{show(given)}: {error}") from None
+def _read(path: Path, folder: Path) -> AnyBody:
+    part, known = body_from_file(path), bodies.bodies()
+    if part.file is None and part.name in known:
+        raise ValueError(f"the body {part.name}, which the [{known[part.name].marker}] table gives")
+    return AnyBody(part, folder)
 
 
 @cache
