@@ -8,14 +8,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from starhold.algebra.quantity import Quantity, quantities
+from starhold.algebra.quantity import Quantity
 from starhold.algebra.scalar import less, maximum, sqrt, where
 from starhold.algebra.structure import flatten, leaves, places
 from starhold.algebra.vector import most
 from starhold.analysis.meter import Meter, Metric, Window, tail_start
 from starhold.analysis.ranking import COSTS, Measure, MetricSet
-from starhold.loop.closed_loop import ClosedLoop
-from starhold.loop.kernels import make_step
 
 if TYPE_CHECKING:
     from starhold.simulation.lane import Recording
@@ -36,6 +34,7 @@ class Noted(NamedTuple):
 def make_meter(recorded: Mapping[str, Quantity], steps: int, period: float, clock: str) -> Meter:
     """The meter of these recorded quantities, for flights of so many steps of a period, or for samples at such intervals;
     clock: the unit of time."""
+    recorded = _with_size(recorded)
     first = Noted(0.0, 0.0, (0.0,) * len(recorded))
     rows = places(first)
     windows, table = dict[str, Window](), dict[str, Metric]()
@@ -76,12 +75,6 @@ def metric_set(run: Recording) -> MetricSet:
 
 def _measured(run: Recording) -> dict[str, Quantity]:
     return _with_size({name: quantity for name, quantity in run.columns.items() if name in run.arrays})
-
-
-def recorded_of(loop: ClosedLoop) -> dict[str, Quantity]:
-    """The recorded quantities of the body and of effectors by name, but for those whose length says nothing."""
-    own, records, _, _ = make_step(loop.composition()).sample(loop.carry(), 0, loop.setup())
-    return _with_size({name: one for part in reversed((own, *records)) for name, one in quantities(type(part)).items()})
 
 
 def _with_size(recorded: Mapping[str, Quantity]) -> dict[str, Quantity]:

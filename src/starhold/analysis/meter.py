@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
@@ -16,12 +16,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra.quantity import Quantity, quantities
 from starhold.algebra.scalar import less, less_equal, sqrt, where
 from starhold.algebra.structure import flatten
 from starhold.algebra.vector import dot, most
 from starhold.algebra.words import number_of
 from starhold.analysis.metrics import ALMOST, KEPT, LAST
-from starhold.loop.closed_loop import Composition
+from starhold.loop.closed_loop import ClosedLoop, Composition
 from starhold.loop.kernels import Arguments, Kernel, Observer, form, make_step, over_samples
 from starhold.trace.program import Program
 
@@ -233,13 +234,23 @@ def _observing(note: Note, parts: Composition) -> Callable[..., Any]:
 def sampled(parts: Composition) -> Callable[..., dict[str, Any]]:
     """Return what gives the recorded quantities of a control instant, of the body and of effectors, by name:
     read(decided, step, setup)."""
-    sample = make_step(parts).sample
 
     def read(decided: Any, step: Any, setup: Any) -> dict[str, Any]:
-        own, records, _, _ = sample(decided, step, setup)
-        return {name: value for part in reversed((own, *records)) for name, value in part._asdict().items()}
+        return {name: value for part in _recorded(parts, decided, step, setup) for name, value in part._asdict().items()}
 
     return read
+
+
+def recorded_of(loop: ClosedLoop) -> dict[str, Quantity]:
+    """The recorded quantities of the body and of effectors by name."""
+    there = _recorded(loop.composition(), loop.carry(), 0, loop.setup())
+    return {name: quantity for part in there for name, quantity in quantities(type(part)).items()}
+
+
+def _recorded(parts: Composition, decided: Any, step: Any, setup: Any) -> Iterator[Any]:
+    """What is recorded of effectors from the last to the first, and of the body, whose names count most."""
+    own, records, _, _ = make_step(parts).sample(decided, step, setup)
+    return reversed((own, *records))
 
 
 def window_ends(steps: int, marks: Sequence[int]) -> list[int]:

@@ -26,6 +26,7 @@ from starhold.report.plots import (
     sound,
     thin,
     thin_times,
+    thinning,
 )
 from starhold.scenario.bodies.rigid_body.craft import sure_torque, wheels_of
 from starhold.scenario.bodies.rigid_body.faults import fault_times
@@ -105,11 +106,6 @@ def _begun(flights: Sequence[Flight]) -> list[Mark]:
         for name, modes in of.items()
         for one in modes[:MOST_MARKS]
     ]
-
-
-def thinning(count: int, points: int) -> int:
-    """The number of samples of which a curve keeps two, of so many in all for about `points`."""
-    return 1 if count <= points else int(np.ceil(2 * count / points))
 
 
 def steps_within(flight: Flight, kind: str) -> list[int | None]:

@@ -15,7 +15,7 @@ from starhold.parts.bodies.libration_point import EARTH_DIAMETER, Sample
 from starhold.report.colours import colour
 from starhold.report.phase_portrait import phase_portrait
 from starhold.report.plane_plots import Guide, Line, Plane, PlanePlot, ring
-from starhold.report.plots import Curve, Panel, Plot, near, positive, recorded_plots, sound, thin, thin_times
+from starhold.report.plots import Curve, Panel, Plot, near, positive, recorded_plots, sound, thin, thin_times, thinning
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
@@ -49,7 +49,7 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario) -> PathP
     entries = [scenario.pick(flight.name) for flight in flights]
     units = scenario.table.libration.units
     longest = max((flight.recording["time"] for flight in flights), key=len)
-    factor = 1 if len(longest) <= points else int(np.ceil(2 * len(longest) / points))
+    factor = thinning(len(longest), points)
     clock, tick = ("years", YEAR) if longest[-1] * units.time > LONG else ("days", DAY)
     rings = sorted({goal.radius for goal in map(_goal, entries) if isinstance(goal, CircleGoal)})
     portrait = phase_portrait(flights, entries, scenario)

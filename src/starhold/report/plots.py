@@ -66,6 +66,11 @@ class Mark(NamedTuple):
     word: str = ""
 
 
+def thinning(count: int, points: int) -> int:
+    """The number of samples of which a curve keeps two, of so many in all for about `points`."""
+    return 1 if count <= points else int(np.ceil(2 * count / points))
+
+
 def thin(values: Curve, factor: int) -> Curve:
     """Two of every `factor` samples, to be drawn over `thin_times`.
 

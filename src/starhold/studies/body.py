@@ -6,14 +6,18 @@ from collections.abc import Mapping, Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+
+from starhold.analysis import any_body
+from starhold.analysis.meter import recorded_of
+from starhold.certification.certificate import Certificate
+from starhold.simulation.lane import label
 
 if TYPE_CHECKING:
     from starhold.analysis.departure import Departure
     from starhold.analysis.meter import Meter
     from starhold.analysis.ranking import MetricSet
     from starhold.analysis.trial import Trial
-    from starhold.certification.certificate import Certificate
     from starhold.scenario.reading import LawEntry, Scenario
     from starhold.simulation.lane import Recording
 
@@ -36,56 +40,60 @@ class Issued(NamedTuple):
     """The mode before, of a certificate about how that hands over."""
 
 
-class BodyStudy(Protocol):
-    """All that flying, measuring and certifying ask of a body; `starhold.studies.bodies` holds one `STUDY` a module."""
+class BodyStudy:
+    """All that flying, measuring and certifying ask of a body; `starhold.studies.bodies` holds one `STUDY` a module. As it
+    stands it is the study of any body: what its part records is flown and measured, in the units of the recording, and
+    nothing is claimed."""
 
     def name_samples(self, scenario: Scenario, loop: Any, samples: Any, carry: Any) -> Recording:
         """Name the samples of `fly`, with what they are measured by among the attributes."""
-        ...
+        return label(loop, samples, carry, scenario.table.simulation.record_every)
 
     def metrics_of(self, run: Recording) -> dict[str, Any]:
         """Measure a recorded run; `diverged_at` (s) is None for a motion that was not lost."""
-        ...
+        return any_body.measure(run)
 
     def meter(self, scenario: Scenario, loop: Any, gains: Any, extras: Sequence[str] = (), cones: Cones = NO_CONES) -> Meter:
         """Make what measures many flights along their way, as `metrics_of` does recordings of every control step. gains:
         those of all lanes, with an array (lanes,) in place of a number that differs; extras: metrics that are measured where
-        they are asked for; cones: axes with the directions that they are to stay away from, by
-        the names of their metrics. ValueError where the body has no
-        such thing."""
-        ...
+        they are asked for; cones: axes with the directions that they are to stay away from, by the names of their metrics.
+        ValueError where the body has no such thing."""
+        nothing_more(extras, cones)
+        clock = getattr(loop.body.module, "TIME_UNIT", "s")
+        return any_body.make_meter(recorded_of(loop), scenario.table.simulation.steps, loop.period, clock)
 
     def metric_set(self, run: Recording) -> MetricSet:
         """Say how metrics of such runs are told and ranked."""
-        ...
+        return any_body.metric_set(run)
 
     def state_names(self, run: Recording) -> Sequence[str]:
         """Name the recorded quantities that the integration gives."""
-        ...
+        return [name for name in run.columns if name in run.arrays]
 
     def resources(self, entry: LawEntry) -> Values:
         """List what a law has beside its gains."""
-        ...
+        return {}
 
     def call_costs(self, loop: Any, run: Recording) -> dict[str, float]:
         """Time the law's calls; empty where that is not worth telling."""
-        ...
+        return {}
 
     def certify(self, scenario: Scenario, entry: LawEntry, loop: Any) -> list[Issued]:
         """Certify one law, as it starts and after each change that it knows of."""
-        ...
+        # A certificate without claims is undecided.
+        return [Issued(Certificate(entry.name, {"body": scenario.body, "law": entry.law.name}, ()), loop)]
 
     def departures(self, issued: Issued, loop: Any, run: Recording) -> Mapping[str, tuple[Departure, ...]]:
         """Tell how a run leaves the proved claims of a certificate, by their kinds."""
-        ...
+        return {}
 
     def fly_claims(self, issued: Issued) -> Trial | None:
         """Try a certificate by flights, None where it claims nothing that can be flown. Raises `BrokenClaimError`."""
-        ...
+        return None
 
     def start_inside(self, issued: Issued) -> dict[str, bool]:
         """Tell, for each kind of proved claim about a set, whether the loop's start lies in it."""
-        ...
+        return {}
 
 
 def study_of(body: str) -> BodyStudy:

@@ -6,14 +6,12 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, final
 
-import numpy as np
-
 from starhold.report.body import BodyReport, PageParts
 from starhold.report.figures import POINTS, over_time, without_runs
 from starhold.report.page_parts import POINTS as PAGE_POINTS
 from starhold.report.page_parts import over_time as over_time_data
 from starhold.report.page_parts import rounded
-from starhold.report.plots import Curve, Plot, recorded_plots, thin_times
+from starhold.report.plots import Curve, Plot, recorded_plots, thin_times, thinning
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -49,7 +47,6 @@ REPORT: BodyReport = AnyBodyReport()
 
 def collect(flights: Sequence[Flight], points: int) -> tuple[Curve, list[Plot]]:
     """Times, and a plot of each quantity that all flights record, a panel for each component; thinned to about `points`."""
-    longest = max((flight.recording for flight in flights), key=lambda run: len(run["time"]))
-    count = len(longest["time"])
-    factor = 1 if count <= points else int(np.ceil(2 * count / points))
-    return thin_times(longest["time"], factor), recorded_plots(flights, factor)
+    longest = max((flight.recording["time"] for flight in flights), key=len)
+    factor = thinning(len(longest), points)
+    return thin_times(longest, factor), recorded_plots(flights, factor)

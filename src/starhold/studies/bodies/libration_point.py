@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, final
 from starhold.analysis.libration_point import METRICS, CircleGoal, EquilibriumGoal, goal_of, make_meter, measure
 from starhold.parts.bodies.libration_point import Units
 from starhold.parts.craft import vector
-from starhold.simulation.lane import label
 from starhold.studies.body import NO_CONES, BodyStudy, Cones, Issued, Values, nothing_more
 
 if TYPE_CHECKING:
@@ -23,12 +22,13 @@ if TYPE_CHECKING:
 
 
 @final
-class LibrationPointStudy:
-    """Runs are scaled, with what their units are worth among the attributes; metrics are in SI."""
+class LibrationPointStudy(BodyStudy):
+    """Runs are scaled, with what their units are worth among the attributes; metrics are in SI. Calls are not timed where
+    control surfaces move within hours."""
 
     def name_samples(self, scenario: Scenario, loop: ClosedLoop, samples: Any, carry: Any) -> Recording:
         units, goal = scenario.table.libration.units, goal_of(loop.gains)
-        run = label(loop, samples, carry, scenario.table.simulation.record_every)
+        run = super().name_samples(scenario, loop, samples, carry)
         worth = {"length_unit_m": units.length, "time_unit_s": units.time, "rate_unit_rad_per_s": units.rate}
         worth |= {"velocity_unit_m_per_s": units.velocity, "acceleration_unit_m_per_s2": units.acceleration}
         worth |= {"settling_tolerance": scenario.table.settling.tolerance}
@@ -63,10 +63,6 @@ class LibrationPointStudy:
     def resources(self, entry: LawEntry) -> Values:
         return {"limit": (entry.options.limit, "1")} | ({"lag": (entry.options.lag, "1")} if entry.options.lag else {})
 
-    def call_costs(self, loop: ClosedLoop, run: Recording) -> dict[str, float]:
-        # Calls are not timed where control surfaces move within hours.
-        return {}
-
     def certify(self, scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[Issued]:
         from starhold.certification.station import certify_station
 
@@ -88,4 +84,4 @@ class LibrationPointStudy:
         return start_inside(issued.certificate, issued.loop)
 
 
-STUDY: BodyStudy = LibrationPointStudy()
+STUDY = LibrationPointStudy()

@@ -7,14 +7,15 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, final
 
 from starhold.algebra.quantity import Quantity
+from starhold.analysis.meter import recorded_of
 from starhold.analysis.rigid_body import EXTRAS, METRICS, error_angle, make_meter, measure
 from starhold.analysis.transient import Limits, against_limits
 from starhold.laws.modes import mode_laws
 from starhold.parts.effectors.wheels import gives_what_is_asked
 from starhold.parts.epoch import OF_DATE, iso_text
 from starhold.scenario.bodies.rigid_body.start import date_of_axes
-from starhold.simulation.lane import fly, label
-from starhold.studies.body import NO_CONES, BodyStudy, Cones, Issued, Values
+from starhold.simulation.lane import fly
+from starhold.studies.body import NO_CONES, BodyStudy, Cones, Issued
 from starhold.studies.modes import certify_modes, mode_departures, same_numbers
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ TRANSIENT = ("rate_limit", "acceleration_limit", "angle_end", "rate_end")
 
 
 @final
-class RigidBodyStudy:
+class RigidBodyStudy(BodyStudy):
     """Everything is in SI. Laws with wheels are certified anew after faults that they know of."""
 
     def name_samples(self, scenario: Scenario, loop: ClosedLoop, samples: Any, carry: Any) -> Recording:
@@ -43,7 +44,7 @@ class RigidBodyStudy:
             told["epoch"] = iso_text(orbit.epoch)
         if of_date is not None:
             told |= {"epoch": iso_text(of_date), "frame": OF_DATE}
-        run = label(loop, samples, carry, scenario.table.simulation.record_every)
+        run = super().name_samples(scenario, loop, samples, carry)
         angle = {"error_angle": error_angle(run["attitude_error"])}
         meant = {"error_angle": Quantity("rad", "angle to the target")}
         attrs = run.attrs | told | {"seed": scenario.table.simulation.seed}
@@ -71,7 +72,7 @@ class RigidBodyStudy:
         settling = scenario.table.settling
         tolerances = settling.attitude_tolerance, settling.rate_tolerance
         steps, still = scenario.table.simulation.steps, loop.target.part.flag("STILL")
-        wheels = bool(loop.rotors)
+        wheels = "wheel_momentum" in recorded_of(loop)
         return make_meter(steps, loop.period, loop.limit, tolerances, extras, cones, still=still, wheels=wheels)
 
     def metric_set(self, run: Recording) -> MetricSet:
@@ -80,9 +81,6 @@ class RigidBodyStudy:
     def state_names(self, run: Recording) -> tuple[str, ...]:
         wheels = ("wheel_momentum",) if "wheel_momentum" in run.arrays else ()
         return ("attitude", "rate", "position", "velocity", *wheels)
-
-    def resources(self, entry: LawEntry) -> Values:
-        return {}
 
     def call_costs(self, loop: ClosedLoop, run: Recording) -> dict[str, float]:
         from starhold.analysis.cost import call_costs, recorded_states
@@ -113,7 +111,7 @@ class RigidBodyStudy:
         return start_inside(issued.certificate, issued.loop) if issued.mode in (None, 1) and issued.before is None else {}
 
 
-STUDY: BodyStudy = RigidBodyStudy()
+STUDY = RigidBodyStudy()
 
 
 def _differs(event: Event, issued: Issued) -> bool:
