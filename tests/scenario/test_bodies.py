@@ -159,7 +159,6 @@ from pydantic import create_model
 from starhold.algebra.vector import ZERO
 from starhold.laws.interface import Gain, fields
 from starhold.laws.catalogue import catalogue
-from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.libration_point import Libration, PointState, Units
 from starhold.scenario.bodies.interface import Body
 from starhold.scenario.schema import LawTable, ScenarioTable, Timing, columns
@@ -200,15 +199,8 @@ class Asteroid(Body):
         given = table.asteroid
         return Made(Libration(1.0, given.stiffness, 10.0 * given.distance, given.distance, 0.9, 3.0))
 
-    def options(self, scenario, own, gains, key):
-        return None
-
-    def build(self, scenario, entry):
-        start = PointState((0.1, 0.0, 0.0), ZERO, ZERO)
-        return ClosedLoop(scenario.craft, entry.law, entry.gains, start, scenario.table.simulation.control_period)
-
-    def examine(self, scenario, entry, loop):
-        pass
+    def given(self, scenario, entry):
+        return {"start": PointState((0.1, 0.0, 0.0), ZERO, ZERO)}
 
 
 BODY = Asteroid()

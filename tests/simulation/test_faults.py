@@ -158,7 +158,7 @@ def test_gains_follow_the_inertia_and_the_torque_left(action):
     struck, acted, changed, known = loop.events
     rows = [[float(x) for x in row.split(",")] for row in WHEELED.strip("[]").split("], [")]
     assert acted.gains == entry.law.design(craft_with(scenario, rows), spec)
-    body, left = craft_with(scenario, rows), torque_limit(scenario.table, wheels_after(acted))
+    body, left = craft_with(scenario, rows), torque_limit(scenario.table, acted.parts)
     assert left < scenario.craft.torque_limit
     assert struck.craft == body
     assert acted.craft == acted.nominal == body._replace(torque_limit=left)

@@ -126,7 +126,7 @@ def test_mpc_plans_within_the_wheels_torque_and_after_a_loss_within_what_is_left
     run = flown(loop)
     size = np.abs(run["command"]).max(axis=1) if kind == "axis" else np.linalg.norm(run["command"], axis=1)
     before, after = scenario.craft.torque_limit, loop.events[1].nominal.torque_limit
-    assert after == torque_limit(scenario.table, wheels_after(loop.events[1])) < before
+    assert after == torque_limit(scenario.table, loop.events[1].parts) < before
     assert size[:250].max() == pytest.approx(before, rel=1e-9)
     assert size[250:].max() <= after * (1.0 + 1e-12)
     told = np.delete(np.arange(601), np.arange(200, 250))

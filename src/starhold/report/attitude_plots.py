@@ -28,7 +28,7 @@ from starhold.report.plots import (
     thin_times,
     thinning,
 )
-from starhold.scenario.bodies.rigid_body.craft import sure_torque, wheels_of
+from starhold.scenario.bodies.rigid_body.craft import effectors_of, sure_torque, wheels_of
 from starhold.scenario.bodies.rigid_body.faults import fault_times
 
 if TYPE_CHECKING:
@@ -241,7 +241,7 @@ def _limit(flights: Sequence[Flight], scenario: Scenario) -> tuple[tuple[float, 
     limit, kind = float(attrs["torque_limit"]), attrs["limit"]
     limit = math.inf if kind == "none" else limit
     words = f"limit of {'each axis' if kind == 'axis' else 'the norm'}"
-    sure = sure_torque(scenario.table, wheels_of(scenario))
+    sure = sure_torque(scenario.table, effectors_of(scenario))
     if sure < limit:
         norm = scenario.table.spacecraft.limit == "norm"
         limit, words = sure, f"what the wheels surely give {'in norm' if norm else 'about each axis at once'}"

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from starhold.algebra.structured import Buffer, repeat
 from starhold.algebra.vector import Vector, add, cross, dot, scale
 from starhold.parts.contract import Card
 from starhold.parts.craft import check_inertia, check_rest, compact, vector
-from starhold.parts.effectors.envelope import COPLANAR, facets_of
+from starhold.parts.effectors.envelope import COPLANAR, authority, facets_of
 from starhold.parts.effectors.layouts import pyramid, three_orthogonal
 
 CARD = Card(
@@ -302,14 +302,30 @@ def lose(wheels: Wheels, index: int) -> Wheels:
     return wheels._replace(torque_limit=limits, least=_least_squares(matrix, working), facets=())
 
 
-def capacity(wheels: Wheels, momentum: Sequence[float]) -> float:
-    """The norm (N m s) of the momentum that wheels with these axial momenta (N m s) at the start can store before a motor
-    fades, whatever its direction, with least-squares allocation; 0 where one is there already."""
-    total = wheel_momentum(tuple(momentum), wheels)
-    columns = zip(wheels.least, wheels.momentum_limit, momentum, strict=True)
+def capacity(own: State, params: Wheels) -> float:
+    """The norm (N m s) of the momentum that wheels in this state at the start can store before a motor fades, whatever its
+    direction, with least-squares allocation; 0 where one is there already."""
+    total = momentum(own, params)
+    columns = zip(params.least, params.momentum_limit, own.momentum, strict=True)
     # What moves no momentum to the body stays in the rotors.
     rooms = [((1.0 - BAND) * limit - abs(held + dot(row, total)), math.sqrt(dot(row, row))) for row, limit, held in columns]
     return max(0.0, min(room / share for room, share in rooms if share > 0.0))
+
+
+def sure_torque(params: Wheels, kind: Literal["axis", "norm"]) -> float:
+    """The torque (N m) that the wheels surely give as they share it out, in norm or about each body axis at once."""
+    return authority(params, kind, peak=params.allocation == ALLOCATIONS.index("least-peak"))
+
+
+def shared_as(params: Wheels, known: Wheels) -> Wheels:
+    """The wheels with a torque shared out among them as among those that laws take them for, if these are as many."""
+    return params._replace(least=known.least) if len(params.axes) == len(known.axes) else params
+
+
+def axial_inertia(params: Wheels) -> NDArray[np.float64]:
+    """The inertia of the rotors about their own axes (3, 3; kg m2)."""
+    axes = np.array(params.axes)
+    return (axes.T * np.array(params.inertia)) @ axes
 
 
 def gives_what_is_asked(wheels: Wheels) -> bool:
@@ -329,8 +345,7 @@ def body_inertia(inertia_total: Any, wheels: Wheels) -> NDArray[np.float64]:
     J' is not the inertia of a body: it need not obey the triangle inequality. Raises ValueError where J is not an inertia
     or J' is not positive definite.
     """
-    axes = np.array(wheels.axes)
-    rest = check_inertia(inertia_total) - (axes.T * np.array(wheels.inertia)) @ axes
+    rest = check_inertia(inertia_total) - axial_inertia(wheels)
     # What symmetric layouts leave of the products is rounding, and would cost the loop its diagonal inertia.
     rest[np.abs(rest) < 1e-15 * check_rest(compact(rest))] = 0.0
     return rest

@@ -15,7 +15,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo, create_
 from starhold.algebra.quantity import quantities
 from starhold.algebra.vector import ZERO
 from starhold.errors import InputError, is_interrupt
-from starhold.laws.catalogue import Law, catalogue
+from starhold.laws.catalogue import Law
 from starhold.laws.interface import Gain
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import make_step
@@ -100,9 +100,6 @@ class AnyBody(Body):
         self.part, self.folder = part, folder
         self.name, self.tables, self.example = part.name, tables_of(part), _example(part)
 
-    def laws(self) -> Mapping[str, Law]:
-        return catalogue(self.name)
-
     def context(self, tables: Mapping[str, Any], where: str) -> Context:
         return Context(where, self.folder)
 
@@ -117,28 +114,16 @@ class AnyBody(Body):
             why = str(error) if type(error) is ValueError else told(error, self.part.file)
             raise InputError(where, MARKER, "", why) from None
 
-    def options(self, scenario: Scenario, own: Any, gains: Any, key: str) -> None:
-        return None
-
-    def build(self, scenario: Scenario, entry: LawEntry) -> ClosedLoop:
-        table, module = scenario.table, self.part.module
+    def given(self, scenario: Scenario, entry: LawEntry) -> dict[str, Any]:
+        table, module, limit = scenario.table, self.part.module, scenario.table.control.limit
         values = {item.name: getattr(table.initial, item.name) for item in _state(self.part)}
-        timing, limit = table.simulation, table.control.limit
-        return ClosedLoop(
-            craft=scenario.craft,
-            nominal=scenario.nominal_craft,
-            law=entry.law,
-            gains=entry.gains,
-            start=module.State(**values, **{module.COMMAND: ZERO}),
-            period=timing.control_period,
-            substeps=timing.substeps,
-            parts=(Fitted(self.part, cast(Made, scenario.made).params), *scenario.parts),
-            limit="none" if limit is None else table.control.limit_kind,
-            command_limit=math.inf if limit is None else limit,
-            divergence_bound=timing.lost_beyond or math.inf,
-            seed=timing.seed,
-            run=timing.run,
-        )
+        return {
+            "start": module.State(**values, **{module.COMMAND: ZERO}),
+            "parts": (Fitted(self.part, cast(Made, scenario.made).params), *scenario.parts),
+            "limit": "none" if limit is None else table.control.limit_kind,
+            "command_limit": limit or math.inf,
+            "divergence_bound": table.simulation.lost_beyond or math.inf,
+        }
 
     def examine(self, scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> None:
         lost = make_step(loop.composition()).check(loop.carry(), 0, loop.setup()).lost_at

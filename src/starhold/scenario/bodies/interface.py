@@ -9,7 +9,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from starhold.errors import InputError
-from starhold.laws.catalogue import Law
+from starhold.laws.catalogue import Law, catalogue
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.part import Fitted
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ class Body(Protocol):
 
     def laws(self) -> Mapping[str, Law]:
         """The installed laws by name."""
-        ...
+        return catalogue(self.name)
 
     def context(self, tables: Mapping[str, Any], where: str) -> Any:
         """The context that validators of these raw tables and of laws' gains need, such as the worth of scaled numbers.
@@ -98,15 +99,31 @@ class Body(Protocol):
     def options(self, scenario: Scenario, own: Any, gains: Any, key: str) -> Any:
         """The options of a law beside its gains, from its validated table (called `key` in errors) or else from the
         scenario. InputError if they do not fit the gains."""
+        return None
+
+    def given(self, scenario: Scenario, entry: LawEntry) -> dict[str, Any]:
+        """What the body's tables give of the closed loop of one law, by the names that `ClosedLoop` has for it: the start,
+        all parts, and what else is not as of any body."""
         ...
 
-    def build(self, scenario: Scenario, entry: LawEntry) -> Any:
+    def build(self, scenario: Scenario, entry: LawEntry) -> ClosedLoop:
         """The closed loop of one law."""
-        ...
+        timing = scenario.table.simulation
+        shared = {
+            "craft": scenario.craft,
+            "nominal": scenario.nominal_craft,
+            "law": entry.law,
+            "gains": entry.gains,
+            "period": timing.control_period,
+            "substeps": timing.substeps,
+            "seed": getattr(timing, "seed", 0),
+            "run": getattr(timing, "run", 0),
+        }
+        return ClosedLoop(**(shared | self.given(scenario, entry)))
 
     def examine(self, scenario: Scenario, entry: LawEntry, loop: Any) -> None:
         """InputError where the law of a loop, which has been called once, cannot work there."""
-        ...
+        return
 
     def drawn(self, scenario: Scenario, columns: Mapping[str, Any]) -> dict[str, Any]:
         """Return the arguments of `moved` for many runs, an array (lanes,) in place of each number, where they differ in the

@@ -6,14 +6,15 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from starhold.algebra.scalar import is_finite
+from starhold.algebra.vector import ZERO, add, dot, norm
 from starhold.analysis.libration_point import CircleGoal, goal_of
 from starhold.errors import InputError
-from starhold.laws.catalogue import Law, catalogue
 from starhold.laws.l2_circle import peak_demand
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.bodies.libration_point import Libration, Units
+from starhold.parts.bodies.libration_point import Libration, PointMeasurement, PointState, Units
+from starhold.parts.catalogue import fit
 from starhold.scenario.bodies.interface import Body
-from starhold.scenario.bodies.libration_point.building import build, check_start
 from starhold.scenario.bodies.libration_point.tables import LibrationPointTable, LibrationTable, PointLawTable
 from starhold.scenario.checking import show, validate
 
@@ -30,6 +31,8 @@ position = [0.0, 0.5, 0.1]
 [simulation]
 duration = 0.1
 """
+NEAR = 0.4
+"""The divergence bound as a share of the nearer body's distance, unless the file gives one."""
 
 
 class Made(NamedTuple):
@@ -54,9 +57,6 @@ class LibrationPoint(Body):
     law_table = PointLawTable
     example = EXAMPLE
 
-    def laws(self) -> Mapping[str, Law]:
-        return catalogue("libration-point")
-
     def context(self, tables: Mapping[str, Any], where: str) -> Units:
         return validate(LibrationTable, tables[self.marker], where, self.marker).units
 
@@ -67,11 +67,29 @@ class LibrationPoint(Body):
         lag = scenario.table.control.lag if own.lag is None else own.lag
         return Options(_limit(scenario, own, gains, key), lag or 0.0)
 
-    def build(self, scenario: Scenario, entry: LawEntry) -> ClosedLoop:
-        return build(scenario, entry)
+    def given(self, scenario: Scenario, entry: LawEntry) -> dict[str, Any]:
+        table, plant, own = scenario.table, scenario.craft, entry.options
+        field = "linear-gravity" if table.libration.model == "linear" else "three-body-gravity"
+        surfaces = (fit("actuator", "lag", own.lag),) if own.lag > 0.0 else ()
+        return {
+            "start": _start(scenario, entry),
+            "parts": (fit("environment", field), *surfaces, *scenario.parts),
+            "limit": "none" if math.isinf(own.limit) else table.control.limit_kind,
+            "command_limit": own.limit,
+            "divergence_bound": table.simulation.lost_beyond or NEAR * min(abs(plant.from_smaller), abs(plant.from_larger)),
+        }
 
     def examine(self, scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> None:
-        check_start(scenario, entry, loop)
+        away = norm(loop.start.position)
+        if away >= loop.divergence_bound:
+            allowed = f"less than lost_beyond, {loop.divergence_bound:.6g}"
+            raise InputError(scenario.where, "initial.position", f"a start {away:.6g} away", allowed)
+        # A law may ask for all the control there is.
+        measurement = PointMeasurement(loop.start.position, loop.start.velocity, loop.period, entry.options.limit)
+        command, _ = loop.law.command(measurement, entry.gains, loop.known, loop.carry().memory)
+        if not is_finite(dot(command, command)):
+            allowed = "a limit, margin or deficit: this law takes as much control as there is"
+            raise InputError(scenario.where, f"law {entry.name}", "no limit of the control", allowed)
 
 
 def _limit(scenario: Scenario, own: PointLawTable, gains: Any, key: str) -> float:
@@ -89,6 +107,15 @@ def _limit(scenario: Scenario, own: PointLawTable, gains: Any, key: str) -> floa
     if not isinstance(goal, CircleGoal):
         raise InputError(where, f"{key}.{word}", show(share), "limit, for a law without a circle has no peak demand")
     return peak_demand(scenario.craft, goal.rate) * goal.radius * (1.0 + share if word == "margin" else 1.0 - share)
+
+
+def _start(scenario: Scenario, entry: LawEntry) -> PointState:
+    """The first state; control surfaces that lag start without control."""
+    start = scenario.table.initial
+    if start.relative_to == "point":
+        return PointState(start.position, start.velocity, ZERO)
+    position, velocity = goal_of(entry.gains).at(start.phase)
+    return PointState(add(position, start.position), add(velocity, start.velocity), ZERO)
 
 
 BODY = LibrationPoint()

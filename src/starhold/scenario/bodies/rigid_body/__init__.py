@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from starhold.laws.catalogue import Law, catalogue
+from starhold.errors import InputError
+from starhold.laws.catalogue import Law
 from starhold.loop.closed_loop import ClosedLoop
+from starhold.loop.modes import join_targets
 from starhold.parts.part import Fitted
-from starhold.scenario.bodies.rigid_body.building import build, check_events
-from starhold.scenario.bodies.rigid_body.craft import Made, make
+from starhold.scenario.bodies.rigid_body.craft import Made, effectors_of, make
 from starhold.scenario.bodies.rigid_body.dials import Dials
-from starhold.scenario.bodies.rigid_body.start import mode_target, told_to_design
+from starhold.scenario.bodies.rigid_body.faults import make_events
+from starhold.scenario.bodies.rigid_body.short_forms import written_out
+from starhold.scenario.bodies.rigid_body.start import mode_target, start_of, target_of, told_to_design
 from starhold.scenario.bodies.rigid_body.tables import AttitudeLawTable, RigidBodyTable
 
 if TYPE_CHECKING:
@@ -55,9 +58,6 @@ class RigidBody(Dials):
     modelled = ("spacecraft", "wheels", "wheel")
     designed = ("initial", "orbit")
 
-    def laws(self) -> Mapping[str, Law]:
-        return catalogue()
-
     def make(self, table: RigidBodyTable, where: str) -> Made:
         return make(table, where)
 
@@ -70,11 +70,27 @@ class RigidBody(Dials):
     def options(self, scenario: Scenario, own: AttitudeLawTable, gains: Any, key: str) -> Options:
         return Options(own.quaternion_sign, own.hysteresis_width, own.fault_action)
 
-    def build(self, scenario: Scenario, entry: LawEntry) -> ClosedLoop:
-        return build(scenario, entry)
+    def given(self, scenario: Scenario, entry: LawEntry) -> dict[str, Any]:
+        body, target, effectors = scenario.table.spacecraft, target_of(scenario), effectors_of(scenario)
+        parts = written_out(scenario, target, effectors)
+        parts = (join_targets(entry.targets), *parts[1:]) if entry.targets else parts
+        return {
+            "start": start_of(scenario, target),
+            "parts": parts,
+            "limit": "none" if math.isinf(body.torque_limit) else body.limit,
+            "command_limit": body.torque_limit if effectors else None,
+            "sign_policy": entry.options.quaternion_sign,
+            "hysteresis_width": entry.options.hysteresis_width,
+            "events": make_events(scenario, entry, parts),
+        }
 
     def examine(self, scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> None:
-        check_events(scenario, entry, loop)
+        for event in loop.events:
+            try:
+                entry.law.remember(event.gains, event.nominal, loop.period)
+            except ValueError as error:
+                key = f'law {entry.name} from {event.step * loop.period:g} s (fault_action = "none" flies on as before)'
+                raise InputError(scenario.where, key, "", str(error)) from None
 
 
 BODY = RigidBody()

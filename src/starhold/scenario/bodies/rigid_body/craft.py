@@ -1,15 +1,17 @@
-"""From the tables of a spacecraft to the numbers that laws act on, and its wheels."""
+"""From the tables of a spacecraft to the numbers that laws act on, and its effectors."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from starhold.errors import InputError
 from starhold.parts.craft import Craft, compact, inverse, make_craft
-from starhold.parts.effectors.envelope import authority
 from starhold.parts.effectors.wheels import Wheels, body_inertia
-from starhold.scenario.bodies.rigid_body.rotors import make_rotors
+from starhold.parts.part import Fitted
+from starhold.scenario.bodies.rigid_body.short_forms import effectors_in
 from starhold.scenario.bodies.rigid_body.tables import RigidBodyTable
 
 if TYPE_CHECKING:
@@ -17,55 +19,60 @@ if TYPE_CHECKING:
 
 
 class Made(NamedTuple):
-    """The numbers of a spacecraft; with wheels, its inertia is without the rotors' moments about their own axes."""
+    """The numbers of a spacecraft, and the effectors of its tables; with wheels, its inertia is without the rotors' moments
+    about their own axes."""
 
     craft: Craft
-    wheels: Wheels | None
+    effectors: tuple[Fitted, ...]
 
 
 def make(table: RigidBodyTable, where: str) -> Made:
     """The spacecraft of these tables. InputError where it cannot be."""
     try:
-        wheels = make_rotors(table.wheels, table.wheel)
-        return Made(_craft(table, wheels, table.spacecraft.inertia), wheels)
+        effectors = effectors_in(table)
+        return Made(_craft(table, effectors, table.spacecraft.inertia), effectors)
     except ValueError as error:
         raise InputError(where, "wheel" if table.wheels or table.wheel else "spacecraft", "", str(error)) from None
 
 
-def wheels_of(scenario: Scenario) -> Wheels | None:
-    """The reaction wheels of a scenario, None for a craft without. A torque is shared out among them as laws suppose them
-    to be."""
-    made, supposed = (cast(Made, one.made).wheels for one in (scenario, scenario.known))
-    if made is supposed or made is None or supposed is None or len(made.axes) != len(supposed.axes):
+def effectors_of(scenario: Scenario) -> tuple[Fitted, ...]:
+    """The effectors of a scenario's tables. A torque is shared out by them as laws suppose them to be."""
+    made, supposed = (cast(Made, one.made).effectors for one in (scenario, scenario.known))
+    if made is supposed or len(made) != len(supposed):
         return made
-    return made._replace(least=supposed.least)
+    pairs = zip(made, supposed, strict=True)
+    return tuple(replace(own, params=own.part.module.shared_as(own.params, known.params)) for own, known in pairs)
+
+
+def wheels_of(scenario: Scenario) -> Wheels | None:
+    """The reaction wheels of a scenario's tables; None for a craft without."""
+    return next((fitted.params for fitted in effectors_of(scenario) if fitted.part.name == "wheels"), None)
 
 
 def craft_with(scenario: Scenario, inertia: Any) -> Craft:
     """The scenario's craft with another inertia (3, 3; kg m2), its wheels included; ValueError where it cannot be."""
-    return _craft(scenario.table, wheels_of(scenario), inertia)
+    return _craft(scenario.table, effectors_of(scenario), inertia)
 
 
-def _craft(table: RigidBodyTable, wheels: Wheels | None, inertia: Any) -> Craft:
+def _craft(table: RigidBodyTable, effectors: tuple[Fitted, ...], inertia: Any) -> Craft:
     gravity = {} if table.orbit is None else {"gravity": table.orbit.gravitational_parameter}
-    craft = make_craft(inertia, torque_limit(table, wheels), **gravity)
-    if wheels is None:
-        return craft
-    rest = body_inertia(inertia, wheels)
-    return craft._replace(inertia=compact(rest), inverse_inertia=inverse(compact(rest)), with_rotors=craft.inertia)
+    craft = make_craft(inertia, torque_limit(table, effectors), **gravity)
+    for fitted in effectors:
+        rest = compact(body_inertia(inertia, fitted.params))
+        craft = craft._replace(inertia=rest, inverse_inertia=inverse(rest), with_rotors=craft.inertia)
+    return craft
 
 
-def torque_limit(table: RigidBodyTable, wheels: Wheels | None) -> float:
-    """The torque that a law may reckon with (N m): the limit of [spacecraft], or what these wheels surely give in its
-    way where that is less."""
-    own, least = table.spacecraft, sure_torque(table, wheels)
-    return least if own.limit == "none" and wheels is not None else min(own.torque_limit, least)
+def torque_limit(table: RigidBodyTable, parts: Iterable[Fitted]) -> float:
+    """The torque that a law may reckon with (N m): the limit of [spacecraft], or what the effectors among these parts surely
+    give in its way where that is less."""
+    own, least = table.spacecraft, sure_torque(table, parts)
+    return least if own.limit == "none" and least < math.inf else min(own.torque_limit, least)
 
 
-def sure_torque(table: RigidBodyTable, wheels: Wheels | None) -> float:
-    """The torque that these wheels surely give (N m), in norm where the limit of [spacecraft] is one of it, else about each
-    axis at once; infinite without wheels."""
-    if wheels is None:
-        return math.inf
-    peak = table.wheels is not None and table.wheels.allocation == "least-peak"
-    return authority(wheels, "norm" if table.spacecraft.limit == "norm" else "axis", peak=peak)
+def sure_torque(table: RigidBodyTable, parts: Iterable[Fitted]) -> float:
+    """The torque that the effectors among these parts surely give (N m), in norm where the limit of [spacecraft] is one of
+    it, else about each axis at once; infinite without any that tells."""
+    kind = "norm" if table.spacecraft.limit == "norm" else "axis"
+    telling = ((fitted.part.hook("sure_torque"), fitted.params) for fitted in parts)
+    return min((tell(params, kind) for tell, params in telling if tell is not None), default=math.inf)

@@ -20,7 +20,7 @@ from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.craft import Craft, check_moments, check_rest, compact, inverse
 from starhold.parts.stated_attitude import check_attitude
 from starhold.scenario.bodies.interface import Body, Moved
-from starhold.scenario.bodies.rigid_body.craft import sure_torque, wheels_of
+from starhold.scenario.bodies.rigid_body.craft import effectors_of, sure_torque
 from starhold.scenario.bodies.rigid_body.start import start_of, stated, target_of, unit_of
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class Dials(Body):
             try:
                 if key in values:
                     check_moments(values[key])
-                if key in values and wheels_of(scenario) is not None:
+                if key in values and craft.with_rotors:
                     check_rest(craft.inertia)
             except ValueError as error:
                 raise InputError("", key, "", str(error)) from None
@@ -108,7 +108,7 @@ class Dials(Body):
             if values is not None:
                 found[key] = tuple(values)
         moments = _moments(scenario, columns)
-        if moments is not None and wheels_of(scenario) is None:
+        if moments is not None and not effectors_of(scenario):
             found[KNOWN] = _inertia(moments, isinstance(scenario.craft.inertia[0], tuple))
         return found
 
@@ -129,7 +129,7 @@ def _crafts(scenario: Scenario, values: Mapping[str, Any]) -> tuple[Craft, Craft
     """The craft that laws know, and the one that flies."""
     craft, limit = scenario.craft, values.get(LIMIT)
     if limit is not None:
-        sure = sure_torque(scenario.table, wheels_of(scenario))
+        sure = sure_torque(scenario.table, effectors_of(scenario))
         craft = craft._replace(torque_limit=minimum(limit, sure) if sure < math.inf else limit)
     nominal = _with_inertia(scenario, craft, values[KNOWN]) if KNOWN in values else craft
     return nominal, _with_inertia(scenario, craft, values[TRUE]) if TRUE in values else nominal
@@ -137,10 +137,9 @@ def _crafts(scenario: Scenario, values: Mapping[str, Any]) -> tuple[Craft, Craft
 
 def _with_inertia(scenario: Scenario, craft: Craft, inertia: Any) -> Craft:
     """The craft with another inertia of the same form, its wheels included."""
-    wheels = wheels_of(scenario)
-    if wheels is None:
+    if not craft.with_rotors:
         return craft._replace(inertia=inertia, inverse_inertia=inverse(inertia))
-    rotors = ((np.array(wheels.axes).T * np.array(wheels.inertia)) @ np.array(wheels.axes)).tolist()
+    rotors = np.sum([f.part.module.axial_inertia(f.params) for f in effectors_of(scenario)], axis=0).tolist()
     like: Any = craft.inertia
 
     def left(i: int, j: int) -> Any:

@@ -13,7 +13,7 @@ from starhold.parts.craft import Craft
 from starhold.parts.effectors.envelope import authority
 from starhold.parts.effectors.wheels import Wheels, lose
 from starhold.parts.part import Fitted
-from starhold.scenario.bodies.rigid_body.craft import craft_with, torque_limit, wheels_of
+from starhold.scenario.bodies.rigid_body.craft import craft_with, effectors_of, torque_limit, wheels_of
 from starhold.scenario.bodies.rigid_body.tables import FaultTable
 
 if TYPE_CHECKING:
@@ -46,6 +46,7 @@ def make_events(scenario: Scenario, entry: LawEntry, parts: tuple[Fitted, ...]) 
         if action_on(fault, entry) != "none":
             moments.append((fault.time + fault.delay, True, place))
     now = Event(0, parts, entry.gains, scenario.craft, scenario.known.craft)
+    effectors = effectors_of(scenario)
     wheels = wheels_of(scenario)
     begun = 0.0 if wheels is None else authority(wheels)
     share, learnt, limit = 1.0, (0.0, 0), scenario.known.craft.torque_limit
@@ -63,7 +64,7 @@ def make_events(scenario: Scenario, entry: LawEntry, parts: tuple[Fitted, ...]) 
                 now, learnt = now._replace(nominal=body), (fault.time, place)
             if wheels is not None and fault.strikes_wheel:
                 left = _left(scenario, wheels, place, fault)
-                share, limit = authority(left) / begun, torque_limit(scenario.known.table, left)
+                share, limit = authority(left) / begun, torque_limit(scenario.known.table, _on(effectors, left))
                 wheels = wheels if action == "retune" else left
                 now = now._replace(parts=_on(now.parts, wheels))
             # The law's limit is nothing that the body feels, so both crafts have it.
@@ -76,7 +77,7 @@ def make_events(scenario: Scenario, entry: LawEntry, parts: tuple[Fitted, ...]) 
 
 
 def _on(parts: tuple[Fitted, ...], wheels: Wheels | None) -> tuple[Fitted, ...]:
-    """The parts of a loop on other wheels."""
+    """The parts on other wheels."""
     return tuple(replace(f, params=wheels) if f.part.name == "wheels" else f for f in parts)
 
 

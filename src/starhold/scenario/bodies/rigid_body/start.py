@@ -15,17 +15,16 @@ from starhold.algebra.vector import ZERO, add, most, subtract
 from starhold.errors import InputError
 from starhold.export.aem import from_date
 from starhold.laws.interface import Start
+from starhold.loop.step import total
 from starhold.parts.bodies.rigid_body import State
 from starhold.parts.catalogue import fit
-from starhold.parts.effectors.wheels import capacity, wheel_momentum
 from starhold.parts.epoch import EPOCH, OF_J2000, Date
 from starhold.parts.orbit import body_of
 from starhold.parts.part import Fitted
 from starhold.parts.roles import Goal
 from starhold.parts.targets import history
-from starhold.scenario.bodies.rigid_body.craft import sure_torque, torque_limit, wheels_of
+from starhold.scenario.bodies.rigid_body.craft import effectors_of, sure_torque, torque_limit
 from starhold.scenario.bodies.rigid_body.history import read_history
-from starhold.scenario.bodies.rigid_body.rotors import start_momenta
 from starhold.scenario.bodies.rigid_body.tables import Pointing, TargetTable
 from starhold.scenario.checking import show, validate
 from starhold.scenario.parts import read_part
@@ -150,16 +149,14 @@ def goal_at_start(goal: Fitted, begun: State) -> Goal:
 
 def told_to_design(scenario: Scenario, sign: str) -> Start:
     """The start that the design of a law may reckon with; `sign`: its quaternion sign policy."""
-    table, goal, wheels = scenario.table, target_of(scenario), wheels_of(scenario)
+    table, goal, effectors = scenario.table, target_of(scenario), effectors_of(scenario)
     begun = start_of(scenario, goal)
     held = goal_at_start(goal, begun)
     error = relative(held.attitude, begun.attitude)
     error = error if sign == "as_published" else stretch(side(error[0]), error)
     rate = subtract(begun.rate, to_body(error, held.rate))
-    momentum, held_by_wheels = math.inf, None
-    torque = (sure_torque if table.spacecraft.limit == "none" else torque_limit)(table, wheels)
-    if wheels is not None:
-        momenta = start_momenta(table.wheels, table.wheel, len(wheels.axes))
-        held_by_wheels, momentum = wheel_momentum(momenta, wheels), capacity(wheels, momenta)
+    torque = (sure_torque if table.spacecraft.limit == "none" else torque_limit)(table, effectors)
+    stored = total(f.part.module.momentum(f.start, f.params) for f in effectors)
+    room = min((f.part.module.capacity(f.start, f.params) for f in effectors), default=math.inf)
     tolerances = table.settling
-    return Start(error, rate, held_by_wheels, torque, momentum, tolerances.attitude_tolerance, tolerances.rate_tolerance)
+    return Start(error, rate, stored, torque, room, tolerances.attitude_tolerance, tolerances.rate_tolerance)
