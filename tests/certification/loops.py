@@ -12,9 +12,9 @@ from starhold.conformance.bench import sample_loop
 from starhold.laws import lqr, matrix_pd
 from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import fields
-from starhold.parts.craft import make_craft, tensor
+from starhold.parts.craft import bare_inertia, make_craft, tensor
 from starhold.parts.effectors.layouts import pyramid
-from starhold.parts.effectors.wheels import body_inertia, make_wheels
+from starhold.parts.effectors.wheels import axial_inertia, make_wheels
 from tests import making
 from tests.making import ORBITAL, aimed
 
@@ -80,7 +80,7 @@ def rotors(law, gains, target=None, layout=pyramid, **changes):
     there."""
     axes = layout()
     wheels = make_wheels(axes, 1e-3, changes.pop("torque_limit", 0.05), changes.pop("momentum_limit", 1.0))
-    body = body_inertia(tensor(FULL.inertia), wheels)
+    body = bare_inertia(tensor(FULL.inertia), axial_inertia(wheels))
     loop = loop_of(law, gains, make_craft(body), target=target or aimed(NO_TURN), limit="none", **changes)
     loop = loop.with_parts(making.rotors(wheels, [0.01 * (-1.0) ** i for i in range(len(axes))]))
     return loop if target == ORBITAL else free(loop)

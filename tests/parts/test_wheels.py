@@ -15,7 +15,7 @@ from starhold.algebra.quaternion import derivative, renormalise, to_reference
 from starhold.algebra.structure import flatten, leaves, move, unflatten
 from starhold.algebra.structured import Buffer, repeat
 from starhold.algebra.vector import add, apply, dot, gyroscopic_torque, inverse, scale, subtract
-from starhold.parts.craft import matrix
+from starhold.parts.craft import bare_inertia, matrix
 from starhold.parts.effectors.layouts import nasa_standard, pyramid, three_orthogonal
 from starhold.parts.effectors.wheel_units import WHEEL_UNITS
 from starhold.parts.effectors.wheels import (
@@ -24,7 +24,7 @@ from starhold.parts.effectors.wheels import (
     allocate,
     allocate_peak,
     available,
-    body_inertia,
+    axial_inertia,
     lose,
     make_wheels,
     motor,
@@ -299,7 +299,7 @@ def noted(state, inertia, wheels):
 
 def flight(wheels, commands, held, steps, rate=(0.01, -0.005, 0.008), size=1.0):
     """Hold each row of `commands` for `held` steps; what `noted` gives before each step, and the last state."""
-    inertia = matrix(body_inertia(size * np.array(TOTAL), wheels))
+    inertia = matrix(bare_inertia(size * np.array(TOTAL), axial_inertia(wheels)))
     recorder = Recorder()
     with recorder.recording():
         cells, out = (recorder.memory(name, writable=True) for name in ("state", "out"))
@@ -357,7 +357,7 @@ def test_rotors_at_rest_in_the_body_are_part_of_it():
     wheels = simple(pyramid(), inertia=0.2, viscous=1e3)
     rate = (0.3, -0.2, 0.5)
     momentum = tuple(0.2 * float(np.dot(a, rate)) for a in wheels.axes)
-    whole = np.array(body_inertia(TOTAL, wheels)) @ rate + np.array(wheel_momentum(momentum, wheels))
+    whole = np.array(bare_inertia(TOTAL, axial_inertia(wheels))) @ rate + np.array(wheel_momentum(momentum, wheels))
     np.testing.assert_allclose(whole, np.array(TOTAL) @ rate, rtol=1e-14)
 
 
@@ -435,11 +435,11 @@ def test_numbers_that_are_refused(more, message):
 
 def test_body_inertia():
     wheels = simple(three_orthogonal(), inertia=(0.1, 0.2, 0.3))
-    np.testing.assert_allclose(body_inertia((1.0, 1.1, 1.2), wheels), np.diag([0.9, 0.9, 0.9]))
+    np.testing.assert_allclose(bare_inertia((1.0, 1.1, 1.2), axial_inertia(wheels)), np.diag([0.9, 0.9, 0.9]))
     with pytest.raises(ValueError, match=r"more inertia than the craft: .* -0.1, 0.1, 0.2"):
-        body_inertia((0.3, 0.3, 0.2), wheels)
+        bare_inertia((0.3, 0.3, 0.2), axial_inertia(wheels))
     with pytest.raises(ValueError, match="symmetric"):
-        body_inertia(np.array([[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), wheels)
+        bare_inertia(np.array([[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), axial_inertia(wheels))
 
 
 def test_catalogue():

@@ -70,9 +70,7 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
     claim = next((c for c in claims if c is not None and c.outcome == "proved"), None)
     if claim is None or _beyond_floats(loop, certificate):
         return None
-    free = _undisturbed(loop, certificate)
-    if loop.wheels is not None and claim.kind == "wheels":
-        free = _on(free, _without_friction(loop.wheels))
+    free = _undisturbed(loop, certificate, bounded=claim.kind == "wheels")
     # The claim's own V, which need not be the law's.
     stiffness = claim.witness["stiffness"]
     frame = take_apart(Motion(make_subject(free), None if stiffness is None else exact(stiffness)))
@@ -209,8 +207,9 @@ def _beyond_floats(loop: ClosedLoop, certificate: Certificate) -> bool:
     return unknown and stable_period(Motion(make_subject(loop))) is None
 
 
-def _undisturbed(loop: ClosedLoop, certificate: Certificate) -> ClosedLoop:
-    """Return the loop as the claims assume it, with a torque that is renewed so often that it counts as continuous."""
+def _undisturbed(loop: ClosedLoop, certificate: Certificate, bounded: bool = False) -> ClosedLoop:
+    """Return the loop as the claims assume it, with a torque that is renewed so often that it counts as continuous; bounded:
+    its wheels, if any, keep their limits."""
     sampled = certificate.claim("sampling")
     longest = None if sampled is None else sampled.numbers["longest"]
     if longest is None:
@@ -221,7 +220,7 @@ def _undisturbed(loop: ClosedLoop, certificate: Certificate) -> ClosedLoop:
     return replace(
         loop,
         start=loop.start._replace(position=ZERO, velocity=ZERO, torque=ZERO),
-        parts=() if wheels is None else (replace(wheels, params=_boundless(wheels.params)),),
+        parts=() if wheels is None else (replace(wheels, params=_frictionless(wheels.params, bounded)),),
         events=(),
         period=period,
         substeps=1,
@@ -243,20 +242,12 @@ def _paced(
     return replace(loop, period=min(loop.period, TURN / max(fastest, 1e-300))), states
 
 
-def _on(loop: ClosedLoop, wheels: Wheels) -> ClosedLoop:
-    """The loop on other wheels."""
-    return loop.with_parts(*(replace(f, params=wheels) for f in loop.used("effector") if f.part.name == "wheels"))
-
-
-def _without_friction(wheels: Wheels) -> Wheels:
+def _frictionless(wheels: Wheels, bounded: bool) -> Wheels:
+    """The wheels come back without friction and, unless bounded, without limits; lost ones stay lost."""
     none = (0.0,) * len(wheels.axes)
-    return wheels._replace(viscous=none, coulomb=none)
-
-
-def _boundless(wheels: Wheels) -> Wheels:
-    """The wheels come back without limits and friction; lost ones stay lost."""
+    free = wheels._replace(viscous=none, coulomb=none)
     limits = tuple(math.inf if limit > 0.0 else 0.0 for limit in wheels.torque_limit)
-    return _without_friction(wheels)._replace(torque_limit=limits, momentum_limit=(math.inf,) * len(limits))
+    return free if bounded else free._replace(torque_limit=limits, momentum_limit=(math.inf,) * len(limits))
 
 
 def _rotors(loop: ClosedLoop, certificate: Certificate, states: Array, random: np.random.Generator) -> Array:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, Literal, NamedTuple
 
 from starhold.algebra.structure import flatten
+from starhold.certification.certificate import Certificate
 from starhold.errors import InputError, is_interrupt
 from starhold.laws.catalogue import Law
 from starhold.laws.interface import Card, fields
@@ -79,6 +80,14 @@ def agree(loop: Any, starts: Sequence[Any], lanes: Sequence[int]) -> None:
         same = all(batch.states[:, lane].tolist() == one for lane in lanes)
         require(same, f"a lane of a batch on {threads} threads differs from a single flight")
     require(flatten((plain.state, plain.effectors)) == one, "plain Python differs from the compiled kernel")
+
+
+def gives_reasons(certificate: Certificate) -> None:
+    """Check that a certificate says of everything it does not prove why."""
+    for claim in certificate.claims:
+        for obligation in claim.obligations:
+            told = obligation.outcome == "proved" or bool(obligation.evidence)
+            require(told, f"{claim.kind}: {obligation.name} is {obligation.outcome} without a reason")
 
 
 def declares_itself(law: Law) -> None:

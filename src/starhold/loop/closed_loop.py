@@ -12,7 +12,6 @@ from starhold.algebra.vector import ZERO, Vector, apply
 from starhold.laws.catalogue import Law
 from starhold.parts.catalogue import find
 from starhold.parts.contract import NoMemory
-from starhold.parts.effectors.wheels import Wheels
 from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import Goal
 from starhold.parts.targets.inertial import Params as Inertial
@@ -144,7 +143,7 @@ class ClosedLoop:
     limit: Limit = "axis"
     command_limit: float | None = None
     """The limit at which the command saturates (N m), per axis or in norm as `limit` says; None: the torque limit that the
-    law sees, the craft's. With wheels the law sees what they give together in every direction; beyond it they saturate."""
+    law sees, the craft's. With effectors that tell what they surely give the law sees that; beyond it they saturate."""
     sign_policy: SignPolicy = "as_published"
     hysteresis_width: float = 0.5
     divergence_bound: float = 1e3
@@ -194,14 +193,14 @@ class ClosedLoop:
         return replace(self, parts=tuple(f for f in self.parts if f.part.role not in words and f.part.name not in words))
 
     @property
-    def wheels(self) -> Wheels | None:
-        """The reaction wheels, where it has any."""
+    def wheels(self) -> Any:
+        """The numbers of the reaction wheels that a claim is about, None without any."""
         found = self.find("wheels")
         return None if found is None else found.params
 
     @property
     def rotors(self) -> tuple[float, ...]:
-        """The angular momenta of the wheels' rotors at the start (N m s)."""
+        """The angular momenta of their rotors at the start (N m s)."""
         found = self.find("wheels")
         return () if found is None else found.start.momentum
 

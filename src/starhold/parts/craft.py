@@ -91,6 +91,19 @@ def check_moments(inertia: Matrix | Vector) -> None:
         raise ValueError(f"no body has these principal moments ({shown}): the largest exceeds the sum of the others")
 
 
+def bare_inertia(inertia_total: Any, axial: NDArray[np.float64]) -> NDArray[np.float64]:
+    """J' = J - sum J_i a_i a_i^T (3, 3; kg m2) of a craft whose total inertia, rotors at rest in it included, is J (three
+    principal moments or 3x3); axial: the sum.
+
+    J' is not the inertia of a body: it need not obey the triangle inequality. Raises ValueError where J is not an inertia
+    or J' is not positive definite.
+    """
+    rest = check_inertia(inertia_total) - axial
+    # What symmetric layouts leave of the products is rounding, and would cost the loop its diagonal inertia.
+    rest[np.abs(rest) < 1e-15 * check_rest(compact(rest))] = 0.0
+    return rest
+
+
 def check_rest(rest: Matrix | Vector) -> float:
     """Return the largest principal moment of a craft without its rotors' about their axes (kg m2); ValueError where one is
     not positive, of recorded numbers too."""

@@ -1,7 +1,7 @@
 """Reaction wheels: how a wanted torque is shared out among them, what their motors and friction do, what the body feels.
 
 The state of a wheel is the absolute axial momentum h = inertia (W + a . rate) of its rotor (N m s): a is its unit axis in
-body axes, W its speed relative to the body. With the wheels' axial inertia taken out of the body's (`body_inertia`),
+body axes, W its speed relative to the body. With the wheels' axial inertia taken out of the body's (`bare_inertia`),
 
     J' w' = on_body + external - w x J' w,        h_i' = motor_i
 
@@ -22,7 +22,7 @@ from starhold.algebra.several import each, weighted
 from starhold.algebra.structured import Buffer, repeat
 from starhold.algebra.vector import Vector, add, cross, dot, scale
 from starhold.parts.contract import Card
-from starhold.parts.craft import check_inertia, check_rest, compact, vector
+from starhold.parts.craft import vector
 from starhold.parts.effectors.envelope import COPLANAR, authority, facets_of
 from starhold.parts.effectors.layouts import pyramid, three_orthogonal
 
@@ -336,19 +336,6 @@ def gives_what_is_asked(wheels: Wheels) -> bool:
         (np.array(part).reshape(-1, 3) for part in zip(*working, strict=True)) if working else (np.zeros((1, 3)),) * 2
     )
     return bool(np.abs(axes.T @ rows + np.eye(3)).max() < 1e-9)
-
-
-def body_inertia(inertia_total: Any, wheels: Wheels) -> NDArray[np.float64]:
-    """J' = J - sum inertia_i a_i a_i^T (3, 3; kg m2) of a craft whose total inertia, wheels at rest in it included, is J
-    (three principal moments or 3x3).
-
-    J' is not the inertia of a body: it need not obey the triangle inequality. Raises ValueError where J is not an inertia
-    or J' is not positive definite.
-    """
-    rest = check_inertia(inertia_total) - axial_inertia(wheels)
-    # What symmetric layouts leave of the products is rounding, and would cost the loop its diagonal inertia.
-    rest[np.abs(rest) < 1e-15 * check_rest(compact(rest))] = 0.0
-    return rest
 
 
 def _unit_axes(axes: Sequence[Sequence[float]]) -> NDArray[np.float64]:

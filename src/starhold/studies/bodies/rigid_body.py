@@ -11,7 +11,6 @@ from starhold.analysis.meter import recorded_of
 from starhold.analysis.rigid_body import EXTRAS, METRICS, error_angle, make_meter, measure
 from starhold.analysis.transient import Limits, against_limits
 from starhold.laws.modes import mode_laws
-from starhold.parts.effectors.wheels import gives_what_is_asked
 from starhold.parts.epoch import OF_DATE, iso_text
 from starhold.scenario.bodies.rigid_body.start import date_of_axes
 from starhold.simulation.lane import fly
@@ -148,7 +147,7 @@ def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:
         return found
     latest = {event.step: event for event in loop.events if event.step < steps}
     for step, event in latest.items():
-        sound = all(gives_what_is_asked(f.params) for f in event.parts if f.part.name == "wheels")
+        sound = all(tells(f.params) for f in event.parts if (tells := f.part.hook("gives_what_is_asked")) is not None)
         if not sound or event.nominal.inertia != event.craft.inertia:
             continue
         now = replace(loop, events=(), craft=event.craft, gains=event.gains, parts=event.parts)

@@ -7,9 +7,11 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
+import numpy as np
+
 from starhold.errors import InputError
-from starhold.parts.craft import Craft, compact, inverse, make_craft
-from starhold.parts.effectors.wheels import Wheels, body_inertia
+from starhold.parts.craft import Craft, bare_inertia, compact, inverse, make_craft
+from starhold.parts.effectors.wheels import Wheels
 from starhold.parts.part import Fitted
 from starhold.scenario.bodies.rigid_body.short_forms import effectors_in
 from starhold.scenario.bodies.rigid_body.tables import RigidBodyTable
@@ -57,10 +59,15 @@ def craft_with(scenario: Scenario, inertia: Any) -> Craft:
 def _craft(table: RigidBodyTable, effectors: tuple[Fitted, ...], inertia: Any) -> Craft:
     gravity = {} if table.orbit is None else {"gravity": table.orbit.gravitational_parameter}
     craft = make_craft(inertia, torque_limit(table, effectors), **gravity)
-    for fitted in effectors:
-        rest = compact(body_inertia(inertia, fitted.params))
-        craft = craft._replace(inertia=rest, inverse_inertia=inverse(rest), with_rotors=craft.inertia)
-    return craft
+    if not effectors:
+        return craft
+    rest = compact(bare_inertia(inertia, axial_inertia(effectors)))
+    return craft._replace(inertia=rest, inverse_inertia=inverse(rest), with_rotors=craft.inertia)
+
+
+def axial_inertia(effectors: tuple[Fitted, ...]) -> Any:
+    """What of the body's inertia (3, 3; kg m2) is that of the effectors' rotors about their own axes."""
+    return np.sum([fitted.part.module.axial_inertia(fitted.params) for fitted in effectors], axis=0)
 
 
 def torque_limit(table: RigidBodyTable, parts: Iterable[Fitted]) -> float:

@@ -20,7 +20,7 @@ from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.craft import Craft, check_moments, check_rest, compact, inverse
 from starhold.parts.stated_attitude import check_attitude
 from starhold.scenario.bodies.interface import Body, Moved
-from starhold.scenario.bodies.rigid_body.craft import effectors_of, sure_torque
+from starhold.scenario.bodies.rigid_body.craft import axial_inertia, effectors_of, sure_torque
 from starhold.scenario.bodies.rigid_body.start import start_of, stated, target_of, unit_of
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ def _with_inertia(scenario: Scenario, craft: Craft, inertia: Any) -> Craft:
     """The craft with another inertia of the same form, its wheels included."""
     if not craft.with_rotors:
         return craft._replace(inertia=inertia, inverse_inertia=inverse(inertia))
-    rotors = np.sum([f.part.module.axial_inertia(f.params) for f in effectors_of(scenario)], axis=0).tolist()
+    rotors = axial_inertia(effectors_of(scenario)).tolist()
     like: Any = craft.inertia
 
     def left(i: int, j: int) -> Any:
