@@ -20,21 +20,26 @@ NUMBERS = ("inertia", "torque_limit", "momentum_limit", "viscous", "coulomb")
 
 
 def written_out(scenario: Scenario, target: Fitted, effectors: tuple[Fitted, ...]) -> tuple[Fitted, ...]:
-    """The parts of the scenario in the order in which they act: its target, its effectors, those that other short forms
-    stand for, and those of [[part]] tables."""
+    """The parts of the scenario in the order in which they act: its target and its effectors, those that its other short
+    forms stand for, and those of [[part]] tables."""
     table = scenario.table
     around, noise, body = table.environment, table.sensor, table.spacecraft
     lag, rate_limit = body.actuator_lag, body.torque_rate_limit
-    forms: tuple[tuple[bool, str, str, Any], ...] = (
-        (table.orbit is not None, "environment", "two-body", ()),
-        (around.gravity_gradient, "environment", "gravity-gradient", ()),
-        (around.torque_noise > 0.0, "environment", "random-torque", (around.torque_noise,)),
-        (noise.attitude_noise > 0.0 or noise.rate_noise > 0.0, "sensor", "gaussian", tuple(dict(noise).values())),
-        (lag > 0.0, "actuator", "lag", (lag, rate_limit)),
-        (lag == 0.0 and math.isfinite(rate_limit), "actuator", "rate-limit", (rate_limit,)),
+    found = (
+        target,
+        *_where(table.orbit is not None, "environment", "two-body"),
+        *_where(around.gravity_gradient, "environment", "gravity-gradient"),
+        *_where(around.torque_noise > 0.0, "environment", "random-torque", around.torque_noise),
+        *effectors,
+        *_where(any(dict(noise).values()), "sensor", "gaussian", noise.attitude_noise, noise.rate_noise),
+        *_where(lag > 0.0, "actuator", "lag", lag, rate_limit),
+        *_where(lag == 0.0 and math.isfinite(rate_limit), "actuator", "rate-limit", rate_limit),
     )
-    found = [target, *effectors, *(fit(role, name, *numbers) for there, role, name, numbers in forms if there)]
     return (*found, *(fitted for fitted in scenario.parts if fitted not in found))
+
+
+def _where(there: bool, role: str, name: str, *numbers: float) -> tuple[Fitted, ...]:
+    return (fit(role, name, *numbers),) if there else ()
 
 
 def effectors_in(table: RigidBodyTable) -> tuple[Fitted, ...]:
