@@ -248,7 +248,7 @@ def recorded_of(loop: ClosedLoop) -> dict[str, Quantity]:
 
 
 def _recorded(parts: Composition, decided: Any, step: Any, setup: Any) -> Iterator[Any]:
-    """What is recorded of effectors from the last to the first, and of the body, whose names count most."""
+    """Return what is recorded of effectors, from the last to the first, and of the body, whose names count most."""
     own, records, _, _ = make_step(parts).sample(decided, step, setup)
     return reversed((own, *records))
 

@@ -120,13 +120,7 @@ class Effector(Protocol):
     if needed, its inertia, and takes the body's angular acceleration for its own rates. With `ACTS` it takes the law's
     command. One that decides only at control instants, or without the law, has `switch`; `OUTSIDE`: whether its torque comes
     from outside, as of a field or of mass that is expelled, and not from momentum of its own. In a mode in which it is
-    inactive, one with `ACTS` gets a zero command, and one with `OUTSIDE` alone has its initial state.
-
-    One that a body's own table gives also has `sure_torque(params, kind)`, the torque that it surely gives, in norm or about
-    each axis at once (N m); `capacity(own, params)`, the momentum that it can still store (N m s); `axial_inertia(params)`,
-    what of the body's inertia is that of rotors about their axes (3, 3; kg m2); `shared_as(params, known)`, its numbers
-    with a command shared out as among those that laws know. With `gives_what_is_asked(params)` it tells whether it does so
-    within its limits."""
+    inactive, one with `ACTS` gets a zero command, and one with `OUTSIDE` alone has its initial state."""
 
     ACTS: bool
     OUTSIDE: bool

@@ -324,8 +324,7 @@ def shared_as(params: Wheels, known: Wheels) -> Wheels:
 
 def axial_inertia(params: Wheels) -> NDArray[np.float64]:
     """The inertia of the rotors about their own axes (3, 3; kg m2)."""
-    axes = np.array(params.axes)
-    return (axes.T * np.array(params.inertia)) @ axes
+    return (np.transpose(params.axes) * np.array(params.inertia)) @ np.array(params.axes)
 
 
 def gives_what_is_asked(wheels: Wheels) -> bool:

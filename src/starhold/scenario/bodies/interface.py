@@ -102,8 +102,8 @@ class Body(Protocol):
         return None
 
     def given(self, scenario: Scenario, entry: LawEntry) -> dict[str, Any]:
-        """What the body's tables give of the closed loop of one law, by the names that `ClosedLoop` has for it: the start,
-        all parts, and what else is not as of any body."""
+        """Return what the body's tables give of the closed loop of one law, by the names that `ClosedLoop` has for it: the
+        start, all parts, and what else is not as of any body."""
         ...
 
     def build(self, scenario: Scenario, entry: LawEntry) -> ClosedLoop:

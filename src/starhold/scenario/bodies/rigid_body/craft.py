@@ -38,7 +38,13 @@ def make(table: RigidBodyTable, where: str) -> Made:
 
 
 def effectors_of(scenario: Scenario) -> tuple[Fitted, ...]:
-    """The effectors of a scenario's tables. A torque is shared out by them as laws suppose them to be."""
+    """The effectors of a scenario's tables, which share a torque out as laws suppose them to be.
+
+    Beside what its role asks for, such an effector has `sure_torque(params, kind)`, the torque (N m) that it surely gives, in
+    norm or about each axis at once; `capacity(own, params)`, the momentum (N m s) that it can still store;
+    `axial_inertia(params)`, what of the body's inertia (3, 3; kg m2) is that of rotors about their axes; and
+    `shared_as(params, known)`, its numbers with a torque shared out as among those that laws know.
+    """
     made, supposed = (cast(Made, one.made).effectors for one in (scenario, scenario.known))
     if made is supposed or len(made) != len(supposed):
         return made
@@ -66,7 +72,7 @@ def _craft(table: RigidBodyTable, effectors: tuple[Fitted, ...], inertia: Any) -
 
 
 def axial_inertia(effectors: tuple[Fitted, ...]) -> Any:
-    """What of the body's inertia (3, 3; kg m2) is that of the effectors' rotors about their own axes."""
+    """Return the share of the body's inertia (3, 3; kg m2) that is of the effectors' rotors about their own axes."""
     return np.sum([fitted.part.module.axial_inertia(fitted.params) for fitted in effectors], axis=0)
 
 
