@@ -40,10 +40,10 @@ def make(table: RigidBodyTable, where: str) -> Made:
 def effectors_of(scenario: Scenario) -> tuple[Fitted, ...]:
     """The effectors of a scenario's tables, which share a torque out as laws suppose them to be.
 
-    Beside what its role asks for, such an effector has `sure_torque(params, kind)`, the torque (N m) that it surely gives, in
-    norm or about each axis at once; `capacity(own, params)`, the momentum (N m s) that it can still store;
-    `axial_inertia(params)`, what of the body's inertia (3, 3; kg m2) is that of rotors about their axes; and
-    `shared_as(params, known)`, its numbers with a torque shared out as among those that laws know.
+    Beside what its role asks for, each has `sure_torque(params, kind)`, the torque (N m) that it surely gives, in norm or
+    about each axis at once; `capacity(own, params)`, the momentum (N m s) that it can still store; `axial_inertia(params)`,
+    what of the body's inertia (3, 3; kg m2) is that of rotors about their axes; and `shared_as(params, known)`, its numbers
+    with a torque shared out as among those that laws know.
     """
     made, supposed = (cast(Made, one.made).effectors for one in (scenario, scenario.known))
     if made is supposed or len(made) != len(supposed):
