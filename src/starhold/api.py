@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 from starhold.algebra.quantity import Quantity
 from starhold.errors import InputError, shortly
-from starhold.scenario import designing, reading
+from starhold.scenario import reading
 from starhold.scenario.reading import make_scenario as make_scenario
 from starhold.simulation.lane import Recording
 from starhold.studies import compare as studies
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from starhold.export.aem import Aem
     from starhold.export.folder import Exported
     from starhold.publications.reproduction import Reproduction
+    from starhold.scenario.designing import Design
     from starhold.studies.budget import Budget
     from starhold.studies.failures import Failure
     from starhold.studies.flight import Flight
@@ -169,10 +170,10 @@ def to_pandas(results: Any) -> DataFrame:
 
 
 @shortly
-def design(scenario: reading.Scenario | str | Path, law: str | None = None) -> list[designing.Design]:
+def design(scenario: reading.Scenario | str | Path, law: str | None = None) -> list[Design]:
     """The gains that formulas give, with what they can be judged by: every law of a scenario that has a `form`, or the one
     of this name. InputError where there is none."""
-    return designing.design(_opened(scenario), law)
+    return studied("design", scenario, law)
 
 
 @shortly
@@ -339,12 +340,14 @@ def modal_roots(scenario: reading.Scenario | str | Path, law: str | None = None)
 
 
 @shortly
-def studied(name: str, scenario: reading.Scenario | str | Path, law: str | None = None) -> Any:
-    """Study a law of a scenario as the command of a name does."""
+def studied(name: str, *about: Any, **options: Any) -> Any:
+    """Study what the command of a name does: a law of a scenario, or what else it is about, with its options."""
     from starhold.report.commands import command
 
     declared = command(name)
-    return declared.study(*declared.prepare(_opened(scenario), law))
+    if declared.read is None:
+        about = (_opened(about[0]), *about[1:])
+    return declared.study(*declared.prepare(*about, **options))
 
 
 def _opened(scenario: reading.Scenario | str | Path) -> reading.Scenario:
@@ -371,6 +374,4 @@ def invariant(problem: InvariantProblem | str | Path) -> Certificate:
     """Prove what can be of invariant sets: of a problem made in Python (`starhold.certification.invariant`), of a TOML
     file, or of the built-in problem of that name. Each claim has an `outcome`, numbers (`level`, the set's size) and
     evidence."""
-    from starhold.certification import invariant as sets
-
-    return sets.certify(problem if isinstance(problem, sets.InvariantProblem) else sets.load(problem))
+    return studied("invariant", problem)

@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import linprog
 
 from starhold.analysis.rigid_body import measure
-from starhold.cli.study import print_result
+from starhold.cli.show import print_blocks
 from starhold.errors import InputError
 from starhold.parts.effectors.layouts import pyramid
 from starhold.parts.effectors.wheels import lose, make_wheels
@@ -257,7 +257,7 @@ def test_names_among_the_gains_are_told_as_they_are_written(tmp_path, capsys):
     short = replace(scenario, table=scenario.table.model_copy(update={"simulation": table}))
     found = [_flown(short, entry, _left(wheels_of(short), lost, 0.02)) for lost in ((), (1,))]
     result = present(short, entry, found)
-    print_result(result)
+    print_blocks(result.blocks)
     assert "The gains are the same in all of them." in capsys.readouterr().out
     write_table(result.numbers, tmp_path / "table.csv")
     with (tmp_path / "table.csv").open(encoding="utf-8") as file:
@@ -275,7 +275,7 @@ def test_a_law_that_what_is_left_does_not_suit_leaves_the_rest_of_the_study(tmp_
     assert struck.gains is None
     assert struck.authority > 0.0
     result = present(short, entry, [intact, struck])
-    print_result(result)
+    print_blocks(result.blocks)
     said = " ".join(capsys.readouterr().out.split())
     assert (
         'without 1 not flown: limit = "axis" needs k_attitude below the torque limit of 0.011547 N m, not 0.013 N m' in said

@@ -12,14 +12,6 @@ USER_ERROR, DIVERGED, FAILED_CHECK, REFUTED, UNDECIDED, INTERNAL_ERROR = 2, 1, 1
 ScenarioFile = Annotated[str, typer.Argument(metavar="FILE", help="a scenario file or the name of a built-in scenario")]
 
 
-def number_or_text(value: str | int) -> str | float:
-    """A quantity as a file would have it: what is a number is one in SI."""
-    try:
-        return value if isinstance(value, int) else float(value)
-    except ValueError:
-        return value
-
-
 def results_in(where: str) -> Any:
     """The option that names the folder for results."""
     return typer.Option("-o", "--output", metavar="DIR", help=f"folder for results, created; else results/{where}")
@@ -30,7 +22,6 @@ Output = Annotated[Path | None, results_in("SCENARIO")]
 CertifyOutput = Annotated[Path | None, results_in("SCENARIO-certificate")]
 CampaignOutput = Annotated[Path | None, results_in("SCENARIO-campaign")]
 ReproductionOutput = Annotated[Path | None, results_in("reproduce-PAPER")]
-InvariantOutput = Annotated[Path | None, results_in("SYSTEM-invariant")]
 ExportOutput = Annotated[Path | None, results_in("SCENARIO-LAW-c")]
 Force = Annotated[bool, typer.Option("--force", help="replace results that are already there")]
 Unstable = Annotated[bool, typer.Option("--allow-unstable", help="take gains that are known to be unstable")]

@@ -14,17 +14,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from starhold.cli import (
-    campaign,
-    certifying,
-    export,
-    invariant,
-    parts,
-    reproduce,
-    sail,
-    studio,
-    study,
-)
+from starhold.cli import campaign, certifying, export, parts, reproduce, studio, study
 from starhold.cli.arguments import (
     DIVERGED,
     INTERNAL_ERROR,
@@ -145,33 +135,6 @@ def _fly(
     return flights
 
 
-@app.command()
-def design(
-    file: ScenarioFile,
-    law: Annotated[str | None, typer.Option(help="which law of the file; every one that has a form if not given")] = None,
-    map_to: Annotated[
-        Path | None, typer.Option("--map", metavar="FILE.png", help="draw the degree of stability over all gains")
-    ] = None,
-    allow_unstable: Unstable = False,
-) -> None:
-    """Print the gains that formulas give: every law of a file that has a `form`."""
-    from starhold.cli.console import console
-    from starhold.cli.show import print_design
-    from starhold.scenario import designing
-    from starhold.scenario.reading import load
-
-    if map_to is not None and map_to.suffix.lower() != ".png":
-        raise InputError("design", "--map", str(map_to), "the name of a PNG file, such as map.png")
-    scenario = load(file, allow_unstable)
-    for found in designing.design(scenario, law):
-        print_design(found, scenario.pick(found.name).law)
-    if map_to is not None:
-        from starhold.report.stability_map import draw_map
-
-        draw_map(map_to, *designing.map_inputs(scenario, law))
-        console.print(f"Map: {map_to}", soft_wrap=True)
-
-
 app.command()(campaign.campaign)
 app.command()(campaign.query)
 app.command()(campaign.rerun)
@@ -179,8 +142,6 @@ app.command()(certifying.certify)
 app.command()(certifying.check)
 for studied in names():
     app.command(studied)(study.command_of(studied))
-app.command()(invariant.invariant)
-app.command()(sail.sail)
 app.command()(reproduce.reproduce)
 app.add_typer(export.app, name="export")
 app.command()(studio.studio)

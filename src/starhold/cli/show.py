@@ -11,14 +11,13 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 from rich.table import Table
 
 from starhold.cli.console import WIDE, console
-from starhold.report.commands import Column
+from starhold.report.commands import Block, Column, Heading
 from starhold.report.commands import Table as Rows
 
 if TYPE_CHECKING:
     from starhold.laws.catalogue import Law
     from starhold.parts.contract import Field
     from starhold.parts.effectors.wheel_units import WheelUnit
-    from starhold.scenario.designing import Design
     from starhold.scenario.reading import LawEntry
     from starhold.studies.flight import Flight
 
@@ -126,6 +125,17 @@ def _cell(text: str, best: bool) -> str:
     return f"[bold green]{text}*[/bold green]" if best else text
 
 
+def print_blocks(blocks: Iterable[Block]) -> None:
+    """Print what a command shows."""
+    for block in blocks:
+        if isinstance(block, Rows):
+            print_rows(block)
+        elif isinstance(block, Heading):
+            console.print(f"[bold]{escape(block.name)}[/bold]{escape(block.rest)}", highlight=False, soft_wrap=True)
+        else:
+            console.print(block, highlight=False, markup=False)
+
+
 def print_rows(what: Rows, apart: bool = False) -> None:
     """Print a table, after an empty line if `apart`; what is nothing is a dash."""
     table = Table(show_edge=False, pad_edge=False, title=what.title or None, title_justify="left")
@@ -139,27 +149,6 @@ def print_rows(what: Rows, apart: bool = False) -> None:
     if apart:
         console.print()
     console.print(table)
-
-
-def print_design(design: Design, law: Law) -> None:
-    """The inputs of a design, its gains, and what it can be judged by."""
-    import numpy as np
-
-    from starhold.report.text import number_text
-
-    console.print(f'[bold]{design.name}[/bold]: {law.card.title}, form "{design.form}"', highlight=False)
-    for title, items, values in (
-        ("from", law.fields(design.form), design.inputs),
-        ("gains", law.fields(), design.gains),
-    ):
-        cells = [(item.name, number_text(values[item.name]), item.gain.unit, item.gain.text) for item in items]
-        print_rows(Rows([*map(Column, (title, "value", "unit", "meaning"))], [[*map(escape, row)] for row in cells]))
-    # Digits, not decimals: entries of P may be far apart in size.
-    digits: Any = {"float_kind": lambda number: f"{number:12.6g}", "complex_kind": lambda number: f"{number:.6g}"}
-    for name, value in design.figures.items():
-        shown = f"{value:.3g}" if isinstance(value, float) else np.array2string(value, max_line_width=WIDE, formatter=digits)
-        console.print(f"{name}: " + ("\n" if "\n" in shown else "") + shown, highlight=False, markup=False)
-    console.print()
 
 
 def print_laws(group: str, known: Mapping[str, Law]) -> None:

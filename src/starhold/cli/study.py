@@ -1,65 +1,108 @@
-"""Makes commands of what stands in `starhold.report.commands`, and prints tables."""
+"""Makes commands of what stands in `starhold.report.commands`."""
 
 from __future__ import annotations
 
 import inspect
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from starhold.cli.arguments import REFUTED, Force, ScenarioFile, Unstable, number_or_text, results_in
-from starhold.report.commands import Result, command
+from starhold.cli.arguments import REFUTED, UNDECIDED, Force, Unstable, results_in
+from starhold.errors import InputError
+from starhold.report.commands import Command, command
+
+CODES = {"missed": REFUTED, "undecided": UNDECIDED}
 
 
 def command_of(name: str) -> Any:
     """The command of a name."""
     declared = command(name)
 
-    def run(file: str, law: str | None, output: Path | None, force: bool, allow_unstable: bool = False, **given: Any):
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
+    def run(output: Path | None = None, force: bool = False, allow_unstable: bool = False, **given: Any) -> None:
         from starhold.cli.console import console
-        from starhold.report.results import open_folder, write_result
+        from starhold.cli.show import print_blocks
+        from starhold.report.results import open_folder, write_part, write_result
         from starhold.scenario.reading import load
 
-        changes = {key: number_or_text(value) for key, value in given.items() if value is not None}
-        scenario, entry = declared.prepare(load(file, allow_unstable), law, **changes)
-        folder = open_folder(output or Path("results") / f"{scenario.name}-{declared.suffix}", force)
-        with Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), console=console) as bars:
-            task = bars.add_task("compiling", total=None)
+        asked = {
+            key: output if key == "output" else given.pop(key) for key, option in declared.options.items() if option.file
+        }
+        paths = {key: path for key, path in asked.items() if path is not None}
+        for key, path in paths.items():
+            if declared.options[key].file == "png" and path.suffix.lower() != ".png":
+                raise InputError(name, f"--{key}", str(path), f"the name of a PNG file, such as {key}.png")
+            if key == "output" and path.exists() and not force:
+                raise InputError(str(path), "", "a file that exists", "another name, or --force")
+        about = [given.pop(key) for key in ("file", "law") if key in given]
+        if about == [None] and declared.listed is not None:
+            print_blocks(declared.listed())
+            return
+        if declared.read is None:
+            about[0] = load(about[0], allow_unstable)
+        subject = declared.prepare(*about, **{key: value for key, value in given.items() if value is not None})
+        folder, title = Path(), getattr(subject[0], "name", "")
+        if declared.suffix:
+            folder = open_folder(output or Path("results") / f"{title}-{declared.suffix}", force)
+        with _progress(declared) as notice:
+            result = declared.result(subject, notice)
+        print_blocks(result.blocks)
+        written = write_result(result, name, title, folder) if declared.suffix else dict[str, Path]()
+        for key, path in paths.items():
+            kind = declared.options[key].file
+            written["Table" if kind == "csv" else key.capitalize()] = write_part(result, kind, path)
+        if written:
+            console.print(". ".join(f"{what}: {path}" for what, path in written.items()), soft_wrap=True)
+        if result.outcome in CODES:
+            raise typer.Exit(CODES[result.outcome])
 
-            def notice(done: int, total: int, what: str) -> None:
-                bars.update(task, completed=done, total=total, description=what)
-
-            result = declared.result(scenario, entry, notice)
-        table, picture = write_result(result, name, scenario, entry.name, folder)
-        print_result(result)
-        console.print(f"Table: {table}. Picture: {picture}", soft_wrap=True)
-        if not result.met:
-            raise typer.Exit(REFUTED)
-
-    kinds: dict[str, Any] = {"file": ScenarioFile, "law": Annotated[str | None, typer.Option(help=declared.law)]}
-    for key, option in declared.options.items():
-        shown = typer.Option(help=option.help, metavar=None if option.whole else "TIME")
-        kinds[key] = Annotated[int | None if option.whole else str | None, shown]
-    kinds |= {"output": Annotated[Path | None, results_in(f"SCENARIO-{declared.suffix}")], "force": Force}
-    kinds |= {"allow_unstable": Unstable} if declared.unstable else {}
-    defaults: dict[str, Any] = {"file": inspect.Parameter.empty, "force": False, "allow_unstable": False}
+    kinds = _parameters(declared)
+    defaults: dict[str, Any] = {key: option.default for key, option in declared.options.items()}
+    defaults |= {"file": inspect.Parameter.empty} if declared.listed is None else {}
+    defaults |= {"force": False, "allow_unstable": False}
     parameters = [
         inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, annotation=kind, default=defaults.get(key))
         for key, kind in kinds.items()
     ]
-    run.__doc__, run.__annotations__ = declared.summary, kinds
+    run.__doc__, run.__annotations__ = inspect.cleandoc(declared.summary), kinds
     run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     return run
 
 
-def print_result(result: Result) -> None:
-    """Print the table, then the sentences."""
-    from starhold.cli.console import console
-    from starhold.cli.show import print_rows
+def _parameters(declared: Command) -> dict[str, Any]:
+    """The types of a command's arguments and options, in order."""
+    kinds: dict[str, Any] = {}
+    if declared.file is not None:
+        kind = str if declared.listed is None else str | None
+        kinds["file"] = Annotated[kind, typer.Argument(metavar="FILE", help=declared.file)]
+    if declared.read is None:
+        kinds["law"] = Annotated[str | None, typer.Option(help=declared.law)]
+    for key, option in declared.options.items():
+        flags = ("-o", "--output") if key == "output" else (f"--{key.replace('_', '-')}",)
+        metavar = f"FILE.{option.file}" if option.file else "TIME" if option.key and not option.whole else None
+        kind = Path if option.file else int if option.whole else str
+        shown = typer.Option(*flags, metavar=metavar, help=option.help)
+        kinds[key] = Annotated[kind if option.default else kind | None, shown]
+    if declared.suffix:
+        subject = "SCENARIO" if declared.read is None else "SYSTEM"
+        kinds["output"] = Annotated[Path | None, results_in(f"{subject}-{declared.suffix}")]
+    if "output" in kinds:
+        kinds["force"] = Force
+    return kinds | ({"allow_unstable": Unstable} if declared.unstable else {})
 
-    print_rows(result.table, apart=True)
-    for text in result.sentences:
-        console.print(text, highlight=False, markup=False)
+
+@contextmanager
+def _progress(declared: Command) -> Iterator[Callable[[int, int, str], None]]:
+    """A bar for a command that tells how far it is; yields what it calls."""
+    if declared.doing is None:
+        yield lambda done, total, what: None
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    from starhold.cli.console import console
+
+    with Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), console=console) as bars:
+        task = bars.add_task("compiling", total=None)
+        yield lambda done, total, what: bars.update(task, completed=done, total=total, description=what)

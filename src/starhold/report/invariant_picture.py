@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from starhold.certification.invariant.wording import down
 from starhold.report.colours import COLOURS
-from starhold.report.figures import framed, save
+from starhold.report.figures import framed
 from starhold.studies.phase_portraits import Portrait
 
-PICTURE = "invariant.png"
 INSIDE, SET, AGAINST, TRUE = COLOURS[5], COLOURS[0], COLOURS[1], COLOURS[2]
 
 
-def draw(portraits: Sequence[Portrait], path: Path, title: str) -> Path | None:
-    """Write the picture to `path`, in a folder that exists, and return the path; None where there is nothing to draw."""
-    drawn = [item for item in portraits if item.V is not None]
-    if not drawn:
-        return None
+def draw(drawn: Sequence[Portrait], title: str) -> Any:
+    """A figure of portraits, of which each has a V."""
     across = min(len(drawn), 2)
     down = -(-len(drawn) // across)
     # Panels as wide as they are drawn where both axes have one scale.
@@ -44,7 +39,7 @@ def draw(portraits: Sequence[Portrait], path: Path, title: str) -> Path | None:
         borderpad=0.0,
         columnspacing=1.4,
     )
-    return save(figure, path)
+    return figure
 
 
 def _share(item: Portrait) -> float:

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 SUMMARY, PAGE = "summary.json", "report.html"
 INDEX = "index.html"
 EXPORT = "export.json"
-STUDIED = tuple(f"{name}.{kind}" for name in commands.names() for kind in ("csv", "png"))
-MARKS = (SUMMARY, EXPORT, "run.nc", PAGE, INDEX, CERTIFICATES, "invariant.png", *STUDIED)
+STUDIED = tuple(f"{name}.{kind}" for name in commands.names() if commands.command(name).suffix for kind in ("csv", "png"))
+MARKS = (SUMMARY, EXPORT, "run.nc", PAGE, INDEX, CERTIFICATES, *STUDIED)
 """A folder with one of these holds results."""
 
 
@@ -92,9 +92,9 @@ def write_run(run: Recording, path: Path) -> None:
         write_netcdf(run, hidden)
 
 
-def write_summary(scenario: Scenario, results: dict[str, dict[str, Any]], path: Path) -> None:
-    """The metrics of each law, SI units, as JSON; a value that does not exist is null."""
-    content = {"scenario": scenario.name, "starhold_version": __version__, "laws": _finite(results)}
+def write_summary(scenario: str, results: dict[str, Any], path: Path) -> None:
+    """The metrics of each law of a scenario of this name, SI units, as JSON; a value that does not exist is null."""
+    content = {"scenario": scenario, "starhold_version": __version__, "laws": _finite(results)}
     with atomic_write(path) as hidden:
         hidden.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
@@ -108,17 +108,34 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def write_result(result: commands.Result, name: str, scenario: Scenario, law: str, folder: Path) -> tuple[Path, Path]:
-    """Write the results of a study into an existing folder; returns the paths of its table and its picture."""
+def write_result(result: commands.Result, name: str, subject: str, folder: Path) -> dict[str, Path]:
+    """Write the results of a study of a subject into an existing folder; returns what is to be looked at: the paths of its
+    table, its certificate and its picture, where there are such."""
+    written = dict[str, Path]()
+    if result.numbers is not None:
+        written["Table"] = write_part(result, "csv", folder / f"{name}.csv")
+    if result.summary is not None:
+        write_summary(subject, dict(result.summary), folder / SUMMARY)
+    if result.certificate is not None:
+        written["Certificate"] = folder / CERTIFICATES
+        with atomic_write(written["Certificate"]) as hidden:
+            result.certificate(hidden)
+    if result.figure is not None:
+        written["Picture"] = write_part(result, "png", folder / f"{name}.png")
+    return written
+
+
+def write_part(result: commands.Result, kind: str, path: Path) -> Path:
+    """Write the numbers of a result ("csv") or its figure ("png"), which it has, and return the path."""
     from starhold.report.figures import save
     from starhold.report.tables import write_table
 
-    table, picture = folder / f"{name}.csv", folder / f"{name}.png"
-    write_table(result.numbers, table)
-    save(result.figure(), picture)
-    if result.summary is not None:
-        write_summary(scenario, {law: dict(result.summary)}, folder / SUMMARY)
-    return table, picture
+    if kind == "csv":
+        assert result.numbers is not None
+        write_table(result.numbers, path)
+        return path
+    assert result.figure is not None
+    return save(result.figure(), path)
 
 
 def write_proofs(certificates: Sequence[Certificate], name: str, folder: Path) -> Path:
@@ -134,7 +151,7 @@ def write_results(scenario: Scenario, flights: Sequence[Flight], folder: Path) -
     flown, by `write_run`, and the pictures by a `Painter`."""
     from starhold.report.page import write_page
 
-    write_summary(scenario, {flight.name: flight.results() for flight in flights}, folder / SUMMARY)
+    write_summary(scenario.name, {flight.name: flight.results() for flight in flights}, folder / SUMMARY)
     if certificates := [certificate for flight in flights for certificate in flight.certificates]:
         write_proofs(certificates, scenario.name, folder)
     page = folder / PAGE

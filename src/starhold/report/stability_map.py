@@ -1,15 +1,13 @@
-"""The decay rate (degree of stability) over the gains, with the mode that decides it, the torque budget and the optimum: a
-PNG file."""
+"""The decay rate (degree of stability) over the gains, with the mode that decides it, the torque budget and the optimum."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from starhold.report.figures import DPI, save
+from starhold.report.figures import DPI
 from starhold.synthesis.stability_degree import Optimum, boundary, degree, optimum
 
 POINTS = 400
@@ -40,15 +38,6 @@ class StabilityMap(NamedTuple):
     budget: float
 
 
-def draw_map(path: Path, ratios: ArrayLike, alpha: float, omega: float, budget: float) -> Path:
-    """Write the map of eta(K_a, K_w) to `path`, a PNG file in a folder that exists, and return the path.
-
-    ratios: (3,), J_axis / J_x in any order; alpha: largest initial error (rad); omega: largest initial rate (1/t0); budget:
-    L. ValueError as `optimum` raises it, before anything is written. Equal arguments give equal files.
-    """
-    return paint(stability_map(ratios, alpha, omega, budget), path)
-
-
 def stability_map(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> StabilityMap:
     """The map around the optimum. Arguments and errors as of `draw_map`."""
     best = optimum(ratios, alpha, omega, budget)
@@ -61,10 +50,15 @@ def stability_map(ratios: ArrayLike, alpha: float, omega: float, budget: float) 
     return StabilityMap(K_a, K_w, eta, ask, best, three, float(alpha), float(omega), float(budget))
 
 
-def paint(what: StabilityMap, path: Path) -> Path:
-    """Write the figure to `path`, in a folder that exists, and return the path."""
+def draw_map(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> Any:
+    """A figure of the map of eta(K_a, K_w). Equal arguments give equal files.
+
+    ratios: (3,), J_axis / J_x in any order; alpha: largest initial error (rad); omega: largest initial rate (1/t0); budget:
+    L. ValueError as `optimum` raises it.
+    """
     from matplotlib.figure import Figure
 
+    what = stability_map(ratios, alpha, omega, budget)
     figure = Figure(figsize=(8.0, 6.2), dpi=DPI)
     figure.set_layout_engine("none")
     axis: Any = figure.add_axes((0.085, 0.17, 0.745, 0.70))
@@ -96,7 +90,7 @@ def paint(what: StabilityMap, path: Path) -> Path:
         handlelength=2.6,
         columnspacing=1.6,
     )
-    return save(figure, path)
+    return figure
 
 
 def _budget(axis: Any, what: StabilityMap) -> None:

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from starhold.files import atomic_write
-from starhold.report.commands import Column, Table
-
-if TYPE_CHECKING:
-    from starhold.synthesis.circle import Station
+from starhold.report.commands import Table
 
 
 def write_table(table: Table, path: Path) -> None:
@@ -28,17 +24,3 @@ def cell(value: Any) -> str:
     if value is None or isinstance(value, str):
         return value or ""
     return " ".join(repr(number) for number in np.asarray(value).ravel().tolist())
-
-
-def write_sail(station: Station, path: Path) -> None:
-    """Write the sail that a circle takes, one row a rate and reflectivity."""
-    from starhold.studies import sail
-
-    columns = sail.reflectivities(station)
-    head = ["rate", "period", "peak_scaled", "peak", "pressure", "radius", "specular", "diffuse", "area_per_mass"]
-    rows: list[Sequence[Any]] = [
-        [*row[:4], station.pressure, station.radius, mirror, min(station.diffuse, 1.0 - mirror), area]
-        for row in sail.rows(station, columns)
-        for mirror, area in zip(columns, row.areas, strict=True)
-    ]
-    write_table(Table([Column(name) for name in head], rows), path)

@@ -68,26 +68,6 @@ def _certify(scenario: Scenario, folder: Path, tell: Tell) -> str:
     return _page(folder, text)
 
 
-def _design(scenario: Scenario, folder: Path, tell: Tell) -> str:
-    from starhold.report.text import number_text
-    from starhold.scenario.designing import design
-
-    tell(0, 0, "gains are computed")
-    parts: list[str] = []
-    for found in design(scenario):
-        law = scenario.pick(found.name).law
-        parts.append(f'<h2>{escape(found.name)}: {escape(law.card.title)}, form "{escape(found.form)}"</h2>')
-        for title, items, values in (("from", law.fields(found.form), found.inputs), ("gains", law.fields(), found.gains)):
-            rows = [(item.name, _shown(values[item.name]), item.gain.unit, item.gain.text) for item in items]
-            parts.append(_table((title, "value", "unit", "meaning"), rows))
-        figures = "".join(
-            f"<dt>{escape(name)}</dt><dd>{escape(number_text(value) if isinstance(value, float) else str(value))}</dd>"
-            for name, value in found.figures.items()
-        )
-        parts.append(f"<dl>{figures}</dl>")
-    return _document(scenario, folder, parts)
-
-
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = ["".join(f"<td>{escape(text)}</td>" for text in row) for row in rows]
     heads = "".join(f"<th>{escape(text)}</th>" for text in head)
@@ -95,32 +75,33 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return f'<div class="wide"><table class="text"><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table></div>'
 
 
-def _shown(value: Any) -> str:
-    from starhold.report.text import number_text
-
-    return "—" if value is None else number_text(value)
-
-
 def _studied(name: str, scenario: Scenario, folder: Path, tell: Tell) -> str:
-    """A page of a study: its picture, its sentences and its table."""
-    from rich.text import Text
-
+    """A page of a study: its picture, what it shows, and its files."""
     from starhold.report.results import write_result
 
     command = commands.command(name)
-    scenario, entry = command.prepare(scenario)
-    result = command.result(scenario, entry, tell)
-    table, picture = write_result(result, name, scenario, entry.name, folder)
-    drawn = base64.b64encode(picture.read_bytes()).decode()
-    parts = [
-        f"<h2>{escape(result.title)}</h2>",
-        f'<p><img src="data:image/png;base64,{drawn}" alt="{escape(result.title)}" style="max-width:100%"></p>',
-        *(f'<p style="white-space:pre-line">{escape(text)}</p>' for text in result.sentences),
-        _table(result.table.heads(), [[Text.from_markup(text).plain for text in row] for row in result.table.texts()]),
-        f'<p>All digits: <a href="{table.name}" download>{table.name}</a>. '
-        f'Picture: <a href="{picture.name}" download>{picture.name}</a>.</p>',
-    ]
+    subject = command.prepare(scenario)
+    result = command.result(subject, tell)
+    files = write_result(result, name, scenario.name, folder) if command.suffix else {}
+    parts = [f"<h2>{escape(result.title)}</h2>"]
+    if "Picture" in files:
+        drawn = base64.b64encode(files["Picture"].read_bytes()).decode()
+        source = f"data:image/png;base64,{drawn}"
+        parts.append(f'<p><img src="{source}" alt="{escape(result.title)}" style="max-width:100%"></p>')
+    parts += [_block(block) for block in result.blocks]
+    links = (f'{what}: <a href="{path.name}" download>{path.name}</a>' for what, path in files.items())
+    parts += [f"<p>{'. '.join(links)}.</p>"] if files else []
     return _document(scenario, folder, parts)
+
+
+def _block(block: commands.Block) -> str:
+    from rich.text import Text
+
+    if isinstance(block, commands.Heading):
+        return f"<h2>{escape(block.name + block.rest)}</h2>"
+    if isinstance(block, str):
+        return f'<p style="white-space:pre-wrap">{escape(block)}</p>' if block else ""
+    return _table(block.heads(), [[Text.from_markup(text).plain for text in row] for row in block.texts()])
 
 
 def _export(scenario: Scenario, folder: Path, tell: Tell) -> str:
@@ -187,8 +168,7 @@ def _page(folder: Path, text: str) -> str:
 KINDS = {
     "compare": _compare,
     "certify": _certify,
-    "design": _design,
-    **{name: partial(_studied, name) for name in commands.names()},
+    **{name: partial(_studied, name) for name in commands.names() if commands.command(name).read is None},
     "campaign": _campaign,
     "export": _export,
 }

@@ -1,14 +1,16 @@
-"""Commands that study one law of a scenario: each is a file of this folder, with its name and a `COMMAND`. The command line,
-the Python interface and the studio offer whatever stands here, and present its `Result`."""
+"""Commands whose results are declared: each is a file of this folder, with its name and a `COMMAND`. The command line and
+the Python interface offer whatever stands here, and the studio what is about a scenario."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from starhold.scenario.reading import LawEntry, Scenario
 
 
@@ -45,26 +47,48 @@ class Table(NamedTuple):
         ]
 
 
+class Heading(NamedTuple):
+    """A name that stands out, and what follows it in its line."""
+
+    name: str
+    rest: str = ""
+
+
+Block: TypeAlias = Table | Heading | str
+"""What is shown as a whole; "" is an empty line."""
+
+
 class Result(NamedTuple):
-    """A study gives this. numbers: all that it computed, SI and radians, for a file. figure: makes the figure with the
-    plotting library. table and sentences: for reading. summary: for summary.json, None without that file. met: whether all
-    that is required is met."""
+    """A study gives this. blocks: for reading, in order. What there is no file of is None: numbers, all that it computed, SI
+    and radians, are for NAME.csv; figure makes the figure of NAME.png with the plotting library; summary, by law, is for
+    summary.json; certificate writes one. outcome: whether all that is required is met, or proved."""
 
     title: str
-    numbers: Table
-    figure: Callable[[], Any]
-    table: Table
-    sentences: Sequence[str] = ()
+    blocks: Sequence[Block]
+    numbers: Table | None = None
+    figure: Callable[[], Any] | None = None
     summary: Mapping[str, Any] | None = None
-    met: bool = True
+    certificate: Callable[[Path], None] | None = None
+    outcome: Literal["met", "missed", "undecided"] = "met"
 
 
 class Option(NamedTuple):
-    """An option that stands in place of a key of the scenario: a whole number if `whole`, else a time."""
+    """An option. key: the key of the scenario in whose place it stands, a whole number if `whole`, else a time; "" for a
+    text that `read` takes. file: "csv" or "png", where it names a file for the numbers or for the figure."""
 
     key: str
     help: str
     whole: bool = False
+    default: str | None = None
+    file: Literal["", "csv", "png"] = ""
+
+
+def number_or_text(value: str | float) -> str | float:
+    """A quantity as a file would have it: what is a number is one in SI."""
+    try:
+        return float(value) if isinstance(value, str) else value
+    except ValueError:
+        return value
 
 
 def later(path: str) -> Callable[..., Any]:
@@ -78,38 +102,51 @@ def _named(scenario: Scenario, law: str | None) -> LawEntry:
 
 
 class Command(NamedTuple):
-    """A study of one law of a rigid body.
+    """A command about a law of a scenario; or about something else, which `read` gives.
 
-    summary: what it does, in a sentence. suffix: results go to SCENARIO-suffix. study: computes, from a scenario, a law and
-    a notice, which hears the number done, that of all and what comes next ("" at the end). present: the Result of
-    these and what was computed. pick: the law that a name or None means, with InputError for what cannot be studied. law:
-    help for --law. doing: what stands beside the bar of progress. unstable: whether there is --allow-unstable.
+    summary: what it does, in a sentence. suffix: results go to SUBJECT-suffix; "" where none are written unasked. study:
+    computes, from a scenario, a law and, if there is `doing`, a notice, which hears the number done, that of all and what
+    comes next ("" at the end). present: the Result of these and what was computed. pick: the law that a name or None means,
+    with InputError for what cannot be studied. law: help for --law. doing: what stands beside the bar of progress. unstable:
+    whether there is --allow-unstable. body: the one that scenarios are about, any if "". file: help for FILE, None for a
+    command without; listed: what is shown where FILE is not given, if it need not be. read: returns what stands in place of
+    a scenario and a law, from FILE and options.
     """
 
     summary: str
     suffix: str
     study: Callable[..., Any]
-    present: Callable[[Scenario, LawEntry, Any], Result]
-    pick: Callable[[Scenario, str | None], LawEntry] = _named
+    present: Callable[..., Result]
+    pick: Callable[[Scenario, str | None], Any] = _named
     law: str = "which law of the file; the first if not given"
-    doing: str = "{}"
+    doing: str | None = "{}"
     options: Mapping[str, Option] = {}
     unstable: bool = False
+    body: str = "rigid-body"
+    file: str | None = "a scenario file or the name of a built-in scenario"
+    listed: Callable[[], Sequence[Block]] | None = None
+    read: Callable[..., tuple[Any, ...]] | None = None
 
-    def prepare(self, scenario: Scenario, law: str | None = None, **given: Any) -> tuple[Scenario, LawEntry]:
-        """The scenario with what options say, and the law."""
-        scenario = scenario.about("rigid-body")
+    def prepare(self, *about: Any, **given: Any) -> tuple[Any, ...]:
+        """The arguments of `study`: the scenario with what options say, and the law; or what `read` gives."""
+        if self.read is not None:
+            defaults = {name: option.default for name, option in self.options.items() if not option.file}
+            return self.read(*about, **defaults | given)
+        scenario: Scenario = about[0].about(self.body) if self.body else about[0]
         if given:
-            scenario = scenario.with_({self.options[name].key: value for name, value in given.items()})
-        return scenario, self.pick(scenario, law)
+            scenario = scenario.with_({self.options[name].key: number_or_text(value) for name, value in given.items()})
+        return scenario, self.pick(scenario, *about[1:] or (None,))
 
-    def result(self, scenario: Scenario, entry: LawEntry, notice: Callable[[int, int, str], None]) -> Result:
-        """Study a law, and present what is found."""
+    def result(self, subject: tuple[Any, ...], notice: Callable[[int, int, str], None]) -> Result:
+        """Study what `prepare` gave, and present what is found."""
+        if self.doing is None:
+            return self.present(*subject, self.study(*subject))
+        doing = self.doing
 
         def told(done: int, total: int, what: str) -> None:
-            notice(done, total, self.doing.format(what) if what else "flown")
+            notice(done, total, doing.format(what) if what else "flown")
 
-        return self.present(scenario, entry, self.study(scenario, entry, told))
+        return self.present(*subject, self.study(*subject, told))
 
 
 def names() -> list[str]:

@@ -31,7 +31,9 @@ def present(scenario: Scenario, entry: LawEntry, found: Budget) -> Result:
     numbers = Table([*map(Column, list(records[0])[: -len(heads)]), *heads], [list(row.values()) for row in records])
     sentences = [_setting_text(found), *(f"{index}: {MEANINGS[index]}." for index in found.indices)]
     title = f"{found.scenario}, {found.law}: pointing error by source"
-    return Result(title, numbers, lambda: draw(found, title), _table(found), sentences, found.summary(), found.met)
+    blocks, summary = ["", _table(found), *sentences], {found.law: found.summary()}
+    outcome = "met" if found.met else "missed"
+    return Result(title, blocks, numbers, lambda: draw(found, title), summary, outcome=outcome)
 
 
 def _table(found: Budget) -> Table:

@@ -30,7 +30,7 @@ def present(scenario: Scenario, entry: LawEntry, found: Sequence[Failure]) -> Re
     if any(failure.saturation is not None and failure.saturation.known == "extrapolated" for failure in found):
         sentences.append("~ extrapolated from the growth of the momentum late in the flight.")
     title = f"{scenario.name}, {entry.name}: loss of wheels"
-    return Result(title, _numbers(found, entry), lambda: draw(found, title), _table(found, retuned), sentences)
+    return Result(title, ["", _table(found, retuned), *sentences], _numbers(found, entry), lambda: draw(found, title))
 
 
 def _numbers(found: Sequence[Failure], entry: LawEntry) -> Table:

@@ -28,7 +28,7 @@ def present(scenario: Scenario, entry: LawEntry, found: Study) -> Result:
     if found.own is not None:
         sentences.append("\n".join(["", *law_lines(found.own, found.b), ""]))
     title = f"{scenario.name}: fastest root within the limits"
-    return Result(title, _numbers(found), lambda: draw(found, title), _table(found), sentences)
+    return Result(title, ["", _table(found), *sentences], _numbers(found), lambda: draw(found, title))
 
 
 def _numbers(found: Study) -> Table:

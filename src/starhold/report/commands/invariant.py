@@ -1,0 +1,89 @@
+"""What functions V say of invariant sets of any small system."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from starhold.report.commands import Block, Column, Command, Heading, Result, Table, later
+
+if TYPE_CHECKING:
+    from starhold.certification.certificate import Certificate
+    from starhold.certification.invariant import InvariantProblem
+    from starhold.studies.phase_portraits import Portrait
+
+COLOURS = {"proved": "green", "refuted": "red", "undecided": "yellow"}
+
+
+def listed() -> list[Block]:
+    """The systems that come with starhold."""
+    from starhold.certification import invariant as sets
+
+    return [Heading(name, f"  {sets.load(name).description}") for name in sets.builtin_names()]
+
+
+def read(problem: InvariantProblem | str | Path) -> tuple[InvariantProblem]:
+    """The problem: made in Python, of a file, or the built-in one of a name."""
+    from starhold.certification import invariant as sets
+
+    return (problem if isinstance(problem, sets.InvariantProblem) else sets.load(problem),)
+
+
+def present(problem: InvariantProblem, found: Certificate) -> Result:
+    """Each claim with its outcome, how it was shown and what it lacks; the phase portrait with the sets."""
+    from starhold.certification import invariant as sets
+    from starhold.studies.phase_portraits import portraits
+
+    shown = portraits(problem, found)
+    drawn = [item for item in shown if item.V is not None]
+    told = dict.fromkeys(a for claim in found.claims for a in claim.assumptions)
+    blocks = ["", Heading(found.name), _table(found, shown), f"  assuming: {'; '.join(told)}", ""]
+    figure = partial(_draw, drawn, problem.name) if drawn else None
+    outcome = {"proved": "met", "refuted": "missed"}.get(found.outcome, "undecided")
+    written: Any = partial(sets.write, found)
+    return Result(problem.name, blocks, figure=figure, certificate=written, outcome=outcome)  # type: ignore[arg-type]
+
+
+def _draw(drawn: list[Portrait], title: str) -> Any:
+    from starhold.report.invariant_picture import draw
+
+    return draw(drawn, title)
+
+
+def _table(certificate: Certificate, portraits: list[Portrait]) -> Table:
+    from rich.markup import escape
+
+    from starhold.certification.invariant.wording import HEADINGS, OBLIGATIONS, evidence, limit, sentence, size
+
+    rows: list[list[str]] = []
+    for claim, portrait in zip(certificate.claims, portraits, strict=True):
+        heading, name = HEADINGS[claim.numbers["theorem"]], escape(claim.witness["name"])
+        colour = COLOURS[claim.outcome]
+        title = f"{name}\n[dim]{heading}[/dim]" if name else heading
+        rows.append([title, f"[{colour}]{claim.outcome}[/{colour}]", escape(sentence(claim))])
+        lines = [f"[dim]{line}[/dim]" for line in (size(claim.numbers, portrait.orbit_area), limit(claim.numbers)) if line]
+        lines += [
+            f"needed, but {o.outcome}: {OBLIGATIONS[o.name]}; {escape(evidence(o))}"
+            for o in claim.obligations
+            if o.outcome != "proved"
+        ]
+        if claim.outcome == "proved":
+            lines.append(f"[dim]by {', '.join(dict.fromkeys(o.how for o in claim.obligations))}[/dim]")
+        rows += [["", "", line] for line in lines]
+    return Table([*map(Column, ("claim", "outcome", "what it says"))], rows)
+
+
+COMMAND = Command(
+    """Prove what functions V say of an invariant set of any small system: a table, certificate.json and a picture.
+
+    Exit code 0: all that is claimed is proved; 3: something is refuted, with the state that does; 4: not decided.
+    """,
+    "invariant",
+    later("certification.invariant.certify"),
+    present,
+    doing=None,
+    file="a file with a system, or the name of a built-in one; none: list these",
+    listed=listed,
+    read=read,
+)
