@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import os
-import queue
-import subprocess
-import sys
+import signal
 import threading
-from contextlib import suppress
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context, parent_process
 from pathlib import Path
 from typing import Any
 
@@ -23,88 +22,48 @@ class Checker:
 
     def __init__(self, longest: float = LONGEST) -> None:
         self._longest, self._lock = longest, threading.Lock()
-        self._process: subprocess.Popen[str] | None = None
-        self._answers: queue.Queue[str] = queue.Queue()
+        self._pool: ProcessPoolExecutor | None = None
 
     def check(self, text: str, where: str, folder: Path) -> dict[str, Any]:
         """Tell of a text what `editing.check` does, or that its check does not end."""
         with self._lock:
-            process = self._running()
-            assert process.stdin is not None
+            self._pool = self._pool or ProcessPoolExecutor(1, get_context("spawn"), _begin)
             try:
-                process.stdin.write(json.dumps([text, where, str(folder)]) + "\n")
-                process.stdin.flush()
-                line = self._answers.get(timeout=self._longest)
-            except queue.Empty:
-                self._end()
-                return {"error": f"{where}: the check did not end within {self._longest:g} s; a file that it names may not"}
-            except OSError:
-                line = ""
-            if not line:
-                self._end()
-                return {"error": f"{where}: the check ended without an answer; a file that it names may have ended it"}
-            return json.loads(line)
+                return self._pool.submit(_check, text, where, folder).result(self._longest)
+            except TimeoutError:
+                why = f"did not end within {self._longest:g} s; a file that it names may not"
+            except BrokenProcessPool:
+                why = "ended without an answer; a file that it names may have ended it"
+            self.close()
+            return {"error": f"{where}: the check {why}"}
 
     def close(self) -> None:
         """End the process."""
         # Without the lock, which a check that does not end holds.
-        process = self._process
-        if process is not None and process.stdin is not None:
-            process.kill()
-            process.wait()
-            with suppress(OSError):
-                process.stdin.close()
-
-    def _running(self) -> subprocess.Popen[str]:
-        if self._process is None or self._process.poll() is not None:
-            command = [sys.executable, "-m", "starhold.studio.checker"]
-            process = subprocess.Popen(
-                command,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-                text=True,
-                encoding="utf-8",
-            )
-            answers: queue.Queue[str] = queue.Queue()
-            threading.Thread(target=_listen, args=(process, answers), daemon=True).start()
-            self._process, self._answers = process, answers
-        return self._process
-
-    def _end(self) -> None:
-        self.close()
-        self._process = None
+        pool, self._pool = self._pool, None
+        if pool is not None:
+            for process in list((pool._processes or {}).values()):
+                process.kill()
+            pool.shutdown()
 
 
-def _listen(process: subprocess.Popen[str], answers: queue.Queue[str]) -> None:
-    assert process.stdout is not None
-    with process.stdout as told:
-        for line in told:
-            answers.put(line)
-    answers.put("")
+def _begin() -> None:
+    """Let files that are run print nowhere, and the process end with the studio alone, whatever ends that."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for stream in (1, 2):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
+    threading.Thread(target=_end_with_studio, daemon=True).start()
 
 
-def main() -> None:
-    """Answer each line of standard input, a text with its name and folder, by a line of JSON."""
-    # What files print as they are run must not stand between the answers.
-    answers, sys.stdout = sys.stdout, sys.stderr
-    asked: queue.Queue[str] = queue.Queue()
-    threading.Thread(target=_hear, args=(asked,), daemon=True).start()
-    while True:
-        text, where, folder = json.loads(asked.get())
-        try:
-            found = editing.check(text, where, Path(folder))
-        except Exception as error:
-            found = {"error": f"{where}: {type(error).__name__}: {error}"}
-        print(json.dumps(found), file=answers, flush=True)
-
-
-def _hear(asked: queue.Queue[str]) -> None:
-    for line in sys.stdin:
-        asked.put(line)
-    # The studio is gone, and with it whoever waits for a check that may not end.
+def _end_with_studio() -> None:
+    studio = parent_process()
+    assert studio is not None
+    studio.join()
     os._exit(0)
 
 
-if __name__ == "__main__":
-    main()
+def _check(text: str, where: str, folder: Path) -> dict[str, Any]:
+    try:
+        return editing.check(text, where, folder)
+    except Exception as error:
+        return {"error": f"{where}: {type(error).__name__}: {error}"}

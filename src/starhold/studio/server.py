@@ -16,7 +16,8 @@ from starlette.concurrency import run_in_threadpool
 from starlette.middleware import Middleware
 from starlette.requests import Request
 from starlette.responses import FileResponse, HTMLResponse, JSONResponse, PlainTextResponse, RedirectResponse, Response
-from starlette.routing import Route
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from starhold.errors import InputError
@@ -34,14 +35,6 @@ POLICY = (
     "default-src 'self'; script-src 'self' 'unsafe-inline'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
     "worker-src blob:; frame-ancestors 'self'"
 )
-ASSETS = {
-    name: kind
-    for kind, names in {
-        "text/css": ("studio.css", "codemirror.css", "show-hint.css"),
-        "text/javascript": ("studio.js", "codemirror.js", "toml.js", "show-hint.js"),
-    }.items()
-    for name in names
-}
 
 
 class Guard:
@@ -135,7 +128,7 @@ class Studio:
         """Make the application."""
         routes = [
             Route("/", self._page),
-            Route("/assets/{name}", self._asset),
+            Mount("/assets", StaticFiles(packages=[("starhold.studio", "assets")])),
             Route("/begin", self._begin),
             Route("/builtin/{name}", self._builtin),
             Route("/check", self._check, methods=["POST"]),
@@ -151,11 +144,8 @@ class Studio:
         return Starlette(routes=routes, middleware=[Middleware(Guard, token=token)])
 
     async def _page(self, request: Request) -> Response:
-        return HTMLResponse(_text("studio.html"))
-
-    async def _asset(self, request: Request) -> Response:
-        name = request.path_params["name"]
-        return Response(_text(name), media_type=ASSETS[name]) if name in ASSETS else PlainTextResponse("no such file", 404)
+        page = resources.files("starhold.studio") / "assets" / "studio.html"
+        return HTMLResponse(page.read_text(encoding="utf-8"))
 
     async def _begin(self, request: Request) -> Response:
         words, choices = await run_in_threadpool(editing.words), await run_in_threadpool(editing.choices)
@@ -273,10 +263,6 @@ async def _asked(request: Request, *names: str) -> dict[str, str] | None:
     if not isinstance(given, dict) or not all(isinstance(given.get(name), str) for name in names):
         return None
     return {name: given[name] for name in names}
-
-
-def _text(name: str) -> str:
-    return (resources.files("starhold.studio") / "assets" / name).read_text(encoding="utf-8")
 
 
 def serve(path: Path | None, name: str, text: str, port: int, told: Callable[[str], None], browse: bool) -> None:

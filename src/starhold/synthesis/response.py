@@ -15,16 +15,17 @@ from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from starhold.algebra.quaternion import Quaternion, derivative, renormalise, vector_part
+from starhold.algebra.quaternion import Quaternion, renormalise, vector_part
 from starhold.algebra.scalar import Scalar, either, less, maximum, where
 from starhold.algebra.structure import runge_kutta
 from starhold.algebra.structured import repeat
 from starhold.algebra.vector import ZERO, Vector, cross, dot, scale, subtract
 from starhold.algebra.words import number_of
-from starhold.parts.bodies.rigid_body import Measurement, angular_acceleration
+from starhold.parts.bodies.rigid_body import State, observe, rates
 from starhold.parts.contract import NoMemory
 from starhold.parts.contract import Parameter as Gain
 from starhold.parts.craft import Craft, tensor
+from starhold.parts.roles import Goal, Loads, Scene
 from starhold.synthesis.start import Start
 from starhold.trace.calling import Compiled
 
@@ -33,6 +34,7 @@ STEPS = 4000
 MOST = 64
 RESOLVED = 0.4
 """Part of the fastest time constant that a step may be."""
+ON_TARGET = Goal((1.0, 0.0, 0.0, 0.0), ZERO, ZERO)
 IN_HAND = 0.99
 """Share of the required settling time that designs use: with a held torque the loop settles a little later."""
 
@@ -228,16 +230,17 @@ def _flight(torque: Callable[..., Any], count: int, wheels: bool, like: _Like) -
     """Compile the slew: gains, craft, start, step and squared ends give the last step at which angle or rate was outside
     (-1: at none), and the largest squares of torque and of the wheel momentum."""
 
-    def command(state: Any, gains: Any, craft: Craft, step: Scalar) -> Vector:
-        attitude, rate, stored = state
-        return torque(Measurement(attitude, rate, rate, ZERO, ZERO, ZERO, ZERO, step, stored), gains, craft, NoMemory())[0]
+    def command(moving: Any, gains: Any, craft: Craft, step: Scalar) -> Vector:
+        attitude, rate, stored = moving
+        scene = Scene(ON_TARGET, True, ZERO, stored, step, math.inf, ())
+        return torque(observe(State(attitude, rate, ZERO, ZERO, ZERO), scene), gains, craft, NoMemory())[0]
 
-    def motion(state: Any, gains: Any, craft: Craft, step: Scalar) -> Any:
-        attitude, rate, stored = state
-        given = command(state, gains, craft, step)
-        felt = subtract(given, cross(rate, stored)) if wheels else given
-        taken = scale(-1.0, given) if wheels else ZERO
-        return derivative(attitude, rate), angular_acceleration(rate, felt, craft), taken
+    def motion(moving: Any, gains: Any, craft: Craft, step: Scalar) -> Any:
+        given, (attitude, rate, stored) = command(moving, gains, craft, step), moving
+        reaction = subtract(given, cross(rate, stored)) if wheels else None
+        loads = Loads(None, None, reaction, None, not wheels)
+        turning, spin, *_ = rates(State(attitude, rate, ZERO, ZERO, given), loads, None, craft)
+        return turning, spin, scale(-1.0, given) if wheels else ZERO
 
     advance = runge_kutta(motion)
 
