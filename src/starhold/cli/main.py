@@ -148,40 +148,8 @@ app.command()(studio.studio)
 app.command()(parts.parts)
 app.command("check-part")(parts.check_part)
 app.command("check-law", help="The old name of check-part.")(parts.check_part)
-
-
-@app.command()
-def laws(name: Annotated[str | None, typer.Argument(help="show this law's card and gains; or a file's")] = None) -> None:
-    """List the control laws, or describe one."""
-    from starhold.cli.show import print_law, print_laws, print_modes
-    from starhold.conformance.suite import find_law
-    from starhold.laws.catalogue import catalogue
-    from starhold.laws.modes import NAME as MODES
-    from starhold.parts.catalogue import parts as installed
-    from starhold.scenario.checking import nearest
-
-    groups = {body: catalogue(body) for body in installed("body")}
-    known = {law: found for group in groups.values() for law, found in group.items()}
-    if name is None:
-        for body, group in groups.items():
-            print_laws(body, group)
-    elif name.endswith(".py"):
-        print_law(find_law(name))
-    elif name == MODES:
-        print_modes()
-    elif name not in known:
-        raise InputError("laws", "", name, nearest(name, [*known, MODES]))
-    else:
-        print_law(known[name])
-
-
-@app.command()
-def wheels() -> None:
-    """List the reaction wheels of the catalogue, for `unit` in a scenario."""
-    from starhold.cli.show import print_wheels
-    from starhold.parts.effectors.wheel_units import WHEEL_UNITS
-
-    print_wheels(WHEEL_UNITS)
+app.command()(parts.laws)
+app.command()(parts.wheels)
 
 
 @app.command()

@@ -1,8 +1,8 @@
-"""The commands `parts` and `check-part`."""
+"""The commands that list what is installed, `laws`, `parts` and `wheels`, and `check-part`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,10 +10,38 @@ import typer
 
 from starhold.cli.arguments import FAILED_CHECK
 from starhold.errors import InputError
-from starhold.report.commands import Column, Table
+from starhold.report.commands import Block, Column, Heading, Table
 
 if TYPE_CHECKING:
+    from starhold.laws.catalogue import Law
+    from starhold.parts.contract import Field
     from starhold.parts.part import Part
+
+NEW_MODES = "starhold new my.toml --from cubesat-mission shows one."
+
+
+def laws(name: Annotated[str | None, typer.Argument(help="show this law's card and gains; or a file's")] = None) -> None:
+    """List the control laws, or describe one."""
+    from starhold.cli.show import print_blocks
+    from starhold.conformance.suite import find_law
+    from starhold.laws.modes import NAME as MODES
+    from starhold.scenario.checking import nearest
+
+    groups = _laws()
+    known = {law: found for group in groups.values() for law, found in group.items()}
+    if name is None:
+        for body, group in groups.items():
+            rows = [(law.name, law.card.claims, law.card.summary) for law in group.values()]
+            print_blocks([_table((body, "claims", "summary"), rows)])
+    elif name.endswith(".py"):
+        print_blocks(_law_blocks(find_law(name)))
+    elif name == MODES:
+        told = "modes: a law made of laws, each in a [[law.mode]] table with the condition on which the next one begins."
+        print_blocks([f"{told} {NEW_MODES}"])
+    elif name not in known:
+        raise InputError("laws", "", name, nearest(name, [*known, MODES]))
+    else:
+        print_blocks(_law_blocks(known[name]))
 
 
 def parts(
@@ -22,26 +50,34 @@ def parts(
     ] = None,
 ) -> None:
     """List the parts that a loop can be made of, those of one role, or describe one."""
-    from starhold.cli.show import print_law
-    from starhold.conformance.parts import find_part
-    from starhold.laws.catalogue import Law, catalogue
+    from starhold.cli.show import print_blocks
+    from starhold.laws.catalogue import Law
     from starhold.parts import catalogue as installed
     from starhold.parts.roles import ROLES
     from starhold.scenario.checking import nearest
 
-    def of_role(role: str) -> dict[str, Any]:
-        if role != "law":
-            return dict(installed.parts(role))
-        return {law: found for body in installed.parts("body") for law, found in catalogue(body).items()}
-
+    of_laws = {law: found for group in _laws().values() for law, found in group.items()}
+    known = {role: dict[str, Any](of_laws if role == "law" else installed.parts(role)) for role in ROLES}
     if name is None or name in ROLES:
-        _print_roles({role: of_role(role).values() for role in ROLES if name in (None, role)})
+        for role in ROLES if name is None else (name,):
+            rows = [_row(part) for part in known[role].values()]
+            print_blocks([_table((role, "body", "given by", "summary"), rows), ""])
         return
-    known = {part: found for role in ROLES for part, found in of_role(role).items()}
-    if not Path(name).is_file() and not name.endswith(".py") and name not in known:
-        raise InputError("parts", "", name, nearest(name, [*ROLES, *known]))
-    found = known[name] if name in known else _find(name, find_part)
-    (print_law if isinstance(found, Law) else print_part)(found)
+    every = {part: found for group in known.values() for part, found in group.items()}
+    if not Path(name).is_file() and not name.endswith(".py") and name not in every:
+        raise InputError("parts", "", name, nearest(name, [*ROLES, *every]))
+    found = every[name] if name in every else _find(name)
+    print_blocks(_law_blocks(found) if isinstance(found, Law) else _part_blocks(found))
+
+
+def wheels() -> None:
+    """List the reaction wheels of the catalogue, for `unit` in a scenario."""
+    from starhold.cli.show import print_blocks
+    from starhold.parts.effectors.wheel_units import WHEEL_UNITS
+
+    numbers = [Column(name, "", ".4g") for name in ("torque, N m", "momentum, N m s", "rotor inertia, kg m²", "mass, kg")]
+    rows = [[u.name, u.maker, u.torque_limit, u.momentum_limit, u.inertia, u.mass, u.source] for u in WHEEL_UNITS.values()]
+    print_blocks([Table([Column("unit"), Column("maker"), *numbers, Column("source")], rows)])
 
 
 def check_part(
@@ -53,11 +89,11 @@ def check_part(
     from rich.markup import escape
 
     from starhold.cli.console import console
-    from starhold.conformance.parts import examine_part, find_part
+    from starhold.conformance.parts import examine_part
     from starhold.conformance.suite import examine
     from starhold.laws.catalogue import Law
 
-    found, failed = _find(part, find_part), 0
+    found, failed = _find(part), 0
     for verdict in examine(found) if isinstance(found, Law) else examine_part(found):
         failed += verdict.outcome == "failed"
         colour = {"passed": "green", "failed": "red", "does not apply": "dim"}[verdict.outcome]
@@ -68,62 +104,84 @@ def check_part(
         raise typer.Exit(FAILED_CHECK)
 
 
-def _find(given: str, find_part: Any) -> Any:
-    """The part or the law of this name or in this file."""
-    from starhold.conformance.suite import find_law
+def _laws() -> dict[str, dict[str, Law]]:
+    """The laws by the bodies that they steer."""
     from starhold.laws.catalogue import catalogue
+    from starhold.parts.catalogue import parts as installed
+
+    return {body: dict(catalogue(body)) for body in installed("body")}
+
+
+def _find(given: str) -> Part:
+    """The part or the law of this name or in this file."""
+    from starhold.conformance.parts import find_part
+    from starhold.conformance.suite import find_law
     from starhold.parts import catalogue as installed
 
+    law = any(given in group for group in _laws().values())
     if Path(given).is_file():
         try:
             law = installed.role_of(installed.read_module(Path(given))) == "law"
         except (OSError, ValueError):
             # Told by whoever reads it for good.
             law = True
-    else:
-        law = any(given in catalogue(body) for body in installed.parts("body"))
     return find_law(given) if law else find_part(given)
 
 
-def _print_roles(groups: dict[str, Iterable[Part]]) -> None:
+def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
+    """A table of plain words."""
     from rich.markup import escape
 
-    from starhold.cli.console import console
-    from starhold.cli.show import print_rows
-
-    for role, known in groups.items():
-        rows: list[list[str]] = []
-        for part in known:
-            given = {"law": "[[law]]", "body": "its table"}.get(role, f"[{part.table}]" if part.table else "[[part]]")
-            of = part.name if role == "body" else part.body or "any"
-            rows.append([*map(escape, (part.name, of, given, part.card.summary))])
-        print_rows(Table([*map(Column, (role, "body", "given by", "summary"))], rows))
-        console.print()
+    return Table([*map(Column, heads)], [[*map(escape, row)] for row in rows])
 
 
-def print_part(part: Part) -> None:
+def _row(part: Part) -> tuple[str, str, str, str]:
+    given = {"law": "[[law]]", "body": "its table"}.get(part.role, f"[{part.table}]" if part.table else "[[part]]")
+    return part.name, part.name if part.role == "body" else part.body or "any", given, part.card.summary
+
+
+def _law_blocks(law: Law) -> list[Block]:
+    """A law's card, gains and design forms."""
+    card = law.card
+    claim = "no stability; assumes" if card.claims == "none" else f"{card.claims} asymptotic stability, if"
+    claims = f"Claims: {claim}: {'; '.join(card.assumptions)}"
+    blocks = [Heading(law.name, f": {card.title}"), card.summary, claims, *(f"Source: {source}" for source in card.sources)]
+    blocks += _field_blocks("Gains", law.fields())
+    return blocks + [block for form in law.forms for block in _field_blocks(f'form = "{form}"', law.fields(form))]
+
+
+def _part_blocks(part: Part) -> list[Block]:
     """The card of a part, its parameters and what it records."""
-    from rich.markup import escape
-
     from starhold.algebra.quantity import quantities
-    from starhold.cli.console import console
-    from starhold.cli.show import print_fields, print_rows
 
     card = part.card
-    console.print(f"[bold]{part.name}[/bold], {part.role}: {card.title}", highlight=False)
-    console.print(card.summary, highlight=False, markup=False)
-    if card.assumptions:
-        console.print(f"Assumes: {'; '.join(card.assumptions)}", highlight=False, markup=False)
-    for source in card.sources:
-        console.print(f"Source: {source}", highlight=False, markup=False)
-    if part.needs:
-        console.print(f"Needs: {', '.join(part.needs)}", highlight=False, markup=False)
+    blocks: list[Block] = [Heading(part.name, f", {part.role}: {card.title}"), card.summary]
+    blocks += [f"Assumes: {'; '.join(card.assumptions)}"] if card.assumptions else []
+    blocks += [f"Source: {source}" for source in card.sources]
+    blocks += [f"Needs: {', '.join(part.needs)}"] if part.needs else []
     if part.table:
-        console.print(f"Given by the table [{part.table}] of a scenario", highlight=False, markup=False)
+        blocks.append(f"Given by the table [{part.table}] of a scenario")
     elif part.role != "body":
-        print_fields("Parameters", part.fields())
+        blocks += _field_blocks("Parameters", part.fields())
     kinds = [getattr(part.module, kind) for kind in ("Reading", "Estimate", "Sample") if hasattr(part.module, kind)]
     if kinds and getattr(part.module, "RECORDED", True):
-        recorded = [(name, told.unit, told.text) for kind in kinds for name, told in quantities(kind).items()]
-        rows = [[*map(escape, row)] for row in recorded]
-        print_rows(Table([*map(Column, ("recorded", "unit", "meaning"))], rows), apart=True)
+        rows = [(name, told.unit, told.text) for kind in kinds for name, told in quantities(kind).items()]
+        blocks += ["", _table(("recorded", "unit", "meaning"), rows)]
+    return blocks
+
+
+def _field_blocks(title: str, fields: Iterable[Field]) -> list[Block]:
+    """Parameters with their units, bounds and defaults under a title."""
+    rows: list[tuple[str, ...]] = []
+    for item in fields:
+        gain, default = item.gain, item.default
+        allowed = ", ".join(gain.choices) or _bounds(gain)
+        default = "required" if item.required else str(gain.choices[default] if gain.choices else default)
+        rows.append((item.name, gain.unit, allowed, default, gain.text))
+    return ["", Heading(title), _table(("key", "unit", "allowed", "default", "meaning"), rows)]
+
+
+def _bounds(gain: Any) -> str:
+    parts = [(gain.above, "> "), (gain.at_least, ">= "), (gain.at_most, "<= ")]
+    bounds = ", ".join(f"{sign}{bound:g}" for bound, sign in parts if bound is not None)
+    return gain.describe() + (f", {bounds}" if bounds else "")

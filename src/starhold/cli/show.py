@@ -11,13 +11,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 from rich.table import Table
 
 from starhold.cli.console import WIDE, console
-from starhold.report.commands import Block, Column, Heading
+from starhold.report.commands import Block, Heading
 from starhold.report.commands import Table as Rows
 
 if TYPE_CHECKING:
-    from starhold.laws.catalogue import Law
-    from starhold.parts.contract import Field
-    from starhold.parts.effectors.wheel_units import WheelUnit
     from starhold.scenario.reading import LawEntry
     from starhold.studies.flight import Flight
 
@@ -149,55 +146,3 @@ def print_rows(what: Rows, apart: bool = False) -> None:
     if apart:
         console.print()
     console.print(table)
-
-
-def print_laws(group: str, known: Mapping[str, Law]) -> None:
-    """Name, claim and summary of each law of a group."""
-    rows = [[*map(escape, (law.name, law.card.claims, law.card.summary))] for law in known.values()]
-    print_rows(Rows([*map(Column, (group, "claims", "summary"))], rows))
-
-
-def print_modes() -> None:
-    """Say what a law of modes is."""
-    told = "modes: a law made of laws, each in a [[law.mode]] table with the condition on which the next one begins."
-    console.print(f"{told} starhold new my.toml --from cubesat-mission shows one.", markup=False, highlight=False)
-
-
-def print_wheels(units: Mapping[str, WheelUnit]) -> None:
-    """Print what is known of each wheel; a dash where the maker does not say."""
-    numbers = [Column(name, "", ".4g") for name in ("torque, N m", "momentum, N m s", "rotor inertia, kg m²", "mass, kg")]
-    rows = [[u.name, u.maker, u.torque_limit, u.momentum_limit, u.inertia, u.mass, u.source] for u in units.values()]
-    print_rows(Rows([Column("unit"), Column("maker"), *numbers, Column("source")], rows))
-
-
-def print_law(law: Law) -> None:
-    """A law's card, gains and design forms."""
-    card = law.card
-    console.print(f"[bold]{law.name}[/bold]: {card.title}", highlight=False)
-    console.print(card.summary, highlight=False)
-    claim = "no stability; assumes" if card.claims == "none" else f"{card.claims} asymptotic stability, if"
-    console.print(f"Claims: {claim}: {'; '.join(card.assumptions)}", highlight=False)
-    for source in card.sources:
-        console.print(f"Source: {source}", highlight=False)
-    print_fields("Gains", law.fields())
-    for form in law.forms:
-        print_fields(f'form = "{form}"', law.fields(form))
-
-
-def print_fields(title: str, fields: Iterable[Field]) -> None:
-    """Parameters with their units, bounds and defaults under a title."""
-    console.print(f"\n[bold]{title}[/bold]", highlight=False)
-    rows: list[list[str]] = []
-    for item in fields:
-        allowed = ", ".join(item.gain.choices) or _bounds(item.gain)
-        default = (
-            "required" if item.required else str(item.gain.choices[item.default] if item.gain.choices else item.default)
-        )
-        rows.append([*map(escape, (item.name, item.gain.unit, allowed, default, item.gain.text))])
-    print_rows(Rows([*map(Column, ("key", "unit", "allowed", "default", "meaning"))], rows))
-
-
-def _bounds(gain: Any) -> str:
-    parts = [(gain.above, "> "), (gain.at_least, ">= "), (gain.at_most, "<= ")]
-    bounds = ", ".join(f"{sign}{bound:g}" for bound, sign in parts if bound is not None)
-    return gain.describe() + (f", {bounds}" if bounds else "")
