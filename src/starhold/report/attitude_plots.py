@@ -171,12 +171,7 @@ def early(flights: Sequence[Flight]) -> float | None:
 
 def until(flights: Sequence[Flight], end: float) -> list[Flight]:
     """Flights with what was recorded up to a time (s)."""
-    short: list[Flight] = []
-    for flight in flights:
-        count = int(np.searchsorted(flight.recording["time"], end * (1.0 + 1e-9), side="right"))
-        arrays = {name: values[: max(1, count)] for name, values in flight.recording.arrays.items()}
-        short.append(replace(flight, recording=replace(flight.recording, arrays=arrays)))
-    return short
+    return [replace(flight, recording=flight.recording.until(end)) for flight in flights]
 
 
 def _transient(flights: Sequence[Flight], factor: int, scenario: Scenario) -> tuple[Plot, ...]:

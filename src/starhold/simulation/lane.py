@@ -7,7 +7,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -54,6 +54,11 @@ class Recording:
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         return self.arrays[name]
+
+    def until(self, time: float) -> Recording:
+        """The recording up to a time, its first sample at least."""
+        kept = max(1, int(np.searchsorted(self["time"], time * (1.0 + 1e-9), side="right")))
+        return replace(self, arrays={name: values[:kept] for name, values in self.arrays.items()})
 
     def dataset(self) -> xr.Dataset:
         """The recording as a Dataset with units."""

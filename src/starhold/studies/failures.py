@@ -19,7 +19,7 @@ from starhold.parts.effectors.wheels import Wheels, lose
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.bodies.rigid_body.tables import FaultTable
 from starhold.scenario.building import build
-from starhold.simulation.lane import Recording, fly, label
+from starhold.simulation.lane import fly, label
 from starhold.studies.bodies.rigid_body import certify_law
 from starhold.synthesis.stability_degree import degree, scale
 
@@ -195,7 +195,8 @@ def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
     every, steps = table.simulation.record_every, _steps(scenario, loop, period)
     samples, carry = fly(loop, steps, every)
     recording = label(loop, samples, carry, every)
-    metrics = measure(_until(recording, table.simulation.duration), *_tolerances(scenario))
+    # A motion that is lost later is lost all the same.
+    metrics = measure(recording.until(table.simulation.duration), *_tolerances(scenario))
     working = [i for i in range(len(require_wheels(scenario).axes)) if i + 1 not in failure.lost]
     filled = recording["wheel_momentum"][:, working] / np.array(require_wheels(scenario).momentum_limit)[working]
     lost_at = metrics["diverged_at"]
@@ -253,12 +254,6 @@ def _steps(scenario: Scenario, loop: ClosedLoop, period: float | None) -> int:
     every = scenario.table.simulation.record_every
     more = math.ceil(period / loop.period / every + 1.0) * every
     return steps + more if steps + more <= MOST_STEPS else steps
-
-
-def _until(recording: Recording, time: float) -> Recording:
-    """The recording up to a time (s); a motion lost later is lost all the same."""
-    kept = int(np.searchsorted(recording["time"], time * (1.0 + 1e-9), side="right"))
-    return Recording({name: values[:kept] for name, values in recording.arrays.items()}, recording.attrs)
 
 
 def saturation(times: Array, filled: Array, period: float | None) -> Saturation:

@@ -32,15 +32,9 @@ Tell = Callable[[int, int, str], None]
 
 def _compare(scenario: Scenario, folder: Path, tell: Tell) -> str:
     from starhold.report.results import write_results
-    from starhold.studies import compare as studies
+    from starhold.studies.compare import compare
 
-    loops = [studies.build(scenario, entry) for entry in scenario.laws]
-    flights: list[Any] = []
-    for entry, loop in zip(scenario.laws, loops, strict=True):
-        flight = studies.fly_law(scenario, entry, loop, lambda name, done, total: tell(done, total, f"{name} flies"))
-        tell(0, 0, f"{entry.name} is certified")
-        flights.append(studies.prove(scenario, entry, loop, flight))
-    flights = [studies.timed(scenario, loop, flight) for loop, flight in zip(loops, flights, strict=True)]
+    flights = compare(scenario, lambda name, done, total: tell(done, total, f"{name} flies"))
     return write_results(scenario, flights, folder).name
 
 
