@@ -2,8 +2,6 @@
 
 import json
 
-import pytest
-
 import starhold as sh
 from starhold.certification.invariant import enclosure
 from starhold.certification.invariant.problem import FORMAT
@@ -50,19 +48,6 @@ def test_an_undecided_claim_ends_with_four(tmp_path, monkeypatch):
     # Nor is it shown with 25 times as many boxes.
     monkeypatch.setattr(enclosure, "MOST", 10_000)
     assert written(tmp_path, y="0", theorem="attracts").returncode == 4
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("invariant", "none.toml"), "no such file"),
-        (("invariant", "van-der-pole"), "did you mean van-der-pol?"),
-        (("invariant", "bad.toml"), 'bad.toml: rates.y: found the function "sin"; allowed: one of where, min'),
-    ],
-)
-def test_user_errors_are_one_line(tmp_path, words, said):
-    (tmp_path / "bad.toml").write_text(file(y="sin(x)"), encoding="utf-8")
-    complains(starhold(*words, cwd=tmp_path), said)
 
 
 def test_systems_that_come_with_it_are_listed(tmp_path):

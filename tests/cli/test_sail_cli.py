@@ -36,24 +36,3 @@ def test_another_pair_and_point(tmp_path):
     assert "C = 4.02872 Ω²" in done.stdout
     assert "100 % of the Sun's disc" in done.stdout
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("--radius", "3 s"), "--radius: found 3 s; allowed: a quantity in m"),
-        (("--radius", "-2"), "--radius: found -2; allowed: must be above 0"),
-        (("--radius", "1e9 km"), "--radius: found 1e9 km; allowed: a circle smaller than"),
-        (("--primaries", "earth-moon"), "--primaries: found earth-moon; allowed: a pair with the Sun"),
-        (("--primaries", "sun-erth"), "did you mean sun-earth?"),
-        (("--primaries", "sun-jupiter", "--radius", "1 km"), "a circle that the Sun reaches"),
-        (("--point", "L3"), "--point: found L3; allowed: L1 or L2"),
-        (("--reflectivity", "1.2"), "--reflectivity: found 1.2; allowed: must be at most 1"),
-        (("--diffuse", "0.5"), "must add up to more than 0 and at most 1, not 1.5"),
-        (("--mass", "heavy"), "--mass: found heavy; allowed: a number"),
-        (("--area", "nan"), "--area: found nan; allowed: must be finite"),
-        (("-o", "no/such/folder.csv"), "cannot be written: No such file or directory"),
-    ],
-)
-def test_user_errors_are_one_line_and_exit_code_2(words, said, tmp_path):
-    complains(starhold("sail", *words, cwd=tmp_path), said)
