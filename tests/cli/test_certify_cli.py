@@ -89,15 +89,3 @@ def test_bad_wishes_are_one_line_and_exit_code_2(line, key, tmp_path):
     (tmp_path / "bad.toml").write_text(CRAFT + f"[certify]\n{line}\n" + PD)
     complains(starhold("certify", "bad.toml", "-o", "out", cwd=tmp_path), key)
     assert not (tmp_path / "out").exists()
-
-
-def test_compare_writes_the_certificates_beside_the_report(tmp_path):
-    (tmp_path / "two.toml").write_text(CRAFT + PD + MPC)
-    done = starhold("compare", "two.toml", "-o", "out", cwd=tmp_path, code=0)
-    found = outcomes(tmp_path / "out" / "certificate.json")
-    assert list(found) == ["pd", "mpc"]
-    assert found["pd"]["convergence"] == "proved"
-    assert "Certified on this spacecraft" in done.stdout
-    page = (tmp_path / "out" / "report.html").read_text()
-    assert "<h2>What is proved</h2>" in page
-    assert "Nothing is claimed" in page

@@ -1,5 +1,7 @@
 """A command is declared in one file: all that offers commands has it from there."""
 
+import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -32,58 +34,66 @@ COMMAND = Command(
     "Tell the gains.", "told", study, present, options={"for_so_long": Option("simulation.duration", "how long")}
 )
 '''
-COMMANDS = """
-import sys
+WORDS = {
+    "all": ["--help"],
+    "help": ["tell-gains", "--help"],
+    "done": ["tell-gains", "short.toml", "--law", "lyapunov", "--for-so-long", "0.1 min"],
+    "again": ["tell-gains", "short.toml", "--law", "lyapunov"],
+}
+EXTENDED = """
+import json, sys
 from starhold.report import commands
-commands.__path__.append({folder!r})
-from starhold.cli.main import run_command
-raise SystemExit(run_command())
+commands.__path__.append("more")
+import starhold as sh
+from starhold.report.results import MARKS
+from starhold.studio.worker import KINDS
+from tests.running import starhold
+told = {name: starhold(*words, cwd=".") for name, words in json.loads(sys.argv[1]).items()}
+found = {name: (done.returncode, done.stdout + done.stderr) for name, done in told.items()}
+print(json.dumps(found | {"rate": sh.tell_gains("short.toml", "lyapunov")["k_rate"], "kinds": list(KINDS), "marks": MARKS}))
 """
 
 
-@pytest.fixture
-def folder(tmp_path):
-    (tmp_path / "more").mkdir()
-    (tmp_path / "more" / "tell_gains.py").write_text(FILE, encoding="utf-8")
-    (tmp_path / "short.toml").write_text(SHORT, encoding="utf-8")
-    return tmp_path
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("one-file")
+    (folder / "more").mkdir()
+    (folder / "more" / "tell_gains.py").write_text(FILE, encoding="utf-8")
+    (folder / "short.toml").write_text(SHORT, encoding="utf-8")
+    return folder
 
 
-def run(folder, *words):
-    code = COMMANDS.format(folder=str(folder / "more"))
-    return subprocess.run([sys.executable, "-c", code, *words], cwd=folder, capture_output=True, text=True)
+@pytest.fixture(scope="module")
+def told(folder):
+    """What a process that finds the file says: commands, Python and the studio."""
+    paths = {"PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[2]), *sys.path])}
+    words = [sys.executable, "-c", EXTENDED, json.dumps(WORDS)]
+    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, env=os.environ | paths)
+    return json.loads(done.stdout)
 
 
-def test_the_command_line_has_a_command_from_one_file(folder):
-    told = run(folder, "--help").stdout
-    assert "tell-gains" in told
-    assert "Tell the gains." in told
-    assert "--for-so-long" in run(folder, "tell-gains", "--help").stdout
-    done = run(folder, "tell-gains", "short.toml", "--law", "lyapunov", "--for-so-long", "0.1 min")
-    assert done.returncode == 0, done.stderr
-    assert "Gains of lyapunov." in done.stdout
+def test_the_command_line_has_a_command_from_one_file(folder, told):
+    assert "tell-gains" in told["all"][1]
+    assert "Tell the gains." in told["all"][1]
+    assert "--for-so-long" in told["help"][1]
+    code, text = told["done"]
+    assert code == 0, text
+    assert "Gains of lyapunov." in text
     into = folder / "results" / "three-laws-told"
     assert sorted(path.name for path in into.iterdir()) == ["summary.json", "tell-gains.csv", "tell-gains.png"]
     head, *rows = (into / "tell-gains.csv").read_text(encoding="utf-8").splitlines()
     assert head == "gain,value (SI),duration (s)"
     assert all(row.endswith(",6.0") for row in rows)
     # Its files are results, which nothing replaces unasked.
-    (into / "summary.json").unlink()
-    again = run(folder, "tell-gains", "short.toml", "--law", "lyapunov")
-    assert again.returncode == 2
-    assert "results already there (tell-gains.csv)" in again.stderr
+    code, text = told["again"]
+    assert code == 2
+    assert "results already there" in text
+    assert {"tell-gains.csv", "tell-gains.png"} <= set(told["marks"])
 
 
-def test_python_and_the_studio_have_it_too(folder, monkeypatch):
-    code = "import starhold as sh; print(sh.tell_gains('short.toml', 'lyapunov')['k_rate'])"
-    extended = COMMANDS.format(folder=str(folder / "more")).partition("from starhold.cli")[0]
-    asked = "from starhold.studio.worker import KINDS; print('tell-gains' in KINDS)"
-    done = subprocess.run(
-        [sys.executable, "-c", f"{extended}{code}\n{asked}"], cwd=folder, capture_output=True, text=True, check=True
-    )
-    rate, offered = done.stdout.split()
-    assert float(rate) > 0.0
-    assert offered == "True"
+def test_python_and_the_studio_have_it_too(told):
+    assert told["rate"] > 0.0
+    assert "tell-gains" in told["kinds"]
 
 
 def test_every_file_of_the_folder_is_a_command_of_everything():

@@ -23,6 +23,7 @@ from starhold.studio.server import MOST_TEXT, cookie_name
 from tests.browser import Browser
 from tests.refusals import complains
 from tests.report import flown
+from tests.running import starhold
 
 pytest.importorskip("uvicorn")
 pytest.importorskip("starlette")
@@ -399,8 +400,7 @@ def test_errors_stand_at_the_key(old: str, new: str, at: str) -> None:
         (["three-laws", "--port", "1"], "another port"),
     ],
 )
-def test_bad_input_is_one_line(given: list[str], said: str) -> None:
+def test_bad_input_is_one_line(given: list[str], said: str, tmp_path: Path) -> None:
     if "1" in given and hasattr(os, "geteuid") and os.geteuid() == 0:
         pytest.skip("an administrator may listen anywhere")
-    command = [sys.executable, "-m", "starhold", "studio", *given, "--no-browser"]
-    complains(subprocess.run(command, capture_output=True, text=True, timeout=60), said)
+    complains(starhold("studio", *given, "--no-browser", cwd=tmp_path), said)
