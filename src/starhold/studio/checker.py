@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import os
-import signal
 import threading
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 from starhold.studio import editing
+from starhold.studio.apart import begin
 
 LONGEST = 20.0
 """Seconds that a check may take."""
@@ -27,7 +26,7 @@ class Checker:
     def check(self, text: str, where: str, folder: Path) -> dict[str, Any]:
         """Tell of a text what `editing.check` does, or that its check does not end."""
         with self._lock:
-            self._pool = self._pool or ProcessPoolExecutor(1, get_context("spawn"), _begin)
+            self._pool = self._pool or ProcessPoolExecutor(1, get_context("spawn"), begin)
             try:
                 return self._pool.submit(_check, text, where, folder).result(self._longest)
             except TimeoutError:
@@ -45,21 +44,6 @@ class Checker:
             for process in list((pool._processes or {}).values()):
                 process.kill()
             pool.shutdown()
-
-
-def _begin() -> None:
-    """Let files that are run print nowhere, and the process end with the studio alone, whatever ends that."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for stream in (1, 2):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
-    threading.Thread(target=_end_with_studio, daemon=True).start()
-
-
-def _end_with_studio() -> None:
-    studio = parent_process()
-    assert studio is not None
-    studio.join()
-    os._exit(0)
 
 
 def _check(text: str, where: str, folder: Path) -> dict[str, Any]:

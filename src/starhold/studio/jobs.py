@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import shutil
-import subprocess
-import sys
 import tempfile
 import threading
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from typing import Any
 
+from starhold.studio.worker import work
+
+SPAWN = get_context("spawn")
 MOST = 3
 """Jobs that work at a time."""
 
@@ -26,7 +29,7 @@ class Job:
     kind: str
     name: str
     folder: Path
-    process: subprocess.Popen[str]
+    process: SpawnProcess
     laws: Sequence[str] = ()
     state: dict[str, Any] = field(default_factory=dict[str, Any])
     ended: bool = False
@@ -59,12 +62,13 @@ class Jobs:
             number = len(self._jobs) + 1
             folder = Path(self._place.name) / str(number)
             folder.mkdir()
-            command = [sys.executable, "-m", "starhold.studio.worker", kind, where, str(beside), str(folder), *laws]
-            process = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8"
-            )
+            told, teller = SPAWN.Pipe(duplex=False)
+            process = SPAWN.Process(target=work, args=(teller, kind, text, where, beside, folder, laws))
+            process.start()
+            # The end of the process closes the last teller.
+            teller.close()
             job = self._jobs[number] = Job(number, kind, name, folder, process, laws)
-        threading.Thread(target=_follow, args=(job, text), daemon=True).start()
+        threading.Thread(target=_follow, args=(job, told), daemon=True).start()
         return job
 
     def get(self, number: int) -> Job | None:
@@ -87,33 +91,19 @@ class Jobs:
         for number in self._jobs:
             self.stop(number)
         for job in self._jobs.values():
-            job.process.wait()
+            job.process.join()
         shutil.rmtree(self._place.name, ignore_errors=True)
         self._place.cleanup()
 
 
-def _follow(job: Job, text: str) -> None:
-    """Hand a process its scenario, and note what it tells until it ends."""
-    process = job.process
-    given, told, errors = process.stdin, process.stdout, process.stderr
-    assert given is not None
-    assert told is not None
-    assert errors is not None
-    # Read beside, for a full pipe would stop the process.
-    complaints: list[str] = []
-    listener = threading.Thread(target=lambda: complaints.extend(errors), daemon=True)
-    listener.start()
-    with suppress(BrokenPipeError):
-        # Left open: where this process ends, however that happens, the job sees its end and ends too.
-        given.write(json.dumps(text) + "\n")
-        given.flush()
-    for line in told:
-        if "error" not in job.state:
-            job.state = json.loads(line)
-    process.wait()
-    listener.join()
-    with suppress(BrokenPipeError):
-        given.close()
+def _follow(job: Job, told: Connection) -> None:
+    """Note what a process tells until it ends."""
+    with suppress(EOFError):
+        while True:
+            state = told.recv()
+            if "error" not in job.state:
+                job.state = state
+    job.process.join()
     if not {"shown", "error"} & job.state.keys():
-        job.state = {"error": "".join(complaints[-20:]).strip() or f"ended with code {process.returncode}"}
+        job.state = {"error": f"ended with code {job.process.exitcode}"}
     job.ended = True

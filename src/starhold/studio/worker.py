@@ -1,25 +1,23 @@
-"""Does one thing that the studio was asked for, in a process of its own: reads a scenario's text as a line of JSON from
-standard input, tells its progress and its result as lines of JSON, and leaves its files in a folder. It ends where its
-standard input does."""
+"""Does one thing that the studio was asked for, in a process of its own: tells its progress and its result, and leaves its
+files in a folder."""
 
 from __future__ import annotations
 
 import base64
-import json
-import os
 import shutil
-import sys
-import threading
 import time
+import traceback
 from collections.abc import Callable, Sequence
 from functools import partial
 from html import escape
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from starhold.errors import InputError
 from starhold.report import commands
 from starhold.scenario.reading import parse
+from starhold.studio.apart import begin
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -171,44 +169,25 @@ RERUN = "rerun"
 """And of a campaign: one of its runs again."""
 
 
-def main(kind: str, where: str, beside: str, folder: str, *more: str) -> None:
-    """Do it; the last line tells the file to look at, or what was wrong. more: the laws of the scenario; of a run of a
-    campaign, whose folder `where` is, the law and the run's number."""
-    # What files print as they are run must not stand between the lines.
-    global _answers
-    _answers, sys.stdout = sys.stdout, sys.stderr
-    told, text = [0.0], json.loads(sys.stdin.readline())
-    threading.Thread(target=_end_with_studio, daemon=True).start()
+def work(teller: Connection, kind: str, text: str, where: str, beside: Path, folder: Path, laws: Sequence[str]) -> None:
+    """Do it, in a process that this is all of; the last thing told is the file to look at, or what was wrong. laws: those of
+    the scenario; of a run of a campaign, whose folder `where` is, the law and the run's number."""
+    begin()
+    told = [0.0]
 
     def tell(done: int, total: int, what: str) -> None:
         now = time.monotonic()
         if now - told[0] >= PULSE or done == total:
             told[0] = now
-            _say({"done": done, "total": total, "what": what})
+            teller.send({"done": done, "total": total, "what": what})
 
     try:
         if kind == RERUN:
-            _say({"shown": _rerun(Path(where), more[0], int(more[1]), Path(folder), tell)})
-            return
-        scenario = parse(text, where, Path(beside))
-        _say({"shown": KINDS[kind](scenario, Path(folder), tell)})
+            shown = _rerun(Path(where), laws[0], int(laws[1]), folder, tell)
+        else:
+            shown = KINDS[kind](parse(text, where, beside), folder, tell)
+        teller.send({"shown": shown})
     except InputError as error:
-        _say({"error": str(error), "key": error.key})
-
-
-def _end_with_studio() -> None:
-    # Not through sys.stdin, which a thread that waits for it would hold at the end of this process.
-    while os.read(0, 1):
-        pass
-    os._exit(1)
-
-
-_answers: Any = sys.stdout
-
-
-def _say(what: dict[str, Any]) -> None:
-    print(json.dumps(what), file=_answers, flush=True)
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])
+        teller.send({"error": str(error), "key": error.key})
+    except Exception:
+        teller.send({"error": traceback.format_exc(-10).strip()})

@@ -1,0 +1,23 @@
+"""Processes that work for a studio."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from multiprocessing import parent_process
+
+
+def begin() -> None:
+    """Let files that are run print nowhere, and the process end with the studio alone, whatever ends that."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for stream in (1, 2):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
+    threading.Thread(target=_end_with_studio, daemon=True).start()
+
+
+def _end_with_studio() -> None:
+    studio = parent_process()
+    assert studio is not None
+    studio.join()
+    os._exit(0)
