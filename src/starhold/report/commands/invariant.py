@@ -1,4 +1,4 @@
-"""What functions V say of invariant sets of any small system."""
+"""A table and a picture of what is proved of invariant sets of any small system."""
 
 from __future__ import annotations
 

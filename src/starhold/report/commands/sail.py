@@ -129,7 +129,7 @@ def _margin(station: Station, area: float, mass: float) -> str:
 
 
 def _deficits(station: Station, deficits: list[float]) -> Table:
-    """What deficits leave; a margin is a negative one."""
+    """A row a deficit, with what it leaves; a margin is a negative one."""
     columns = [Column("deficit", "%", ".4g"), Column("largest radius", "km", ".6g"), Column("Sun seen there", "%", ".4g")]
     columns += [Column("radius in that light", "km", ".6g"), Column("on its limit, full circle", "% of the time", ".3g")]
     rows: list[list[float]] = []
