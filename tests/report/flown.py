@@ -13,6 +13,7 @@ from starhold.report.figures import paint
 from starhold.scenario.building import build
 from starhold.scenario.reading import Scenario, builtin_text, parse
 from starhold.simulation.lane import Recording, fly, label
+from starhold.studies.compare import compare
 from starhold.studies.flight import Flight
 
 GAINS = {"k_rate": (0.09, "N m s"), "switching_gain": ("<5>", "mN m")}
@@ -49,6 +50,21 @@ def flights() -> tuple[Flight, ...]:
         metrics = measure(run, table.settling.attitude_tolerance, table.settling.rate_tolerance)
         made.append(Flight(entry.name, entry.law.name, run, metrics, GAINS, METRICS))
     return tuple(made)
+
+
+@cache
+def told(name: str, duration: str = "1 yr") -> Scenario:
+    """A built-in scenario, shorter."""
+    text = builtin_text(name)
+    for years in ("1 yr", "2 yr", "4 yr", "10 yr"):
+        text = text.replace(f'duration = "{years}"', f'duration = "{duration}"')
+    return parse(text, name)
+
+
+@cache
+def stations(name: str) -> tuple[Flight, ...]:
+    """Its laws, flown."""
+    return tuple(compare(told(name)))
 
 
 def draw(flights: Any, folder: Path, scenario: Any) -> list[Path]:

@@ -17,6 +17,7 @@ from starhold.report.page_parts import settings
 from starhold.scenario.building import build
 from starhold.scenario.reading import load, parse
 from starhold.simulation.lane import Recording, fly, label
+from starhold.studies.compare import compare
 from tests.report import flown
 from tests.report.reader import Reader
 
@@ -31,10 +32,17 @@ def reader(page: str) -> Reader:
     return Reader(page)
 
 
-def test_nothing_is_loaded(page: str, reader: Reader) -> None:
+@pytest.fixture(scope="module")
+def station() -> str:
+    return render(flown.told("l2-deficit"), flown.stations("l2-deficit"))
+
+
+def test_nothing_is_loaded(page: str, reader: Reader, station: str) -> None:
     reader.loads_nothing()
-    assert page.count("leeoniya/uPlot") == 1
-    assert "plotly.js v" not in page
+    Reader(station).loads_nothing()
+    for text, plotly in ((page, 0), (station, 1)):
+        assert text.count("leeoniya/uPlot") == 1
+        assert text.count("* plotly.js v") == plotly
 
 
 def test_the_licence_of_what_draws_goes_with_the_page(page: str) -> None:
@@ -161,12 +169,18 @@ def test_names_from_files_are_no_markup() -> None:
     assert "<5> mN m" in found.text
     # Data are the first two, of which nothing ends a script.
     assert "alert(" not in "".join(found.scripts[2:])
+    other = Reader(render(flown.called(flown.told("l2-circle"), name), flown.stations("l2-circle")))
+    assert sum(tag == "script" for tag, _ in other.tags) == 5
+    assert "alert(" not in "".join(other.scripts[1:])
+    assert name in other.words
 
 
-def test_equal_flights_give_equal_bytes(tmp_path: Path, page: str) -> None:
-    path = tmp_path / "report.html"
+def test_equal_flights_give_equal_bytes(tmp_path: Path, page: str, station: str) -> None:
+    path, scenario = tmp_path / "report.html", flown.told("l2-deficit")
     write_page(path, flown.scenario(), flown.flights())
     assert path.read_bytes() == page.encode()
+    write_page(path, scenario, compare(scenario))
+    assert path.read_bytes() == station.encode()
 
 
 def test_a_lost_run_is_told_and_the_others_are_shown() -> None:

@@ -43,7 +43,8 @@ def test_map_line_and_optimum_are_drawn(tmp_path: Path, given: tuple[tuple[float
 
 def test_equal_arguments_give_equal_files(tmp_path: Path) -> None:
     first, second, other = (
-        save(draw_map(*given), tmp_path / f"{number}.png").read_bytes() for number, given in enumerate([GIVEN[0], *GIVEN[:2]])
+        save(draw_map(*given), tmp_path / f"{number}.png").read_bytes()
+        for number, given in enumerate([GIVEN[0], *GIVEN[:2]])
     )
     assert first == second
     assert first != other
