@@ -1,4 +1,4 @@
-"""Docstrings begin with a sentence that stands by itself."""
+"""Docstrings begin with a sentence that stands by itself; names say what a value is."""
 
 import ast
 import re
@@ -9,6 +9,19 @@ import pytest
 SOURCE = Path(__file__).parents[1] / "src" / "starhold"
 FRAGMENT = re.compile(r"(What|The same|Of)\b")
 """Beginnings that need the name above, or the docstring before, to be understood."""
+
+BARE = {"told", "found", "own", "held", "asked"}
+"""Names that hide whether a value is a measurement, a bound, a command or a result."""
+CLEAN = (
+    *("algebra", "trace", "parts", "laws", "synthesis", "loop", "simulation", "conformance", "publications"),
+    *("files.py", "errors.py"),
+    *(str(path.relative_to(SOURCE)) for path in sorted((SOURCE / "scenario").glob("*.py"))),
+)
+"""Packages and files without such names."""
+
+
+def files_of(place):
+    return sorted(place.rglob("*.py")) if place.is_dir() else [place]
 
 
 def docstrings(path):
@@ -22,11 +35,30 @@ def docstrings(path):
 
 @pytest.mark.parametrize("folder", sorted({path.relative_to(SOURCE).parts[0] for path in SOURCE.rglob("*.py")}))
 def test_docstrings_begin_with_a_sentence(folder):
-    place = SOURCE / folder
-    found = [
+    fragments = [
         f"{path.relative_to(SOURCE)}:{line}: {text.splitlines()[0]}"
-        for path in (sorted(place.rglob("*.py")) if place.is_dir() else [place])
+        for path in files_of(SOURCE / folder)
         for line, text in docstrings(path)
         if FRAGMENT.match(text)
     ]
-    assert found == []
+    assert fragments == []
+
+
+def names(path):
+    """Line and name of all that a file names: variables, arguments, attributes, keywords, functions and classes."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for field in ("id", "arg", "attr", "name"):
+            name = getattr(node, field, None)
+            if isinstance(name, str):
+                yield getattr(node, "lineno", 0), name
+
+
+@pytest.mark.parametrize("place", CLEAN)
+def test_names_say_what_a_value_is(place):
+    bare = [
+        f"{path.relative_to(SOURCE)}:{line}: {name}"
+        for path in files_of(SOURCE / place)
+        for line, name in names(path)
+        if name in BARE
+    ]
+    assert bare == []

@@ -1,4 +1,4 @@
-"""Errors that a user can cause. Each is one line; the command line ends with exit code 2 on it."""
+"""Errors that a user can cause are one line; the command line ends with exit code 2 on it."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ class InterruptedByUserError(BaseException):
 
 
 def is_interrupt(error: BaseException) -> bool:
-    """Whether an error is the user's wish to end, and no fault of the file in which it was raised. A command has a handler
-    of its own for Ctrl-C, so that a `KeyboardInterrupt` there is the file's."""
+    """Whether an error is the user's request to stop, and no fault of the file in which it was raised. Commands handle
+    Ctrl-C themselves, so that a `KeyboardInterrupt` there comes from the file."""
     plain = isinstance(error, KeyboardInterrupt) and signal.getsignal(signal.SIGINT) is signal.default_int_handler
     return plain or isinstance(error, InterruptedByUserError)
 
 
 class InputError(Exception):
-    """Something the user wrote is not as it must be: where (file and key), what was found, what is allowed."""
+    """A user's input is wrong: where (file and key), the value given and the values allowed."""
 
-    def __init__(self, where: str, key: str, found: str, allowed: str) -> None:
-        self.where, self.key, self.found, self.allowed = where, key, found, allowed
-        parts = [where, key, f"found {found}" if found else ""]
-        # Without something found, `allowed` is a sentence of its own.
-        bare = not found or allowed.startswith("did you mean")
+    def __init__(self, where: str, key: str, given: str, allowed: str) -> None:
+        self.where, self.key, self.given, self.allowed = where, key, given, allowed
+        parts = [where, key, f"found {given}" if given else ""]
+        # Where nothing is given, `allowed` is a sentence of its own.
+        bare = not given or allowed.startswith("did you mean")
         hint = allowed if bare else f"allowed: {allowed}"
-        joint = "; " if found else ": "
+        joint = "; " if given else ": "
         super().__init__(_one_line(": ".join(part for part in parts if part) + (f"{joint}{hint}" if allowed else "")))
 
 
 def shortly(function: _Function) -> _Function:
-    """A function of the Python interface: its InputError says where the fault is, so that the frames below add nothing."""
+    """Let a function of the Python interface raise its InputError without the frames below, which add nothing."""
 
     @wraps(function)
     def called(*args: Any, **keywords: Any) -> Any:
@@ -48,5 +48,5 @@ def shortly(function: _Function) -> _Function:
 
 
 def _one_line(text: str) -> str:
-    """A character that does not print, such as a line break in a key, as its escape."""
+    """Return the text with characters that do not print, such as line breaks, as their escapes."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

@@ -1,4 +1,4 @@
-"""Files that appear under their names only when they are whole, and folders that one process at a time writes into."""
+"""Files appear under their names only when they are whole, and only one process at a time writes into a folder."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from pathlib import Path
 from starhold.errors import InputError
 
 UNFINISHED = ".writing-"
-"""How names of folders begin in which files are being written."""
+"""Prefix of the hidden folders in which files are being written."""
 LARGEST = 2**28
-"""Bytes of a file that is read."""
+"""Size of the largest file that is read (bytes)."""
 _claimed: dict[tuple[int, int], int] = {}
 """Open handles of the folders that this process has claimed, by device and inode."""
 
@@ -47,29 +47,29 @@ def claim(folder: Path) -> None:
 
 
 def clear_unfinished(folder: Path) -> None:
-    """Remove what processes that were killed left half written in a folder and in those in it."""
+    """Remove the half-written files that killed processes left in a folder and its subfolders."""
     for left in (*folder.glob(f"{UNFINISHED}*"), *folder.glob(f"*/{UNFINISHED}*")):
         shutil.rmtree(left, ignore_errors=True)
 
 
 def read_bytes(path: Path) -> bytes:
-    """Read a whole file. OSError where it cannot be read or is larger than any that is taken, for a device has no end."""
+    """Read a whole file. OSError where it cannot be read or is larger than LARGEST, for a device has no end."""
     with path.open("rb") as file:
-        found = file.read(LARGEST + 1)
-    if len(found) > LARGEST:
+        content = file.read(LARGEST + 1)
+    if len(content) > LARGEST:
         raise OSError(errno.EFBIG, f"larger than {LARGEST // 2**20} MiB", str(path))
-    return found
+    return content
 
 
 def read_text(path: Path) -> str:
-    """The text of a file, in UTF-8. Errors as of `read_bytes`; UnicodeDecodeError where it holds other bytes."""
+    """Return the text of a file, in UTF-8. Errors as of `read_bytes`; UnicodeDecodeError where it holds other bytes."""
     return read_bytes(path).decode("utf-8")
 
 
 @contextmanager
 def atomic_write(path: Path) -> Generator[Path]:
-    """A path to write to, in a hidden folder beside `path`, renamed to it on success and removed on failure. InputError
-    where it cannot be written."""
+    """Yield a path to write to, in a hidden folder beside `path`, renamed to it on success and removed on failure.
+    InputError where it cannot be written."""
     hidden: Path | None = None
     try:
         hidden = Path(tempfile.mkdtemp(prefix=UNFINISHED, dir=path.parent))

@@ -230,7 +230,7 @@ def test_a_file_named_as_an_installed_part(tmp_path):
 ROWS = {
     "missing": (None, "rows.csv: No such file"),
     "words": ("time,x,y,z\n0,0,0,much\n1,0,0,0\n", "rows.csv: could not convert string to float"),
-    "a column too few": ("0,0,0\n1,0,0\n", "has not 4 columns; allowed: a CSV file of time, x, y, z"),
+    "a column too few": ("0,0,0\n1,0,0\n", "a line without 4 columns; allowed: a CSV file of time, x, y, z"),
     "lines of other lengths": ("0,0,0,1\n1,0,0\n", "a CSV file of time, x, y, z"),
     "nothing": ("time,x,y,z\n", "rows of time, x, y, z"),
     "no number": ("0,0,0,nan\n1,0,0,0\n", "finite"),

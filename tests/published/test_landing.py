@@ -43,7 +43,7 @@ def test_the_search_for_this_very_start_beats_the_fit(flights):
     assert flights["searched"]["transient_time"] < flights["fit"]["transient_time"] - 1.2
     assert flights["searched"]["limits_kept"]
     scenario = load("landing")
-    (item,) = study(scenario, pick_modal(scenario, None)).found
+    (item,) = study(scenario, pick_modal(scenario, None)).results
     assert item.hard.root == scenario.pick("searched").gains.phi_0[0]
     assert item.hard.transient.peak_rate == pytest.approx(flights["searched"]["peak_rate"], rel=1e-9)
     assert item.hard.time == pytest.approx(flights["searched"]["transient_time"], rel=1e-9)
@@ -65,7 +65,7 @@ def test_hard_limits_give_the_published_fit_at_every_angle(found):
 
 
 def test_the_acceleration_decides_below_85_degrees_and_the_rate_above(found):
-    for item in found.found:
+    for item in found.results:
         seen = item.hard.transient
         assert seen.keeps(LIMITS)
         tight = max(seen.peak_acceleration) / LIMITS.acceleration, seen.peak_rate / LIMITS.rate
@@ -75,27 +75,27 @@ def test_the_acceleration_decides_below_85_degrees_and_the_rate_above(found):
 def test_the_next_faster_root_breaks_a_limit(found):
     scenario = load("landing-limits")
     problem = problem_of(scenario, scenario.laws[0])
-    for item in found.found[::5]:
+    for item in found.results[::5]:
         faster, same = (problem.fly(item.angle, [item.hard.root + less])[0] for less in (-0.001, 0.0))
         assert same == item.hard.transient
         assert not faster.keeps(LIMITS)
 
 
 def test_the_own_fit_is_no_worse_than_the_published_one(found):
-    own, published = (np.abs(pieces.errors(found.angles, found.roots)) for pieces in (found.own, found.published))
+    own, published = (np.abs(pieces.errors(found.angles, found.roots)) for pieces in (found.fitted, found.published))
     assert np.sqrt(np.mean(own**2)) < 0.8 * np.sqrt(np.mean(published**2))
     assert own.max() < published.max()
 
 
 def test_tolerances_buy_five_to_twelve_per_cent(found):
-    gains = [1.0 - item.eased.time / item.hard.time for item in found.found]
+    gains = [1.0 - item.eased.time / item.hard.time for item in found.results]
     assert 0.05 < min(gains) < max(gains) < 0.12
 
 
 def test_what_is_printed_is_read_back(found, tmp_path):
     text = builtin_text("landing-limits")
-    scenario = parse(text[: text.index("[[law]]")] + "\n".join(law_lines(found.own, found.b)), "pasted")
-    assert scenario.laws[0].gains.phi_0[0] == pytest.approx(float(found.own.at(math.radians(90.0))), rel=1e-4)
+    scenario = parse(text[: text.index("[[law]]")] + "\n".join(law_lines(found.fitted, found.b)), "pasted")
+    assert scenario.laws[0].gains.phi_0[0] == pytest.approx(float(found.fitted.at(math.radians(90.0))), rel=1e-4)
     result = present(scenario, scenario.laws[0], found)
     write_table(result.numbers, tmp_path / "roots.csv")
     with (tmp_path / "roots.csv").open() as file:
@@ -119,4 +119,4 @@ def test_the_published_fit_is_shown_beside_the_published_problem_alone():
     scenario = parse(text, "same")
     found = study(scenario, scenario.laws[0])
     assert found.published is not None
-    assert found.own is None
+    assert found.fitted is None

@@ -189,5 +189,5 @@ def test_a_mode_that_lacks_a_reading_is_told_which_sensor_has_it():
 
 
 def test_forms_of_modes_are_not_designed_alone():
-    with pytest.raises(InputError, match="modes alone, whose forms are not told"):
+    with pytest.raises(InputError, match="only modes, whose designs are not shown"):
         design(read(TEXT)[0])

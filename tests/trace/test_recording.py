@@ -340,10 +340,10 @@ def test_a_refusal_names_the_line_and_what_to_write(equation: Callable[..., Any]
     first = equation.__code__.co_firstlineno
     lines = range(first, first + 6) if equation is _written_by_done else [first]
     assert any(str(caught.value).startswith(f"test_recording.py, line {line}: ") for line in lines), str(caught.value)
-    assert what in caught.value.found
+    assert what in caught.value.given
     assert instead in caught.value.allowed
     line = Path(__file__).read_text().splitlines()[int(caught.value.where.split()[-1]) - 1]
-    assert caught.value.found.endswith(f", in `{line.strip()}`")
+    assert caught.value.given.endswith(f", in `{line.strip()}`")
 
 
 def test_a_refusal_names_the_law() -> None:

@@ -1,4 +1,4 @@
-"""Cosine and sine by arithmetic alone: where equations need the angle that something has turned by since the start."""
+"""Cosine and sine are computed by arithmetic alone, for equations that need the angle turned since the start."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from starhold.algebra.dual import Dual
 from starhold.algebra.scalar import Scalar, absolute, less, side, where
 
 _SHIFT = 1.5 * 2.0**52
-"""Numbers beside it are whole: what is added to it is rounded."""
+"""Adding this to a number rounds it: doubles of this size are whole."""
 _COSINE = tuple(float(Fraction((-1) ** n, factorial(2 * n))) for n in range(9))
 _SINE = tuple(float(Fraction((-1) ** n, factorial(2 * n + 1))) for n in range(8))
-"""The series are cut where the rest is below 2^-54 up to an eighth of a turn."""
+"""Coefficients of the series, cut where the remainder is below 2^-54 up to an eighth of a turn."""
 
 
 def nearest(x: Scalar) -> Scalar:
     """Return the whole number nearest to x, the even one of two; |x| is below 2^51."""
-    # The slope of the sum is not that of the rounding: none.
+    # Rounding has no slope, though the sum that does it has one.
     x = x.value if isinstance(x, Dual) else x
     return (x + _SHIFT) - _SHIFT
 
 
 def cosine_sine(turns: Scalar) -> tuple[Scalar, Scalar]:
-    """Return cosine and sine of an angle in turns, with errors below 3e-16 of the angle as it is given; below 2^49 turns."""
+    """Return cosine and sine of an angle in turns, below 2^49 of them, with errors below 3e-16 for the angle as given."""
     quarters = 4.0 * (turns - nearest(turns))
     whole = nearest(quarters)
     angle = (0.25 * tau) * (quarters - whole)

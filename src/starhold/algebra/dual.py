@@ -14,18 +14,18 @@ from numpy.typing import NDArray
 from starhold.algebra.operations import Operation
 
 TOWARD: ContextVar[NDArray[np.float64] | None] = ContextVar("toward", default=None)
-"""The direction (n,) into which one looks where an equation chooses between branches just there."""
+"""Direction (n,) of the one-sided derivative where an equation switches branches at this very point."""
 DIRECTIONS = 4
 """Directions, each with its opposite, in which branches must agree."""
 AGREED = 1e-9
 
 
 class BorderError(ArithmeticError):
-    """An equation has no slope: it chooses just there between branches that do not agree, or looks at a number's bits."""
+    """An equation has no slope here: the branches that meet disagree, or it reads a number's bits."""
 
 
 class _UndecidedError(ArithmeticError):
-    """A comparison of equal numbers, and no direction to look into."""
+    """Equal numbers are compared, and there is no direction in which one becomes the larger."""
 
 
 class Dual:
@@ -73,10 +73,10 @@ class Dual:
         return Dual(-self.value, -self.slopes)
 
     def read(self, entry: Operation, values: Sequence[Any]) -> Any:
-        """Apply an operation of which this is an operand."""
+        """Apply an operation that has this number as an operand."""
         if entry.name == "sqrt":
             root = math.sqrt(self.value) if self.value >= 0.0 else math.nan
-            # Of the length of a vector there is no slope where the vector is zero.
+            # The length of a vector has no slope where the vector is zero.
             return Dual(root, self.slopes * (0.5 / root if root > 0.0 else math.nan))
         if entry.name in ("less", "less_equal"):
             (a, da), (b, db) = map(_parts, values)
@@ -88,38 +88,38 @@ class Dual:
             return entry.plain(a, b)
         if "symbolic" not in entry.meanings or entry.takes[0] != "number":
             raise BorderError(f"{entry.name} has no derivative")
-        # What is left are the four operations, which duals have of their own.
+        # The remaining operations are those of arithmetic, which duals define themselves.
         return entry.meanings["symbolic"](*values)
 
 
 def variables(values: Sequence[float], first: int, count: int) -> list[Dual]:
-    """Return duals of these values, the variables from the number `first` on of `count` in all."""
+    """Return duals of these values, which are the variables `first`, `first + 1`, ... of `count`."""
     return [Dual(float(value), np.eye(1, count, first + k)[0]) for k, value in enumerate(values)]
 
 
 def differentiate(equation: Callable[[], Sequence[Any]], count: int) -> NDArray[np.float64]:
-    """Return the derivatives (numbers, count) by `count` variables of the numbers that an equation of duals gives.
+    """Return the derivatives (numbers, count) of an equation's numbers by its `count` variables.
 
-    Where it compares numbers that are equal there, as limits of a length do at zero, it is read anew in DIRECTIONS
-    directions and their opposites: BorderError where values or slopes on the two sides differ, or there is none. Other
-    directions are not looked into."""
+    Where it compares equal numbers, as a limit on a length does at zero, it is evaluated again in DIRECTIONS directions
+    and their opposites. BorderError where values or slopes differ between them, or there is no slope. No other
+    directions are tried."""
     try:
         return _agreed([_table(equation(), count)])
     except _UndecidedError:
         pass
-    found: list[NDArray[np.float64]] = []
+    tables: list[NDArray[np.float64]] = []
     for direction in np.random.default_rng(1).standard_normal((DIRECTIONS, count)):
         for toward in (direction, -direction):
             token = TOWARD.set(toward)
             try:
-                found.append(_table(equation(), count))
+                tables.append(_table(equation(), count))
             finally:
                 TOWARD.reset(token)
-    return _agreed(found)
+    return _agreed(tables)
 
 
 def _table(numbers: Sequence[Any], count: int) -> NDArray[np.float64]:
-    """Values and, behind each, its derivatives."""
+    """Return the values, each followed by its derivatives."""
     rows: list[NDArray[np.float64]] = []
     for number in numbers:
         value, slopes = _parts(number)

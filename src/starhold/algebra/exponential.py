@@ -1,4 +1,4 @@
-"""The exponential function by arithmetic alone: for equations that have no library."""
+"""The exponential function is computed by arithmetic alone, for equations, which have no library."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from starhold.algebra.words import rotate_left, whole_word, with_bits
 _LOGARITHM = Fraction("0.693147180559945309417232121458176568")
 _HIGH = round(_LOGARITHM * 2**40) / 2**40
 _LOW = float(_LOGARITHM - Fraction(_HIGH))
-"""The logarithm of 2 in two parts, of which the first times a whole number of up to ten bits is exact."""
+"""The logarithm of 2 in two parts; the first times a whole number of up to ten bits is exact."""
 _SERIES = tuple(float(Fraction(1, factorial(n))) for n in range(14))
 _MOST = 700.0
 
 
 def exponential(x: Scalar) -> Scalar:
-    """Return e^x, with a relative error below 4e-16; beyond -700 and 700 what it is there."""
+    """Return e^x with a relative error below 4e-16, for x clipped to [-700, 700]."""
     within = clip(x, _MOST)
     power = nearest(within * float(1 / _LOGARITHM))
     rest = (within - power * _HIGH) - power * _LOW

@@ -56,9 +56,9 @@ class Intervals:
     def __truediv__(self, other: Any) -> Intervals:
         """Return the whole line where the divisor may be zero."""
         b = _read(other)
-        found = _hull(np.divide, self, b.low, b.high)
+        quotient = _hull(np.divide, self, b.low, b.high)
         around = (b.low <= 0.0) & (b.high >= 0.0)
-        return Intervals(np.where(around, -np.inf, found.low), np.where(around, np.inf, found.high))
+        return Intervals(np.where(around, -np.inf, quotient.low), np.where(around, np.inf, quotient.high))
 
     def __rtruediv__(self, other: Any) -> Intervals:
         return _read(other) / self
@@ -66,13 +66,13 @@ class Intervals:
     def square(self) -> Intervals:
         """Return x x, which is tighter than the product of two intervals."""
         size, least = np.maximum(-self.low, self.high), np.maximum(np.maximum(self.low, -self.high), 0.0)
-        found = _outward(least * least, size * size)
-        return Intervals(np.maximum(found.low, 0.0), found.high)
+        squares = _outward(least * least, size * size)
+        return Intervals(np.maximum(squares.low, 0.0), squares.high)
 
     def sqrt(self) -> Intervals:
-        """The root is taken of what is not below zero in the interval."""
-        found = _outward(np.sqrt(np.maximum(self.low, 0.0)), np.sqrt(np.maximum(self.high, 0.0)))
-        return Intervals(np.maximum(found.low, 0.0), found.high)
+        """Return the square root of the part of the interval that is not negative."""
+        roots = _outward(np.sqrt(np.maximum(self.low, 0.0)), np.sqrt(np.maximum(self.high, 0.0)))
+        return Intervals(np.maximum(roots.low, 0.0), roots.high)
 
     def clipped(self, low: float, high: float) -> Intervals:
         """Return the intersection with low .. high, for numbers that are known to lie there."""
@@ -84,7 +84,7 @@ def _read(value: Any) -> Intervals:
 
 
 def _outward(low: Array, high: Array) -> Intervals:
-    # By at least the distance to the next float, which is a fraction of nextafter's time; infinities may become NaN.
+    # By at least the distance to the next float, in a fraction of nextafter's time; infinities may become NaN.
     with np.errstate(invalid="ignore", over="ignore", under="ignore"):
         low = low - (np.abs(low) * _SHARE + _LEAST)
         high = high + (np.abs(high) * _SHARE + _LEAST)
@@ -92,7 +92,7 @@ def _outward(low: Array, high: Array) -> Intervals:
 
 
 def _hull(operation: Callable[[Any, Any], Any], a: Intervals, low: Array, high: Array) -> Intervals:
-    """Return the hull of the operation on the ends, where monotonic ones attain their extremes."""
+    """Return the hull of the operation's values at the ends, where a monotonic operation has its extremes."""
     with np.errstate(all="ignore"):
         ends = [operation(x, y) for x in (a.low, a.high) for y in ((low,) if low is high else (low, high))]
     least, most = ends[0], ends[0]

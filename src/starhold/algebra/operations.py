@@ -1,8 +1,7 @@
-"""Operations have a plain meaning, and one for every other reader of an equation.
+"""An operation has a plain meaning, and one for every other reader of an equation.
 
-An operation is written once, as a function of floats under `@operation(...)`, which names its meaning for SymPy, for balls,
-for exact polynomials, and in the languages that a trace is printed in. Numbers of other readers find their meaning by
-their type.
+An operation is written once, as a function of floats under `@operation(...)`, which names its meaning for SymPy, for
+balls, for exact polynomials, and in the languages that a trace is printed in. The type of a number picks the meaning.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ class Operation(NamedTuple):
     meanings: dict[str, Any]
 
     def missing(self) -> list[str]:
-        """Return the readers that this operation should mean something to and does not."""
+        """Return the readers for which this operation lacks a meaning."""
         about = {*self.takes, self.gives}
         readers = PRINTED if about & {WORD, INDEX, UNIFORM} else (*PRINTED, *EXACT)
         return [reader for reader in readers if reader not in self.meanings]
@@ -67,8 +66,8 @@ def operation(takes: str, gives: str, **meanings: Any) -> Callable[[_Function], 
 
 
 def _read(entry: Operation, values: tuple[Any, ...]) -> Any:
-    """Apply the operation as the reader does whose number is among the values."""
-    readers = [found for value in values if (found := _reader(value)) is not None]
+    """Apply the operation as the reader of the values does."""
+    readers = [reader for reader in map(_reader, values) if reader is not None]
     if not readers:
         return entry.plain(*values)
     for value, reader in zip(values, map(_reader, values), strict=True):
@@ -77,7 +76,7 @@ def _read(entry: Operation, values: tuple[Any, ...]) -> Any:
         if reader == "dual":
             return value.read(entry, values)
     # SymPy and polynomials keep their own truths; a ball's are True, False and None.
-    reader = next((found for found in readers if found != "ball"), "ball")
+    reader = next((reader for reader in readers if reader != "ball"), "ball")
     if reader not in entry.meanings:
         raise TypeError(f"{entry.name} means nothing to the reader {reader}")
     return entry.meanings[reader](*values)
@@ -90,16 +89,16 @@ def _reader(value: Any) -> str | None:
     if value is None:
         return "ball"
     cls = cast(Any, type(value))
-    own: str | None = getattr(cls, "reader", None)
+    declared: str | None = getattr(cls, "reader", None)
     root = cls.__module__.partition(".")[0]
-    if own is None and root not in _LIBRARIES:
+    if declared is None and root not in _LIBRARIES:
         raise TypeError(f"no reader for numbers of type {cls.__name__}")
-    return own if own is not None else _LIBRARIES[root]
+    return declared if declared is not None else _LIBRARIES[root]
 
 
 def written_at() -> tuple[str, str]:
-    """Return where the equation that runs now is written, and the text of that line: of a law its name, file and line,
-    rather than those of a library which it calls."""
+    """Return where the equation that runs now is written, and the text of that line. For a law this is its name and the
+    line of its file, even inside a library that it calls."""
     frame: Any = sys._getframe(1)  # pyright: ignore[reportPrivateUsage]
     frames: list[Any] = []
     while frame is not None:
@@ -113,6 +112,6 @@ def written_at() -> tuple[str, str]:
 
 
 def library(name: str) -> Any:
-    """Return a reader's module, loaded when a number of its own is met; named at run time because its types are too loose
+    """Return a reader's module, loaded when its first number is met; named at run time because its types are too loose
     for a strict checker."""
     return import_module(name)

@@ -25,7 +25,7 @@ Monomial: TypeAlias = tuple[str, ...]
 
 
 class UnreadableError(TypeError):
-    """An equation does what polynomials cannot follow; the text names the operation and the line."""
+    """A polynomial cannot follow an equation; the text names the operation and the line."""
 
 
 def unreadable(what: str) -> UnreadableError:
@@ -35,7 +35,7 @@ def unreadable(what: str) -> UnreadableError:
 
 
 def exact(number: Any) -> Coefficient:
-    """Return a number as a rational of the same value; balls stay. ValueError for what is not finite."""
+    """Return a number as a rational of the same value; balls stay. ValueError for numbers that are not finite."""
     if isinstance(number, (fmpq, arb)):
         return number
     try:
@@ -84,13 +84,13 @@ class Polynomial:
 
     def slope(self, name: str) -> Polynomial:
         """Return the partial derivative."""
-        found: dict[Monomial, Coefficient] = {}
+        terms: dict[Monomial, Coefficient] = {}
         for monomial, c in self.terms.items():
             power = monomial.count(name)
             if power:
                 place = monomial.index(name)
-                found[monomial[:place] + monomial[place + 1 :]] = c * power
-        return Polynomial(found)
+                terms[monomial[:place] + monomial[place + 1 :]] = c * power
+        return Polynomial(terms)
 
     def at(self, values: Mapping[str, Any]) -> Coefficient:
         """Return its value where every variable has one."""
@@ -102,13 +102,13 @@ class Polynomial:
         return total
 
     def given(self, values: Mapping[str, Any]) -> Polynomial:
-        """Return the polynomial of the other variables where these have values."""
-        found = Polynomial({})
+        """Return the polynomial in the other variables, with these values inserted."""
+        total = Polynomial({})
         for monomial, c in self.terms.items():
             for name in monomial:
                 c = c * values[name] if name in values else c
-            found = found + Polynomial({tuple(name for name in monomial if name not in values): c})
-        return found
+            total = total + Polynomial({tuple(name for name in monomial if name not in values): c})
+        return total
 
     def only(self, keep: Callable[[Monomial], bool]) -> Polynomial:
         """Return the terms whose monomials are kept."""
@@ -117,10 +117,10 @@ class Polynomial:
     def __add__(self, other: Any) -> Any:
         if isinstance(other, Cases):
             return NotImplemented
-        found = dict(self.terms)
+        terms = dict(self.terms)
         for monomial, c in _polynomial(other).terms.items():
-            found[monomial] = found[monomial] + c if monomial in found else c
-        return Polynomial(found)
+            terms[monomial] = terms[monomial] + c if monomial in terms else c
+        return Polynomial(terms)
 
     __radd__ = __add__
 
@@ -136,12 +136,12 @@ class Polynomial:
     def __mul__(self, other: Any) -> Any:
         if isinstance(other, Cases):
             return NotImplemented
-        found: dict[Monomial, Coefficient] = {}
+        terms: dict[Monomial, Coefficient] = {}
         for n, d in _polynomial(other).terms.items():
             for m, c in self.terms.items():
                 both = tuple(sorted(m + n)) if m and n else m or n
-                found[both] = found[both] + c * d if both in found else c * d
-        return Polynomial(found)
+                terms[both] = terms[both] + c * d if both in terms else c * d
+        return Polynomial(terms)
 
     __rmul__ = __mul__
 
@@ -167,8 +167,8 @@ _RECIPROCALS: ContextVar[tuple[tuple[Polynomial, str], ...]] = ContextVar("recip
 
 @contextmanager
 def reciprocal(divisor: Any, name: str) -> Generator[None]:
-    """For a while, division by this polynomial is multiplication by the variable of this name, which stands for its
-    reciprocal: what is made of it is an identity only together with divisor * name = 1."""
+    """Inside this context, division by the polynomial is multiplication by the variable `name`, which stands for its
+    reciprocal: results are identities only together with divisor * name = 1."""
     token = _RECIPROCALS.set((*_RECIPROCALS.get(), (divisor, name)))
     try:
         yield
@@ -178,7 +178,7 @@ def reciprocal(divisor: Any, name: str) -> Generator[None]:
 
 @dataclass(frozen=True)
 class Condition:
-    """The condition is `positive` > 0; as a comparison reads it, a < b is b - a > 0."""
+    """A condition says that `positive` > 0; the comparison a < b becomes b - a > 0."""
 
     positive: Polynomial
     reader: ClassVar[str] = "polynomial"
@@ -191,7 +191,7 @@ class Condition:
 
 @dataclass(frozen=True)
 class Case:
-    """A piecewise polynomial has cases like this: the conditions that hold there or not, and its polynomial."""
+    """A case of a piecewise polynomial has conditions, each true or false there, and a polynomial."""
 
     truths: tuple[tuple[Condition, bool], ...]
     value: Polynomial
@@ -239,7 +239,7 @@ class Cases:
 
 @dataclass(frozen=True)
 class Split:
-    """A comparison of piecewise polynomials has cases as they have, each with what the comparison is there."""
+    """A comparison of piecewise polynomials has cases, each with the comparison's truth or condition there."""
 
     pieces: tuple[tuple[tuple[tuple[Condition, bool], ...], bool | Condition], ...]
     reader: ClassVar[str] = "polynomial"
@@ -255,17 +255,17 @@ def jointly(
 ) -> list[tuple[tuple[tuple[Condition, bool], ...], list[Polynomial]]]:
     """Return the cases of several piecewise polynomials at once: conditions and one polynomial for each value. ValueError
     for more than `most` cases."""
-    found: list[tuple[tuple[tuple[Condition, bool], ...], list[Polynomial]]] = [((), [])]
+    cells: list[tuple[tuple[tuple[Condition, bool], ...], list[Polynomial]]] = [((), [])]
     for value in values:
-        found = [
+        cells = [
             (truths, [*before, piece.value])
-            for held, before in found
+            for conditions, before in cells
             for piece in pieces(value)
-            if (truths := _merged(held, piece.truths)) is not None
+            if (truths := _merged(conditions, piece.truths)) is not None
         ]
-        if most is not None and len(found) > most:
-            raise ValueError(f"{len(found)} cells, more than {most}")
-    return found
+        if most is not None and len(cells) > most:
+            raise ValueError(f"{len(cells)} cells, more than {most}")
+    return cells
 
 
 def _polynomial(value: Any) -> Polynomial:
@@ -276,11 +276,11 @@ def _merged(
     a: tuple[tuple[Condition, bool], ...], b: tuple[tuple[Condition, bool], ...]
 ) -> tuple[tuple[Condition, bool], ...] | None:
     """Return both sets of conditions, None where they contradict one another."""
-    held = {condition.key: (condition, truth) for condition, truth in a}
+    merged = {condition.key: (condition, truth) for condition, truth in a}
     for condition, truth in b:
-        if held.setdefault(condition.key, (condition, truth))[1] != truth:
+        if merged.setdefault(condition.key, (condition, truth))[1] != truth:
             return None
-    positive = [condition.positive for condition, truth in held.values() if truth]
+    positive = [condition.positive for condition, truth in merged.values() if truth]
     for place, one in enumerate(positive):
         for other in positive[place + 1 :]:
             # The sum can be a number only where both have the same monomials but for the constant.
@@ -290,10 +290,10 @@ def _merged(
             # Two quantities whose sum is not positive cannot both be.
             if total is not None and total <= 0:
                 return None
-    return tuple(held.values())
+    return tuple(merged.values())
 
 
-# --- what `algebra.scalar` asks of a reader ----------------------------------------------------------------------------
+# --- the operations that `algebra.scalar` needs ----------------------------------------------------------------------------
 
 
 def sqrt(x: Any) -> Any:

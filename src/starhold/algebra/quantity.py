@@ -1,4 +1,5 @@
-"""Annotations tell what the fields of a state or of an argument mean; tables, recordings and checks read them."""
+"""Annotations give the fields of a state or of an argument a unit and a meaning; tables, recordings and checks read
+them."""
 
 from __future__ import annotations
 
@@ -6,8 +7,8 @@ from typing import Any, NamedTuple, get_args, get_type_hints
 
 
 class Quantity(NamedTuple):
-    """A field has a unit and a meaning. `dimension` names what its components run over in recordings: "axis" for vectors,
-    "quaternion", "wheel"; "" for a single number."""
+    """A field has a unit and a meaning. `dimension` names the index of its components in recordings: "axis" for
+    vectors, "quaternion", "wheel"; "" for a single number."""
 
     unit: str
     text: str

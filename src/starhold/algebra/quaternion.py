@@ -47,7 +47,7 @@ def normalise(q: Quaternion) -> Quaternion:
 
 
 def renormalise(q: Quaternion) -> Quaternion:
-    """Bring a quaternion of nearly unit length back to it by one Newton step: an error e of |q|2 leaves 3/8 e2 of |q|."""
+    """Bring a quaternion of nearly unit length back to it by one Newton step: an error e of |q|^2 leaves 3/8 e^2 of |q|."""
     return stretch(1.5 - 0.5 * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), q)
 
 
@@ -78,7 +78,7 @@ def relative(target: Quaternion, q: Quaternion) -> Quaternion:
 
 
 def nearer(q: Quaternion, other: Quaternion) -> Quaternion:
-    """Choose of q and -q, the same attitude, the one nearer to `other`."""
+    """Return whichever of q and -q, the same attitude, is nearer to `other`."""
     return stretch(side(q[0] * other[0] + q[1] * other[1] + q[2] * other[2] + q[3] * other[3]), q)
 
 

@@ -1,5 +1,5 @@
-"""The rotation vector of a quaternion, and the quaternion of a short one, by arithmetic alone: where laws and kernels have
-no arc functions and no sines."""
+"""Rotation vectors and quaternions are converted by arithmetic alone, for laws and kernels, which have no sines or arc
+functions."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from starhold.algebra.scalar import absolute, minimum, side, sqrt
 from starhold.algebra.vector import Vector, dot, scale
 
 _TERMS = 20
-"""The series of asin(x) / x is cut after so many, in x^2 <= sin(pi/8)^2: the rest is below 2^-55."""
+"""Terms of the series of asin(x) / x; for x^2 <= sin(pi/8)^2 the remainder is below 2^-55."""
 _SERIES = tuple(float(Fraction(comb(2 * n, n), 4**n * (2 * n + 1))) for n in range(_TERMS))
 
 
 def rotation_vector(q: Quaternion) -> Vector:
-    """The axis of the rotation times its angle (rad), the shorter way: at most pi long. To a few units in the last place."""
-    # Half the rotation, and half of that again: the half angle of what is left, a quarter of the first, is below pi/8.
+    """Return the axis of the rotation times its angle (rad), at most pi, to a few units in the last place."""
+    # Halving the rotation twice leaves a half angle below pi/8.
     cosine = minimum(absolute(q[0]), 1.0)
     half = sqrt(0.5 + 0.5 * cosine)
     quarter = sqrt(0.5 + 0.5 * half)
@@ -32,7 +32,7 @@ def rotation_vector(q: Quaternion) -> Vector:
 
 
 def short_turn(half: Vector) -> Quaternion:
-    """The quaternion of half a rotation vector (rad), with an error below |half|^7 / 5000: below rounding up to 0.02 rad."""
+    """Return the quaternion of half a rotation vector (rad); the error is below |half|^7 / 5000, rounding up to 0.02 rad."""
     square = dot(half, half)
     scalar = 1.0 - square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0)))
     x, y, z = scale(1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0)), half)

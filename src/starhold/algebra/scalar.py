@@ -23,7 +23,7 @@ Truth: TypeAlias = Any
 
 
 def _native(operator: Any) -> dict[str, Any]:
-    """Return the meanings of an operator of Python, which the numbers of these readers have of their own."""
+    """Return the meanings of a Python operator, which the numbers of these readers define themselves."""
     return dict.fromkeys(EXACT, operator)
 
 
@@ -137,7 +137,7 @@ def _ball_select(condition: bool | None, a: Any, b: Any) -> Any:
            javascript="{0} ? {1} : {2}", symbolic=_symbolic_select,
            ball=_ball_select, polynomial=_polynomial("where"))  # fmt: skip
 def select(condition: Truth, a: Scalar, b: Scalar) -> Scalar:
-    """Return as `where` does on a condition that is not known while recording."""
+    """Do as `where` does, on a condition that is not known while recording."""
     return a if condition else b
 
 

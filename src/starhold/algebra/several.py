@@ -1,7 +1,7 @@
 """Operations on tuples of any length: an equation applied to every element, or a weighted sum.
 
-When recorded they are unrolled for the lengths of their arguments: a step with any number of wheels costs what one written
-by hand does. The elements may differ in shape from one to the next."""
+When recorded they are unrolled for the lengths of their arguments: a step with any number of wheels costs no more than
+one written by hand. The elements may differ in shape from one to the next."""
 
 from __future__ import annotations
 

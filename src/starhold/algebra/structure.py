@@ -20,14 +20,14 @@ def move(state: _State, step: float, rate: Any) -> _State:
         return state
     if not isinstance(state, tuple):
         return cast(Any, state) + step * rate
-    # Numbers are most of what is met: a call for each would cost more than its sum.
+    # Most leaves are numbers: a call for each would cost more than its sum.
     pairs = zip(cast(Any, state), rate, strict=True)
     parts = [s + step * r if type(s) is float and r is not None else move(s, step, r) for s, r in pairs]
     return rebuild(cast(Any, state), parts)
 
 
 def runge_kutta(slope: Callable[..., Any]) -> Callable[..., Any]:
-    """The classical method of fourth order over a substep, for d(state)/dt = slope(state, *more)."""
+    """Return the classical Runge-Kutta substep of fourth order for d(state)/dt = slope(state, *more)."""
 
     def advance(state: Any, h: Any, *more: Any) -> Any:
         a = slope(state, *more)
@@ -40,7 +40,7 @@ def runge_kutta(slope: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def leaves(value: Any) -> Iterator[Any]:
-    """Yield what a nested value is made of, in order; None and () are nothing."""
+    """Yield the leaves of a nested value in order; None and () have none."""
     if isinstance(value, tuple):
         for part in cast(tuple[Any, ...], value):
             yield from leaves(part)
@@ -56,7 +56,7 @@ def mapped(value: Any, leaf: Callable[[Any], Any]) -> Any:
 
 
 def rebuild(like: Any, parts: Sequence[Any]) -> Any:
-    """Return a tuple or NamedTuple like this one of other parts."""
+    """Return a tuple or NamedTuple of the same type with other parts."""
     return type(like)(*parts) if hasattr(like, "_fields") else tuple(parts)
 
 
@@ -78,14 +78,13 @@ def flatten(state: Any) -> list[float]:
 
 
 def places(state: Any) -> Any:
-    """The state with the place of each number among `flatten(state)` in its stead: rows of a table of states by name."""
+    """Return the state with each number replaced by its place in `flatten(state)`."""
     count = iter(range(1 << 40))
     return mapped(state, lambda leaf: leaf if isinstance(leaf, Buffer) else next(count))
 
 
 def rows(state: Any) -> Any:
-    """Return the state with a slice in the place of each of its fields: where that field stands in a table of `flatten`ed
-    states, which has a row for each number."""
+    """Return the state with each field replaced by the slice of its rows in a table of `flatten`ed states."""
     ends = [len(flatten(tuple(state[: k + 1]))) for k in range(len(state))]
     return rebuild(state, [slice(first, last) for first, last in zip([0, *ends], ends, strict=False)])
 
@@ -110,7 +109,7 @@ def unflatten(numbers: Any, like: _State) -> _State:
 
 
 def alike(values: Sequence[_State]) -> list[_State]:
-    """The values come back with diagonals written as vectors turned into matrices where another value has a matrix."""
+    """Return the values; where some have a matrix and others its diagonal as a vector, all get a matrix."""
     return [reduce(_widened, values, value) for value in values]
 
 

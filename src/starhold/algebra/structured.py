@@ -19,10 +19,10 @@ from starhold.algebra.scalar import Scalar, Truth, opposite
 from starhold.algebra.words import same_index
 
 RECORDER: ContextVar[Any] = ContextVar("recorder", default=None)
-"""What records the equations that run now; None in plain Python."""
+"""The recorder of the equations that run now; None in plain Python."""
 
 Index: TypeAlias = int
-"""A count, a loop's counter, or made of such by + - *: the same for all lanes."""
+"""A count, a loop's counter, or a sum, difference or product of these: the same for all lanes."""
 State: TypeAlias = tuple[Any, ...]
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -44,7 +44,7 @@ class Buffer:
         self.cells[self._place(index)] = value
 
     def _place(self, index: Index) -> Index:
-        # Where both are known; of recorded indices the bounds are checked over the whole trace.
+        # Only plain ints are checked here; the bounds of recorded indices are checked over the whole trace.
         if type(index) is type(self.size) is int and not 0 <= index < self.size:
             raise IndexError(f"{index} of {self.size} numbers")
         return self.base + index
@@ -112,8 +112,8 @@ def at(index: Index, place: Index, body: Callable[..., Any]) -> None:
 
 
 def function(equation: _Function) -> _Function:
-    """Record an equation once and call it where it is called, for what is too long to be written out each time. It may read
-    and write what it is given, and nothing else; whole numbers and truths of Python are constants of it."""
+    """Record an equation once as a function of the trace, for one too long to be written out at each call. It reads and
+    writes nothing but its arguments; Python's whole numbers and truths are constants of it."""
 
     @wraps(equation)
     def call(*values: Any) -> Any:

@@ -63,10 +63,10 @@ def norm(a: Vector) -> Scalar:
 
 def most(a: tuple[Scalar, ...]) -> Scalar:
     """Return the largest size of a component."""
-    found = absolute(a[0])
+    largest = absolute(a[0])
     for component in a[1:]:
-        found = maximum(found, absolute(component))
-    return found
+        largest = maximum(largest, absolute(component))
+    return largest
 
 
 def unit(a: Vector) -> Vector:

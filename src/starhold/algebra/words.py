@@ -1,8 +1,8 @@
 """Random numbers are made by operations on 64-bit words, and between them, numbers and the indices of loops.
 
-In plain Python a word is an int from 0 to 2^64 - 1. JavaScript has no such integers: there a word is two signed ones of 32
-bits, and its texts speak of their halves as {0h} and {0l}. What gives a word has a text for its high half and one for its
-low half, which is computed first: the text of the high one may speak of it as {low}.
+In plain Python a word is an int from 0 to 2^64 - 1. JavaScript has no such integers: there a word is two signed ones of
+32 bits, and its texts speak of their halves as {0h} and {0l}. An operation that gives a word has a text for each half;
+the low half is computed first, and the text of the high half may name it {low}.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def lowest_bit(a: int) -> Truth:
 @operation("number", "word", llvm="bitcast {number} {0} to {word}", c="bits_of({0})",
            javascript=("high_bits({0})", "low_bits({0})"))  # fmt: skip
 def bits_of(x: Scalar) -> int:
-    """Return the bits of an IEEE double; of a NaN those of some NaN, not the same on every machine."""
+    """Return the bits of an IEEE double; for a NaN those of some NaN, not the same on every machine."""
     return int(struct.unpack("<Q", struct.pack("<d", x))[0])
 
 

@@ -207,7 +207,7 @@ def _fly(packed: bytes, version: str, law: str, first: int, count: int) -> _Told
         with ThreadPool(1) as pool:
             return _Told(who, job(law, first, count, pool)())
     except InputError as error:
-        return _Told(who, _Refusal(error.where, error.key, error.found, error.allowed))
+        return _Told(who, _Refusal(error.where, error.key, error.given, error.allowed))
     except Exception as error:
         told = f"failed in runs {first} to {first + count - 1} of {law}: {_in_a_line(error)}; {_KEPT}"
         return _Told(who, _Refusal("a worker", who, "", told))

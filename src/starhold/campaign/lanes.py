@@ -97,7 +97,7 @@ class Lanes:
                 yield flat
             except InputError as error:
                 where = f"{self.scenario.where}, run {run}"
-                raise InputError(where, error.key, error.found, error.allowed) from None
+                raise InputError(where, error.key, error.given, error.allowed) from None
 
     def _tried(self, columns: Columns, place: int, run: int) -> Flat | None:
         """The numbers of one of these runs; None where its scenario is refused."""

@@ -169,7 +169,7 @@ class Store:
         except OSError as error:
             raise InputError(str(path), "", "", f"cannot be written: {error.strerror}{_KEPT}") from None
         except InputError as error:
-            raise InputError(error.where, error.key, error.found, error.allowed + _KEPT) from None
+            raise InputError(error.where, error.key, error.given, error.allowed + _KEPT) from None
         kept = self.files(chunk.law)
         if all(held.path != path for held in kept):
             kept.append(replace(file, path=path))

@@ -99,8 +99,8 @@ def accepted(scenario: Scenario, place: Place, value: Any, name: str = "") -> An
         return locate(scenario.with_(place.change(value)), place.key).value
     except InputError as error:
         if error.key.rpartition(".")[2] == place.key.rpartition(".")[2]:
-            raise place.refuse(name, error.found or show(value), error.allowed) from None
-        found = f"found {error.found}; " if error.found else ""
+            raise place.refuse(name, error.given or show(value), error.allowed) from None
+        found = f"found {error.given}; " if error.given else ""
         raise place.refuse(name, show(value), f"what {error.key or 'the scenario'} takes: {found}{error.allowed}") from None
 
 
@@ -150,7 +150,7 @@ def locate(scenario: Scenario, key: str) -> Place:
             raise _no("a key that all runs share", "a key of the craft, its surroundings, laws or parts")
         return _locate(scenario, key, tuple(path))
     except InputError as error:
-        raise InputError(scenario.where, told, error.found, error.allowed) from None
+        raise InputError(scenario.where, told, error.given, error.allowed) from None
 
 
 def _no(found: str, allowed: str) -> InputError:

@@ -22,7 +22,7 @@ from starhold.certification.saturation import FREE, saturation
 from starhold.certification.sliding import surface_claim
 from starhold.certification.subject import Subject, described, make_subject
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.effectors.wheels import gives_what_is_asked
+from starhold.parts.effectors.wheels import gives_allocated_torque
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certific
 
 def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:
     loop, claims = subject.loop, list[Claim]()
-    sound = loop.wheels is None or gives_what_is_asked(loop.wheels)
+    sound = loop.wheels is None or gives_allocated_torque(loop.wheels)
     if loop.remembers and loop.law.lyapunov is not None:
         everywhere = {"rate_everywhere": None, "everything": True}
         claims.append(_undecided("convergence", everywhere, subject, "the law keeps a memory from call to call"))

@@ -20,7 +20,7 @@ from starhold.certification.sampling import sampling
 from starhold.certification.subject import above, below, described, described_target, make_subject, upper
 from starhold.laws.modes import ENDS
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.effectors.wheels import gives_what_is_asked
+from starhold.parts.effectors.wheels import gives_allocated_torque
 
 ROUNDING = 2.0**-45
 """Share by which a rate or an angle that a law computes is off at most, for angles up to `WIDEST`."""
@@ -32,7 +32,7 @@ def hand_over(loop: ClosedLoop, before: ClosedLoop, name: str, levels: Mapping[s
     """The certificate of the loop of the law that takes over from the loop before. levels: the tests of the switch, in
     rad/s and rad. None where no V shows from where the motions of this loop end on target, or where that is not everywhere
     and nothing bounds the rate."""
-    if loop.remembers or loop.law.lyapunov is None or not (loop.wheels is None or gives_what_is_asked(loop.wheels)):
+    if loop.remembers or loop.law.lyapunov is None or not (loop.wheels is None or gives_allocated_torque(loop.wheels)):
         return None
     subject = make_subject(loop)
     target, last = described_target(loop), described_target(before)

@@ -1,1 +1,1 @@
-"""One suite of checks that every law must pass, run by the tests over all laws and by `starhold check-law` over yours."""
+"""One suite of checks holds for every part and law; the tests run it over all of them, `starhold check-part` over yours."""

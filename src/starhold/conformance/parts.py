@@ -43,7 +43,7 @@ def examine_part(part: Part) -> Iterator[Verdict]:
 
 
 def find_part(given: str) -> Part:
-    """The part that is installed under a name, or that a file holds. InputError where there is none."""
+    """The part that is installed under a name, or stands in a file. InputError where there is none."""
     installed = {part.name: part for role in ("body", *ROLES) for part in parts(role).values()}
     path = Path(given)
     if given in installed and not path.is_file():
@@ -55,12 +55,12 @@ def find_part(given: str) -> Part:
         allowed = f"a Python file that holds a part, or a part by name: {nearest(given, list(installed))}"
         raise InputError(given, "", "no such file", allowed) from None
     except (OSError, ValueError) as error:
-        found = error.strerror if isinstance(error, OSError) else ""
-        raise InputError(given, "", found or "", "a Python file that holds a part" if found else str(error)) from None
+        reason = error.strerror if isinstance(error, OSError) else ""
+        raise InputError(given, "", reason or "", "a Python file that holds a part" if reason else str(error)) from None
 
 
 def loop_with(part: Part, params: Any) -> ClosedLoop:
-    """A loop that holds a part, and what it needs."""
+    """A loop with a part and the parts that it needs."""
     return body_module("starhold.conformance.bodies", part.body or "rigid-body").loop_with(part, params)
 
 
@@ -96,7 +96,7 @@ def is_pure(part: Part) -> None:
     """A flight depends on nothing but its loop."""
     _loops_only(part)
     for params in part.examples():
-        # In plain Python, which runs the file at every step, and not once, when a kernel is recorded.
+        # Plain Python runs the file at every step; recording a kernel runs it once.
         ends = [numbers_of(fly_plainly(loop_with(part, params), STEPS)) for _ in range(2)]
         require(bool(np.array_equal(*ends, equal_nan=True)), "two flights of the same loop differ")
 
@@ -151,12 +151,12 @@ def keeps_units(part: Part) -> None:
             def value(system: Any, name: str = name, equation: Any = equation, params: Any = params) -> Any:
                 period = rescale((PERIOD,), ("s",), system)[0]
                 fitted = Fitted(part, rescale_params(part, params, system))
-                own = fitted.prepared(period)
+                taken = fitted.prepared(period)
                 state = rescale(loop.start, ("1", "rad/s", "m", "m/s", "N m"), system)
                 if part.role == "actuator":
                     output, target = rescale(((1e-3, 2e-3, -1e-3), (3e-3, -1e-3, 2e-3)), ("N m", "N m"), system)
-                    return equation(target, own) if name == "command" else equation(output, target, output, period, own)
-                return equation(state, own, rescale(craft, CRAFT_UNITS, system), fitted.remembered(own))
+                    return equation(target, taken) if name == "command" else equation(output, target, output, period, taken)
+                return equation(state, taken, rescale(craft, CRAFT_UNITS, system), fitted.remembered(taken))
 
             plain = np.array(value((1.0, 1.0, 1.0)))
             for system in SYSTEMS:
@@ -186,9 +186,9 @@ def keeps_momentum(part: Part) -> None:
         numbers = loop.setup().effectors
         totals: list[Any] = []
         for carry in carries:
-            own = zip(loop.used("effector"), carry.effectors, numbers, strict=True)
+            effectors = zip(loop.used("effector"), carry.effectors, numbers, strict=True)
             total = apply(loop.craft.inertia, carry.state.rate)
-            for fitted, state, prepared in own:
+            for fitted, state, prepared in effectors:
                 module = fitted.part.module
                 total = add(total, module.momentum(state, prepared))
                 if fitted.part.hook("inertia_change") is not None:
@@ -201,7 +201,7 @@ def keeps_momentum(part: Part) -> None:
 def measures_what_it_says(part: Part) -> None:
     """The fields of readings and estimates are shaped as those of the body's state that they are called after."""
     if part.role not in ("sensor", "estimator"):
-        raise NotApplicableError("only sensors and estimators tell of the state")
+        raise NotApplicableError("only sensors and estimators give the state")
     for params in part.examples():
         loop = loop_with(part, params)
         memories = fly(loop, 3)[1].memories
@@ -210,7 +210,7 @@ def measures_what_it_says(part: Part) -> None:
             for name in getattr(value, "_fields", ()):
                 if name in loop.start._fields:
                     same = len(flatten((getattr(value, name),))) == len(flatten((getattr(loop.start, name),)))
-                    require(same, f"{name} is shaped otherwise than that of the body")
+                    require(same, f"{name} has another shape than that of the body")
 
 
 def draws_in_its_range(part: Part) -> None:
@@ -226,22 +226,22 @@ def draws_in_its_range(part: Part) -> None:
 
 
 def _draws(part: Part) -> bool:
-    """Whether its equation asks for random numbers."""
-    asked: list[int] = []
+    """Whether its equation draws random numbers."""
+    places: list[int] = []
 
-    class Asked(Dice):
+    class Watched(Dice):
         def vector(self, place: int, deviation: Any) -> Any:
-            asked.append(place)
+            places.append(place)
             return super().vector(place, deviation)
 
     loop = loop_with(part, part.examples()[0])
     fitted = next(f for f in loop.parts if f.part == part)
-    numbers, dice = fitted.prepared(loop.period), Asked((1, 2), 3, 0)
+    numbers, dice = fitted.prepared(loop.period), Watched((1, 2), 3, 0)
     if part.hook("measure") is not None:
         part.module.measure(loop.start, fitted.remembered(numbers, loop.start), numbers, dice, 3)
     else:
         part.module.update(fitted.remembered(numbers), loop.start, numbers, dice, 3)
-    return bool(asked)
+    return bool(places)
 
 
 def _loops_only(part: Part) -> None:

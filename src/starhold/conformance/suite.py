@@ -1,4 +1,4 @@
-"""Runs the checks for laws of a body over a law."""
+"""The checks for laws of a body are run over a law."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def examine(law: Law) -> Iterator[Verdict]:
 
 
 def find_law(given: str) -> Law:
-    """The law that is installed under a name, or that a file holds, for whatever body. InputError where there is none."""
+    """The law for any body that is installed under a name, or stands in a file. InputError where there is none."""
     installed = {name: law for body in parts("body") for name, law in catalogue(body).items()}
     path = Path(given)
     if given in installed and not path.is_file():
@@ -30,5 +30,5 @@ def find_law(given: str) -> Law:
         allowed = f"a Python file that holds a law, or a law by name: {nearest(given, list(installed))}"
         raise InputError(given, "", "no such file", allowed) from None
     except (OSError, ValueError) as error:
-        found = error.strerror if isinstance(error, OSError) else ""
-        raise InputError(given, "", found or "", "a Python file that holds a law" if found else str(error)) from None
+        reason = error.strerror if isinstance(error, OSError) else ""
+        raise InputError(given, "", reason or "", "a Python file that holds a law" if reason else str(error)) from None

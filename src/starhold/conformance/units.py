@@ -23,10 +23,10 @@ def rescaled(
         return [times(value, _factor(unit, factors)) for value, unit in zip(values, units, strict=True)]
 
     gain_units = [None if item.gain.choices or item.gain.whole else item.gain.unit for item in law.fields()]
-    own = [v if unit is None else times(v, _factor(unit, factors)) for v, unit in zip(gains, gain_units, strict=True)]
+    other = [v if unit is None else times(v, _factor(unit, factors)) for v, unit in zip(gains, gain_units, strict=True)]
     return (
         Measurement(*scaled(measurement, _units(Measurement))),
-        law.gains(*own),
+        law.gains(*other),
         Craft(*scaled(craft, _units(Craft))),
         1.0 / _factor("N m", factors),
     )
@@ -34,7 +34,7 @@ def rescaled(
 
 @cache
 def _units(cls: Any) -> list[str]:
-    return [told.unit for told in quantities(cls).values()]
+    return [quantity.unit for quantity in quantities(cls).values()]
 
 
 def times(value: Any, factor: float) -> Any:
@@ -66,8 +66,8 @@ def rescale_params(part: Part, params: Any, factors: tuple[float, float, float])
     """The parameters of a part in another system of units."""
     if part.table:
         return params
-    found = [
+    values = [
         value if item.gain.choices or item.gain.whole else times(value, _factor(item.gain.unit, factors))
         for item, value in zip(part.fields(), params, strict=True)
     ]
-    return type(params)(*found)
+    return type(params)(*values)

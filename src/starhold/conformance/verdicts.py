@@ -11,7 +11,7 @@ from starhold.errors import InputError, is_interrupt
 from starhold.laws.catalogue import Law
 from starhold.laws.interface import Card, fields
 from starhold.loop.kernels import fly_plainly
-from starhold.parts.catalogue import told
+from starhold.parts.catalogue import error_line
 from starhold.parts.part import Part
 from starhold.simulation.lane import fly
 from starhold.simulation.lanes import simulate_many
@@ -49,7 +49,7 @@ def run(checks: Iterable[Callable[..., None]], part: Part) -> Iterator[Verdict]:
         except BaseException as reason:
             if is_interrupt(reason):
                 raise
-            yield Verdict(name, "failed", told(reason, part.file))
+            yield Verdict(name, "failed", error_line(reason, part.file))
         else:
             yield Verdict(name, "passed", "")
 

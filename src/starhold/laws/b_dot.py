@@ -34,7 +34,7 @@ class Gains(NamedTuple):
 
 
 class Orbit(NamedTuple):
-    """The form takes the gain from the orbit, in which the field must turn before all axes have been slowed."""
+    """The form takes the gain from the orbit, along which the field must turn before all axes have been slowed."""
 
     orbit_period: Annotated[float, Gain("s", above=0.0, text="of the orbit")]
     inclination: Annotated[float, Gain("rad", at_least=0.0, at_most=math.pi, text="of the orbit to the magnetic equator")]
@@ -66,7 +66,7 @@ def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: Memory)
     """Return the torque of the dipole (N m, body)."""
     field = measurement.magnetic_field
     square = dot(field, field)
-    # Without a field, or with one alone, nothing is known.
+    # The field's rate of change needs two measurements.
     share = where(less(0.0, square), divide(-gains.k / measurement.period, square), 0.0)
     dipole = scale(memory.known * share, subtract(field, memory.field))
     return cross(dipole, field), Memory(field, where(less(0.0, square), 1.0, 0.0))

@@ -13,8 +13,8 @@ from typing import Any
 import starhold.laws
 from starhold.laws.interface import Card, Field, NoMemory, Start, fields
 from starhold.parts import catalogue as parts
+from starhold.parts.catalogue import error_line as error_line
 from starhold.parts.catalogue import read_module as read_module
-from starhold.parts.catalogue import told as told
 from starhold.parts.part import Part
 
 
@@ -34,7 +34,7 @@ class Law(Part):
 
     @property
     def body(self) -> str:
-        """The name of the body that it steers: what its file says, or the one whose command it gives."""
+        """The name of the body that it steers: that of its file, or the one whose command it gives."""
         return getattr(self.module, "BODY", None) or next(
             name for name, command in _commands().items() if self.hook(command)
         )
@@ -66,15 +66,15 @@ class Law(Part):
 
     def fields(self, form: str | None = None) -> list[Field]:
         """The gains in order, or the inputs of a design form."""
-        own = self.hook("fields") if form is None else None
-        return fields(self.gains if form is None else self.forms[form]) if own is None else own()
+        listed = self.hook("fields") if form is None else None
+        return fields(self.gains if form is None else self.forms[form]) if listed is None else listed()
 
     def examples(self) -> list[Any]:
         """Gains that tests, docs and benchmarks run."""
         return self.module.examples()
 
     def complete(self, spec: Any, start: Callable[[], Start]) -> Any:
-        """The inputs of a design form, with what they leave to the scenario, which `start` tells."""
+        """The inputs of a design form, completed from the scenario's start."""
         teller = getattr(self.module, "complete", None)
         return spec if teller is None else teller(spec, start)
 
@@ -83,12 +83,12 @@ class Law(Part):
         return self.module.design(craft, spec)
 
     def explain(self, craft: Any, spec: Any) -> list[tuple[str, Any]]:
-        """A design can be judged by these figures, name and value; there are none for a law that has nothing to add."""
+        """Figures, name and value, by which a design is judged; none for a law without `explain`."""
         teller = getattr(self.module, "explain", None)
         return [] if teller is None else teller(craft, spec)
 
     def check(self, gains: Any, craft: Any) -> None:
-        """ValueError where gains, each within its bounds, make a loop that cannot be stable; not every law can tell."""
+        """Raise ValueError where gains within their bounds make a loop that cannot be stable; not every law checks."""
         teller = getattr(self.module, "check", None)
         if teller is not None:
             teller(gains, craft)
@@ -99,7 +99,7 @@ class Law(Part):
         return NoMemory() if maker is None else maker(gains, craft, period)
 
     def counters(self, memory: Any) -> tuple[int, ...] | None:
-        """Tell what a law that iterates has counted: calls, iterations in all, the most in a call, calls that ended
+        """Return the counts of a law that iterates: calls, iterations in all, the most in a call, calls that ended
         without the optimum; None for other laws."""
         teller = getattr(self.module, "counters", None)
         return None if teller is None else teller(memory)
@@ -129,7 +129,7 @@ def _of_body(body: str) -> dict[str, Law]:
 
 @contextmanager
 def adopted(law: Law) -> Generator[None]:
-    """Make a law from a file known by its name for a while, among the laws for its body."""
+    """Inside this context, list a law from a file among the laws for its body."""
     known = catalogue(law.body)
     before = known.get(law.name)
     known[law.name] = law
@@ -145,9 +145,9 @@ _FROM_FILES: dict[str, Law] = {}
 
 
 def known_law(name: str) -> Law | None:
-    """The attitude law of this name: one that is installed, else the one read last from a file so called."""
-    found = catalogue().get(name, _FROM_FILES.get(name))
-    return found if found is None or found.body == "rigid-body" else None
+    """The attitude law of this name: the installed one, else the last one read from a file of this name."""
+    law = catalogue().get(name, _FROM_FILES.get(name))
+    return law if law is None or law.body == "rigid-body" else None
 
 
 def file_of(name: str) -> Path | None:
@@ -157,7 +157,7 @@ def file_of(name: str) -> Path | None:
 
 
 def from_file(path: Path, known: Mapping[str, Law] | None = None) -> Law:
-    """The law in a file, which is run for it. `known`: the laws that are installed, of which it may be one. Errors as of
+    """The law in a file, which is executed. `known`: the installed laws, of which it may be one. Errors as of
     `parts.catalogue.from_file`."""
     law = parts.from_file(path, known or {}, as_law)
     if law.file is not None:
@@ -183,8 +183,8 @@ def as_law(module: ModuleType, path: Path | None = None) -> Law:
 
 
 def _command_of(body: Any, module: ModuleType, path: Path | None) -> str:
-    """The name of the command of the body that a law's module names. A body that is not known yet may stand in a file of its
-    name beside that of the law."""
+    """The name of the command of a law's body. A body that is not known yet may stand in a file of its name beside the
+    law's."""
     try:
         return parts.find("body", body).module.COMMAND
     except (KeyError, TypeError):

@@ -1,4 +1,4 @@
-"""PD feedback of which the part across the magnetic field acts, all that magnetorquers can give."""
+"""The part of PD feedback across the magnetic field acts, which is all that magnetorquers can give."""
 
 from __future__ import annotations
 

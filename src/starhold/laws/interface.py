@@ -1,12 +1,11 @@
 """Laws of attitude control: the measurement that they take, and the declarations of a law file.
 
-A law file holds `CARD`, `class Gains(NamedTuple)`, the equation
-`torque(measurement, gains, craft, memory) -> (torque, memory)` and `examples()`. It may add
-`lyapunov(measurement, gains, craft)`, design forms (`FORMS` with `design(craft, spec)`, and `complete(spec, start)` for
-inputs that the scenario gives), `check(gains, craft)` that refuses what cannot be stable, and
-`remember(gains, craft, period)` for a memory that is not empty, and `record(memory, period)` for what is recorded of that,
-a NamedTuple whose fields are annotated with `Quantity`. `FROM_OUTSIDE = True`: the torque has to come from outside the
-spacecraft, as that of magnetorquers does and that of wheels does not.
+A law file holds `CARD`, `class Gains(NamedTuple)`, the equation `torque(measurement, gains, craft, memory) -> (torque,
+memory)` and `examples()`. It may add `lyapunov(measurement, gains, craft)`, design forms (`FORMS` with `design(craft,
+spec)`, and `complete(spec, start)` for inputs that the scenario gives), `check(gains, craft)` that refuses gains that
+cannot be stable, `remember(gains, craft, period)` for a memory that is not empty, and `record(memory, period)` for its
+recorded quantities, a NamedTuple whose fields are annotated with `Quantity`. `FROM_OUTSIDE = True`: the torque has to
+come from outside the spacecraft, as that of magnetorquers does and that of wheels does not.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ Claim: TypeAlias = Literal["global", "almost-global", "local", "none"]
 
 @dataclass(frozen=True)
 class Card(contract.Card):
-    """Title, formula, sources and assumptions of a law, the stability that it claims, and what its readers must know."""
+    """Title, formula, sources and assumptions of a law, the stability that it claims, and facts that its readers need."""
 
     claims: Claim
     """The stability that is claimed: global, almost-global, local or none; where it is any, the assumptions are not

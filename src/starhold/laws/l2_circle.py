@@ -28,27 +28,27 @@ class Gains(NamedTuple):
     radius: Annotated[float, Gain(above=0.0, dimension="length", text="of the circle, lengths")]
     rate: Annotated[float, Gain(dimension="rate", text="at which it is run through, from Y to Z; negative the other way")]
     alpha: Annotated[float, Gain(above=0.0, text="weight of the distance from the circle")]
-    k: Annotated[float, Gain(above=0.0, text="feedback on what the velocity is off by; of a relay the size of its thrust")]
+    k: Annotated[float, Gain(above=0.0, text="feedback on the velocity error; size of a relay's thrust")]
     k_x: Annotated[float, Gain(above=0.0, text="on the position along X")]
     k_velocity: Annotated[float, Gain(above=0.0, text="on the velocity along X")]
     feedback: Annotated[int, Gain(choices=("smooth", "relay"), text="relay: k in the direction against the error")] = 0
     boundary_layer: Annotated[
         float, Gain(at_least=0.0, dimension="velocity", text="velocity error within which the relay is proportional")
     ] = 0.0
-    model: Annotated[int, Gain(choices=MODELS, text="nonlinear: what the linear model leaves out is undone too")] = 0
+    model: Annotated[int, Gain(choices=MODELS, text="nonlinear: cancels what the linear model leaves out too")] = 0
 
 
 class Best(NamedTuple):
-    """The form takes the rate of the least control, and along X the double root of the natural rate."""
+    """The form takes the rate that needs the least control, and along X the double root of the natural rate."""
 
     radius: Annotated[float, Gain(above=0.0, dimension="length", text="of the circle, lengths")]
     alpha: Annotated[float, Gain(above=0.0, text="weight of the distance from the circle")] = 1.0
-    k: Annotated[float, Gain(above=0.0, text="feedback on what the velocity is off by; of a relay its thrust")] = 1.0
+    k: Annotated[float, Gain(above=0.0, text="feedback on the velocity error; size of a relay's thrust")] = 1.0
     feedback: Annotated[int, Gain(choices=("smooth", "relay"), text="relay: k in the direction against the error")] = 0
     boundary_layer: Annotated[
         float, Gain(at_least=0.0, dimension="velocity", text="velocity error within which the relay is proportional")
     ] = 0.0
-    model: Annotated[int, Gain(choices=MODELS, text="nonlinear: what the linear model leaves out is undone too")] = 0
+    model: Annotated[int, Gain(choices=MODELS, text="nonlinear: cancels what the linear model leaves out too")] = 0
 
 
 FORMS: dict[str, Any] = {"best": Best}
@@ -68,7 +68,7 @@ def check(gains: Gains, plant: Libration) -> None:
 
 
 def explain(plant: Libration, spec: Best) -> list[tuple[str, Any]]:
-    """A design is judged by what the circle asks of the control."""
+    """Return figures of the control that the circle demands."""
     rate = design(plant, spec).rate
     peak = peak_demand(plant, rate) * spec.radius
     return [("rate", rate), ("period (of the turning axes)", plant.rate / abs(rate)), ("peak demand (scaled)", peak)]
@@ -91,7 +91,7 @@ def errors(measurement: PointMeasurement, gains: Gains) -> Vector:
 
 
 def neutral(measurement: PointMeasurement, gains: Gains, plant: Libration) -> Vector:
-    """Return the control under which V stays as it is (scaled)."""
+    """Return the control that keeps V constant (scaled)."""
     y, z, v = measurement.position[1], measurement.position[2], measurement.velocity
     pull, square = 2.0 * gains.alpha * errors(measurement, gains)[0], plant.rate * plant.rate
     return (
@@ -102,7 +102,7 @@ def neutral(measurement: PointMeasurement, gains: Gains, plant: Libration) -> Ve
 
 
 def feedback(measurement: PointMeasurement, gains: Gains, plant: Libration) -> Vector:
-    """Return the control acceleration for the linear model (scaled): what keeps V, and what lowers it."""
+    """Return the control acceleration for the linear model (scaled): the part that keeps V, and the part that lowers it."""
     off = errors(measurement, gains)
     wrong = (0.0, off[1], off[2])
     smooth, relayed = scale(gains.k, wrong), along(wrong, gains.k, gains.boundary_layer)

@@ -12,7 +12,7 @@ from starhold.parts.bodies.libration_point import Libration
 
 CARD = Card(
     title="Rest beside a libration point",
-    summary="u = constant feed-forward + feedback axis by axis, the Coriolis acceleration undone",
+    summary="u = constant feed-forward + feedback axis by axis, the Coriolis acceleration cancelled",
     sources=("published study of the direct Lyapunov method for compact invariant sets: holding a point near L2",),
     assumptions=("linear motion near the point", "control not limited"),
     claims="local",
@@ -26,7 +26,7 @@ class Gains(NamedTuple):
     z: Annotated[float, Gain(dimension="length", text="place of rest along Z, lengths")]
     k_x: Annotated[float, Gain(above=0.0, text="on the position along X")]
     k_velocity: Annotated[Vector, Gain(shape=(3,), text="on the velocity, by axis")]
-    model: Annotated[int, Gain(choices=MODELS, text="nonlinear: what the linear model leaves out is undone too")] = 0
+    model: Annotated[int, Gain(choices=MODELS, text="nonlinear: cancels what the linear model leaves out too")] = 0
 
 
 class Degree(NamedTuple):
@@ -35,7 +35,7 @@ class Degree(NamedTuple):
 
     y: Annotated[float, Gain(dimension="length", text="place of rest along Y, lengths")] = 0.0
     z: Annotated[float, Gain(dimension="length", text="place of rest along Z, lengths")] = 0.0
-    model: Annotated[int, Gain(choices=MODELS, text="nonlinear: what the linear model leaves out is undone too")] = 0
+    model: Annotated[int, Gain(choices=MODELS, text="nonlinear: cancels what the linear model leaves out too")] = 0
 
 
 FORMS: dict[str, Any] = {"degree": Degree}

@@ -1,8 +1,8 @@
-"""The control is, of all within the limit, the one under which a chosen V decreases fastest.
+"""Among all controls within the limit the law takes the one under which a chosen V decreases fastest.
 
-V weighs the velocity against one that leads to the circle, y' = -rate z - pull f1 y and z' = rate y - pull f1 z with
-f1 = y^2 + z^2 - radius^2. With pull = 0 it would be the V of `l2-circle`, and a control of full size would hold any circle
-near the wanted one: there that V is constant whatever the control.
+V weighs the velocity against one that leads to the circle, y' = -rate z - pull f1 y and z' = rate y - pull f1 z with f1
+= y^2 + z^2 - radius^2. With pull = 0 it would be the V of `l2-circle`, and a control of full size would hold any circle
+near the wanted one, for there that V is constant whatever the control.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ class Gains(NamedTuple):
     alpha: Annotated[float, Gain(above=0.0, text="weight of the distance from the circle")]
     beta: Annotated[float, Gain(above=0.0, text="weight of x' + slope x")]
     surface_gain: Annotated[float, Gain(above=0.0, text="rate at which x then falls")]
-    pull: Annotated[float, Gain(above=0.0, text="of the velocity that is wanted, towards the circle")]
+    pull: Annotated[float, Gain(above=0.0, text="of the demanded velocity towards the circle")]
     boundary_layer: Annotated[float, Gain(at_least=0.0, text="|g| within which the control is proportional to it")] = 0.0
 
 
 class Best(NamedTuple):
-    """The form takes the rate of the least control on the circle; along X the natural rate."""
+    """The form takes the rate that needs the least control on the circle, and along X the natural rate."""
 
     radius: Annotated[float, Gain(above=0.0, dimension="length", text="of the circle, lengths")]
     alpha: Annotated[float, Gain(above=0.0, text="weight of the distance from the circle")] = 1.0
     beta: Annotated[float, Gain(above=0.0, text="weight of x' + slope x")] = 1.0
-    pull: Annotated[float, Gain(above=0.0, text="of the velocity that is wanted, towards the circle")] = 1.0
+    pull: Annotated[float, Gain(above=0.0, text="of the demanded velocity towards the circle")] = 1.0
     boundary_layer: Annotated[float, Gain(at_least=0.0, text="|g| within which the control is proportional to it")] = 0.05
 
 
@@ -74,13 +74,12 @@ def _slopes(measurement: PointMeasurement, gains: Gains) -> Vector:
 
 
 def control(measurement: PointMeasurement, gains: Gains, plant: Libration, memory: NoMemory) -> tuple[Vector, NoMemory]:
-    """Return the control acceleration (scaled): V' is linear in it, so that the least is on the limit, against dV/dv."""
+    """Return the control acceleration (scaled): V' is linear in it, so its minimum lies on the limit, against dV/dv."""
     return along(_slopes(measurement, gains), -measurement.limit, gains.boundary_layer), memory
 
 
 def lyapunov(measurement: PointMeasurement, gains: Gains, plant: Libration) -> Scalar:
-    """Return V = (alpha f1^2 + f2^2 + f3^2 + beta (x' + slope x)^2)/2, f2 and f3 what the velocity is off by along Y and
-    Z."""
+    """Return V = (alpha f1^2 + f2^2 + f3^2 + beta (x' + slope x)^2)/2 with f2 and f3 the velocity errors along Y and Z."""
     g, f1 = _slopes(measurement, gains), _off(measurement, gains)
     return 0.5 * (gains.alpha * f1 * f1 + g[1] * g[1] + g[2] * g[2] + g[0] * g[0] / gains.beta)
 

@@ -116,7 +116,7 @@ def design(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> Gains:
             moments, axes, q, r = _by_axes(inertia, spec)
             k_rate, k_attitude = (_turned(axes, k) for k in closed_form(moments, q, r))
     for gain in (k_rate, k_attitude):
-        # Weights that couple the axes may well give a negative entry; nothing else does, unless numbers ran out.
+        # Weights that couple the axes may well give a negative entry; nothing else does within the range of doubles.
         if not np.isfinite(gain).all() or not (isinstance(spec, Numeric) or (np.diagonal(gain) > 0.0).all()):
             raise ValueError(OUT_OF_RANGE)
     return Gains(compact(k_rate), compact(k_attitude), share)
@@ -156,11 +156,11 @@ def solution(craft: Craft, spec: FormI | FormII | FormIII) -> Solution:
 
 
 def riccati_problem(craft: Craft, spec: FormI | FormII | FormIII) -> tuple[Array, Array, Array]:
-    """Return weights Q (6, 6), rate first, and R (3, 3) of a form and its P (6, 6), in body axes; of form I for R the
-    identity."""
-    found = solution(craft, spec)
-    both = np.kron(np.eye(2), found.axes)
-    return both * found.q @ both.T, found.axes * found.r @ found.axes.T, both @ found.p @ both.T
+    """Return weights Q (6, 6), rate first, and R (3, 3) of a form and its P (6, 6), in body axes; form I has the
+    identity for R."""
+    closed = solution(craft, spec)
+    both = np.kron(np.eye(2), closed.axes)
+    return both * closed.q @ both.T, closed.axes * closed.r @ closed.axes.T, both @ closed.p @ both.T
 
 
 def explain(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> list[tuple[str, Any]]:
@@ -168,31 +168,31 @@ def explain(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> list[tupl
     eigenvalues, and whether the gyroscopic torque leaves V alone."""
     inertia, gains = tensor(craft.inertia), design(craft, spec)
     k_rate, k_attitude = tensor(gains.k_rate), tensor(gains.k_attitude)
-    found: list[tuple[str, Any]] = []
+    figures: list[tuple[str, Any]] = []
     if isinstance(spec, Numeric):
         q, r = _numeric_weights(spec)
         p = solve_riccati(inertia, q, r).p
-        found += [("P", p), ("Riccati residual, relative", riccati_residual(p, inertia, q, r))]
+        figures += [("P", p), ("Riccati residual, relative", riccati_residual(p, inertia, q, r))]
         power = gyroscopic_residual(inertia, k_attitude)
     else:
         closed = solution(craft, spec)
         # About the principal axes: turned into the body's, small entries drown in the rounding of large ones.
         about = (closed.p, np.diag(closed.moments), np.diag(closed.q), np.diag(closed.r))
         others = zip(closed[4:], scipy_axes(closed.moments, closed.q, closed.r), strict=True)
-        found.append(("P", riccati_problem(craft, spec)[2]))
-        found.append(("Riccati residual, relative", riccati_residual(*about)))
-        found.append(("P against SciPy, relative", max(float(np.abs(own / other - 1.0).max()) for own, other in others)))
+        figures.append(("P", riccati_problem(craft, spec)[2]))
+        figures.append(("Riccati residual, relative", riccati_residual(*about)))
+        figures.append(("P against SciPy, relative", max(float(np.abs(a / b - 1.0).max()) for a, b in others)))
         y = spec.b * closed.moments if isinstance(spec, FormI) else np.sqrt(closed.q[3:] / closed.r)
         power = abs(kappa(closed.moments, y)) / (3.0 * np.sqrt(3.0))
         if not isinstance(spec, FormI) and spec.balance:
             for name, given, moved in (("q", spec.q, closed.q), ("r", spec.r, closed.r)):
-                found.append((f"weights {name}, balanced", moved))
-                found.append((f"of the weights {name} given", moved / np.array(given)))
+                figures.append((f"weights {name}, balanced", moved))
+                figures.append((f"of the weights {name} given", moved / np.array(given)))
     modes = linear_modes(inertia, np.hstack([k_rate, k_attitude]))
-    found.append(("eigenvalues of the linear loop (1/s)", modes))
-    found.append(("degree of stability (1/s)", float(-modes.real.max())))
-    found.append(("gyroscopic residual (s^2)", float(power)))
-    return found
+    figures.append(("eigenvalues of the linear loop (1/s)", modes))
+    figures.append(("degree of stability (1/s)", float(-modes.real.max())))
+    figures.append(("gyroscopic residual (s^2)", float(power)))
+    return figures
 
 
 def _by_axes(inertia: Array, spec: FormII | FormIII) -> tuple[Array, Array, Array, Array]:
@@ -214,7 +214,7 @@ def _turned(axes: Array, diagonal: Array) -> Array:
 
 
 def _without_rounding(gain: Array) -> Array:
-    """Return the matrix, symmetric where it is but for the rounding of the weights."""
+    """Return the matrix, made symmetric where it is symmetric but for the rounding of the weights."""
     if np.abs(gain - gain.T).max() <= 1e-14 * np.abs(gain).max():
         return 0.5 * (gain + gain.T)
     return gain
@@ -228,7 +228,7 @@ def gyroscopic_residual(inertia: Array, k_attitude: Array) -> float:
     weight = axes.T @ np.linalg.inv(k_attitude) @ axes
     if np.abs(weight - np.diag(np.diagonal(weight))).max() <= 1e-12 * np.abs(weight).max():
         return abs(kappa(moments, 1.0 / np.diagonal(weight))) / (3.0 * np.sqrt(3.0))
-    # Not diagonal together: the maximum over a fine grid of directions, a figure for reading and no bound.
+    # Not diagonal together: the maximum over a fine grid of directions is an estimate and no bound.
     random = np.random.default_rng(0).normal(size=(20_000, 3))
     rates = random / np.linalg.norm(random, axis=1, keepdims=True)
     return float(np.abs(np.einsum("ki,ij,kj->k", rates, weight, np.cross(rates, rates * moments))).max())
@@ -237,8 +237,8 @@ def gyroscopic_residual(inertia: Array, k_attitude: Array) -> float:
 def balanced(moments: Array, spec: FormII | FormIII) -> tuple[Array, Array]:
     """Return weights q (6,) and r (3,) for moments (3,), moved to where kappa vanishes if `spec.balance` says so.
 
-    ValueError where no value of the weight that is named does it (that of the middle moment's axis always can), and where
-    weights, given or moved, are not positive or differ by more than MOST_SPREAD.
+    ValueError where kappa vanishes for no value of the named weight (that of the middle moment's axis always can), and
+    where weights, given or moved, are not positive or differ by more than MOST_SPREAD.
     """
     q, r = positive(spec.q, 6, "q"), positive(spec.r, 3, "r")
     check_spreads(q[:3], q[3:], r)

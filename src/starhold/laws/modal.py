@@ -1,4 +1,4 @@
-"""Modal control places the poles of the motion, linearised anew at every step, exactly, by levels."""
+"""Modal control places the poles of the motion exactly and level by level, linearising it anew at every step."""
 
 from __future__ import annotations
 
@@ -79,12 +79,12 @@ FORMS: dict[str, Any] = {"equal": Equal, "fit": Fit}
 
 
 def complete(spec: Equal | Fit, start: Callable[[], Start]) -> Equal | Fit:
-    """Return the inputs of a form with the error angle (rad) at the start of a run where they leave it out."""
+    """Return the inputs of a form, with the error angle (rad) at the start where they give none."""
     return spec._replace(angle=start().angle) if isinstance(spec, Fit) and spec.angle is None else spec
 
 
 def design(craft: Craft, spec: Equal | Fit) -> Gains:
-    """Set phi_0 = phi_1 = a E. ValueError where a fit is told no angle."""
+    """Set phi_0 = phi_1 = a E. ValueError for a fit without an angle."""
     if isinstance(spec, Equal):
         a = spec.a
     elif spec.angle is None:
@@ -105,7 +105,7 @@ def fitted(angle: ArrayLike, below: Vector, above: Vector, split: float) -> NDAr
 
 
 def explain(craft: Craft, spec: Equal | Fit) -> list[tuple[str, Any]]:
-    """Return the root, and how soon it forgets."""
+    """Return the root and its time constant."""
     a = design(craft, spec).phi_0[0]
     return [("root a (1/s)", a), ("time constant (s)", -1.0 / a)]  # type: ignore[operator]
 
@@ -139,9 +139,9 @@ def _upper(q: Vector, w: Vector, gains: Gains, craft: Craft, first: Scalar, rest
     """Return K_1 (first, rest), which would give the quaternion the spectra phi_1 and b |w|2, if it could be steered by the
     momentum."""
     half = apply(craft.inertia, _straighten(q, w))
-    own = scale(2.0, apply(craft.inertia, _straighten(q, rest)))
+    doubled = scale(2.0, apply(craft.inertia, _straighten(q, rest)))
     last = scale(4.0 * gains.b, half)
-    pulled = apply(gains.phi_1, add(scale(first, last), own))
+    pulled = apply(gains.phi_1, add(scale(first, last), doubled))
     return subtract(subtract(scale(first, half), scale(0.5 * dot(w, rest), last)), pulled)
 
 
@@ -153,9 +153,9 @@ def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemor
     """
     q, w = vector_part(measurement.attitude), measurement.rate
     turning = derivative(measurement.attitude, w)
-    held = _upper(q, w, gains, craft, measurement.attitude[0] - 1.0, q)
+    steered = _upper(q, w, gains, craft, measurement.attitude[0] - 1.0, q)
     moved = _upper(q, w, gains, craft, turning[0], vector_part(turning))
-    feedback = subtract(moved, apply(gains.phi_0, add(held, apply(craft.inertia, w))))
+    feedback = subtract(moved, apply(gains.phi_0, add(steered, apply(craft.inertia, w))))
     model = add(
         gyroscopic_torque(craft.inertia, measurement.body_rate), cross(measurement.body_rate, measurement.wheel_momentum)
     )

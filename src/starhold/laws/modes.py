@@ -1,7 +1,7 @@
-"""A law made of laws: each mode has one, and conditions on the measurement say when another mode begins.
+"""A supervisor switches between laws: each mode has one, and conditions on the measurement begin another mode.
 
-At a control instant the conditions of the present mode are evaluated, and the law of the mode that they give commands: so
-the state in which a mode begins fulfils the condition of the switch. A mode's law begins with its initial memory each time.
+At a control instant the conditions of the present mode are evaluated, and the law of the mode that they lead to commands,
+so the state in which a mode begins fulfils its switch's condition. A mode's law begins with its initial memory each time.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ TEXTS = {
     "wheel_momentum": "the norm of the wheels' momentum",
 }
 TESTS = tuple(f"{name}_{side}" for name in UNITS for side in ("below", "above"))
-"""A condition may ask for these, beside time: a norm that the law is told below or above a level."""
+"""Quantities that a condition may test, beside time: a measured norm below or above a level."""
 ENDS = ("rate_below", "body_rate_below", "angle_below")
 """The tests that bound where a mode ends."""
-AFTER = Gain("s", at_least=0.0, text="once the mode has flown so long")
-DWELL = Gain("s", at_least=0.0, text="and all of it has held so long, without a break")
+AFTER = Gain("s", at_least=0.0, text="least time in the mode")
+DWELL = Gain("s", at_least=0.0, text="time for which all of it must have held without a break")
 
 
 def level_of(test: str) -> Gain:
@@ -45,7 +45,7 @@ def level_of(test: str) -> Gain:
 
 
 class Switch(NamedTuple):
-    """Another mode begins, counted from 0, where all tests hold for a while; `key`: "until" or "back"."""
+    """A switch begins another mode (`to`, counted from 0) once all tests have held for a while; `key`: "until" or "back"."""
 
     key: str
     to: int
@@ -53,7 +53,7 @@ class Switch(NamedTuple):
 
 
 class Mode(NamedTuple):
-    """A mode has a name, a law, switches to others, the later before the earlier where both are due, and the names of the
+    """A mode has a name, a law, switches to other modes, of which the last one due counts, and the names of the
     effectors that work in it (None: all)."""
 
     name: str
@@ -62,18 +62,18 @@ class Mode(NamedTuple):
     effectors: tuple[str, ...] | None = None
 
     def has(self, effector: str) -> bool:
-        """Whether an effector of this name, of those that may rest, works in the mode."""
+        """Whether an effector of this name works in the mode."""
         return self.effectors is None or effector in self.effectors
 
 
 class Memory(NamedTuple):
-    """The law keeps the mode, counted from 0, for how many control periods it has flown, for how many control instants each
-    of its switches has held, the memories of the laws, and those that they begin with."""
+    """The law remembers the mode, counted from 0, its age in control periods, for how many control instants each of its
+    switches has held, and the memories of the laws, present and initial."""
 
     mode: float
     age: float
-    held: tuple[float, ...]
-    own: tuple[Any, ...]
+    instants: tuple[float, ...]
+    memories: tuple[Any, ...]
     fresh: tuple[Any, ...]
 
 
@@ -86,13 +86,13 @@ class Sample(NamedTuple):
 
 @dataclass(frozen=True)
 class Modes:
-    """The module of a law of modes: all that a law file holds. Equal for laws of the same modes, whatever their gains."""
+    """A law of modes has this for a module, with all that a law file holds; equal for the same modes with any gains."""
 
     modes: tuple[Mode, ...]
 
     @property
     def CARD(self) -> Card:  # noqa: N802
-        """The law's card; the modes' laws are even only together."""
+        """The law's card; its quaternion sign is even only where that of every mode is."""
         laws = [mode.law for mode in self.modes]
         return Card(
             title="Modes",
@@ -105,7 +105,7 @@ class Modes:
 
     @property
     def READS(self) -> tuple[str, ...]:  # noqa: N802
-        """The readings that any of them needs."""
+        """The readings that any mode's law needs."""
         return tuple(dict.fromkeys(name for mode in self.modes for name in mode.law.reads))
 
     @property
@@ -115,29 +115,29 @@ class Modes:
 
     def fields(self) -> list[Field]:
         """The gains in order, under the keys that they have in the law's table."""
-        found: list[Field] = []
+        listed: list[Field] = []
         for place, mode in enumerate(self.modes, 1):
-            found += [replace(item, name=f"mode[{place}].{item.name}") for item in _own(mode)]
-        return found
+            listed += [replace(item, name=f"mode[{place}].{item.name}") for item in _mode_fields(mode)]
+        return listed
 
     def parts(self, gains: Any) -> Iterator[tuple[Mode, Any, list[tuple[Switch, Any]]]]:
         """Each mode with the gains of its law, and its switches with their numbers."""
         left = iter(gains)
         for mode in self.modes:
-            own = mode.law.gains(*(next(left) for _ in mode.law.fields()))
-            yield mode, own, [(s, [next(left) for _ in _numbers(s)]) for s in mode.switches]
+            law_gains = mode.law.gains(*(next(left) for _ in mode.law.fields()))
+            yield mode, law_gains, [(s, [next(left) for _ in _numbers(s)]) for s in mode.switches]
 
     def remember(self, gains: Any, craft: Any, period: float) -> Memory:
-        """The memory at the start: the first mode."""
-        own, fresh = (tuple(mode.law.remember(its, craft, period) for mode, its, _ in self.parts(gains)) for _ in range(2))
+        """The memory at the start, in the first mode."""
+        now, fresh = (tuple(mode.law.remember(its, craft, period) for mode, its, _ in self.parts(gains)) for _ in range(2))
         slots = max(len(mode.switches) for mode in self.modes)
-        return Memory(0.0, -1.0, (0.0,) * slots, own, fresh)
+        return Memory(0.0, -1.0, (0.0,) * slots, now, fresh)
 
-    def decide(self, told: Measurement, gains: Any, memory: Memory) -> Memory:
+    def decide(self, measurement: Measurement, gains: Any, memory: Memory) -> Memory:
         """The memory with the mode that commands at this control instant."""
         age = memory.age + 1.0
-        now = _Told(told)
-        held, following = [n + 1.0 for n in memory.held], memory.mode
+        now = _Quantities(measurement)
+        instants, following = [n + 1.0 for n in memory.instants], memory.mode
         due: list[tuple[Truth, int]] = []
         for place, (_, _, switches) in enumerate(self.parts(gains)):
             here = _is(memory.mode, place)
@@ -145,42 +145,42 @@ class Modes:
                 holds = now.later(age, after)
                 for test, level in zip(switch.tests, levels, strict=True):
                     holds = both(holds, now.holds(test, level))
-                held[slot] = where(both(here, opposite(holds)), 0.0, held[slot])
-                due.append((both(here, now.later(held[slot] - 1.0, dwell)), switch.to))
+                instants[slot] = where(both(here, opposite(holds)), 0.0, instants[slot])
+                due.append((both(here, now.later(instants[slot] - 1.0, dwell)), switch.to))
         for truth, to in due:
             following = where(truth, float(to), following)
         switched = less(0.5, absolute(following - memory.mode))
-        own = tuple(
+        memories = tuple(
             _renewed(both(switched, _is(following, place)), kept, fresh)
-            for place, (kept, fresh) in enumerate(zip(memory.own, memory.fresh, strict=True))
+            for place, (kept, fresh) in enumerate(zip(memory.memories, memory.fresh, strict=True))
         )
-        held = tuple(where(switched, 0.0, n) for n in held)
-        return Memory(following, where(switched, 0.0, age), held, own, memory.fresh)
+        instants = tuple(where(switched, 0.0, n) for n in instants)
+        return Memory(following, where(switched, 0.0, age), instants, memories, memory.fresh)
 
-    def command(self, told: Measurement, gains: Any, craft: Any, memory: Memory) -> tuple[Any, Memory]:
-        """The command of the mode that has been decided on."""
-        found, own = ZERO, list[Any]()
+    def command(self, measurement: Measurement, gains: Any, craft: Any, memory: Memory) -> tuple[Any, Memory]:
+        """The command of the present mode."""
+        command, memories = ZERO, list[Any]()
         for place, (mode, its, _) in enumerate(self.parts(gains)):
 
             def act(_: Any, kept: Any, law: Law = mode.law, its: Any = its) -> Any:
-                return law.command(told, its, craft, kept)
+                return law.command(measurement, its, craft, kept)
 
-            found, kept = when(_is(memory.mode, place), act, found, memory.own[place])
-            own.append(kept)
-        return found, memory._replace(own=tuple(own))
+            command, kept = when(_is(memory.mode, place), act, command, memory.memories[place])
+            memories.append(kept)
+        return command, memory._replace(memories=tuple(memories))
 
-    def torque(self, told: Measurement, gains: Any, craft: Any, memory: Memory) -> tuple[Any, Memory]:
-        """The torque (N m, body) of the mode that is due."""
-        return self.command(told, gains, craft, self.decide(told, gains, memory))
+    def torque(self, measurement: Measurement, gains: Any, craft: Any, memory: Memory) -> tuple[Any, Memory]:
+        """The torque (N m, body) of the mode that begins or continues."""
+        return self.command(measurement, gains, craft, self.decide(measurement, gains, memory))
 
     def inactive(self, effector: str, memory: Memory) -> Truth | None:
         """Whether an effector of this name is inactive in the present mode; None for one that is active in all."""
-        found: Truth | None = None
+        resting: Truth | None = None
         for place, mode in enumerate(self.modes):
             if not mode.has(effector):
                 here = _is(memory.mode, place)
-                found = here if found is None else either(found, here)
-        return found
+                resting = here if resting is None else either(resting, here)
+        return resting
 
     def record(self, memory: Memory, period: Scalar) -> Sample:
         """The recorded quantities."""
@@ -192,7 +192,7 @@ class Modes:
             mode.law.check(its, craft)
 
     def examples(self) -> list[Any]:
-        """None: a scenario has the gains."""
+        """Return none: a scenario has the gains."""
         return []
 
 
@@ -209,16 +209,16 @@ def mode_laws(law: Law, gains: Any) -> list[tuple[str, Law, Any]]:
     return [(mode.name, mode.law, its) for mode, its, _ in law.module.parts(gains)]
 
 
-class _Told:
-    """The quantities in the conditions, each computed once when it is needed."""
+class _Quantities:
+    """Quantities in the conditions are computed once, when first needed."""
 
-    def __init__(self, told: Measurement) -> None:
-        self.told = told
+    def __init__(self, measurement: Measurement) -> None:
+        self.measurement = measurement
         self._known: dict[str, Scalar] = {}
 
     def later(self, periods: Scalar, time: Scalar) -> Truth:
-        """Whether so many control periods are a time (s), to the nearest control instant."""
-        period = self.told.period
+        """Whether this many control periods reach a time (s), to the nearest control instant."""
+        period = self.measurement.period
         return less_equal(time - 0.5 * period, periods * period)
 
     def holds(self, test: str, level: Scalar) -> Truth:
@@ -230,7 +230,8 @@ class _Told:
     def _value(self, name: str) -> Scalar:
         if name not in self._known:
             angle = name == "angle"
-            self._known[name] = half_angle_sine(self.told.attitude) if angle else norm(getattr(self.told, name))
+            measured = getattr(self.measurement, "attitude" if angle else name)
+            self._known[name] = half_angle_sine(measured) if angle else norm(measured)
         return self._known[name]
 
 
@@ -248,14 +249,14 @@ def _is(mode: Scalar, place: int) -> Truth:
 
 
 def _renewed(begins: Truth, kept: Any, fresh: Any) -> Any:
-    """A law's memory, or the one that it begins with."""
-    for own, first in zip(buffers(kept), buffers(fresh), strict=True):
+    """Return a law's memory, or its initial one as its mode begins."""
+    for present, first in zip(buffers(kept), buffers(fresh), strict=True):
 
-        def copy(own: Buffer = own, first: Buffer = first) -> None:
+        def copy(present: Buffer = present, first: Buffer = first) -> None:
             def put(k: Any) -> None:
-                own[k] = first[k]
+                present[k] = first[k]
 
-            repeat(own.size, put)
+            repeat(present.size, put)
 
         when(begins, copy)
     return chosen(begins, fresh, kept)
@@ -263,11 +264,11 @@ def _renewed(begins: Truth, kept: Any, fresh: Any) -> Any:
 
 def _numbers(switch: Switch) -> list[Field]:
     """The numbers of a switch under its keys."""
-    found = [Field("after", AFTER, False, 0.0), Field("dwell", DWELL, False, 0.0)]
-    return [*found, *(Field(test, level_of(test), True) for test in switch.tests)]
+    waits = [Field("after", AFTER, False, 0.0), Field("dwell", DWELL, False, 0.0)]
+    return [*waits, *(Field(test, level_of(test), True) for test in switch.tests)]
 
 
-def _own(mode: Mode) -> list[Field]:
+def _mode_fields(mode: Mode) -> list[Field]:
     """The gains of a mode's law, and its switches' numbers."""
     switched = [
         Field(f"{s.key}.{item.name}", item.gain, item.required, item.default) for s in mode.switches for item in _numbers(s)
@@ -280,6 +281,6 @@ def _gains_of(modes: Modes) -> Any:
     named = [
         (f"{item.name}_of_{place}".replace(".", "_"), Annotated[Any, item.gain])
         for place, mode in enumerate(modes.modes, 1)
-        for item in _own(mode)
+        for item in _mode_fields(mode)
     ]
     return NamedTuple("Gains", named)  # pyright: ignore

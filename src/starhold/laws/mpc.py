@@ -104,7 +104,7 @@ def terminal_weight(gains: Gains, craft: Craft, period: float) -> tuple[Any, Any
     name = TERMINALS[gains.terminal]
     p: Any = q if name == "stage" else np.zeros((6, 6))
     if name == "riccati":
-        # Loaded here, where alone it is needed; by name, its types being too loose for a strict checker.
+        # Loaded here, the only place that needs it; by name because its types are too loose for a strict checker.
         riccati = import_module("scipy.linalg").solve_discrete_are
         try:
             p = riccati(a, b, q, r)

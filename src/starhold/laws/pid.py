@@ -30,7 +30,7 @@ CARD = Card(
 
 
 class Gains(NamedTuple):
-    """The gains are damping, stiffness, the integral gain, and the torque that the integral may ask for."""
+    """The gains are damping, stiffness, the integral gain, and the largest torque of the integral."""
 
     k_rate: Annotated[float, Gain("N m s", above=0.0, text="damping")]
     k_attitude: Annotated[float, Gain("N m", above=0.0, text="stiffness against the quaternion's vector part")]

@@ -12,7 +12,7 @@ from starhold.parts.bodies.libration_point import Libration, PointMeasurement, l
 from starhold.synthesis.circle import best_rate
 
 MODELS = ("linear", "nonlinear")
-"""Of the motion, in the order of the numbers that gains hold for them."""
+"""Models of the motion; gains hold the number of one."""
 
 
 def least_rate(plant: Libration) -> float:
@@ -23,7 +23,7 @@ def least_rate(plant: Libration) -> float:
 
 
 def nonlinear_remainder(measurement: PointMeasurement, plant: Libration, model: Scalar) -> Vector:
-    """Return what the full problem adds to the linear acceleration here, where `model` asks for it, else zero."""
+    """Return the full problem's acceleration less the linear one where `model` is nonlinear, else zero."""
     more = subtract(
         nonlinear(measurement.position, measurement.velocity, plant),
         linear(measurement.position, measurement.velocity, plant),
@@ -39,13 +39,13 @@ def check_x(k_position: float, k_velocity: float, plant: Libration) -> None:
 
 
 def hold_x(measurement: PointMeasurement, k_position: Scalar, k_velocity: Scalar, plant: Libration) -> Scalar:
-    """Control along X that undoes the Coriolis acceleration and feeds back."""
+    """Return the control along X, which cancels the Coriolis acceleration and feeds back."""
     coriolis = 2.0 * plant.rate * measurement.velocity[1]
     return -coriolis - k_position * measurement.position[0] - k_velocity * measurement.velocity[0]
 
 
 def along(direction: Vector, size: Scalar, layer: Scalar) -> Vector:
-    """The vector of this size in a direction, shorter in proportion where the direction's length is within the layer; zero
-    for no direction at all."""
+    """Return the vector of this size in a direction, shorter in proportion where the direction is shorter than the
+    layer; zero for a zero direction."""
     length = maximum(sqrt(dot(direction, direction)), layer)
     return scale(where(less(0.0, length), size / where(less(0.0, length), length, 1.0), 0.0), direction)

@@ -15,7 +15,7 @@ from starhold.algebra.vector import Matrix, Vector, add, apply, cross, gyroscopi
 from starhold.laws.interface import Card, Gain, Measurement, NoMemory, Start
 from starhold.parts.craft import Craft, tensor, vector
 from starhold.synthesis import response
-from starhold.synthesis.response import Turn, largest_moment, settle, told
+from starhold.synthesis.response import Turn, largest_moment, settle, slew_figures
 
 CARD = Card(
     title="Sliding mode",
@@ -57,18 +57,16 @@ class Layered(NamedTuple):
 
 
 class Settling(NamedTuple):
-    """The form asks for the least slope that settles in time, within the torque that there is, found by integrating the
-    slew: towards a target at rest, without torque from outside."""
+    """The form takes the least slope that settles in time within the available torque, by integrating the slew to a
+    target at rest without external torque."""
 
     time: Annotated[float, Gain("s", above=0.0, text="after which angle and rate stay within their tolerances")]
     switching_gain: Annotated[
-        float | None, Gain("N m", above=0.0, text="switching torque; the torque over 2 sqrt 3, half of it, if absent")
+        float | None, Gain("N m", above=0.0, text="switching torque; torque / (2 sqrt 3) if absent")
     ] = None
     boundary_layer: Annotated[float, Gain("rad/s", at_least=0.0, text="boundary layer; 0 switches by sign")] = 0.0
-    torque: Annotated[float | None, Gain("N m", above=0.0, text="largest norm of the torque; what there is if absent")] = (
-        None
-    )
-    momentum: Annotated[float | None, Gain("N m s", above=0.0, text="that wheels can store; what there is if absent")] = None
+    torque: Annotated[float | None, Gain("N m", above=0.0, text="largest norm; all that is available if absent")] = None
+    momentum: Annotated[float | None, Gain("N m s", above=0.0, text="of the wheels; all available if absent")] = None
     attitude: Annotated[
         Any,
         Gain("1", shape=(4,), spread=False, text="turn from the target to the body at the start; the scenario's if absent"),
@@ -85,7 +83,7 @@ FORMS: dict[str, Any] = {"bandwidth": Layered, "settling": Settling}
 
 
 def complete(spec: Layered | Settling, start: Callable[[], Start]) -> Layered | Settling:
-    """Return the inputs of a form that settles in time, with what they leave to the scenario."""
+    """Return the inputs of a form; one that settles in time is completed from the scenario's start."""
     spec = response.complete(spec, start)
     if isinstance(spec, Layered) or spec.switching_gain is not None:
         return spec
@@ -130,19 +128,19 @@ def _settled(craft: Craft, spec: Settling) -> tuple[Gains, Turn]:
 
 
 def explain(craft: Craft, spec: Layered | Settling) -> list[tuple[str, Any]]:
-    """Tell how the slew goes; of a boundary layer, the eigenvalues of the linear loop within it, and else on the surface."""
-    found: list[tuple[str, Any]] = []
+    """Return figures of the slew, and eigenvalues of the linear loop: in the boundary layer, else on the surface."""
+    figures: list[tuple[str, Any]] = []
     if isinstance(spec, Settling):
         gains, turn = _settled(craft, spec)
-        found = told(turn)
+        figures = slew_figures(turn)
     else:
         gains = design(craft, spec)
     slope, inertia = tensor(gains.surface_gain), tensor(craft.inertia)
     if gains.boundary_layer == 0.0:
-        return [*found, ("eigenvalues on the surface (1/s)", np.linalg.eigvals(-0.5 * slope))]
+        return [*figures, ("eigenvalues on the surface (1/s)", np.linalg.eigvals(-0.5 * slope))]
     hold = np.linalg.solve(inertia, np.diag(gains.switching_gain)) / gains.boundary_layer
     loop = np.block([[np.zeros((3, 3)), np.eye(3)], [-0.5 * hold @ slope, -0.5 * slope - hold]])
-    return [*found, ("eigenvalues of the linear loop in the layer (1/s)", np.linalg.eigvals(loop))]
+    return [*figures, ("eigenvalues of the linear loop in the layer (1/s)", np.linalg.eigvals(loop))]
 
 
 def surface(measurement: Measurement, gains: Gains) -> Vector:
@@ -157,7 +155,7 @@ def switch(s: Scalar, layer: Scalar) -> Scalar:
 
 
 def equivalent_torque(measurement: Measurement, surface_gain: Matrix | Vector, craft: Craft) -> Vector:
-    """Return the torque (N m) under which s = w + K q stays as it is where no torque acts from outside."""
+    """Return the torque (N m) that keeps s = w + K q constant without external torque."""
     q = vector_part(measurement.attitude)
     q_rate = scale(0.5, add(scale(measurement.attitude[0], measurement.rate), cross(q, measurement.rate)))
     wanted = subtract(measurement.target_acceleration, apply(surface_gain, q_rate))

@@ -52,32 +52,33 @@ FORMS: dict[str, Any] = {"degree-of-stability": Stability}
 def design(craft: Craft, spec: Stability) -> Gains:
     """Return the gains of the largest decay rate (degree of stability); ValueError if angle and rate are zero, for then
     nothing bounds them."""
-    found = _optimum(craft, spec)
-    k = found.k_attitude
-    return Gains(found.k_rate, (k, k, k), spec.compensation)
+    optimum = _optimum(craft, spec)
+    k = optimum.k_attitude
+    return Gains(optimum.k_rate, (k, k, k), spec.compensation)
 
 
 def explain(craft: Craft, spec: Stability) -> list[tuple[str, Any]]:
-    """Return the scaled problem, its optimum, and what a search over all gains within the budget finds."""
-    found = _optimum(craft, spec)
-    budget = (spec.angle, spec.rate * found.t0, found.L)
-    searched = brute_force(found.ratios, *budget)
+    """Return the scaled problem, its optimum, and its share of the best found by a search over all gains within the
+    budget."""
+    optimum = _optimum(craft, spec)
+    budget = (spec.angle, spec.rate * optimum.t0, optimum.L)
+    searched = brute_force(optimum.ratios, *budget)
     return [
-        ("time scale t0 (s)", found.t0),
-        ("budget L", found.L),
-        ("inertia ratios", np.array(found.ratios)),
-        ("scaled stiffness K_a", found.K_a),
-        ("scaled damping K_w", found.K_w),
-        ("degree of stability, scaled", found.eta),
-        ("degree of stability (1/s)", found.eta_per_second),
-        ("of what a search over all gains finds", found.eta / searched.eta),
+        ("time scale t0 (s)", optimum.t0),
+        ("budget L", optimum.L),
+        ("inertia ratios", np.array(optimum.ratios)),
+        ("scaled stiffness K_a", optimum.K_a),
+        ("scaled damping K_w", optimum.K_w),
+        ("degree of stability, scaled", optimum.eta),
+        ("degree of stability (1/s)", optimum.eta_per_second),
+        ("share of the best that a search over all gains finds", optimum.eta / searched.eta),
     ]
 
 
 def map_inputs(craft: Craft, spec: Stability) -> tuple[Any, float, float, float]:
     """Return ratios, scaled angle and rate, and budget, from which a map of the decay rate is drawn."""
-    found = _optimum(craft, spec)
-    return found.ratios, spec.angle, spec.rate * found.t0, found.L
+    optimum = _optimum(craft, spec)
+    return optimum.ratios, spec.angle, spec.rate * optimum.t0, optimum.L
 
 
 def _optimum(craft: Craft, spec: Stability) -> Designed:
@@ -92,10 +93,10 @@ def _twist(k: Vector, q: Vector) -> Vector:
 
 
 def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
-    """Return the torque asked of the wheels (N m, body)."""
+    """Return the torque demanded of the wheels (N m, body)."""
     q = vector_part(measurement.attitude)
     twist = _twist(gains.k_attitude, q)
-    # S = 2 (q0 Mq + Mq x q), of which equal weights leave 4 k q0 q.
+    # S = 2 (q0 Mq + Mq x q), which for equal weights is 4 k q0 q.
     cosines = scale(2.0, add(scale(measurement.attitude[0], twist), cross(twist, q)))
     feedback = add(scale(gains.k_rate, measurement.rate), cosines)
     momentum = add(apply(craft.inertia, measurement.body_rate), measurement.wheel_momentum)

@@ -1,4 +1,4 @@
-"""The closed loop: a body, a law, and the parts around them. The only place a law meets a plant."""
+"""A closed loop is a body, a law and the parts around them; nowhere else does a law meet a plant."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ class Setup(NamedTuple):
 
 
 class Composition(NamedTuple):
-    """The parts whose equations a loop is made of; equal for loops that one kernel flies, but for the form of their
-    numbers."""
+    """The parts whose equations a loop is made of; one kernel flies all loops of equal compositions and numbers of one
+    form."""
 
     body: Part
     law: Law
@@ -69,9 +69,9 @@ class Memories(NamedTuple):
 
 
 class Carry(NamedTuple):
-    """A trajectory carries this from step to step: the states of the body, of the effectors, and of actuators that another
-    one follows; the law's memory, those of other parts, the sign h = +-1 of the quaternion policy, the command, and the
-    control step at which the motion diverged (-1: it has not)."""
+    """A trajectory carries this from step to step: the states of the body, of the effectors, and of actuators that
+    another one follows; the law's memory, those of other parts, the sign h = +-1 of the quaternion policy, the command,
+    and the control step at which the motion diverged (-1: none)."""
 
     state: Any
     effectors: tuple[Any, ...]
@@ -121,7 +121,7 @@ class Phase(NamedTuple):
         return apply(self.craft.inverse_inertia, apply(self.before.inertia, rate))
 
     def entered(self, carry: Carry) -> Carry:
-        """A carry as the phase begins with it."""
+        """The carry with which the phase begins."""
         return carry._replace(state=carry.state._replace(rate=self.rate_from(carry.state.rate))) if self.jumps else carry
 
 
@@ -163,8 +163,8 @@ class ClosedLoop:
     @property
     def body(self) -> Part:
         """The part that moves: the body among the parts, else the installed one for which the law is made."""
-        own = self.used("body")
-        return own[0].part if own else find("body", self.law.body)
+        bodies = self.used("body")
+        return bodies[0].part if bodies else find("body", self.law.body)
 
     def used(self, role: str) -> tuple[Fitted, ...]:
         """The parts of a role."""
@@ -175,7 +175,7 @@ class ClosedLoop:
         return next((fitted for fitted in self.parts if fitted.part.name == name), None)
 
     def has(self, name: str) -> bool:
-        """Whether it has a part of this name."""
+        """Whether the loop has a part of this name."""
         return self.find(name) is not None
 
     def with_parts(self, *more: Fitted) -> Self:
@@ -195,22 +195,22 @@ class ClosedLoop:
     @property
     def wheels(self) -> Any:
         """The numbers of the reaction wheels that a claim is about, None without any."""
-        found = self.find("wheels")
-        return None if found is None else found.params
+        fitted = self.find("wheels")
+        return None if fitted is None else fitted.params
 
     @property
     def rotors(self) -> tuple[float, ...]:
         """The angular momenta of their rotors at the start (N m s)."""
-        found = self.find("wheels")
-        return () if found is None else found.start.momentum
+        fitted = self.find("wheels")
+        return () if fitted is None else fitted.start.momentum
 
     @property
     def target(self) -> Fitted:
-        """The attitude that the body is to reach; the inertial axes where nothing else is said."""
+        """The attitude that the body is to reach; the inertial axes by default."""
         return next(iter(self.used("target")), ON_TARGET)
 
     def saturation_limit(self) -> float:
-        """The limit at which the command saturates; infinite for none."""
+        """The limit at which the command saturates; infinite without one."""
         return getattr(self.craft, "torque_limit", np.inf) if self.command_limit is None else self.command_limit
 
     def composition(self) -> Composition:
@@ -243,7 +243,7 @@ class ClosedLoop:
 
     @property
     def remembers(self) -> bool:
-        """Whether the law has a memory from one call to the next."""
+        """Whether the law keeps a memory from one call to the next."""
         return any(True for _ in leaves(self.law.remember(self.gains, self.known, self.period)))
 
     def setup(self) -> Setup:
@@ -269,18 +269,18 @@ class ClosedLoop:
     def phases(self, steps: int) -> list[Phase]:
         """The phases of a run of so many control steps, divided at the events."""
         events = (Event(0, self.parts, self.gains, self.craft, self.known), *self.events)
-        # Of one form in all phases, so that one kernel flies them all.
+        # Gains and crafts have one form in all phases, so that one kernel flies them all.
         gains = alike([event.gains for event in events])
         crafts = alike([event.craft for event in events] + [event.nominal for event in events])
         lasts = [*(min(event.step, steps) for event in self.events), steps]
-        found: list[Phase] = []
+        phases: list[Phase] = []
         before = crafts[0]
-        for event, last, own, craft, nominal in zip(events, lasts, gains, crafts, crafts[len(events) :], strict=False):
+        for event, last, law_gains, craft, nominal in zip(events, lasts, gains, crafts, crafts[len(events) :], strict=False):
             if last > event.step:
                 setup = replace(self, parts=event.parts).setup()
-                found.append(Phase(event.step, last, own, nominal, craft, setup, before))
+                phases.append(Phase(event.step, last, law_gains, nominal, craft, setup, before))
                 before = craft
-        return found
+        return phases
 
     def carry(self, start: Any = None, gains: Any = None, nominal: Any = None, setup: Setup | None = None) -> Carry:
         """The carry at the start of a trajectory: of the loop, or with another state of the body, gains, nominal model or
@@ -292,13 +292,13 @@ class ClosedLoop:
         sensors, estimator = self.used("sensor"), next(iter(self.used("estimator")), None)
         memories = Memories(
             goal.attitude if goal is not None and self.target.part.flag("FOLLOWS") else NoMemory(),
-            tuple(f.remembered(own) for f, own in zip(self.used("environment"), setup.environments, strict=True)),
-            tuple(f.remembered(own, start) for f, own in zip(sensors, setup.sensors, strict=True)),
+            tuple(f.remembered(numbers) for f, numbers in zip(self.used("environment"), setup.environments, strict=True)),
+            tuple(f.remembered(numbers, start) for f, numbers in zip(sensors, setup.sensors, strict=True)),
             tuple(before_first(f.part, start) for f in sensors if is_recorded(f.part)),
             NoMemory() if estimator is None else estimator.remembered(setup.estimator, start),
             () if estimator is None else before_first(estimator.part, start),
         )
-        effectors = tuple(f.remembered(own) for f, own in zip(self.used("effector"), setup.effectors, strict=True))
+        effectors = tuple(f.remembered(numbers) for f, numbers in zip(self.used("effector"), setup.effectors, strict=True))
         followed = sum(f.part.hook("rates") is not None for f in self.used("actuator"))
         return Carry(start, effectors, (ZERO,) * (followed - 1), memory, memories, h, ZERO, -1.0)
 
@@ -326,9 +326,9 @@ def before_first(part: Part, state: Any) -> Any:
     """The value of a sensor's reading or an estimator's estimate before the first one: the fields of the body's state of the
     same names, else the part's `FIRST`. ValueError if there is neither."""
     kind: Any = part.module.Estimate if part.role == "estimator" else part.module.Reading
-    own = getattr(part.module, "FIRST", {})
+    first = getattr(part.module, "FIRST", {})
     for name in kind._fields:
-        if not hasattr(state, name) and (not isinstance(own, dict) or name not in own):
+        if not hasattr(state, name) and (not isinstance(first, dict) or name not in first):
             example = f'FIRST = {{"{name}": 0.0}}'
-            raise ValueError(f"{name} is none of the body's state: say what it is before the first control step, {example}")
-    return kind(*(own[name] if name in own else getattr(state, name) for name in kind._fields))
+            raise ValueError(f"{name} is no field of the body's state: give it before the first control step, {example}")
+    return kind(*(first[name] if name in first else getattr(state, name) for name in kind._fields))

@@ -1,5 +1,5 @@
-"""The kernels that repeat the step of a closed loop over one lane or many: programs recorded from the equations of a step,
-compiled when they are first asked for.
+"""The kernels that repeat the step of a closed loop over one lane or many: programs recorded from the equations of a
+step, compiled on first use.
 
 One lane, any lane of a batch, plain Python, C and JavaScript agree bit for bit. No fast-math anywhere.
 """
@@ -27,8 +27,8 @@ Array: TypeAlias = NDArray[np.float64]
 
 
 class Numbers(NamedTuple):
-    """The arguments of a kernel: gains, the nominal model that the law has of the craft, the craft that flies, the setup.
-    Numbers of theirs may be arrays (lanes,), where lanes differ. Whole numbers are constants of the kernel."""
+    """The arguments of a kernel: gains, the nominal model that the law has of the craft, the craft that flies, the
+    setup. Their numbers may be arrays (lanes,) where lanes differ. Whole numbers are constants of the kernel."""
 
     gains: Any
     nominal: Any
@@ -42,9 +42,9 @@ class Numbers(NamedTuple):
 
 
 class Observer(NamedTuple):
-    """Notes are taken of a flight along the way, each control step: note(noted, decided, carry, step, setup, numbers) ->
+    """An observer takes notes of a flight at each control step: note(noted, decided, carry, step, setup, numbers) ->
     noted. `decided` is the carry at the control instant `step`, with the command decided there, and `carry` that at its
-    end; `first` gives the shape of what is noted, `numbers` are arguments of the kernel."""
+    end; `first` gives the shape of the notes, `numbers` are arguments of the kernel."""
 
     note: Callable[..., Any]
     first: Any
@@ -58,8 +58,8 @@ def make_step(parts: Composition) -> Step:
 
 
 def form(value: Any) -> Any:
-    """Equal for arguments that one kernel serves: their structure, what is constant in them, and which of the numbers that
-    parts have in common are equal."""
+    """A key that is equal for arguments that one kernel serves: their structure, their constants, and which of the
+    numbers that parts have in common are equal."""
     return _form(value, {})
 
 
@@ -76,7 +76,7 @@ def _form(value: Any, known: dict[str, int]) -> Any:
 
 
 def _in_common(value: tuple[Any, ...]) -> str | None:
-    """Equal for equal numbers that parts have in common, bit by bit; None for any others, and where lanes differ."""
+    """A key that is equal for bitwise equal numbers that parts have in common; None for others, and where lanes differ."""
     if not getattr(value, "IN_COMMON", False) or not all(isinstance(leaf, float) for leaf in leaves(value)):
         return None
     return repr(value)
@@ -98,14 +98,14 @@ class Arguments:
 
     def __init__(self, *values: Any) -> None:
         self.values = values
-        found = list(leaves(values))
-        self.shared = np.array([leaf for leaf in found if isinstance(leaf, float)])
-        self.own = [leaf for leaf in found if isinstance(leaf, np.ndarray)]
+        numbers = list(leaves(values))
+        self.shared = np.array([leaf for leaf in numbers if isinstance(leaf, float)])
+        self.varying = [leaf for leaf in numbers if isinstance(leaf, np.ndarray)]
         self.tables = np.array([x for table in buffers(values) for x in table.cells])
 
     def bound(self, recorder: Recorder, base: Any) -> Any:
         """The values while recording; `base` is where a lane's own numbers begin."""
-        shared, own, tables = (recorder.memory(name, lanes=name == "own") for name in ("shared", "own", "tables"))
+        shared, varying, tables = (recorder.memory(name, lanes=name == "own") for name in ("shared", "own", "tables"))
         places = {name: iter(range(1 << 40)) for name in ("shared", "own")}
         offset = 0
 
@@ -114,7 +114,7 @@ class Arguments:
             if isinstance(value, float):
                 return shared[next(places["shared"])]
             if isinstance(value, np.ndarray):
-                return own[base + next(places["own"])]
+                return varying[base + next(places["own"])]
             if isinstance(value, Buffer):
                 offset += value.size
                 return Buffer(tables, offset - value.size, value.size)
@@ -127,7 +127,7 @@ class Arguments:
                 return None if value is None else leaf(value)
             shared = _in_common(value)  # pyright: ignore
             if shared in met:
-                # What a second part computes of them is a common subexpression.
+                # A second part's computations with them are common subexpressions.
                 for _ in leaves(value):
                     next(places["shared"])
                 return met[shared]
@@ -140,7 +140,7 @@ class Arguments:
 
     def rows(self, lanes: int) -> Array:
         """The arguments that differ between lanes, as an array (arguments, lanes)."""
-        return np.array([np.broadcast_to(row, (lanes,)) for row in self.own]).reshape(len(self.own), lanes)
+        return np.array([np.broadcast_to(row, (lanes,)) for row in self.varying]).reshape(len(self.varying), lanes)
 
 
 def numbers_of(state: Any) -> list[float]:
@@ -201,9 +201,9 @@ def make_kernel(kind: Callable[..., Program], parts: Composition, width: int, *a
 
 
 def one(step: Step, carry: Any, numbers: Numbers, substeps: int) -> Program:
-    """The flight of one lane, or of a vector of lanes that draw the same random numbers, recorded: `groups` times `each`
-    control steps from `first` on, with a sample of the step number `place` of every group, written to the row `row` and
-    those after it. A lane stops when its motion diverges; its last carry stays in `carry`."""
+    """The flight of one lane, or of a vector of lanes that draw the same random numbers, recorded: `groups` times
+    `each` control steps from `first` on, with a sample of the step number `place` of every group, written from the row
+    `row` on. A lane stops when its motion diverges; its last carry stays in `carry`."""
     recorder = Recorder()
     with recorder.recording():
         cells = recorder.memory("carry", lanes=True, writable=True)
@@ -250,7 +250,7 @@ def many(step: Step, carry: Any, numbers: Numbers, substeps: int, observer: Obse
         arguments = Arguments(*numbers, more, runs)
 
         def block(b: Any) -> None:
-            gains, nominal, craft, setup, noting, own_run = arguments.bound(recorder, b * len(arguments.own))
+            gains, nominal, craft, setup, noting, own_run = arguments.bound(recorder, b * len(arguments.varying))
             along = word_add(word_add(run, word_of(b * width)), recorder.lane())
             key = (seed, along if isinstance(runs, tuple) else whole_word(own_run))
             base, place = b * len(numbers_of(carry)), b * len(flatten(first_noted))
@@ -282,9 +282,9 @@ def _propagated(step: Step, carry: Any, craft: Any, setup: Any, substeps: int) -
 def over_samples(
     note: Callable[..., Any], first: Any, numbers: tuple[Any, Any], columns: tuple[tuple[str, tuple[int, ...]], ...]
 ) -> Program:
-    """The notes of a recording, recorded: of `count` samples in `record`, the instants from `first` on, kept in `noted`.
+    """The program that takes notes of `count` samples in `record`, from the instant `first` on, and keeps them in `noted`.
 
-    note(noted, quantities, instant, limit, numbers) -> noted; first: the shape of what is noted; numbers: those of the
+    note(noted, quantities, instant, limit, numbers) -> noted; first: the shape of the notes; numbers: those of the
     notes, and the limit; columns: the recorded quantities with their shapes, () or (components,), in order.
     """
     recorder = Recorder()

@@ -1,4 +1,4 @@
-"""A law of modes in a loop: each mode may have a target of its own, and its law can be flown by itself."""
+"""Each mode of a law may have a target of its own in the loop, and its law can be flown by itself."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from starhold.parts.roles import Goal
 
 @dataclass(frozen=True)
 class ModeTargets:
-    """The module of a target that is the target of the present mode; `goal` takes the mode, counted from 0."""
+    """This has in place of the module of a target the target of the present mode; `goal` takes the mode, counted from 0."""
 
     parts: tuple[Part, ...]
     ROLE = "target"
@@ -32,7 +32,7 @@ class ModeTargets:
 
     @property
     def NEEDS(self) -> tuple[str, ...]:  # noqa: N802
-        """Parts that any of them needs."""
+        """Parts that any of the targets needs."""
         return tuple(dict.fromkeys(need for part in self.parts for need in part.needs))
 
     @property
@@ -52,40 +52,40 @@ class ModeTargets:
 
     def prepare(self, params: tuple[Any, ...], period: float) -> tuple[Any, ...]:
         """Their parameters as equations take them."""
-        return tuple(Fitted(part, own).prepared(period) for part, own in zip(self.parts, params, strict=True))
+        return tuple(Fitted(part, numbers).prepared(period) for part, numbers in zip(self.parts, params, strict=True))
 
     def goal(self, params: tuple[Any, ...], state: Any, step: Any, before: Any, mode: Any) -> Goal:
         """The goal of the present mode."""
-        goals = [part.module.goal(own, state, step, before) for part, own in zip(self.parts, params, strict=True)]
-        found = goals[0]
+        goals = [part.module.goal(numbers, state, step, before) for part, numbers in zip(self.parts, params, strict=True)]
+        present = goals[0]
         for place, goal in enumerate(goals[1:], 1):
-            found = chosen(less(absolute(mode - float(place)), 0.5), goal, found)
-        return found
+            present = chosen(less(absolute(mode - float(place)), 0.5), goal, present)
+        return present
 
 
 def join_targets(targets: Sequence[Fitted]) -> Fitted:
     """The target of a loop whose modes have these, one each."""
     module: Any = ModeTargets(tuple(target.part for target in targets))
-    # One from a file is tried out as parts from files are.
+    # A target from a file is tried out as all parts from files are.
     file = next((target.part.file for target in targets if target.part.file is not None), None)
     return Fitted(Part("targets-of-modes", module, file), tuple(target.params for target in targets))
 
 
 @dataclass(frozen=True)
 class Inactive:
-    """The module of an effector that is inactive in a mode: its command is zero."""
+    """This takes the place of the module of an effector that is inactive in a mode: its command is zero."""
 
     module: Any
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
             raise AttributeError(name)
-        found = getattr(self.module, name)
+        value = getattr(self.module, name)
         if name == "command":
-            return lambda applied, params: found(ZERO, params)
+            return lambda applied, params: value(ZERO, params)
         if name == "switch":
-            return lambda own, wanted, *more: found(own, ZERO, *more)
-        return found
+            return lambda state, wanted, *more: value(state, ZERO, *more)
+        return value
 
 
 def loop_of_mode(loop: ClosedLoop, place: int) -> ClosedLoop:
@@ -95,14 +95,14 @@ def loop_of_mode(loop: ClosedLoop, place: int) -> ClosedLoop:
     alone, target = replace(loop, law=law, gains=gains, events=()), loop.target
     if target.part.flag("BY_MODE"):
         module: Any = target.part.module
-        own = Fitted(module.parts[place], target.params[place])
-        alone = replace(alone, parts=tuple(own if fitted is target else fitted for fitted in alone.parts))
+        mode_target = Fitted(module.parts[place], target.params[place])
+        alone = replace(alone, parts=tuple(mode_target if fitted is target else fitted for fitted in alone.parts))
     mode = loop.law.module.modes[place]
-    found: list[Fitted] = []
+    active: list[Fitted] = []
     for fitted in alone.parts:
         if not can_be_inactive(fitted.part) or mode.has(fitted.part.name):
-            found.append(fitted)
+            active.append(fitted)
         elif not fitted.part.flag("OUTSIDE"):
             module = Inactive(fitted.part.module)
-            found.append(replace(fitted, part=Part(f"inactive-{fitted.part.name}", module, fitted.part.file)))
-    return replace(alone, parts=tuple(found))
+            active.append(replace(fitted, part=Part(f"inactive-{fitted.part.name}", module, fitted.part.file)))
+    return replace(alone, parts=tuple(active))

@@ -34,11 +34,11 @@ class Step(NamedTuple):
 
 
 def total(vectors: Any) -> Any:
-    """The sum of vectors from the first to the last; None of none."""
-    found = None
+    """The sum of vectors from the first to the last; None without any."""
+    result = None
     for vector in vectors:
-        found = vector if found is None else add(found, vector)
-    return found
+        result = vector if result is None else add(result, vector)
+    return result
 
 
 def make_equations(parts: Composition) -> Step:
@@ -64,26 +64,26 @@ def make_equations(parts: Composition) -> Step:
         state, memories = carry.state, carry.memories
         goal = goal_of(carry, state, step, setup)
         readings, kept = SimpleNamespace(), []
-        found, shown = state, []
+        known, shown = state, []
         for sensor, memory, params, first in zip(parts.sensors, memories.sensors, setup.sensors, named.sensors, strict=True):
             reading, memory = sensor.module.measure(state, memory, params, Dice(key, word_of(step), first), step)
             vars(readings).update(reading._asdict())
-            found = found._replace(**{name: x for name, x in reading._asdict().items() if name in state._fields})
+            known = known._replace(**{name: x for name, x in reading._asdict().items() if name in state._fields})
             kept.append(memory)
             if is_recorded(sensor):
                 shown.append(reading)
-        estimate, own = memories.estimate, memories.estimator
+        estimate, estimator = memories.estimate, memories.estimator
         if parts.estimator is not None:
-            estimate, own = parts.estimator.module.estimate(readings, own, setup.estimator, craft, setup.period)
-            found = state._replace(**{name: x for name, x in estimate._asdict().items() if name in state._fields})
+            estimate, estimator = parts.estimator.module.estimate(readings, estimator, setup.estimator, craft, setup.period)
+            known = state._replace(**{name: x for name, x in estimate._asdict().items() if name in state._fields})
         telling = [one for one in named.torques if one.part.flag("MODELLED")]
         torque = total(
-            one.part.module.torque(found, setup.environments[one.place], craft, memories.environments[one.place])
+            one.part.module.torque(known, setup.environments[one.place], craft, memories.environments[one.place])
             for one in telling
         )
-        # Those that take the command know their speeds; others have no sensor.
+        # Effectors that take the command know their speeds; others have no sensor.
         turning = zip(parts.effectors, carry.effectors, setup.effectors, strict=True)
-        momentum = total(e.module.momentum(own, params) for e, own, params in turning if e.flag("ACTS"))
+        momentum = total(e.module.momentum(inner, params) for e, inner, params in turning if e.flag("ACTS"))
 
         def show(goal):
             scene = Scene(
@@ -96,8 +96,8 @@ def make_equations(parts: Composition) -> Step:
                 _readings(tuple(vars(readings)))(*vars(readings).values()),
             )
             followed = goal.attitude if goal is not None and follows else memories.followed
-            return body.observe(found, scene), memories._replace(
-                followed=followed, sensors=tuple(kept), readings=tuple(shown), estimator=own, estimate=estimate
+            return body.observe(known, scene), memories._replace(
+                followed=followed, sensors=tuple(kept), readings=tuple(shown), estimator=estimator, estimate=estimate
             )
 
         return show, goal
@@ -108,25 +108,25 @@ def make_equations(parts: Composition) -> Step:
 
     def update(carry, step, key, gains, craft, setup):
         show, goal = observed(carry, step, key, craft, setup)
-        told, memories = show(goal)
+        measurement, memories = show(goal)
         h = carry.h
         if by_mode:
-            # The law of the mode that begins is told of its own target.
-            carry = carry._replace(memory=parts.law.module.decide(told, gains, carry.memory))
-            told, memories = show(goal_of(carry, carry.state, step, setup))
-            h = where(less(carry.memory.age, 0.5), side(told.attitude[0]), h)
+            # The measurement of the law of a mode that begins is relative to the mode's own target.
+            carry = carry._replace(memory=parts.law.module.decide(measurement, gains, carry.memory))
+            measurement, memories = show(goal_of(carry, carry.state, step, setup))
+            h = where(less(carry.memory.age, 0.5), side(measurement.attitude[0]), h)
         if policy is not None:
-            attitude, h = policy(told.attitude, h, setup.width)
-            told = told._replace(attitude=attitude)
-        command, memory = command_of(told, gains, craft, carry.memory)
+            attitude, h = policy(measurement.attitude, h, setup.width)
+            measurement = measurement._replace(attitude=attitude)
+        command, memory = command_of(measurement, gains, craft, carry.memory)
         command = limit(command, setup.limit)
         passed = command
         for actuator, params in zip(parts.actuators, setup.actuators, strict=True):
             if actuator.hook("command") is not None:
                 passed = actuator.module.command(passed, params)
         effectors = tuple(
-            switched(e, own, passed, told, carry.state, params, step, memory) if e.hook("switch") is not None else own
-            for e, own, params in zip(parts.effectors, carry.effectors, setup.effectors, strict=True)
+            inner if e.hook("switch") is None else switched(e, inner, passed, measurement, carry.state, p, step, memory)
+            for e, inner, p in zip(parts.effectors, carry.effectors, setup.effectors, strict=True)
         )
         state = carry.state if named.dynamic else carry.state._replace(**{body.COMMAND: passed})
         environments = [
@@ -138,23 +138,23 @@ def make_equations(parts: Composition) -> Step:
         memories = memories._replace(environments=tuple(environments))
         return Carry(state, effectors, carry.actuators, memory, memories, h, passed, carry.lost_at)
 
-    def switched(effector, own, wanted, told, state, params, step, memory):
-        """The own state of an effector as a control step begins. For one that is inactive in the present mode it is the
+    def switched(effector, inner, wanted, measurement, state, params, step, memory):
+        """The state of an effector as a control step begins. For one that is inactive in the present mode it is the
         state for a zero command or, if the effector takes no command, its initial state."""
         inactive = named.inactive(effector, memory)
         switch = effector.module.switch
         if inactive is None:
-            return switch(own, wanted, told, state, params, step)
+            return switch(inner, wanted, measurement, state, params, step)
         if effector.flag("ACTS"):
-            return switch(own, chosen(inactive, ZERO, wanted), told, state, params, step)
-        return chosen(inactive, effector.module.remember(params), switch(own, wanted, told, state, params, step))
+            return switch(inner, chosen(inactive, ZERO, wanted), measurement, state, params, step)
+        return chosen(inactive, effector.module.remember(params), switch(inner, wanted, measurement, state, params, step))
 
     def outside(kind, state, craft, memories, setup):
         """The sum of the environments' torques or accelerations."""
-        found = named.torques if kind == "torque" else named.accelerations
+        sources = named.torques if kind == "torque" else named.accelerations
         return total(
             getattr(one.part.module, kind)(state, setup.environments[one.place], craft, memories.environments[one.place])
-            for one in found
+            for one in sources
         )
 
     def slope(moving, begun, carry, craft, setup):
@@ -164,10 +164,10 @@ def make_equations(parts: Composition) -> Step:
         if commands is None:
             commands = tuple(_commands(applied, effectors, setup, carry.memory))
         reactions, inertias = [], []
-        for effector, own, command, params in zip(parts.effectors, effectors, commands, setup.effectors, strict=True):
-            reactions.append(effector.module.reaction(own, command, state, params))
+        for effector, inner, command, params in zip(parts.effectors, effectors, commands, setup.effectors, strict=True):
+            reactions.append(effector.module.reaction(inner, command, state, params))
             if effector.hook("inertia") is not None:
-                inertias.append(effector.module.inertia(own, params))
+                inertias.append(effector.module.inertia(inner, params))
         loads = Loads(
             outside("acceleration", state, craft, carry.memories, setup),
             outside("torque", state, craft, carry.memories, setup),
@@ -178,16 +178,16 @@ def make_equations(parts: Composition) -> Step:
         output_rates, command_rate = _driven(outputs, applied, carry, begun, setup)
         rates = body.rates(state, loads, command_rate, craft)
         turning = rates[state._fields.index("rate")] if parts.effectors else None
-        own_rates = tuple(
-            effector.module.rates(own, command, state, turning, params)
-            for effector, own, command, params in zip(parts.effectors, effectors, commands, setup.effectors, strict=True)
+        effector_rates = tuple(
+            effector.module.rates(inner, command, state, turning, params)
+            for effector, inner, command, params in zip(parts.effectors, effectors, commands, setup.effectors, strict=True)
         )
-        return (rates, own_rates, output_rates)
+        return (rates, effector_rates, output_rates)
 
     def _commands(applied, effectors, setup, memory):
-        for effector, own, params in zip(parts.effectors, effectors, setup.effectors, strict=True):
+        for effector, inner, params in zip(parts.effectors, effectors, setup.effectors, strict=True):
             if effector.hook("pulse") is not None:
-                yield effector.module.pulse(own, setup.substep, params)
+                yield effector.module.pulse(inner, setup.substep, params)
             elif effector.flag("ACTS") and effector.hook("switch") is None:
                 inactive = named.inactive(effector, memory)
                 yield effector.module.command(applied if inactive is None else chosen(inactive, ZERO, applied), params)
@@ -214,7 +214,7 @@ def make_equations(parts: Composition) -> Step:
     def propagate(carry, craft, setup):
         """One substep."""
         applied = getattr(carry.state, body.COMMAND)
-        # A command that is held is shared out once.
+        # A held command is shared out once.
         commands = tuple(_commands(applied, carry.effectors, setup, carry.memory)) if not named.dynamic else None
         begun = _Begun(commands, applied, carry.actuators)
         state, effectors, outputs = advance(
@@ -234,12 +234,12 @@ def make_equations(parts: Composition) -> Step:
         applied = getattr(state, body.COMMAND)
         commands = tuple(_commands(applied, carry.effectors, setup, carry.memory))
         users = list(zip(parts.effectors, carry.effectors, commands, setup.effectors, strict=True))
-        given = total(e.module.applied(own, command, state, p) for e, own, command, p in users if e.flag("ACTS"))
-        own = body.sample(state, goal_of(carry, state, step, setup), applied if given is None else given, carry.command)
+        given = total(e.module.applied(inner, command, state, p) for e, inner, command, p in users if e.flag("ACTS"))
+        whole = body.sample(state, goal_of(carry, state, step, setup), applied if given is None else given, carry.command)
         records = tuple(e.module.record(s, command, state, p) for e, s, command, p in users if e.hook("record"))
         if parts.law.hook("record") is not None:
             records = (*records, parts.law.module.record(carry.memory, setup.period))
-        return (own, records, carry.memories.readings, carry.memories.estimate)
+        return (whole, records, carry.memories.readings, carry.memories.estimate)
 
     def slope_of(carry, craft, setup):
         applied = getattr(carry.state, body.COMMAND)
@@ -287,19 +287,19 @@ class _Named:
 def _ranges(parts: list[Part]) -> list[int]:
     """The index of the first random number of each part: the one it requests if it is the first of its name, else one that
     begins a range of its own."""
-    found: list[int] = []
+    firsts: list[int] = []
     for place, part in enumerate(parts):
-        own = getattr(part.module, "NUMBERS_FROM", None)
-        found.append((place + 1) * RANGE if own is None or part in parts[:place] else own)
-    return found
+        requested = getattr(part.module, "NUMBERS_FROM", None)
+        firsts.append((place + 1) * RANGE if requested is None or part in parts[:place] else requested)
+    return firsts
 
 
 def _matrices(inertias: Any) -> Any:
     """The sum of 3x3 matrices."""
-    found = inertias[0]
+    inertia = inertias[0]
     for more in inertias[1:]:
-        found = tuple(add(a, b) for a, b in zip(found, more, strict=True))
-    return found
+        inertia = tuple(add(a, b) for a, b in zip(inertia, more, strict=True))
+    return inertia
 
 
 @cache

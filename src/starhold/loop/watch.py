@@ -1,4 +1,4 @@
-"""Records along a flight the duration of a slew and the peaks of rate and acceleration."""
+"""The duration of a slew and the peaks of rate and acceleration are recorded along a flight."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class Ends(NamedTuple):
 
 
 class Watched(NamedTuple):
-    """A transient is noted by these: squares of the error angle's half sine and of the relative rate, both over their ends,
+    """A transient has these notes: squares of the error angle's half sine and of the relative rate, both over their ends,
     at the last instant; the control step, with its fraction, at which each was last above 1; the largest square of the
-    body's rate (rad2/s2), and of each of its components the largest mean rate of change over a control step (rad/s2)."""
+    body's rate (rad2/s2), and for each of its components the largest mean rate of change over a control step (rad/s2)."""
 
     angle: float
     rate: float

@@ -1,4 +1,4 @@
-"""Finds the parts of each role: modules of the role's package with a `CARD`, the entry points `starhold.parts` of other
+"""The parts of each role are modules of the role's package with a `CARD`, the entry points `starhold.parts` of other
 packages, and files."""
 
 from __future__ import annotations
@@ -46,31 +46,30 @@ DEMANDED: dict[str, tuple[str, ...]] = {
 }
 """The attributes that a part of each role must define, beside `CARD` and `ROLE`."""
 EITHER: dict[str, tuple[str, ...]] = {"environment": ("torque", "acceleration"), "actuator": ("command", "rates")}
-"""Equations of which a part of a role has at least one."""
+"""Equations that parts of a role have at least one of."""
 
 AnyPart = TypeVar("AnyPart", bound=Part)
 
 
 @cache
 def parts(role: str) -> dict[str, Part]:
-    """All parts of a role but laws that are installed, by name. One of another package that does not load is left out, with
-    a warning that names it."""
+    """All installed parts of a role except laws, by name. One of another package that does not load is left out, with a
+    warning that names it."""
     return installed(PACKAGES[role], role, as_part)
 
 
 _BODIES: dict[str, Part] = {}
-"""Bodies from files, by name: the one read last of those so called."""
+"""Bodies from files, by name: the last one read under each name."""
 
 
 def find(role: str, name: str) -> Part:
-    """The part of this role and name that is installed, or the body read from a file so called. KeyError where there is
-    none."""
+    """The installed part of this role and name, or the body of this name read from a file. KeyError where there is none."""
     installed = parts(role)
     return _BODIES[name] if role == "body" and name not in installed else installed[name]
 
 
 def body_from_file(path: Path) -> Part:
-    """The body in a file, which is run for it and from then on found by its name. Errors as of `from_file`."""
+    """The body in a file, which is executed; from then on the body is found by its name. Errors as of `from_file`."""
     body = from_file(path, parts("body"), as_part)
     if body.role != "body":
         raise ValueError(f"its ROLE must be body, not {body.role}")
@@ -86,29 +85,29 @@ def fit(role: str, name: str, *numbers: Any, called: str = "", start: Any = None
 
 
 def telling(readings: Iterable[str]) -> list[Fitted]:
-    """Installed sensors that tell of these readings, one for each or for several, with parameters of their examples.
+    """Installed sensors that give these readings, one for each or for several, with parameters of their examples.
     LookupError where there is none."""
-    found: dict[str, Fitted] = {}
+    chosen: dict[str, Fitted] = {}
     for reading in readings:
         sensors = (one for one in parts("sensor").values() if not one.table and reading in one.module.Reading._fields)
         sensor = next(sensors, None)
         if sensor is None:
             raise LookupError(f"no sensor of starhold measures {reading}")
-        found.setdefault(sensor.name, Fitted(sensor, sensor.examples()[0]))
-    return list(found.values())
+        chosen.setdefault(sensor.name, Fitted(sensor, sensor.examples()[0]))
+    return list(chosen.values())
 
 
 def installed(package: str, role: str, make: Callable[..., AnyPart]) -> dict[str, AnyPart]:
     """The parts of a role by name: those of a package of starhold, and those that other packages offer."""
     modules = pkgutil.iter_modules(import_module(package).__path__, f"{package}.")
-    found = [make(import_module(entry.name)) for entry in modules if _declares_card(entry.name)]
+    collected = [make(import_module(entry.name)) for entry in modules if _declares_card(entry.name)]
     for point in entry_points(group="starhold.parts"):
         try:
             module = _loaded(point)
         except BaseException as error:
             if is_interrupt(error):
                 raise
-            # Told with the laws, once.
+            # The laws' turn warns of it, once.
             if role == "law":
                 _leave_out(point.value, error)
             continue
@@ -116,15 +115,15 @@ def installed(package: str, role: str, make: Callable[..., AnyPart]) -> dict[str
             continue
         try:
             part = make(module)
-            if part.name in {known.name for known in found}:
+            if part.name in {known.name for known in collected}:
                 raise ValueError(f"a part named {part.name} exists already")
-            found.append(part)
+            collected.append(part)
         except ValueError as error:
             _leave_out(point.value, error)
     if role == "law":
         for point in entry_points(group="starhold.laws"):
             _leave_out(point.value, ValueError("its entry point is called starhold.laws, now starhold.parts"))
-    return {part.name: part for part in sorted(found, key=lambda part: part.name)}
+    return {part.name: part for part in sorted(collected, key=lambda part: part.name)}
 
 
 def _loaded(point: Any) -> ModuleType:
@@ -135,12 +134,12 @@ def _loaded(point: Any) -> ModuleType:
 
 
 def role_of(module: ModuleType) -> str | None:
-    """The role that a module declares; of one with `Gains` it goes without saying."""
+    """The role that a module declares; a module with `Gains` need not declare that it is a law."""
     return getattr(module, "ROLE", "law" if hasattr(module, "Gains") else None)
 
 
 def _leave_out(what: str, error: BaseException) -> None:
-    warnings.warn(f"the part {what} is left out: {told(error)}", stacklevel=4)
+    warnings.warn(f"the part {what} is left out: {error_line(error)}", stacklevel=4)
 
 
 def as_part(module: ModuleType, path: Path | None = None) -> Part:
@@ -158,7 +157,7 @@ def as_part(module: ModuleType, path: Path | None = None) -> Part:
 
 
 def make(kind: type[AnyPart], module: ModuleType, path: Path | None, demanded: tuple[str, ...]) -> AnyPart:
-    """An object of this kind for a module that holds what is demanded. ValueError, one line, where it does not."""
+    """An object of this kind for a module with the demanded attributes. ValueError, one line, where it lacks one."""
     missing = [name for name in ("CARD", *demanded) if not hasattr(module, name)]
     if missing:
         raise ValueError(f"{module.__file__}: this {role_of(module) or 'part'} needs {', '.join(missing)}")
@@ -178,9 +177,9 @@ _READ: dict[tuple[Path, str], ModuleType] = {}
 
 
 def from_file(path: Path, known: Mapping[str, AnyPart], make: Callable[..., AnyPart]) -> AnyPart:
-    """The part in a file, which is run for it; known: the installed parts of its role, of which it may be one.
+    """The part in a file, which is executed; known: the installed parts of its role, of which it may be one.
 
-    ValueError, one line, where the file is none of Python, fails, lacks a part of the contract, or has the name of another
+    ValueError, one line, where the file is not Python, fails, lacks a part of the contract, or has the name of another
     part that is installed. OSError where it cannot be read.
     """
     path = _real(path)
@@ -197,13 +196,13 @@ def read_module(path: Path) -> ModuleType:
     """A file of Python run as a module, again where its text has changed. Errors as of `from_file`."""
     given, path = path, _real(path)
     source = read_bytes(path)
-    # Of the name as it is given, too: a link that is called a table is not run.
+    # The suffix as given counts too: a link that is called a table is not run.
     if {given.suffix, path.suffix} != {".py"}:
         raise ValueError("a part's file ends in .py")
     key = (path, hashlib.sha256(source).hexdigest())
     if key in _READ:
         return _READ[key]
-    # A name of its own, so that a file called random.py does not hide the library's, nor one text of a file another.
+    # A unique name, so that a file called random.py does not hide the library's, nor one text of a file another.
     place = hashlib.sha256(str(path).encode(errors="replace")).hexdigest()
     module = ModuleType(f"starhold_part_{path.stem}_{place[:8]}_{key[1][:8]}")
     module.__file__ = str(path)
@@ -216,7 +215,7 @@ def read_module(path: Path) -> ModuleType:
         del sys.modules[module.__name__]
         if is_interrupt(error):
             raise
-        raise ValueError(told(error, path)) from None
+        raise ValueError(error_line(error, path)) from None
     _READ[key] = module
     return module
 
@@ -226,7 +225,7 @@ def _real(path: Path) -> Path:
     return Path(os.path.realpath(path))
 
 
-def told(error: BaseException, path: Path | None = None) -> str:
+def error_line(error: BaseException, path: Path | None = None) -> str:
     """An error in one line, with the line of a file that it comes from."""
     lines = [frame.lineno for frame in extract_tb(error.__traceback__) if path and frame.filename == str(path)]
     place = f"{path.name}, line {lines[-1]}: " if path and lines else ""

@@ -1,8 +1,8 @@
 """The contract that every part of a closed loop keeps, whatever its role.
 
-A part is one file: `CARD` says what it is, `ROLE` what it does in a loop, `class Params(NamedTuple)` which numbers it takes,
-with units and bounds, and `examples()` gives some of them. The equations of each role, and what a part may add, stand in
-`roles`. All of them are pure functions of tuples of numbers.
+A part is one file: `CARD` describes it, `ROLE` names its role in a loop, `class Params(NamedTuple)` declares its
+numbers with units and bounds, and `examples()` gives some of them. The equations of each role, and further
+declarations, stand in `roles`. All of them are pure functions of tuples of numbers.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Parameter:
     """Unit, bounds and shape of one parameter, or of a law's gain, declared as an annotation."""
 
     unit: str = "1"
-    """In which plain numbers count: "N m s", "1/s^2"; "1" for none."""
+    """The unit of plain numbers: "N m s", "1/s^2"; "1" for none."""
     above: float | None = None
     """Every number is greater."""
     at_least: float | None = None
@@ -57,18 +57,18 @@ class Parameter:
     whole: bool = False
     """A whole number, which is a constant of the part while it is recorded: Python's `if` and `range` may use it."""
     choices: tuple[str, ...] = ()
-    """Words, of which the part gets the place of the one that is chosen: 0, 1, ...; a constant as well."""
+    """Words to choose from; the part gets the place of the chosen one: 0, 1, ...; a constant as well."""
     text: str = ""
     """The meaning, for listings and pages."""
     spread: bool = True
     """Whether a number stands for a vector of equal numbers."""
     columns: tuple[str, ...] = ()
-    """Of a table: the names of its columns. It is given as rows, or as the name of a CSV file of them."""
+    """The names of a table's columns. The table is given as rows, or as the name of a CSV file of them."""
     dimension: Literal["", "length", "velocity", "acceleration", "time", "rate"] = ""
     """The physical dimension of a scaled number, which a file may also give as a string with a unit."""
     shared: str = ""
-    """The key of a scenario, "orbit.epoch", that gives the number to all parts that declare so, in place of keys of their
-    own tables; scenarios of bodies that lack it leave it to those."""
+    """The key of a scenario, "orbit.epoch", that gives the number to all parts that declare it, in place of keys of
+    their own tables, which scenarios without such a key use."""
 
     def check(self, value: Any) -> Any:
         """Validate a value and convert it to the form that equations take; the ValueError says what is allowed."""
@@ -79,7 +79,7 @@ class Parameter:
         try:
             array = np.asarray(value, dtype=float)
         except (ValueError, TypeError):
-            # Rows of different lengths, or what is no number.
+            # Rows of different lengths, or entries that are no numbers.
             raise ValueError(f"must be {self.describe()}") from None
         if self.columns and (array.ndim != 2 or array.shape[1] != len(self.columns)):
             raise ValueError(f"must be {self.describe()}")
@@ -117,7 +117,7 @@ class Parameter:
             raise ValueError("must be a whole number")
 
     def describe(self) -> str:
-        """Tell what may be written for this parameter."""
+        """Describe the values that may be written for this parameter."""
         if self.columns:
             return f"rows of {', '.join(self.columns)}, or the name of a CSV file of such columns"
         if not self.shape:
@@ -142,7 +142,7 @@ class Field:
 def fields(cls: Any, but: str = "") -> list[Field]:
     """Read the declared parameters of a NamedTuple class (`Params`, `Gains`, a design form), in order; `but`: the name of a
     field that is left out."""
-    found: list[Field] = []
+    declared: list[Field] = []
     hints = get_type_hints(cls, include_extras=True)
     for name in cls._fields:
         if name == but:
@@ -152,5 +152,5 @@ def fields(cls: Any, but: str = "") -> list[Field]:
         if get_origin(hint) is not Annotated or gain is None:
             raise TypeError(f"{cls.__module__}.{cls.__name__}.{name} declares no unit: annotate it with Parameter")
         defaults: dict[str, Any] = cls._field_defaults
-        found.append(Field(name, gain, name not in defaults, defaults.get(name)))
-    return found
+        declared.append(Field(name, gain, name not in defaults, defaults.get(name)))
+    return declared

@@ -25,7 +25,7 @@ class Craft(NamedTuple):
     torque_limit: Annotated[
         float,
         Quantity(
-            "N m", "that a law may reckon with, per axis or in norm; infinite for none; with wheels at most what they give"
+            "N m", "that a law may count on, per axis or in norm; infinite for none; with wheels at most what they give"
         ),
     ]
     gravity: Annotated[float, Quantity("m^3/s^2", "gravitational parameter of the body that it orbits")]
@@ -65,7 +65,7 @@ def tensor(inertia: Matrix | Vector) -> NDArray[np.float64]:
 
 
 def check_inertia(inertia: Any) -> NDArray[np.float64]:
-    """The 3x3 tensor of three principal moments or a 3x3 array; ValueError says what no rigid body can have."""
+    """The 3x3 tensor of three principal moments or a 3x3 array; ValueError where no rigid body can have it."""
     tensor = np.asarray(inertia, dtype=float)
     if tensor.shape == (3,):
         tensor = np.diag(tensor)
@@ -115,7 +115,7 @@ def check_rest(rest: Matrix | Vector) -> float:
 
 
 def compact(array: Any) -> Matrix | Vector:
-    """A 3x3 array as a matrix, or as the vector of its diagonal where nothing stands beside it."""
+    """A 3x3 array as a matrix, or as the vector of its diagonal where all else is zero."""
     full = np.asarray(array, dtype=float)
     diagonal = np.diagonal(full)
     return matrix(full) if np.count_nonzero(full - np.diag(diagonal)) else vector(diagonal)

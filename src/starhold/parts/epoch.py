@@ -26,7 +26,7 @@ EPOCH = Parameter(
 )
 """The declaration of the epoch, common to all parts; a scenario gives it to all of them."""
 START: Date = (2026.0, 1.0, 1.0, 0.0, 0.0, 0.0)
-"""The epoch of a flight that is given none."""
+"""The epoch of a flight without one."""
 WRITTEN = 'a date as "2026-03-20T12:00:00Z", or as whole year, month, day, hour, minute and a second below 60, UTC'
 """The accepted forms of an epoch."""
 OF_DATE, OF_J2000 = "MOD_EARTH", "EME2000"
@@ -38,15 +38,15 @@ _J2000 = datetime(2000, 1, 1, 12)
 
 
 def date_of(given: str | date | Sequence[float]) -> Date:
-    """The epoch that is written in ISO 8601 or told by the standard library, in UTC unless it says another offset, or by six
-    numbers. ValueError for what is no date."""
+    """The epoch given in ISO 8601, by the standard library (UTC unless it has another offset), or as six numbers.
+    ValueError for anything else."""
     try:
-        told = datetime.fromisoformat(given.strip()) if isinstance(given, str) else given
-        if not isinstance(told, date):
-            found: Date = EPOCH.check(told)
-            days_of(found)
-            return found
-        begun = told if isinstance(told, datetime) else datetime(told.year, told.month, told.day)
+        parsed = datetime.fromisoformat(given.strip()) if isinstance(given, str) else given
+        if not isinstance(parsed, date):
+            epoch: Date = EPOCH.check(parsed)
+            days_of(epoch)
+            return epoch
+        begun = parsed if isinstance(parsed, datetime) else datetime(parsed.year, parsed.month, parsed.day)
         begun = begun.astimezone(UTC) if begun.tzinfo else begun
     except (ValueError, OverflowError):
         raise ValueError(WRITTEN) from None
@@ -56,12 +56,13 @@ def date_of(given: str | date | Sequence[float]) -> Date:
 
 
 def days_of(epoch: Date) -> float:
-    """The days since J2000, 2000 January 1 at noon. ValueError for what is no date."""
+    """The days since J2000, 2000 January 1 at noon. ValueError where the epoch is no date."""
     return (_instant(epoch) - _J2000) / timedelta(days=1)
 
 
 def iso_text(epoch: Date) -> str:
-    """The date in ISO 8601, UTC, to the microsecond, such as "2026-03-20T12:00:00". ValueError for what is no date."""
+    """The date in ISO 8601, UTC, to the microsecond, such as "2026-03-20T12:00:00". ValueError where the epoch is no
+    date."""
     return _instant(epoch).isoformat()
 
 
@@ -92,7 +93,7 @@ def _instant(epoch: Date) -> datetime:
 
 
 def date_text(epoch: Date) -> str:
-    """The epoch as errors tell it."""
+    """The epoch as error messages write it."""
     return f"[{', '.join(f'{number:g}' for number in epoch)}]"
 
 
@@ -110,6 +111,6 @@ def turned(start: float, time: Scalar) -> Scalar:
 
 
 def spun(vector: Vector, cosine: Scalar, sine: Scalar) -> Vector:
-    """Return a vector turned about the third axis by an angle of this cosine and sine: by the Earth's, from its own axes
-    to inertial ones."""
+    """Return a vector turned about the third axis by an angle of this cosine and sine; the Earth's angle takes
+    Earth-fixed to inertial components."""
     return (cosine * vector[0] - sine * vector[1], sine * vector[0] + cosine * vector[1], vector[2])

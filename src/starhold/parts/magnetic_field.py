@@ -87,19 +87,19 @@ class Numbers(NamedTuple):
 
 
 def prepared(epoch: Date, period: float = 1.0, rows: tuple[Row, ...] = ROWS) -> Numbers:
-    """The numbers of the field for a flight that begins at an epoch (UTC), within which the coefficients rest. period: of
-    the control (s), for `field_at`.
+    """The numbers of the field for a flight that begins at an epoch (UTC), during which the coefficients are constant.
+    period: the control period (s), for `field_at`.
 
     ValueError for an epoch that is no date, or not from 2025 to 2030.
     """
     days = _known(epoch)
     highest = max(row[0] for row in rows)
-    found = [[(0.0, 0.0) for _ in range(max(m, 1), highest + 1)] for m in range(highest + 1)]
+    pairs = [[(0.0, 0.0) for _ in range(max(m, 1), highest + 1)] for m in range(highest + 1)]
     for n, m, g, h in _at(days, rows):
         # From Schmidt's normalisation to none, in T; (n - m)! makes one factor of all that the gradient needs.
         size = 1e-9 * sqrt((2.0 if m else 1.0) * factorial(n - m) / factorial(n + m)) / factorial(n - m)
-        found[m][n - max(m, 1)] = (size * g, size * h)
-    cosines, sines = (tuple(tuple(pair[k] for pair in order) for order in found) for k in (0, 1))
+        pairs[m][n - max(m, 1)] = (size * g, size * h)
+    cosines, sines = (tuple(tuple(pair[k] for pair in order) for order in pairs) for k in (0, 1))
     return Numbers(cosines, sines, sidereal(days), period)
 
 
@@ -140,16 +140,16 @@ def field(position: Vector, time: Scalar, params: Numbers) -> Vector:
 
 
 def field_at(position: Vector, step: Any, params: Numbers) -> Vector:
-    """The magnetic field (T) at a position (m) as a control step begins, both in inertial axes. All parts that ask for it at
-    one place cost a kernel the field once."""
+    """The magnetic field (T) at a position (m) as a control step begins, both in inertial axes. A kernel computes it
+    once for all parts that need it at one place."""
     return field(position, number_of(step) * params.period, params)
 
 
 def earth_fixed(position: Vector, params: Numbers) -> Vector:
     """The magnetic field (T) at a position (m), both in axes of the Earth: minus the gradient of the potential.
 
-    The harmonics are those of Cunningham, made of x, y, z alone, so that no angle is needed and the poles are places as any
-    (Montenbruck and Gill, Satellite Orbits, 3.2.4).
+    The harmonics are those of Cunningham, made of x, y, z alone, so that no angle is needed and the poles are no
+    exception (Montenbruck and Gill, Satellite Orbits, 3.2.4).
     """
     highest = len(params.cosines) - 1
     inverse_square = 1.0 / dot(position, position)
@@ -176,10 +176,10 @@ def earth_fixed(position: Vector, params: Numbers) -> Vector:
         def total(weights: tuple[Scalar, ...], order: int, least: int = least) -> Scalar:
             """The sum over degrees of the weights times the harmonics of one degree more, of an order."""
             harmonics = columns[order][least + 1 - order :]
-            found = weights[0] * harmonics[0]
+            result = weights[0] * harmonics[0]
             for weight, harmonic in zip(weights[1:], harmonics[1:], strict=False):
-                found = found + weight * harmonic
-            return found
+                result = result + weight * harmonic
+            return result
 
         c, s = powers[m + 1]
         if m == 0:

@@ -1,4 +1,4 @@
-"""Two-body orbits: from Keplerian elements to position and velocity, where an orbit comes lowest, and when it meets a
+"""Two-body orbits: from Keplerian elements to position and velocity, the lowest point of an orbit, and when it meets a
 surface; the bodies that are orbited."""
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def meets_at(position: Vector, velocity: Vector, gravity: float, radius: float) 
     distance, energy, radial, _ = _invariants(position, velocity, gravity)
     if lowest(position, velocity, gravity) >= radius:
         return math.inf
-    # A parabola is as good as an ellipse that returns after ages.
+    # A parabola is taken for an ellipse that returns after ages.
     energy = energy if abs(energy) > 1e-12 * gravity / distance else -1e-12 * gravity / distance
     a = -0.5 * gravity / energy
     size, rate = abs(a), math.sqrt(gravity / abs(a) ** 3)

@@ -9,7 +9,7 @@ from starhold.algebra.words import number_of
 from starhold.parts.contract import Parameter
 
 Window: TypeAlias = tuple[Scalar, Scalar]
-OUTAGE = Parameter("s", shape=(2,), spread=False, at_least=0.0, text="from when to when it gives nothing; none if the same")
+OUTAGE = Parameter("s", shape=(2,), spread=False, at_least=0.0, text="begin and end without readings; none if equal")
 """The declaration of outages, common to all sensors."""
 NEVER: Window = (0.0, 0.0)
 

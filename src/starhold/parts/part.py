@@ -79,14 +79,14 @@ class Part:
         return getattr(self.module, name, None)
 
     def flag(self, name: str) -> bool:
-        """Whether it declares itself to be so, see `parts.roles`."""
+        """Whether it declares this flag, see `parts.roles`."""
         return bool(getattr(self.module, name, False))
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """A part in a loop: its parameters, the name that recordings and errors call it by, and the state that it starts with
-    (of effectors; None for what the part says)."""
+    """A part in a loop: its parameters, the name that recordings and errors call it by, and the state that it starts
+    with (of effectors; None: the part's default)."""
 
     part: Part
     params: Any = ()
@@ -104,7 +104,7 @@ class Fitted:
         return self.params if make is None else make(self.params, period)
 
     def remembered(self, *about: Any) -> Any:
-        """Its memory, or an effector's state, at the start, made of its parameters and what its role adds."""
+        """Its memory, or an effector's state, at the start, made of its parameters and the arguments that its role adds."""
         if self.start is not None:
             return self.start
         make = self.part.hook("remember")

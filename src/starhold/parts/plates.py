@@ -9,7 +9,7 @@ from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Vector, scale
 
 COLUMNS = ("area", "normal_x", "normal_y", "normal_z", "x", "y", "z")
-"""Of a table of plates: area (m2), outward normal, and centre from the centre of mass (m), body axes."""
+"""The columns of a table of plates: area (m2), outward normal, and centre from the centre of mass (m), body axes."""
 TEXT = "areas, outward normals and centres from the centre of mass, body axes; no plate shades another"
 BOX = (
     (0.06, 1.0, 0.0, 0.0, 0.052, -0.01, 0.02),

@@ -1,9 +1,9 @@
-"""Random numbers as a function of (seed, run, step, number): no stream, so nothing depends on scheduling.
+"""Random numbers are a function of (seed, run, step, number): no stream, so nothing depends on scheduling.
 
-The bits are Threefry-2x64 with 20 rounds ("Parallel Random Numbers: As Easy as 1, 2, 3"). Each call gives two words, and
-these two Gaussians by the transform of Box and Muller, made of `+ - * /`, a square root and operations on words only, so
-that floats, every lane and exported code round alike. What is computed differs from the exact transform of the same words
-by less than 9e-14 of the number.
+The bits are Threefry-2x64 with 20 rounds ("Parallel Random Numbers: As Easy as 1, 2, 3"). Each call gives two words,
+and these two Gaussians by the transform of Box and Muller, made of `+ - * /`, a square root and operations on words
+only, so that floats, every lane and exported code round alike. The results differ from the exact transform of the same
+words by less than 9e-14 of the number.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ def cosine_and_sine(x: Scalar) -> tuple[Scalar, Scalar]:
 def transform(a: Word, b: Word) -> tuple[Scalar, Scalar]:
     """Two independent Gaussians from two words: bits 0 to 51 of each, and the highest."""
     unit, angle = to_unit(a), to_angle(b)
-    # The division begins first: what the angle needs is done while it lasts.
+    # The division begins first: the angle is computed while it lasts.
     e, s = _reduced(unit)
     cosine, sine = cosine_and_sine(angle)
     radius = sqrt(_joined(e, s))

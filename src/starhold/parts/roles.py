@@ -1,9 +1,9 @@
-"""The roles of the parts of a closed loop: for each the equations that a part of it defines, as protocols.
+"""The roles of the parts of a closed loop: for each the equations that its parts define, as protocols.
 
-A part is a module; `parts.contract` says what all of them hold. Equations take and give numbers and tuples of numbers, so
-that floats, traces and exact polynomials read them alike. `params` is the part's `Params` (or what its `prepare` makes of
-them), `state` the body's, `craft` the numbers of the body, `dice` random numbers of the part's own, `step` the number of the
-control step.
+A part is a module; `parts.contract` says what all of them hold. Equations take and give numbers and tuples of numbers,
+so that floats, traces and exact polynomials read them alike. `params` is the part's `Params` (or what its `prepare`
+makes of them), `state` the body's state, for effectors their own and `body` the body's; `craft` the numbers of the
+body, `dice` random numbers of the part's own, `step` the number of the control step.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ class Goal(NamedTuple):
 
 
 class Loads(NamedTuple):
-    """All that acts on a body, None where there is nothing of the kind: the acceleration by environments, the torque by
-    environments, the reaction of the effectors (N m, body), and the inertia that these add (3, 3); `direct`: whether the
-    actuators act on the body itself, because no effector takes the command."""
+    """All that acts on a body, None for a kind that the loop lacks: the acceleration by environments, the torque by
+    environments, the reaction of the effectors (N m, body), and the inertia that these add (3, 3); `direct`: whether
+    the actuators act on the body itself, because no effector takes the command."""
 
     acceleration: Vector | None
     torque: Vector | None
@@ -42,9 +42,9 @@ class Loads(NamedTuple):
 
 
 class Scene(NamedTuple):
-    """Beside the state all that a measurement is made of: the goal (None where the loop has no target), whether it never
-    turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s, body), the control period, the
-    limit of the command, and all readings of the sensors, an attribute for each."""
+    """All that a measurement is made of beside the state: the goal (None where the loop has no target), whether it
+    never turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s, body), the control
+    period, the limit of the command, and all readings of the sensors, an attribute for each."""
 
     goal: Any
     still: bool
@@ -56,13 +56,13 @@ class Scene(NamedTuple):
 
 
 class Body(Protocol):
-    """The part that moves. `State` has a field named `COMMAND` for the command that acts, three numbers; `Measurement` is
-    the input of laws, `Sample` the recorded quantities, with fields annotated with `Quantity`. `SIGN_POLICIES`: by name, the
-    choice among equivalent measurements; none if there is no choice. `TIME_UNIT`: "s" by default.
+    """The part that moves. `State` has a field named `COMMAND` for the command that acts, three numbers; `Measurement`
+    is the input of laws, `Sample` the recorded quantities, with fields annotated with `Quantity`. `SIGN_POLICIES`: by
+    name, the choice among equivalent measurements; none if there is no choice. `TIME_UNIT`: "s" by default.
 
-    A body that scenarios have no tables for is given by a [body] table: the fields of its `Params`, if it has any, are the
-    keys of that, and those of its `State` but the command, annotated with `Parameter`, the keys of [initial]. Its craft is
-    its `Params`, or what its `make` gives of them."""
+    A body without tables of its own in scenarios is given by a [body] table, whose keys are the fields of its `Params`,
+    if it has any; the keys of [initial] are the fields of its `State` except the command, annotated with `Parameter`.
+    Its craft is its `Params`, or what its `make` makes of them."""
 
     COMMAND: str
     TIME_UNIT: str
@@ -129,45 +129,45 @@ class Effector(Protocol):
         """The commands of its motors for a desired torque on the body (N m)."""
         ...
 
-    def switch(self, own: Any, wanted: Vector, told: Any, state: State, params: Any, step: int, /) -> Any:
-        """The own state at the start of a control step, in place of `command`; wanted: the command (N m), told: the law's
-        measurement."""
+    def switch(self, state: Any, wanted: Vector, measurement: Any, body: State, params: Any, step: int, /) -> Any:
+        """Its state at the start of a control step, in place of `command`; wanted: the command (N m), measurement: the
+        law's, body: the body's state."""
         ...
 
-    def pulse(self, own: Any, substep: Scalar, params: Any, /) -> Any:
+    def pulse(self, state: Any, substep: Scalar, params: Any, /) -> Any:
         """The command for the next substep, of an effector with `switch`; none if it is absent."""
         ...
 
-    def reaction(self, own: Any, command: Any, body: State, params: Any, /) -> Vector:
-        """The torque on the body (N m) at its own state, -w x h of its momentum h included, the part that goes with the
-        body's angular acceleration left out."""
+    def reaction(self, state: Any, command: Any, body: State, params: Any, /) -> Vector:
+        """The torque on the body (N m), with -w x h of its momentum h and without the terms in the body's angular
+        acceleration."""
         ...
 
-    def inertia(self, own: Any, params: Any, /) -> Matrix:
+    def inertia(self, state: Any, params: Any, /) -> Matrix:
         """The inertia (3, 3; kg m2) that the body's angular acceleration meets besides the body's own."""
         ...
 
-    def rates(self, own: Any, command: Any, body: State, acceleration: Vector, params: Any, /) -> Any:
-        """d(own state)/dt, None for what does not change; acceleration: the body's angular one (rad/s2)."""
+    def rates(self, state: Any, command: Any, body: State, acceleration: Vector, params: Any, /) -> Any:
+        """d(state)/dt, None for constant parts; acceleration: the body's angular one (rad/s2)."""
         ...
 
-    def momentum(self, own: Any, params: Any, /) -> Vector:
+    def momentum(self, state: Any, params: Any, /) -> Vector:
         """Its angular momentum relative to the body (N m s, body axes)."""
         ...
 
-    def inertia_change(self, own: Any, params: Any, /) -> Matrix:
-        """How much more inertia (3, 3; kg m2) the whole has than the body's numbers say, where its shape changes: what the
-        momentum has besides, times the body's rate."""
+    def inertia_change(self, state: Any, params: Any, /) -> Matrix:
+        """The inertia (3, 3; kg m2) that the whole has beyond the body's numbers as its shape changes; times the body's
+        rate it belongs to the momentum."""
         ...
 
-    def record(self, own: Any, command: Any, body: State, params: Any, /) -> Any:
-        """A NamedTuple of what is recorded of it."""
+    def record(self, state: Any, command: Any, body: State, params: Any, /) -> Any:
+        """Its recorded quantities, a NamedTuple."""
         ...
 
 
 class Sensor(Protocol):
-    """A sensor tells of the body's state. `Reading` is a NamedTuple whose fields are called as those of the body's state
-    that it tells of; further fields are for estimators."""
+    """A sensor measures the body's state. `Reading` is a NamedTuple whose fields are named as those of the body's state
+    that it measures; further fields are for estimators."""
 
     Reading: type
 
@@ -181,8 +181,8 @@ class Sensor(Protocol):
 
 
 class Estimator(Protocol):
-    """The state as it is computed from readings. `NEEDS`: the readings that it takes, by name; `Estimate` is a NamedTuple
-    whose fields are called as those of the body's state that it tells of."""
+    """The state as it is computed from readings. `NEEDS`: the readings that it takes, by name; `Estimate` is a
+    NamedTuple whose fields are named as those of the body's state that it estimates."""
 
     NEEDS: tuple[str, ...]
     Estimate: type
@@ -210,8 +210,8 @@ class Target(Protocol):
 
 
 class Actuator(Protocol):
-    """From the command of a law to what acts. One without `rates` changes the command at control instants alone; one with
-    them has an output of its own that follows its input."""
+    """An actuator turns the command of a law into the one that acts. One without `rates` changes the command at control
+    instants alone; one with them has an output of its own that follows its input."""
 
     def command(self, command: Vector, params: Any, /) -> Vector:
         """The command that is passed on."""
@@ -223,4 +223,4 @@ class Actuator(Protocol):
 
 
 ROLES = ("body", "effector", "environment", "sensor", "estimator", "target", "law", "actuator")
-"""In the order of a loop's description; each names a package under `parts`, laws have their own."""
+"""The roles in the order of a loop's description; each names a package under `parts`, laws have their own."""

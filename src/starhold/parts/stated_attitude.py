@@ -16,7 +16,7 @@ START = Parameter(
     "1",
     shape=(4,),
     spread=False,
-    text="attitude that is taken for true at the start: quaternion, inertial to body, scalar first",
+    text="assumed attitude at the start: quaternion, inertial to body, scalar first",
 )
 """The declaration of the initial estimate, common to all estimators."""
 

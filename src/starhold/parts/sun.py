@@ -23,9 +23,9 @@ SHADOW = "the Earth's shadow is that of a sphere without air, its edge straight 
 UNIT = 1.495978707e11
 """The astronomical unit, m."""
 PRESSURE = 1361.0 / 299792458.0
-"""The pressure of sunlight on what absorbs it, at one astronomical unit, N/m2 (Kopp and Lean 2011)."""
+"""The pressure of sunlight on an absorbing surface, at one astronomical unit, N/m2 (Kopp and Lean 2011)."""
 STRONGEST = PRESSURE / 0.983**2
-"""The same at the perihelion, rounded up."""
+"""This pressure at the perihelion, rounded up."""
 RADIUS, EARTH = BODIES["Sun"].radius, BODIES["Earth"].radius
 # Degrees at J2000, and in a day.
 _LONGITUDE, _ANOMALY = (280.460, 0.9856474), (357.528, 0.9856003)
@@ -77,9 +77,9 @@ def in_view(position: Vector, seen: Sun) -> Scalar:
     the share by less than 0.4 %.
     """
     square = dot(position, position)
-    # As the attraction of the Earth has it, so that a kernel computes it once.
+    # In the form that the Earth's attraction has, so that a kernel computes it once.
     inverse = sqrt(1.0 / square)
-    # Of the angle between the Sun and the Earth's centre, and of the Earth's angular radius, cosine and sine.
+    # Cosine and sine of the angle between the Sun and the Earth's centre, and of the Earth's angular radius.
     toward = -inverse * dot(position, seen.direction)
     across = sqrt(maximum(1.0 - toward * toward, 0.0))
     half = EARTH * inverse
@@ -107,5 +107,5 @@ def _of_disc(height: Scalar) -> Scalar:
 
 
 def pressure(seen: Sun) -> Scalar:
-    """The pressure of sunlight on what absorbs it, where the Earth does not hide it (N/m2)."""
+    """The pressure of sunlight on an absorbing surface, where the Earth does not hide it (N/m2)."""
     return PRESSURE / (seen.distance * seen.distance)

@@ -1,1 +1,1 @@
-"""Regenerates what the five publications print, and lays it beside them."""
+"""The figures and numbers that five publications print are made again and laid beside them."""

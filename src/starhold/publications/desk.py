@@ -1,4 +1,4 @@
-"""Measures ask for scenarios, and for what was flown, drawn or proved of them; each is made once for a publication."""
+"""Measures get scenarios, flights, figures and proofs here; each is made once for a publication."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Desk:
     def __init__(self, letter: str) -> None:
         self.letter = letter
         self.used: dict[str, str] = {}
-        """The texts of the scenario files that were asked for."""
+        """The texts of the scenario files used so far."""
         self._made: dict[Any, Any] = {}
 
     @cached_property
@@ -48,11 +48,11 @@ class Desk:
         return Path(folder)
 
     def once(self, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
-        """Return what `make` gives, made at the first time that this key is asked for."""
-        told = repr(key)
-        if told not in self._made:
-            self._made[told] = make()
-        return self._made[told]
+        """Return the result of `make`, which is called at the first request for this key."""
+        name = repr(key)
+        if name not in self._made:
+            self._made[name] = make()
+        return self._made[name]
 
     def scenario(self, file: str, changes: Mapping[str, Any] | None = None) -> Scenario:
         """A scenario, with changes."""

@@ -1,4 +1,4 @@
-"""A figure as data: what is drawn, not how."""
+"""A figure as data: its curves, not the drawing of them."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ Style: TypeAlias = Literal["line", "dashed", "dotted", "points", "steps", "area"
 
 @dataclass(frozen=True)
 class Curve:
-    """Points that belong together: x (n,) and y (n,), in the units that the panel's labels tell. An "area" is a closed
-    outline that is filled; "faint" is a thin grey line."""
+    """Points that belong together: x (n,) and y (n,), in the units of the panel's labels. An "area" is a closed outline
+    that is filled; "faint" is a thin grey line."""
 
     x: Any
     y: Any
@@ -30,7 +30,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes. Spans are what is shown, (low, high); all of it where None. Levels are horizontal lines."""
+    """One pair of axes. Spans (low, high) limit the view; None shows all. Levels are horizontal lines."""
 
     x_label: str
     y_label: str

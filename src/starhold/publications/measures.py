@@ -1,4 +1,4 @@
-"""Measures that more than one publication asks for."""
+"""Measures that several publications share."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from starhold.publications.verdicts import Finding
 def metric(
     desk: Desk, file: str, law: str, name: str, scale: float = 1.0, changes: Mapping[str, Any] | None = None
 ) -> Finding:
-    """A metric of a flight, as `compare` tells it (SI), times a scale; not a number where the flight has none."""
+    """A metric of a flight, as `compare` reports it (SI), times a scale; not a number where the flight has none."""
     value = desk.flight(file, law, changes).metrics.get(name)
     return Finding(float("nan") if value is None else scale * float(value))
 

@@ -50,14 +50,14 @@ def index_page(made: Sequence[Reproduction]) -> str:
         f"<td>{tally(one.rows.values())}</td></tr>"
         for one in made
     )
-    found = [(judged, one.paper) for one in made for judged in one.rows.values() if judged.row.erratum is not None]
+    errata = [(judged, one.paper) for one in made for judged in one.rows.values() if judged.row.erratum is not None]
     body = [
         "<h1>Published and reproduced</h1>",
         '<p class="lead">Every figure, table and numerical statement of the publications that starhold implements, made '
         "again and laid beside what is printed.</p>",
         _changes([judged for one in made for judged in one.changed]),
         _grid(("publication", "figures", "rows", "verdicts"), rows, "wide titled"),
-        _errata(found),
+        _errata(errata),
         _reading(),
         f"<footer>starhold {__version__}</footer>",
     ]
@@ -77,13 +77,13 @@ def badge(verdict: str) -> str:
 
 
 def value_words(judged: Judged) -> str:
-    """Tell what was found, in words."""
+    """The measured value, in words."""
     value, unit = judged.finding.value, judged.row.unit
     if isinstance(value, dict):
         yes = [name for name, true in value.items() if true]
         no = [name for name, true in value.items() if not true]
-        told = [f"true: {', '.join(yes)}"] * bool(yes) + [f"false: {', '.join(no)}"] * bool(no)
-        return "; ".join(told)
+        cases = [f"true: {', '.join(yes)}"] * bool(yes) + [f"false: {', '.join(no)}"] * bool(no)
+        return "; ".join(cases)
     if isinstance(value, bool):
         return "true" if value else "false"
     numbers = [value] if isinstance(value, (int, float)) else list(value)
@@ -91,14 +91,14 @@ def value_words(judged: Judged) -> str:
 
 
 def difference(judged: Judged) -> str:
-    """Ours less the printed as a share of it, or their ratio where they are far apart; nothing of a bound or a statement."""
+    """Our value less the printed, as a share of it, or their ratio if far apart; "" for bounds and statements."""
     value = judged.finding.value
     if isinstance(value, (bool, dict)):
         return ""
     numbers = [value] if isinstance(value, (int, float)) else list(value)
     pairs = zip(judged.row.printed, numbers, strict=True)
-    told = [_apart(one.value, float(ours)) for one, ours in pairs if not one.bound]
-    return "none" if told and set(told) == {"none"} else ", ".join(told)
+    differences = [_apart(one.value, float(ours)) for one, ours in pairs if not one.bound]
+    return "none" if differences and set(differences) == {"none"} else ", ".join(differences)
 
 
 def _apart(printed: float, ours: float) -> str:
@@ -160,14 +160,14 @@ def _row(judged: Judged, numbers: bool) -> str:
 def _changes(changed: Sequence[Judged]) -> str:
     if not changed:
         return ""
-    told = "; ".join(f"{judged.row.name}: {judged.row.verdict} is now {judged.verdict}" for judged in changed)
-    return f'<p class="alarm">Verdicts other than recorded: {escape(told)}.</p>'
+    verdicts = "; ".join(f"{judged.row.name}: {judged.row.verdict} is now {judged.verdict}" for judged in changed)
+    return f'<p class="alarm">Verdicts other than recorded: {escape(verdicts)}.</p>'
 
 
-def _errata(found: Sequence[tuple[Judged, Paper]]) -> str:
-    if not found:
+def _errata(errata: Sequence[tuple[Judged, Paper]]) -> str:
+    if not errata:
         return ""
-    numbered = sorted(found, key=lambda pair: pair[0].row.erratum or 0)
+    numbered = sorted(errata, key=lambda pair: pair[0].row.erratum or 0)
     rows = "".join(
         f'<tr><td>{judged.row.erratum}</td><td><a href="{paper.letter}.html#{escape(judged.row.name)}">'
         f"{paper.letter}, {escape(judged.row.where)}</a></td>"

@@ -1,4 +1,4 @@
-"""Reads `paper.toml`: what a publication prints, item by item, and who measures it."""
+"""`paper.toml` says what a publication prints, item by item, and who measures it."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ class _Strict(BaseModel):
 
 
 class Item(_Strict):
-    """Something that a measure makes: the function's name, of a module in the paper's folder or of the common ones, and what
-    it is called with beside the desk."""
+    """Something that a measure makes: the function's name, of a module in the paper's folder or of the common ones, and
+    its arguments beside the desk."""
 
     by: str
     given: dict[str, Any] = Field(default_factory=dict, alias="with")
 
 
 class FigureItem(Item):
-    """A figure: its number in the publication ("" for one of ours), what it shows, and what is to be seen in it."""
+    """A figure: its number in the publication ("" for one of ours), its caption, and the point to see in it."""
 
     number: str = ""
     name: str
-    """What its file is called."""
+    """The name of its file."""
     caption: str
     seen: str = ""
     after: str = ""
@@ -53,7 +53,7 @@ class Row(Item):
     verdict: Verdict
     """The verdict that is expected."""
     why: str = ""
-    """What explains a verdict that is not plain agreement."""
+    """The explanation of a verdict that is not plain agreement."""
     erratum: int | None = None
     """The erratum's number, of a row that shows one."""
 
@@ -87,7 +87,7 @@ class Section(_Strict):
 
 
 class Paper(_Strict):
-    """A publication, told as far as its source tells it."""
+    """A publication, described as far as its source is."""
 
     letter: str
     title: str
@@ -120,7 +120,7 @@ def papers_of(word: str) -> list[str]:
 
 
 def paper_of(word: str, or_else: str = "") -> str:
-    """The letter of a publication, in capitals. InputError for anything else, naming what else is allowed."""
+    """The letter of a publication, in capitals. InputError for anything else, naming the words allowed."""
     if word.upper() not in PAPERS:
         raise InputError("reproduce", "publication", word, f"{', '.join(PAPERS)}{or_else}")
     return word.upper()
@@ -138,7 +138,7 @@ def read_paper(letter: str) -> Paper:
 
 def scenario_files(letter: str) -> dict[str, str]:
     """The scenario files of a publication, by their names without the ending."""
-    found = {item.name: item for item in folder_of(letter).iterdir() if item.name.endswith(".toml")}
+    files = {item.name: item for item in folder_of(letter).iterdir() if item.name.endswith(".toml")}
     return {
-        name.removesuffix(".toml"): found[name].read_text(encoding="utf-8") for name in sorted(found) if name != "paper.toml"
+        name.removesuffix(".toml"): files[name].read_text(encoding="utf-8") for name in sorted(files) if name != "paper.toml"
     }

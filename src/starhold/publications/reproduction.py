@@ -1,4 +1,4 @@
-"""Makes what a publication prints: every figure, and a verdict on every row."""
+"""Every figure of a publication is made, and every row gets a verdict."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from starhold.publications.verdicts import Finding, Verdict, judge
 
 @dataclass(frozen=True)
 class Judged:
-    """A row with what was found and the verdict on it."""
+    """A row with its measurement and the verdict on it."""
 
     row: Row
     finding: Finding
@@ -26,7 +26,7 @@ class Judged:
 
     @property
     def changed(self) -> bool:
-        """Whether the verdict is another than the one recorded."""
+        """Whether the verdict differs from the recorded one."""
         return self.verdict != self.row.verdict
 
     def summary(self) -> dict[str, Any]:
@@ -61,7 +61,7 @@ class Reproduction:
 
     @property
     def changed(self) -> list[Judged]:
-        """The rows whose verdict is another than the one recorded."""
+        """The rows whose verdict differs from the recorded one."""
         return [judged for judged in self.rows.values() if judged.changed]
 
 

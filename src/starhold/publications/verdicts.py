@@ -1,5 +1,5 @@
-"""A verdict says how a measurement compares with a printed number or statement. It is computed; written down is the one
-that is expected, so that a change shows."""
+"""A verdict says how a measurement compares with a printed number or statement. It is computed; the expected one is
+written down, so that a change shows."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PLAIN: tuple[Verdict, ...] = ("agrees", "holds")
 @dataclass(frozen=True)
 class Finding:
     """A measurement is a number (or one for each that is printed), or whether a statement is true: of all, or by the
-    names of choices. The note says in a few words what was seen."""
+    names of choices. The note describes it in a few words."""
 
     value: float | Sequence[float] | bool | dict[str, bool]
     note: str = ""

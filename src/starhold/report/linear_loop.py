@@ -76,7 +76,7 @@ def _know(scenario: Scenario, number: int, name: str) -> _Known:
     try:
         linear = linear_of(scenario, scenario.pick(name))
     except InputError as error:
-        return _Known(number, name, why=error.found)
+        return _Known(number, name, why=error.given)
     shown = response(linear)
     return _Known(number, name, linear, shown, margins(linear, shown))
 

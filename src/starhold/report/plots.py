@@ -90,11 +90,6 @@ def thin(values: Curve, factor: int) -> Curve:
     return flat
 
 
-def thinning(count: int, points: int) -> int:
-    """The number of samples of which a curve keeps two, of so many in all for about `points`."""
-    return 1 if count <= points else int(np.ceil(2 * count / points))
-
-
 def thin_times(times: Curve, factor: int) -> Curve:
     """The times over which curves made by `thin` are drawn."""
     if factor == 1:

@@ -1,4 +1,4 @@
-"""Scenario files, and scenarios made in Python: called, this package is `make_scenario`, for `sh.scenario({...})`."""
+"""Scenarios are files, or made in Python: called, this package is `make_scenario`, for `sh.scenario({...})`."""
 
 from __future__ import annotations
 

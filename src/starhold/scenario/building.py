@@ -1,4 +1,4 @@
-"""From a scenario to closed loops."""
+"""Closed loops are built from a scenario."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from starhold.scenario.reading import LawEntry, Scenario
 
 def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
     """The closed loop of one law of a scenario. InputError where the law cannot work with its gains, or the integration
-    cannot follow what is in the loop."""
+    cannot follow the loop."""
     loop = scenario.hooks.build(scenario, entry)
     check_fit(loop, scenario.where)
     try_parts(loop, scenario.where, f"law {entry.name}")

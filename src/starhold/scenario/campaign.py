@@ -1,8 +1,7 @@
-"""The [campaign] table of a scenario: which keys are drawn from which distributions, how many runs, and what is required of
-them.
+"""The [campaign] table of a scenario: which keys are drawn from which distributions, how many runs, and the requirements.
 
-Numbers that carry the unit of another key, such as the bounds of a distribution, stay here as the file has them; the package
-`campaign` reads them as those keys ask.
+Numbers that carry the unit of another key, such as the bounds of a distribution, stay here as the file has them; the
+package `campaign` reads them with those keys' units.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ RAW = 'a number, a string with a unit such as "0.1 N m", or a list of them'
 
 
 def _raw(value: Any) -> Any:
-    """The value, if it is what may stand for a number or numbers of another key."""
+    """The value, if it may stand for a number or numbers of another key."""
     if isinstance(value, list | tuple):
         return [_raw(item) for item in cast(list[Any], value)]
     if isinstance(value, bool) or not isinstance(value, int | float | str):
@@ -48,27 +47,27 @@ class DispersionTable(Table):
     """One key, or several that are drawn together; each table adds its `distribution`."""
 
     judged_apart: Annotated[
-        Flag, Field(description="known before flight, as the day of a launch: runs of like values are judged by themselves")
+        Flag, Field(description="known before flight, as the day of launch: runs of equal values are judged by themselves")
     ] = False
     known_to_law: Annotated[
-        Flag, Field(description="laws are told each drawn value and designed for it; else for what the file has")
+        Flag, Field(description="laws know each drawn value and are designed for it; else for the file's value")
     ] = False
 
 
 class RelativeTable(DispersionTable):
-    """One whose numbers may be shares."""
+    """A dispersion whose numbers may be shares."""
 
-    relative: Annotated[Flag, Field(description="the numbers are shares of the value that the file has")] = False
+    relative: Annotated[Flag, Field(description="the numbers are shares of the file's value")] = False
 
 
 class SpreadTable(RelativeTable):
-    """One that is drawn for each component on its own, or once for all."""
+    """A dispersion that is drawn for each component on its own, or once for all."""
 
     together: Annotated[Flag, Field(description="all components move together, by one draw")] = False
 
 
 class UniformTable(SpreadTable):
-    """Every value between two is as likely."""
+    """Every value between two bounds is equally likely."""
 
     distribution: Literal["uniform"]
     low: Annotated[Any, *raw("the least value")]
@@ -79,7 +78,7 @@ class NormalTable(SpreadTable):
     """Gauss's distribution."""
 
     distribution: Literal["normal"]
-    mean: Annotated[Any, *raw("by default what the file has")] = None
+    mean: Annotated[Any, *raw("by default the file's value")] = None
     sigma: Annotated[Any, *raw("standard deviation")]
 
 
@@ -87,7 +86,7 @@ class TruncatedNormalTable(SpreadTable):
     """Gauss's distribution between two bounds."""
 
     distribution: Literal["truncated-normal"]
-    mean: Annotated[Any, *raw("of the distribution before it is cut; by default what the file has")] = None
+    mean: Annotated[Any, *raw("of the distribution before it is cut; by default the file's value")] = None
     sigma: Annotated[Any, *raw("standard deviation before it is cut")]
     low: Annotated[Any, *raw("the least value, if there is one")] = None
     high: Annotated[Any, *raw("the greatest value, if there is one")] = None
@@ -103,7 +102,7 @@ class LogNormalTable(SpreadTable):
     """The logarithm has Gauss's distribution."""
 
     distribution: Literal["log-normal"]
-    median: Annotated[Any, *raw("by default what the file has")] = None
+    median: Annotated[Any, *raw("by default the file's value")] = None
     sigma: Annotated[Any, *raw("standard deviation of the natural logarithm, no unit")]
 
 
@@ -119,7 +118,7 @@ class CorrelatedNormalTable(RelativeTable):
     """Gauss's distribution of several numbers together: of the keys that commas divide, or of one vector."""
 
     distribution: Literal["correlated-normal"]
-    mean: Annotated[Any, *raw("by default what the file has")] = None
+    mean: Annotated[Any, *raw("by default the file's value")] = None
     sigma: Annotated[Any, *raw("standard deviations")] = None
     correlation: Annotated[Any, *raw("correlations, a row for each number")] = None
     covariance: Annotated[Any, *raw("covariances (SI), a row for each number, in place of sigma and correlation")] = None
@@ -169,13 +168,13 @@ def _read_dispersion(given: Any) -> DispersionTable:
     table = cast(Mapping[str, Any], given)
     name = table.get("distribution")
     if not isinstance(name, str) or name not in DISTRIBUTIONS:
-        found = "nothing" if name is None else show(name)
-        raise told_at("distribution", found, nearest(str(name), list(DISTRIBUTIONS)))
+        described = "nothing" if name is None else show(name)
+        raise told_at("distribution", described, nearest(str(name), list(DISTRIBUTIONS)))
     try:
         return validate(DISTRIBUTIONS[name], dict(table), "", "")
     except InputError as error:
-        # Told again by the table around, which knows the rest of the key.
-        raise told_at(error.key, error.found, error.allowed) from None
+        # Raised again by the table around, which knows the rest of the key.
+        raise told_at(error.key, error.given, error.allowed) from None
 
 
 Dispersed: TypeAlias = Annotated[
@@ -191,8 +190,8 @@ class RequirementTable(Table):
 
     name: Annotated[Name | None, Field(description="how tables and columns call it; the metric if absent")] = None
     metric: Annotated[str, Field(description="what is required: a metric as summaries name them, lost, or exclusion-cone")]
-    at_most: Annotated[Any, *raw("the greatest value that will do, in the metric's unit")] = None
-    at_least: Annotated[Any, *raw("the least value that will do, in the metric's unit")] = None
+    at_most: Annotated[Any, *raw("the greatest value allowed, in the metric's unit")] = None
+    at_least: Annotated[Any, *raw("the least value allowed, in the metric's unit")] = None
     axis: Annotated[Any, *quantity(Gain("1", shape=(3,), spread=False, text="body axis that keeps out of a cone"))] = None
     direction: Annotated[Any, *quantity(Gain("1", shape=(3,), spread=False, text="inertial axis of that cone"))] = None
     share: Annotated[
@@ -229,7 +228,7 @@ class RequirementTable(Table):
 
 
 class CampaignTable(Table):
-    """Many runs with numbers drawn from distributions, and what is required of them."""
+    """Many runs with numbers drawn from distributions, and the requirements on them."""
 
     runs: Annotated[int, *quantity(Gain("1", at_least=1, at_most=MOST_RUNS, whole=True, text="of each law"))] = 10_000
     seed: Annotated[int, *quantity(Gain("1", at_least=0, at_most=2**53, whole=True, text="of the draws"))] = 1
@@ -243,12 +242,12 @@ class CampaignTable(Table):
 
     @model_validator(mode="after")
     def _names_differ(self) -> CampaignTable:
-        # Case apart, for columns are called by them, and SQL does not tell it.
+        # Without regard to case, for columns have these names, and SQL ignores it.
         names = [requirement.called.casefold() for requirement in self.requirement]
         for number, name in enumerate(names, 1):
             if name in names[: number - 1]:
-                found = self.requirement[number - 1].called
-                raise at_key(f"requirement[{number}].name", "a name that no other requirement has, in any case", found)
+                called = self.requirement[number - 1].called
+                raise at_key(f"requirement[{number}].name", "a name that no other requirement has, in any case", called)
         return self
 
 

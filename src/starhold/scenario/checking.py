@@ -1,4 +1,4 @@
-"""Checks of what a scenario file holds: whatever is wrong becomes one line."""
+"""The contents of a scenario file are checked: every fault becomes one line."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import PydanticCustomError
 
 from starhold.errors import InputError, is_interrupt
-from starhold.laws.catalogue import Law, from_file, told
+from starhold.laws.catalogue import Law, error_line, from_file
 from starhold.loop.kernels import form, make_step
 from starhold.scenario.tables import check_name
 
@@ -38,14 +38,14 @@ RENAMED = {
 }
 """Old names of keys, laws and built-in scenarios, refused with the new one named where that one is known."""
 MOST_SUBSTEPS = 10**6
-"""The most of a control period, which is over before an interrupt is heeded."""
+"""The most in a control period, which ends before an interrupt is heeded."""
 
 
 LONGEST_TEXT, DEEPEST, MOST_DIGITS = 2**22, 16, 60
 """Characters of a file, tables and lists within one another, and digits of a whole number."""
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{50}}")
-"""A dotted key so long that the time to read it, which grows with its square, tells."""
+"""A dotted key so long that the time to read it, which grows with its square, matters."""
 
 
 def read_toml(text: str, where: str) -> dict[str, Any]:
@@ -77,7 +77,7 @@ def _in_words(value: Any) -> Any:
 
 
 def _check_sizes(tables: dict[str, Any], where: str) -> None:
-    """InputError where anything is nested too deeply to be worked on, or a whole number is far beyond what floats hold."""
+    """InputError where anything is nested too deeply, or a whole number is far beyond the range of floats."""
     left: list[tuple[int, str, Any]] = [(0, "", tables)]
     while left:
         depth, key, value = left.pop()
@@ -95,8 +95,8 @@ def _check_sizes(tables: dict[str, Any], where: str) -> None:
 def numbered(laws: Any, where: str) -> list[tuple[str, Any]]:
     """The law tables of a file with the keys that errors call them by; InputError where there is none."""
     if not isinstance(laws, list) or not laws:
-        found = "no law" if laws is None else show(laws)
-        raise InputError(where, "law", found, "at least one [[law]] table")
+        given = "no law" if laws is None else show(laws)
+        raise InputError(where, "law", given, "at least one [[law]] table")
     return [(f"law[{number}]", item) for number, item in enumerate(cast(list[Any], laws), 1)]
 
 
@@ -120,17 +120,17 @@ def pick_law(
 
 
 def _refuse_other_way(law: Law, form: str | None, name: str, where: str, key: str) -> None:
-    """InputError for a gain beside a form, and for an input of a form that is not there."""
-    own = {way: {item.name: None for item in law.fields(way)} for way in (None, *law.forms)}
-    if name in own[form]:
+    """InputError for a gain beside a form, and for an input of a form that is absent."""
+    inputs = {way: {item.name: None for item in law.fields(way)} for way in (None, *law.forms)}
+    if name in inputs[form]:
         return
-    if form is not None and name in own[None]:
-        allowed = f"the inputs of the form, {', '.join(own[form])}, or the gains without the form"
+    if form is not None and name in inputs[None]:
+        allowed = f"the inputs of the form, {', '.join(inputs[form])}, or the gains without the form"
         raise InputError(where, key, f'a gain beside form = "{form}", which computes the gains', allowed)
-    others = [f'"{way}"' for way in law.forms if name in own[way]]
+    others = [f'"{way}"' for way in law.forms if name in inputs[way]]
     if others:
-        found = "an input of a form, and no form" if form is None else f'an input of another form than "{form}"'
-        raise InputError(where, key, found, f"form = {' or '.join(others)} in the same table")
+        given = "an input of a form, and no form" if form is None else f'an input of another form than "{form}"'
+        raise InputError(where, key, given, f"form = {' or '.join(others)} in the same table")
 
 
 def _law_of(table: dict[str, Any], known: Mapping[str, Law], where: str, key: str) -> Law:
@@ -180,7 +180,7 @@ def make_gains(law: Law, values: list[Any], spec: Any, craft: Any, where: str, k
 
 @contextmanager
 def refusing(law: Law, where: str, key: str) -> Generator[None]:
-    """Make an InputError of what a law refuses by a ValueError, and of a law from a file whatever goes wrong in it."""
+    """Turn a law's ValueError into an InputError, and any exception of a law from a file."""
     try:
         yield
     except InputError:
@@ -189,14 +189,14 @@ def refusing(law: Law, where: str, key: str) -> Generator[None]:
         if is_interrupt(error):
             raise
         if law.file is not None and type(error) is not ValueError:
-            raise InputError(where, key, "", told(error, law.file)) from None
+            raise InputError(where, key, "", error_line(error, law.file)) from None
         if not isinstance(error, ValueError):
             raise
         raise InputError(where, key, "", str(error)) from None
 
 
 def try_law(loop: Any, where: str, key: str) -> None:
-    """InputError where the loop's law fails, told with the line of its file: it is called once, in plain Python, which goes
+    """InputError where the loop's law fails, with the line of its file: it is called once, in plain Python, which goes
     through all of it."""
     law = loop.law
     with refusing(law, where, key):
@@ -264,7 +264,7 @@ def validate(
 def _translate(
     error: ValidationError, model: type[BaseModel], data: Any, where: str, prefix: str, extra: list[str]
 ) -> InputError:
-    """The first fault pydantic found, in starhold's words."""
+    """The first fault that pydantic reports, in starhold's words."""
     # Unknown keys first: a misspelt key is the reason that the right one is missing.
     fault = min(error.errors(include_url=False), key=lambda e: e["type"] != "extra_forbidden")
     place = [f"[{part + 1}]" if isinstance(part, int) else part for part in fault["loc"]]
@@ -274,16 +274,16 @@ def _translate(
     key = cut(".".join(part for part in [prefix, *map(_quoted, place[:-1]), *place[-1:]] if part).replace(".[", "["), 200)
     if fault["type"] == "told_at":
         return InputError(where, key, context["found"], context["reason"])
-    found = "nothing" if context.get("found", "") is None else show(context.get("found", fault.get("input")))
+    given = "nothing" if context.get("found", "") is None else show(context.get("found", fault.get("input")))
     if fault["type"] == "extra_forbidden":
         known: list[str] = [*{*_model_at(model, place[:-1]).model_fields, *(extra if len(place) == 1 else [])}]
-        found = "an old name" if RENAMED.get(place[-1]) in known else "an unknown key"
-        return InputError(where, key, found, nearest(place[-1], known))
+        given = "an old name" if RENAMED.get(place[-1]) in known else "an unknown key"
+        return InputError(where, key, given, nearest(place[-1], known))
     if fault["type"] == "missing":
         return InputError(where, key, "nothing", "this key is required")
     if fault["type"] in ("quantity", "quantity_at"):
-        return InputError(where, key, found, str(context["reason"]).removeprefix("must be "))
-    return InputError(where, key, found, _plain(fault["msg"]))
+        return InputError(where, key, given, str(context["reason"]).removeprefix("must be "))
+    return InputError(where, key, given, _plain(fault["msg"]))
 
 
 def _quoted(part: str) -> str:
@@ -309,7 +309,7 @@ def _plain(message: str) -> str:
 
 
 def show(value: Any) -> str:
-    """A value that was found, short enough for one line."""
+    """A value as text, short enough for one line."""
     return cut(f'"{value}"' if isinstance(value, str) else str(value))
 
 

@@ -1,4 +1,4 @@
-"""Gains that formulas give the laws of a scenario, with what they can be judged by."""
+"""The gains that formulas give the laws of a scenario, with figures to judge them by."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ def design(scenario: Scenario, law: str | None = None) -> list[Design]:
     designed = [_design(scenario, entry, entry.form) for entry in entries if entry.form is not None]
     if not designed:
         allowed = 'at least one [[law]] with a form, such as type = "lqr", form = "II"'
-        found = "modes alone, whose forms are not told" if any(_has_modes(entry) for entry in entries) else "no form"
-        raise InputError(scenario.where, "law" if law is None else f"law {law}", found, allowed)
+        given = "only modes, whose designs are not shown" if any(_has_modes(entry) for entry in entries) else "no form"
+        raise InputError(scenario.where, "law" if law is None else f"law {law}", given, allowed)
     return designed
 
 

@@ -1,4 +1,4 @@
-"""Reads the gains of a law's table, given as they are or designed."""
+"""The gains of a law's table are read, given as they are or designed."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ class Read(NamedTuple):
 def read_gains(
     data: Any, scenario: Scenario, context: Any, key: str, base: type[LawTable] | None = None, whole: Any = None
 ) -> Read:
-    """The law of a raw table, called `key` in errors, for a scenario that as yet has none. base: what such tables have
-    beside the gains, by default that of the body; whole: the table, read already, that holds a body's own keys in its
+    """The law of a raw table, called `key` in errors, for a scenario that as yet has none. base: the keys of such tables
+    beside the gains, by default those of the body; whole: the table, read already, that holds a body's own keys in its
     place."""
     body, where, craft = scenario.hooks, scenario.where, scenario.craft
-    found, law, form = pick_law(data, body.laws(), body.name, scenario.folder, where, key)
+    table, law, form = pick_law(data, body.laws(), body.name, scenario.folder, where, key)
     declared, shared = law.fields(form), scenario.table.shared
-    refuse_own(found, declared, shared, where, key)
+    refuse_own(table, declared, shared, where, key)
     extra = ["file", *(["form"] if law.forms else [])]
-    own = validate(law_model(law, form, base or body.law_table, tuple(shared)), found, where, key, extra, context)
-    values = list(values_of(declared, own, shared).values())
+    validated = validate(law_model(law, form, base or body.law_table, tuple(shared)), table, where, key, extra, context)
+    values = list(values_of(declared, validated, shared).values())
     with refusing(law, where, key):
-        spec = None if form is None else body.complete(scenario, law, law.forms[form](*values), whole or own)
+        spec = None if form is None else body.complete(scenario, law, law.forms[form](*values), whole or validated)
     gains = make_gains(law, values, spec, craft, where, key)
     if not scenario.allow_unstable:
         refuse_unstable(lambda: law.check(gains, craft), where, key)
-    return Read(law, form, own, spec, gains)
+    return Read(law, form, validated, spec, gains)

@@ -58,7 +58,7 @@ def _law_schemas(body: Body, base: type[LawTable], known: dict[str, Any]) -> lis
     shared = base.model_json_schema()
     shared["properties"].pop("type")
     file = {"type": "string", "description": "a Python file that holds a law, relative to this one; it is run"}
-    own = {"title": "LawFromFile", "type": "object", "properties": {"file": file, **shared["properties"]}}
+    from_file = {"title": "LawFromFile", "type": "object", "properties": {"file": file, **shared["properties"]}}
     needed = [name for name in shared.get("required", []) if name != "type"]
     known.update(shared.get("$defs", {}))
-    return [*tables, own | {"required": ["file", *needed], "not": {"required": ["type"]}}]
+    return [*tables, from_file | {"required": ["file", *needed], "not": {"required": ["type"]}}]

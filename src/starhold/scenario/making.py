@@ -1,4 +1,4 @@
-"""Changed scenarios, and tables from Python in what TOML has: written and read as a file is, so that both mean the same."""
+"""Changed scenarios and tables from Python are written as TOML and read as a file is, so that both mean the same."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ _PART = re.compile(r"([^.\[\]]+)(?:\[(\d+)\])?")
 
 
 def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
-    """The scenario with other values at these keys, which are told as errors tell them, "spacecraft.inertia" or
-    "law[2].k_rate", and of laws and parts by their names too, "law.pd.k_rate"; None takes a key, a table or a law away."""
+    """The scenario with other values at these keys, named as errors name them, "spacecraft.inertia" or "law[2].k_rate",
+    and for laws and parts by their names too, "law.pd.k_rate"; None removes a key, a table or a law."""
     return next(variants(scenario, [changes]))
 
 
 def variants(scenario: Scenario, changes: Iterable[Mapping[str, Any]]) -> Iterator[Scenario]:
-    """The scenario changed in one way after the other; errors tell which."""
+    """The scenario changed in one way after the other; errors name the change."""
     names = {"law": [entry.name for entry in scenario.laws], "part": [fitted.called for fitted in scenario.parts]}
     tables = read_toml(scenario.text, scenario.where)
     for change in changes:
         # As short as one line allows: of many changes the first.
-        told = ", ".join(f"{key} = {show(value)}" for key, value in list(change.items())[:4])
-        told = " ".join(told.split()).encode(errors="backslashreplace").decode()
-        where = f"{scenario.where} with {told}" if told else scenario.where
+        described = ", ".join(f"{key} = {show(value)}" for key, value in list(change.items())[:4])
+        described = " ".join(described.split()).encode(errors="backslashreplace").decode()
+        where = f"{scenario.where} with {described}" if described else scenario.where
         try:
             other = deepcopy(tables)
             for key, value in change.items():
                 _put(other, path_of(key, names, where), deepcopy(value), where, scenario.table)
             yield scenario._of(plain(other, where, ""))  # pyright: ignore[reportPrivateUsage]
         except InputError as error:
-            raise InputError(where, error.key, error.found, error.allowed) from None
+            raise InputError(where, error.key, error.given, error.allowed) from None
 
 
 def path_of(key: Any, names: Mapping[str, Sequence[str]], where: str) -> list[str | int]:
@@ -68,8 +68,8 @@ def path_of(key: Any, names: Mapping[str, Sequence[str]], where: str) -> list[st
     return path
 
 
-def _put(tables: Any, path: Sequence[str | int], value: Any, where: str, held: Any) -> None:
-    """Put a value into raw tables; held: the validated ones, whose defaults stand for vectors that the file leaves out."""
+def _put(tables: Any, path: Sequence[str | int], value: Any, where: str, validated: Any) -> None:
+    """Put a value into raw tables; validated: those whose defaults stand for vectors that the file leaves out."""
     here: Any = tables
     seen = ""
     for part, after in zip(path, [*path[1:], None], strict=True):
@@ -84,9 +84,9 @@ def _put(tables: Any, path: Sequence[str | int], value: Any, where: str, held: A
             seen = f"{seen}.{part}".lstrip(".")
             if not isinstance(here, dict):
                 raise InputError(where, seen, "a value that is no table", "keys of tables")
-            held = getattr(held, part, None)
+            validated = getattr(validated, part, None)
             if not last:
-                known = list(cast(Any, held)) if isinstance(held, tuple) else []
+                known = list(cast(Any, validated)) if isinstance(validated, tuple) else []
                 cast(dict[str, Any], here).setdefault(part, known if isinstance(after, int) else {})
         if last:
             cast(Any, here)[part] = value
@@ -95,8 +95,8 @@ def _put(tables: Any, path: Sequence[str | int], value: Any, where: str, held: A
 
 
 def plain(value: Any, where: str, key: str) -> Any:
-    """The value in what TOML has; InputError where it is nothing of that."""
-    # One that is not loaded has made no rotation.
+    """The value in types that TOML has; InputError where it has none of them."""
+    # Without the module loaded there is no rotation.
     transform: Any = sys.modules.get("scipy.spatial.transform")
     if transform is not None and isinstance(value, transform.Rotation):
         return cast(Any, value).as_quat(scalar_first=True).tolist()
@@ -109,13 +109,13 @@ def plain(value: Any, where: str, key: str) -> Any:
     if isinstance(value, date):
         return value.isoformat()
     if isinstance(value, Mapping):
-        found: dict[str, Any] = {}
+        table: dict[str, Any] = {}
         for name, item in cast(Mapping[Any, Any], value).items():
             if not isinstance(name, str):
                 raise InputError(where, key, f"the key {show(name)}", "keys that are strings")
             if item is not None:
-                found[name] = plain(item, where, f"{key}.{name}".lstrip("."))
-        return found
+                table[name] = plain(item, where, f"{key}.{name}".lstrip("."))
+        return table
     if isinstance(value, list | tuple):
         items = list(cast(Sequence[Any], value))
         return [plain(item, where, f"{key}[{n}]") for n, item in enumerate(items, 1) if item is not None]

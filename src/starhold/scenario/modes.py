@@ -1,4 +1,4 @@
-"""Reads laws of modes: a [[law]] of the type "modes" with [[law.mode]] tables."""
+"""Laws of modes are read: a [[law]] of the type "modes" with [[law.mode]] tables."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class _Condition(Table):
-    """When another mode begins: all that is asked for holds for so long."""
+    """Another mode begins when all tests have held for a time."""
 
     to: Annotated[str | None, Field(description="the mode that begins; until: the next, back: the one before")] = None
     after: Annotated[float, *quantity(AFTER)] = 0.0
@@ -37,7 +37,7 @@ class _Condition(Table):
 
     @property
     def tests(self) -> tuple[str, ...]:
-        """The tests that it asks for."""
+        """The names of its tests."""
         return tuple(test for test in TESTS if getattr(self, test) is not None)
 
 
@@ -71,7 +71,7 @@ class ModeTable(LawTable):
 
 @cache
 def modes_model(base: type[LawTable]) -> type[LawTable]:
-    """The table of a law of modes, but for its modes; base: what a body's tables of laws have."""
+    """The table of a law of modes, but for its modes; base: the keys of a body's law tables."""
     entries: dict[str, Any] = {"type": (Literal[NAME], NAME)}
     return create_model("Modes", __base__=base, __doc__="A law for each mode.", **entries)
 
@@ -89,8 +89,8 @@ def read_modes(data: Any, scenario: Scenario, context: Any, key: str) -> Read:
     table = validate(modes_model(scenario.hooks.law_table), rest, where, key, ["mode"], context)
     given = data.get("mode")
     if not isinstance(given, list) or len(cast(list[Any], given)) < 2:
-        found = "nothing" if given is None else "one mode" if isinstance(given, list) and given else show(given)
-        raise InputError(where, f"{key}.mode", found, "at least two [[law.mode]] tables")
+        described = "nothing" if given is None else "one mode" if isinstance(given, list) and given else show(given)
+        raise InputError(where, f"{key}.mode", described, "at least two [[law.mode]] tables")
     reads: list[Read] = []
     for number, one in enumerate(cast(list[Any], given), 1):
         place = f"{key}.mode[{number}]"

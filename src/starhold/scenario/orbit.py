@@ -1,4 +1,4 @@
-"""The table of an orbit, by position and velocity or by elements, and what is refused of one."""
+"""The table of an orbit, by position and velocity or by elements, and the orbits that are refused."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from starhold.scenario.quantity import ask_for_unit, quantity, reader
 from starhold.scenario.tables import Table, at_key, refuse
 
 DENSEST = 1e6
-"""Mean density (kg/m3) of what is closer to a centre of attraction than a craft can be; planets have less than 6000."""
+"""Mean density (kg/m3) above which a start lies inside the central body; planets have less than 6000."""
 LOWEST = 1.0 / 64.0
-"""Plain altitudes below this share of the body's radius are asked for their unit: about the Earth, below 100 km."""
+"""Plain altitudes below this share of the body's radius need a unit: about the Earth, below 100 km."""
 FASTEST = 10.0
 """Speed over that of escape from the Sun, a planet or the Moon beyond which a unit is taken to be wrong."""
 STRAIGHT = 1e-9
@@ -30,7 +30,7 @@ ANGLES = ("inclination", "raan", "argument_of_perigee", "true_anomaly")
 
 
 def too_dense(gravity: float, distance: float) -> bool:
-    """Whether no body with this gravitational parameter (m3/s2) is small enough to be at this distance (m) from."""
+    """Whether no body with this gravitational parameter (m3/s2) is small enough for an orbit at this distance (m)."""
     return gravity > DENSEST * NEWTON * 4.0 / 3.0 * math.pi * distance**3
 
 
@@ -112,11 +112,11 @@ class Orbit(Table):
     @model_validator(mode="wrap")
     @classmethod
     def _in_metres(cls, given: Any, read: Callable[[Any], Orbit]) -> Orbit:
-        found, altitude = read(given), cast(Any, given).get("altitude") if isinstance(given, dict) else None
-        if isinstance(altitude, int | float) and found.surface is not None and altitude < LOWEST * found.surface:
-            low = f"{LOWEST * found.surface:.6g} or more about this body"
+        orbit, altitude = read(given), cast(Any, given).get("altitude") if isinstance(given, dict) else None
+        if isinstance(altitude, int | float) and orbit.surface is not None and altitude < LOWEST * orbit.surface:
+            low = f"{LOWEST * orbit.surface:.6g} or more about this body"
             raise at_key("altitude", ask_for_unit(altitude, "m", low, "km"), altitude)
-        return found
+        return orbit
 
     @model_validator(mode="after")
     def _told_once(self) -> Orbit:
@@ -151,17 +151,17 @@ class Orbit(Table):
         except ValueError as error:
             key = "true_anomaly" if "anomaly" in str(error) else "semi_major_axis"
             raise at_key(key, str(error), getattr(self, key)) from None
-        key, found = ("semi_major_axis", self.semi_major_axis) if self.position is None else ("position", list(position))
+        key, value = ("semi_major_axis", self.semi_major_axis) if self.position is None else ("position", list(position))
         distance, fast = norm(position), norm(velocity)
         if not distance:
-            raise at_key(key, "a point away from the centre of attraction", found)
+            raise at_key(key, "a point away from the centre of attraction", value)
         if self.surface is not None and distance < self.surface:
             name = body_of(gravity) or "body"
             allowed = f"a start above the {name}'s radius of {1e-3 * self.surface:g} km; a plain number is in m"
-            raise at_key(key, allowed, found)
+            raise at_key(key, allowed, value)
         if too_dense(gravity, distance):
             allowed = "a start that is not inside what it orbits; plain numbers are in m, GM in m^3/s^2"
-            raise at_key(key, allowed, found)
+            raise at_key(key, allowed, value)
         if norm(cross(position, velocity)) <= STRAIGHT * distance * fast:
             raise at_key("velocity", "an orbit that passes beside the centre of attraction, not through it", list(velocity))
         return self
@@ -176,13 +176,13 @@ class Orbit(Table):
             warnings.warn(f"orbit.velocity: {said}", stacklevel=2)
         if surface is None or lowest(position, velocity, gravity) >= surface:
             return
-        key, found = ("velocity", list(velocity)) if self.position is not None else ("semi_major_axis", self.semi_major_axis)
+        key, value = ("velocity", list(velocity)) if self.position is not None else ("semi_major_axis", self.semi_major_axis)
         name = body_of(gravity) or "body"
         moment = meets_at(position, velocity, gravity, surface)
         if moment < duration:
             allowed = (
                 f"an orbit above the {name}'s surface, which this one meets after {moment:.4g} s; plain numbers are in m/s"
             )
-            raise at_key(f"orbit.{key}", allowed, found)
+            raise at_key(f"orbit.{key}", allowed, value)
         if moment < math.inf:
             warnings.warn(f"orbit.{key}: the orbit meets the {name}'s surface after {moment:.4g} s", stacklevel=2)

@@ -1,4 +1,4 @@
-"""Reads the [[part]] tables of a scenario: parts of any role that stand in a file of their own, here or in another
+"""The [[part]] tables of a scenario are read: parts of any role that stand in a file of their own, here or in another
 package."""
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from starhold.laws.catalogue import Law
 from starhold.laws.modes import Modes
 from starhold.loop.closed_loop import ClosedLoop, before_first, can_be_inactive, is_recorded
 from starhold.loop.step import make_equations
-from starhold.parts.catalogue import PACKAGES, as_part, from_file, parts, read_module, role_of, told
+from starhold.parts.catalogue import PACKAGES, as_part, error_line, from_file, parts, read_module, role_of
 from starhold.parts.orbit import body_of
 from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import Goal
@@ -36,7 +36,7 @@ SINGLE = {"estimator": "one estimator", "target": "one target"}
 
 
 class PartTable(Table):
-    """All that a part's table may say beside the part's own parameters."""
+    """The keys of a part's table beside the part's own parameters."""
 
     type: str
     name: Annotated[Name | None, Field(description="how recordings and errors call it; the type if absent")] = None
@@ -65,15 +65,15 @@ def read_parts(
         return ()
     if not isinstance(tables, list):
         raise InputError(where, "part", show(tables), "[[part]] tables, with double brackets")
-    found: list[Fitted] = []
+    collected: list[Fitted] = []
     for number, data in enumerate(cast(list[Any], tables), 1):
         key = f"part[{number}]"
         if not isinstance(data, dict):
             raise InputError(where, key, show(data), "a [[part]] table")
         read = read_part(cast(dict[str, Any], data), body, folder, where, key, shared, units)
-        taken = {fitted.name for fitted in found}
-        found.append(replace(read, name=free_name(read.name or None, read.part.name, taken, where, key)))
-    return tuple(found)
+        taken = {fitted.name for fitted in collected}
+        collected.append(replace(read, name=free_name(read.name or None, read.part.name, taken, where, key)))
+    return tuple(collected)
 
 
 def read_part(
@@ -103,8 +103,8 @@ def _of_type(table: dict[str, Any], where: str, key: str) -> Part:
     given = next((part for role in PACKAGES for part in parts(role).values() if part.name == name and part.table), None)
     if given is not None:
         raise InputError(where, f"{key}.type", show(name), f"the [{given.table}] table, which gives it")
-    found = "nothing" if name is None else show(name)
-    raise InputError(where, f"{key}.type", found, f"{nearest(str(name), list(known))}; or a file")
+    described = "nothing" if name is None else show(name)
+    raise InputError(where, f"{key}.type", described, f"{nearest(str(name), list(known))}; or a file")
 
 
 def _read(path: Path) -> Part:
@@ -116,7 +116,7 @@ def _read(path: Path) -> Part:
 
 def with_rows(part: Part, table: dict[str, Any], folder: Path, where: str, key: str) -> dict[str, Any]:
     """The table with the rows of CSV files in place of their names."""
-    found = dict(table)
+    filled = dict(table)
     for item in part.fields():
         given = table.get(item.name)
         if item.gain.columns and isinstance(given, str):
@@ -127,13 +127,13 @@ def with_rows(part: Part, table: dict[str, Any], folder: Path, where: str, key: 
                 if lines and not _is_number(lines[0][0]):
                     lines = lines[1:]
                 if any(len(line) != len(item.gain.columns) for line in lines):
-                    raise ValueError(f"a line that has not {len(item.gain.columns)} columns")
-                found[item.name] = [[float(cell) for cell in line] for line in lines]
+                    raise ValueError(f"a line without {len(item.gain.columns)} columns")
+                filled[item.name] = [[float(cell) for cell in line] for line in lines]
             except OSError as error:
                 raise InputError(where, f"{key}.{item.name}", f"{given}: {error.strerror}", allowed) from None
             except ValueError as error:
                 raise InputError(where, f"{key}.{item.name}", f"{given}: {error}", allowed) from None
-    return found
+    return filled
 
 
 def _is_number(text: str) -> bool:
@@ -148,9 +148,9 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
     """InputError where the parts of a loop do not go together."""
     fitted = loop.parts
     for role, most in SINGLE.items():
-        found = loop.used(role)
-        if len(found) > 1:
-            raise InputError(where, _key(found[1]), f"a second {role}, beside {found[0].called}", most)
+        used = loop.used(role)
+        if len(used) > 1:
+            raise InputError(where, _key(used[1]), f"a second {role}, beside {used[0].called}", most)
     _check_effectors(loop, where)
     readings: dict[str, str] = {}
     for sensor in loop.used("sensor"):
@@ -167,8 +167,8 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
                 raise InputError(where, _key(one), f"no {need}, which {one.called} needs", allowed)
         about = one.part.about
         if about and body_of(loop.craft.gravity) != about:
-            found = f"an orbit about {body_of(loop.craft.gravity) or 'an unknown body'}"
-            raise InputError(where, _key(one), found, f"one about {about}, of which it is a model")
+            given = f"an orbit about {body_of(loop.craft.gravity) or 'an unknown body'}"
+            raise InputError(where, _key(one), given, f"one about {about}, the body of its model")
     for one, key in (*((f.part, _key(f)) for f in fitted), (loop.law, f"law {loop.law.name}")):
         for need in one.reads:
             if need not in readings:
@@ -185,7 +185,7 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
 
 
 def _measuring(reading: str) -> str:
-    """A sensor of a reading, with the installed ones that there are."""
+    """A sensor of a reading, with examples among the installed ones."""
     known = [name for name, part in parts("sensor").items() if reading in part.module.Reading._fields and not part.table]
     return f"a sensor that measures {reading}{', such as ' * bool(known)}{' or '.join(known)}"
 
@@ -201,8 +201,8 @@ def _check_effectors(loop: ClosedLoop, where: str) -> None:
     module: Any = loop.law.module
     if not isinstance(module, Modes):
         if len(acting) > 1:
-            found = f"a second effector for the command, beside {acting[0].called}"
-            raise InputError(where, _key(acting[1]), found, 'one, or a law of type "modes" whose modes say which')
+            given = f"a second effector for the command, beside {acting[0].called}"
+            raise InputError(where, _key(acting[1]), given, 'one, or a law of type "modes" whose modes say which')
         _check_outside(loop.law, acting, where, f"law {loop.law.name}")
         return
     for mode in module.modes:
@@ -223,8 +223,8 @@ def _check_effectors(loop: ClosedLoop, where: str) -> None:
 def _check_outside(law: Law, acting: list[Fitted], where: str, key: str) -> None:
     """InputError where a law's torque has to come from outside, and an effector would only shift momentum."""
     if law.flag("FROM_OUTSIDE") and acting and not acting[0].part.flag("OUTSIDE"):
-        found = f"{law.name} with {acting[0].called}, which keep the momentum that it is to take away"
-        raise InputError(where, key, found, "magnetorquers, another effector that acts from outside, or none")
+        given = f"{law.name} with {acting[0].called}, which keep the momentum that it is to take away"
+        raise InputError(where, key, given, "magnetorquers, another effector that acts from outside, or none")
 
 
 def _key(fitted: Fitted) -> str:
@@ -251,7 +251,7 @@ def try_parts(loop: ClosedLoop, where: str, key: str) -> None:
         return
     tried = replace(loop, parts=tuple(f if f.part.file is None else _watched(f, loop, where) for f in loop.parts))
     try:
-        # Not of the cache of such steps, for it is flown once.
+        # The step is not cached, for it is flown once.
         step, carry, setup = make_equations(tried.composition()), tried.carry(), tried.setup()
         for number in range(2):
             carry = step.update(carry, number, (loop.seed, 0), loop.gains, loop.known, setup)
@@ -262,7 +262,7 @@ def try_parts(loop: ClosedLoop, where: str, key: str) -> None:
     except BaseException as error:
         if is_interrupt(error):
             raise
-        # The law's own file may be at fault; else what a part gives does not fit where it is taken.
+        # The law's own file may be at fault; else a part's result does not fit where it is used.
         try_law(loop, where, key)
         guilty = next(f for f in loop.parts if f.part.file is not None)
         allowed = "its equations must return states formed as those they are given"
@@ -270,58 +270,58 @@ def try_parts(loop: ClosedLoop, where: str, key: str) -> None:
 
 
 def _watched(fitted: Fitted, loop: ClosedLoop, where: str) -> Fitted:
-    """A part from a file whose every equation is looked at when it is called."""
+    """A part from a file whose every equation is checked when it is called."""
     module: Any = _Watched(fitted, loop.start, where)
     return replace(fitted, part=replace(fitted.part, module=module))
 
 
 class _Watched:
-    """The module of a part from a file, whose equations raise InputError where they fail or give what its role does not."""
+    """The module of a part from a file, whose equations raise InputError where they fail or break their role's contract."""
 
     def __init__(self, fitted: Fitted, state: Any, where: str) -> None:
         self._fitted, self._state, self._where = fitted, state, where
 
     def __getattr__(self, name: str) -> Any:
-        found = getattr(self._fitted.part.module, name)
-        return found if isinstance(found, type) or not callable(found) else self._called(name, found)
+        attribute = getattr(self._fitted.part.module, name)
+        return attribute if isinstance(attribute, type) or not callable(attribute) else self._called(name, attribute)
 
     def _called(self, name: str, equation: Any) -> Any:
         def called(*given: Any) -> Any:
             part = self._fitted.part
             try:
-                found = equation(*given)
+                result = equation(*given)
             except BaseException as error:
                 if is_interrupt(error):
                     raise
-                raise InputError(self._where, _key(self._fitted), "", told(error, part.file)) from None
-            what = self._wrong(part, name, found, given)
+                raise InputError(self._where, _key(self._fitted), "", error_line(error, part.file)) from None
+            what = self._wrong(part, name, result, given)
             if what:
-                raise InputError(self._where, _key(self._fitted), f"{name} returns {show(found)}", what)
-            return found
+                raise InputError(self._where, _key(self._fitted), f"{name} returns {show(result)}", what)
+            return result
 
         return called
 
-    def _wrong(self, part: Part, name: str, found: Any, given: Any) -> str:
-        """Words for what the equation should give, where it does not."""
+    def _wrong(self, part: Part, name: str, result: Any, given: Any) -> str:
+        """Return words for the result that the equation should have, where it does not have it."""
         if name in VECTORS.get(part.role, ()):
-            return "" if _alike(found, ZERO) else "three numbers"
+            return "" if _alike(result, ZERO) else "three numbers"
         if (part.role, name) == ("effector", "inertia"):
-            return "" if _alike(found, (ZERO, ZERO, ZERO)) else "three rows of three numbers"
+            return "" if _alike(result, (ZERO, ZERO, ZERO)) else "three rows of three numbers"
         if (part.role, name) == ("target", "goal"):
             like = Goal((1.0, 0.0, 0.0, 0.0), ZERO, ZERO)
-            return "" if isinstance(found, Goal) and _alike(found, like) else "a Goal of four, three and three numbers"
+            return "" if isinstance(result, Goal) and _alike(result, like) else "a Goal of four, three and three numbers"
         if (part.role, name) in (("effector", "rates"), ("effector", "switch"), ("environment", "update")):
-            return "" if _alike(found, given[0], name == "rates") else "numbers formed as those of the first argument"
+            return "" if _alike(result, given[0], name == "rates") else "numbers formed as those of the first argument"
         if name == "record":
-            return _undeclared(type(found))
+            return _undeclared(type(result))
         if name not in ("measure", "estimate"):
             return ""
         kind = part.module.Reading if name == "measure" else part.module.Estimate
-        if not (isinstance(found, tuple) and len(cast(Any, found)) == 2 and isinstance(found[0], kind)):
+        if not (isinstance(result, tuple) and len(cast(Any, result)) == 2 and isinstance(result[0], kind)):
             return f"a pair of a {kind.__name__} and the memory"
-        if not _alike(found[1], given[1]):
+        if not _alike(result[1], given[1]):
             return "a memory formed as the one that it is given"
-        for item, value in cast(Any, found[0])._asdict().items():
+        for item, value in cast(Any, result[0])._asdict().items():
             if item in self._state._fields and not _alike(value, getattr(self._state, item)):
                 return f"{item} formed as that of the body's state"
         return _undeclared(kind) if name == "estimate" or is_recorded(part) else ""
@@ -336,7 +336,7 @@ VECTORS = {
 
 
 def _undeclared(kind: Any) -> str:
-    """Words for what recordings need of a kind of tuple, where it lacks it."""
+    """Return words for what recordings need and a kind of tuple lacks."""
     try:
         quantities(kind)
     except Exception:
@@ -357,10 +357,10 @@ def _alike(one: Any, other: Any, still: bool = False) -> bool:
 def part_schemas(body: str, shared: tuple[str, ...]) -> list[dict[str, Any]]:
     """JSON Schemas of the [[part]] tables of a body: one for each installed part, and one for a part from a file; shared:
     keys of its scenarios that give parameters to all parts."""
-    found = [part_model(part, shared).model_json_schema() for part in installed().values() if part.body in ("", body)]
-    for table in found:
+    schemas = [part_model(part, shared).model_json_schema() for part in installed().values() if part.body in ("", body)]
+    for table in schemas:
         table["required"] = sorted({"type", *table.get("required", [])})
     file = {"type": "string", "description": "a Python file that holds a part, relative to this one; it is run"}
     name = PartTable.model_json_schema()["properties"]["name"]
-    own = {"title": "PartFromFile", "type": "object", "properties": {"file": file, "name": name}, "required": ["file"]}
-    return [*found, own | {"not": {"required": ["type"]}}]
+    from_file = {"title": "PartFromFile", "type": "object", "properties": {"file": file, "name": name}, "required": ["file"]}
+    return [*schemas, from_file | {"not": {"required": ["type"]}}]

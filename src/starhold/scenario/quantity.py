@@ -18,13 +18,13 @@ from starhold.scenario.units import shown, to_number
 LEAST, MOST = 1e-30, 1e30
 """Sizes of quantities that files may hold, beside zero; of a vector or matrix the size of its largest entry."""
 PLAIN = {"rad": (math.tau, "within 2 pi", "deg"), "T": (1e-3, "within 0.001", "nT")}
-"""By unit: up to what size plain numbers are taken, and what a larger one may be meant in."""
+"""By unit: the largest plain number that is taken, this bound in words, and the unit that a larger one may be meant in."""
 MOST_WHOLE = 2**53
 """Up to here floats hold every whole number."""
 
 
 Annotations: TypeAlias = tuple[BeforeValidator, WithJsonSchema, Gain]
-"""What reads a quantity, what describes it in the JSON schema, and its declaration, which pydantic leaves with the field."""
+"""The validator of a quantity, its JSON schema, and its declaration, which pydantic leaves with the field."""
 
 
 def quantity(gain: Gain) -> Annotations:
@@ -49,13 +49,13 @@ SCALED = {"length": "m", "velocity": "m/s", "acceleration": "m/s^2", "time": "s"
 
 
 def any_quantity(gain: Gain) -> Annotations:
-    """The annotations for a quantity, scaled where the declaration says of what."""
+    """The annotations for a quantity, scaled where the declaration has a dimension."""
     return scaled(gain.dimension, replace(gain, unit=SCALED[gain.dimension])) if gain.dimension else quantity(gain)
 
 
 def scaled(kind: Literal["length", "velocity", "acceleration", "time", "rate"], gain: Gain) -> Annotations:
-    """The annotations for scaled numbers: plain ones are, strings with the gain's unit become so. Their worth in SI is told
-    by the validation's context, under the name of its kind; the bounds are of scaled numbers."""
+    """The annotations for scaled numbers: plain ones are scaled, strings with the gain's unit become so. The SI value
+    of one unit stands in the validation's context, under the name of its kind; the bounds are of scaled numbers."""
     read, schema = reader(gain), _schema(gain)
     schema["description"] = f"{gain.text} (scaled, or with a unit such as {gain.unit})"
 
@@ -96,15 +96,15 @@ def _to_numbers(value: Any, gain: Gain, worth: float) -> Any:
         return to_number(value, gain.unit) / worth
     if gain.whole and abs(value) > MOST_WHOLE:
         raise ValueError("at most 2^53")
-    most, told, unit = PLAIN.get(gain.unit, (math.inf, "", ""))
+    most, within, unit = PLAIN.get(gain.unit, (math.inf, "", ""))
     if abs(value) > most:
-        raise ValueError(ask_for_unit(value, gain.unit, told, unit))
+        raise ValueError(ask_for_unit(value, gain.unit, within, unit))
     return value
 
 
-def ask_for_unit(value: float, unit: str, told: str, other: str) -> str:
-    """The question for the unit of a plain number that is far from any of its kind; other: the unit that may be meant."""
-    return f'a plain number is in {unit}, {told}; with a unit it is "{value:g} {other}" or "{value:g} {unit}"'
+def ask_for_unit(value: float, unit: str, within: str, other: str) -> str:
+    """The text that asks for the unit of a plain number far from any of its kind; other: the unit that may be meant."""
+    return f'a plain number is in {unit}, {within}; with a unit it is "{value:g} {other}" or "{value:g} {unit}"'
 
 
 def _check_size(value: Any) -> None:

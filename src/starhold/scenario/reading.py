@@ -1,4 +1,4 @@
-"""Reads a scenario file; every error in it is reported in one line."""
+"""A scenario file is read; every error in it is reported in one line."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from starhold.scenario.writing import toml_text
 LONGEST_PATH = 200
 """Characters of a path that errors show whole."""
 WHERE = "scenario"
-"""The name that errors call one by that comes from no file."""
+"""The name, in errors, of a scenario that comes from no file."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -44,7 +44,7 @@ class LawEntry:
     law: Law
     gains: Any
     options: Any
-    """The NamedTuple of what the body lets a law's table say beside its gains."""
+    """The values of the keys that a body adds to the gains of law tables, a NamedTuple."""
     form: str | None = None
     spec: Any = None
     """The design form that gave the gains, and its inputs; None where the file gives the gains themselves."""
@@ -57,8 +57,8 @@ class LawEntry:
 
 @dataclass(frozen=True, repr=False)
 class Scenario:
-    """A scenario file read and checked: how its body is read and built, its tables, its laws with their gains, its text,
-    what errors call it, and the folder that file names in it are relative to."""
+    """A scenario file read and checked: how its body is read and built, its tables, its laws with their gains, its
+    text, its name in errors, and the folder that file names in it are relative to."""
 
     hooks: Body
     table: Any
@@ -67,7 +67,7 @@ class Scenario:
     where: str = ""
     folder: Path = Path()
     allow_unstable: bool = False
-    """Whether gains that a law tells to be unstable are taken."""
+    """Whether gains are accepted that a law's own check finds unstable."""
     parts: tuple[Fitted, ...] = ()
     """The parts that [[part]] tables give."""
     supposed: Scenario | None = None
@@ -109,9 +109,9 @@ class Scenario:
 
     @shortly
     def with_(self, changes: Mapping[str, Any]) -> Scenario:
-        """The scenario with other values at some keys: {"spacecraft.inertia": [2, 3, 4], "law.pd.k_rate": "0.1 N m s"}; the
-        key of a law's or a part's table is its name, or "law[1]" by its place; None takes away what is there. InputError as
-        of a file."""
+        """The scenario with other values at some keys: {"spacecraft.inertia": [2, 3, 4], "law.pd.k_rate": "0.1 N m s"};
+        the key of a law's or a part's table is its name, or "law[1]" by its place; None removes a key. InputError as
+        for a file."""
         return changed(self, changes)
 
     def _of(self, tables: Mapping[str, Any]) -> Scenario:
@@ -150,26 +150,26 @@ def open_scenario(source: Scenario | str | Path) -> Scenario:
 
 
 def load(source: str | Path, allow_unstable: bool = False) -> Scenario:
-    """The scenario in a file, or the built-in one of that name. InputError says what is wrong with it; gains that a law
-    tells to be unstable are, unless allowed."""
+    """The scenario in a file, or the built-in one of that name. InputError says what is wrong with it, which includes
+    gains that a law's own check finds unstable, unless they are allowed."""
     return parse(*_read_text(source), allow_unstable)
 
 
 def _read_text(source: str | Path) -> tuple[str, str, Path]:
-    """The text of a file or of a built-in scenario, what errors call it, and its folder."""
+    """The text of a file or of a built-in scenario, its name in errors, and its folder."""
     path, where = Path(source), cut(str(source), LONGEST_PATH)
     try:
         if not path.is_file() and str(source) in builtin_names():
             return builtin_text(str(source)), str(source), Path()
         with path.open(encoding="utf-8") as file:
-            # No more than is taken, for a device has no end.
+            # No more than the limit, for a device has no end.
             return file.read(LONGEST_TEXT + 1), where, path.parent
     except FileNotFoundError:
         known = nearest(where, builtin_names())
         raise InputError(where, "", "no such file", f"a scenario file, or a built-in scenario: {known}") from None
     except (OSError, ValueError) as error:
-        found = getattr(error, "strerror", None) or type(error).__name__
-        raise InputError(where, "", found, "a readable text file") from None
+        reason = getattr(error, "strerror", None) or type(error).__name__
+        raise InputError(where, "", reason, "a readable text file") from None
 
 
 def parse(text: str, where: str, folder: Path = Path(), allow_unstable: bool = False) -> Scenario:
@@ -181,9 +181,8 @@ def parse(text: str, where: str, folder: Path = Path(), allow_unstable: bool = F
 def make_scenario(tables: Mapping[str, Any], folder: str | Path = ".", allow_unstable: bool = False) -> Scenario:
     """The scenario of tables as a file would hold them, {"name": "mine", "spacecraft": {"inertia": [2, 3, 4]}, ..., "law":
     [{"type": "pd", ...}]}: strings, numbers, truths, dates, lists and tables; tuples and NumPy arrays count as lists, a
-    Rotation of SciPy as the quaternion of an attitude, and what is None as left out. `folder`: what file names in it are
-    relative to. InputError says what is wrong, as of a file. A scenario's `with_` gives others like it, and its `text` is
-    the file."""
+    Rotation of SciPy as the quaternion of an attitude, and None as left out. File names in it are relative to `folder`.
+    InputError says what is wrong, as for a file. A scenario's `with_` gives others like it, and its `text` is the file."""
     written = plain(tables, WHERE, "")
     return read_tables(written, toml_text(written), WHERE, Path(folder), allow_unstable)
 
@@ -191,7 +190,7 @@ def make_scenario(tables: Mapping[str, Any], folder: str | Path = ".", allow_uns
 def read_tables(data: Mapping[str, Any], text: str, where: str, folder: Path, allow_unstable: bool) -> Scenario:
     """The scenario of the raw tables that a text holds."""
     body = body_of(data, where, folder)
-    # First of all, for it says what the numbers of the other tables are worth.
+    # First of all, for it scales the numbers of the other tables.
     context = body.context(data, where)
     table = _tables(body, data, where, context)
     parts = read_parts(data.get("part"), body.name, folder, where, table.shared, context)
@@ -223,7 +222,7 @@ def _supposed(scenario: Scenario, data: Mapping[str, Any], context: Any) -> Scen
         supposed = replace(scenario, table=_tables(scenario.hooks, other, scenario.where, context))
         _ = supposed.made
     except InputError as error:
-        raise InputError(error.where, f"nominal.{error.key}", error.found, error.allowed) from None
+        raise InputError(error.where, f"nominal.{error.key}", error.given, error.allowed) from None
     return supposed
 
 
@@ -231,7 +230,7 @@ def _read_law(data: Any, scenario: Scenario, context: Any, key: str, taken: set[
     """The law of a raw table, for a scenario that as yet has none."""
     body, where = scenario.hooks, scenario.where
     reads = read_modes if has_modes(data, body) else read_gains
-    law, form, own, spec, gains, targets = reads(data, scenario, context, key)
-    options = body.options(scenario, own, gains, key)
-    name = free_name(own.name, law.name, taken, where, key)
+    law, form, table, spec, gains, targets = reads(data, scenario, context, key)
+    options = body.options(scenario, table, gains, key)
+    name = free_name(table.name, law.name, taken, where, key)
     return LawEntry(name, law, gains, options, form, spec, targets)

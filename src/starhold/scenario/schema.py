@@ -20,13 +20,13 @@ from starhold.scenario.shared import own_fields
 from starhold.scenario.tables import Name, Table, at_key
 
 APART = ("law", "part")
-"""Arrays of tables that are read one by one, each as what it names asks."""
+"""Arrays of tables that are read one by one, each by the type that it names."""
 MOST_STEPS = 1e12
-"""Beyond this many control steps the count is no longer told from its neighbours, and no run would end."""
+"""Beyond this many control steps their count is lost in rounding, and no run would end."""
 
 
 class ScenarioTable(Table):
-    """A whole file but for its laws: a body's own class adds what it has, a `simulation` among it."""
+    """A whole file but for its laws: a body's own class adds its tables, a `simulation` among them."""
 
     name: Annotated[Name, Field(description="how results and folders are called")]
     description: Annotated[str, Field(description="a sentence for the report")] = ""
@@ -36,13 +36,13 @@ class ScenarioTable(Table):
         description="tables that laws take for true and are designed for, in place of the file's own of that name",
     )
     SHARED: ClassVar[Mapping[str, Any]] = MappingProxyType({})
-    """The keys that give a number to all parts that declare it as `shared`, with what a scenario without them gives."""
+    """The keys that give a number to all parts that declare it as `shared`, with the default of each."""
 
     @property
     def shared(self) -> dict[str, Any]:
         """The values of the shared keys."""
-        found = {key: reduce(lambda table, name: getattr(table, name, None), key.split("."), self) for key in self.SHARED}
-        return {key: self.SHARED[key] if value is None else value for key, value in found.items()}
+        given = {key: reduce(lambda table, name: getattr(table, name, None), key.split("."), self) for key in self.SHARED}
+        return {key: self.SHARED[key] if value is None else value for key, value in given.items()}
 
 
 class LawTable(Table):
@@ -103,14 +103,14 @@ class SeededTiming(Timing):
 
 def columns(declared: Iterable[Parameter]) -> dict[str, Any]:
     """The keys, for pydantic's `create_model`, of a table that takes the declared parameters of a law or another part."""
-    found: dict[str, Any] = {}
+    keys: dict[str, Any] = {}
     for item in declared:
         written = item.gain.choices[item.default] if item.gain.choices and not item.required else item.default
-        # What has None for its default, or is unlimited by default, may be left out.
+        # A key may be left out whose default is None or infinite.
         written = None if isinstance(written, float) and not math.isfinite(written) else written
         kind = Annotated[Any, *any_quantity(item.gain), Field(validate_default=written is not None)]
-        found[item.name] = (kind, ... if item.required else written)
-    return found
+        keys[item.name] = (kind, ... if item.required else written)
+    return keys
 
 
 @cache

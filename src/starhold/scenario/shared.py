@@ -30,10 +30,10 @@ def refuse_own(table: Mapping[str, Any], declared: Iterable[Field], shared: Coll
     """InputError where a raw table has a parameter that the scenario gives; `key`: what errors call the table."""
     for item in declared:
         if item.name in table and item.gain.shared in shared:
-            raise InputError(where, f"{key}.{item.name}", "a key that the whole flight shares", told(item.gain.shared))
+            raise InputError(where, f"{key}.{item.name}", "a key that the whole flight shares", shared_key(item.gain.shared))
 
 
-def told(shared: str) -> str:
+def shared_key(shared: str) -> str:
     """The name of a shared key in errors: "epoch in [orbit]"."""
     table, _, name = shared.rpartition(".")
     return f"{name} in [{table}], which gives it to all parts"

@@ -23,14 +23,14 @@ def refuse(reason: str) -> PydanticCustomError:
     return PydanticCustomError("quantity", "{reason}", {"reason": reason})
 
 
-def at_key(key: str, reason: str, found: Any) -> PydanticCustomError:
+def at_key(key: str, reason: str, value: Any) -> PydanticCustomError:
     """An error about one key of a table that is read."""
-    return PydanticCustomError("quantity_at", "{reason}", {"reason": reason, "key": key, "found": found})
+    return PydanticCustomError("quantity_at", "{reason}", {"reason": reason, "key": key, "found": value})
 
 
-def told_at(key: str, found: str, allowed: str) -> PydanticCustomError:
-    """An error about one key of a table that is read, in words that have been found already."""
-    return PydanticCustomError("told_at", "{reason}", {"reason": allowed, "key": key, "found": found})
+def told_at(key: str, given: str, allowed: str) -> PydanticCustomError:
+    """An error about one key of a table that is read, whose value is described already."""
+    return PydanticCustomError("told_at", "{reason}", {"reason": allowed, "key": key, "found": given})
 
 
 LONGEST_NAME = 100

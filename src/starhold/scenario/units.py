@@ -1,5 +1,5 @@
-"""Texts such as "0.01 N m" to numbers. Number and unit are read here, by a grammar that computes nothing; the units library
-only tells what units of these names are worth."""
+"""Texts such as "0.01 N m" become numbers. Number and unit are read here, by a grammar that computes nothing; the units
+library only gives the worth of these units."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _allowed(unit: str) -> str:
 
 @cache
 def _powers(given: str, unit: str) -> dict[str, int]:
-    """The units of a text with their exponents, `unit` being what errors ask for."""
+    """The units of a text with their exponents; `unit` is the one that errors name."""
     given = re.sub(f"[{'⁰¹²³⁴⁵⁶⁷⁸⁹⁻'}]+", lambda raised: "^" + raised[0].translate(_RAISED), given)
     powers = _read(re.sub(r"\s*(?:\*\*|\^)\s*", "^", given), unit) if given else {}
     if any(abs(power) > MOST_POWER for power in powers.values()):
@@ -88,7 +88,7 @@ def _split(name: str) -> list[str]:
 
 def _convert(value: float, powers: dict[str, int], unit: str) -> float:
     if unit == "1":
-        # An angle is no pure number, though the library has it so.
+        # An angle is not a pure number here, though it is one in the library.
         if not powers:
             return value
         if not powers.keys() <= _SHARES.keys() or sum(powers.values()) != 1:
@@ -111,8 +111,8 @@ def _convert(value: float, powers: dict[str, int], unit: str) -> float:
 def _angle_fits(given: Any, wanted: Any) -> bool:
     """Whether radians stand where they are wanted; 1/s will do for rad/s, but Hz, which may count turns, will not."""
     roots = [unit_registry().get_root_units(units)[1] for units in (given, wanted)]
-    angle, asked = (root._units.get("radian", 0) for root in roots)
-    if asked == 0 or angle == asked:
+    angle, wanted_angle = (root._units.get("radian", 0) for root in roots)
+    if wanted_angle == 0 or angle == wanted_angle:
         return True
     return angle == 0 and len(roots[1]._units) > 1 and not any("hertz" in name for name in given)
 

@@ -1,4 +1,4 @@
-"""Laws back to TOML."""
+"""Laws and parts are written as TOML."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ def _value(value: Any) -> str:
 
 
 def law_table(law: Law, gains: Any) -> str:
-    """A [[law]] table with these gains, exact: floats are written so that they read back as the same numbers; without what
-    the scenario gives to all parts."""
+    """A [[law]] table with these gains, exact: floats are written so that they read back as the same numbers; without
+    gains that the scenario gives to all parts."""
     which = f'type = "{law.name}"' if law.file is None else f"file = {json.dumps(str(law.file))}"
     lines = ["[[law]]", which]
     for item, value in _own(law.fields(), gains, body_for(law).tables.SHARED):
@@ -84,7 +84,7 @@ def scenario_with(law: Law, gains: Any) -> str:
 
 
 def part_table(part: Part, params: Any) -> dict[str, Any]:
-    """A [[part]] table with these parameters, without infinite ones and what the scenario gives to all parts."""
+    """A [[part]] table with these parameters, without infinite ones and those that the scenario gives to all parts."""
     table: dict[str, Any] = {"type": part.name} if part.file is None else {"file": str(part.file)}
     body = bodies().get(part.body or "rigid-body")
     for item, value in _own(part.fields(), params, body.tables.SHARED if body else ()):

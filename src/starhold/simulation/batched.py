@@ -1,4 +1,4 @@
-"""Flies loops that differ only in numbers as batches, a vector of lanes at a time, and records each as `fly` does."""
+"""Loops that differ only in numbers fly as batches, a vector of lanes at a time; each is recorded as `fly` does it."""
 
 from __future__ import annotations
 
@@ -38,9 +38,8 @@ def fly_batched(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> list[Any]:
-    """A list of what `use(number, samples, carry)` makes of each flight, in order: samples (number, sample) and carry as
-    `fly` gives them, the same bits. Loops of one form fly together, whatever numbers they differ in; the others one by
-    one."""
+    """The results of `use(number, samples, carry)` for each flight, in order: samples (number, sample) and carry as
+    `fly` gives them, the same bits. Loops of one form fly together, whatever their numbers; the others one by one."""
     groups: dict[Any, list[int]] = {}
     for number, flight in enumerate(flights):
         groups.setdefault(kernel_key(flight), []).append(number)
@@ -48,24 +47,24 @@ def fly_batched(
     for numbers in groups.values():
         group = [flights[number] for number in numbers]
         jobs += (_together if len(group) > FEW else _one_by_one)(group, numbers, use)
-    found: list[Any] = [None] * len(flights)
+    outputs: list[Any] = [None] * len(flights)
     done = 0
     with ThreadPoolExecutor(max_workers=threads or os.cpu_count() or 1) as pool:
         try:
             for results in pool.map(lambda job: job(), jobs):
                 for number, result in results:
-                    found[number] = result
+                    outputs[number] = result
                 done += len(results)
                 if progress is not None:
                     progress(done, len(flights))
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
-    return found
+    return outputs
 
 
 def kernel_key(flight: Flying) -> Any:
-    """Equal for flights that one kernel serves, with the same tables."""
+    """A key that is equal for flights that one kernel serves with the same tables."""
     loop, cut = flight.loop, flight.loop.phases(flight.steps)
     phases = [(p.first, p.last, form(Numbers.of(p))) for p in cut]
     tables = [np.array(table.cells).tobytes() for phase in cut for table in buffers(phase.setup)]
@@ -95,7 +94,7 @@ def _together(group: Sequence[Flying], numbers: Sequence[int], use: Callable[...
     if (steps // every + 1) * size * width > MOST:
         return _one_by_one(group, numbers, use)
     phases = [flight.loop.phases(steps) for flight in group]
-    # Of all lanes at once, so that one kernel flies every block of them.
+    # The form is that of all lanes, so that one kernel flies every block of them.
     whole = [Numbers.of(phase) for phase in stacked(phases)]
     kernels = [make_kernel(one, loop.composition(), width, loop.carry(), values, loop.substeps) for values in whole]
 
@@ -126,7 +125,7 @@ class _Vector:
         self.lost_row = places(self.like).lost_at
 
     def fly(self, numbers: Sequence[Numbers]) -> Callable[[int], tuple[NDArray[np.float64], Any]]:
-        """Fly to the end; returns what gives samples and carry of a lane."""
+        """Fly to the end; returns a function that gives samples and carry of a lane."""
         for place, values in enumerate(numbers):
             now = self.phases[0][place]
             for lane in range(self.width):
@@ -155,9 +154,9 @@ class _Vector:
 
     def _memories(self, numbers: Numbers) -> dict[str, NDArray[np.float64]]:
         arguments = Arguments(*numbers)
-        own = aligned(len(arguments.own), self.width)
-        own[:] = arguments.rows(self.width)
-        memories = {"carry": self.carry, "record": self.samples, "own": own}
+        varying = aligned(len(arguments.varying), self.width)
+        varying[:] = arguments.rows(self.width)
+        memories = {"carry": self.carry, "record": self.samples, "own": varying}
         return memories | {"shared": arguments.shared, "tables": arguments.tables}
 
     def _some(self, kernel: Kernel, memories: Any, first: int, count: int) -> int:

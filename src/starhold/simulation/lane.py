@@ -1,4 +1,4 @@
-"""Flies one trajectory and labels the result."""
+"""One trajectory is flown and its samples are labelled."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class Recording:
     def variables(self) -> tuple[dict[str, Variable], dict[str, Variable]]:
         """The recorded variables, and their coordinates, by name."""
         data: dict[str, Variable] = {}
-        columns = {name: told for name, told in self.columns.items() if name in self.arrays}
+        columns = {name: quantity for name, quantity in self.columns.items() if name in self.arrays}
         for name, (unit, meaning, dimension) in columns.items():
             dimensions = ("time", dimension) if dimension else ("time",)
             data[name] = Variable(dimensions, self[name], {"units": unit, "long_name": meaning})
@@ -79,7 +79,7 @@ class Recording:
             "time": Variable(("time",), self["time"], {"units": self.time_unit, "long_name": "time"}),
             "axis": Variable(("axis",), ["x", "y", "z"], {}),
         }
-        if any(told.dimension == "quaternion" for told in columns.values()):
+        if any(quantity.dimension == "quaternion" for quantity in columns.values()):
             coords["quaternion"] = Variable(("quaternion",), ["q0", "q1", "q2", "q3"], {})
         return data, coords
 
@@ -100,7 +100,7 @@ def simulate(
 def fly(
     loop: ClosedLoop, steps: int, record_every: int = 1, run: int | None = None, progress: Progress | None = None
 ) -> tuple[NDArray[np.float64], Carry]:
-    """The samples (number, sample) of a trajectory, one row for each number of a sample, and what it carries at its end."""
+    """The samples (number, sample) of a trajectory, one row for each number of a sample, and the carry at its end."""
     like, phases = loop.carry(), loop.phases(steps)
     width = len(flatten(make_step(loop.composition()).sample(like, 0, loop.setup())))
     samples = _room(steps, record_every, width)
@@ -119,12 +119,12 @@ def fly(
             chunk = max(1, int(chunk * min(8.0, PULSE / max(time.perf_counter() - begun, 1e-9))))
         lost_at = state_of(carry, like).lost_at
         if lost_at == 0.0:
-            # Nothing was decided; what there is to see is the start.
+            # Nothing was decided; the only sample is the start.
             samples[0] = flatten(make_step(loop.composition()).sample(like, 0, loop.setup()))
         if lost_at >= 0.0:
             return samples[: max(1, int(np.ceil(lost_at / record_every)))].T, state_of(carry, like)
     if steps % record_every == 0 and phases:
-        # The last sample shows what would be commanded next; the step that follows is flown for it and forgotten.
+        # The last sample shows the next command; the step that follows is flown for it and forgotten.
         flight.fly(phases[-1], carry.copy(), steps, 1)
     return samples.T, state_of(carry, like)
 
@@ -145,8 +145,8 @@ class _Flight:
         return self._ready[phase.first]
 
     def fly(self, phase: Any, carry: NDArray[np.float64], first: int, count: int) -> int:
-        """Fly up to `count` control steps from `first` on: to the next sample, or by whole groups between samples. What is
-        carried changes in place. Returns the steps flown."""
+        """Fly up to `count` control steps from `first` on: to the next sample, or by whole groups between samples. The
+        carry changes in place. Returns the steps flown."""
         arguments, kernel = self._prepared(phase)
         memories = {"carry": carry, "record": self.samples, "shared": arguments.shared, "tables": arguments.tables}
         memories["own"] = arguments.shared
@@ -187,25 +187,25 @@ def recorded(loop: ClosedLoop) -> list[tuple[str, Quantity, int]]:
     """The recorded quantities in the order of samples: name, quantity and how many numbers it has. Those of sensors and of
     an estimator are called after the part; so are those of effectors where a name would stand twice."""
     sample = make_step(loop.composition()).sample(loop.carry(), 0, loop.setup())
-    own, records, readings, estimate = sample
+    body_sample, records, readings, estimate = sample
     effectors = [f for f in loop.used("effector") if f.part.hook("record") is not None]
     sensors = [f for f in loop.used("sensor") if is_recorded(f.part)]
     estimators = loop.used("estimator")
-    found: list[tuple[str, Quantity, int]] = []
+    columns: list[tuple[str, Quantity, int]] = []
     taken: set[str] = set()
-    groups = [("", own), *(("", one) for one in records)]
+    groups = [("", body_sample), *(("", one) for one in records)]
     callers = ["", *(f.called for f in effectors), *([loop.law.name] if loop.law.hook("record") is not None else [])]
     groups += [(f.called, one) for f, one in zip(sensors, readings, strict=True)]
     groups += [(f.called, estimate) for f in estimators]
     callers += [f.called for f in (*sensors, *estimators)]
     for (prefix, values), caller in zip(groups, callers, strict=True):
-        told = quantities(type(values))
+        declared = quantities(type(values))
         for name, value in zip(values._fields, values, strict=True):
             stem = prefix or (caller if name in taken else "")
             full = f"{stem.replace('-', '_')}_{name}" if stem else name
             taken.add(full)
-            found.append((full, told[name], len(flatten((value,)))))
-    return found
+            columns.append((full, declared[name], len(flatten((value,)))))
+    return columns
 
 
 def _room(steps: int, record_every: int, width: int) -> NDArray[np.float64]:

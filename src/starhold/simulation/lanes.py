@@ -1,4 +1,4 @@
-"""Flies many trajectories at once: blocks of lanes, divided among threads."""
+"""Many trajectories fly at once: blocks of lanes, divided among threads."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ class RunningBatch:
     ) -> None:
         """Fly the blocks of a piece through a phase, or through `count` control steps of it from `first` on. observer: in
         place of the batch's, with notes of the same shape."""
-        _, kernel, arguments, own, turn = self.prepare(phase, observer)
+        _, kernel, arguments, varying, turn = self.prepare(phase, observer)
         part = self.x[piece.start : piece.stop]
         if turn is not None and first in (None, phase.first):
             rows = list(self.rows.state.rate)
@@ -171,7 +171,7 @@ class RunningBatch:
             "carry": part,
             "noted": self.noted[piece.start : piece.stop],
             "shared": arguments.shared,
-            "own": own[piece.start : piece.stop],
+            "own": varying[piece.start : piece.stop],
             "tables": arguments.tables,
         }
         begin = phase.first if first is None else first
@@ -195,7 +195,7 @@ class RunningBatch:
             more = (numbers, self.loop.substeps, observer, self.runs)
             kernel = make_kernel(many, self.loop.composition(), self.width, self.like, *more)
             turn = self._turned(phase) if phase.jumps else None
-            # With what its key tells apart, lest that go and leave its number to another.
+            # The key's objects are kept, lest others get their ids.
             kept = (phase, observer)
             self._ready[key] = (kept, kernel, arguments, self._packed(arguments.rows(self.lanes)), turn)
         return self._ready[key]
@@ -224,11 +224,11 @@ def carry_columns(loop: ClosedLoop, start: NDArray[np.float64], phase: Any = Non
     """The carry at the start of each lane, one column a lane, from its state (numbers of a state, lanes). phase: the first,
     where numbers of it differ between lanes."""
     lanes = start.shape[1]
-    own = phase is not None and any(isinstance(leaf, np.ndarray) for leaf in leaves((phase.gains, phase.nominal)))
+    varies = phase is not None and any(isinstance(leaf, np.ndarray) for leaf in leaves((phase.gains, phase.nominal)))
     first = loop.carry()
     rows = places(first)
     moving = len(flatten((first.state, first.effectors)))
-    if _differ(loop) or (own and loop.remembers):
+    if _differ(loop) or (varies and loop.remembers):
         gains, nominal = (None, None) if phase is None else (phase.gains, phase.nominal)
         setup = loop.setup()
         carries = (
@@ -269,7 +269,7 @@ def stacked(values: Sequence[Any]) -> Any:
         return first if len(set(values)) == 1 else np.array(values)
     constants = [(x.cells, x.base, x.size) if isinstance(x, Buffer) else x for x in values]
     if any(not (x is constants[0] or (type(x) is type(constants[0]) and x == constants[0])) for x in constants):
-        raise ValueError(f"lanes differ in what is a constant of their kernel: {first} and others")
+        raise ValueError(f"lanes differ in a constant of their kernel: {first} and others")
     return first
 
 

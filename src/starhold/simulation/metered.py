@@ -1,4 +1,4 @@
-"""Flies many lanes with notes taken at every control instant, the last one included, and of each window of time apart."""
+"""Many lanes fly with notes taken at every control instant, the last one included, and for each window of time apart."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ PIECES = 2
 
 
 class Metered(NamedTuple):
-    """The remains of flights: where each lane ended (numbers, lanes), its notes (numbers, lanes), and the noted
-    numbers of windows (windows, quantities, lanes)."""
+    """The results of flights: where each lane ended (numbers, lanes), its notes (numbers, lanes), and the noted numbers
+    of windows (windows, quantities, lanes)."""
 
     ends: Array
     notes: Array
@@ -42,19 +42,19 @@ def begin_metered(
     rows: Sequence[int],
     pool: ThreadPool,
 ) -> Callable[..., Metered]:
-    """Begin to fly lanes through phases, and note the instant after the last step too, at which a command is decided and
-    not flown. What is returned waits for the end, and tells progress until then.
+    """Begin to fly lanes through phases, and note the instant after the last step too, at which a command is decided
+    and not flown. Returns a function that waits for the end and reports progress.
 
-    carries: (numbers, lanes), see `carry_columns`; observers: one before the control step `late` and one from it on; noted:
-    notes before the flight (numbers, lanes); cuts: control steps at which windows end, `late` among them unless it is 0, the
-    last, which takes the last instant in, at the end of the flight or after it; rows: noted numbers that begin anew in each
-    window, at 0.
+    carries: (numbers, lanes), see `carry_columns`; observers: one before the control step `late` and one from it on;
+    noted: notes before the flight (numbers, lanes); cuts: control steps at which windows end, `late` among them unless
+    it is 0, the last, which takes the last instant in, at the end of the flight or after it; rows: noted numbers that
+    begin anew in each window, at 0.
     """
     batch = RunningBatch(loop, carries, first_run, widest(len(carries), len(noted)), observers[0], noted)
     for phase in phases:
         for observer in observers:
             batch.prepare(phase, observer)
-    found = np.empty((len(cuts), len(rows), batch.count, batch.width))
+    by_window = np.empty((len(cuts), len(rows), batch.count, batch.width))
     end, kept = phases[-1].last, list(rows)
 
     def work(piece: range) -> None:
@@ -71,14 +71,14 @@ def begin_metered(
                 batch.fly(phases[-1], piece, end, 1, observers[1])
                 batch.x[span] = carried
             seen = batch.noted[span]
-            found[window, :, span] = seen[:, kept].swapaxes(0, 1)
+            by_window[window, :, span] = seen[:, kept].swapaxes(0, 1)
             seen[:, kept] = 0.0
 
     wait = pool.share(work, batch.count, PIECES)
 
     def finish(progress: Progress | None = None) -> Metered:
         wait(progress)
-        windows = found.reshape(len(cuts), len(rows), -1)[:, :, : carries.shape[1]]
+        windows = by_window.reshape(len(cuts), len(rows), -1)[:, :, : carries.shape[1]]
         return Metered(batch.carries(), batch.notes(), windows)
 
     return finish

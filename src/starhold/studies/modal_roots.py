@@ -37,26 +37,26 @@ class Study:
     """A search's findings, angle by angle; the fit through it, None for too few angles; and the published one, None where
     the limits or the start are not the published ones."""
 
-    found: list[Found]
+    results: list[Found]
     b: float
     eased: bool
     """Whether the limits were tried with tolerances too."""
-    own: TwoPieceFit | None
+    fitted: TwoPieceFit | None
     published: TwoPieceFit | None
 
     @property
     def angles(self) -> NDArray[np.float64]:
         """Initial angles (rad), (n,)."""
-        return np.array([item.angle for item in self.found])
+        return np.array([item.angle for item in self.results])
 
     @property
     def roots(self) -> NDArray[np.float64]:
         """The best roots within the limits (1/s), (n,)."""
-        return np.array([math.nan if item.hard is None else item.hard.root for item in self.found])
+        return np.array([math.nan if item.hard is None else item.hard.root for item in self.results])
 
     def fits(self) -> dict[str, TwoPieceFit]:
         """The fits there are, by how tables call them."""
-        both = {"fit": self.own, "published": self.published}
+        both = {"fit": self.fitted, "published": self.published}
         return {name: pieces for name, pieces in both.items() if pieces is not None}
 
 

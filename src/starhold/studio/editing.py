@@ -27,7 +27,7 @@ def check(text: str, where: str, folder: Any) -> dict[str, Any]:
         for entry in scenario.laws:
             build(scenario, entry)
     except InputError as error:
-        line = line_of(text, error.key, error.found)
+        line = line_of(text, error.key, error.given)
         return {"error": str(error), "key": error.key, "line": line}
     return {"name": scenario.name, "laws": [entry.name for entry in scenario.laws], "body": scenario.body}
 

@@ -1,10 +1,9 @@
-"""A circle about a libration point is kept by sunlight: formulas tell what it asks of the control and of the sail.
+"""A circle about a libration point is kept by sunlight: formulas give its demands on the control and on the sail.
 
 The circle lies across the X axis, so that the solar cells see the Sun past the body in front of it, and is flown at a
-constant rate. Rates here are in units of Omega, accelerations in scaled units a unit of the circle's radius, unless said
-otherwise.
-Source: the study of invariant sets near L2 in Izv. RAN TiSU 2023 no. 4. Its factor 2.786 for the peak demand is 2 Omega w;
-its own formula gives 3.429 for C = 3.94, and only that holds the circle.
+constant rate. Rates here are in units of Omega, accelerations in scaled units a unit of the circle's radius, unless
+said otherwise. Source: the study of invariant sets near L2 in Izv. RAN TiSU 2023 no. 4. Its factor 2.786 for the peak
+demand is 2 Omega w; its own formula gives 3.429 for C = 3.94, and only this holds the circle.
 """
 
 from __future__ import annotations
@@ -35,8 +34,8 @@ def pressure_at(distance: float) -> float:
 
 
 def best_rate(plant: Libration) -> float:
-    """Return the rate w = sqrt(C - 2 Omega2) at which a circle asks least of the control. ValueError where there is none
-    above zero, as at L3."""
+    """Return the rate w = sqrt(C - 2 Omega2) at which a circle demands the least control. ValueError where there is
+    none above zero, as at L3."""
     square = plant.stiffness / plant.rate**2 - 2.0
     if square <= 0.0:
         raise ValueError(f"no rate is best here: C - 2 Omega^2 = {square:.6g} Omega^2 is not positive")
@@ -61,13 +60,13 @@ def rates_held(resource: float, plant: Libration) -> tuple[float, float] | None:
 
 
 def time_on_limit(resource: float, rate: float, plant: Libration) -> float:
-    """Return the part of a revolution in which a circle a unit in radius asks for more than this control acceleration."""
+    """Return the part of a revolution in which a circle a unit in radius demands more than this control acceleration."""
     turning = rate * plant.rate
     least = plant.stiffness - plant.rate**2 - turning * turning
     # |u|2 is peak2 sin2 + least2 cos2 of the phase.
     low, high = least * least, demand(rate, plant) ** 2
-    held = min(max((resource * resource - low) / (high - low), 0.0), 1.0)
-    return 1.0 - 2.0 / math.pi * math.asin(math.sqrt(held))
+    ratio = min(max((resource * resource - low) / (high - low), 0.0), 1.0)
+    return 1.0 - 2.0 / math.pi * math.asin(math.sqrt(ratio))
 
 
 def required(
@@ -84,18 +83,18 @@ def required(
 def peak_required(
     rate: float, radius: float, plant: Libration, field: Field = linear, centre: float = 0.0, push: float = 0.0
 ) -> float:
-    """Return the largest control acceleration (scaled) round the circle, next to a steady push along X (scaled), by going
-    round."""
+    """Return the largest control acceleration (scaled) round the circle, next to a steady push along X (scaled), by
+    going round it in steps."""
     phases: list[float] = np.linspace(0.0, 2.0 * math.pi, 3601).tolist()
     steady = (push, 0.0, 0.0)
     return max(norm(subtract(required(phase, rate, radius, plant, field, centre), steady)) for phase in phases)
 
 
 class Deficit(NamedTuple):
-    """A deficit tells what is left when the control lacks a part of what the circle asks: the largest radius held by formula
-    (m), the part of the Sun seen there, the largest radius when the sail loses that light too (m; 0 for none), the rates at
-    which the full circle is still held (Omega; None for none), and the part of a revolution with the control on its limit
-    there."""
+    """A deficit says what is left when the control lacks a part of the circle's demand: the largest radius held by
+    formula (m), the part of the Sun seen there, the largest radius when the sail loses that light too (m; 0 for none),
+    the rates at which the full circle is still held (Omega; None for none), and the part of a revolution with the
+    control on its limit there."""
 
     missing: float
     radius: float
@@ -107,9 +106,9 @@ class Deficit(NamedTuple):
 
 @dataclass(frozen=True)
 class Station:
-    """A station is a circle about a libration point and the sail that keeps it: two bodies of which the larger is the Sun,
+    """A station is a circle about a libration point and the sail that keeps it: two bodies, the larger being the Sun,
     the name of the point (L1 or L2), the circle's radius (m), the parts of light reflected as by a mirror and in all
-    directions, and the pressure of the whole Sun's light (N/m2; None for what there is at the point)."""
+    directions, and the pressure of the whole Sun's light (N/m2; None: that at the point)."""
 
     pair: Primaries
     point: str
@@ -171,17 +170,17 @@ class Station:
 
     def area_per_mass(self, rate: float | None = None, specular: float | None = None) -> float:
         """Return the least sail for this circle (m2/kg), at the best rate if none is given: peak demand over pressure times
-        the radius of the largest ball of forces. With another specular part the diffuse one keeps to what is left."""
+        the radius of the largest ball of forces. With another specular part the diffuse one is at most the rest."""
         mirror = self.specular if specular is None else specular
         return self.peak(rate) / (self.pressure * ball(mirror, min(self.diffuse, 1.0 - mirror)).radius)
 
     def margin(self, area: float, mass: float, rate: float | None = None) -> float:
-        """A sail of this area (m2) gives a craft of this mass (kg) so many times what the circle asks."""
+        """Return how many times the circle's demand a sail of this area (m2) gives a craft of this mass (kg)."""
         return area / (mass * self.area_per_mass(rate))
 
     def peak_full(self, field: Field) -> float:
-        """Return the peak demand (m/s2) at the best rate as one goes round the circle in a given field, moved towards the
-        Sun by what the steady push of the smallest sail asks in the linear one."""
+        """Return the peak demand (m/s2) at the best rate as one goes round the circle in a given field, moved towards
+        the Sun as far as the steady push of the smallest sail moves it in the linear one."""
         plant, units = self.plant, self.units
         steady = ball(self.specular, self.diffuse)
         push = self.peak() * steady.centre / steady.radius / units.acceleration
@@ -189,8 +188,8 @@ class Station:
         return peak_required(self.rate, self.radius / units.length, plant, field, centre, push) * units.acceleration
 
     def deficit(self, missing: float) -> Deficit:
-        """The deficit tells what is left of the circle at the best rate when this part of its demand is missing (negative:
-        to spare)."""
+        """Return what is left of the circle at the best rate when this part of its demand is missing (negative: to
+        spare)."""
         plant, share = self.plant, 1.0 - missing
         least, radius = demand(self.rate, plant), share * self.radius
         return Deficit(
@@ -207,9 +206,9 @@ class Station:
         planned circle it holds `radius`."""
         here = self.light(self.radius)
         # The light grows with the radius, so going on from above the steps only ever shrink, towards the largest answer.
-        found = radius if radius <= self.radius else radius / here
+        largest = radius if radius <= self.radius else radius / here
         for _ in range(10_000):
-            before, found = found, radius * self.light(found) / here
-            if not found < before * (1.0 - 1e-13):
+            before, largest = largest, radius * self.light(largest) / here
+            if not largest < before * (1.0 - 1e-13):
                 break
-        return found
+        return largest

@@ -5,7 +5,7 @@ columns of R_k: Bhat_k = B_k R_k has full column rank r_k. With P_k the annihila
 
     A_{k+1} = P_k A_k P_k^+,    B_{k+1} = P_k A_k Bhat_k:
 
-what the inputs reach directly is the input of what is left. The last level is left with nothing. From there back up,
+the directions that the inputs reach are the inputs of the rest. The last level has no rest. From there back up,
 
     G_k = Bhat_k^+ + K_{k+1} P_k (last: Bhat_k^+),    K_k = R_k (G_k A_k - Phi_k G_k),    K = K_0.
 
@@ -53,7 +53,7 @@ ALLOWED = 1e-6
 """Largest error of the poles reached, relative, that is not refused."""
 
 GIVEN = 1e-9
-"""How exactly an annihilator must annihilate, and how independent directions must be, relative."""
+"""Relative tolerance for the annihilators to annihilate, and for directions to count as independent."""
 
 
 class UncontrollableError(ValueError):
@@ -129,7 +129,7 @@ def place(
     factor). None, for all or for one, is the usual: P_k orthonormal; R_k = E where B_k has full column rank, else an
     orthonormal basis of the space of its rows, which is the pseudo-inverse of T_k in the skeleton B_k = Bhat_k T_k.
 
-    ValueError where something given is not as said or the error of the poles reached is more than `allowed`, which is so
+    ValueError where an argument is not as said or the error of the poles reached is more than `allowed`, which is so
     for pairs near uncontrollable ones, long chains from few inputs and poles of many sizes; `UncontrollableError`.
     """
     a, b = _pair(A, B)
@@ -137,31 +137,31 @@ def place(
         raise ValueError("give either poles or spectra")
     wanted = None if poles is None else _checked_poles(poles, len(a))
     with np.errstate(all="ignore"):
-        found, units, lengths = _decomposed(a, b, annihilators, directions)
+        chain, units, lengths = _decomposed(a, b, annihilators, directions)
         for name, choice in (("annihilators", annihilators), ("directions", directions)):
-            if choice is not None and not callable(choice) and len(choice) > len(found):
-                raise ValueError(f"{name} has {len(choice)} entries, the pair has {len(found)} levels")
-        sizes = [len(level.rows) for level in found]
+            if choice is not None and not callable(choice) and len(choice) > len(chain):
+                raise ValueError(f"{name} has {len(choice)} entries, the pair has {len(chain)} levels")
+        sizes = [len(level.rows) for level in chain]
         if wanted is not None:
-            blocks = _blocks(_dealt(wanted, sizes), found)
-            kept = tuple(np.linalg.solve(level.scale, phi @ level.scale) for level, phi in zip(found, blocks, strict=True))
+            blocks = _blocks(_dealt(wanted, sizes), chain)
+            kept = tuple(np.linalg.solve(level.scale, phi @ level.scale) for level, phi in zip(chain, blocks, strict=True))
         else:
             kept = _checked_spectra(() if spectra is None else spectra, sizes)
-            blocks = [level.scale @ phi @ np.linalg.inv(level.scale) for level, phi in zip(found, kept, strict=True)]
+            blocks = [level.scale @ phi @ np.linalg.inv(level.scale) for level, phi in zip(chain, kept, strict=True)]
         k: NDArray[Any] = np.zeros((0, 0))
-        for level, phi in zip(reversed(found), reversed(blocks), strict=True):
+        for level, phi in zip(reversed(chain), reversed(blocks), strict=True):
             g = level.rows + k @ level.p if len(level.p) else level.rows
             k = level.right @ (g @ level.a - phi @ g)
         gain = np.real(k) / lengths[:, None] / units
-    strength = tuple(level.strength for level in found)
+    strength = tuple(level.strength for level in chain)
     weakest = int(np.argmin(strength))
-    close = f"the weakest level, {weakest} of 0 to {len(found) - 1}, has a relative strength of {strength[weakest]:.1e}"
+    close = f"the weakest level, {weakest} of 0 to {len(chain) - 1}, has a relative strength of {strength[weakest]:.1e}"
     if not np.isfinite(gain).all():
         raise ValueError(f"the gains leave the range of floating-point numbers; {close}")
     error = _displacement(a, b, gain, _roots(kept) if wanted is None else wanted)
     if not error <= allowed:
         raise ValueError(f"the poles reached would be off by {error:.1e} of their size, {allowed:.1e} is allowed; {close}")
-    return Placement(gain, kept, tuple(level.directions for level in found), strength, error)
+    return Placement(gain, kept, tuple(level.directions for level in chain), strength, error)
 
 
 def reached(A: ArrayLike, B: ArrayLike, K: ArrayLike) -> Complexes:
@@ -172,19 +172,19 @@ def reached(A: ArrayLike, B: ArrayLike, K: ArrayLike) -> Complexes:
     from flint import acb_mat, ctx
 
     with ctx.workprec(BITS // 4):
-        found = acb_mat(_closed(*_pair(A, B), np.asarray(K, float))).eig(algorithm="approx")
-    return np.sort(np.array([complex(mode) for mode in found]))
+        modes = acb_mat(_closed(*_pair(A, B), np.asarray(K, float))).eig(algorithm="approx")
+    return np.sort(np.array([complex(mode) for mode in modes]))
 
 
 def displacement(A: ArrayLike, B: ArrayLike, K: ArrayLike, poles: ArrayLike) -> float:
-    """Tell how far the eigenvalues of A - B K are from poles (n,), relative, to first order, without rounding but that of K.
+    """Tell how far the eigenvalues of A - B K are from poles (n,), relative, to first order, with no rounding but K's.
 
     Simple poles: the largest distance, by the pole's size. Poles closer than NEAR, equal ones above all, are no such smooth
     functions of K, but the polynomial with these roots is: of k of them, about their mean, the change of its coefficient of
     degree k - j, by the j-th power of their size. Where that is zero: that of the largest pole, or else of A.
 
-    These changes a are the numerators of the partial fractions of (reached - asked) / asked, characteristic polynomials of
-    exact coefficients. Of n simple poles each one reached is surely within n |a| of one asked for (Gershgorin).
+    These changes a are the numerators of the partial fractions of (reached - wanted) / wanted, characteristic polynomials
+    of exact coefficients. With n simple poles each one reached is surely within n |a| of a wanted one (Gershgorin).
     """
     a, b = _pair(A, B)
     return _displacement(a, b, np.asarray(K, float), _checked_poles(poles, len(a)))
@@ -218,11 +218,11 @@ def _displacement(a: Array, b: Array, gain: Array, poles: Sequence[complex | acb
 
 def _clusters(poles: list[complex]) -> list[list[int]]:
     """Return places of poles that are near one another, directly or by others between them."""
-    found: list[list[int]] = []
+    clusters: list[list[int]] = []
     for i, pole in enumerate(poles):
-        near = [old for old in found if any(abs(pole - poles[j]) <= NEAR * max(abs(pole), abs(poles[j])) for j in old)]
-        found = [old for old in found if old not in near] + [[i, *(j for old in near for j in old)]]
-    return found
+        near = [old for old in clusters if any(abs(pole - poles[j]) <= NEAR * max(abs(pole), abs(poles[j])) for j in old)]
+        clusters = [old for old in clusters if old not in near] + [[i, *(j for old in near for j in old)]]
+    return clusters
 
 
 def _closed(a: Array, b: Array, gain: Array) -> arb_mat:
@@ -235,7 +235,7 @@ def _closed(a: Array, b: Array, gain: Array) -> arb_mat:
 
 
 def _roots(spectra: Sequence[Array]) -> list[acb]:
-    """Return eigenvalues of all the matrices, in working precision: doubles know those of Jordan blocks to few digits."""
+    """Return eigenvalues of all the matrices, in working precision: in doubles those of Jordan blocks have few digits."""
     from flint import acb_mat, arb_mat, ctx
 
     with ctx.workprec(BITS):
@@ -254,11 +254,11 @@ def _decomposed(
     lengths[lengths == 0.0] = 1.0
     b, scale, down = b / lengths, np.diag(lengths), np.diag(1.0 / units)
     size, noise = float(np.linalg.norm(a, 2)), 100.0 * len(a) * float(np.finfo(float).eps)
-    found, weakest, unit = list[_Level](), 1.0, units
+    chain, weakest, unit = list[_Level](), 1.0, units
     while True:
         u, s, v = np.linalg.svd(b)
-        beside = float(size if found else s[0])
-        # Weak inputs magnify the rounding that comes down with what they leave.
+        beside = float(size if chain else s[0])
+        # Weak inputs magnify the rounding of the states that they leave to the next level.
         rank = int((s > noise / weakest * beside).sum())
         if rank == 0:
             modes, columns = np.linalg.eig(a.T)
@@ -266,7 +266,7 @@ def _decomposed(
             left /= np.linalg.norm(left, axis=1)[:, None]
             raise UncontrollableError(np.round(modes / (size or 1.0), 12) * size, np.round(left, 12))
         rows, across = u[:, :rank].T, s[:rank, None] * v[:rank]
-        at, given, reply = len(found), unit[:, None] * (b @ scale), across @ scale
+        at, given, reply = len(chain), unit[:, None] * (b @ scale), across @ scale
         turn = _chosen_directions(directions, at, given, reply)
         inner = reply @ turn
         right = scale @ turn @ np.linalg.inv(inner)
@@ -274,9 +274,9 @@ def _decomposed(
         right += v[:rank].T / s[:rank] @ (np.eye(rank) - across @ right)
         p = _chosen_annihilator(annihilators, at, given, unit, rows, u[:, rank:].T)
         strength = float(s[rank - 1]) / beside
-        found.append(_Level(a, rows, p, across, right, inner, turn, strength))
+        chain.append(_Level(a, rows, p, across, right, inner, turn, strength))
         if not len(p):
-            return found, units, lengths
+            return chain, units, lengths
         # Orthonormal rows are their own pseudo-inverse, without rounding.
         back = p.T if annihilators is None else np.linalg.pinv(p)
         a, b, down = p @ a @ back, p @ a @ rows.T, p @ down
@@ -285,10 +285,10 @@ def _decomposed(
 
 def _chosen(name: str, choice: Choice | None, at: int, given: Array, shape: tuple[int, int]) -> Array | None:
     """Find the choice that was made for a level whose B is `given`, if there is one."""
-    found = choice(at, given) if callable(choice) else choice[at] if choice is not None and at < len(choice) else None
-    if found is not None and _real(f"{name} of level {at}", found).shape != shape:
-        raise ValueError(f"{name} of level {at} must have shape {shape}, not {np.shape(found)}")
-    return None if found is None else np.asarray(found, dtype=float)
+    chosen = choice(at, given) if callable(choice) else choice[at] if choice is not None and at < len(choice) else None
+    if chosen is not None and _real(f"{name} of level {at}", chosen).shape != shape:
+        raise ValueError(f"{name} of level {at} must have shape {shape}, not {np.shape(chosen)}")
+    return None if chosen is None else np.asarray(chosen, dtype=float)
 
 
 def _chosen_directions(choice: Choice | None, at: int, given: Array, reply: Array) -> Array:
@@ -341,11 +341,11 @@ def _dealt(poles: list[complex], sizes: list[int]) -> list[list[complex]]:
     return dealt[::-1]
 
 
-def _blocks(dealt: list[list[complex]], found: list[_Level]) -> list[NDArray[Any]]:
+def _blocks(dealt: list[list[complex]], chain: list[_Level]) -> list[NDArray[Any]]:
     """Return a matrix with the poles dealt to each level, real but for shared pairs."""
     blocks: list[NDArray[Any]] = []
     along: tuple[Array, Array] | None = None
-    for poles, level in zip(reversed(dealt), reversed(found), strict=True):
+    for poles, level in zip(reversed(dealt), reversed(chain), strict=True):
         basis, normal = np.eye(len(poles)), np.diag(poles)
         if along is not None:
             # The shared pole in the direction with which the level below replies, the others where it does not show.
@@ -370,10 +370,10 @@ def _pair(A: ArrayLike, B: ArrayLike) -> tuple[Array, Array]:
 
 
 def _real(name: str, value: ArrayLike) -> Array:
-    found = np.asarray(value)
-    if found.dtype.kind not in "biuf" or not np.isfinite(found).all():
+    array = np.asarray(value)
+    if array.dtype.kind not in "biuf" or not np.isfinite(array).all():
         raise ValueError(f"{name} must be of finite real numbers")
-    return found.astype(float)
+    return array.astype(float)
 
 
 def _checked_poles(poles: ArrayLike, size: int) -> list[complex]:
@@ -382,18 +382,18 @@ def _checked_poles(poles: ArrayLike, size: int) -> list[complex]:
         raise ValueError(f"poles must be {size} numbers, one for each state, not of shape {given.shape}")
     if given.dtype.kind not in "biufc" or not np.isfinite(given).all():
         raise ValueError("poles must be finite numbers")
-    found = [complex(pole) for pole in given]
-    lone = Counter(found) - Counter(pole.conjugate() for pole in found)
+    numbers = [complex(pole) for pole in given]
+    lone = Counter(numbers) - Counter(pole.conjugate() for pole in numbers)
     if lone:
         raise ValueError(f"poles must be real or in conjugate pairs: {_shown(next(iter(lone)))} lacks its conjugate")
-    return found
+    return numbers
 
 
 def _checked_spectra(spectra: Sequence[ArrayLike], sizes: list[int]) -> tuple[Array, ...]:
-    found = tuple(_real("spectra", phi) for phi in spectra)
-    if (shapes := [phi.shape for phi in found]) != [(size, size) for size in sizes]:
+    matrices = tuple(_real("spectra", phi) for phi in spectra)
+    if (shapes := [phi.shape for phi in matrices]) != [(size, size) for size in sizes]:
         raise ValueError(f"spectra must be square matrices of sizes {sizes}, not of shapes {shapes}")
-    return found
+    return matrices
 
 
 def _shown(number: complex) -> str:

@@ -48,15 +48,13 @@ class Bandwidth(NamedTuple):
 
 
 class Settling(NamedTuple):
-    """The form asks for the lowest gains that settle in time, within the torque that there is, found by integrating the
-    slew: towards a target at rest, without torque from outside."""
+    """The form takes the lowest gains that settle in time within the available torque, by integrating the slew to a
+    target at rest without external torque."""
 
     time: Annotated[float, Gain("s", above=0.0, text="after which angle and rate stay within their tolerances")]
     damping: Annotated[float, Gain("1", above=0.0, text="damping ratio, the least of all axes")] = 0.7
-    torque: Annotated[float | None, Gain("N m", above=0.0, text="largest norm of the torque; what there is if absent")] = (
-        None
-    )
-    momentum: Annotated[float | None, Gain("N m s", above=0.0, text="that wheels can store; what there is if absent")] = None
+    torque: Annotated[float | None, Gain("N m", above=0.0, text="largest norm; all that is available if absent")] = None
+    momentum: Annotated[float | None, Gain("N m s", above=0.0, text="of the wheels; all available if absent")] = None
     attitude: Annotated[
         Quaternion | None,
         Gain("1", shape=(4,), spread=False, text="turn from the target to the body at the start; the scenario's if absent"),
@@ -76,14 +74,14 @@ Spec = TypeVar("Spec", bound=NamedTuple)
 
 
 def complete(spec: Spec, start: Callable[[], Start]) -> Spec:
-    """Return the inputs of a form that settles in time, with what they leave to the scenario."""
+    """Return the inputs of a form; one that settles in time is completed from the scenario's start."""
     left = [name for name in Start.__dataclass_fields__ if getattr(spec, name, 0) is None]
     return spec._replace(**{name: getattr(start(), name) for name in left}) if left else spec
 
 
 class Turn(NamedTuple):
-    """A slew that was tried tells when it settled (s; infinite where it did not), and the largest norms of the torque (N m)
-    and of the wheel momentum (N m s; 0 without wheels)."""
+    """A trial slew has the time at which it settled (s; infinite where it did not), and the largest norms of the torque
+    (N m) and of the wheel momentum (N m s; 0 without wheels)."""
 
     time: float
     torque: float
@@ -96,7 +94,7 @@ def largest_moment(craft: Craft) -> float:
 
 
 def feedback(craft: Craft, bandwidth: float, damping: float) -> tuple[float, float]:
-    """Return k_rate (N m s) and k_attitude (N m); ValueError where they are no finite positive numbers."""
+    """Return k_rate (N m s) and k_attitude (N m); ValueError where they are not finite and positive."""
     moment = largest_moment(craft)
     gains = 2.0 * damping * bandwidth * moment, 2.0 * bandwidth * bandwidth * moment
     if not all(math.isfinite(gain) and gain > 0.0 for gain in gains):
@@ -120,35 +118,35 @@ def settle(
     """Return the gains of the least scale x (1/s) that settle in time, and their slew.
 
     gains_of(x): the gains; rate_of(gains): the fastest rate (1/s) of the loop, which the integration must resolve.
-    ValueError says what time can be had where the torque or the momentum does not allow the one that is asked for.
+    ValueError names the possible time where the torque or the momentum does not allow the required one.
     """
     if any(getattr(spec, name, 0) is None for name in Start.__dataclass_fields__ if name != "wheel_momentum"):
         raise ValueError("a design that settles in time needs the start, the tolerances and the torque")
     if not any(spec.attitude):
         raise ValueError("attitude must be a quaternion that is not zero")
-    asked = IN_HAND * spec.time
+    required = IN_HAND * spec.time
 
     def turn(x: float, horizon: float = 1.5 * spec.time) -> Turn:
         return fly(torque, gains_of(x), craft, spec, horizon, rate_of(gains_of(x)))
 
-    def allowed(found: Turn) -> bool:
-        return found.torque <= spec.torque and found.momentum <= spec.momentum
+    def allowed(slew: Turn) -> bool:
+        return slew.torque <= spec.torque and slew.momentum <= spec.momentum
 
     low, high = 0.0, 0.1 / spec.time
-    found = turn(high)
-    while found.time > asked and allowed(found) and high < 1e4 / spec.time:
+    slew = turn(high)
+    while slew.time > required and allowed(slew) and high < 1e4 / spec.time:
         low, high = high, 1.2 * high
-        found = turn(high)
-    if not allowed(found):
+        slew = turn(high)
+    if not allowed(slew):
         high = _border(turn, allowed, low, high)
-        if high == 0.0 or turn(high).time > asked:
-            raise ValueError(_refusal(spec, _soonest(turn, allowed, high), found))
-    elif found.time > asked:
-        raise ValueError(_refusal(spec, _soonest(turn, allowed, high), found))
+        if high == 0.0 or turn(high).time > required:
+            raise ValueError(_refusal(spec, _soonest(turn, allowed, high), slew))
+    elif slew.time > required:
+        raise ValueError(_refusal(spec, _soonest(turn, allowed, high), slew))
     # A turn that is over before it begins leaves the gains as they were tried.
     while low > 0.0 and high - low > 1e-4 * high:
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if turn(middle).time <= asked else (middle, high)
+        low, high = (low, middle) if turn(middle).time <= required else (middle, high)
     return gains_of(high), turn(high)
 
 
@@ -170,15 +168,15 @@ def _soonest(turn: Callable[..., Turn], allowed: Callable[[Turn], bool], most: f
         # Until it settles, or the horizon is too long for the steps that the loop needs.
         with suppress(ValueError):
             turns = (turn(x, 4.0**k / x) for k in range(1, 6))
-            settled = next((found for found in turns if found.time < math.inf), None)
+            settled = next((slew for slew in turns if slew.time < math.inf), None)
         if settled is not None and allowed(settled):
             best = min(best, settled.time)
     return best
 
 
-def _refusal(spec: Any, best: float, found: Turn) -> str:
+def _refusal(spec: Any, best: float, slew: Turn) -> str:
     what = f"{spec.torque:.4g} N m of torque"
-    if found.torque <= spec.torque and found.momentum > spec.momentum:
+    if slew.torque <= spec.torque and slew.momentum > spec.momentum:
         what = f"{spec.momentum:.4g} N m s that the wheels can store"
     if math.isinf(best):
         return f"it does not settle within {what} and these tolerances, whatever the time"
@@ -199,9 +197,9 @@ def fly(torque: Callable[..., Any], gains: Any, craft: Craft, spec: Any, horizon
     size = math.hypot(*spec.attitude)
     step, begun = horizon / count, (tuple(q / size for q in spec.attitude), tuple(map(float, spec.rate)))
     wheels = spec.wheel_momentum is not None
-    held = tuple(map(float, spec.wheel_momentum)) if wheels else ZERO
+    stored = tuple(map(float, spec.wheel_momentum)) if wheels else ZERO
     flown = _flight(torque, count, wheels, _Like((gains, craft)))
-    last, most, momentum = flown(gains, craft, (*begun, held), step, ends)
+    last, most, momentum = flown(gains, craft, (*begun, stored), step, ends)
     time = math.inf if not last < count else (last + 1.0) * step
     return Turn(time, math.sqrt(most), math.sqrt(momentum))
 
@@ -247,7 +245,7 @@ def _flight(torque: Callable[..., Any], count: int, wheels: bool, like: _Like) -
     def whole(gains: Any, craft: Craft, begun: Any, step: Scalar, ends: Any) -> Any:
         def turn(k: Any, state: Any, last: Scalar, most: Scalar, momentum: Scalar) -> Any:
             given, (q, w, stored) = command(state, gains, craft, step), state
-            # Not so written that a NaN, which is neither, would count as within.
+            # Written so that a NaN does not count as within.
             inside = either(less(ends[0], dot(vector_part(q), vector_part(q))), less(ends[1], dot(w, w)))
             after = advance(state, step, gains, craft, step)
             notes = (
@@ -286,9 +284,9 @@ def designs(
         return settled(craft, spec)[0]
 
     def explain(craft: Craft, spec: Bandwidth | Settling) -> list[tuple[str, Any]]:
-        found = design(craft, spec)
-        turned = told(settled(craft, spec)[1]) if isinstance(spec, Settling) else []
-        return turned + explained(craft, found.k_rate, found.k_attitude)
+        gains = design(craft, spec)
+        turned = slew_figures(settled(craft, spec)[1]) if isinstance(spec, Settling) else []
+        return turned + explained(craft, gains.k_rate, gains.k_attitude)
 
     return design, explain
 
@@ -306,8 +304,8 @@ def explained(craft: Craft, k_rate: float, k_attitude: float) -> list[tuple[str,
     ]
 
 
-def told(turn: Turn) -> list[tuple[str, Any]]:
-    """A design that settles in time is judged by its slew."""
+def slew_figures(turn: Turn) -> list[tuple[str, Any]]:
+    """Return figures of the slew by which a design that settles in time is judged."""
     return [
         ("settles after (s)", turn.time),
         ("largest torque (N m)", turn.torque),

@@ -1,9 +1,9 @@
 """The Riccati equation of regulators is solved at rest on target, for any inertia and any weights, and its solution is
 judged.
 
-State (w; q) of body rate (rad/s) and the quaternion's vector part, J w' = u, q' = w/2, cost x'Qx + u'Ru: Q is (6, 6) with
-the rate first, R (3, 3). Weights and moments may span so many orders of magnitude that doubles lose every digit on the way,
-so `solve_riccati`, `riccati_residual` and `linear_modes` work with BITS binary digits; `scipy_axes` asks somebody else.
+State (w; q) of body rate (rad/s) and the quaternion's vector part, J w' = u, q' = w/2, cost x'Qx + u'Ru: Q is (6, 6)
+with the rate first, R (3, 3). Weights and moments may span so many orders of magnitude that doubles lose every digit on
+the way, so `solve_riccati`, `riccati_residual` and `linear_modes` work with BITS binary digits; `scipy_axes` is independent.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ BITS = 400
 """Working precision: rates of a loop and gains may each span a hundred binary digits, and their products are solved for."""
 
 AGREED = 1e-40
-"""Newton's steps end when no entry of P moves by more than this share of what its row and column allow."""
+"""Newton's steps end when no entry of P moves by more than this share of the scale of its row and column."""
 
 MOST_STEPS = 300
 
@@ -56,17 +56,17 @@ def linear_model(inertia: Array) -> tuple[Array, Array]:
 
 
 def is_full(inertia: Array) -> bool:
-    """Tell whether anything stands beside the diagonal."""
+    """Tell whether any entry off the diagonal is not zero."""
     return bool(np.count_nonzero(inertia - np.diag(np.diagonal(inertia))))
 
 
 def principal(inertia: Array) -> tuple[Array, Array]:
-    """Return principal moments (3,), rising, and their axes as columns (3, 3) of a symmetric inertia (3, 3), to the last
-    digit.
+    """Return principal moments (3,), rising, and their axes as columns (3, 3) of a symmetric inertia (3, 3), to the
+    last digit.
 
-    Doubles know a small moment only to the rounding of the largest, and axes to that over the difference of their moments.
-    So they are refined as by Ogita and Aishima (Japan Journal of Industrial and Applied Mathematics 35, 2018). Axes of
-    moments that are equal, which are nobody's in particular, are left as they come.
+    Doubles give a small moment only to the rounding of the largest, and axes to that over the difference of their
+    moments. So they are refined as by Ogita and Aishima (Japan Journal of Industrial and Applied Mathematics 35, 2018).
+    Axes of equal moments, which are arbitrary, are left as they come.
     """
     from flint import arb_mat, ctx
 
@@ -77,7 +77,7 @@ def principal(inertia: Array) -> tuple[Array, Array]:
     apart = np.abs(np.subtract.outer(rough, rough)) > SAME * rough[2]
     with ctx.workprec(BITS):
         body, axes, one = _exact(inertia), _exact(start), _exact(np.eye(3))
-        # Each step squares the error, of which at most a millionth is left by eigh.
+        # Each step squares the error, which eigh leaves at a millionth at most.
         for _ in range(5):
             skew, turned = one - axes.transpose() * axes, axes.transpose() * body * axes
             moments = [turned[i, i] / (1 - skew[i, i]) for i in range(3)]
@@ -96,8 +96,8 @@ def solve_riccati(inertia: Array, q: Array, r: Array) -> Regulator:
     """Return the regulator of positive definite Q and R, right to the last digit for the numbers given.
 
     Newton's method in Kleinman's form (IEEE Transactions on Automatic Control 13, 1968): each step solves a Lyapunov
-    equation for the cost P of a stable feedback and goes on with that of P, which falls and in the end converges
-    quadratically. ValueError where numbers overflow or no solution is reached.
+    equation for the cost P of a stable feedback and goes on with the feedback of P, which decreases and in the end
+    converges quadratically. ValueError where numbers overflow or no solution is reached.
     """
     from flint import ctx
 
@@ -166,15 +166,15 @@ def scipy_axes(moments: Array, q: Array, r: Array) -> tuple[Array, Array, Array]
     axes, which do not touch one another, one by one, each in units in which r, J and the weight of the attitude are one."""
     # By name, for the types of the library are too loose for a strict checker.
     library: Any = import_module("scipy.linalg")
-    found = np.zeros((3, 3))
+    blocks = np.zeros((3, 3))
     for axis, (moment, rate, attitude, cost) in enumerate(zip(moments, q[:3], q[3:], r, strict=True)):
         # Time in units of `time`, P11 in units of J^2 r / time, an attitude of q as q / (2 time).
         time = np.sqrt(2.0 * moment) * (cost / attitude) ** 0.25
         weight = np.diag([rate / cost * (time / moment) ** 2, 1.0])
         p = library.solve_continuous_are(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[1.0], [0.0]]), weight, np.eye(1))
         size = moment**2 * cost / time
-        found[:, axis] = size * p[0, 0], size * 2.0 / time * p[0, 1], size * 4.0 / time**2 * p[1, 1]
-    return found[0], found[1], found[2]
+        blocks[:, axis] = size * p[0, 0], size * 2.0 / time * p[0, 1], size * 4.0 / time**2 * p[1, 1]
+    return blocks[0], blocks[1], blocks[2]
 
 
 def _lyapunov(a: arb_mat, weight: arb_mat) -> arb_mat:
@@ -214,8 +214,8 @@ def _exact(array: Any) -> arb_mat:
 
 
 def _floats(matrix: arb_mat) -> Array:
-    found = np.array([[float(matrix[i, j].mid()) for j in range(matrix.ncols())] for i in range(matrix.nrows())])
-    # What working precision leaves of zeros, block by block of one unit.
-    for block in (found[i : i + 3, j : j + 3] for i in range(0, found.shape[0], 3) for j in range(0, found.shape[1], 3)):
+    array = np.array([[float(matrix[i, j].mid()) for j in range(matrix.ncols())] for i in range(matrix.nrows())])
+    # Zeros come out as tiny numbers; the entries of a block have one unit.
+    for block in (array[i : i + 3, j : j + 3] for i in range(0, array.shape[0], 3) for j in range(0, array.shape[1], 3)):
         block[np.abs(block) < AGREED * np.abs(block).max()] = 0.0
-    return found
+    return array

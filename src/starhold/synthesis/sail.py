@@ -1,8 +1,8 @@
-"""Sunlight gives the control: the force on a flat reflecting panel, how to set a panel to get a wanted force, the forces
-that can be had at all, and how much of the Sun a body in front of it leaves to see.
+"""Sunlight gives the control: the force on a flat reflecting panel, how to set a panel to get a wanted force, the set
+of available forces, and how much of the Sun can be seen past a body in front of it.
 
-Light travels along +X (at L1 and L2 the X axis of `libration`). A panel is set by its area, by the cone angle between the
-light and the panel's normal on its dark side, and by the clock angle of that normal about X, from Y towards Z.
+Light travels along +X (at L1 and L2 the X axis of `libration`). A panel is set by its area, by the cone angle between
+the light and the panel's normal on its dark side, and by the clock angle of that normal about X, from Y towards Z.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ LAMBERT = 2.0 / 3.0
 MIRROR_RADIUS = 4.0 / (3.0 * math.sqrt(3.0))
 """Radius of the largest ball of forces of a perfect mirror, in units of pressure times area: 0.3849 of its largest force."""
 MIRROR_CENTRE = 4.0 / 3.0 * math.sqrt(2.0 / 3.0)
-"""How far that ball's centre lies from no force, away from the Sun."""
+"""Distance of that ball's centre from zero force, away from the Sun."""
 
 
 class Sail(NamedTuple):
@@ -105,10 +105,10 @@ def given(setting: Setting, sail: Sail) -> Vector:
 
 
 def set_for(wanted: Vector, sail: Sail) -> Setting:
-    """Return the panel of the least area that gives this force (N). In closed form for a mirror, else by halving the cone
-    angle.
+    """Return the panel of the least area that gives this force (N). In closed form for a mirror, else by bisection of
+    the cone angle.
 
-    ValueError where the force points too far from the light, or takes more area than there is.
+    ValueError where the force points too far from the light, or needs more area than the sail has.
     """
     across = math.hypot(wanted[1], wanted[2])
     if across == 0.0 == wanted[0]:
@@ -126,9 +126,9 @@ def set_for(wanted: Vector, sail: Sail) -> Setting:
 
 
 def steer(control: Vector, sail: Sail) -> Setting:
-    """Return the panel for a control acceleration (m/s2) reckoned from the centre of the ball of forces: the sail gives it
-    and the steady push `push(sail)` away from the Sun together. Every control within `reach(sail)` can be had. ValueError:
-    see `set_for`."""
+    """Return the panel for a control acceleration (m/s2) measured from the centre of the ball of forces: the sail gives
+    it together with the steady push `push(sail)` away from the Sun. Every control within `reach(sail)` is available.
+    ValueError: see `set_for`."""
     return set_for(scale(sail.mass, (control[0] + push(sail), control[1], control[2])), sail)
 
 
@@ -180,9 +180,9 @@ def cone_for(lean: float, specular: float, diffuse: float) -> float:
 
 
 def outline(specular: float, diffuse: float, count: int = 181) -> NDArray[np.float64]:
-    """Return the outline (count, 2) of the forces with all the area, along X and across it, in units of pressure times area:
-    from no lean to the widest. The set of all forces is what lies between it and the origin, turned about X; it is
-    convex."""
+    """Return the outline (count, 2) of the forces with all the area, along X and across it, in units of pressure times
+    area: from no lean to the widest. The set of all forces is the region between it and the origin, turned about X; it
+    is convex."""
     cone = np.linspace(0.0, math.acos(widest_cosine(specular, diffuse)), count)
     c, along = np.cos(cone), 2.0 * specular * np.cos(cone) + LAMBERT * diffuse
     return np.stack([c * (1.0 - specular + along * c), c * along * np.sin(cone)], axis=1)
@@ -209,8 +209,7 @@ def ball(specular: float, diffuse: float) -> Ball:
 
 
 def room(centre: float, specular: float, diffuse: float) -> float:
-    """Return the distance from a point of the X axis to the nearest force that cannot be had (units of pressure times
-    area)."""
+    """Return the distance from a point of the X axis to the nearest unavailable force (units of pressure times area)."""
     a, b, e = 1.0 - specular, 2.0 * specular, LAMBERT * diffuse
     # The squared distance to the outline is a polynomial in the cosine c of the cone angle. Between the bends of its slope,
     # the slope changes its sign once at most: to try all such places finds every minimum.
@@ -246,8 +245,8 @@ def lit(offset: Any) -> NDArray[np.float64]:
 
 
 def lit_discs(separation: Any, sun: float, body: float) -> NDArray[np.float64]:
-    """Return the part of the Sun's disc (angular radius `sun`) that a disc of angular radius `body` leaves to see when their
-    centres are this far apart (any shape); angles in one unit, small, the Sun equally bright all over."""
+    """Return the part of the Sun's disc (angular radius `sun`) that can be seen past a disc of angular radius `body`
+    when their centres are this far apart (any shape); angles in one unit, small, the Sun equally bright all over."""
     t = np.clip(np.abs(np.asarray(separation, dtype=float)), max(abs(sun - body), 1e-300), sun + body)
     ours = sun * sun * np.arccos(np.clip((t * t + (sun - body) * (sun + body)) / (2.0 * t * sun), -1.0, 1.0))
     theirs = body * body * np.arccos(np.clip((t * t - (sun - body) * (sun + body)) / (2.0 * t * body), -1.0, 1.0))

@@ -15,9 +15,9 @@ largest ratio,
 
     eta >= h  <=>  K_w >= 2 b h  and  2 K_a >= K_w h - a h^2.
 
-Both bounds rise with K_w, so no gains with eta >= h ask for less torque, whatever alpha and omega, than the corner
-K_w = 2 b h, 2 K_a = (2 b - a) h^2, where K_a = c K_w^2 with c = (2 b - a) / (8 b^2) = (1 - (1 - a/b)^2) / (8 a). What the
-corner asks for, (2 b - a) alpha h^2 + 2 b omega h, rises with h: the largest h spends the whole budget. For alpha > 0 the
+Both bounds rise with K_w, so no gains with eta >= h demand less torque, whatever alpha and omega, than the corner
+K_w = 2 b h, 2 K_a = (2 b - a) h^2, where K_a = c K_w^2 with c = (2 b - a) / (8 b^2) = (1 - (1 - a/b)^2) / (8 a). The
+corner's demand, (2 b - a) alpha h^2 + 2 b omega h, rises with h: the largest h spends the whole budget. For alpha > 0 the
 corner is the only optimum. For alpha = 0 the budget bounds K_w alone, and any larger K_a does as well: the corner is the
 least of them. For omega = 0 it bounds K_a alone, and still the corner is the only one, for more damping slows axis a. For
 equal moments c = 1/(8a): the critically damped double root. The order of the axes does not matter.
@@ -130,11 +130,11 @@ def optimum(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> Opt
 
 
 def brute_force(ratios: ArrayLike, alpha: float, omega: float, budget: float, points: int = 41, rounds: int = 8) -> Optimum:
-    """Return the best of a grid of gains along and below the budget line, `points` each way, refined `rounds` times around
-    it.
+    """Return the best of a grid of gains along and below the budget line, `points` each way, refined `rounds` times
+    around it.
 
-    Knows `degree` and the budget, nothing of `optimum`, whose arguments and errors it shares. Sets of equal or larger eta
-    are convex, so the best lies beside the best point of a line and of the grid: eta is right to about 1e-9, relative.
+    It uses `degree` and the budget, and nothing of `optimum`, whose arguments and errors it shares. Sets of equal or larger
+    eta are convex, so the best lies beside the best point of a line and of the grid: eta is right to about 1e-9, relative.
     """
     a, b = _extremes(ratios)
     alpha, omega, budget = _demands(alpha, omega, budget)
@@ -228,11 +228,11 @@ def _best_stiffness(K_w: Array, most: Array, ratios: ArrayLike, points: int, rou
     """Find for each damping (n,) the best stiffness up to `most` (n,), from a grid refined around its best, and its eta."""
     low, high = np.zeros_like(most), most
     rows = np.arange(len(K_w))
-    found = low, low
+    best = low, low
     for _ in range(rounds):
         K_a = np.linspace(low, high, points, axis=1)
         eta = degree(K_a, K_w[:, None], ratios)
         at = np.argmax(eta, axis=1)
-        found = K_a[rows, at], eta[rows, at]
+        best = K_a[rows, at], eta[rows, at]
         low, high = K_a[rows, np.maximum(at - 1, 0)], K_a[rows, np.minimum(at + 1, points - 1)]
-    return found
+    return best

@@ -1,4 +1,4 @@
-"""A scenario gives designs the start and what there is of torque and momentum."""
+"""A scenario gives designs the start and the available torque and momentum."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from starhold.algebra.vector import Vector
 
 @dataclass(frozen=True)
 class Start:
-    """A scenario tells a design the rotation from the target axes to the body axes, the rate relative to the target (rad/s)
-    and the wheel momentum (N m s, body axes; None for a craft without) at the start; the torque (N m) and, of wheels, the
-    angular momentum (N m s) that there is about every axis, infinite for no limit; and the angle (rad) and rate (rad/s) at
-    which the target counts as reached."""
+    """A scenario gives a design the rotation from the target axes to the body axes, the rate relative to the target
+    (rad/s) and the wheel momentum (N m s, body axes; None for a craft without) at the start; the torque (N m) and, of
+    wheels, the angular momentum (N m s) available about every axis, infinite for no limit; and the angle (rad) and rate
+    (rad/s) at which the target counts as reached."""
 
     attitude: Quaternion
     rate: Vector

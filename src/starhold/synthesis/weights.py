@@ -15,7 +15,7 @@ MOST_SPREAD = 1e12
 Gains then span at most as much, and stay positive as full matrices of doubles, which hold sixteen digits."""
 
 SAME = 1e-10
-"""Principal moments that differ by no more than this share of the largest are equal: rounding alone tells their axes."""
+"""Principal moments that differ by no more than this share of the largest are equal: rounding alone decides their axes."""
 
 BALANCES = ("none", "least", "q4", "q5", "q6", "r1", "r2", "r3")
 """Weights that `balance` may move: none, all of them least in logarithm, or the one named."""
@@ -30,7 +30,7 @@ def balance(moments: Array, q: Array, r: Array, how: str) -> tuple[Array, Array]
     """Return weights q (6,) and r (3,) for moments (3,) moved to where kappa vanishes: the one that `how` names, or all
     least.
 
-    ValueError where no value of the weight that is named does it; that of the middle moment's axis always can.
+    ValueError where kappa vanishes for no value of the named weight; that of the middle moment's axis always can.
     """
     share = np.roll(moments, -2) - np.roll(moments, -1)
     parts = share / np.sqrt(q[3:] / r)
@@ -77,9 +77,9 @@ def _least_shift(parts: Array, middle: int) -> Array:
         alone = 1.0 - float(np.exp(np.delete(size, number)).sum())
         if alone > 0.0:
             starts.append(np.eye(len(others))[number] * (part - np.log(alone)))
-    found: Any = min((library.minimize(length, start, jac=slope, tol=1e-12) for start in starts), key=lambda end: end.fun)
+    best: Any = min((library.minimize(length, start, jac=slope, tol=1e-12) for start in starts), key=lambda end: end.fun)
     shift = np.zeros(3)
-    shift[others], shift[middle] = found.x, follows(found.x)
+    shift[others], shift[middle] = best.x, follows(best.x)
     return shift
 
 
@@ -102,7 +102,7 @@ def positive_definite(given: Any, size: int, name: str) -> Array:
     diagonal = np.diagonal(array)
     if (diagonal <= 0.0).any():
         raise ValueError(f"{name} must be positive definite; its diagonal holds {diagonal.min():g}")
-    # Scaled to a diagonal of ones, so that neither units nor large weights hide what is wrong with small ones.
+    # Scaled to a diagonal of ones, so that neither units nor large weights hide faults in small ones.
     root = np.sqrt(diagonal)
     scaled = array / root / root[:, None]
     if not np.abs(scaled - scaled.T).max() <= 1e-9:
@@ -120,8 +120,8 @@ def check_spreads(rate: Array, attitude: Array, cost: Array, *, kind: str = "") 
         # Of a full matrix the least eigenvalue is known to the rounding of the largest: a thousandth is forgiven.
         spread = values.max() / max(values.min(), 1e-16 * values.max())
         if not spread <= 1.001 * MOST_SPREAD:
-            found = f"{kind}{name}: the weights of the {part} differ by a factor of {spread:.3g}"
-            raise ValueError(f"{found}; at most {MOST_SPREAD:g} is allowed")
+            reason = f"{kind}{name}: the weights of the {part} differ by a factor of {spread:.3g}"
+            raise ValueError(f"{reason}; at most {MOST_SPREAD:g} is allowed")
 
 
 def check_axes(moments: Array, q: Array, r: Array) -> None:

@@ -1,6 +1,6 @@
-"""Records equations as lists of operations, and prints them as machine code, C and JavaScript.
+"""Equations are recorded as lists of operations, and printed as machine code, C and JavaScript.
 
-Start with `program`: what a trace is. `recording` makes one by calling an equation with `handles`, which note what is done
-to them; `llvm`, `c99`, `javascript` and `ptx` print it; `machine` compiles and loads; `calling` does all of that for one
-equation.
+Start with `program`: what a trace is. `recording` makes one by calling an equation with `handles`, which note what is
+done to them; `llvm`, `c99`, `javascript` and `ptx` print it; `machine` compiles and loads; `calling` does all of that
+for one equation.
 """

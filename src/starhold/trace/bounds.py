@@ -1,8 +1,8 @@
-"""Bounds what a program does: every address lies within its memory, and no more is done than is counted here.
+"""The work of a program is bounded: every address lies within its memory, and no more is done than is counted here.
 
-Addresses are made of counts and counters alone, so they are polynomials in them. A polynomial that is linear in a counter is
-greatest at an end of the counter's range, which is a polynomial in what stands round its loop: so the bounds are those that
-are reached, but for some products of a counter with itself. What a branch or a loop says of the counters holds within it.
+Addresses are made of counts and counters alone, so they are polynomials in them. A polynomial that is linear in a
+counter is greatest at an end of the counter's range, which is a polynomial in the counters of the loops around: so the
+bounds are attained, but for some products of a counter with itself. Conditions on the counters hold in their branch or loop.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class OutsideError(Exception):
 
 
 class Work(NamedTuple):
-    """The counts tell how often something is done, at the most."""
+    """The counts are upper bounds of how often each kind of operation is done."""
 
     additions: int = 0
     multiplications: int = 0
@@ -67,13 +67,13 @@ class Work(NamedTuple):
         return Work(*(a + b for a, b in zip(self, other, strict=True)))
 
     def times(self, count: int) -> Work:
-        """Multiply the work by so many times."""
+        """Return this much work so many times over."""
         return Work(*(count * a for a in self))
 
 
 class Turns(NamedTuple):
-    """A loop of what is run that is not within another has a counter, a largest number of turns, and a bound of what one of
-    them does."""
+    """A loop that is not within another has a counter, a largest number of turns, and a bound of the work of one of
+    them."""
 
     counter: str
     most: int
@@ -113,20 +113,20 @@ class Form:
         self.terms = {symbols: c for symbols, c in terms.items() if c}
 
     def __add__(self, other: Form) -> Form:
-        found = Counter(self.terms)
+        terms = Counter(self.terms)
         for symbols, c in other.terms.items():
-            found[symbols] += c
-        return Form(found)
+            terms[symbols] += c
+        return Form(terms)
 
     def __sub__(self, other: Form) -> Form:
         return self + constant(-1) * other
 
     def __mul__(self, other: Form) -> Form:
-        found = Counter[tuple[int, ...]]()
+        terms = Counter[tuple[int, ...]]()
         for a, c in self.terms.items():
             for b, d in other.terms.items():
-                found[tuple(sorted(a + b))] += c * d
-        return Form(found)
+                terms[tuple(sorted(a + b))] += c * d
+        return Form(terms)
 
     def text(self, names: Sequence[str]) -> str:
         """Return it in the names of the symbols, its number last."""
@@ -159,13 +159,13 @@ class Form:
 
     def at(self, symbol: int, value: Form) -> Form:
         """Return the polynomial where a symbol is another polynomial."""
-        found = Form({})
+        total = Form({})
         for symbols, c in self.terms.items():
             part = Form({tuple(s for s in symbols if s != symbol): c})
             for _ in range(symbols.count(symbol)):
                 part = part * value
-            found += part
-        return found
+            total += part
+        return total
 
 
 def constant(value: int) -> Form:
@@ -193,7 +193,7 @@ def extreme(form: Form, ranges: Ranges, highest: bool) -> int:
 
 
 def _by_intervals(form: Form, ranges: Ranges, highest: bool) -> int:
-    """Return a bound term by term, in how far each symbol lies above its lowest value: that of a sum of terms of one
+    """Return a bound term by term, in the height of each symbol above its lowest value: that of a sum of terms of one
     sign."""
     above: dict[int, int] = {}
     for symbol in {symbol for symbols in form.terms for symbol in symbols}:
@@ -227,7 +227,7 @@ def required(form: Form, ranges: Ranges) -> Ranges | None:
 
 
 class _Part(NamedTuple):
-    """A part sums up what a block does each time, and what it does once in all the turns of the loop of a symbol."""
+    """A part sums up the work of a block each time, and the work done once in all the turns of the loop of a symbol."""
 
     each: Work
     once: dict[int, Work]
@@ -290,7 +290,7 @@ class _Walk:
         return total
 
     def _note(self, s: Op, known: dict[str, Form]) -> None:
-        """Remember what an index is, or for a truth about two of them their difference."""
+        """Remember the form of an index, or for a truth about two of them that of their difference."""
         if s.operation.name in ("index_plus", "index_minus", "index_product", "same_index"):
             a, b = (self._form(value, known) for value in s.args)
             if s.operation.name == "index_plus":
@@ -329,7 +329,7 @@ class _Walk:
         self.ranges = inside
         part = self._block(function, s.body, known)
         self.ranges = outer
-        # In one turn alone of the innermost of the loops that it speaks of.
+        # The branch is taken in one turn alone of the innermost loop whose counter it compares.
         if off.last is not None and off.slope(off.last):
             everything = sum_of([part.each, *part.once.values()])
             return _Part(Work(), {off.last: everything})
@@ -344,7 +344,7 @@ class _Walk:
         turns = extreme(most, inside, highest=True)
         self.ranges = inside
         known[s.counter] = self._symbol(s.counter, constant(0), most - constant(1))
-        own = len(self.names) - 1
+        counter = len(self.names) - 1
         branch = s.most == 1
         self.depth += not branch
         part = self._block(function, s.head, known).plus(self._block(function, s.body, known))
@@ -352,8 +352,8 @@ class _Walk:
         self.ranges = outer
         if self.depth == 0 and not branch:
             self.loops.append(Turns(s.counter, turns, sum_of([part.each, *part.once.values()])))
-        once = {symbol: more.times(turns) for symbol, more in part.once.items() if symbol != own}
-        return _Part(part.each.times(turns).plus(part.once.get(own, Work())), once)
+        once = {symbol: more.times(turns) for symbol, more in part.once.items() if symbol != counter}
+        return _Part(part.each.times(turns).plus(part.once.get(counter, Work())), once)
 
 
 def sum_of(parts: list[Work]) -> Work:

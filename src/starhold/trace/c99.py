@@ -1,4 +1,4 @@
-"""Prints a program as C99, for one lane: a function for each that was recorded, the last of which is what is called.
+"""A program is printed as C99, for one lane: a function for each recorded one; the last is the one to call.
 
 It is given the memories as pointers, then counts as `long` and words as `uint64_t`. It uses nothing of the library but
 `sqrt` (and `memcpy`, where it takes doubles apart), allocates nothing, and gives the bits that plain Python gives where
@@ -51,8 +51,7 @@ _HELPERS = {"bits_of": _BITS_OF, "with_bits": _WITH_BITS}
 
 
 class C99(Source):
-    """The printer makes the text of a program. What a function gives, it returns, or writes to pointers where that is more
-    than one value."""
+    """The printer makes the text of a program. A function returns its value, or writes several to pointers."""
 
     language = "c"
     special: ClassVar = {"nan": "NAN", "inf": "INFINITY", "-inf": "-INFINITY"}
@@ -61,16 +60,16 @@ class C99(Source):
 
     @property
     def prototype(self) -> str:
-        """Return the declaration of what is called, for a header."""
+        """Return the declaration of the function to call, for a header."""
         return self._head(self.program.main).replace(TIE, " ") + ";"
 
     def _opening(self) -> list[str]:
         body = "\n".join(self.lines)
         helpers = [text for name, text in _HELPERS.items() if f"{name}(" in body]
-        found = ["#include <math.h>", "#include <stdint.h>", *["#include <string.h>"] * bool(helpers), "", GUARD]
+        lines = ["#include <math.h>", "#include <stdint.h>", *["#include <string.h>"] * bool(helpers), "", GUARD]
         for text in helpers:
-            found += ["", text]
-        return found
+            lines += ["", text]
+        return lines
 
     def _head(self, function: Function) -> str:
         main = self.is_main(function)

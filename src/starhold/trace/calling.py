@@ -23,8 +23,8 @@ WIDTH = 8
 
 
 class Compiled:
-    """An equation is compiled for arguments shaped like the ones given: their floats, and those in buffers, are arguments,
-    all else is a constant of it."""
+    """An equation is compiled for arguments shaped like the given ones: their floats, also those in buffers, are
+    arguments, all else is a constant."""
 
     def __init__(self, equation: Callable[..., Any], *like: Any) -> None:
         self.program, self._like = record_call(equation, like)
@@ -45,7 +45,7 @@ class Compiled:
         y = np.empty(len(self._leaves))
         self._one(x.ctypes.data, y.ctypes.data, 1)
         source = iter(y.tolist())
-        return mapped(self._like, lambda leaf: _told(leaf, next(source)))
+        return mapped(self._like, lambda leaf: _plain(leaf, next(source)))
 
     def over(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the numbers it gives, (numbers, lanes), for arguments whose floats are the columns of (floats, lanes);
@@ -59,15 +59,15 @@ class Compiled:
         return y.swapaxes(0, 1).reshape(len(self._leaves), -1)[:, :count]
 
 
-def _told(leaf: Any, number: float) -> Any:
+def _plain(leaf: Any, number: float) -> Any:
     if not isinstance(leaf, Handle):
         return leaf
     return number == 1.0 if leaf.kind == TRUTH else number
 
 
 def record_call(equation: Callable[..., Any], like: tuple[Any, ...]) -> tuple[Program, Any]:
-    """Return a program that reads the floats of the arguments from the memory `x` and writes what the equation gives to `y`,
-    both `count` times over; and what it gives, with handles for numbers."""
+    """Return a program that reads the floats of the arguments from the memory `x` and writes the equation's numbers to
+    `y`, both `count` times over; and the equation's result, with handles for numbers."""
     recorder = Recorder()
     x = recorder.memory("x", lanes=True)
     y = recorder.memory("y", lanes=True, writable=True)

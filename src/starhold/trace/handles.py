@@ -11,7 +11,7 @@ INSTEAD = "+ - * /, sqrt and the other operations of starhold.algebra.scalar"
 
 
 class RecordingError(InputError):
-    """An equation does what cannot be recorded; the text names the law, the line of its file and what to write instead."""
+    """An equation cannot be recorded; the text names the law, the line of its file and what to write instead."""
 
 
 class Handle:
@@ -134,7 +134,7 @@ class Word(Handle):
 
 
 class Index(Handle):
-    """All lanes share this integer: a count, a loop's counter, or made of such by + - *."""
+    """All lanes share this integer: a count, a loop's counter, or a sum, difference or product of these."""
 
     __slots__ = ()
     kind = INDEX
@@ -153,10 +153,10 @@ class Uniform(Handle):
 HANDLES: dict[str, type[Handle]] = {cls.kind: cls for cls in (Number, Truth, Word, Index, Uniform)}
 
 
-def refuse(found: str, allowed: str) -> NoReturn:
+def refuse(what: str, allowed: str) -> NoReturn:
     """Raise a RecordingError that points at the line of the equation that runs now."""
     place, text = written_at()
-    raise RecordingError(place, "", f"{found}, in `{text}`", allowed)
+    raise RecordingError(place, "", f"{what}, in `{text}`", allowed)
 
 
 def kind_of(value: Any) -> str:

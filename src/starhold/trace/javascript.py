@@ -1,8 +1,7 @@
-"""Prints a program as JavaScript (ES2017), for one lane: a function for each that was recorded, the last of which is what is
-called.
+"""A program is printed as JavaScript (ES2017), for one lane: a function for each recorded one; the last is the one to call.
 
-It is given the memories as Float64Arrays, then counts as numbers and words as pairs [high, low] of 32-bit integers, which
-is what a word is everywhere here. It needs neither a library nor a module, and gives the bits that plain Python gives.
+It is given the memories as Float64Arrays, then counts as numbers and words as pairs [high, low] of 32-bit integers, as
+words are everywhere here. It needs neither a library nor a module, and gives the bits that plain Python gives.
 """
 
 from __future__ import annotations
@@ -79,7 +78,7 @@ class JavaScript(Source):
         return [f"{name}$high", f"{name}$low"] if kind == WORD else [name]
 
     def _texts_of_parts(self, value: Value, kind: str) -> list[str]:
-        """Return the texts of a value: of a word that of each half."""
+        """Return the texts of a value: for a word that of each half."""
         if kind != WORD:
             return [self.text(value, kind)]
         if isinstance(value, str):

@@ -1,7 +1,7 @@
-"""Prints a program as LLVM's intermediate representation, for one lane or for W lanes in explicit vectors.
+"""A program is printed as LLVM's intermediate representation, for one lane or for W lanes in explicit vectors.
 
-No operation is reassociated or contracted. Lanes go through loops together: a lane that is done keeps what its slots hold
-and writes nothing, by masks.
+No operation is reassociated or contracted. Lanes go through loops together: a lane that is done keeps what its slots
+hold and writes nothing, by masks.
 """
 
 from __future__ import annotations
@@ -61,11 +61,11 @@ class Llvm:
     """The printer makes the text of a program. Memories are pointers: a memory of lanes holds W numbers for each index."""
 
     convention: ClassVar[str] = ""
-    """How what is run is called, where not as C calls it."""
+    """Calling convention of the function to run, where it is not C's."""
     passed: ClassVar[tuple[str, ...]] = ()
-    """Integers that every function is given last."""
+    """Integers that are the last arguments of every function."""
     lane: ClassVar[str] = "0"
-    """The number of the lane where there is one alone."""
+    """The number of the lane where there is only one."""
 
     def __init__(self, program: Program, width: int) -> None:
         if width > 1:
@@ -84,13 +84,13 @@ class Llvm:
     def _declarations(self) -> list[str]:
         t = self.types
         number, word = t.names[NUMBER], t.names[WORD]
-        found = [
+        declarations = [
             f"declare {number} @llvm.sqrt.{t.suffix}({number})",
             f"declare {word} @llvm.fshl.{t.words}({word}, {word}, {word})",
         ]
         if t.width > 1:
-            found.append(f"declare void @llvm.masked.store.{t.suffix}.p0({number}, ptr, i32, {t.names[TRUTH]})")
-        return found
+            declarations.append(f"declare void @llvm.masked.store.{t.suffix}.p0({number}, ptr, i32, {t.names[TRUTH]})")
+        return declarations
 
     # Text of the parts.
 
@@ -135,8 +135,8 @@ class Llvm:
         pointers = [("ptr noalias", f"%{memory.name}") for memory in self.program.memories]
         if function is self.program.main:
             return pointers + [("i64", f"%{name}" if kind == INDEX else f"%{name}.given") for name, kind in function.params]
-        own = [(self.types.names[kind], f"%{name}") for name, kind in function.params]
-        return pointers + own + [("i64", name) for name in self.passed]
+        typed = [(self.types.names[kind], f"%{name}") for name, kind in function.params]
+        return pointers + typed + [("i64", name) for name in self.passed]
 
     def _gives(self, function: Function) -> str:
         return "{ " + ", ".join(self.types.names[kind] for _, kind in function.outs) + " }" if function.outs else "void"
@@ -157,7 +157,7 @@ class Llvm:
         self.text += [head, *self.lines, f"  ret {gives} {out}".rstrip(), "}"]
 
     def _begin(self, main: Function) -> None:
-        """Add what comes first in the function that is run."""
+        """Add the first lines of the function to run."""
         for name, kind in main.params:
             if kind == WORD:
                 self._splat("i64", f"%{name}.given", WORD, f"%{name}")
@@ -198,7 +198,7 @@ class Llvm:
         values: list[str] = []
         kinds = s.operation.takes
         for value, kind in zip(s.args, kinds, strict=True):
-            # What a word is turned by is a word of its own here.
+            # The count of a rotation is a word here.
             values.append(self._value(value, WORD if kind == STATIC else kind))
         line = s.operation.meanings["llvm"].format(*values, **self.types.fields)
         if INDEX in kinds and s.operation.gives in (NUMBER, WORD):
@@ -253,7 +253,7 @@ class Llvm:
                 bits = self._let(f"bitcast {truth} {mask} to i{self.types.width}")
                 go = self._let(f"icmp ne i{self.types.width} {bits}, 0")
             more = self._let(f"and i1 {more}, {go}")
-        asked = self.label
+        tested = self.label
         self._put(f"br i1 {more}, label %turn.{at}, label %past.{at}")
         self._begin_block(f"turn.{at}")
         self._block(s.body, mask)
@@ -272,4 +272,4 @@ class Llvm:
         self._put(f"br label %head.{at}")
         self._begin_block(f"past.{at}")
         for slot in s.slots:
-            self._put(f"%{slot.end} = phi {self.types.names[slot.kind]} [ %{slot.name}, %{asked} ]")
+            self._put(f"%{slot.end} = phi {self.types.names[slot.kind]} [ %{slot.name}, %{tested} ]")

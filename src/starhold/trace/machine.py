@@ -1,4 +1,4 @@
-"""Compiles programs for this processor and calls them."""
+"""Programs are compiled for this processor and called."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ def _is_wide() -> bool:
 
 
 def load(program: Program, width: int, passes: bool | None = None) -> Callable[..., None]:
-    """Return the program as a function of this process, for so many lanes at once: addresses of the memories (a memory of
-    lanes holds `width` numbers for each index, aligned to their size), then counts and words. It lets go of the interpreter.
+    """Return the program as a function of this process, for so many lanes at once: addresses of the memories (a memory
+    of lanes holds `width` numbers for each index, aligned to their size), then counts and words. It releases the GIL.
 
-    passes: whether LLVM reworks what is printed before it makes code of it; left open, where that has been measured to bring
-    more than it costs: on one lane, and on many where registers are plenty and nothing is called.
+    passes: whether LLVM optimises the printed text before it makes code of it; None: where that has been measured to
+    pay, on one lane, and on many where registers are plenty and nothing is called.
     """
     calls = any(isinstance(s, Call) for s in statements(program.main.body))
     if passes is None:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeAlias
 from starhold.algebra.operations import Operation
 
 Value: TypeAlias = Any
-"""The name of what an earlier statement gave (a str), or a constant (a float, bool or int)."""
+"""The name of an earlier statement's result (a str), or a constant (a float, bool or int)."""
 
 
 class Op(NamedTuple):
@@ -36,8 +36,8 @@ class Store(NamedTuple):
 
 
 class Slot(NamedTuple):
-    """A variable of a loop is called `name` within it and `name` with an underscore after it; `before` is what it holds
-    before the first turn, `after` what each turn makes of it."""
+    """A variable of a loop is called `name` within it and `name` with an underscore after it; `before` is its value
+    before the first turn, `after` its value after each turn."""
 
     name: str
     kind: str
@@ -80,8 +80,8 @@ Block: TypeAlias = tuple[Any, ...]
 
 
 class Function(NamedTuple):
-    """A function is a block of its own; params and outs are pairs of a name (or constant) and a kind; shape: what printers
-    know of how they are grouped."""
+    """A function is a block of its own; params and outs are pairs of a name (or constant) and a kind; shape: how
+    printers group them."""
 
     name: str
     doc: str
@@ -92,7 +92,7 @@ class Function(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """A program is given numbers: a block of them for each lane, or one for all; size, where it is known."""
+    """A memory holds the numbers that a program is given: a block for each lane, or one for all; size, where it is known."""
 
     name: str
     lanes: bool
@@ -101,8 +101,8 @@ class Memory(NamedTuple):
 
 
 class Program(NamedTuple):
-    """A program has functions in the order of their definition, the last of which is what is run, and the memories it is
-    given, in order."""
+    """A program has functions in the order of their definition, of which the last is run, and the memories it is given,
+    in order."""
 
     functions: tuple[Function, ...]
     memories: tuple[Memory, ...]
@@ -148,23 +148,23 @@ def writes(block: Block) -> bool:
 
 
 def prune(block: Block, outs: Iterable[Value]) -> tuple[Block, dict[str, Value]]:
-    """Return the block without operations and slots that nobody reads, and with slots that never change replaced by what
-    they hold; and what stands for their names now."""
+    """Return the block without operations and slots that nobody reads, and with slots that never change replaced by
+    their values; and the values that stand for their names now."""
     wanted, names = set(outs), dict[str, Value]()
     # A loop within may show that a slot of the loop round it never changes either.
     while True:
-        found: dict[str, Value] = {}
-        block = _settled(block, found)
-        if not found:
+        settled: dict[str, Value] = {}
+        block = _settled(block, settled)
+        if not settled:
             break
-        wanted = {renamed(out, found) for out in wanted}
-        names = {name: renamed(value, found) for name, value in names.items()} | found
+        wanted = {renamed(out, settled) for out in wanted}
+        names = {name: renamed(value, settled) for name, value in names.items()} | settled
     return pruned(block, live_names(block, wanted)), names
 
 
 def single_turns(function: Function) -> Function:
-    """Return the function with what the loops of one turn hold in it read where it comes from: such a loop is a branch, and
-    what only its slots read is gone."""
+    """Return the function with the slots of loops of one turn replaced by their values: such a loop is a branch, and
+    values that only its slots read are gone."""
     names: dict[str, Value] = {}
     for s in statements(function.body):
         if isinstance(s, Loop) and s.most == 1:
@@ -176,17 +176,17 @@ def single_turns(function: Function) -> Function:
 
 
 def renamed(value: Value, names: dict[str, Value]) -> Value:
-    """A value is replaced by what stands for it."""
+    """Return the value that stands for this one."""
     return names.get(value, value) if isinstance(value, str) else value
 
 
 def _settled(block: Block, names: dict[str, Value]) -> Block:
-    """Return the block with settled slots replaced; `names` says by what, and grows."""
-    found: list[Any] = []
+    """Return the block with settled slots replaced by the values in `names`, which grows."""
+    result: list[Any] = []
     for s in block:
         if isinstance(s, Loop):
             slots = [slot._replace(before=renamed(slot.before, names)) for slot in s.slots]
-            # A slot that each turn hands on as it is.
+            # Each turn hands this slot on as it is.
             for slot in slots:
                 if slot.after == slot.name or (not isinstance(slot.after, str) and _same(slot.after, slot.before)):
                     names[slot.name] = names[slot.end] = slot.before
@@ -201,8 +201,8 @@ def _settled(block: Block, names: dict[str, Value]) -> Block:
             s = s._replace(index=renamed(s.index, names))
         else:
             s = Store(s.memory, renamed(s.index, names), renamed(s.value, names))
-        found.append(s)
-    return tuple(found)
+        result.append(s)
+    return tuple(result)
 
 
 def _same(a: Value, b: Value) -> bool:
@@ -212,7 +212,7 @@ def _same(a: Value, b: Value) -> bool:
 def live_names(block: Block, outs: Iterable[Value]) -> set[Value]:
     """Return what is read for the sake of the outs, or of what is written."""
     names, before = set(outs), -1
-    # Backwards, so that what is read by what is read is mostly found at once.
+    # Backwards, so that chains of reads are mostly found at once.
     order = [*statements(block)][::-1]
     acts = {id(s): writes((s,)) for s in order if isinstance(s, (Loop, Branch, Call))}
     while before != (before := len(names)):
@@ -240,7 +240,7 @@ def _refs(s: Op | Load | Call) -> list[str]:
 
 def pruned(block: Block, names: set[Value]) -> Block:
     """Return the block without what gives none of these names."""
-    found: list[Any] = []
+    result: list[Any] = []
     for s in block:
         if isinstance(s, Loop):
             slots = tuple(slot for slot in s.slots if {slot.name, slot.end} & names)
@@ -256,5 +256,5 @@ def pruned(block: Block, names: set[Value]) -> Block:
                 continue
         elif isinstance(s, (Op, Load)) and s.ref not in names:
             continue
-        found.append(s)
-    return tuple(found)
+        result.append(s)
+    return tuple(result)

@@ -1,8 +1,8 @@
-"""Prints a program as assembly of another machine, from the same intermediate representation: PTX of NVIDIA's GPUs, where
-each thread is a lane, and of any processor that LLVM knows, for one lane.
+"""A program is printed as assembly of another machine, from the same intermediate representation: PTX of NVIDIA's GPUs,
+where each thread is a lane, and of any processor that LLVM knows, for one lane.
 
-No test runs it on a GPU. What LLVM is given is run on the processor at hand, one thread after the other, and of the PTX that
-it makes is checked that every operation rounds to nearest and none is fused.
+No test runs it on a GPU. The text for LLVM is run on the processor at hand, one thread after the other, and the PTX
+that LLVM makes of it is checked: every operation rounds to nearest and none is fused.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Keeps the notes while equations are recorded: what is done to handles becomes a tree of blocks."""
+"""Operations on handles are recorded as a tree of blocks."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ _WORDS = """
     bits_of with_bits high_bits low_bits
 """
 RESERVED = frozenset(_WORDS.split())
-"""Words of the languages printed, which no variable may be called."""
+"""Words of the printed languages, which no variable may have for a name."""
 
 
 MARK = "\u241e"
-"""Stands on both sides of a number's place and format in a text that a check made of recorded numbers."""
+"""This stands on both sides of a number's place and format in a text that a check made of recorded numbers."""
 
 _CONSTANTS = {NUMBER: (float, int), TRUTH: (bool,), WORD: (int,), INDEX: (int,), STATIC: (int,)}
 
@@ -66,13 +66,13 @@ class Cells:
 
 
 class _Names:
-    """Gives every variable a name of its own."""
+    """Every variable gets a name of its own."""
 
     def __init__(self, taken: Iterable[str]) -> None:
         self._taken, self._counts = {*taken, *RESERVED}, Counter[str]()
 
     def new(self, hint: str) -> str:
-        """Return the hint, or with a number. Names never end in an underscore: that marks what a loop leaves."""
+        """Return the hint, with a number where it is taken. None ends in an underscore, which marks values after a loop."""
         name = hint = hint.strip("_") or "x"
         while name in self._taken or name == "t":
             self._counts[hint] += 1
@@ -82,8 +82,8 @@ class _Names:
 
 
 class Path:
-    """One way through the comparisons of a check: the answers that are given, and no from there on. `truths` and
-    `taken` are the comparisons met with the answers that they got; `numbers` those that a text asked for."""
+    """One way through the comparisons of a check: the given answers, then no to all others. `truths` and `taken` are
+    the comparisons met with the answers that they got; `numbers` those that appear in a text."""
 
     def __init__(self, turns: Sequence[bool]) -> None:
         self.taken, self._turns = list[bool](), turns
@@ -105,7 +105,7 @@ class Path:
 
 
 class Recorder:
-    """Keeps what is done to handles as a tree of blocks, equal operations of a block and those round it once."""
+    """A recorder keeps operations on handles as a tree of blocks, with equal operations kept once."""
 
     def __init__(self) -> None:
         self.memories: list[Memory] = []
@@ -143,7 +143,7 @@ class Recorder:
             RECORDER.reset(token)
 
     def program(self, name: str, doc: str = "") -> Program:
-        """Return the notes so far make a program."""
+        """Return the program of the notes so far."""
         body, _ = prune(tuple(self._open[0]), ())
         main = Function(self._titles.new(name), doc, tuple(self._inputs), body, ())
         return Program((*(function for function, _, _ in self._functions.values()), main), tuple(self.memories))
@@ -178,10 +178,10 @@ class Recorder:
         return self._once(key, lambda ref: Op(ref, operation, refs), operation.gives)
 
     def _unfit(self, operation: Operation, value: Any, kind: str) -> NoReturn:
-        found = value.kind if isinstance(value, Handle) else type(value).__name__
+        given = value.kind if isinstance(value, Handle) else type(value).__name__
         wanted = {NUMBER: "a number", TRUTH: "a truth, as less gives", INDEX: "a count or a counter"}.get(kind, f"a {kind}")
-        instead = "number_of(index)" if found == INDEX and kind == NUMBER else wanted
-        refuse(f"{operation.name} of a value of kind {found}", instead)
+        instead = "number_of(index)" if given == INDEX and kind == NUMBER else wanted
+        refuse(f"{operation.name} of a value of kind {given}", instead)
 
     def _once(self, key: Any, make: Callable[[str], Any], gives: str) -> Any:
         for seen in self._seen:
@@ -231,10 +231,10 @@ class Recorder:
         kinds = [kind for _, kind in names]
         if INDEX in kinds:
             refuse("an index handed from turn to turn of a loop", "the loop's counter, or number_of(index)")
-        found = [kind_of(x) for x in leaves(after) if not isinstance(x, Buffer)]
-        if found != kinds:
+        given = [kind_of(x) for x in leaves(after) if not isinstance(x, Buffer)]
+        if given != kinds:
             refuse(
-                f"a turn of a loop that takes {', '.join(kinds) or 'nothing'} and gives {', '.join(found) or 'nothing'}",
+                f"a turn of a loop that takes {', '.join(kinds) or 'nothing'} and gives {', '.join(given) or 'nothing'}",
                 "the same",
             )
         pairs = zip(names, self._refs(state), self._refs(after), strict=True)
@@ -313,7 +313,7 @@ class Recorder:
         if isinstance(value, tuple):
             return (type(value), *(self._form(part) for part in value))  # pyright: ignore
         if isinstance(value, Buffer):
-            # Of numbers that are known while recording the list itself.
+            # Numbers that are known while recording make the list itself the form.
             cells = value.cells.memory.name if isinstance(value.cells, Cells) else id(value.cells)
             return (cells, self._form(value.base), self._form(value.size))
         if value is None or type(value) in (int, bool):
@@ -328,12 +328,12 @@ class Recorder:
         return tuple(self._open.pop()), out
 
     def _named(self, state: tuple[Any, ...], words: list[str]) -> list[tuple[str, str]]:
-        found: list[tuple[str, str]] = []
+        pairs: list[tuple[str, str]] = []
         for part, word in zip(state, words, strict=False):
             for label, leaf in _labelled(part, word.strip("_") or "x"):
                 if not isinstance(leaf, Buffer):
-                    found.append((self._names.new(label), kind_of(leaf)))
-        return found
+                    pairs.append((self._names.new(label), kind_of(leaf)))
+        return pairs
 
     def _handles(self, like: Any, names: list[tuple[str, str]]) -> Any:
         source = iter(names)

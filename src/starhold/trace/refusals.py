@@ -19,17 +19,17 @@ MOST = 100
 """Ways through a check."""
 
 Words = list[str | tuple[int, str]]
-"""The text of a refusal: pieces of text, and numbers as their place in what the program gives and their format."""
+"""The text of a refusal: pieces of text, and numbers as their place among those of the program and their format."""
 
 
 def record_check(check: Callable[..., Any], like: tuple[Any, ...]) -> tuple[Program, list[tuple[int, Words]]] | None:
     """Return a program of the floats of the arguments, as of `record_call`, and for each refusal the place of the number
     that is 1 where it holds, with its text; None where the check refuses nothing on account of them. RecordingError where
     the check does what cannot be recorded."""
-    found: list[tuple[int, Words]] = []
+    refusals: list[tuple[int, Words]] = []
 
     def ways(*values: Any) -> tuple[Any, ...]:
-        found.clear()
+        refusals.clear()
         recorder = next(leaf.recorder for leaf in leaves(values) if isinstance(leaf, Handle))
         numbers: list[Any] = []
         left, count = [list[bool]()], 0
@@ -55,12 +55,12 @@ def record_check(check: Callable[..., Any], like: tuple[Any, ...]) -> tuple[Prog
             met = zip(path.truths, path.taken, strict=True)
             holds = reduce(both, (truth if taken else opposite(truth) for truth, taken in met), True)
             first = len(numbers) + 1
-            found.append((len(numbers), _words(refusal, first)))
+            refusals.append((len(numbers), _words(refusal, first)))
             numbers += [where(holds, 1.0, 0.0), *path.numbers]
         return tuple(numbers)
 
     program, _ = record_call(ways, like)
-    return (program, found) if found else None
+    return (program, refusals) if refusals else None
 
 
 def _words(text: str, first: int) -> Words:

@@ -1,7 +1,7 @@
-"""Prints a program as text that people read: what C and JavaScript have in common.
+"""A program is printed as text that people read: this is common to C and JavaScript.
 
-An operation that is read once is written where it is read, unless the text grows long; so is what reads a table, but not
-what reads memory that may be written to in between. Loops of the trace are loops, and those of one turn are branches.
+An operation that is read once is written where it is read, unless the text grows long; so is a load from a table, but
+not from memory that may be written to in between. Loops of the trace are loops, and those of one turn are branches.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from starhold.trace.program import (
 WIDTH = 110
 """Characters of a line, where one can be broken."""
 TIE = "\N{NO-BREAK SPACE}"
-"""What is written as a blank, and where no line is broken."""
+"""This is written as a blank at which no line is broken."""
 LONG, SHORT = 72, 28
 """Characters of an expression that is written where it is read: of one that is read once, and of any made of indices."""
 
@@ -56,8 +56,8 @@ class Expression(NamedTuple):
 @cache
 def operator_of(text: str) -> str:
     """Return the operator of a text with places for its operands."""
-    if found := re.fullmatch(r"\{0\} (\S+) (?:\{1\}|\d+)", text):
-        return found[1] if found[1] in _LEVELS else _OTHER
+    if match := re.fullmatch(r"\{0\} (\S+) (?:\{1\}|\d+)", text):
+        return match[1] if match[1] in _LEVELS else _OTHER
     if re.fullmatch(r"(-|!|\(\w+\))\{0\}", text):
         return _UNARY
     if re.fullmatch(r"[\w.]+(\([^()]*\))?", text):
@@ -93,7 +93,7 @@ class Source(ABC):
     special: ClassVar[dict[str, str]]
     """Numbers that are not finite, by their names in Python."""
     taken: ClassVar[frozenset[str]]
-    """What no function may be called, besides words of the language."""
+    """Names that no function may have, besides words of the language."""
 
     def __init__(self, program: Program) -> None:
         self.program = program
@@ -120,7 +120,7 @@ class Source(ABC):
         return "\n".join([*self._opening(), *self.lines]) + "\n"
 
     def is_main(self, function: Function) -> bool:
-        """Tell whether a function is what is called."""
+        """Tell whether a function is the one to call."""
         return function.name == self.program.main.name
 
     def _touched(self, function: Function) -> list[Memory]:
@@ -128,7 +128,7 @@ class Source(ABC):
                 if isinstance(s, (Load, Store))}  # fmt: skip
         return [memory for memory in self.program.memories if memory.name in used]
 
-    # What a language says.
+    # Texts of a language.
 
     @abstractmethod
     def _opening(self) -> list[str]:
@@ -144,11 +144,11 @@ class Source(ABC):
 
     @abstractmethod
     def _declared(self, kind: str, changes: bool = False) -> str:
-        """Return what comes before the name of a value where it is declared."""
+        """Return the text before the name of a value where it is declared."""
 
     @abstractmethod
     def _call(self, s: Call) -> None:
-        """Call a function, and name what it gives."""
+        """Call a function, and name its results."""
 
     # Text of the parts.
 
@@ -176,7 +176,7 @@ class Source(ABC):
         self.put(f"{self._declared(kind)} {name} = {text};")
 
     def _set(self, declared: str, name: str, value: Value, kind: str) -> None:
-        """Declare what changes, or change it."""
+        """Declare a variable, or assign to it."""
         for part, text in zip(self._parts(name, kind), self._texts_of_parts(value, kind), strict=True):
             self.put(f"{declared}{part} = {text};")
 
@@ -187,7 +187,7 @@ class Source(ABC):
         self.lines += [part.replace(TIE, " ") for part in wide.wrap(line)]
 
     def open(self, line: str) -> None:
-        """Begin what stands in braces."""
+        """Begin a block in braces."""
         self.put(line + " {")
         self.depth += 1
 
@@ -218,26 +218,26 @@ class Source(ABC):
     # Where names are read.
 
     def _prepare(self, function: Function) -> None:
-        """Find what is read once, in the block that computes it."""
+        """Find the values that are read once, in the block that computes them."""
         home: dict[str, int] = {}
         seen: dict[Value, list[int]] = defaultdict(list)
         blocks = 0
 
-        def walk(block: tuple[Any, ...], own: int) -> None:
+        def walk(block: tuple[Any, ...], here: int) -> None:
             nonlocal blocks
             for s in block:
                 if isinstance(s, (Op, Load)):
-                    home[s.ref] = own
+                    home[s.ref] = here
                 elif isinstance(s, Call) and s.refs:
                     # Members of one variable, where it has any.
-                    home[s.refs[0][0].partition(".")[0]] = own
+                    home[s.refs[0][0].partition(".")[0]] = here
                 for value, times in self._operands(s):
-                    seen[value] += [own] * times
+                    seen[value] += [here] * times
                 if isinstance(s, (Branch, Loop)):
                     blocks += 1
                     inner = blocks
                     if isinstance(s, Loop):
-                        head = own if s.most == 1 else inner
+                        head = here if s.most == 1 else inner
                         walk(s.head, head)
                         seen[s.done].append(head)
                         for slot in s.slots:
@@ -247,7 +247,7 @@ class Source(ABC):
         walk(function.body, 0)
         for out, times in self._results(function):
             seen[out] += [0] * times
-        self._once = {name for name, own in home.items() if seen.get(name) == [own]}
+        self._once = {name for name, place in home.items() if seen.get(name) == [place]}
         self._read = {value for value in seen if isinstance(value, str)}
         self._folded = {}
 
@@ -303,7 +303,7 @@ class Source(ABC):
     def written(self, s: Op, text: str, names: Mapping[str, str] = MappingProxyType({})) -> Expression:
         """Return the expression of an operation with its operands substituted; names: further names that its text uses."""
         if s.operation.name == "same_index" and (s.args[0] == s.args[1] or not any(isinstance(x, str) for x in s.args)):
-            # Compilers warn of what is known.
+            # Compilers warn of comparisons whose result is known.
             return Expression(self._constant(s.args[0] == s.args[1], UNIFORM))
         operator = operator_of(text)
         values = [self.use(value, kind) for value, kind in zip(s.args, s.operation.takes, strict=True)]
@@ -326,7 +326,7 @@ class Source(ABC):
         if not one:
             begun, most = f"{self._declared(INDEX, changes=True)} {s.counter} = 0", self.text(s.most, INDEX)
             self.open(f"for ({begun}; {s.counter} < {most}; {s.counter}++)")
-            # What a turn begins with stays while the variables change one after another.
+            # The values at the start of a turn stay while the variables change one after another.
             for slot in s.slots:
                 ends = zip(self._parts(slot.name, slot.kind), self._parts(slot.end, slot.kind), strict=True)
                 for part, end in ends if slot.name in self._read else ():
@@ -366,14 +366,14 @@ def names(function: Function) -> Iterator[str]:
 
 def _reached(function: Function, functions: dict[str, Function]) -> dict[str, Function]:
     """Return a function and those that it calls, by name."""
-    found: dict[str, Function] = {}
+    reached: dict[str, Function] = {}
     left = [function.name]
     while left:
         name = left.pop()
-        if name not in found:
-            found[name] = functions[name]
-            left += [s.function.name for s in statements(found[name].body) if isinstance(s, Call)]
-    return found
+        if name not in reached:
+            reached[name] = functions[name]
+            left += [s.function.name for s in statements(reached[name].body) if isinstance(s, Call)]
+    return reached
 
 
 def _titles(names: list[str], taken: set[str]) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""The checks for laws of a body of which nothing is known but what its part declares."""
+"""These checks are for laws of a body that is known only by what its part declares."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def _loop(law: Law, gains: Any) -> ClosedLoop:
 
 
 def loop_with(part: Part, params: Any) -> ClosedLoop:
-    """A loop that holds a part, steered by whatever law for its body is installed."""
+    """A loop with a part, under a law that is installed for its body."""
     law = next(iter(catalogue(part.body).values()), None)
     if law is None:
         raise NotApplicableError(f"no law for the body {part.body} is installed")

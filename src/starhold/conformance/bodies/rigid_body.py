@@ -47,7 +47,7 @@ ON_TARGET = Measurement((1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO
 
 
 def loop_with(part: Part, params: Any) -> ClosedLoop:
-    """A loop that holds a part, and what it needs."""
+    """A loop with a part and the parts that it needs."""
     law = catalogue()["lyapunov"]
     loop = sample_loop(law, law.examples()[0])
     if part.role == "target":
@@ -73,7 +73,7 @@ def reads_alike(law: Law) -> None:
     """Plain Python, one lane and every lane of a batch agree bit for bit."""
     for gains in law.examples():
         loop = sample_loop(law, gains)
-        # Of lanes that start alike only the first draws the random numbers of its sensors.
+        # The other lanes that start alike draw other random numbers of their sensors.
         lanes = (0,) if law.reads else (0, 2)
         agree(loop, [replace_rate(loop.start, factor) for factor in (1.0, 0.5, 1.0, 2.0)], lanes)
 
@@ -170,22 +170,22 @@ def _torques(law: Law, gains: Any, system: tuple[float, float, float] = (1.0, 1.
     memory: Any = None
     for hold in HOLDS:
         for motion in MOTIONS:
-            seen, own, craft, back = rescaled(law, motion, gains, CRAFT, system)
+            seen, scaled, craft, back = rescaled(law, motion, gains, CRAFT, system)
             for _ in range(hold):
-                memory = law.remember(own, craft, seen.period) if memory is None else memory
-                torque, memory = law.command(seen, own, craft, memory)
+                memory = law.remember(scaled, craft, seen.period) if memory is None else memory
+                torque, memory = law.command(seen, scaled, craft, memory)
                 yield np.array(torque) * back
 
 
 def _changed(law: Law, gains: Any) -> Iterator[Any]:
-    """Gains of which one at a time, of those with a unit, is greater by half."""
+    """Yield gains with one number at a time, of those with a unit, greater by half."""
     for place, (item, value) in enumerate(zip(law.fields(), gains, strict=True)):
         if not (item.gain.choices or item.gain.whole):
             yield law.gains(*gains[:place], times(value, 1.5), *gains[place + 1 :])
 
 
 def _first_effect(torques: Iterator[NDArray[np.float64]], others: Iterator[NDArray[np.float64]]) -> int:
-    """Calls until torques differ by what a wrong unit is sure to show by; 0 where they do not."""
+    """Count the calls until torques differ by as much as a wrong unit would make them; 0 where they never do."""
     size = 1e-9
     for number, (one, other) in enumerate(zip(torques, others, strict=True), 1):
         size = max(size, float(np.abs(one).max()))
@@ -210,7 +210,7 @@ def decreases_lyapunov(law: Law) -> None:
 
 
 def can_be_certified(law: Law) -> None:
-    """The certifier reads the law, or says what of it cannot be read."""
+    """The certifier reads the law, or says what it cannot read."""
     for gains in law.examples():
         plain = sample_loop(law, gains)
         for loop in (
@@ -232,7 +232,7 @@ def flies_a_scenario(law: Law) -> None:
         recording = label(loop, samples, carry, 1)
         measured = measure(recording, 1e-3, 1e-3)
         require(measured["diverged_at"] is None, f"the motion is lost after {measured['diverged_at']} s")
-        # What is timed has a kernel of its own.
+        # Timing records a kernel of its own.
         if gains == law.examples()[0]:
             require(call_costs(loop, samples, calls=100)["cost_median"] >= 0.0, "a call cannot be timed")
         fly_claims(loop, certify(loop, law.name), flights=FEW)

@@ -14,10 +14,10 @@ from starhold.laws.predictive.limits import (
     Limits,
     Symmetric,
     box_inverse,
-    held,
     inverse,
     loose,
     plane_inverse,
+    pressing,
     pressure,
     project,
     repelled,
@@ -51,7 +51,7 @@ def rollout(problem: Problem) -> Scalar:
 
 @function
 def adjoint(problem: Problem) -> Scalar:
-    """Find the gradient of half the cost, and a bound on its gap to the optimum if all that is held has to be."""
+    """Find the gradient of half the cost, and a bound on its gap to the optimum if the held limits are active."""
     store, (a, b), weight, bounds = carve(problem), motion(problem), weights(problem), limits(problem)
     n, columns, pushes = problem.horizon, transposed(a), transposed(b)
 
@@ -87,8 +87,8 @@ def _costate(q: Any, columns: Rows, x: Numbers, y: Numbers) -> Numbers:
 
 
 class Value(NamedTuple):
-    """Half the best cost from a state on is x'curvature x / 2 + slope'x + constant; beside it stands what is known of the
-    moves so far: the Newton decrement and the number of limits held."""
+    """Half the best cost from a state on is x'curvature x / 2 + slope'x + constant. The Newton decrement and the number
+    of limits held are those of the moves so far."""
 
     curvature: Rows
     slope: Numbers
@@ -98,9 +98,9 @@ class Value(NamedTuple):
 
 @function
 def sweep(problem: Problem, barrier: Scalar) -> tuple[Scalar, Scalar]:
-    """Find the Newton step by one backward Riccati sweep, as a policy: step + feedback (x - x of the plan). What presses
-    against a limit is held; with a gradient of zeros nothing is, which gives the policy without limits. Gives the Newton
-    decrement and the number of limits held.
+    """Find the Newton step by one backward Riccati sweep, as a policy: step + feedback (x - x of the plan). Moves that
+    press against a limit are held there; with a gradient of zeros none are, which gives the policy without limits.
+    Gives the Newton decrement and the number of limits held.
 
     A barrier above zero asks for the step of the interior-point method instead: nothing is held, and the limits repel.
     """
@@ -141,13 +141,13 @@ def sweep(problem: Problem, barrier: Scalar) -> tuple[Scalar, Scalar]:
 
 
 def _held_inverse(bounds: Limits, v: Vector, g: Vector, m: Symmetric, holds: Truth) -> tuple[Symmetric, Scalar]:
-    """Return the inverse of m on what no limit holds, and the number of limits that hold."""
+    """Return the inverse of m on the directions that no limit holds, and the number of limits that hold."""
     if bounds.ball:
         normal, multiplier = pressure(bounds, v, g)
         pressed = both(holds, less(0.0, multiplier))
         pairs = zip(plane_inverse(m, normal, multiplier), inverse(m), strict=True)
         return cast(Symmetric, tuple(where(pressed, x, y) for x, y in pairs)), where(pressed, 1.0, 0.0)
-    x, y, z = held(bounds, v, g)
+    x, y, z = pressing(bounds, v, g)
     fixed = (both(holds, x), both(holds, y), both(holds, z))
     count = [where(axis, 1.0, 0.0) for axis in fixed]
     return box_inverse(m, fixed), count[0] + count[1] + count[2]
@@ -203,8 +203,8 @@ def unroll(problem: Problem) -> None:
 
 
 class Trial(NamedTuple):
-    """A trial plan tells whether a limit cut anything, and half the cost towards it, which changes by slope + curvature / 2,
-    free of the cancellation that a difference of two costs suffers."""
+    """A trial plan has a flag, whether a limit cut a move, and the change of half the cost towards it, slope +
+    curvature / 2, which is free of the cancellation that a difference of two costs suffers."""
 
     cut: Truth
     slope: Scalar
@@ -240,7 +240,7 @@ def follow(problem: Problem, start: Numbers) -> Trial:
 
 @function
 def take_over(problem: Problem) -> None:
-    """Take the trial plan over."""
+    """Put the trial plan in the place of the plan."""
     store = carve(problem)
 
     def stage(k: Index) -> None:

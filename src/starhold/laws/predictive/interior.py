@@ -31,9 +31,8 @@ class Turn(NamedTuple):
 @function
 def interior(problem: Problem, half: Scalar, most: Scalar) -> tuple[Scalar, Scalar]:
     """Solve by the primal-dual interior-point method (Boyd and Vandenberghe 2004, section 11.7): it comes near the
-    optimum in a number of sweeps that hardly depends on the program, and what then lies near a limit is put on it. The
-    better of its plan and the one given, of that half cost, is kept. Gives the sweeps, at most `most`, and half the
-    cost."""
+    optimum in a number of sweeps that hardly depends on the program, and then puts moves near a limit on it. The better
+    of its plan and the given one, of this half cost, is kept. Gives the sweeps, at most `most`, and half the cost."""
     count = number_of(_pairs(problem) * problem.horizon)
     barrier = 0.1 * half / count
     _begin(problem, barrier)
@@ -75,7 +74,7 @@ def _begin(problem: Problem, barrier: Scalar) -> None:
 
 
 def _turn(problem: Problem, now: Turn, count: Scalar, most: Scalar) -> Turn:
-    """Take one step: towards the optimum that the barrier allows, which is then lowered."""
+    """Take one step towards the optimum that the barrier allows, then lower the barrier."""
     adjoint(problem)
     sweep(problem, now.barrier)
     unroll(problem)

@@ -1,4 +1,4 @@
-"""A move is limited to a box or a ball round a centre, which small inverses respect."""
+"""A move is limited to a box or a ball round a centre; inverses of 3x3 matrices respect the limits."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def project(limits: Limits, v: Vector) -> tuple[Vector, Truth]:
     return w, opposite(reduce(both, inside))
 
 
-def held(limits: Limits, v: Vector, g: Vector) -> Truths:
+def pressing(limits: Limits, v: Vector, g: Vector) -> Truths:
     """Tell which axes of a box press against a limit, for the gradient g."""
 
     def presses(i: int) -> Truth:
@@ -97,7 +97,7 @@ def loose(limits: Limits, v: Vector, g: Vector) -> Vector:
         normal, multiplier = pressure(limits, v, g)
         along = add(g, scale(multiplier * limits.bound, normal))
         return choose(less(0.0, multiplier), along, g)
-    fixed = held(limits, v, g)
+    fixed = pressing(limits, v, g)
     return (where(fixed[0], 0.0, g[0]), where(fixed[1], 0.0, g[1]), where(fixed[2], 0.0, g[2]))
 
 

@@ -1,10 +1,10 @@
-"""The quadratic program of predictive control lies in one memory; here is where its numbers lie.
+"""The numbers of the quadratic program of predictive control lie in one buffer, in the order given here.
 
     minimise   sum over k < N of x_k'Q x_k + v_k'R v_k,  plus x_N'P x_N,   x_{k+1} = A x_k + B v_k,
     subject to |v_k - centre| <= bound, on each axis (box) or in norm (ball).
 
-All numbers of a program lie in one buffer, from which `carve` makes the named parts: one buffer, not twenty, is what a
-trajectory carries and what the passes over the horizon hand to each other.
+`carve` makes the named parts of the buffer: one buffer, not twenty, is what a trajectory carries and what the passes
+over the horizon hand to each other.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Store(NamedTuple):
     bend: Any
     """The change that the trial plan makes to the state after each move (6 each)."""
     multipliers: Any
-    """Of the limits, in the interior-point method (3 each)."""
+    """Multipliers of the limits, in the interior-point method (3 each)."""
     spare: Any
     """A plan put aside (3 each)."""
 
@@ -103,7 +103,7 @@ def carve(problem: Problem) -> Store:
 
 
 def size(horizon: int, *, dense: bool = False) -> int:
-    """Tell how many numbers a program of that many moves has."""
+    """Return how many numbers a program of that many moves has."""
     *_, end = accumulate(_sizes(horizon, dense=dense))
     return end
 

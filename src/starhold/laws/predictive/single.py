@@ -65,8 +65,8 @@ def work_out(problem: Problem, budget: Index) -> tuple[Scalar, Scalar, Truth]:
 
 
 def record_solver(*, ball: bool) -> Program:
-    """Return the solver as a program: memories `numbers`, of `pose`, and `report` (3), what `work_out` gives; then the
-    horizon and the budget."""
+    """Return the solver as a program: memories `numbers`, of `pose`, and `report` (3), the results of `work_out`; then
+    the horizon and the budget."""
     recorder = Recorder()
     numbers = recorder.memory("numbers", lanes=True, writable=True)
     report = recorder.memory("report", lanes=True, writable=True)

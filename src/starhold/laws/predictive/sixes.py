@@ -1,7 +1,7 @@
 """Matrices and vectors of six and three numbers are tuples, written out term by term.
 
-Sums of six begin with what they are added to, and run in order of the columns; those of three are the plain ones of
-`algebra.vector`. A vector in place of a matrix of weights stands for a diagonal one.
+Sums of six begin with the number that they are added to, and run in order of the columns; those of three are the plain
+ones of `algebra.vector`. A vector in place of a matrix of weights stands for a diagonal one.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
 """Quadratic programs of predictive control are solved by equations: no allocation, no library, and a bound on the work.
 
 The method is a projected Newton method of two metrics (Bertsekas 1982, "Projected Newton methods for optimization
-problems with simple constraints"). What presses against a limit is held there, for a ball with the curvature of the
-sphere; the rest takes the Newton step, which one backward Riccati sweep gives in time proportional to N. The step is
-flown with its feedback through the limits, so moves further on already answer to those that were cut; where that does
-not bring the cost down, a search along the projected line does. Programs on which this is slow are handed to an
-interior-point method, whose answer is the next start; a scaled gradient step, which always descends, is the last
-resort. A run ends when the gap to the optimum is proved small: for multipliers of the right sign, strong convexity
-bounds the gap of half the cost by g'R^-1 g / 2, g being the gradient that is not held.
+problems with simple constraints"). Moves that press against a limit are held there, on a ball with the curvature of the
+sphere; the others take the Newton step, which one backward Riccati sweep gives in time proportional to N. The step is
+flown with its feedback through the limits, so later moves already answer to those that were cut; where that does not
+reduce the cost, a search along the projected line does. Programs on which this is slow are handed to an interior-point
+method, whose answer is the next start; a scaled gradient step, which always descends, is the last resort. A run ends
+when the gap to the optimum is proved small: for multipliers of the right sign, strong convexity bounds the gap of half
+the cost by g'R^-1 g / 2, g being the gradient that no limit holds.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ class Solved(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """A run stands at half the cost of the plan, the sweeps so far, whether the interior-point method has been used, whether
-    the run is over, and what `Solved` says then."""
+    """The progress of a run is half the cost of the plan, the sweeps so far, whether the interior-point method has been
+    used, whether the run is over, and the fields of `Solved` at that time."""
 
     half: Scalar
     sweeps: Scalar
@@ -82,7 +82,7 @@ def improve(problem: Problem, budget: Index, warm: Truth) -> Solved:
 
 
 def _fly_freely(problem: Problem) -> Truth:
-    """Fly the policy without limits through them: the optimum if nothing is cut, which it says, else a good start."""
+    """Fly the policy without limits through the limits, and tell whether they cut it: if not, it is the optimum."""
     store = carve(problem)
 
     def clear(k: Index) -> None:
@@ -129,7 +129,7 @@ def _turn(problem: Problem, budget: Index, now: Progress) -> Progress:
 
 
 def _better(problem: Problem, budget: Index, now: Progress) -> Progress:
-    """Return A Newton step, or the interior-point method where that does not serve."""
+    """Take a Newton step, or the interior-point method where that does not serve."""
 
     def newton(_tried: Attempt) -> tuple[Attempt]:
         return (_newton(problem, budget, now),)
@@ -145,7 +145,7 @@ def _better(problem: Problem, budget: Index, now: Progress) -> Progress:
 
 
 def _newton(problem: Problem, budget: Index, now: Progress) -> Attempt:
-    """Return the projected Newton step, a search along it, or a gradient step, whichever first brings the cost down."""
+    """Take the projected Newton step, a search along it, or a gradient step, whichever first reduces the cost."""
 
     def search(_change: Scalar) -> tuple[Scalar]:
         return (_search(problem),)
@@ -157,7 +157,7 @@ def _newton(problem: Problem, budget: Index, now: Progress) -> Attempt:
     sweeps = now.sweeps + 1.0
     trial = follow(problem, REST)
     none_held = less_equal(holding, 0.0)
-    # Flown as it is, the step gives the exact optimum of what is not held; on a ball only where nothing is.
+    # Flown as it is, the step gives the exact optimum of the free moves; on a ball only where all are free.
     free = opposite(trial.cut)
     free = both(free, none_held) if problem.ball else free
     change = where(free, -(0.5 * decrement), trial.change)
@@ -183,15 +183,15 @@ def _is_zero(x: Scalar) -> Truth:
 
 
 def _search(problem: Problem) -> Scalar:
-    """Return a trial plan along the Newton step without limits; gives the change of half the cost, zero where none was
+    """Make a trial plan along the Newton step without limits; gives the change of half the cost, zero where none was
     found."""
     unroll(problem)
     return shorten(problem, float(HALVINGS))
 
 
 def _gradient_step(problem: Problem) -> Scalar:
-    """Return a trial plan along the gradient, each move in its own scale: the projection guarantees descent for short steps.
-    Gives the change of half the cost, zero where rounding hides any."""
+    """Make a trial plan along the gradient, each move in its own scale: the projection guarantees descent for short
+    steps. Gives the change of half the cost, zero where rounding hides any."""
     store = carve(problem)
 
     def stage(k: Index) -> None:
@@ -220,7 +220,7 @@ def shorten(problem: Problem, halvings: Scalar) -> Scalar:
 
 
 def advance(problem: Problem) -> None:
-    """Shift a solved plan by one move; the last is what the tail gives at its end."""
+    """Shift a solved plan by one move; the tail's feedback gives the last one."""
     store, bounds, n = carve(problem), limits(problem), problem.horizon
     against = [-x for x in store.states.row(n, 6)]
     last: Vector = (

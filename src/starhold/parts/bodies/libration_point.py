@@ -33,7 +33,7 @@ TIME_UNIT = "1/Omega"
 SIGN_POLICIES: dict[str, Callable[..., Any]] = {}
 
 EARTH_DIAMETER = 12_742_000.0
-"""m: the unit of length unless another is asked for."""
+"""m: the default unit of length."""
 POINTS = ("L1", "L2", "L3")
 """L1 lies between the two bodies, L2 beyond the smaller one, L3 beyond the larger one."""
 
@@ -59,7 +59,7 @@ class PointState(NamedTuple):
 
 
 class PointMeasurement(NamedTuple):
-    """Quantities that a law is told at a control instant; scaled."""
+    """Quantities that a law reads at a control instant; scaled."""
 
     position: Annotated[Vector, Quantity("length", "from the libration point, turning axes")]
     velocity: Annotated[Vector, Quantity("length Omega", "relative to the turning axes")]
@@ -109,7 +109,7 @@ def nonlinear(position: Vector, velocity: Vector, plant: Libration) -> Vector:
 
 
 def _tide(position: Vector, distance: Scalar, pull: Scalar) -> Vector:
-    """The attraction of a body that the origin is `distance` along X away from, less that at the origin.
+    """The attraction of a body less its attraction at the origin, which lies `distance` along X from the body.
 
     With D the body's distance vector to the origin and |D + r|2 = D2 (1 + q) it is pull (D ((1+q)^1.5 - 1) - r)/(1+q)^1.5;
     the difference in it as Encke and Battin write it (An Introduction to the Mathematics and Methods of Astrodynamics, 8.6).
@@ -183,8 +183,8 @@ class Units(NamedTuple):
 
 
 class Primaries(NamedTuple):
-    """Two bodies on circles about each other: what they are called, GM of the larger and of the smaller one (m3/s2), the
-    distance between them (m) and their radii (m)."""
+    """Two bodies on circles about each other: their name, GM of the larger and of the smaller one (m3/s2), the distance
+    between them (m) and their radii (m)."""
 
     name: str
     larger: float

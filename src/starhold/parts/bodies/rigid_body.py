@@ -41,7 +41,7 @@ ROWS: Any = rows(State((1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO, ZERO))
 
 
 class Measurement(NamedTuple):
-    """Quantities that a law is told at a control instant; vectors are in body axes."""
+    """Quantities that a law reads at a control instant; vectors are in body axes."""
 
     attitude: Annotated[Quaternion, Quantity("1", "rotation from the target axes to the body axes, scalar first")]
     rate: Annotated[Vector, Quantity("rad/s", "angular velocity relative to the target")]
@@ -91,7 +91,7 @@ def motion(
 
 
 def rates(state: State, loads: Loads, torque_rate: Vector | None, craft: Craft) -> Any:
-    """d(state)/dt under what acts on the body. Where an effector takes the command, the actuators' torque acts on it
+    """d(state)/dt under all loads on the body. Where an effector takes the command, the actuators' torque acts on it
     alone."""
     torque = state.torque if loads.reaction is None else loads.reaction
     if loads.reaction is not None and loads.direct:
@@ -123,14 +123,14 @@ def observe(state: State, scene: Scene) -> Measurement:
     goal = scene.goal
     error = relative(goal.attitude, state.attitude)
     position = to_body(state.attitude, state.position)
-    told = (scene.torque, position, scene.period, scene.momentum, getattr(scene.readings, "magnetic_field", ZERO))
+    known = (scene.torque, position, scene.period, scene.momentum, getattr(scene.readings, "magnetic_field", ZERO))
     if scene.still:
-        # The arithmetic on the zeros of a target at rest is spared here, for a compiler must not drop it.
-        return Measurement(error, state.rate, state.rate, ZERO, ZERO, *told)
+        # The arithmetic on the zeros of a target at rest is left out here, for a compiler must not drop it.
+        return Measurement(error, state.rate, state.rate, ZERO, ZERO, *known)
     target_rate, target_acceleration = to_body(error, goal.rate), to_body(error, goal.acceleration)
     error_rate = subtract(state.rate, target_rate)
     target_acceleration = subtract(target_acceleration, cross(error_rate, target_rate))
-    return Measurement(error, error_rate, state.rate, target_rate, target_acceleration, *told)
+    return Measurement(error, error_rate, state.rate, target_rate, target_acceleration, *known)
 
 
 def sample(state: State, goal: Goal, applied: Vector, command: Vector) -> Sample:
@@ -141,7 +141,7 @@ def sample(state: State, goal: Goal, applied: Vector, command: Vector) -> Sample
 
 
 def _plus(a: Any, b: Any) -> Any:
-    """The sum of two inertias, of which the first may be three moments."""
+    """The sum of two inertias; the first may be three moments."""
     full = a if isinstance(a[0], tuple) else ((a[0], 0.0, 0.0), (0.0, a[1], 0.0), (0.0, 0.0, a[2]))
     return tuple(add(x, y) for x, y in zip(full, b, strict=True))
 

@@ -1,17 +1,16 @@
-"""Control-moment gyros whose rotors change their speed too: how a wanted torque is steered, what gimbals and rotors do, what
-the body feels.
+"""Control-moment gyros whose rotors change their speed too: their steering, their motion, and their torque on the body.
 
 Each unit has a gimbal about an axis g fixed in the body, and in it a rotor about s, which turns with the gimbal; t = g x s.
-With h the momentum of the rotor relative to the body about s, Js, Jt, Jg the moments of gimbal and rotor together about s, t
-and g, Jr the rotor's about s, w_s and w_t the body's rate about s and t, p = h + (Js - Jt) w_s, and x the gimbal's angle,
+With h the momentum of the rotor relative to the body about s, Js, Jt, Jg the moments of gimbal and rotor together about s,
+t and g, Jr the rotor's about s, w_s and w_t the body's rate about s and t, p = h + (Js - Jt) w_s, and x the gimbal's angle,
 
     h' = rotor motor - Jr (s.w' + w_t x'),        Jg (x'' + g.w') = gimbal motor + p w_t
 
 hold exactly, and the body feels -(rotor motor) s - x' b - (gimbal motor + p w_t) g with b = p t + (Js - Jr - Jt) w_t s.
 
-Gimbal rates and rotor torques, each as a share y of its limit, are steered to give the wanted torque with the least sum of
-y^2 of the gimbals and y^2 / weight of the rotors. The weight is small but next to singularities of the gimbals: there, where
-no gimbal has torque in some direction, the rotors' axes have it."""
+Gimbal rates and rotor torques, each as a share y of its limit, are steered to give the wanted torque with the least sum
+of y^2 of the gimbals and y^2 / weight of the rotors. The weight is small but next to singularities of the gimbals:
+there, where no gimbal has torque in some direction, the rotors' axes have it."""
 
 from __future__ import annotations
 
@@ -91,12 +90,12 @@ class Params(NamedTuple):
             "1, 1, kg m^2, rad/s, N m, N m, N m s, rad, N m s",
             columns=COLUMNS,
             text="direction of the gimbal; of the spin axis at gimbal angle zero; moment of the rotor about it; moments of "
-            "gimbal and rotor together about spin, transverse and gimbal axis; largest gimbal rate that is asked for (0: "
+            "gimbal and rotor together about spin, transverse and gimbal axis; largest commanded gimbal rate (0: "
             "none); largest torques of the gimbal's and the rotor's motor (0: a rotor that nothing drives); largest "
             "momentum of the rotor relative to the body; gimbal angle and that momentum at the start",
         ),
     ]
-    bandwidth: Annotated[float, Parameter("1/s", above=0.0, text="at which gimbal rates follow what is asked for")] = 10.0
+    bandwidth: Annotated[float, Parameter("1/s", above=0.0, text="at which gimbal rates follow their commands")] = 10.0
     rotor_weight: Annotated[
         float, Parameter("1", at_least=0.0, text="of the rotors' torques beside gimbal rates, at a singularity")
     ] = 1.0
@@ -163,8 +162,8 @@ class Sample(NamedTuple):
 
 
 class Turned(NamedTuple):
-    """A unit where it is: its spin and transverse axes, the body's rate about the second (rad/s), the torque that the body
-    loses for a unit of gimbal rate (N m s), and the moment of the turning body on the gimbal (N m)."""
+    """A unit at its gimbal angle has spin and transverse axes, the body's rate about the second (rad/s), the torque
+    that the body loses for a unit of gimbal rate (N m s), and the moment of the turning body on the gimbal (N m)."""
 
     unit: Unit
     spin: Vector
@@ -180,28 +179,28 @@ def prepare(params: Params, period: float) -> Prepared:
     reach, squares = np.zeros((3, 3)), 0.0
     for number, row in enumerate(params.units, 1):
         unit = _unit(number, row)
-        *_, torque_limit, momentum_limit, _, held = row
-        if not (torque_limit >= 0.0 and momentum_limit > 0.0 and abs(held) <= momentum_limit):
+        *_, torque_limit, momentum_limit, _, stored = row
+        if not (torque_limit >= 0.0 and momentum_limit > 0.0 and abs(stored) <= momentum_limit):
             raise ValueError(
                 f"the rotor of unit {number} needs a torque limit of at least 0, a momentum limit above 0, and a momentum "
                 "within it"
             )
-        if unit.rate_limit * held:
+        if unit.rate_limit * stored:
             reach += np.eye(3) - np.outer(unit.gimbal, unit.gimbal)
         if torque_limit:
             reach += np.outer(unit.spin, unit.spin)
-        squares += (unit.rate_limit * held) ** 2 / 3.0
+        squares += (unit.rate_limit * stored) ** 2 / 3.0
         units.append(unit)
     if not squares:
         raise ValueError("there is no unit with momentum in a gimbal that turns")
     if np.linalg.eigvalsh(reach)[0] < PERPENDICULAR:
         raise ValueError("the units give no torque about some axis: two gimbals that are not parallel are needed")
-    *_, torques, momenta, angles, held = zip(*params.units, strict=True)
+    *_, torques, momenta, angles, stored = zip(*params.units, strict=True)
     none = (0.0,) * len(units)
     rotors = Wheels(
         tuple(unit.spin for unit in units), tuple(unit.rotor_inertia for unit in units), torques, momenta, none, none, ()
     )
-    return Prepared(tuple(units), rotors, State(angles, none, held), squares, squares**-3, *params[1:])
+    return Prepared(tuple(units), rotors, State(angles, none, stored), squares, squares**-3, *params[1:])
 
 
 def _unit(number: int, row: tuple[float, ...]) -> Unit:
@@ -233,24 +232,24 @@ def command(applied: Vector, params: Prepared) -> Vector:
     return applied
 
 
-def turned(own: State, rate: Vector, params: Prepared) -> tuple[Turned, ...]:
-    """The units where they are, on a body that turns at this rate (rad/s)."""
-    return each(_turned, (params.units, own.angle, own.momentum), rate)
+def turned(state: State, rate: Vector, params: Prepared) -> tuple[Turned, ...]:
+    """The units at their gimbal angles, on a body that turns at this rate (rad/s)."""
+    return each(_turned, (params.units, state.angle, state.momentum), rate)
 
 
-def _turned(unit: Unit, angle: Scalar, held: Scalar, rate: Vector) -> Turned:
+def _turned(unit: Unit, angle: Scalar, stored: Scalar, rate: Vector) -> Turned:
     cosine, sine = cosine_sine(angle * (0.5 / math.pi))
     spin = add(scale(cosine, unit.spin), scale(sine, unit.transverse))
     transverse = subtract(scale(cosine, unit.transverse), scale(sine, unit.spin))
     across = dot(transverse, rate)
-    carried = held + (unit.about_spin - unit.about_transverse) * dot(spin, rate)
+    carried = stored + (unit.about_spin - unit.about_transverse) * dot(spin, rate)
     frame = unit.about_spin - unit.rotor_inertia - unit.about_transverse
     column = add(scale(carried, transverse), scale(frame * across, spin))
     return Turned(unit, spin, transverse, across, column, carried * across)
 
 
 class Steered(NamedTuple):
-    """Gimbal rates (rad/s) and rotor torques (N m) that are asked for, and the determinant of the gimbals' torques."""
+    """The demanded gimbal rates (rad/s) and rotor torques (N m), and the determinant of the gimbals' torques."""
 
     rate: Numbers
     torque: Numbers
@@ -258,8 +257,8 @@ class Steered(NamedTuple):
 
 
 def steer(units: tuple[Turned, ...], wanted: Vector, params: Prepared) -> Steered:
-    """Gimbal rates (rad/s) and rotor torques (N m) that together give the body this torque (N m); where one would be beyond
-    its limit all are reduced alike, so that the torque keeps its line."""
+    """Gimbal rates (rad/s) and rotor torques (N m) that together give the body this torque (N m); where one would
+    exceed its limit all are reduced alike, so that the torque keeps its direction."""
     turning = tuple(scale(one.unit.rate_limit, one.column) for one in units)
     driving = tuple(scale(limit, one.spin) for limit, one in zip(params.rotors.torque_limit, units, strict=True))
     by_gimbals = _gram(turning)
@@ -284,67 +283,67 @@ def _gram(columns: tuple[Vector, ...]) -> Matrix:
     """The sum of a a^T."""
 
     def row(axis: int) -> Vector:
-        found = ZERO
+        total = ZERO
         for one in columns:
-            found = add(found, scale(one[axis], one))
-        return found
+            total = add(total, scale(one[axis], one))
+        return total
 
     return (row(0), row(1), row(2))
 
 
-def motors(own: State, units: tuple[Turned, ...], wanted: Vector, params: Prepared) -> tuple[Numbers, Numbers]:
+def motors(state: State, units: tuple[Turned, ...], wanted: Vector, params: Prepared) -> tuple[Numbers, Numbers]:
     """The torques of the gimbals' motors and of the rotors' motors (N m)."""
-    asked = steer(units, wanted, params)
-    gimbals = each(_servo, (units, own.rate, asked.rate), params.bandwidth)
-    return gimbals, each(clip, (asked.torque, available(asked.torque, own.momentum, params.rotors)))
+    demanded = steer(units, wanted, params)
+    gimbals = each(_servo, (units, state.rate, demanded.rate), params.bandwidth)
+    return gimbals, each(clip, (demanded.torque, available(demanded.torque, state.momentum, params.rotors)))
 
 
-def _servo(one: Turned, rate: Scalar, asked: Scalar, bandwidth: Scalar) -> Scalar:
+def _servo(one: Turned, rate: Scalar, demanded: Scalar, bandwidth: Scalar) -> Scalar:
     unit = one.unit
-    return clip(unit.about_gimbal * bandwidth * (asked - rate) - one.load, unit.torque_limit)
+    return clip(unit.about_gimbal * bandwidth * (demanded - rate) - one.load, unit.torque_limit)
 
 
-def applied(own: State, command: Vector, body: Any, params: Prepared) -> Vector:
-    """The torque that gimbals and motors give the body (N m), what goes with its angular acceleration left out."""
-    units = turned(own, body.rate, params)
-    found = ZERO
-    for one, rate, gimbal, rotor in zip(units, own.rate, *motors(own, units, command, params), strict=True):
+def applied(state: State, command: Vector, body: Any, params: Prepared) -> Vector:
+    """The torque that gimbals and motors give the body (N m), without the terms in its angular acceleration."""
+    units = turned(state, body.rate, params)
+    torque = ZERO
+    for one, rate, gimbal, rotor in zip(units, state.rate, *motors(state, units, command, params), strict=True):
         felt = add(scale(rate, one.column), scale(gimbal + one.load, one.unit.gimbal))
-        found = subtract(found, add(scale(rotor, one.spin), felt))
-    return found
+        torque = subtract(torque, add(scale(rotor, one.spin), felt))
+    return torque
 
 
-def reaction(own: State, command: Vector, body: Any, params: Prepared) -> Vector:
+def reaction(state: State, command: Vector, body: Any, params: Prepared) -> Vector:
     """The torque of the units on the body (N m)."""
-    carried = add(momentum(own, params), apply(inertia_change(own, params), body.rate))
-    return subtract(applied(own, command, body, params), cross(body.rate, carried))
+    carried = add(momentum(state, params), apply(inertia_change(state, params), body.rate))
+    return subtract(applied(state, command, body, params), cross(body.rate, carried))
 
 
-def inertia(own: State, params: Prepared) -> Matrix:
+def inertia(state: State, params: Prepared) -> Matrix:
     """The inertia that the body's angular acceleration meets besides the body's own (kg m2): rotors and gimbals turn on
     about their own axes."""
-    found = inertia_change(own, params)
-    for one in turned(own, ZERO, params):
+    total = inertia_change(state, params)
+    for one in turned(state, ZERO, params):
         unit = one.unit
-        found = combine(1.0, found, -unit.rotor_inertia, _gram((one.spin,)))
-        found = combine(1.0, found, -unit.about_gimbal, _gram((unit.gimbal,)))
-    return found
+        total = combine(1.0, total, -unit.rotor_inertia, _gram((one.spin,)))
+        total = combine(1.0, total, -unit.about_gimbal, _gram((unit.gimbal,)))
+    return total
 
 
-def inertia_change(own: State, params: Prepared) -> Matrix:
+def inertia_change(state: State, params: Prepared) -> Matrix:
     """The inertia of the whole less that with all gimbals at angle zero (kg m2)."""
-    found: Matrix = (ZERO, ZERO, ZERO)
-    for one in turned(own, ZERO, params):
+    total: Matrix = (ZERO, ZERO, ZERO)
+    for one in turned(state, ZERO, params):
         more = combine(1.0, _gram((one.spin,)), -1.0, _gram((one.unit.spin,)))
-        found = combine(1.0, found, one.unit.about_spin - one.unit.about_transverse, more)
-    return found
+        total = combine(1.0, total, one.unit.about_spin - one.unit.about_transverse, more)
+    return total
 
 
-def rates(own: State, command: Vector, body: Any, acceleration: Vector, params: Prepared) -> State:
+def rates(state: State, command: Vector, body: Any, acceleration: Vector, params: Prepared) -> State:
     """d(angles, rates, momenta)/dt."""
-    units = turned(own, body.rate, params)
-    columns = (units, own.rate, *motors(own, units, command, params))
-    return State(own.rate, each(_speeding, columns, acceleration), each(_spinning, columns, acceleration))
+    units = turned(state, body.rate, params)
+    columns = (units, state.rate, *motors(state, units, command, params))
+    return State(state.rate, each(_speeding, columns, acceleration), each(_spinning, columns, acceleration))
 
 
 def _speeding(one: Turned, rate: Scalar, gimbal: Scalar, rotor: Scalar, acceleration: Vector) -> Scalar:
@@ -355,21 +354,21 @@ def _spinning(one: Turned, rate: Scalar, gimbal: Scalar, rotor: Scalar, accelera
     return rotor - one.unit.rotor_inertia * (dot(one.spin, acceleration) + one.across * rate)
 
 
-def momentum(own: State, params: Prepared) -> Vector:
+def momentum(state: State, params: Prepared) -> Vector:
     """The units' angular momentum relative to the body (N m s)."""
-    found = ZERO
-    for one, rate, held in zip(turned(own, ZERO, params), own.rate, own.momentum, strict=True):
+    total = ZERO
+    for one, rate, stored in zip(turned(state, ZERO, params), state.rate, state.momentum, strict=True):
         turning = scale(one.unit.about_gimbal * rate, one.unit.gimbal)
-        found = add(found, add(scale(held, one.spin), turning))
-    return found
+        total = add(total, add(scale(stored, one.spin), turning))
+    return total
 
 
-def record(own: State, command: Vector, body: Any, params: Prepared) -> Sample:
+def record(state: State, command: Vector, body: Any, params: Prepared) -> Sample:
     """The recorded quantities."""
-    units = turned(own, body.rate, params)
-    gimbals, rotors = motors(own, units, command, params)
-    asked = steer(units, command, params)
-    return Sample(own.angle, own.rate, asked.rate, gimbals, own.momentum, rotors, asked.determinant)
+    units = turned(state, body.rate, params)
+    gimbals, rotors = motors(state, units, command, params)
+    demanded = steer(units, command, params)
+    return Sample(state.angle, state.rate, demanded.rate, gimbals, state.momentum, rotors, demanded.determinant)
 
 
 def fastest(params: Params) -> float:

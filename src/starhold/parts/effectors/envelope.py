@@ -27,10 +27,10 @@ def facets_of(axes: tuple[Vector, ...], least: tuple[Vector, ...]) -> Buffer:
 
 def authority(wheels: Wheels, kind: Literal["axis", "norm"] = "norm", *, peak: bool = False) -> float:
     """The torque (N m) that the wheels surely give: any torque of at most this norm ("norm"), or of at most this about each
-    body axis at once ("axis"), is shared out within the motors' torque limits. 0 where a wheel that is counted on has none.
+    body axis at once ("axis"), is allocated within the motors' torque limits. 0 where a wheel that is counted on has none.
 
-    Shared out by least squares it is the largest such ball or box. With the least peak it is the largest within the
-    envelope of wheels that all have the least of the limits: the largest, where the limits are equal.
+    Under least squares it is the largest such ball or box. With the least peak it is the largest within the envelope of
+    wheels that all have the least of the limits: the largest, where the limits are equal.
     """
     limits = [wheels.torque_limit[k] for k in _counted(wheels.least)]
     if peak:
@@ -46,7 +46,7 @@ def _sizes(rows: Array, kind: str) -> Array:
 
 
 def _counted(least: tuple[Vector, ...]) -> tuple[int, ...]:
-    """The wheels that torque is shared out among."""
+    """The wheels that take part in the allocation."""
     return tuple(k for k, row in enumerate(least) if any(row))
 
 
@@ -76,7 +76,7 @@ def _facets(rows: tuple[Vector, ...], counted: tuple[int, ...]) -> Buffer:
         normal /= outside @ heights
         peak = np.outer(outside, normal)
         left = np.eye(3) - strong.T @ peak
-        # Two axes leave no choice, so either of them tells it.
+        # With two axes there is one such plane, and either axis gives it.
         for free in plane if len(plane) > 2 else plane[:1]:
             across = np.cross(normal, unit[free])
             sides = np.where(np.isin(np.arange(count), plane), np.sign(strong @ across), 0.0)

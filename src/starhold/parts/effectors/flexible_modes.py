@@ -19,7 +19,7 @@ CARD = Card(
     sources=("Spacecraft Dynamics and Control (1997): hybrid coordinates",),
     assumptions=(
         "small deflections, which leave the inertia as it is",
-        "cantilever modes of unit modal mass, whose coupling takes in that the craft's centre of mass gives way",
+        "cantilever modes of unit modal mass, whose coupling includes the recoil of the craft's centre of mass",
         "gravity acts on the craft as if nothing were deflected",
     ),
 )
@@ -93,17 +93,17 @@ def _spring(stiffness: Scalar, damping: Scalar, deflection: Scalar, rate: Scalar
     return stiffness * deflection + damping * rate
 
 
-def springs(own: State, params: Numbers) -> tuple[Scalar, ...]:
+def springs(state: State, params: Numbers) -> tuple[Scalar, ...]:
     """The forces of springs and dampers on the modes (sqrt(kg) m/s2), with the sign of the deflection."""
-    return each(_spring, (params.stiffness, params.damping, own.deflection, own.rate))
+    return each(_spring, (params.stiffness, params.damping, state.deflection, state.rate))
 
 
-def reaction(own: State, command: Any, body: Any, params: Numbers) -> Vector:
+def reaction(state: State, command: Any, body: Any, params: Numbers) -> Vector:
     """The torque of the modes on the body (N m)."""
-    return subtract(weighted(springs(own, params), params.coupling), cross(body.rate, momentum(own, params)))
+    return subtract(weighted(springs(state, params), params.coupling), cross(body.rate, momentum(state, params)))
 
 
-def inertia(own: State, params: Numbers) -> Matrix:
+def inertia(state: State, params: Numbers) -> Matrix:
     """The inertia that the body's angular acceleration meets besides the body's own (kg m2): -sum d d^T."""
 
     def row(axis: int) -> Vector:
@@ -112,20 +112,20 @@ def inertia(own: State, params: Numbers) -> Matrix:
     return (row(0), row(1), row(2))
 
 
-def rates(own: State, command: Any, body: Any, acceleration: Vector, params: Numbers) -> State:
+def rates(state: State, command: Any, body: Any, acceleration: Vector, params: Numbers) -> State:
     """d(deflections, rates)/dt."""
-    pairs = zip(springs(own, params), params.coupling, strict=True)
-    return State(own.rate, tuple(-spring - dot(coupling, acceleration) for spring, coupling in pairs))
+    pairs = zip(springs(state, params), params.coupling, strict=True)
+    return State(state.rate, tuple(-spring - dot(coupling, acceleration) for spring, coupling in pairs))
 
 
-def momentum(own: State, params: Numbers) -> Vector:
+def momentum(state: State, params: Numbers) -> Vector:
     """The modes' angular momentum relative to the body (N m s)."""
-    return weighted(own.rate, params.coupling)
+    return weighted(state.rate, params.coupling)
 
 
-def record(own: State, command: Any, body: Any, params: Numbers) -> Sample:
+def record(state: State, command: Any, body: Any, params: Numbers) -> Sample:
     """The recorded quantities."""
-    return Sample(own.deflection, own.rate)
+    return Sample(state.deflection, state.rate)
 
 
 def fastest(params: Params) -> float:

@@ -36,7 +36,7 @@ from starhold.parts.craft import Craft, check_inertia, tensor, total_inertia, ve
 
 CARD = Card(
     title="Hinged panels",
-    summary="D_i x_i'' + damping x_i' + stiffness x_i = -A_i.w' - what the rates give; the body feels the panels' momentum",
+    summary="D_i x_i'' + damping x_i' + stiffness x_i = -A_i.w' - terms in the rates; the body feels the panels' momentum",
     sources=("Lagrange's equations of a hub with rigid panels on hinges",),
     assumptions=(
         "rigid panels, springs and dampers linear in the angle",
@@ -60,7 +60,7 @@ COLUMNS = (
 
 
 class Params(NamedTuple):
-    """The mass that is moved about, and a row for each panel."""
+    """The mass of the craft, and a row for each panel."""
 
     mass: Annotated[float, Parameter("kg", above=0.0, text="of the whole craft")]
     panels: Annotated[
@@ -116,8 +116,8 @@ class Sample(NamedTuple):
 
 
 class _Swung(NamedTuple):
-    """A panel where it is: its angle and rate, its axes to the centre and normal, its centre of mass from the craft's as
-    that is now (m), its momentum for a unit of rate (kg m), and its angular momentum about the craft's centre (kg m2)."""
+    """A panel at its angle has a rate, its axes to the centre and normal, its centre of mass from the craft's present
+    one (m), its momentum for a unit of rate (kg m), and its angular momentum about the craft's centre (kg m2)."""
 
     panel: Panel
     angle: Scalar
@@ -130,7 +130,7 @@ class _Swung(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers that equations take. ValueError for a panel that no craft has."""
+    """The numbers that equations take. ValueError for panels that no craft can have."""
     panels = tuple(_panel(k, row) for k, row in enumerate(params.panels, 1))
     if not panels:
         raise ValueError("there is no panel")
@@ -185,33 +185,33 @@ def remember(params: Numbers) -> State:
     return State(tuple(panel.angle for panel in params.panels), (0.0,) * len(params.panels))
 
 
-def _swung(own: State, params: Numbers) -> tuple[list[_Swung], Vector]:
-    """The panels where they are, and how far the craft's centre of mass has shifted (m)."""
+def _swung(state: State, params: Numbers) -> tuple[list[_Swung], Vector]:
+    """The panels at their angles, and the shift of the craft's centre of mass (m)."""
     shift: Vector = ZERO
     placed: list[tuple[Vector, Vector, Vector]] = []
-    for panel, angle in zip(params.panels, own.angle, strict=True):
+    for panel, angle in zip(params.panels, state.angle, strict=True):
         cosine, sine = cosine_sine(angle * (0.5 / math.pi))
         out = add(scale(cosine, panel.out), scale(sine, panel.normal))
         normal = subtract(scale(cosine, panel.normal), scale(sine, panel.out))
         shift = add(shift, scale(panel.mass * panel.length * params.inverse, subtract(out, panel.out)))
         placed.append((out, normal, add(panel.hinge, scale(panel.length, out))))
-    found: list[_Swung] = []
-    for panel, angle, rate, (out, normal, place) in zip(params.panels, own.angle, own.rate, placed, strict=True):
+    panels: list[_Swung] = []
+    for panel, angle, rate, (out, normal, place) in zip(params.panels, state.angle, state.rate, placed, strict=True):
         place, pushed = subtract(place, shift), scale(panel.mass * panel.length, normal)
         turned = add(scale(panel.moments[0], panel.axis), cross(place, pushed))
-        found.append(_Swung(panel, angle, rate, out, normal, place, pushed, turned))
-    return found, shift
+        panels.append(_Swung(panel, angle, rate, out, normal, place, pushed, turned))
+    return panels, shift
 
 
 def _whole(swung: list[_Swung], shift: Vector, params: Numbers) -> Matrix:
-    """The panels' share of the inertia about the craft's centre of mass as it is (kg m2), but for what does not change."""
-    found = _point(-params.mass, shift)
+    """The panels' share of the inertia about the craft's present centre of mass (kg m2), but for a constant."""
+    total = _point(-params.mass, shift)
     for one in swung:
         axes = (one.panel.axis, one.out, one.normal)
         parts = [_outer(size, axis, axis) for size, axis in zip(one.panel.moments, axes, strict=True)]
         for part in (*parts, _point(one.panel.mass, add(one.place, shift))):
-            found = combine(1.0, found, 1.0, part)
-    return found
+            total = combine(1.0, total, 1.0, part)
+    return total
 
 
 def _outer(c: Scalar, a: Vector, b: Vector) -> Matrix:
@@ -228,10 +228,10 @@ def _point(mass: Scalar, place: Vector) -> Matrix:
 
 def _moving(swung: list[_Swung], params: Numbers) -> Vector:
     """The velocity of the centre of mass due to the panels (m/s)."""
-    found = ZERO
+    total = ZERO
     for one in swung:
-        found = add(found, scale(one.rate * params.inverse, one.pushed))
-    return found
+        total = add(total, scale(one.rate * params.inverse, one.pushed))
+    return total
 
 
 def _moments(swung: list[_Swung], rate: Vector, params: Numbers) -> list[Scalar]:
@@ -239,22 +239,22 @@ def _moments(swung: list[_Swung], rate: Vector, params: Numbers) -> list[Scalar]
     moving, pulled = _moving(swung, params), ZERO
     for one in swung:
         pulled = add(pulled, scale(one.panel.mass * one.panel.length * params.inverse * one.rate * one.rate, one.out))
-    found: list[Scalar] = []
+    moments: list[Scalar] = []
     for one in swung:
         panel = one.panel
         turning = (panel.moments[1] - panel.moments[2]) * (dot(one.out, rate) * dot(one.normal, rate))
         carried = add(cross(rate, subtract(cross(rate, one.place), scale(2.0, moving))), pulled)
         spring = panel.stiffness * one.angle + panel.damping * one.rate
-        found.append(turning - dot(one.pushed, carried) - spring)
-    return found
+        moments.append(turning - dot(one.pushed, carried) - spring)
+    return moments
 
 
 def _shared(swung: list[_Swung], params: Numbers) -> Matrix:
-    """The inverse of what couples the hinges through the centre of mass: 1 - sum p p^T / (mass D)."""
-    found: Matrix = diagonal((1.0, 1.0, 1.0))
+    """The inverse of the hinges' coupling through the centre of mass: 1 - sum p p^T / (mass D)."""
+    coupling: Matrix = diagonal((1.0, 1.0, 1.0))
     for one in swung:
-        found = combine(1.0, found, -1.0, _outer(params.inverse * one.panel.inverse, one.pushed, one.pushed))
-    return inverse(found)
+        coupling = combine(1.0, coupling, -1.0, _outer(params.inverse * one.panel.inverse, one.pushed, one.pushed))
+    return inverse(coupling)
 
 
 def _accelerations(swung: list[_Swung], moments: list[Scalar], params: Numbers) -> list[Scalar]:
@@ -267,12 +267,12 @@ def _accelerations(swung: list[_Swung], moments: list[Scalar], params: Numbers) 
     return [one.panel.inverse * (moment + dot(one.pushed, centre)) for one, moment in pairs]
 
 
-def reaction(own: State, command: Any, body: Any, params: Numbers) -> Vector:
+def reaction(state: State, command: Any, body: Any, params: Numbers) -> Vector:
     """The torque of the panels on the body (N m)."""
-    swung, shift = _swung(own, params)
+    swung, shift = _swung(state, params)
     w, moving = body.rate, _moving(swung, params)
-    carried = add(apply(inertia_change(own, params), w), momentum(own, params))
-    # The change of the inertia, times w, and what the hinges' rates and accelerations change of their momentum.
+    carried = add(apply(inertia_change(state, params), w), momentum(state, params))
+    # The rate of change of the inertia, times w, and that of the hinges' momentum.
     given = scale(-params.mass, _swept(shift, moving, w))
     for one, speeding in zip(swung, _accelerations(swung, _moments(swung, w, params), params), strict=True):
         panel = one.panel
@@ -295,52 +295,52 @@ def _swept(place: Vector, speed: Vector, rate: Vector) -> Vector:
     return subtract(twice, add(scale(dot(place, rate), speed), scale(dot(speed, rate), place)))
 
 
-def inertia(own: State, params: Numbers) -> Matrix:
+def inertia(state: State, params: Numbers) -> Matrix:
     """The inertia that the body's angular acceleration meets besides the body's own (kg m2)."""
-    swung, _ = _swung(own, params)
-    found, coupled = inertia_change(own, params), _NONE
+    swung, _ = _swung(state, params)
+    total, coupled = inertia_change(state, params), _NONE
     for one in swung:
         share = one.panel.inverse
-        found = combine(1.0, found, -1.0, _outer(share, one.turned, one.turned))
+        total = combine(1.0, total, -1.0, _outer(share, one.turned, one.turned))
         coupled = combine(1.0, coupled, 1.0, _outer(share, one.pushed, one.turned))
     through = multiply(transpose(coupled), multiply(_shared(swung, params), coupled))
-    return combine(1.0, found, -params.inverse, through)
+    return combine(1.0, total, -params.inverse, through)
 
 
-def inertia_change(own: State, params: Numbers) -> Matrix:
+def inertia_change(state: State, params: Numbers) -> Matrix:
     """The inertia of the whole less that with the panels in their rest positions (kg m2)."""
-    return combine(1.0, _whole(*_swung(own, params), params), -1.0, params.rest)
+    return combine(1.0, _whole(*_swung(state, params), params), -1.0, params.rest)
 
 
-def rates(own: State, command: Any, body: Any, acceleration: Vector, params: Numbers) -> State:
+def rates(state: State, command: Any, body: Any, acceleration: Vector, params: Numbers) -> State:
     """d(angles, rates)/dt."""
-    swung, _ = _swung(own, params)
+    swung, _ = _swung(state, params)
     moments = _moments(swung, body.rate, params)
     left = [moment - dot(one.turned, acceleration) for one, moment in zip(swung, moments, strict=True)]
-    return State(own.rate, tuple(_accelerations(swung, left, params)))
+    return State(state.rate, tuple(_accelerations(swung, left, params)))
 
 
-def momentum(own: State, params: Numbers) -> Vector:
+def momentum(state: State, params: Numbers) -> Vector:
     """The panels' angular momentum relative to the body (N m s)."""
-    found = ZERO
-    for one in _swung(own, params)[0]:
-        found = add(found, scale(one.rate, one.turned))
-    return found
+    total = ZERO
+    for one in _swung(state, params)[0]:
+        total = add(total, scale(one.rate, one.turned))
+    return total
 
 
-def record(own: State, command: Any, body: Any, params: Numbers) -> Sample:
+def record(state: State, command: Any, body: Any, params: Numbers) -> Sample:
     """The recorded quantities."""
-    return Sample(own.angle, own.rate)
+    return Sample(state.angle, state.rate)
 
 
 def fastest(params: Params) -> float:
-    """The fastest rate (1/s) at which a panel swings, or its damper brings it to rest, on a hub that does not turn but
-    gives way."""
-    found = 0.0
+    """The fastest rate (1/s) at which a panel swings, or its damper brings it to rest, on a hub that moves freely but
+    does not turn."""
+    largest = 0.0
     for panel in prepare(params, 1.0).panels:
         swung = 1.0 / panel.inverse - (panel.mass * panel.length) ** 2 / params.mass
-        found = max(found, math.sqrt(panel.stiffness / swung), panel.damping / swung)
-    return found
+        largest = max(largest, math.sqrt(panel.stiffness / swung), panel.damping / swung)
+    return largest
 
 
 def examples() -> list[Params]:

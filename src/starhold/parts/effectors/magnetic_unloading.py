@@ -1,4 +1,4 @@
-"""Magnetorquers that take momentum out of the wheels, whatever law steers these."""
+"""Magnetorquers take momentum out of the wheels, under any law."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CARD = Card(
     assumptions=(
         *magnetorquers.CARD.assumptions[:-1],
         "no law knows of its torque, which wheels take up as they hold the attitude",
-        "what lies along the field is left until the field has turned",
+        "momentum along the field stays until the field has turned",
     ),
 )
 ROLE = "effector"
@@ -61,15 +61,15 @@ class Sample(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an epoch that the field is not known at."""
+    """The numbers of a flight. ValueError for an epoch at which the field is not known."""
     return Numbers(*params[:4], magnetic_field.prepared(params.epoch, period))
 
 
-def switch(own: State, wanted: Vector, told: Any, state: Any, params: Numbers, step: int) -> State:
-    """The dipole for the wheels' momentum in the measured field, and the field that is there."""
-    torque = scale(-params.gain, subtract(told.wheel_momentum, params.momentum))
-    dipole = within(dipole_for(torque, told.magnetic_field), params.dipole_limit, params.limited)
-    return State(dipole, magnetic_field.field_at(state.position, step, params.field))
+def switch(state: State, wanted: Vector, measurement: Any, body: Any, params: Numbers, step: int) -> State:
+    """The dipole for the wheels' momentum in the measured field, and the field at the craft."""
+    torque = scale(-params.gain, subtract(measurement.wheel_momentum, params.momentum))
+    dipole = within(dipole_for(torque, measurement.magnetic_field), params.dipole_limit, params.limited)
+    return State(dipole, magnetic_field.field_at(body.position, step, params.field))
 
 
 remember, reaction, rates, momentum = (
@@ -80,9 +80,9 @@ remember, reaction, rates, momentum = (
 )
 
 
-def record(own: State, command: Any, body: Any, params: Numbers) -> Sample:
+def record(state: State, command: Any, body: Any, params: Numbers) -> Sample:
     """The recorded quantities."""
-    return Sample(own.dipole, reaction(own, command, body, params))
+    return Sample(state.dipole, reaction(state, command, body, params))
 
 
 def examples() -> list[Params]:

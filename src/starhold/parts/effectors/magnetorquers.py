@@ -21,7 +21,7 @@ CARD = Card(
         *magnetic_field.ASSUMPTIONS,
         "along the body axes, without lag or hysteresis, held for a control period",
         "the field in inertial axes is held for a control period",
-        "what is wanted along the field is not given",
+        "no torque along the field",
     ),
 )
 ROLE = "effector"
@@ -32,7 +32,7 @@ READS = ("magnetic_field",)
 LIMIT = Parameter("A m^2", above=0.0, shape=(3,), text="largest dipole along each body axis")
 LIMITED = Parameter(
     choices=("together", "each"),
-    text="dipoles beyond the limit are reduced together, so that the torque keeps its line, or each",
+    text="dipoles beyond the limit are reduced together, which keeps the torque's direction, or each by itself",
 )
 """The declaration of the dipole limit, common to all parts with magnetorquers."""
 
@@ -67,7 +67,7 @@ class Sample(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an epoch that the field is not known at."""
+    """The numbers of a flight. ValueError for an epoch at which the field is not known."""
     return Numbers(params.dipole_limit, params.limited, magnetic_field.prepared(params.epoch, period))
 
 
@@ -76,15 +76,15 @@ def remember(params: Any) -> State:
     return State(ZERO, ZERO)
 
 
-def switch(own: State, wanted: Vector, told: Any, state: Any, params: Numbers, step: int) -> State:
-    """The dipole for a wanted torque (N m) in the measured field, and the field that is there."""
-    dipole = within(dipole_for(wanted, told.magnetic_field), params.dipole_limit, params.limited)
-    return State(dipole, magnetic_field.field_at(state.position, step, params.field))
+def switch(state: State, wanted: Vector, measurement: Any, body: Any, params: Numbers, step: int) -> State:
+    """The dipole for a wanted torque (N m) in the measured field, and the field at the craft."""
+    dipole = within(dipole_for(wanted, measurement.magnetic_field), params.dipole_limit, params.limited)
+    return State(dipole, magnetic_field.field_at(body.position, step, params.field))
 
 
 def dipole_for(torque: Vector, field: Vector) -> Vector:
-    """The least dipole (A m2) that in a field (T) gives a torque (N m), but for its part along the field; none where there
-    is no field."""
+    """The least dipole (A m2) that in a field (T) gives a torque (N m), but for its part along the field; zero without
+    a field."""
     square = dot(field, field)
     return scale(where(less(0.0, square), divide(1.0, square), 0.0), cross(field, torque))
 
@@ -102,29 +102,29 @@ def _filled(dipole: Scalar, limit: Scalar) -> Scalar:
     return absolute(dipole) / limit
 
 
-def reaction(own: State, command: Any, body: Any, params: Any) -> Vector:
+def reaction(state: State, command: Any, body: Any, params: Any) -> Vector:
     """The torque on the body (N m)."""
-    return cross(own.dipole, to_body(body.attitude, own.field))
+    return cross(state.dipole, to_body(body.attitude, state.field))
 
 
-def rates(own: State, command: Any, body: Any, acceleration: Vector, params: Any) -> Any:
+def rates(state: State, command: Any, body: Any, acceleration: Vector, params: Any) -> Any:
     """Nothing changes between control instants."""
     return None
 
 
-def momentum(own: State, params: Any) -> Vector:
-    """None of its own (N m s)."""
+def momentum(state: State, params: Any) -> Vector:
+    """No momentum (N m s)."""
     return ZERO
 
 
-def applied(own: State, command: Any, body: Any, params: Numbers) -> Vector:
+def applied(state: State, command: Any, body: Any, params: Numbers) -> Vector:
     """The torque on the body (N m)."""
-    return reaction(own, command, body, params)
+    return reaction(state, command, body, params)
 
 
-def record(own: State, command: Any, body: Any, params: Numbers) -> Sample:
+def record(state: State, command: Any, body: Any, params: Numbers) -> Sample:
     """The recorded quantities."""
-    return Sample(own.dipole)
+    return Sample(state.dipole)
 
 
 def examples() -> list[Params]:

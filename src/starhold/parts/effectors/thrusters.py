@@ -1,5 +1,5 @@
-"""Pairs of thrusters for each way round each body axis, that are on or off: pulses of modulated width behind a Schmitt
-trigger."""
+"""Pairs of thrusters about each body axis, one for each sense, are on or off: pulses of modulated width behind a
+Schmitt trigger."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ CARD = Card(
 ROLE = "effector"
 ACTS = OUTSIDE = True
 GRAVITY = 9.80665
-"""Standard gravity, by which a specific impulse is told in seconds (m/s2)."""
+"""Standard gravity (m/s2), by which a specific impulse is given in seconds."""
 
 
 class Params(NamedTuple):
-    """The torque of a pair, when it fires, and what that costs."""
+    """The torque of a pair, when it fires, and its propellant."""
 
     torque: Annotated[Vector, Parameter("N m", above=0.0, shape=(3,), text="of a pair about each body axis that fires")]
     minimum: Annotated[float, Parameter("s", at_least=0.0, text="shortest time that a pair is on")] = 0.0
@@ -59,8 +59,8 @@ class Numbers(NamedTuple):
 
 
 class State(NamedTuple):
-    """For each axis which way round its thrusters fire (-1, 0, 1), for how long yet (s), and the impulse of their torque
-    since the start, whichever way (N m s)."""
+    """For each axis the sense in which its thrusters fire (-1, 0, 1), the time left (s), and the impulse of their
+    torque since the start, in either sense (N m s)."""
 
     firing: Vector
     left: Vector
@@ -78,7 +78,7 @@ class Sample(NamedTuple):
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a control period (s). ValueError where thresholds or the shortest pulse do not fit."""
     if any(off > on for off, on in zip(params.off, params.on, strict=True)):
-        raise ValueError("a pair cannot end to fire at a command above that at which it begins: off must be at most on")
+        raise ValueError("a pair cannot stop firing at a command above that at which it starts: off must be at most on")
     if params.minimum > period:
         raise ValueError(f"the shortest pulse must be at most the control period of {period:g} s, not {params.minimum:g} s")
     spent = 1.0 / (params.lever * params.specific_impulse * GRAVITY)
@@ -90,11 +90,11 @@ def remember(params: Numbers) -> State:
     return State(ZERO, ZERO, ZERO)
 
 
-def switch(own: State, wanted: Vector, told: Any, state: Any, params: Numbers, step: int) -> State:
+def switch(state: State, wanted: Vector, measurement: Any, body: Any, params: Numbers, step: int) -> State:
     """The pairs that fire in the control step that begins, and for how long, for a wanted torque (N m)."""
-    firing: Any = each(_trigger, (wanted, own.firing, params.on, params.off))
+    firing: Any = each(_trigger, (wanted, state.firing, params.on, params.off))
     left: Any = each(_width, (wanted, firing, params.torque), params)
-    return State(firing, left, own.impulse)
+    return State(firing, left, state.impulse)
 
 
 def _trigger(wanted: Scalar, firing: Scalar, on: Scalar, off: Scalar) -> Scalar:
@@ -103,14 +103,14 @@ def _trigger(wanted: Scalar, firing: Scalar, on: Scalar, off: Scalar) -> Scalar:
 
 
 def _width(wanted: Scalar, firing: Scalar, torque: Scalar, params: Numbers) -> Scalar:
-    asked = params.period * (absolute(wanted) / torque)
-    width = params.period if params.pulses else minimum(maximum(asked, params.minimum), params.period)
+    demanded = params.period * (absolute(wanted) / torque)
+    width = params.period if params.pulses else minimum(maximum(demanded, params.minimum), params.period)
     return absolute(firing) * width
 
 
-def pulse(own: State, substep: Scalar, params: Numbers) -> Vector:
+def pulse(state: State, substep: Scalar, params: Numbers) -> Vector:
     """The share of a substep that each pair is on, with its sense."""
-    share: Any = each(_share, (own.firing, own.left), substep)
+    share: Any = each(_share, (state.firing, state.left), substep)
     return share
 
 
@@ -118,31 +118,31 @@ def _share(firing: Scalar, left: Scalar, substep: Scalar) -> Scalar:
     return firing * minimum(maximum(left / substep, 0.0), 1.0)
 
 
-def reaction(own: State, command: Vector, body: Any, params: Numbers) -> Vector:
+def reaction(state: State, command: Vector, body: Any, params: Numbers) -> Vector:
     """The torque on the body (N m)."""
     return times(params.torque, command)
 
 
-def rates(own: State, command: Vector, body: Any, acceleration: Vector, params: Numbers) -> Any:
+def rates(state: State, command: Vector, body: Any, acceleration: Vector, params: Numbers) -> Any:
     """d(state)/dt: the time runs, the impulse grows."""
     share: Any = each(absolute, (command,))
     return State(None, scale(-1.0, share), times(params.torque, share))  # pyright: ignore[reportArgumentType]
 
 
-def momentum(own: State, params: Numbers) -> Vector:
-    """None of its own (N m s)."""
+def momentum(state: State, params: Numbers) -> Vector:
+    """No momentum (N m s)."""
     return ZERO
 
 
-def applied(own: State, command: Vector, body: Any, params: Numbers) -> Vector:
+def applied(state: State, command: Vector, body: Any, params: Numbers) -> Vector:
     """The mean torque of the control period that begins (N m)."""
-    return scale(1.0 / params.period, times(params.torque, times(own.firing, own.left)))
+    return scale(1.0 / params.period, times(params.torque, times(state.firing, state.left)))
 
 
-def record(own: State, command: Vector, body: Any, params: Numbers) -> Sample:
+def record(state: State, command: Vector, body: Any, params: Numbers) -> Sample:
     """The recorded quantities."""
-    x, y, z = own.impulse
-    return Sample(times(own.firing, own.left), own.impulse, params.propellant * (x + y + z))
+    x, y, z = state.impulse
+    return Sample(times(state.firing, state.left), state.impulse, params.propellant * (x + y + z))
 
 
 def examples() -> list[Params]:

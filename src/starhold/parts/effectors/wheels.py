@@ -1,7 +1,7 @@
-"""Reaction wheels: how a wanted torque is shared out among them, what their motors and friction do, what the body feels.
+"""Reaction wheels: the allocation of a wanted torque, motors and friction, and the torque on the body.
 
-The state of a wheel is the absolute axial momentum h = inertia (W + a . rate) of its rotor (N m s): a is its unit axis in
-body axes, W its speed relative to the body. With the wheels' axial inertia taken out of the body's (`bare_inertia`),
+The state of a wheel is the absolute axial momentum h = inertia (W + a . rate) of its rotor (N m s): a is its unit axis
+in body axes, W its speed relative to the body. With the wheels' axial inertia taken out of the body's (`bare_inertia`),
 
     J' w' = on_body + external - w x J' w,        h_i' = motor_i
 
@@ -49,15 +49,14 @@ CREEP = 1.0
 would make any integrator of fixed step chatter about standstill."""
 
 ALLOCATIONS, MOST = ("least-squares", "least-peak"), 24
-"""Ways to share out a torque, and how many wheels a craft has at most: the work of the second grows with their cube."""
+"""Allocation rules, and the most wheels that a craft has: the work of the second rule grows with their cube."""
 _WORST_CONDITION = 1e3
 
 
 class Wheels(NamedTuple):
     """N wheels: unit spin axes (body), rotor inertias about them (kg m2), largest motor torques (N m; 0 for a lost wheel),
-    largest axial momenta (N m s), viscous (N m s) and Coulomb friction (N m); and how to share out a torque, by least
-    squares (one row a wheel, zero for one that takes no part) or with the least peak (see `with_facets`, without
-    which there is nothing to share it out with)."""
+    largest axial momenta (N m s), viscous (N m s) and Coulomb friction (N m); and how a torque is allocated, by least
+    squares (a row for each wheel, zero for one that takes no part) or with the least peak, which needs `with_facets`."""
 
     axes: tuple[Vector, ...]
     inertia: Numbers
@@ -95,13 +94,13 @@ class Sample(NamedTuple):
 
 
 def prepare(params: Wheels, period: float) -> Wheels:
-    """The wheels with what their allocation needs."""
+    """The wheels, prepared for their allocation."""
     return with_facets(params) if params.allocation else params
 
 
 def with_facets(wheels: Wheels) -> Wheels:
-    """The wheels with what `allocate_peak` needs. The facets are as many for any wheels of that number, so that one kernel
-    serves them before a loss and after."""
+    """The wheels with the facets that `allocate_peak` needs. Any wheels of this number have as many facets, so that one
+    kernel serves them before a loss and after."""
     return wheels._replace(facets=facets_of(wheels.axes, wheels.least))
 
 
@@ -115,30 +114,30 @@ def command(applied: Vector, params: Wheels) -> Numbers:
     return allocate_peak(applied, params) if params.allocation else allocate(applied, params)
 
 
-def reaction(own: State, command: Numbers, body: Any, params: Wheels) -> Vector:
+def reaction(state: State, command: Numbers, body: Any, params: Wheels) -> Vector:
     """The torque of the wheels on the body (N m)."""
-    return on_body(motor(command, own.momentum, body.rate, params), own.momentum, body.rate, params)
+    return on_body(motor(command, state.momentum, body.rate, params), state.momentum, body.rate, params)
 
 
-def rates(own: State, command: Numbers, body: Any, acceleration: Vector, params: Wheels) -> State:
+def rates(state: State, command: Numbers, body: Any, acceleration: Vector, params: Wheels) -> State:
     """d(momentum)/dt of each rotor (N m)."""
-    return State(motor(command, own.momentum, body.rate, params))
+    return State(motor(command, state.momentum, body.rate, params))
 
 
-def momentum(own: State, params: Wheels) -> Vector:
+def momentum(state: State, params: Wheels) -> Vector:
     """The rotors' momentum in body axes (N m s)."""
-    return wheel_momentum(own.momentum, params)
+    return wheel_momentum(state.momentum, params)
 
 
-def record(own: State, command: Numbers, body: Any, params: Wheels) -> Sample:
+def record(state: State, command: Numbers, body: Any, params: Wheels) -> Sample:
     """The recorded quantities."""
-    h = own.momentum
+    h = state.momentum
     return Sample(h, motor(command, h, body.rate, params), command, available(command, h, params))
 
 
-def applied(own: State, command: Numbers, body: Any, params: Wheels) -> Vector:
+def applied(state: State, command: Numbers, body: Any, params: Wheels) -> Vector:
     """The torque of motors and friction on the body (N m)."""
-    return scale(-1.0, weighted(motor(command, own.momentum, body.rate, params), params.axes))
+    return scale(-1.0, weighted(motor(command, state.momentum, body.rate, params), params.axes))
 
 
 def fastest(params: Wheels) -> float:
@@ -154,14 +153,14 @@ def examples() -> list[Wheels]:
 
 def allocate(torque: Vector, wheels: Wheels) -> Numbers:
     """Motor torques (N m) that together give the body this torque (N m), -sum a_i tau_i = torque, with the least sum of
-    squares. Neither limits nor friction are looked at; a lost wheel gets none."""
+    squares. Limits and friction are ignored; a lost wheel gets none."""
     return each(dot, (wheels.least,), torque)
 
 
 def allocate_peak(torque: Vector, wheels: Wheels) -> Numbers:
     """Motor torques (N m) that together give the body this torque (N m), the largest of them as small as can be; where
-    that leaves a choice, the next largest too. Continuous and piecewise linear in the torque. Neither limits nor friction
-    are looked at; a lost wheel gets none. Not for exact polynomials, which cannot compare pieces with pieces.
+    that leaves a choice, the next largest too. Continuous and piecewise linear in the torque. Limits and friction are
+    ignored; a lost wheel gets none. Not for exact polynomials, which cannot compare pieces with pieces.
 
     By duality the least peak is the largest |y . torque| with sum |y . a_k| = 1, and the largest is reached where y is
     normal to two of the axes: all other wheels give the peak, and the two follow from the torque (facets of a zonotope, the
@@ -177,19 +176,19 @@ def allocate_peak(torque: Vector, wheels: Wheels) -> Numbers:
         return absolute(dot((n0, n1, n2), torque)), absolute(dot((e0, e1, e2), torque)), *shared
 
     def better(k: Any, *best: Scalar) -> tuple[Any, ...]:
-        found = piece(k + 1)
+        candidate = piece(k + 1)
         # Where two facets cost the same, both give the same torques.
-        inner = both(less_equal(best[0], found[0]), less(best[1], found[1]))
-        wins = either(less(best[0], found[0]), inner)
-        return tuple(where(wins, new, old) for new, old in zip(found, best, strict=True))
+        inner = both(less_equal(best[0], candidate[0]), less(best[1], candidate[1]))
+        wins = either(less(best[0], candidate[0]), inner)
+        return tuple(where(wins, new, old) for new, old in zip(candidate, best, strict=True))
 
     return repeat(facets.size // width - 1, better, *piece(0))[2:]
 
 
 def motor(command: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels) -> Numbers:
-    """d(momentum)/dt of each wheel (N m) under the commanded motor torques (N m), at axial momenta (N m s) and body rate
-    (rad/s): the command within the torque limit, faded out where it would carry the momentum beyond its limit (see BAND),
-    and friction against the speed relative to the body (see CREEP). Infinite limits are none."""
+    """d(momentum)/dt of each wheel (N m) under the commanded motor torques (N m), at axial momenta (N m s) and body
+    rate (rad/s): the command within the torque limit, faded out where it would carry the momentum beyond its limit (see
+    BAND), and friction against the speed relative to the body (see CREEP). Limits may be infinite."""
     columns = (
         command,
         momentum,
@@ -214,7 +213,7 @@ def _motor(
     coulomb: Scalar,
     rate: Vector,
 ) -> Scalar:
-    # Reciprocals of what does not change, which a compiler takes out of the loop over the lanes.
+    # Reciprocals of constants, which a compiler takes out of the loop over the lanes.
     speed = momentum * (1.0 / inertia) - dot(axis, rate)
     given = _room(command, momentum, momentum_limit) * clip(command, torque_limit)
     return given - viscous * speed - coulomb * clip(speed * (1.0 / CREEP), 1.0)
@@ -235,7 +234,7 @@ def available(command: Numbers, momentum: Numbers, wheels: Wheels) -> Numbers:
 
 def _available(command: Scalar, momentum: Scalar, torque_limit: Scalar, momentum_limit: Scalar) -> Scalar:
     room = _room(command, momentum, momentum_limit)
-    # No share of an unlimited torque is none.
+    # A zero share of an infinite torque is zero.
     return where(less(0.0, room), room * torque_limit, 0.0)
 
 
@@ -302,13 +301,13 @@ def lose(wheels: Wheels, index: int) -> Wheels:
     return wheels._replace(torque_limit=limits, least=_least_squares(matrix, working), facets=())
 
 
-def capacity(own: State, params: Wheels) -> float:
+def capacity(state: State, params: Wheels) -> float:
     """The norm (N m s) of the momentum that wheels in this state at the start can store before a motor fades, whatever its
     direction, with least-squares allocation; 0 where one is there already."""
-    total = momentum(own, params)
-    columns = zip(params.least, params.momentum_limit, own.momentum, strict=True)
-    # What moves no momentum to the body stays in the rotors.
-    rooms = [((1.0 - BAND) * limit - abs(held + dot(row, total)), math.sqrt(dot(row, row))) for row, limit, held in columns]
+    total = momentum(state, params)
+    columns = zip(params.least, params.momentum_limit, state.momentum, strict=True)
+    # The part of the momenta that adds up to zero stays in the rotors.
+    rooms = [((1.0 - BAND) * limit - abs(h + dot(row, total)), math.sqrt(dot(row, row))) for row, limit, h in columns]
     return max(0.0, min(room / share for room, share in rooms if share > 0.0))
 
 
@@ -327,9 +326,9 @@ def axial_inertia(params: Wheels) -> NDArray[np.float64]:
     return (np.transpose(params.axes) * np.array(params.inertia)) @ np.array(params.axes)
 
 
-def gives_what_is_asked(wheels: Wheels) -> bool:
-    """Whether, within the limits of the wheels, the torque on the body is the one that is shared out: not so while a lost
-    wheel is still counted on."""
+def gives_allocated_torque(wheels: Wheels) -> bool:
+    """Whether, within the wheels' limits, the torque on the body is the allocated one: not so while a lost wheel is
+    still counted on."""
     working = [(axis, row) for axis, row, limit in zip(wheels.axes, wheels.least, wheels.torque_limit, strict=True) if limit]
     axes, rows = (
         (np.array(part).reshape(-1, 3) for part in zip(*working, strict=True)) if working else (np.zeros((1, 3)),) * 2

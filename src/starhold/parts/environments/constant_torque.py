@@ -33,7 +33,7 @@ def torque(state: Any, params: Params, craft: Craft, memory: Any) -> Vector:
 
 
 def bound(params: Params) -> float:
-    """The largest norm that it has (N m), anywhere."""
+    """The largest norm of the torque (N m), anywhere."""
     return math.hypot(*params.torque)
 
 

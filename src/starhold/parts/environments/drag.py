@@ -100,7 +100,7 @@ def update(memory: Memory, state: Any, params: Numbers, dice: Dice, step: int) -
     wind = (-params.turn * position[1], params.turn * position[0], 0.0)
     through = subtract(state.velocity, wind)
     square = dot(position, position)
-    # As the attraction of the Earth has it, so that a kernel computes it once.
+    # In the form that the Earth's attraction has, so that a kernel computes it once.
     distance = square * sqrt(1.0 / square)
     thinned = exponential((params.distance - distance) * (1.0 / params.scale_height))
     return Memory(unit(through), params.density * thinned * dot(through, through))

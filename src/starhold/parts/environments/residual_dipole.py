@@ -1,4 +1,4 @@
-"""The torque of the Earth's magnetic field on what is magnetic in a spacecraft."""
+"""The torque of the Earth's magnetic field on the residual dipole of a spacecraft."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Numbers(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an epoch that the field is not known at."""
+    """The numbers of a flight. ValueError for an epoch at which the field is not known."""
     return Numbers(params.dipole, magnetic_field.prepared(params.epoch, period))
 
 
@@ -63,7 +63,7 @@ def torque(state: Any, params: Numbers, craft: Craft, memory: Vector) -> Vector:
 
 
 def bound(params: Params) -> float:
-    """The largest norm that it has (N m) at distances from `BOUND_FROM` on, where the field is nowhere stronger."""
+    """The largest norm of the torque (N m) at distances from `BOUND_FROM` on, where the field is nowhere stronger."""
     return norm(params.dipole) * magnetic_field.strongest(params.epoch)
 
 

@@ -51,7 +51,7 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """For each plate its normal, and the arms (m3) of what it takes up, mirrors and scatters: area and share times the
+    """For each plate its normal, and the arms (m3) of absorbed, mirrored and scattered light: area and share times the
     centre, or times centre x normal; the Sun, and the control period (s)."""
 
     normals: tuple[Vector, ...]
@@ -70,7 +70,7 @@ class Memory(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for a plate that cannot be, and a bad epoch."""
+    """The numbers of a flight. ValueError for an impossible plate or a bad epoch."""
     shares = [row[7:] for row in params.plates]
     for number, (specular, diffuse) in enumerate(shares, 1):
         if not (specular >= 0.0 and diffuse >= 0.0 and specular + diffuse <= 1.0):
@@ -108,7 +108,7 @@ def torque(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector:
 
 
 def bound(params: Params) -> float:
-    """The largest norm that it has (N m) anywhere: every plate seen square on, at the perihelion."""
+    """The largest norm of the torque (N m) anywhere: every plate seen square on, at the perihelion."""
     numbers = prepare(params, 1.0)
     arms = (*numbers.taken, *numbers.mirrored, *numbers.scattered)
     return sun.STRONGEST * sum(norm(arm) for arm in arms)

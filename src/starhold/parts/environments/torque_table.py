@@ -20,7 +20,7 @@ CARD = Card(
     title="Torque from a table",
     summary="M(t) along straight lines between the rows of a table, none before the first and after the last",
     sources=("definition",),
-    assumptions=("no law knows of it", "held for a control period at what it is at its start"),
+    assumptions=("no law knows of it", "held for a control period at its value at the start"),
 )
 ROLE = "environment"
 Row: TypeAlias = tuple[float, float, float, float]
@@ -60,13 +60,13 @@ def update(memory: Vector, state: Any, params: Numbers, dice: Dice, step: int) -
     """The torque of the control step that begins, in the table's axes (N m)."""
     time = number_of(step) * params.period
 
-    def piece(k: Any, found: Vector) -> tuple[Vector]:
+    def piece(k: Any, value: Vector) -> tuple[Vector]:
         (begin, *first), (end, *last) = params.rows.row(k, 4), params.rows.row(k + 1, 4)
         share = (time - begin) / (end - begin)
         start, stop = cast(Vector, tuple(first)), cast(Vector, tuple(last))
         here = add(start, scale(share, subtract(stop, start)))
         inside = both(less_equal(begin, time), less(time, end))
-        return (tuple(where(inside, x, y) for x, y in zip(here, found, strict=True)),)  # type: ignore[return-value]
+        return (tuple(where(inside, x, y) for x, y in zip(here, value, strict=True)),)  # type: ignore[return-value]
 
     return repeat(params.rows.size // 4 - 1, piece, ZERO)[0]
 
@@ -77,7 +77,7 @@ def torque(state: Any, params: Numbers, craft: Craft, memory: Vector) -> Vector:
 
 
 def bound(params: Params) -> float:
-    """The largest norm that it has (N m), anywhere: along a straight line the norm is largest at an end."""
+    """The largest norm of the torque (N m), anywhere: along a straight line the norm is largest at an end."""
     return max(math.hypot(*row[1:]) for row in params.table)
 
 

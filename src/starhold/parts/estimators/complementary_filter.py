@@ -32,7 +32,7 @@ class Params(NamedTuple):
     """The gains of the filter, and its initial attitude."""
 
     attitude_gain: Annotated[
-        float, Parameter("1", above=0.0, at_most=1.0, text="share of an attitude's error put right at once")
+        float, Parameter("1", above=0.0, at_most=1.0, text="share of an attitude's error corrected at once")
     ]
     bias_gain: Annotated[float, Parameter("1/s", at_least=0.0, text="rate of the bias for a radian of error")]
     start: Annotated[Quaternion, START] = NO_TURN
@@ -47,7 +47,7 @@ class Estimate(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """The attitude foretold for the next control step, the bias (rad/s), and whether an attitude has come yet (1)."""
+    """The attitude predicted for the next control step, the bias (rad/s), and whether an attitude has come yet (1)."""
 
     attitude: Quaternion
     bias: Vector
@@ -55,19 +55,19 @@ class Memory(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Params:
-    """The parameters with the start as a unit quaternion. ValueError for one that is none."""
+    """The parameters with the start as a unit quaternion. ValueError for a start that is no quaternion."""
     return params._replace(start=unit_quaternion(params.start))
 
 
 def remember(params: Params, state: Any) -> Memory:
-    """The filter begins with what is stated for the start."""
+    """The filter begins with the attitude stated for the start."""
     return Memory(params.start, ZERO, 0.0)
 
 
 def estimate(readings: Any, memory: Memory, params: Params, craft: Craft, period: Scalar) -> tuple[Estimate, Memory]:
-    """The estimate at a control step, and what it foretells of the next."""
+    """The estimate at a control step, and the prediction for the next."""
     measured = readings.attitude
-    # A sensor that does not tell whether its attitude is new gives a new one at each control step.
+    # A sensor that does not say whether its attitude is new gives a new one at each control step.
     new = less(0.5, getattr(readings, "attitude_is_new", 1.0))
     first = both(new, opposite(less(0.5, memory.begun)))
     foretold: Any = tuple(where(first, x, old) for x, old in zip(measured, memory.attitude, strict=True))

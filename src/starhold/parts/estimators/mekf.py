@@ -1,5 +1,5 @@
-"""Attitude and gyro bias by the multiplicative extended Kalman filter: the gyro carries the attitude on, each new attitude
-of the star tracker corrects both, by gains that follow from how sure either is."""
+"""Attitude and gyro bias by the multiplicative extended Kalman filter: the gyro carries the attitude on, each new
+attitude of the star tracker corrects both, by gains that follow from their covariances."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ CARD = Card(
         "Kalman Filtering for Spacecraft Attitude Estimation (1982)",
     ),
     assumptions=(
-        "errors of gyro and star tracker are white, and as large as the filter is told",
+        "errors of gyro and star tracker are white, of the deviations that the filter assumes",
         "attitudes come without delay",
         "the rate changes in proportion to time between control steps",
         "the error of the attitude is small",
@@ -52,7 +52,7 @@ NEEDS = ("attitude", "rate")
 FIRST = {"gyro_bias": ZERO, "attitude_deviation": ZERO, "gyro_bias_deviation": ZERO}
 HOUR = 3600.0
 UNKNOWN = math.sqrt(math.pi**2 / 9.0 + 2.0 / 3.0)
-"""Standard deviation about each axis (rad) of an attitude that may be any: of its rotation vector."""
+"""Standard deviation about each axis (rad) of the rotation vector of an attitude that may be any."""
 
 
 class Params(NamedTuple):
@@ -90,7 +90,7 @@ class Numbers(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """Attitude, rate without the bias, the bias, and how sure the filter is of them."""
+    """Attitude, rate without the bias, the bias, and the standard deviations of attitude and bias."""
 
     attitude: Annotated[Quaternion, Quantity("1", "estimated attitude, inertial to body, scalar first", "quaternion")]
     rate: Annotated[Vector, Quantity("rad/s", "estimated angular velocity, body axes", "axis")]
@@ -103,8 +103,8 @@ class Memory(NamedTuple):
     """The attitude at the last control step, the bias and the gyro's reading then (rad/s), the covariance of the errors of
     attitude (rad, body axes) and bias in blocks, and 0 before the first reading, 1 before the first attitude, 2 after it.
 
-    Half the noise of that reading will turn the attitude in the period that begins, half did so in the one before. What a
-    new attitude says of it is kept by counting it into the attitude and its error: attitude less half a period of noise.
+    Half the noise of that reading has turned the attitude in the period before, half will turn it in the period that
+    begins. A new attitude corrects this noise too, because the attitude and its error are kept less half a period of it.
     """
 
     attitude: Quaternion
@@ -117,8 +117,8 @@ class Memory(NamedTuple):
 
 
 class Instant(NamedTuple):
-    """The attitude at a control step, the covariance of its error, the noise of the gyro's reading as far as it is known
-    (rad/s), and what is remembered."""
+    """The attitude at a control step, the covariance of its error, the noise of the gyro's reading as far as it is
+    known (rad/s), and the memory."""
 
     attitude: Quaternion
     turn: Matrix
@@ -148,7 +148,7 @@ def prepare(params: Params, period: float) -> Numbers:
 
 
 def remember(params: Numbers, state: Any) -> Memory:
-    """The filter begins with what is stated for the start."""
+    """The filter begins with the attitude stated for the start."""
     square, begin = params.start_turn, params.bias
     nothing: Matrix = (ZERO, ZERO, ZERO)
     turn, walk = diagonal((square, square, square)), diagonal((begin, begin, begin))
@@ -158,7 +158,7 @@ def remember(params: Numbers, state: Any) -> Memory:
 def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, period: Scalar) -> tuple[Estimate, Memory]:
     """The estimate at a control step."""
     measured = readings.attitude
-    # A sensor that does not tell whether its attitude is new gives a new one at each control step.
+    # A sensor that does not say whether its attitude is new gives a new one at each control step.
     new = less(0.5, getattr(readings, "attitude_is_new", 1.0))
     foretold = propagated(memory, readings.rate, params, period)
     before = chosen(less(0.5, memory.stage), foretold, memory)._replace(rate=readings.rate, stage=maximum(memory.stage, 1.0))
@@ -176,14 +176,14 @@ def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, perio
 
 
 def taken(now: Instant, measured: Quaternion, params: Numbers) -> Instant:
-    """The first attitude as it is: its error has nothing to do with the bias, nor with the noise of the gyro."""
+    """The first attitude, taken as it is: its error has nothing to do with the bias, nor with the noise of the gyro."""
     ahead = combine(1.0, params.tracker, params.reading, IDENTITY)
     memory = now.memory._replace(attitude=measured, turn=ahead, mixed=(ZERO, ZERO, ZERO))
     return Instant(measured, params.tracker, ZERO, memory)
 
 
 def corrected(now: Instant, measured: Quaternion, params: Numbers, period: Scalar) -> Instant:
-    """The estimate with what a new attitude says of attitude, bias and noise."""
+    """The estimate of attitude, bias and noise, corrected by a new attitude."""
     before = now.memory
     error = relative(now.attitude, measured)
     turn = scale(2.0 * side(error[0]), vector_part(error))
@@ -238,13 +238,13 @@ def summed(a: Matrix, b: Matrix) -> Matrix:
 
 
 def symmetric(a: Matrix) -> Matrix:
-    """Return the mean of a matrix and its transposed one, which rounding keeps apart."""
+    """Return the mean of a matrix and its transpose, which differ by rounding."""
     x, y, z = 0.5 * (a[0][1] + a[1][0]), 0.5 * (a[0][2] + a[2][0]), 0.5 * (a[1][2] + a[2][1])
     return ((a[0][0], x, y), (x, a[1][1], z), (y, z, a[2][2]))
 
 
 def deviations(a: Matrix) -> Vector:
-    """Return the roots of the diagonal."""
+    """Return the square roots of the diagonal."""
     return (sqrt(a[0][0]), sqrt(a[1][1]), sqrt(a[2][2]))
 
 

@@ -28,7 +28,7 @@ CARD = Card(
     ),
     assumptions=(
         *magnetic_field.ASSUMPTIONS,
-        "the Sun is better known than the field: its direction is kept, of the field's only the plane with it",
+        "the Sun is better known than the field: its direction is kept, and of the field only the plane through both",
         "the gyro's bias is small while the Sun is out of sight",
     ),
 )
@@ -74,7 +74,7 @@ class Memory(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an epoch that the field is not known at."""
+    """The numbers of a flight. ValueError for an epoch at which the field is not known."""
     return Numbers(sun.prepared(params.epoch), magnetic_field.prepared(params.epoch), math.sin(params.apart) ** 2)
 
 
@@ -94,13 +94,13 @@ def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, perio
         sun.sun(time, params.sun).direction, magnetic_field.field(readings.position, time, params.field), 0.0
     )
     usable = both(there, clear)
-    # Of what is not usable something finite.
+    # An unusable measurement is replaced by something finite.
     matrix: Any = tuple(
         tuple(where(usable, x, y) for x, y in zip(row, still, strict=True))
         for row, still in zip(product(axes, transpose(reference)), IDENTITY, strict=True)
     )
-    found = nearer(to_quaternion(matrix), carried)
-    attitude: Any = tuple(where(usable, x, y) for x, y in zip(found, carried, strict=True))
+    measured = nearer(to_quaternion(matrix), carried)
+    attitude: Any = tuple(where(usable, x, y) for x, y in zip(measured, carried, strict=True))
     age = where(usable, 0.0, memory.age + period)
     return Estimate(attitude, rate, age), Memory(attitude, rate, age, memory.steps + 1.0)
 
@@ -116,5 +116,5 @@ def triad(first: Vector, second: Vector, sine_squared: Scalar) -> tuple[Matrix, 
 
 
 def examples() -> list[Params]:
-    """At the epoch of parts that are given none, and another one."""
+    """The default epoch, and another one."""
     return [Params(), Params((2027.0, 6.0, 21.0, 12.0, 30.0, 15.0), math.radians(20.0))]

@@ -37,7 +37,7 @@ class Reading(NamedTuple):
 
 def measure(state: Any, memory: NoMemory, params: Params, dice: Dice, step: int) -> tuple[Reading, NoMemory]:
     """Attitude turned by Gaussian angles about the body axes, rate with a Gaussian error."""
-    # Of a small rotation the quaternion's vector part is half the angle.
+    # The vector part of a small rotation's quaternion is half the angle.
     d = dice.vector(0, 0.5 * params.attitude)
     attitude = normalise(multiply(state.attitude, (1.0, d[0], d[1], d[2])))
     return Reading(attitude, add(state.rate, dice.vector(3, params.rate))), memory

@@ -34,7 +34,7 @@ class Reading(NamedTuple):
 
 
 def measure(state: Any, memory: NoMemory, params: Params, dice: Dice, step: int) -> tuple[Reading, NoMemory]:
-    """Where it is at this control step."""
+    """Position and velocity at this control step, with noise."""
     position = add(state.position, dice.vector(0, params.position))
     return Reading(position, add(state.velocity, dice.vector(3, params.velocity))), memory
 

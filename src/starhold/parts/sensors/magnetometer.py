@@ -22,7 +22,7 @@ CARD = Card(
         *magnetic_field.ASSUMPTIONS,
         "axes along the body's",
         "white noise from control step to control step",
-        "what is magnetic on board shows as a constant bias: torque rods are off while it measures",
+        "magnetic parts on board show as a constant bias: torque rods are off while it measures",
     ),
 )
 ROLE = "sensor"
@@ -59,7 +59,7 @@ class Reading(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an epoch that the field is not known at, and for a bad outage."""
+    """The numbers of a flight. ValueError for an epoch at which the field is not known, and for a bad outage."""
     field, outage = magnetic_field.prepared(params.epoch, period), in_steps(params.outage, period)
     return Numbers(params.noise, params.bias, 1.0 + params.scale_error, field, outage)
 
@@ -74,8 +74,8 @@ def measure(state: Any, memory: Vector, params: Numbers, dice: Dice, step: int) 
     true = magnetic_field.field_at(state.position, step, params.field)
     shown = add(add(scale(params.factor, to_body(state.attitude, true)), params.bias), dice.vector(0, params.noise))
     out = is_out(step, params.outage)
-    held: Any = tuple(where(out, old, new) for old, new in zip(memory, shown, strict=True))
-    return Reading(held, where(out, 0.0, 1.0)), held
+    latest: Any = tuple(where(out, old, new) for old, new in zip(memory, shown, strict=True))
+    return Reading(latest, where(out, 0.0, 1.0)), latest
 
 
 def examples() -> list[Params]:

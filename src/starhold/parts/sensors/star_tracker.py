@@ -16,10 +16,10 @@ from starhold.parts.random import Dice
 
 CARD = Card(
     title="Star tracker",
-    summary="q_m = q(t - delay) turned by Gaussian angles, less sure about the boresight; held between updates",
+    summary="q_m = q(t - delay) turned by Gaussian angles, more about the boresight; held between updates",
     sources=("Fundamentals of Spacecraft Attitude Determination and Control (2014)",),
     assumptions=(
-        "stars are in view but in the outage",
+        "stars are in view except during the outage",
         "errors independent from update to update",
         "before its first update it shows the inertial axes",
     ),
@@ -93,7 +93,7 @@ def prepare(params: Params, period: float) -> Numbers:
 
 
 def remember(params: Numbers, state: Any) -> Memory:
-    """An update is due, and what is on its way is the attitude at the start. Until it comes the inertial axes are shown."""
+    """An update is due, and the attitude at the start is on its way. Until it comes the inertial axes are shown."""
     return Memory(NO_TURN, (state.attitude,) * params.late, 0.0)
 
 

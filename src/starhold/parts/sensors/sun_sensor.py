@@ -63,7 +63,7 @@ class Numbers(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """The direction that it shows, nothing where it does not see the Sun."""
+    """The direction that it shows, zero where it does not see the Sun."""
 
     sun: Annotated[Vector, Quantity("1", "direction as measured, 0 if unseen, body axes", "axis")]
     sun_is_seen: Annotated[float, Quantity("1", "1 where the sensor sees the Sun, else 0")]
@@ -74,7 +74,7 @@ def prepare(params: Params, period: float) -> Numbers:
     size = math.hypot(*params.boresight)
     if not size > 0.0:
         raise ValueError("the boresight needs a direction")
-    # With a margin for rounding a sensor that sees all does so.
+    # The margin for rounding lets a sensor with half a turn see all.
     cosine = math.cos(params.half_angle) - 1e-12
     outage = in_steps(params.outage, period)
     return Numbers(params.noise, scale(1.0 / size, params.boresight), cosine, sun.prepared(params.epoch), period, outage)
@@ -86,11 +86,11 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
     toward = to_body(state.attitude, seen.direction)
     inside = less_equal(params.cosine, dot(toward, params.boresight))
     lit = less(0.5, sun.in_view(state.position, seen))
-    found = both(both(inside, lit), opposite(is_out(step, params.outage)))
+    visible = both(both(inside, lit), opposite(is_out(step, params.outage)))
     # Along the direction itself the noise has no effect.
     shown = unit(add(toward, dice.vector(0, params.noise)))
-    told: Any = tuple(where(found, x, 0.0) for x in shown)
-    return Reading(told, where(found, 1.0, 0.0)), memory
+    reading: Any = tuple(where(visible, x, 0.0) for x in shown)
+    return Reading(reading, where(visible, 1.0, 0.0)), memory
 
 
 def examples() -> list[Params]:

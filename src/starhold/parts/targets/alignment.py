@@ -58,14 +58,14 @@ def _slope(a: Moving, b: Moving) -> Scalar:
 
 
 def cross_of(a: Moving, b: Moving) -> Moving:
-    """The vector product of two that move."""
+    """The vector product of two moving vectors."""
     first = add(cross(a.first, b.value), cross(a.value, b.first))
     middle = scale(2.0, cross(a.first, b.first))
     return Moving(cross(a.value, b.value), first, add(add(cross(a.second, b.value), middle), cross(a.value, b.second)))
 
 
 def unit_of(a: Moving) -> Moving:
-    """The direction of one that moves; not defined where it is zero."""
+    """The direction of a moving vector; not defined where it is zero."""
     inverse = 1.0 / norm(a.value)
     unit = scale(inverse, a.value)
     growth = dot(unit, a.first)
@@ -87,7 +87,7 @@ def opposite_of(a: Moving) -> Moving:
 
 
 STRIDE = 600.0
-"""Over which the Sun's motion is differenced (s): what that leaves out of its rate is 1e-15 rad/s."""
+"""The step over which the Sun's motion is differenced (s), with an error of its rate of 1e-15 rad/s."""
 
 
 def towards_sun(time: Scalar, params: sun.Numbers) -> Moving:

@@ -82,7 +82,7 @@ def prepare(params: Params, period: float) -> Numbers:
 
 
 def goal(params: Numbers, state: Any, step: int, before: Quaternion) -> Goal:
-    """The attitude at this control step: the second direction is against the orbit's normal, as of the orbital frame."""
+    """The attitude at this control step: the second direction is against the orbit's normal, as in the orbital frame."""
     cosine, sine = cosine_sine(turned(params.turn, number_of(step) * params.period))
     place, up = spun(params.place, cosine, sine), spun(params.up, cosine, sine)
     craft = orbiting(state.position, state.velocity, params.gravity)

@@ -82,7 +82,7 @@ def tabulate(times: Any, attitudes: Any, sample_times: Any) -> NDArray[np.float6
 
 
 def knots_of(times: Any, attitudes: Any, last: float) -> Knots:
-    """The knots, of the spline of `tabulate`, that a run from 0 to `last` (s) is between. Raises ValueError as that does."""
+    """The knots of the spline of `tabulate` that a run from 0 to `last` (s) needs. Raises ValueError as that does."""
     times, attitudes = np.asarray(times, dtype=float), np.asarray(attitudes, dtype=float)
     rates: NDArray[np.float64] = _spline(times, attitudes)(times, 1)
     first, end = np.searchsorted(times, 0.0, "right") - 1, np.searchsorted(times, last, "left") + 1

@@ -16,7 +16,7 @@ from starhold.parts.targets.alignment import AXIS, OTHER, Moving, aligned, body_
 
 CARD = Card(
     title="Sun",
-    summary="a body axis along the Sun's direction, another as near as it can to a direction that rests",
+    summary="a body axis along the Sun's direction, another as near as it can to a fixed direction",
     sources=sun.SOURCES,
     assumptions=(*sun.ASSUMPTIONS, "in the Earth's shadow too"),
 )

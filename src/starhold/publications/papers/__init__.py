@@ -1,2 +1,2 @@
-"""One folder a publication: `paper.toml` says what it prints and who measures it, scenario files are what is flown, and
-modules compute what no scenario holds."""
+"""Each publication has a folder: `paper.toml` says what it prints and who measures it, scenario files hold the flights,
+and modules compute what no scenario holds."""

@@ -25,8 +25,8 @@ def present(scenario: Scenario, entry: LawEntry, found: Study) -> Result:
     for name, pieces in found.fits().items():
         off = 100.0 * abs(pieces.errors(found.angles, found.roots))
         sentences.append(f"{name}: off by {(off**2).mean() ** 0.5:.2f} % rms, {off.max():.2f} % at most")
-    if found.own is not None:
-        sentences.append("\n".join(["", *law_lines(found.own, found.b), ""]))
+    if found.fitted is not None:
+        sentences.append("\n".join(["", *law_lines(found.fitted, found.b), ""]))
     title = f"{scenario.name}: fastest root within the limits"
     return Result(title, ["", _table(found), *sentences], _numbers(found), lambda: draw(found, title))
 
@@ -36,7 +36,7 @@ def _numbers(found: Study) -> Table:
     head += ["eased_root", "eased_time"] * found.eased
     fits = [pieces.at(found.angles).tolist() for pieces in found.fits().values()]
     rows: list[list[Any]] = []
-    for item, *fitted in zip(found.found, *fits, strict=True):
+    for item, *fitted in zip(found.results, *fits, strict=True):
         hard: Any = item.hard
         eased: Any = [item.eased.root, item.eased.time] if found.eased and item.eased is not None else []
         peaks = hard.transient.peak_rate, *hard.transient.peak_acceleration
@@ -84,8 +84,8 @@ def draw(found: Study, title: str) -> Any:
     if fits:
         axes[1].axhline(0.0, color="0.35", linewidth=0.8)
         axes[1].set_ylabel("error of fit, %")
-    kinds = [("within the limits", [item.hard for item in found.found], COLOURS[0], COLOURS[0])]
-    kinds += [("with their tolerances", [item.eased for item in found.found], COLOURS[4], "white")] * found.eased
+    kinds = [("within the limits", [item.hard for item in found.results], COLOURS[0], COLOURS[0])]
+    kinds += [("with their tolerances", [item.eased for item in found.results], COLOURS[4], "white")] * found.eased
     for words, best, colour, inside in kinds:
         style = {"color": colour, "markerfacecolor": inside, "linestyle": "", "marker": "o", "markersize": 4.5}
         for axis, name in ((top, "root"), (last, "time")):

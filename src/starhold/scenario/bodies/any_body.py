@@ -20,7 +20,7 @@ from starhold.laws.interface import Gain
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import make_step
 from starhold.parts import contract
-from starhold.parts.catalogue import body_from_file, parts, told
+from starhold.parts.catalogue import body_from_file, error_line, parts
 from starhold.parts.part import Fitted, Part
 from starhold.scenario import bodies
 from starhold.scenario.bodies.interface import Body
@@ -111,7 +111,7 @@ class AnyBody(Body):
         except BaseException as error:
             if is_interrupt(error):
                 raise
-            why = str(error) if type(error) is ValueError else told(error, self.part.file)
+            why = str(error) if type(error) is ValueError else error_line(error, self.part.file)
             raise InputError(where, MARKER, "", why) from None
 
     def given(self, scenario: Scenario, entry: LawEntry) -> dict[str, Any]:

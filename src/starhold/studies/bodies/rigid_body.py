@@ -147,7 +147,7 @@ def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:
         return found
     latest = {event.step: event for event in loop.events if event.step < steps}
     for step, event in latest.items():
-        sound = all(tells(f.params) for f in event.parts if (tells := f.part.hook("gives_what_is_asked")) is not None)
+        sound = all(tells(f.params) for f in event.parts if (tells := f.part.hook("gives_allocated_torque")) is not None)
         if not sound or event.nominal.inertia != event.craft.inertia:
             continue
         now = replace(loop, events=(), craft=event.craft, gains=event.gains, parts=event.parts)

@@ -32,14 +32,14 @@ def gravity_torque(desk: Desk) -> Finding:
 
 
 def beside_wheels(desk: Desk) -> Finding:
-    """Tell whether each disturbance is at least a hundred times smaller than what wheels give."""
+    """Tell whether each disturbance is at least a hundred times smaller than the torque of wheels."""
     torques = {
         "gravity gradient, 10⁴ kg m²": 1.5 * ORBIT**2 * 1e4,
         "solar pressure, 10⁻⁴ N m": 1e-4,
         "solar pressure on large panels, 10⁻³ N m": 1e-3,
     }
-    told = ", ".join(f"1/{0.1 / torque:.0f}" for torque in torques.values())
-    return Finding({name: 0.1 / torque >= 100.0 for name, torque in torques.items()}, f"{told} of 0.1 N m")
+    note = ", ".join(f"1/{0.1 / torque:.0f}" for torque in torques.values())
+    return Finding({name: 0.1 / torque >= 100.0 for name, torque in torques.items()}, f"{note} of 0.1 N m")
 
 
 def controllable(desk: Desk) -> Finding:
@@ -59,7 +59,7 @@ def riccati_solution(desk: Desk, form: str) -> Finding:
     for inertia, spec in _specs(form):
         q, r, p = lqr.riccati_problem(make_craft(inertia), spec)
         other = np.asarray(solve_riccati(inertia, q, r).p)
-        # Of units that differ: each entry beside its own row and column.
+        # Units differ: each entry is compared beside its own row and column.
         scale = np.sqrt(np.outer(np.diag(other), np.diag(other)))
         worst = max(worst, float(np.abs((p - other) / scale).max()))
         least = min(least, float(np.linalg.eigvalsh(p / scale).min()))
@@ -93,9 +93,9 @@ def middle_weight(desk: Desk) -> Finding:
         y = np.sqrt(q[3:] / r)
         j1, j2, j3 = moments
         y2 = (j3 - j1) * y[0] * y[2] / ((j3 - j2) * y[2] + (j2 - j1) * y[0])
-        held = kappa(moments, np.array([y[0], y2, y[2]])) / ((j3 - j1) / y2)
+        residual = kappa(moments, np.array([y[0], y2, y[2]])) / ((j3 - j1) / y2)
         moved, _ = balance(moments, q, r, "q5")
-        worst = max(worst, abs(held), abs(np.sqrt(moved[4] / r[1]) / y2 - 1.0))
+        worst = max(worst, abs(residual), abs(np.sqrt(moved[4] / r[1]) / y2 - 1.0))
         if y2 <= 0.0:
             return Finding(False, f"y2 = {y2:g}")
     return Finding(bool(worst < 1e-9), f"{TRIALS} trials: off by {worst:.0e} of its terms")
@@ -136,39 +136,39 @@ def channels(desk: Desk) -> Finding:
 
 
 def conditions(desk: Desk, file: str, laws: Sequence[str], claim: str) -> Finding:
-    """Tell of which laws a claim is proved."""
+    """Tell for which laws a claim is proved."""
     issued = {law: desk.claims(file, law).get(claim) for law in laws}
     proved = {law: one is not None and one.outcome == "proved" for law, one in issued.items()}
     return Finding(proved, f"{claim} proved by certificate")
 
 
 def falling(desk: Desk, runs: Sequence[tuple[str, str]]) -> Finding:
-    """Tell along which flights V never rises, but for its rounding."""
-    found: dict[str, bool] = {}
+    """Tell along which flights V is non-increasing, but for its rounding."""
+    verdicts: dict[str, bool] = {}
     for file, law in runs:
         values = _lyapunov(desk, file, law)
-        found[law] = bool((np.diff(values) <= 1e-12 * values[0]).all())
-    return Finding(found, "sample by sample, over the whole flights")
+        verdicts[law] = bool((np.diff(values) <= 1e-12 * values[0]).all())
+    return Finding(verdicts, "sample by sample, over the whole flights")
 
 
 def settled(desk: Desk, runs: Sequence[tuple[str, str]]) -> Finding:
     """Tell which flights settle."""
     times = {law: desk.flight(file, law).metrics["settling_time"] for file, law in runs}
-    told = ", ".join(f"{law} {time:.0f} s" for law, time in times.items() if time is not None)
-    return Finding({law: time is not None for law, time in times.items()}, told)
+    note = ", ".join(f"{law} {time:.0f} s" for law, time in times.items() if time is not None)
+    return Finding({law: time is not None for law, time in times.items()}, note)
 
 
 def below_wheels(desk: Desk, runs: Sequence[tuple[str, str]]) -> Finding:
     """Tell which flights need less than 0.1 N m."""
     peaks = {law: desk.flight(file, law).metrics["peak_torque"] for file, law in runs}
-    told = ", ".join(f"{law} {peak:.3g}" for law, peak in peaks.items())
-    return Finding({law: peak < 0.1 for law, peak in peaks.items()}, f"{told} N m")
+    note = ", ".join(f"{law} {peak:.3g}" for law, peak in peaks.items())
+    return Finding({law: peak < 0.1 for law, peak in peaks.items()}, f"{note} N m")
 
 
 def gyroscopic_beyond(desk: Desk, rates: Sequence[Sequence[str]]) -> Finding:
     """Tell from which rates form I does not settle within 12 h; wheels of 0.1 N m balance the gyroscopic torque of none."""
-    found: dict[str, bool] = {}
-    told: list[str] = []
+    verdicts: dict[str, bool] = {}
+    notes: list[str] = []
     for rate in rates:
         limit = {"spacecraft.limit": "axis", "spacecraft.torque_limit": 0.1}
         changes = limit | {"initial.rate": list(rate), "simulation.duration": "12 h"}
@@ -176,23 +176,23 @@ def gyroscopic_beyond(desk: Desk, rates: Sequence[Sequence[str]]) -> Finding:
         spin = np.asarray(flight.recording["rate"])[0]
         torque = float(np.abs(np.cross(spin, np.array([2500.0, 9000.0, 9800.0]) * spin)).max())
         time, name = flight.metrics["settling_time"], f"{np.degrees(np.linalg.norm(spin)):.1f}°/s"
-        found[name] = time is None
-        told.append(
+        verdicts[name] = time is None
+        notes.append(
             f"{torque:.2f} N m, settled after {time:.0f} s" if time is not None else f"{torque:.2f} N m, not settled"
         )
-    return Finding(found, "; ".join(told))
+    return Finding(verdicts, "; ".join(notes))
 
 
 def globally(desk: Desk) -> Finding:
-    """Tell for which laws the required attitude attracts every start: none has q0 = -1 among those, the same attitude, where
-    their torque vanishes too."""
-    found: dict[str, bool] = {}
+    """Tell for which laws the required attitude attracts every start: not for those whose torque vanishes at q0 = -1
+    too, the same attitude."""
+    verdicts: dict[str, bool] = {}
     for entry in desk.scenario("stabilisation").laws:
         loop = desk.loop("stabilisation", entry.name)
         turned = Measurement((-1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, loop.period)
         torque, _ = loop.law.module.torque(turned, loop.gains, loop.craft, NoMemory())
-        found[entry.name] = any(part != 0.0 for part in torque)
-    return Finding(found, "at q0 = -1, a full turn away, the torque is zero")
+        verdicts[entry.name] = any(part != 0.0 for part in torque)
+    return Finding(verdicts, "at q0 = -1, a full turn away, the torque is zero")
 
 
 def offset(desk: Desk, law: str) -> Finding:
@@ -250,26 +250,26 @@ def _lyapunov(desk: Desk, file: str, law: str) -> Any:
 def _inertias() -> list[Any]:
     """Random inertias whose moments differ up to tenfold, in random axes."""
     random = np.random.default_rng(RNG)
-    found: list[Any] = []
+    inertias: list[Any] = []
     for _ in range(TRIALS):
         axes = np.linalg.qr(random.normal(size=(3, 3)))[0]
         moments = 10.0 ** random.uniform(3.0, 4.0, 3)
         moments[np.argmax(moments)] = min(moments.max(), 0.99 * (moments.sum() - moments.max()))
-        found.append(axes * moments @ axes.T)
-    return found
+        inertias.append(axes * moments @ axes.T)
+    return inertias
 
 
 def _specs(form: str) -> list[tuple[Any, Any]]:
     """Random inertias, diagonal for form II, with random weights."""
-    random, found = np.random.default_rng(RNG + 1), []
+    random, specs = np.random.default_rng(RNG + 1), []
     for inertia in _inertias():
         if form == "I":
-            found.append((inertia, lqr.FormI(float(10.0 ** random.uniform(-6, -4)), float(10.0 ** random.uniform(-6, -4)))))
+            specs.append((inertia, lqr.FormI(float(10.0 ** random.uniform(-6, -4)), float(10.0 ** random.uniform(-6, -4)))))
             continue
         weights = tuple((10.0 ** np.r_[random.uniform(1.0, 4.0, 3), random.uniform(-2.0, 0.0, 3)]).tolist())
         costs = tuple((10.0 ** random.uniform(-1.0, 1.0, 3)).tolist())
         if form == "II":
-            found.append((np.diag(np.sort(np.linalg.eigvalsh(inertia))), lqr.FormII(weights, costs)))
+            specs.append((np.diag(np.sort(np.linalg.eigvalsh(inertia))), lqr.FormII(weights, costs)))
         else:
-            found.append((inertia, lqr.FormIII(weights, costs)))
-    return found
+            specs.append((inertia, lqr.FormIII(weights, costs)))
+    return specs

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 PASSES = 3
 WINDOW = 2000
-"""Calls from the start on whose mean is told: 200 s, in which predictive control arrives."""
+"""Calls from the start on over which the mean is taken: 200 s, in which predictive control arrives."""
 SHOWN = (0.8, 700.0)
 """Horizons that a figure shows."""
 
@@ -49,21 +49,21 @@ def call_times(desk: Desk) -> dict[str, NDArray[np.float64]]:
     of several passes, in which the laws take turns."""
 
     def make() -> dict[str, NDArray[np.float64]]:
-        found: dict[str, NDArray[np.float64]] = {}
+        times: dict[str, NDArray[np.float64]] = {}
         kernels: dict[str, Replay] = {}
         for name, (file, law, chunk, calls) in TIMED.items():
             loop = desk.loop(file, law)
             kernels[name] = Replay(loop, recorded_states(loop, desk.recording(file, law)))
-            found[name] = np.full(calls // chunk, np.inf)
+            times[name] = np.full(calls // chunk, np.inf)
         empty = dict.fromkeys(TIMED, np.inf)
         for _ in range(PASSES):
             for name, kernel in kernels.items():
                 chunk = TIMED[name].chunk
                 empty[name] = min([empty[name], *(_timed(kernel, 0, 0) for _ in range(20))])
-                for number in range(len(found[name])):
+                for number in range(len(times[name])):
                     spent = _timed(kernel, number * chunk, (number + 1) * chunk) - empty[name]
-                    found[name][number] = min(found[name][number], max(spent, 1e-9) / chunk)
-        return found
+                    times[name][number] = min(times[name][number], max(spent, 1e-9) / chunk)
+        return times
 
     return desk.once(("call times",), make)
 
@@ -90,15 +90,15 @@ def total_time(desk: Desk, name: str) -> Finding:
 
 
 def time_ratio(desk: Desk, name: str) -> Finding:
-    """How many Lyapunov calls one call of a law takes the time of."""
+    """The time of a law's call in Lyapunov calls."""
     return Finding(ratio(desk, name))
 
 
 def time_cases(desk: Desk, names: Sequence[str], least: float, most: float = float("inf")) -> Finding:
-    """Tell of which laws a call takes between `least` and `most` times as long as one of the Lyapunov law."""
-    found = {name: ratio(desk, name) for name in names}
-    note = ", ".join(f"{name} {value:.2g} times" for name, value in found.items())
-    return Finding({name: least < value < most for name, value in found.items()}, note)
+    """Tell for which laws a call takes between `least` and `most` times as long as one of the Lyapunov law."""
+    ratios = {name: ratio(desk, name) for name in names}
+    note = ", ".join(f"{name} {value:.2g} times" for name, value in ratios.items())
+    return Finding({name: least < value < most for name, value in ratios.items()}, note)
 
 
 def operations(desk: Desk, law: str, gravity: bool) -> int:
@@ -131,7 +131,7 @@ def call_figure(desk: Desk, names: Mapping[str, str], unit: str = "ns", scale: f
     for name, label in names.items():
         middle = 0.1 * TIMED[name].chunk * (np.arange(len(times[name])) + 0.5)
         curves.append(Curve(middle, scale * times[name], label, "line" if alone else "steps"))
-    # Whatever else the machine did meanwhile.
+    # Other work of the machine shows as spikes.
     span = (0.0, 1.5 * float(np.quantile(curves[0].y, 0.95))) if alone else None
     return Figure([Panel("time, s", f"time of a call, {unit}", curves, y_span=span, log_y=not alone)])
 

@@ -31,15 +31,15 @@ def skew(a: Any) -> Array:
 def near_the_target(desk: Desk, degrees: float = 1.0) -> Finding:
     """Tell whether the Lyapunov law turns the short way from rest, a little off the target, for either sign of Q."""
     half = np.radians(degrees) / 2.0
-    found: dict[str, bool] = {}
+    verdicts: dict[str, bool] = {}
     notes: list[str] = []
     for name, sign in (("q0 > 0", 1.0), ("q0 < 0 at the same attitude", -1.0)):
         start = [sign * np.cos(half), sign * np.sin(half), 0.0, 0.0]
         changes = {"initial.attitude": start, "initial.rate": [0.0, 0.0, 0.0]}
         angle = np.degrees(error_angle(desk.recording(COMMON, "lyapunov", changes)["attitude_error"]))
-        found[name] = bool(angle.max() < 2.0 * degrees)
+        verdicts[name] = bool(angle.max() < 2.0 * degrees)
         notes.append(f"{name}: at most {angle.max():.0f} degrees off on the way")
-    return Finding(found, "; ".join(notes))
+    return Finding(verdicts, "; ".join(notes))
 
 
 def target_motion(desk: Desk, cases: int = 100) -> Finding:
@@ -57,8 +57,8 @@ def target_motion(desk: Desk, cases: int = 100) -> Finding:
         # E has the scalar below.
         e = np.vstack([block, -q[1:]])
         printed.append(float(np.linalg.norm(2.0 * block @ first[1:] - rate) / np.linalg.norm(rate)))
-        found = 2.0 * e.T @ np.array([*second[1:], second[0]])
-        by_e.append(float(np.linalg.norm(found - acceleration) / np.linalg.norm(acceleration)))
+        by_formula = 2.0 * e.T @ np.array([*second[1:], second[0]])
+        by_e.append(float(np.linalg.norm(by_formula - acceleration) / np.linalg.norm(acceleration)))
     note = f"off by up to {max(printed):.1g} times the rate, and {max(by_e):.0e} times the acceleration"
     return Finding({"rate": max(printed) < 1e-9, "acceleration": max(by_e) < 1e-9}, note)
 
@@ -75,12 +75,12 @@ def on_the_surface(desk: Desk, cases: int = 2000) -> Finding:
         return float(gain * q[1:] @ derivative(q, -gain * q[1:])[1:])
 
     start = np.array([0.0, 1.0, 1.0, 1.0]) / np.sqrt(3.0)
-    found = {
+    verdicts = {
         "q0 > 0": all(slope(q) < 0.0 for q in attitudes if q[0] > 0.0),
         "q0 = 0 as at the published start": slope(start) < -1e-12,
         "q0 < 0": all(slope(q) < 0.0 for q in attitudes if q[0] < 0.0),
     }
-    return Finding(found, f"V_e' = {slope(start):.1g} at the published attitude")
+    return Finding(verdicts, f"V_e' = {slope(start):.1g} at the published attitude")
 
 
 def reaching_condition(desk: Desk, cases: int = 2000) -> Finding:
@@ -120,9 +120,9 @@ def gravity_block(desk: Desk, cases: int = 20) -> Finding:
 
 
 def one_step(desk: Desk, of: Mapping[str, Mapping[str, Any]]) -> Finding:
-    """Tell whether x + h (A_c x + B u) foresees the state (q; w) a control period later, within a tenth of what it moves,
+    """Tell whether x + h (A_c x + B u) predicts the state (q; w) a control period later, within a tenth of what it moves,
     under predictive control. of: cases by name; `step`: whether h is the control period, or 1 as printed; `changes`."""
-    found: dict[str, float] = {}
+    errors: dict[str, float] = {}
     for name, case in of.items():
         loop = desk.loop(COMMON, "mpc", case.get("changes"))
         end, inertia = fly(loop, 1)[1], tensor(loop.craft.inertia)
@@ -132,7 +132,7 @@ def one_step(desk: Desk, of: Mapping[str, Mapping[str, Any]]) -> Finding:
         # The gravity block is six orders smaller.
         slope = np.block([[-skew(rate), 0.5 * np.eye(3)], [np.zeros((3, 3)), np.linalg.solve(inertia, damping)]]) @ before
         slope[3:] += np.linalg.solve(inertia, control)
-        foreseen = before + (loop.period if case["step"] else 1.0) * slope
-        found[name] = float(np.linalg.norm(foreseen - after) / np.linalg.norm(after - before))
-    note = "off by, as a share of what the state moves: " + ", ".join(f"{name} {error:.2g}" for name, error in found.items())
-    return Finding({name: error < 0.1 for name, error in found.items()}, note)
+        predicted = before + (loop.period if case["step"] else 1.0) * slope
+        errors[name] = float(np.linalg.norm(predicted - after) / np.linalg.norm(after - before))
+    note = "off by, as a share of what the state moves: " + ", ".join(f"{name} {off:.2g}" for name, off in errors.items())
+    return Finding({name: error < 0.1 for name, error in errors.items()}, note)

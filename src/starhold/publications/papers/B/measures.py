@@ -1,4 +1,4 @@
-"""Flights of the three laws are held against what the publication says, and drawn as it draws them."""
+"""Flights of the three laws are compared with the statements of the publication, and drawn as it draws them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LAWS = ("lyapunov", "sliding", "mpc")
 COMMON = "three-laws"
 
 
-# What is flown
+# Scenarios
 
 
 def gains(desk: Desk) -> Finding:
@@ -34,11 +34,10 @@ def gains(desk: Desk) -> Finding:
 
 
 def first_command(desk: Desk, file: str, law: str, component: bool = False) -> Finding:
-    """Measure what a law asks for at the start, before any limit (N m): the norm, or the largest component."""
-    asked = desk.recording(file, law)["command"][0]
-    return Finding(
-        float(np.abs(asked).max() if component else np.linalg.norm(asked)), f"about the axes {np.round(asked, 5).tolist()}"
-    )
+    """Measure a law's command at the start, before any limit (N m): the norm, or the largest component."""
+    command = desk.recording(file, law)["command"][0]
+    size = np.abs(command).max() if component else np.linalg.norm(command)
+    return Finding(float(size), f"about the axes {np.round(command, 5).tolist()}")
 
 
 def gravity_torque(desk: Desk) -> Finding:
@@ -49,16 +48,16 @@ def gravity_torque(desk: Desk) -> Finding:
     return Finding(1.5 * craft.gravity / radius**3 * (moments[-1] - moments[0]))
 
 
-# What flies
+# Flights
 
 
 def arrives(desk: Desk, file: str, laws: Sequence[str], within: float, changes: Mapping[str, Any] | None = None) -> Finding:
-    """Tell of each law whether its error of attitude stays within a bound (rad) over the last quarter of the flight."""
+    """Tell for each law whether its error of attitude stays within a bound (rad) over the last quarter of the flight."""
     return cases(desk, [{"name": law, "file": file, "law": law, "changes": changes} for law in laws], within)
 
 
 def cases(desk: Desk, of: Sequence[Mapping[str, Any]], within: float) -> Finding:
-    """Tell of several flights whether each ends within a bound (rad): `name`, `file`, `law` and perhaps `changes`."""
+    """Tell for several flights whether each ends within a bound (rad): `name`, `file`, `law` and perhaps `changes`."""
     ends = {one["name"]: _final(desk, one["file"], one["law"], one.get("changes")) for one in of}
     return Finding({name: end <= within for name, end in ends.items()}, _listed(ends, "rad"))
 
@@ -101,32 +100,32 @@ def worse_with_noise(desk: Desk) -> Finding:
 
 
 def pattern(desk: Desk, files: Mapping[str, str], least: float) -> Finding:
-    """Tell whether the torque with noise goes like that without: the correlation of means over 5 s in the first 200 s, the
-    least of the laws, by the names of readings."""
+    """Tell whether the torque with noise follows that without: the correlation of means over 5 s in the first 200 s,
+    the least of the laws, by the names of readings."""
 
     def means(file: str, law: str) -> Array:
         return np.asarray(desk.recording(file, law)["torque"])[:2000].reshape(40, 50, 3).mean(axis=1).ravel()
 
-    found = {
+    correlations = {
         name: {law: float(np.corrcoef(means(COMMON, law), means(file, law))[0, 1]) for law in LAWS}
         for name, file in files.items()
     }
-    note = "; ".join(f"{name}: {_listed(of)}" for name, of in found.items())
-    return Finding({name: min(of.values()) >= least for name, of in found.items()}, note)
+    note = "; ".join(f"{name}: {_listed(of)}" for name, of in correlations.items())
+    return Finding({name: min(of.values()) >= least for name, of in correlations.items()}, note)
 
 
 def sooner(desk: Desk, of: Sequence[Mapping[str, Any]], factor: float = 1.0) -> Finding:
-    """Tell of each case whether the first flight stays within an accuracy after fewer steps than `factor` times those of the
-    second; one that never does comes last. Each has a name, a metric, and two flights (file, law, perhaps changes)."""
-    found: dict[str, bool] = {}
+    """Tell for each case whether the first flight stays within an accuracy after fewer steps than `factor` times those of
+    the second; one that never does comes last. Each has a name, a metric, and two flights (file, law, perhaps changes)."""
+    verdicts: dict[str, bool] = {}
     notes: list[str] = []
     for one in of:
         first, second = (
             desk.flight(file, law, *changes).metrics[one["metric"]] for file, law, *changes in (one["first"], one["second"])
         )
-        found[one["name"]] = first is not None and (second is None or first < factor * second)
+        verdicts[one["name"]] = first is not None and (second is None or first < factor * second)
         notes.append(f"{one['name']}: {_count(first)}, {_count(second)}")
-    return Finding(found, "; ".join(notes))
+    return Finding(verdicts, "; ".join(notes))
 
 
 def _count(steps: Any) -> str:
@@ -136,13 +135,13 @@ def _count(steps: Any) -> str:
 def least_accurate(desk: Desk, of: Sequence[Mapping[str, Any]], law: str) -> Finding:
     """Tell in which cases a law ends further from the target than both others; each has a name, and the file and the law for
     every law."""
-    found: dict[str, bool] = {}
+    verdicts: dict[str, bool] = {}
     notes: list[str] = []
     for one in of:
         ends = {name: _final(desk, *flight) for name, flight in one["flights"].items()}
-        found[one["name"]] = max(ends, key=lambda name: ends[name]) == law
+        verdicts[one["name"]] = max(ends, key=lambda name: ends[name]) == law
         notes.append(f"{one['name']}: {_listed(ends, 'rad')}")
-    return Finding(found, "; ".join(notes))
+    return Finding(verdicts, "; ".join(notes))
 
 
 def same_after(desk: Desk, law: str, bound: float, short: float) -> Finding:
@@ -167,7 +166,7 @@ def quotients(desk: Desk, totals: Sequence[float], calls: int) -> Finding:
 
 
 def plans(desk: Desk, file: str, law: str, instants: Sequence[int], until: float) -> Figure:
-    """The attitude that predictive control foresees at some control instants, and the moves that it plans, with what was
+    """The attitude that predictive control predicts at some control instants, and the moves that it plans, with those
     flown."""
     from starhold.laws.mpc import program
     from starhold.laws.predictive.problem import carve
@@ -200,8 +199,8 @@ def with_detail(
     detail: Sequence[float],
     scale: float = 1.0,
 ) -> Figure:
-    """The components of a recorded quantity, a panel each, and below what each does between two instants (s); the upper
-    panels end with the later."""
+    """The components of a recorded quantity, a panel each, and below each its detail between two instants (s); the
+    upper panels end with the later."""
     run = desk.recording(file, law)
     time, values = run["time"], scale * np.asarray(run[quantity])
     first, last = detail

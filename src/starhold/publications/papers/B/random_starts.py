@@ -23,7 +23,7 @@ FILE = "random-starts"
 LAWS = ("lyapunov", "sliding", "mpc")
 PREFIXES = {"attitude": "", "rate": "rate_"}
 PASSAGES = 16
-"""Starts of which first passages are counted."""
+"""Starts whose first passages are counted."""
 
 
 def counts(desk: Desk, kind: str) -> dict[str, Array]:
@@ -42,7 +42,7 @@ def first_passages(desk: Desk, kind: str) -> dict[str, Array]:
 
     def make() -> dict[str, dict[str, Array]]:
         steps, frame = desk.scenario(FILE).table.simulation.steps, desk.campaign(FILE).frame()
-        found: dict[str, dict[str, Array]] = {"attitude": {}, "rate": {}}
+        first: dict[str, dict[str, Array]] = {"attitude": {}, "rate": {}}
         for law in LAWS:
             loop = desk.loop(FILE, law)
             rows: Any = frame[frame["law"] == law].head(PASSAGES)
@@ -57,9 +57,9 @@ def first_passages(desk: Desk, kind: str) -> dict[str, Array]:
                 return _passages(label(flights[number].loop, samples, carry, 1))
 
             flown = fly_batched(flights, passages)
-            for number, name in enumerate(found):
-                found[name][law] = np.array([each[number] for each in flown])
-        return found
+            for number, name in enumerate(first):
+                first[name][law] = np.array([each[number] for each in flown])
+        return first
 
     return desk.once(("first passages",), make)[kind]
 
@@ -79,19 +79,19 @@ def first_within(error: Array, bound: float) -> float:
 def steps_figure(desk: Desk, kind: str) -> Figure:
     """The steps over the order of the deviation: medians, the middle four fifths of the starts, and first passages; and the
     share of the starts that stay within."""
-    found, first = counts(desk, kind), first_passages(desk, kind)
+    steps, first = counts(desk, kind), first_passages(desk, kind)
     orders = np.array(DECADES, dtype=float)
     curves: list[Curve] = []
     shares: list[Curve] = []
     for hue, law in enumerate(LAWS):
-        low, middle, high = (_quantile(found[law], share) for share in (0.1, 0.5, 0.9))
+        low, middle, high = (_quantile(steps[law], share) for share in (0.1, 0.5, 0.9))
         there = np.isfinite(high)
         if there.any():
             outline = np.concatenate([orders[there], orders[there][::-1]])
             curves.append(Curve(outline, np.concatenate([low[there], high[there][::-1]]), "", "area", hue))
         curves.append(Curve(orders, _drawn(middle), law, "line", hue))
         curves.append(Curve(orders, _drawn(_quantile(first[law])), "first passage" if hue == 0 else "", "dotted", hue))
-        shares.append(Curve(orders, 100.0 * np.isfinite(found[law]).mean(axis=0), law, "line", hue))
+        shares.append(Curve(orders, 100.0 * np.isfinite(steps[law]).mean(axis=0), law, "line", hue))
     symbol = "|q|" if kind == "attitude" else "|ω| in rad/s"
     across = f"k of {symbol} ≤ 10^-k"
     return Figure([Panel(across, "control steps", curves), Panel(across, "starts that stay within, %", shares)], columns=2)
@@ -103,8 +103,8 @@ def _drawn(steps: Array) -> Array:
 
 def medians(desk: Desk, kind: str, first: bool = False) -> dict[str, Array]:
     """The medians of the counts, (6,) by law."""
-    found = first_passages(desk, kind) if first else counts(desk, kind)
-    return {law: _quantile(found[law]) for law in LAWS}
+    steps = first_passages(desk, kind) if first else counts(desk, kind)
+    return {law: _quantile(steps[law]) for law in LAWS}
 
 
 def _quantile(steps: Array, share: float = 0.5) -> Array:
@@ -113,20 +113,20 @@ def _quantile(steps: Array, share: float = 0.5) -> Array:
 
 def fewest(desk: Desk, kind: str, law: str, against: Sequence[str], orders: Sequence[int], first: bool = False) -> Finding:
     """Tell to which accuracies a law takes fewer steps than others, by the medians over random starts."""
-    found = medians(desk, kind, first)
-    cases = {f"to 10^-{k}": all(found[law][k - 1] < found[other][k - 1] for other in against) for k in orders}
-    note = "; ".join(f"{one}: {', '.join(_count(found[one][k - 1]) for k in orders)}" for one in (law, *against))
+    steps = medians(desk, kind, first)
+    cases = {f"to 10^-{k}": all(steps[law][k - 1] < steps[other][k - 1] for other in against) for k in orders}
+    note = "; ".join(f"{one}: {', '.join(_count(steps[one][k - 1]) for k in orders)}" for one in (law, *against))
     return Finding(cases, note)
 
 
 def rises(desk: Desk, law: str, orders: dict[str, int], factor: float) -> Finding:
-    """Tell whether the step from one accuracy to the next costs a law more than `factor` times what it costs the others;
-    orders: the k that is come to, for attitude and for rate."""
+    """Tell whether the step from one accuracy to the next costs a law more than `factor` times what it costs the
+    others; orders: the k reached, for attitude and for rate."""
     cases: dict[str, bool] = {}
     notes: list[str] = []
     for kind, k in orders.items():
-        found = medians(desk, kind)
-        rise = {one: float(found[one][k - 1] - found[one][k - 2]) for one in LAWS}
+        steps = medians(desk, kind)
+        rise = {one: float(steps[one][k - 1] - steps[one][k - 2]) for one in LAWS}
         cases[f"{kind} from 10^-{k - 1} to 10^-{k}"] = all(rise[law] > factor * rise[one] for one in LAWS if one != law)
         notes.append(f"{kind}: " + ", ".join(f"{one} {_count(rise[one])}" for one in LAWS))
     return Finding(cases, "; ".join(notes))

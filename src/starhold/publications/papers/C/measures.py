@@ -22,7 +22,7 @@ from starhold.synthesis.stability_degree import boundary, brute_force, degree, d
 RNG = 2012
 TRIALS = 400
 WEAK = 0.002
-"""What the wheel about y has left after its fault (N m)."""
+"""The torque that the wheel about y has left after its fault (N m)."""
 EXAMPLE = ((1.0, 1.5, 2.0), 0.5, 0.3, 2.0)
 """Ratios of the moments, largest angle (rad), largest rate and budget, in the publication's units."""
 
@@ -33,7 +33,7 @@ def closed_loop(desk: Desk, file: str, law: str) -> Finding:
     run, loop = desk.recording(file, law, whole), desk.loop(file, law, whole)
     q, rate, time = (np.asarray(run[name]) for name in ("attitude_error", "rate_error", "time"))
     slope = (rate[2:] - rate[:-2]) / (time[2:] - time[:-2])[:, None]
-    # The torque is held over a period, so what acts at a sample's middle is the mean of two commands.
+    # The torque is held over a period, so the torque at a sample's middle is the mean of two commands.
     restoring = loop.gains.k_rate * rate + np.asarray(loop.gains.k_attitude) * 4.0 * q[:, :1] * q[:, 1:]
     acting = 0.5 * (restoring[1:-1] + restoring[:-2])
     off = float(np.abs(slope @ tensor(loop.craft.inertia) + acting).max() / np.abs(acting).max())
@@ -50,9 +50,9 @@ def roots_match(desk: Desk) -> Finding:
         matrix[3:, :3] = np.eye(3)
         inside = np.sqrt(damping**2 - 8.0 * ratios * stiffness + 0.0j)
         printed = np.concatenate([(-damping + inside) / (2.0 * ratios), (-damping - inside) / (2.0 * ratios)])
-        found = np.linalg.eigvals(matrix)
-        worst = max(worst, max(float(np.abs(found - root).min()) for root in printed))
-    # Where two roots meet, eigenvalues know half the digits.
+        eigenvalues = np.linalg.eigvals(matrix)
+        worst = max(worst, max(float(np.abs(eigenvalues - root).min()) for root in printed))
+    # Where two roots meet, eigenvalues have half the digits.
     return Finding(worst < 1e-6, f"{TRIALS} trials: at most {worst:.0e} apart")
 
 
@@ -78,16 +78,16 @@ def middle_regions(desk: Desk) -> Finding:
 
 def curve_in_second(desk: Desk) -> Finding:
     """Tell for which moments the curve (23) lies in the second region of (20)."""
-    found: dict[str, bool] = {}
+    verdicts: dict[str, bool] = {}
     for s1, s2 in ((0.1, 0.5), (0.4, 0.5), (0.2, 0.6), (0.1, 0.9), (0.8, 0.9)):
         square = 1.0 / boundary((1.0, 1.0 + s1, 1.0 + s2))
-        found[f"σ1 = {s1}, σ2 = {s2}"] = 8.0 < square <= 8.0 * (1.0 + s1)
-    return Finding(found, "it does where σ1 ≥ σ2²/(1 + 2σ2)")
+        verdicts[f"σ1 = {s1}, σ2 = {s2}"] = 8.0 < square <= 8.0 * (1.0 + s1)
+    return Finding(verdicts, "it does where σ1 ≥ σ2²/(1 + 2σ2)")
 
 
 def printed_optimum(desk: Desk) -> Finding:
     """Tell for which orders of the moments (25), taken as it is printed, gives the largest degree of stability."""
-    found: dict[str, bool] = {}
+    verdicts: dict[str, bool] = {}
     for order in permutations((1.0, 1.5, 2.0)):
         x, y, z = order
         ratios = np.array([1.0, y / x, z / x])
@@ -96,13 +96,13 @@ def printed_optimum(desk: Desk) -> Finding:
         if share > 0.0:
             K_w = _on_line(share, 0.5, 0.3, 2.0)
             reached = float(degree(share * K_w**2, K_w, ratios))
-        found[f"{x:g} : {y:g} : {z:g}"] = reached > best * (1.0 - 1e-6)
-    return Finding(found, "moments about x, y and z")
+        verdicts[f"{x:g} : {y:g} : {z:g}"] = reached > best * (1.0 - 1e-6)
+    return Finding(verdicts, "moments about x, y and z")
 
 
 def general_optimum(desk: Desk) -> Finding:
-    """Tell whether the formula of the smallest and the largest moment is the optimum whatever their order, against a search
-    over all gains."""
+    """Tell whether the formula of the smallest and the largest moment is the optimum in any order of the moments,
+    against a search over all gains."""
     random, worst = np.random.default_rng(RNG), 0.0
     for _ in range(25):
         ratios, alpha, omega, budget = _ratios(random), *random.uniform((0.1, 0.0, 0.5), (3.0, 1.0, 4.0)).tolist()
@@ -117,12 +117,12 @@ def example(desk: Desk) -> Finding:
     share = _share(ratios[2])
     K_w = _on_line(share, alpha, omega, budget)
     eta, best = K_w / (2.0 * ratios[2]), brute_force(ratios, alpha, omega, budget)
-    told = f"K_ω = {K_w:.4f}, K_a = {share * K_w**2:.4f}, degree of stability {eta:.4f}"
-    return Finding(bool(abs(best.eta / eta - 1.0) < 1e-8), told)
+    note = f"K_ω = {K_w:.4f}, K_a = {share * K_w**2:.4f}, degree of stability {eta:.4f}"
+    return Finding(bool(abs(best.eta / eta - 1.0) < 1e-8), note)
 
 
 def degree_after(desk: Desk, file: str, law: str) -> Finding:
-    """Tell whether a retuned law is proved to converge, and what its degree of stability becomes."""
+    """Tell whether a retuned law is proved to converge, and with which degree of stability."""
     issued = [one.certificate for one in desk.certificates(file, law)]
     kept = {certificate.name: certificate.claims[0].outcome == "proved" for certificate in issued}
     moments = np.diagonal(tensor(desk.scenario(file).craft.inertia))
@@ -133,21 +133,21 @@ def degree_after(desk: Desk, file: str, law: str) -> Finding:
 
 
 def within_torque(desk: Desk, file: str, laws: Sequence[str]) -> Finding:
-    """Tell of which laws the weak wheel is asked for no more than it has, at every sample after the fault."""
-    found, told = dict[str, bool](), list[str]()
+    """Tell which laws demand no more of the weak wheel than it has, at every sample after the fault."""
+    verdicts, notes = dict[str, bool](), list[str]()
     for law in laws:
         time, command = samples(desk, file, law, "wheel_command")
-        asked = float(np.abs(command[time >= 6.0, 1]).max())
-        found[law] = asked <= WEAK
-        told.append(f"{law} {1e3 * asked:.2f} mN m of {1e3 * WEAK:g}")
-    return Finding(found, "; ".join(told))
+        demanded = float(np.abs(command[time >= 6.0, 1]).max())
+        verdicts[law] = demanded <= WEAK
+        notes.append(f"{law} {1e3 * demanded:.2f} mN m of {1e3 * WEAK:g}")
+    return Finding(verdicts, "; ".join(notes))
 
 
 def settles(desk: Desk, file: str, laws: Sequence[str]) -> Finding:
     """Tell which laws fail to settle."""
     times = {law: desk.flight(file, law).metrics["settling_time"] for law in laws}
-    told = ", ".join(f"{law} after {time:.0f} s" for law, time in times.items() if time is not None)
-    return Finding({law: time is None for law, time in times.items()}, f"settles: {told}")
+    note = ", ".join(f"{law} after {time:.0f} s" for law, time in times.items() if time is not None)
+    return Finding({law: time is None for law, time in times.items()}, f"settles: {note}")
 
 
 def globally(desk: Desk) -> Finding:
@@ -214,7 +214,7 @@ def _on_line(share: float, alpha: float, omega: float, budget: float) -> float:
 
 
 def _ratios(random: Any) -> Any:
-    """Moments in units of the first, of a body that can be."""
+    """Moments in units of the first, of a possible body."""
     while True:
         moments = random.uniform(0.4, 2.0, 3)
         if moments.max() < moments.sum() - moments.max():
@@ -228,6 +228,6 @@ def _in_region(damping: Any, formula: Any) -> Finding:
         s1, s2 = np.sort(random.uniform(0.0, 1.0, 2))
         stiffness = random.uniform(0.1, 3.0)
         K_w = damping(s1, s2, stiffness)
-        found = float(degree(stiffness, K_w, (1.0, 1.0 + s1, 1.0 + s2)))
-        worst = max(worst, abs(formula(s1, s2, stiffness, K_w) / found - 1.0))
+        exact = float(degree(stiffness, K_w, (1.0, 1.0 + s1, 1.0 + s2)))
+        worst = max(worst, abs(formula(s1, s2, stiffness, K_w) / exact - 1.0))
     return Finding(bool(worst < 1e-9), f"{TRIALS} trials: at most {worst:.0e} apart")

@@ -1,5 +1,5 @@
 """Measures of this publication's turns: the roots that turn fastest within limits, the fits through them, the printed turn,
-and what the control's period and a torque from outside do to it. Those of its linear model stand in `placement`."""
+and the effects of the control period and of external torque on it. Those of its linear model stand in `placement`."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SHORT = 0.002
 POINTS = {"below": (10.0, 45.0, 85.0), "above": (85.0, 135.0, 180.0)}
 """Angles (deg) that each piece of the published fit goes through."""
 TIGHT = 0.997
-"""Share of a limit from which on it is the one that decides."""
+"""Share of a limit above which it is the one that decides."""
 
 
 def searched(desk: Desk) -> Study:
@@ -44,8 +44,8 @@ def fine_roots(desk: Desk) -> dict[float, float]:
         angles = sorted({angle for points in POINTS.values() for angle in points})
         changes = {"simulation.control_period": SHORT, "transient.angles": [f"{angle:g} deg" for angle in angles]}
         scenario = desk.scenario("landing-limits", changes)
-        found = study(scenario, pick_modal(scenario, "published"))
-        return dict(zip(angles, found.roots.tolist(), strict=True))
+        result = study(scenario, pick_modal(scenario, "published"))
+        return dict(zip(angles, result.roots.tolist(), strict=True))
 
     return desk.once(("fine roots",), make)
 
@@ -58,9 +58,9 @@ def through(angles: ArrayLike, roots: ArrayLike) -> tuple[float, float, float]:
         first, second, third = np.exp(d * (x - x[0]))
         return float((first - second) * (y[1] - y[2]) - (second - third) * (y[0] - y[1]))
 
-    # Beyond these ends the second step is nothing beside the first, or the curve a line.
-    found: Any = brentq(misses, -50.0 / (x[2] - x[0]), -1e-6, xtol=1e-13)
-    d = float(found)
+    # Beyond these ends the second step is negligible beside the first, or the curve is a line.
+    root: Any = brentq(misses, -50.0 / (x[2] - x[0]), -1e-6, xtol=1e-13)
+    d = float(root)
     c = float((y[0] - y[1]) / (np.exp(d * x[0]) - np.exp(d * x[1])))
     return c, d, float(y[0] - c * math.exp(d * x[0]))
 
@@ -91,33 +91,33 @@ def no_other_step(desk: Desk, steps: Sequence[float]) -> Finding:
 
 def off_the_printed_fit(desk: Desk, share: float) -> Finding:
     """Tell whether the printed fit is within a share of the best roots, within the limits and with their tolerances."""
-    found = searched(desk)
-    hard, eased = (np.abs(PUBLISHED.errors(found.angles, roots)) for roots in (found.roots, _eased(found)))
-    told = f"off by at most {100 * hard.max():.2f} %, and by {100 * eased.min():.1f} to {100 * eased.max():.1f} %"
-    return Finding({"within the limits": bool(hard.max() < share), "with the tolerances": bool(eased.max() < share)}, told)
+    search = searched(desk)
+    hard, eased = (np.abs(PUBLISHED.errors(search.angles, roots)) for roots in (search.roots, _eased(search)))
+    note = f"off by at most {100 * hard.max():.2f} %, and by {100 * eased.min():.1f} to {100 * eased.max():.1f} %"
+    return Finding({"within the limits": bool(hard.max() < share), "with the tolerances": bool(eased.max() < share)}, note)
 
 
 def least_squares(desk: Desk) -> Finding:
     """Tell whether the least-squares fit through all roots is nearer to them than the printed one, rms and at worst."""
-    found = searched(desk)
-    assert found.own is not None
-    own, printed = (np.abs(pieces.errors(found.angles, found.roots)) for pieces in (found.own, PUBLISHED))
-    means = [100.0 * math.sqrt(float(np.mean(errors**2))) for errors in (own, printed)]
-    c, d, e = found.own.below
-    f, g, h = found.own.above
-    split = found.own.split * DEGREES
+    search = searched(desk)
+    assert search.fitted is not None
+    fitted, printed = (np.abs(pieces.errors(search.angles, search.roots)) for pieces in (search.fitted, PUBLISHED))
+    means = [100.0 * math.sqrt(float(np.mean(errors**2))) for errors in (fitted, printed)]
+    c, d, e = search.fitted.below
+    f, g, h = search.fitted.above
+    split = search.fitted.split * DEGREES
     return Finding(
-        bool(means[0] < means[1] and own.max() < printed.max()),
+        bool(means[0] < means[1] and fitted.max() < printed.max()),
         f"{c:.3f} exp({d:.3f}ϑ) {e:+.3f} up to {split:g}°, {f:.3f} exp({g:.3f}ϑ) {h:+.3f} beyond: {means[0]:.2f} % rms, "
-        f"{100 * own.max():.2f} % at most; the printed one {means[1]:.2f} %, {100 * printed.max():.2f} %",
+        f"{100 * fitted.max():.2f} % at most; the printed one {means[1]:.2f} %, {100 * printed.max():.2f} %",
     )
 
 
 def which_limit(desk: Desk) -> Finding:
     """Tell whether the acceleration decides up to 85 degrees and the rate beyond, at every angle that was searched."""
-    limits, found = _limits(desk), searched(desk).found
+    limits, results = _limits(desk), searched(desk).results
     decides: list[bool] = []
-    for item in found:
+    for item in results:
         assert item.hard is not None
         seen = item.hard.transient
         shares = max(seen.peak_acceleration) / limits.acceleration, seen.peak_rate / limits.rate
@@ -129,11 +129,11 @@ def which_limit(desk: Desk) -> Finding:
 def inside_the_interval(desk: Desk) -> Finding:
     """Tell whether every best root lies inside [-3, 0), with and without tolerances, and the next faster one breaks a
     limit."""
-    scenario, found = desk.scenario("landing-limits"), searched(desk)
+    scenario, search = desk.scenario("landing-limits"), searched(desk)
     problem, limits = problem_of(scenario, scenario.pick("published")), _limits(desk)
-    every = np.r_[found.roots, _eased(found)]
+    every = np.r_[search.roots, _eased(search)]
     faster = [
-        problem.fly(angle, [root - 1e-3])[0].keeps(limits) for angle, root in zip(found.angles, found.roots, strict=True)
+        problem.fly(angle, [root - 1e-3])[0].keeps(limits) for angle, root in zip(search.angles, search.roots, strict=True)
     ]
     return Finding(
         bool(every.min() > -2.9 and every.max() < -0.1) and not any(faster), f"{every.min():g} to {every.max():g} 1/s"
@@ -142,11 +142,11 @@ def inside_the_interval(desk: Desk) -> Finding:
 
 def printed_fit_flies(desk: Desk) -> Finding:
     """Tell whether turns with the printed fit's roots keep the limits, and the limits with the least tolerances printed."""
-    scenario, found = desk.scenario("landing-limits"), searched(desk)
+    scenario, search = desk.scenario("landing-limits"), searched(desk)
     problem, hard = problem_of(scenario, scenario.pick("published")), _limits(desk)
     eased = Limits(hard.rate + math.radians(2.0), hard.acceleration + math.radians(3.0))
-    flown = [problem.fly(angle, [root])[0] for angle, root in zip(found.angles, PUBLISHED.at(found.angles), strict=True)]
-    longer = [one.time / item.hard.time for one, item in zip(flown, found.found, strict=True) if one.time and item.hard]
+    flown = [problem.fly(angle, [root])[0] for angle, root in zip(search.angles, PUBLISHED.at(search.angles), strict=True)]
+    longer = [one.time / item.hard.time for one, item in zip(flown, search.results, strict=True) if one.time and item.hard]
     rate, swing = max(one.peak_rate for one in flown), max(max(one.peak_acceleration) for one in flown)
     return Finding(
         {
@@ -159,16 +159,16 @@ def printed_fit_flies(desk: Desk) -> Finding:
 
 def roots_over_angle(desk: Desk) -> Figure:
     """The best roots, with the printed fit, the one through our roots at its points, and the least-squares one."""
-    found = searched(desk)
-    assert found.own is not None
-    at = found.angles * DEGREES
+    best = searched(desk)
+    assert best.fitted is not None
+    at = best.angles * DEGREES
     dense = np.linspace(10.0, 180.0, 341)
     fits = [("(5.7) as printed", PUBLISHED, "dashed"), ("through three points", three_point_fit(fine_roots(desk)), "line")]
-    drawn: list[Any] = [*fits, ("least squares", found.own, "dotted")]
-    points = Curve(at, -found.roots, "best within the limits", "points", 0)
+    drawn: list[Any] = [*fits, ("least squares", best.fitted, "dotted")]
+    points = Curve(at, -best.roots, "best within the limits", "points", 0)
     lines = [Curve(dense, -f.at(np.radians(dense)), name, style, n) for n, (name, f, style) in enumerate(drawn, 1)]
     errors = [
-        Curve(at, 100.0 * f.errors(found.angles, found.roots), name, style, n) for n, (name, f, style) in enumerate(drawn, 1)
+        Curve(at, 100.0 * f.errors(best.angles, best.roots), name, style, n) for n, (name, f, style) in enumerate(drawn, 1)
     ]
     return Figure(
         [
@@ -180,9 +180,9 @@ def roots_over_angle(desk: Desk) -> Figure:
 
 def times_over_angle(desk: Desk) -> Figure:
     """The least transient times, within the limits and with their tolerances."""
-    found = searched(desk)
-    hard, eased = ([getattr(item, kind).time for item in found.found] for kind in ("hard", "eased"))
-    at = found.angles * DEGREES
+    search = searched(desk)
+    hard, eased = ([getattr(item, kind).time for item in search.results] for kind in ("hard", "eased"))
+    at = search.angles * DEGREES
     curves = [Curve(at, hard, "within the limits"), Curve(at, eased, "with 3 °/s and 5 °/s² more", "dashed")]
     return Figure([Panel("initial angle, deg", "least transient time, s", curves, y_span=(0.0, 30.0))])
 
@@ -201,12 +201,12 @@ def fitted_root(desk: Desk) -> Finding:
 def turn(desk: Desk, law: str, wanted: Sequence[str], changes: Mapping[str, Any] | None = None) -> Finding:
     """Numbers of a turn: "time" (s), "rate" (deg/s), "accelerations" (deg/s2, three)."""
     flown = desk.flight("landing", law, changes).metrics
-    told: dict[str, list[float]] = {
+    numbers: dict[str, list[float]] = {
         "time": [flown["transient_time"]],
         "rate": [flown["peak_rate"] * DEGREES],
         "accelerations": [part * DEGREES for part in flown["peak_accelerations"]],
     }
-    return Finding([number for name in wanted for number in told[name]])
+    return Finding([number for name in wanted for number in numbers[name]])
 
 
 def limits_kept(desk: Desk) -> Finding:
@@ -224,15 +224,15 @@ def one_root_for_all(desk: Desk, peaks: Sequence[str], time: str) -> Finding:
     halves = [(float(text), 0.5 * 10.0 ** -len(text.partition(".")[2])) for text in (*peaks, time)]
     all_peaks = np.all([np.abs(row - at) <= half for row, (at, half) in zip(seen, halves, strict=False)], axis=0)
     on_time = np.abs(flown.time - halves[-1][0]) <= halves[-1][1]
-    told = f"{roots[all_peaks].min():.5f} to {roots[all_peaks].max():.5f}" if all_peaks.any() else "none"
-    return Finding(bool(all_peaks.any() and not on_time.any()), f"{told}; times of {flown.time.min():.2f} s and more")
+    note = f"{roots[all_peaks].min():.5f} to {roots[all_peaks].max():.5f}" if all_peaks.any() else "none"
+    return Finding(bool(all_peaks.any() and not on_time.any()), f"{note}; times of {flown.time.min():.2f} s and more")
 
 
 def faster_root(desk: Desk) -> Finding:
-    """Tell how much sooner the root that a search for this very start finds comes to the end within the limits."""
+    """Tell whether the root searched for this very start ends the turn sooner within the limits."""
     ours, fit = (desk.flight("landing", law).metrics for law in ("searched", "fit"))
-    told = f"a = −0.454: {ours['transient_time']:.2f} s, {ours['peak_rate'] * DEGREES:.2f} °/s"
-    return Finding(bool(ours["limits_kept"] and ours["transient_time"] < fit["transient_time"] - 1.0), told)
+    note = f"a = −0.454: {ours['transient_time']:.2f} s, {ours['peak_rate'] * DEGREES:.2f} °/s"
+    return Finding(bool(ours["limits_kept"] and ours["transient_time"] < fit["transient_time"] - 1.0), note)
 
 
 def scalar_root(desk: Desk, share: float) -> Finding:
@@ -246,13 +246,13 @@ def scalar_root(desk: Desk, share: float) -> Finding:
 def periods(desk: Desk, seconds: Sequence[float]) -> Finding:
     """Tell whether the printed turn keeps the limits without tolerance when its torque is held for so many seconds."""
     flown = {h: _held(desk, h) for h in seconds}
-    told = ", ".join(
+    note = ", ".join(
         f"{h:g} s: {seen['transient_time']:.1f} s, {seen['peak_rate'] * DEGREES:.1f} °/s"
         if seen["transient_time"] is not None
-        else f"{h:g} s: comes to no end"
+        else f"{h:g} s: does not end"
         for h, seen in flown.items()
     )
-    return Finding({f"h = {h:g} s": bool(seen["limits_kept"]) for h, seen in flown.items()}, told)
+    return Finding({f"h = {h:g} s": bool(seen["limits_kept"]) for h, seen in flown.items()}, note)
 
 
 def period_of_linear_motion(desk: Desk, at_least: float) -> Finding:
@@ -274,8 +274,8 @@ def over_periods(desk: Desk, seconds: Sequence[float]) -> Figure:
 
 
 def known_torque(desk: Desk) -> Finding:
-    """Tell whether the error that is left under the gravity gradient is less than a thousandth of what that torque would
-    leave if the law were not told of it."""
+    """Tell whether the error that is left under the gravity gradient is less than a thousandth of the one that this
+    torque would leave if the law did not know it."""
     scenario = desk.scenario("known-torque")
     inertia, orbit = tensor(scenario.craft.inertia), np.array(desk.recording("known-torque", "modal")["position"])[-1]
     # At the target the body's axes are the inertial ones.
@@ -283,11 +283,11 @@ def known_torque(desk: Desk) -> Finding:
     torque = 3.0 * scenario.craft.gravity / size**5 * np.cross(orbit, inertia @ orbit)
     left = _left(inertia, torque, _root(scenario))
     seen = float(desk.flight("known-torque", "modal").metrics["final_attitude_error"])
-    return Finding(seen < 1e-3 * left, f"{seen:.0e} rad left; {left:.0e} rad if the law were not told of it")
+    return Finding(seen < 1e-3 * left, f"{seen:.0e} rad left; {left:.0e} rad if the law did not know it")
 
 
 def unknown_torque(desk: Desk) -> Finding:
-    """Tell whether the error that an untold torque leaves is 2 asin |J^-1 M / 2a^2|."""
+    """Tell whether the error that an unknown torque leaves is 2 asin |J^-1 M / 2a^2|."""
     scenario = desk.scenario("unknown-torque")
     torque = np.array(next(part for part in scenario.parts if part.name == "constant-torque").params.torque)
     left = _left(tensor(scenario.craft.inertia), torque, _root(scenario))
@@ -308,7 +308,7 @@ def beyond_the_energy(desk: Desk) -> Finding:
     sets = {"the energy": {"law.rounded.quaternion_sign": "hysteresis"}, "the mixed V": None}
     run = desk.recording("landing", "rounded")
     attitude, rate = np.array(run["attitude_error"])[0], np.array(run["rate_error"])[0]
-    told: dict[str, tuple[float, float]] = {}
+    levels: dict[str, tuple[float, float]] = {}
     for name, changes in sets.items():
         claim = desk.claims("landing", "rounded", changes)["region"]
         if claim.outcome != "proved":
@@ -316,9 +316,9 @@ def beyond_the_energy(desk: Desk) -> Finding:
         shape = Shape(**claim.witness)
         if (shape == ENERGY) != (name == "the energy"):
             return Finding(False, f"{name}: another V was taken")
-        told[name] = float(shape.value(_root(desk.scenario("landing"), "rounded"), attitude, rate)), claim.numbers["level"]
-    words = "; ".join(f"{name}: V = {value:.3f} of {level:.3f}" for name, (value, level) in told.items())
-    (energy, least), (mixed, level) = told.values()
+        levels[name] = float(shape.value(_root(desk.scenario("landing"), "rounded"), attitude, rate)), claim.numbers["level"]
+    words = "; ".join(f"{name}: V = {value:.3f} of {level:.3f}" for name, (value, level) in levels.items())
+    (energy, least), (mixed, level) = levels.values()
     return Finding(energy > least and mixed < level, words)
 
 
@@ -326,15 +326,15 @@ def _counted(desk: Desk, step: float) -> dict[float, float]:
     """The best roots (1/s) at the published points (deg) by times in whole steps (s), the slowest of those that tie."""
 
     def make() -> dict[float, tuple[NDArray[np.float64], NDArray[np.float64]]]:
-        limits, found = _limits(desk), dict[float, tuple[NDArray[np.float64], NDArray[np.float64]]]()
-        # Times at h = 0, from those at two periods: what holding the torque adds is of first order in the period.
+        limits, times = _limits(desk), dict[float, tuple[NDArray[np.float64], NDArray[np.float64]]]()
+        # Times at h = 0, from those at two periods: the effect of holding the torque is of first order in the period.
         scenarios = [desk.scenario("landing-limits", {"simulation.control_period": h}) for h in (0.001, 0.002)]
         near, far = (problem_of(scenario, scenario.pick("published")) for scenario in scenarios)
         for angle, root in fine_roots(desk).items():
             roots: NDArray[np.float64] = np.arange(-4.0, 30.0) * 1e-3 + root
             flown, longer = (problem.fly(math.radians(angle), roots) for problem in (near, far))
-            found[angle] = roots, np.where(flown.within(limits), 2.0 * flown.time - longer.time, np.inf)
-        return found
+            times[angle] = roots, np.where(flown.within(limits), 2.0 * flown.time - longer.time, np.inf)
+        return times
 
     best: dict[float, float] = {}
     for angle, (roots, times) in desk.once(("times near the best roots",), make).items():
@@ -344,8 +344,8 @@ def _counted(desk: Desk, step: float) -> dict[float, float]:
 
 
 def _piece(roots: Mapping[float, float], piece: str) -> Finding:
-    told = ", ".join(f"{roots[point]:.3f} at {point:g}°" for point in POINTS[piece])
-    return Finding([-number for number in getattr(three_point_fit(roots), piece)], f"through {told}")
+    points = ", ".join(f"{roots[point]:.3f} at {point:g}°" for point in POINTS[piece])
+    return Finding([-number for number in getattr(three_point_fit(roots), piece)], f"through {points}")
 
 
 def _held(desk: Desk, period: float) -> dict[str, Any]:
@@ -354,7 +354,7 @@ def _held(desk: Desk, period: float) -> dict[str, Any]:
 
 
 def _left(inertia: NDArray[np.float64], torque: NDArray[np.float64], a: float) -> float:
-    """The angle (rad) at which the law balances a torque (3,) that it is not told of: 2a^2 q = J^-1 M."""
+    """The angle (rad) at which the law balances a torque (3,) that it does not know: 2a^2 q = J^-1 M."""
     return 2.0 * math.asin(float(np.linalg.norm(np.linalg.solve(inertia, torque))) / (2.0 * a * a))
 
 
@@ -367,5 +367,5 @@ def _limits(desk: Desk) -> Limits:
     return Limits(table.rate_limit, table.acceleration_limit)
 
 
-def _eased(found: Study) -> NDArray[np.float64]:
-    return np.array([math.nan if item.eased is None else item.eased.root for item in found.found])
+def _eased(search: Study) -> NDArray[np.float64]:
+    return np.array([math.nan if item.eased is None else item.eased.root for item in search.results])

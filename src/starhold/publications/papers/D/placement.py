@@ -1,4 +1,4 @@
-"""The publication's linear model, its levels and its regulators, held against placement by the general algorithm."""
+"""The publication's linear model, its levels and its regulators are compared with placement by the general algorithm."""
 
 from __future__ import annotations
 
@@ -152,8 +152,8 @@ def gyroscopic_sign(desk: Desk) -> Finding:
     for case, spectra in cases():
         gyroscopic = np.cross(case.rate, case.inertia @ case.rate)
         for name, sign in zip(worst, (-1.0, 1.0), strict=True):
-            told = case._replace(torque=case.torque + sign * gyroscopic)
-            u = told.control(single_root_regulator(told, spectra.phi_2))
+            known = case._replace(torque=case.torque + sign * gyroscopic)
+            u = known.control(single_root_regulator(known, spectra.phi_2))
             swing = np.linalg.solve(case.inertia, u + case.torque - gyroscopic)
             worst[name] = max(worst[name], _apart(swing, closed_loop(case, spectra.phi_2)))
     return Finding({name: error < EXACT for name, error in worst.items()}, _errors(worst))
@@ -164,8 +164,8 @@ def controllable(desk: Desk) -> Finding:
     and at rest."""
     turning = [levels(*case.model()) == [3, 3, 1] for case, _ in cases()]
     resting = [_controllable(case._replace(rate=np.zeros(3))) for case, _ in cases()]
-    found = {"while the body turns": all(turning), "at rest, where turns begin and end": any(resting)}
-    return Finding(found, "levels of 3, 3 and 1 poles")
+    verdicts = {"while the body turns": all(turning), "at rest, where turns begin and end": any(resting)}
+    return Finding(verdicts, "levels of 3, 3 and 1 poles")
 
 
 def unstable_by_itself(desk: Desk) -> Finding:
@@ -203,14 +203,14 @@ def printed_levels(desk: Desk) -> Finding:
             (np.linalg.pinv(b_1), np.hstack([np.zeros((3, 1)), 2.0 * jd])),
             (b_2, -0.25 * w[None] @ np.linalg.inv(jd)),
         ]
-        worst = max(worst, float(abs(a_2[0, 0])), *(_apart(found, printed) for found, printed in pairs))
+        worst = max(worst, float(abs(a_2[0, 0])), *(_apart(computed, printed) for computed, printed in pairs))
     return _identity(worst)
 
 
 def classical_algorithm(desk: Desk) -> Finding:
     """Tell whether the last level has more inputs than states, so that its B has no full column rank."""
-    found = [levels(*case.model())[-1] for case, _ in cases()]
-    return Finding(all(size == 1 for size in found), "one pole for three inputs")
+    sizes = [levels(*case.model())[-1] for case, _ in cases()]
+    return Finding(all(size == 1 for size in sizes), "one pole for three inputs")
 
 
 def inverse_of_the_skeleton(desk: Desk) -> Finding:
@@ -250,13 +250,13 @@ def placed_poles(desk: Desk, level: int) -> Finding:
 
 
 def general_placement(desk: Desk) -> Finding:
-    """Tell how far (4.11) is from the gain that the general algorithm finds from numbers alone, when it is told (4.8)."""
+    """Tell how far (4.11) is from the gain that the general algorithm computes from numbers alone, with (4.8) given."""
     worst = 0.0
     for case, spectra in cases():
         turned = case.straighten @ case.rate[:, None]
         given = [spectra.phi_0, spectra.phi_1, [[spectra.phi_2]]]
-        found = place(*case.model(), spectra=given, directions=[None, None, turned]).K
-        worst = max(worst, _apart(regulators(case, spectra)[2], found))
+        gain = place(*case.model(), spectra=given, directions=[None, None, turned]).K
+        worst = max(worst, _apart(regulators(case, spectra)[2], gain))
     return _identity(worst, 1e-8)
 
 
@@ -276,12 +276,12 @@ def loop_of_the_law(desk: Desk) -> Finding:
     for case, spectra in cases():
         a, craft = spectra.phi_2, make_craft(case.inertia)
         gyroscopic = np.cross(case.rate, case.inertia @ case.rate)
-        told = case._replace(torque=case.torque - gyroscopic)
+        known = case._replace(torque=case.torque - gyroscopic)
         rate = _numbers(case.rate)
         seen = Measurement(_numbers(case.attitude), rate, rate, ZERO, ZERO, _numbers(case.torque), ZERO, 0.1)
         flown, _ = modal.torque(seen, modal.Gains((a, a, a), (a, a, a), -0.01), craft, NoMemory())
-        for name, u in zip(worst, (told.control(single_root_regulator(told, a)), np.array(flown)), strict=True):
-            swing = np.linalg.solve(case.inertia, u + told.torque)
+        for name, u in zip(worst, (known.control(single_root_regulator(known, a)), np.array(flown)), strict=True):
+            swing = np.linalg.solve(case.inertia, u + known.torque)
             worst[name] = max(worst[name], _apart(swing, closed_loop(case, a)))
     return Finding({name: error < EXACT for name, error in worst.items()}, _errors(worst))
 
@@ -290,13 +290,13 @@ def stable_sign(desk: Desk) -> Finding:
     """Tell whether A - B K with (5.1) is stable at each state for a < 0, and not for a > 0."""
     stable: dict[float, list[bool]] = {-0.428: [], 0.428: []}
     for case, _ in cases():
-        for a, found in stable.items():
-            found.append(is_stable(reached(*case.model(), single_root_regulator(case, a))))
+        for a, verdicts in stable.items():
+            verdicts.append(is_stable(reached(*case.model(), single_root_regulator(case, a))))
     return Finding(all(stable[-0.428]) and not any(stable[0.428]), f"{TRIALS} random states")
 
 
 def at_rest(desk: Desk) -> Finding:
-    """Tell whether the law's torque goes on to -2 a^2 J q as the rate vanishes, where the poles cannot be placed."""
+    """Tell whether the law's torque tends to -2 a^2 J q as the rate vanishes, where the poles cannot be placed."""
     worst, a = 0.0, -0.428
     for case, _ in cases():
         crept = np.linalg.norm(case.rate)
@@ -314,9 +314,9 @@ def _controllable(case: Case) -> bool:
     return True
 
 
-def _apart(found: Any, wanted: Any) -> float:
+def _apart(value: Any, wanted: Any) -> float:
     """The largest difference, as a share of the largest number."""
-    return float(np.abs(found - wanted).max() / np.abs(wanted).max())
+    return float(np.abs(value - wanted).max() / np.abs(wanted).max())
 
 
 def _identity(worst: float, allowed: float = EXACT) -> Finding:

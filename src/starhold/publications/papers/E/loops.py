@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from starhold.certification.certificate import Certificate
 
 WINDOW = ((-1.5, 3.5), (-2.0, 2.5))
-"""What figure 1 shows, by the numbers on its axes."""
+"""The span of figure 1, by the numbers on its axes."""
 TIGHT: dict[str, Any] = {"rtol": 1e-9, "atol": 1e-11, "max_step": 0.05}
 
 
@@ -50,8 +50,8 @@ def flown(start: Sequence[float], until: float, near: float = 0.0, far: float = 
         return (away - near) * (away - far)
 
     setattr(ends, "terminal", True)  # noqa: B010 -- a function has no such attribute
-    found = solve_ivp(lambda _, state: rates(*state), (0.0, until), list(start), events=ends, **TIGHT)
-    return found.t, found.y
+    solution = solve_ivp(lambda _, state: rates(*state), (0.0, until), list(start), events=ends, **TIGHT)
+    return solution.t, solution.y
 
 
 def draws(count: int, seed: int = 1) -> Any:
@@ -66,7 +66,7 @@ def phi(x: Any, y: Any) -> Any:
 
 
 def certificate(desk: Desk, problem: str) -> tuple[InvariantProblem, Certificate]:
-    """Prove what a built-in problem claims."""
+    """Prove the claims of a built-in problem."""
 
     def make() -> tuple[InvariantProblem, Certificate]:
         read = load(problem)
@@ -78,19 +78,19 @@ def certificate(desk: Desk, problem: str) -> tuple[InvariantProblem, Certificate
 def theorem(desk: Desk, problem: str, claim: int = 0) -> Finding:
     """Tell whether a claim of a built-in problem is proved."""
     read, made = certificate(desk, problem)
-    found = made.claims[claim]
-    level = found.numbers.get("level")
-    told = f"{read.description}: {found.witness['name'] or found.numbers['theorem']}, {found.outcome}"
-    return Finding(found.outcome == "proved", told + ("" if level is None else f", V up to {level:.5g}"))
+    proved = made.claims[claim]
+    level = proved.numbers.get("level")
+    note = f"{read.description}: {proved.witness['name'] or proved.numbers['theorem']}, {proved.outcome}"
+    return Finding(proved.outcome == "proved", note + ("" if level is None else f", V up to {level:.5g}"))
 
 
 def largest_level(desk: Desk, problem: str) -> Finding:
     """Tell whether a level of V is certified, and one at most 1 % above it refuted."""
     _, made = certificate(desk, problem)
-    found = made.claims[0]
-    level, beyond = found.numbers["level"], found.numbers["refuted_level"]
-    told = f"V up to {level:.5g} is certified, up to {beyond:.5g} refuted: {found.numbers['limited_by']}"
-    return Finding(found.outcome == "proved" and beyond < 1.01 * level, told)
+    proved = made.claims[0]
+    level, beyond = proved.numbers["level"], proved.numbers["refuted_level"]
+    note = f"V up to {level:.5g} is certified, up to {beyond:.5g} refuted: {proved.numbers['limited_by']}"
+    return Finding(proved.outcome == "proved" and beyond < 1.01 * level, note)
 
 
 def only_equilibrium(desk: Desk) -> Finding:
@@ -112,8 +112,8 @@ def where_from(desk: Desk, count: int) -> Finding:
     for start in draws(count, 2):
         _, states = flown(start, -30.0, 1e-5, 1e3)
         (bounded if phi(*start) < 0.0 else others).append(float(np.linalg.norm(states[:, -1])))
-    told = f"backwards, {len(bounded)} within G come to the origin, {len(others)} others go beyond 1000"
-    return Finding(max(bounded) < 2e-5 and min(others) > 999.0, told)
+    note = f"backwards, {len(bounded)} within G come to the origin, {len(others)} others go beyond 1000"
+    return Finding(max(bounded) < 2e-5 and min(others) > 999.0, note)
 
 
 def loops_kept(desk: Desk, count: int) -> Finding:
@@ -156,8 +156,8 @@ def printed_halves(desk: Desk) -> Finding:
     V = maximum(where(less(0.0, y), above, below), 0.0)
     made = certify(replace(read, claims=(replace(read.claims[0], V=V),)))
     states = [o.evidence["state"] for o in made.claims[0].obligations if o.outcome == "refuted"]
-    told = f"refuted at {tuple(float(states[0][name]) for name in ('x', 'y'))}" if states else made.claims[0].outcome
-    return Finding(made.claims[0].outcome == "proved", f"{told}; on y = 0 the halves are 4x(x - 2) and x(x - 2)")
+    note = f"refuted at {tuple(float(states[0][name]) for name in ('x', 'y'))}" if states else made.claims[0].outcome
+    return Finding(made.claims[0].outcome == "proved", f"{note}; on y = 0 the halves are 4x(x - 2) and x(x - 2)")
 
 
 def strict_subsets(desk: Desk, inner: float, wider: float) -> Finding:
@@ -172,13 +172,13 @@ def strict_subsets(desk: Desk, inner: float, wider: float) -> Finding:
     away = np.linalg.norm(states[:, :, None] - ring[:, None, :], axis=0).min(axis=1)
     gone, end = float(away.max() - 2.0 * inner), float(np.linalg.norm(states[:, -1]))
     near = float(np.linalg.norm(start))
-    told = f"from within {near:.4f} of c <= {inner:g} a motion goes more than {gone:.1f} away, then comes to it"
-    return Finding({"it is stable": gone < 0.1, "it does not attract": end > 1e-6}, told)
+    note = f"from within {near:.4f} of c <= {inner:g} a motion goes more than {gone:.1f} away, then comes to it"
+    return Finding({"it is stable": gone < 0.1, "it does not attract": end > 1e-6}, note)
 
 
 def definition(desk: Desk, near: float) -> Finding:
-    """Tell whether the origin counts as unstable: by excursions from ever nearer starts, as Lyapunov has it, and by what
-    happens after some time that all starts share, as definition 1 has it."""
+    """Tell whether the origin counts as unstable: by excursions from ever nearer starts, as Lyapunov has it, and by the
+    motion after some time that all starts share, as definition 1 has it."""
     excursion: list[float] = []
     late: list[float] = []
     for size in (0.1, 0.01, 0.001):
@@ -189,13 +189,13 @@ def definition(desk: Desk, near: float) -> Finding:
             far, last = max(far, float(distance.max())), max(last, float(times[distance > near].max(initial=0.0)))
         excursion.append(far)
         late.append(last)
-    told = f"from within 0.001 motions go {excursion[-1]:.2f} away; after {max(late):.1f} all stay within {near:g}"
+    note = f"from within 0.001 motions go {excursion[-1]:.2f} away; after {max(late):.1f} all stay within {near:g}"
     cases = {"by Lyapunov's definition": min(excursion) > 1.0, "by definition 1 as printed": max(late) > 14.0}
-    return Finding(cases, told)
+    return Finding(cases, note)
 
 
 def figure_1(desk: Desk) -> Figure:
-    """The phase portrait of (2.2), loops and what surrounds them."""
+    """The phase portrait of (2.2), loops and their surroundings."""
     starts = [(2.0 * c, 0.0) for c in (0.15, 0.3, 0.45, 0.6, 0.75, 0.9)]
     starts += [(-x, 0.0) for x in (0.25, 0.5, 0.75, 1.0, 1.25, 1.45)] + [(2.3, -2.0), (3.0, -2.0)]
 
@@ -215,7 +215,7 @@ def figure_1(desk: Desk) -> Figure:
 
 
 def theorems(desk: Desk) -> Figure:
-    """An example of each theorem: motions, the set, and what is certified of it."""
+    """An example of each theorem: motions, the set, and its certified part."""
     about = np.linspace(0.0, 2.0 * np.pi, 9)[:-1]
     spin = load("spin")
     # States of one energy about the axis of the largest inertia, seen along it.
@@ -250,7 +250,7 @@ def _panel(title: str, x: str, y: str, lines: Sequence[Any], points: Sequence[tu
 
 
 def _certified(desk: Desk, problem: str, claim: int, starts: Any, title: str) -> Panel:
-    """Motions with the border of what is certified and of the set itself."""
+    """Motions with the borders of the certified set and of the set itself."""
     from contourpy import contour_generator
 
     read, made = certificate(desk, problem)
@@ -260,8 +260,8 @@ def _certified(desk: Desk, problem: str, claim: int, starts: Any, title: str) ->
     level = made.claims[claim].numbers["level"]
     curves = [Curve.along(line, hue=0) for line in lines]
     for value, label, hue in ((level, "certified", 2), (2e-3 * level, "the set", 1)):
-        found: Any = contours.lines(value)
-        curves += [Curve.along(np.transpose(line), label if k == 0 else "", hue=hue) for k, line in enumerate(found)]
+        border: Any = contours.lines(value)
+        curves += [Curve.along(np.transpose(line), label if k == 0 else "", hue=hue) for k, line in enumerate(border)]
     x_span, y_span = ((float(side[0]), float(side[-1])) for side in (drawn.x, drawn.y))
     across, up = drawn.names[:2]
     return Panel(across, up, curves, title, x_span, y_span)

@@ -32,14 +32,14 @@ def matrix(plant: Libration, feedback: Callable[[PointMeasurement], Any] | None 
     """Return the matrix (6, 6) of the linear model, state position and velocity, with a law that is linear."""
     zero = PointMeasurement((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, math.inf)
     constant = np.zeros(3) if feedback is None else np.array(feedback(zero))
-    found = np.zeros((6, 6))
-    found[:3, 3:] = np.eye(3)
+    whole = np.zeros((6, 6))
+    whole[:3, 3:] = np.eye(3)
     for column, unit in enumerate(np.eye(6)):
         position, velocity = tuple(unit[:3]), tuple(unit[3:])
-        found[3:, column] = linear(position, velocity, plant)
+        whole[3:, column] = linear(position, velocity, plant)
         if feedback is not None:
-            found[3:, column] += np.array(feedback(PointMeasurement(position, velocity, 0.0, math.inf))) - constant
-    return found
+            whole[3:, column] += np.array(feedback(PointMeasurement(position, velocity, 0.0, math.inf))) - constant
+    return whole
 
 
 def stiffness(desk: Desk) -> Finding:
@@ -51,31 +51,31 @@ def roots(desk: Desk) -> Finding:
     """Tell whether the characteristic polynomial has one positive, one negative and two imaginary roots."""
     whole = matrix(plant_of(desk))
     flat = [0, 1, 3, 4]
-    found = {"in the plane X, Y": np.linalg.eigvals(whole[np.ix_(flat, flat)]), "with Z": np.linalg.eigvals(whole)}
+    eigenvalues = {"in the plane X, Y": np.linalg.eigvals(whole[np.ix_(flat, flat)]), "with Z": np.linalg.eigvals(whole)}
 
     def counts(values: Any) -> tuple[int, int, int]:
         still = np.abs(values.real) < 1e-9
         return int((values.real > 1e-9).sum()), int((values.real < -1e-9).sum()), int(still.sum())
 
-    real, turning = found["with Z"].real.max(), sorted({round(abs(z.imag), 3) for z in found["with Z"]} - {0.0})
-    told = f"real roots ±{real:.3f}, imaginary ones ±{' and ±'.join(f'{w:.3f}' for w in turning)}"
-    return Finding({where: counts(values) == (1, 1, 2) for where, values in found.items()}, told)
+    real, turning = eigenvalues["with Z"].real.max(), sorted({round(abs(z.imag), 3) for z in eigenvalues["with Z"]} - {0.0})
+    note = f"real roots ±{real:.3f}, imaginary ones ±{' and ±'.join(f'{w:.3f}' for w in turning)}"
+    return Finding({where: counts(values) == (1, 1, 2) for where, values in eigenvalues.items()}, note)
 
 
 def feed_forward(desk: Desk, C: float) -> Finding:
     """Tell whether rest beside Y and Z takes (C - Omega^2) rho and C rho."""
-    plant, asked = plant_of(desk, C), {}
+    plant, demands = plant_of(desk, C), {}
     for name in ("beside Y", "beside Z"):
         entry = desk.scenario(REST).pick(name)
         place = (0.0, entry.gains.y, entry.gains.z)
         rest = PointMeasurement(place, (0.0, 0.0, 0.0), 0.0, math.inf)
         command, _ = entry.law.command(rest, entry.gains, plant, NoMemory())
         left = np.add(command, linear(place, (0.0, 0.0, 0.0), plant))
-        asked[name] = float(np.linalg.norm(command)) if np.abs(left).max() < 1e-12 else math.nan
-    right = abs(asked["beside Y"] - (C - 1.0)) < 1e-12 and abs(asked["beside Z"] - C) < 1e-12
+        demands[name] = float(np.linalg.norm(command)) if np.abs(left).max() < 1e-12 else math.nan
+    right = abs(demands["beside Y"] - (C - 1.0)) < 1e-12 and abs(demands["beside Z"] - C) < 1e-12
     circle = demand(best_rate(plant), plant)
-    told = f"{asked['beside Y']:.2f} and {asked['beside Z']:.2f}; the circle asks for {circle:.2f} at most"
-    return Finding(right, told)
+    note = f"{demands['beside Y']:.2f} and {demands['beside Z']:.2f}; the circle asks for {circle:.2f} at most"
+    return Finding(right, note)
 
 
 def degree(desk: Desk) -> Finding:
@@ -83,10 +83,10 @@ def degree(desk: Desk) -> Finding:
     entry, plant = desk.scenario(REST).pick("beside Y"), plant_of(desk)
 
     def slowest(gains: Any) -> list[float]:
-        whole = matrix(plant, lambda told: entry.law.command(told, gains, plant, NoMemory())[0])
+        whole = matrix(plant, lambda measurement: entry.law.command(measurement, gains, plant, NoMemory())[0])
         return [float(np.linalg.eigvals(whole[np.ix_([k, k + 3], [k, k + 3])]).real.max()) for k in range(3)]
 
-    # The Coriolis acceleration is undone, so that axes are independent.
+    # The Coriolis acceleration is cancelled, so that axes are independent.
     best = slowest(entry.gains)
     others = [slowest(entry.gains._replace(k_velocity=tuple(f * k for k in entry.gains.k_velocity))) for f in (0.9, 1.1)]
     right = all(other[k] > best[k] + 0.01 for other in others for k in range(3))
@@ -115,10 +115,10 @@ def _slope(state: Any) -> Any:
 
 def zone_ratio(desk: Desk) -> Finding:
     """The largest x at rest from which the craft comes back, over that within which the control is linear."""
-    found = largest(lambda x: desk.flight(REST, "beside Y", {**_unit(desk), "initial.position": [x, 0.0, 0.0]}).lost is None)
+    edge = largest(lambda x: desk.flight(REST, "beside Y", {**_unit(desk), "initial.position": [x, 0.0, 0.0]}).lost is None)
     shown = desk.claims(REST, "beside Y")["saturated-axis"]
     share = shown.numbers["width"] / shown.numbers["boundary"]
-    return Finding(found / 0.5, f"{shown.outcome}: {100.0 * share:.1f} % of the strip between the separatrices comes back")
+    return Finding(edge / 0.5, f"{shown.outcome}: {100.0 * share:.1f} % of the strip between the separatrices comes back")
 
 
 def largest(comes_back: Callable[[float], bool], high: float = 2.0, steps: int = 16) -> float:
@@ -160,26 +160,26 @@ def figure_4(desk: Desk) -> Figure:
 
 
 def falls(desk: Desk) -> Finding:
-    """Tell whether V' under (3.7) is -k (f2^2 + f3^2), of the law's own equations and in symbols throughout."""
+    """Tell whether V' under (3.7) is -k (f2^2 + f3^2), from the law's equations and in symbols throughout."""
     import sympy
 
     x, y, z, a, b, c = sympy.symbols("x y z a b c", real=True)
     symbols = sympy.symbols("Omega C rho omega alpha k k_x k_v", positive=True)
     plant = Libration(*symbols[:2], *[sympy.Integer(1)] * 4)
-    gains, told = l2_circle.Gains(*symbols[2:]), PointMeasurement((x, y, z), (a, b, c), 0.0, math.inf)
-    control, V = l2_circle.feedback(told, gains, plant), l2_circle.lyapunov(told, gains, plant)
-    acceleration = [p + q for p, q in zip(linear(told.position, told.velocity, plant), control, strict=True)]
+    gains, measurement = l2_circle.Gains(*symbols[2:]), PointMeasurement((x, y, z), (a, b, c), 0.0, math.inf)
+    control, V = l2_circle.feedback(measurement, gains, plant), l2_circle.lyapunov(measurement, gains, plant)
+    acceleration = [p + q for p, q in zip(linear(measurement.position, measurement.velocity, plant), control, strict=True)]
     rates = zip((x, y, z, a, b, c), (a, b, c, *acceleration), strict=True)
     slope: Any = sum(sympy.diff(V, name) * rate for name, rate in rates)
-    _, f2, f3 = l2_circle.errors(told, gains)
+    _, f2, f3 = l2_circle.errors(measurement, gains)
     return Finding(bool(sympy.simplify(slope + gains.k * (f2**2 + f3**2)) == 0), "an identity in state, gains, Omega and C")
 
 
 def indicator(desk: Desk) -> Finding:
-    """Tell whether what the certificate of the law says is proved: the circle attracts, from which level of V on."""
-    found = desk.claims("l2-circle", "smooth")["circle"]
-    told = f"{found.outcome} up to V = {found.numbers['level']:.7g}; on the axis, where V = 0.5, V' is zero too"
-    return Finding(found.outcome == "proved", told)
+    """Tell whether the law's certificate proves that the circle attracts, and up to which level of V."""
+    circle = desk.claims("l2-circle", "smooth")["circle"]
+    note = f"{circle.outcome} up to V = {circle.numbers['level']:.7g}; on the axis, where V = 0.5, V' is zero too"
+    return Finding(circle.outcome == "proved", note)
 
 
 def relay(desk: Desk) -> Finding:
@@ -187,8 +187,8 @@ def relay(desk: Desk) -> Finding:
     laws = {"with a layer": "relay with layer", "without one": "relay"}
     off = {name: _off(desk.flight("l2-circle", law)) for name, law in laws.items()}
     outcome = desk.claims("l2-circle", "relay")["circle"].outcome
-    told = f"off by {off['with a layer']:.4f} and {off['without one']:.4f} radii after two years; without a layer {outcome}"
-    return Finding({name: value < 0.005 for name, value in off.items()}, told)
+    note = f"off by {off['with a layer']:.4f} and {off['without one']:.4f} radii after two years; without a layer {outcome}"
+    return Finding({name: value < 0.005 for name, value in off.items()}, note)
 
 
 def steepest(desk: Desk) -> Finding:
@@ -196,12 +196,12 @@ def steepest(desk: Desk) -> Finding:
     it."""
     changes = {"V with a pull towards the circle": None, "V of (3.5)": {"law.l2-optimal.pull": 1e-9}}
     off = {name: _off(desk.flight("l2-circle", "l2-optimal", change)) for name, change in changes.items()}
-    told = "off by " + " and ".join(f"{value:.3f}" for value in off.values()) + " radii after two years"
-    return Finding({name: value < 0.005 for name, value in off.items()}, told)
+    note = "off by " + " and ".join(f"{value:.3f}" for value in off.values()) + " radii after two years"
+    return Finding({name: value < 0.005 for name, value in off.items()}, note)
 
 
 def at_the_axis(desk: Desk, C: float) -> Finding:
-    """Tell whether the nominal control is largest where y = 0, for every rate, and whether its peak is as the formula."""
+    """Tell whether the nominal control is largest where y = 0, for every rate, and whether its peak follows the formula."""
     plant = plant_of(desk, C)
     right: list[bool] = []
     for rate in (0.5, 1.0, best_rate(plant), 2.0, 3.0):
@@ -220,12 +220,12 @@ def extremes(desk: Desk, C: float) -> Finding:
         lambda rate: demand(rate, plant), bounds=(0.1, 4.0), method="bounded", options={"xatol": 1e-9}
     )
     top = demand(1e-3, plant) < demand(0.0, plant)
-    told = f"{demand(0.0, plant):.3f} at rate 0, {float(least.fun):.3f} at {float(least.x):.4f}"
-    return Finding(top and abs(float(least.x) - best_rate(plant)) < 1e-6, told)
+    note = f"{demand(0.0, plant):.3f} at rate 0, {float(least.fun):.3f} at {float(least.x):.4f}"
+    return Finding(top and abs(float(least.x) - best_rate(plant)) < 1e-6, note)
 
 
 def rate(desk: Desk, C: float) -> Finding:
-    """The rate at which the circle asks least."""
+    """The rate at which the circle demands least."""
     return Finding(best_rate(plant_of(desk, C)))
 
 
@@ -256,8 +256,8 @@ def farthest(desk: Desk) -> Finding:
     Sun."""
     dark, sun = (side * largest(lambda x, s=side: _from(desk, s * x).lost is None, 1.0) for side in (1.0, -1.0))
     off = max(_off(_from(desk, 0.99 * x)) for x in (dark, sun))
-    told = f"from x = {sun:.3f} to {dark:.3f}; started 1 % within that, off by {off:.4f} radii after two years"
-    return Finding(off < 0.001, told)
+    note = f"from x = {sun:.3f} to {dark:.3f}; started 1 % within that, off by {off:.4f} radii after two years"
+    return Finding(off < 0.001, note)
 
 
 def _off(flight: Any) -> float:
@@ -285,12 +285,12 @@ def deficit(desk: Desk, law: str, tells: str) -> Finding:
     begun = np.flatnonzero(np.diff(full.astype(int)) == 1) * 0.01
     turn = 2.0 * math.pi / best_rate(plant_of(desk))
     share, times = flight.metrics["limit_share"], len(begun)
-    told = f"{times} times in two years, {100.0 * share:.0f} % of the time; half a revolution takes {turn / 2.0:.2f}"
-    return Finding(times >= 4, told + f", between two onsets {np.diff(begun).min():.2f} to {np.diff(begun).max():.2f} pass")
+    note = f"{times} times in two years, {100.0 * share:.0f} % of the time; half a revolution takes {turn / 2.0:.2f}"
+    return Finding(times >= 4, note + f", between two onsets {np.diff(begun).min():.2f} to {np.diff(begun).max():.2f} pass")
 
 
 def lag_hours(desk: Desk, lag: float) -> Finding:
-    """Hours of a lag in the unit of time of which a year has 2 pi."""
+    """Hours of a lag, in the unit of time in which a year has 2 pi."""
     time = desk.scenario(DEFICIT).table.libration.units.time
     half_a_day = 43200.0 / time
     return Finding(lag * time / 3600.0, f"12 h are {half_a_day:.4f}, or {half_a_day / (2.0 * math.pi):.4f} of a year")
@@ -303,14 +303,14 @@ def settles(desk: Desk, lag_h: float, days: float, left: float) -> Finding:
 
 
 def alike(desk: Desk, lags: Sequence[float]) -> Finding:
-    """Tell of lags whether figures 6 and 7 look as without: whether nowhere the lines are two widths apart."""
-    told: list[str] = []
+    """Tell for which lags figures 6 and 7 look as without: whether nowhere the lines are two widths apart."""
+    notes: list[str] = []
     cases: dict[str, bool] = {}
     for lag in lags:
         apart = [_apart(desk, *flight, lag) for flight in ((EDGE, "circle"), (DEFICIT, "deficit 10"))]
         cases[f"T = {lag:g}"] = max(apart) < LINES
-        told.append(f"{100.0 * apart[0]:.1f} and {100.0 * apart[1]:.1f} % for T = {lag:g}")
-    return Finding(cases, "lines apart in figures 6 and 7, of their width: " + "; ".join(told))
+        notes.append(f"{100.0 * apart[0]:.1f} and {100.0 * apart[1]:.1f} % for T = {lag:g}")
+    return Finding(cases, "lines apart in figures 6 and 7, of their width: " + "; ".join(notes))
 
 
 def _lagging(law: str, lag: float) -> dict[str, Any]:
@@ -328,8 +328,8 @@ def farthest_place(path: Any, other: Any) -> float:
     from scipy.spatial import KDTree
 
     wide = np.ptp(path, axis=0)
-    found = [KDTree(path[:, pair] / wide[pair]).query(other[:, pair] / wide[pair])[0].max() for pair in ([0, 1], [1, 2])]
-    return float(max(found))
+    distances = [KDTree(path[:, pair] / wide[pair]).query(other[:, pair] / wide[pair])[0].max() for pair in ([0, 1], [1, 2])]
+    return float(max(distances))
 
 
 def figure_6(desk: Desk) -> Figure:
@@ -357,12 +357,12 @@ def _planes(runs: dict[str, Any], limit: float) -> list[Panel]:
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
     round_ = np.array([np.cos(turn), np.sin(turn)])
     pairs = (("position", 0, 1), ("position", 1, 2), ("control", 1, 2))
-    found: list[Panel] = []
+    panels: list[Panel] = []
     for k, (quantity, i, j) in enumerate(pairs):
         name = "u_" if quantity == "control" else ""
         labels = runs if not k or len(runs) == 1 else [""] * len(runs)
         paths = [run[quantity][:, [i, j]].T for run in runs.values()]
         lines = [Curve.along(path, label, hue=n) for n, (path, label) in enumerate(zip(paths, labels, strict=True))]
         guides = ([], [Curve.along(round_, "circle", "dashed", 6)], [Curve.along(limit * round_, "limit", "dashed", 6)])[k]
-        found.append(Panel(name + "xyz"[i], name + "xyz"[j], [*lines, *guides], equal=k > 0))
-    return found
+        panels.append(Panel(name + "xyz"[i], name + "xyz"[j], [*lines, *guides], equal=k > 0))
+    return panels

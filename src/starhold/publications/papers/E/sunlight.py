@@ -47,8 +47,8 @@ def same_angle(desk: Desk) -> Finding:
     sun, earth = discs()
     share = earth / sun
     ring = 100.0 * station().light(0.0)
-    told = f"the Earth's is {share:.3f} of the Sun's: on the axis a ring with {ring:.0f} % of the light is left"
-    return Finding({"within a tenth": abs(share - 1.0) < 0.1, "within a hundredth": abs(share - 1.0) < 0.01}, told)
+    note = f"the Earth's is {share:.3f} of the Sun's: on the axis a ring with {ring:.0f} % of the light is left"
+    return Finding({"within a tenth": abs(share - 1.0) < 0.1, "within a hundredth": abs(share - 1.0) < 0.01}, note)
 
 
 def clear_offset(desk: Desk) -> Finding:
@@ -100,8 +100,8 @@ def ball(desk: Desk) -> Finding:
             off = max(off, float(np.linalg.norm(np.subtract(sails.steered(setting, sail), wanted))) / reach)
             most = max(most, setting.area / sail.area)
     radius = sails.MIRROR_RADIUS / 2.0
-    told = f"radius {radius:.4f} of 2 p S/m; its border asks for at most {100.0 * most:.1f} % of the area"
-    return Finding(off < 1e-9 and most < 1.0 + 1e-9, told)
+    note = f"radius {radius:.4f} of 2 p S/m; its border asks for at most {100.0 * most:.1f} % of the area"
+    return Finding(off < 1e-9 and most < 1.0 + 1e-9, note)
 
 
 def shifted(desk: Desk) -> Finding:
@@ -126,11 +126,11 @@ def area(desk: Desk, low: float, high: float, pressure: float) -> Finding:
         return here.peak() / (pressure * sails.MIRROR_RADIUS * mirror)
 
     ends = " and ".join(f"{least(1.0) / value:.2f}" for value in (low, high))
-    told = (
+    note = (
         f"{low:g} and {high:g} belong to reflectivities {ends}; a perfect mirror takes {least(1.0):.3f} m²/kg, in the light "
         f"at the circle ({here.pressure * 1e6:.2f} µN/m²) {here.area_per_mass():.3f}"
     )
-    return Finding({f"reflectivity {one:g}": low <= least(one) <= high for one in (1.0, 0.9, 0.8, 0.7, 0.6)}, told)
+    return Finding({f"reflectivity {one:g}": low <= least(one) <= high for one in (1.0, 0.9, 0.8, 0.7, 0.6)}, note)
 
 
 def solar_cells(desk: Desk, efficiency: float, most: float) -> Finding:
@@ -164,9 +164,9 @@ def fly_sail(desk: Desk, margin: float, lag_h: float, years: float) -> dict[str,
         lag, reach = lag_h * 3600.0 / units.time, sails.reach(sail)
 
         def commanded(state: Any) -> sails.Setting:
-            told = PointMeasurement(tuple(state[:3]), tuple(state[3:6]), 0.0, math.inf)
-            command, _ = entry.law.command(told, entry.gains, plant, NoMemory())
-            # A hair within what the mirror reaches, lest rounding ask for more.
+            measurement = PointMeasurement(tuple(state[:3]), tuple(state[3:6]), 0.0, math.inf)
+            command, _ = entry.law.command(measurement, entry.gains, plant, NoMemory())
+            # A hair within the mirror's reach, lest rounding exceed it.
             wanted = clip_norm(scale(units.acceleration, command), reach * (1.0 - 1e-9))
             return sails.steer(wanted, sail)
 
@@ -174,12 +174,12 @@ def fly_sail(desk: Desk, margin: float, lag_h: float, years: float) -> dict[str,
             return math.remainder(to - clock, 2.0 * math.pi)
 
         def slope(_: float, state: Any) -> list[float]:
-            asked = commanded(state)
-            cone, clock = state[6:] if lag else asked[1:]
-            given = sails.steered(sails.Setting(asked.area, cone, clock), sail)
+            setting = commanded(state)
+            cone, clock = state[6:] if lag else setting[1:]
+            given = sails.steered(sails.Setting(setting.area, cone, clock), sail)
             field = linear(tuple(state[:3]), tuple(state[3:6]), plant)
             pulled = [a + b / units.acceleration for a, b in zip(field, given, strict=True)]
-            rates = [(asked.cone - state[6]) / lag, turned(state[7], asked.clock) / lag] if lag else [0.0, 0.0]
+            rates = [(setting.cone - state[6]) / lag, turned(state[7], setting.clock) / lag] if lag else [0.0, 0.0]
             return [*state[3:6], *pulled, *rates]
 
         start = [0.0, 1.0, 0.0, 0.0, 0.0, entry.gains.rate]
@@ -188,12 +188,12 @@ def fly_sail(desk: Desk, margin: float, lag_h: float, years: float) -> dict[str,
         states = solve_ivp(
             slope, (0.0, times[-1]), [*start, first.cone, first.clock], t_eval=times, rtol=1e-8, max_step=0.02
         ).y
-        asked = np.array([commanded(state) for state in states.T])
-        share = asked[:, :1] / sail.area
+        settings = np.array([commanded(state) for state in states.T])
+        share = settings[:, :1] / sail.area
         return {
             "time": times * entry.gains.rate / (2.0 * np.pi),
             "position": states[:3].T,
-            "asked": np.concatenate([share, np.degrees(asked[:, 1:])], axis=1),
+            "asked": np.concatenate([share, np.degrees(settings[:, 1:])], axis=1),
             "set": np.concatenate([share, np.degrees(states[6:].T)], axis=1) if lag else None,
         }
 
@@ -207,8 +207,8 @@ def sail_keeps(desk: Desk, margin: float, lags_h: Sequence[float], years: float)
         position = fly_sail(desk, margin, lag, years)["position"]
         half = position[len(position) // 2 :]
         off[f"{lag:g} h"] = float(np.hypot(np.hypot(half[:, 1], half[:, 2]) - 1.0, half[:, 0]).max())
-    told = "off by " + ", ".join(f"{value:.4f} radii at {name}" for name, value in off.items())
-    return Finding({name: value < 0.01 for name, value in off.items()}, told)
+    note = "off by " + ", ".join(f"{value:.4f} radii at {name}" for name, value in off.items())
+    return Finding({name: value < 0.01 for name, value in off.items()}, note)
 
 
 def sail_figure(desk: Desk, margin: float, lag_h: float, years: float) -> Figure:
@@ -218,11 +218,11 @@ def sail_figure(desk: Desk, margin: float, lag_h: float, years: float) -> Figure
     time = flown["time"][last]
     panels: list[Panel] = []
     for k, label in enumerate(("area, share of all", "cone angle, degrees", "clock angle, degrees")):
-        asked, given = flown["asked"][last, k], flown["set"][last, k]
+        commanded, given = flown["asked"][last, k], flown["set"][last, k]
         if k == 2:
             # Whole turns are left out; the line breaks where a turn ends.
-            asked, given = (_broken(np.remainder(angle + 180.0, 360.0) - 180.0) for angle in (asked, given))
-        lines = [Curve(time, asked, "command"), *([Curve(time, given, "as it is", "dashed")] if k else [])]
+            commanded, given = (_broken(np.remainder(angle + 180.0, 360.0) - 180.0) for angle in (commanded, given))
+        lines = [Curve(time, commanded, "command"), *([Curve(time, given, "as it is", "dashed")] if k else [])]
         panels.append(Panel("revolutions", label, lines))
     return Figure(panels, 3)
 
@@ -283,8 +283,8 @@ def figure_3(desk: Desk) -> Figure:
             Curve(0.5 * sun * RING[0], 0.5 * sun * RING[1], "Sun", "area", 4),
             Curve(0.5 * earth * RING[0] - apart, 0.5 * earth * RING[1], "Earth", "area", 0),
         ]
-        told = f"offset {offset:g} diameter: {100.0 * here.light(offset * EARTH_DIAMETER):.0f} %"
-        panels.append(Panel("degrees", "", shapes, told, (-1.0, 0.5), (-0.6, 0.75), equal=True))
+        title = f"offset {offset:g} diameter: {100.0 * here.light(offset * EARTH_DIAMETER):.0f} %"
+        panels.append(Panel("degrees", "", shapes, title, (-1.0, 0.5), (-0.6, 0.75), equal=True))
     offsets = np.linspace(0.0, 1.2, 121)
     curves = [
         Curve(offsets, sails.lit(2.0 * offsets), "equal discs, formula"),
@@ -295,7 +295,7 @@ def figure_3(desk: Desk) -> Figure:
 
 
 def figure_5(desk: Desk, margin: float, lag_h: float, years: float) -> Figure:
-    """A mirror that turns the light's push aside, and the pushes within reach, with what the circle asks for."""
+    """A mirror that turns the light's push aside, and the pushes within reach, with those that the circle demands."""
     flown = fly_sail(desk, margin, lag_h, years)
     shares = flown["asked"][-400:]
     lean = math.radians(float(shares[:, 1].max()))
@@ -317,8 +317,8 @@ def figure_5(desk: Desk, margin: float, lag_h: float, years: float) -> Figure:
     outline = sails.outline(1.0, 0.0)
     both = np.concatenate([outline, outline[::-1] * [1.0, -1.0]])
     centre, radius = sails.MIRROR_CENTRE, sails.MIRROR_RADIUS
-    asked = [(math.cos(cone) ** 2, math.sin(cone), share) for share, cone, _ in shares * [1.0, math.pi / 180.0, 1.0]]
-    push = np.array([2.0 * share * c2 * np.array([math.sqrt(c2), s]) for c2, s, share in asked]).T
+    settings = [(math.cos(cone) ** 2, math.sin(cone), share) for share, cone, _ in shares * [1.0, math.pi / 180.0, 1.0]]
+    push = np.array([2.0 * share * c2 * np.array([math.sqrt(c2), s]) for c2, s, share in settings]).T
     reach = [
         Curve.along(both.T, style="area", hue=0),
         Curve(centre + radius * RING[0], radius * RING[1], hue=1),
