@@ -25,3 +25,14 @@ def complains(done, *words):
     assert done.stderr.count("\n") == 1, done.stderr
     assert "Traceback" not in (done.stdout or "")
     assert [word for word in words if word not in done.stderr] == [], done.stderr
+
+
+def rows(text):
+    """The rows of a table: its cells stand between bars, ↵ in them begins a new line of a file."""
+    return [[cell.strip().replace("↵", "\n") for cell in row.split("|")] for row in text.strip().splitlines()]
+
+
+def replaced(text, old, new):
+    """The text of a file with one thing changed that is there."""
+    assert old in text, old
+    return text.replace(old, new)

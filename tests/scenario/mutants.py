@@ -14,44 +14,10 @@ ODD = [
     *(True, False, 0, 1, -1, 2, 3, 0.5, 7, 90, 1000, 2**31, 2**63, 10**30, 10**50),
     *(math.nan, math.inf, -math.inf, 1e-300, 1e-30, 1e-12, 1e-6, 1e6, 1e12, 1e29, 1e155, 1e300, -1e29, -0.0),
     *("", " ", "x", "yes", "true", "none", "axis", "target", "orbital", "history", "L1", "nan", "1e400 m", "9**9**9 s"),
-    *(
-        "1 m",
-        "1 km",
-        "1 s",
-        "1 h",
-        "1e30 yr",
-        "1 N m",
-        "1 mNm",
-        "1 deg",
-        "400 deg",
-        "1 Hz",
-        "1 m/s",
-        "5 %",
-        "a\nb",
-        "\x00",
-        "[/red]",
-    ),
-    *(
-        [],
-        [[]],
-        {},
-        [{}],
-        [0, 0, 0],
-        [1, 0, 0],
-        [1, 2, 3],
-        [0, 0, 0, 0],
-        [1, 0, 0, 0],
-        [10, 0, 0, 0],
-        [1e29, 1, 1],
-        ["1 m", 2, "x"],
-    ),
-    *(
-        [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
-        [[0, 0, 0], [0, 0, 0], [0, 0, 0]],
-        [math.nan] * 3,
-        [1] * 100,
-        {"from": 0, "to": 1, "step": 1e-9},
-    ),
+    *("1 m", "1 km", "1 s", "1 h", "1e30 yr", "1 N m", "1 mNm", "1 deg", "400 deg", "1 Hz", "1 m/s", "5 %", "a\nb", "\x00"),
+    *("[/red]", [], [[]], {}, [{}], [0, 0, 0], [1, 0, 0], [1, 2, 3], [0, 0, 0, 0], [1, 0, 0, 0], [10, 0, 0, 0]),
+    *([1e29, 1, 1], ["1 m", 2, "x"], [math.nan] * 3, [1] * 100, {"from": 0, "to": 1, "step": 1e-9}),
+    *([[1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 0, 0], [0, 0, 0], [0, 0, 0]]),
 ]
 TEXTS = [*(template_text(body) for body in bodies()), *(builtin_text(name) for name in builtin_names())]
 SHORT = 40
@@ -84,9 +50,8 @@ def scale(table, chance):
     places = [place for place in keys_of(table) if number_in(at(table, place)) is not None]
     *parent, last = chance.choice(places)
     value = at(table, parent)[last]
-    factor = chance.choice(
-        [-1.0, 0.0, 1e3, 1e-3, 180.0 / math.pi, 10.0 ** chance.randint(-25, 25), chance.uniform(0.1, 10.0)]
-    )
+    far = 10.0 ** chance.randint(-25, 25)
+    factor = chance.choice([-1.0, 0.0, 1e3, 1e-3, 180.0 / math.pi, far, chance.uniform(0.1, 10.0)])
     number, unit = number_in(value)
     at(table, parent)[last] = f"{number * factor!r} {unit}" if unit else type(number)(number * factor)
 
@@ -147,10 +112,7 @@ def mutant(seed):
     chance = random.Random(seed)
     table = tomllib.loads(chance.choice(TEXTS))
     timing = table["simulation"]
-    if "libration" not in table:
-        timing["duration"] = SHORT * timing.get("control_period", 0.1)
-    else:
-        timing["duration"] = SHORT * timing.get("control_period", 0.001)
+    timing["duration"] = SHORT * timing.get("control_period", 0.001 if "libration" in table else 0.1)
     for _ in range(chance.choice([1, 1, 1, 2, 3])):
         chance.choice([mutate, scale, scale, scale])(table, chance)
     return "\n".join(f"{json.dumps(str(key))} = {shown(value)}" for key, value in table.items())

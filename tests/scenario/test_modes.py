@@ -15,7 +15,7 @@ from starhold.scenario.json_schema import json_schema
 from starhold.scenario.reading import parse
 from tests.making import built
 from tests.missions import BASE, DETUMBLE, POINT
-from tests.refusals import refused
+from tests.refusals import refused, replaced, rows
 
 TURNED = """
 from typing import NamedTuple
@@ -24,15 +24,10 @@ from starhold.parts.roles import Goal
 
 CARD = Card(title="Turned", summary="q_RN = constant", sources=("mine",), assumptions=())
 ROLE = "target"
-
-
-class Params(NamedTuple):
-    pass
-
+Params = NamedTuple("Params", [])
 
 def goal(params, state, step, before):
     return Goal((0.6, 0.0, 0.8, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-
 
 def examples():
     return [Params()]
@@ -45,40 +40,38 @@ def read(text):
     return scenario, build(scenario, scenario.laws[0])
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "told"),
-    [
-        ('type = "pd"', 'type = "pdd"', 'law[1].mode[1].type: found "pdd"; did you mean pd?'),
-        ("k_rate = 0.02", "k_rat = 0.02", "law[1].mode[1].k_rat: found an unknown key; did you mean k_rate?"),
-        ("rate_below =", "speed_below =", "law[1].mode[1].until.speed_below: found an unknown key"),
-        ('rate_below = "0.5 deg/s", dwell', "dwell", "law[1].mode[1].until"),
-        (DETUMBLE[DETUMBLE.index("until") :], "", "law[1].mode[1].until: found nothing; allowed: a condition"),
-        ('name = "point"', 'name = "detumble"', 'law[1].mode[2].name: found "detumble"; allowed: a name that no other mode'),
-        ('name = "point"\n', "", "law[1].mode[2].name: found nothing; allowed: this key is required"),
-        ("back = { ", 'back = { to = "pint", ', 'law[1].mode[2].back.to: found "pint"; allowed: one of detumble'),
-        ("back = { ", 'until = { after = "9 s" }\nback = { ', "law[1].mode[2].until.to: found nothing"),
-        ("until = {", "back = { after = 5 }\nuntil = {", "law[1].mode[1].back.to: found nothing"),
-        ('"0.5 deg/s"', '"0.5 deg"', "law[1].mode[1].until.rate_below"),
-        (POINT, "", "law[1].mode: found one mode; allowed: at least two [[law.mode]] tables"),
-        (DETUMBLE + POINT, "", "law[1].mode: found nothing; allowed: at least two [[law.mode]] tables"),
-        ('type = "modes"', 'type = "modes"\nk_rate = 1', "law[1].k_rate: found an unknown key"),
-        ("k_integral = 1e-5", "k_integral = 1.0", "law[1].mode[2]: k_integral must be below"),
-    ],
-)
-def test_a_fault_is_told_in_one_line(old, new, told):
-    assert old in TEXT
-    text = TEXT.replace(old, new)
-    text = text.partition("\nback")[0] if told.startswith("law[1].mode: ") else text
+FAULTS = rows("""
+type = "pd" | type = "pdd" | law[1].mode[1].type: found "pdd"; did you mean pd?
+k_rate = 0.02 | k_rat = 0.02 | law[1].mode[1].k_rat: found an unknown key; did you mean k_rate?
+rate_below = | speed_below = | law[1].mode[1].until.speed_below: found an unknown key
+rate_below = "0.5 deg/s", dwell | dwell | law[1].mode[1].until
+name = "point" | name = "detumble" | law[1].mode[2].name: found "detumble"; allowed: a name that no other mode
+name = "point" | | law[1].mode[2].name: found nothing; allowed: this key is required
+back = { | back = { to = "pint", | law[1].mode[2].back.to: found "pint"; allowed: one of detumble
+back = { | until = { after = "9 s" }↵back = { | law[1].mode[2].until.to: found nothing
+until = { | back = { after = 5 }↵until = { | law[1].mode[1].back.to: found nothing
+"0.5 deg/s" | "0.5 deg" | law[1].mode[1].until.rate_below
+type = "modes" | type = "modes"↵k_rate = 1 | law[1].k_rate: found an unknown key
+k_integral = 1e-5 | k_integral = 1.0 | law[1].mode[2]: k_integral must be below
+""")
+FAULTS += [
+    [DETUMBLE[DETUMBLE.index("until") :], "", "law[1].mode[1].until: found nothing; allowed: a condition"],
+    [TEXT[TEXT.index(POINT) :], "", "law[1].mode: found one mode; allowed: at least two [[law.mode]] tables"],
+    [TEXT[TEXT.index(DETUMBLE) :], "", "law[1].mode: found nothing; allowed: at least two [[law.mode]] tables"],
+]
+
+
+@pytest.mark.parametrize("row", FAULTS, ids=lambda row: row[2])
+def test_a_fault_is_told_in_one_line(row):
+    old, new, told = row
     with refused(told):
-        read(text)
+        read(replaced(TEXT, old, new))
 
 
 def test_a_mode_that_nothing_leads_to_is_refused():
     third = POINT.replace('"point"', '"rest"')
     text = BASE + DETUMBLE.replace("dwell", 'to = "rest", dwell') + POINT + "until = { after = 5 }" + third
-    with pytest.raises(
-        InputError, match=r'mode\[2\]: found "point"; allowed: a mode that a condition of another one leads to'
-    ):
+    with refused('mode[2]: found "point"; allowed: a mode that a condition of another one leads to'):
         read(text)
 
 
@@ -130,11 +123,10 @@ def test_a_mode_changes_by_its_key_and_designs_its_gains():
 
 
 def test_the_schema_takes_modes():
-    schema = json_schema()
-    jsonschema.validate(tomllib.loads(TEXT), schema)
+    schema = jsonschema.Draft202012Validator(json_schema())
+    assert schema.is_valid(tomllib.loads(TEXT))
     for old, new in (("rate_below", "speed_below"), ('name = "point"\n', ""), ("k_rate = 0.02", "k_rat = 0.02")):
-        with pytest.raises(jsonschema.ValidationError):
-            jsonschema.validate(tomllib.loads(TEXT.replace(old, new)), schema)
+        assert not schema.is_valid(tomllib.loads(replaced(TEXT, old, new)))
 
 
 RODS = """
@@ -156,11 +148,7 @@ lever = 0.1
 @pytest.mark.parametrize(
     ("first", "second", "told"),
     [
-        (
-            '["magnetorquers"]',
-            '["thrusters", "magnetorquers"]',
-            "point: effectors: found magnetorquers and thrusters, which",
-        ),
+        ('["magnetorquers"]', '["thrusters", "magnetorquers"]', "point: effectors: found magnetorquers and thrusters, whi"),
         ('["magnetorquers"]', None, "point: effectors: found magnetorquers and thrusters, which both take the command"),
         ('["magnetorquer"]', '["thrusters"]', 'detumble: effectors: found "magnetorquer"; did you mean magnetorquers?'),
         ("[]", '["thrusters"]', "detumble: effectors: found none that takes the command; allowed: one of magnetorquers, t"),
@@ -182,9 +170,7 @@ def test_without_modes_two_effectors_for_a_command_are_refused_with_what_helps()
 
 def test_a_mode_that_lacks_a_reading_is_told_which_sensor_has_it():
     modes = DETUMBLE.replace('type = "pd"\nk_rate = 0.02\nk_attitude = 1e-6', 'type = "b-dot"\nk = 1e-3') + POINT
-    with pytest.raises(
-        InputError, match=r"no magnetic_field, .* a sensor that measures magnetic_field, such as magnetometer"
-    ):
+    with refused("no magnetic_field, ", " a sensor that measures magnetic_field, such as magnetometer"):
         read(BASE + modes)
 
 

@@ -9,7 +9,7 @@ from starhold.errors import InputError
 from starhold.scenario.designing import design
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.studies.modal_roots import pick_modal, study
-from tests.refusals import refused
+from tests.refusals import refused, replaced, rows
 
 BASE = builtin_text("landing-limits")
 COARSE = BASE.replace('step = "5 deg"', 'step = "85 deg"').replace("step = 0.001", "step = 0.05")
@@ -17,14 +17,8 @@ COARSE = BASE.replace('step = "5 deg"', 'step = "85 deg"').replace("step = 0.001
 
 def parsed(*pairs, text=COARSE):
     for old, new in pairs:
-        assert old in text
-        text = text.replace(old, new)
+        text = replaced(text, old, new)
     return parse(text, "my.toml")
-
-
-def searched(*pairs, law=None):
-    scenario = parsed(*pairs)
-    return study(scenario, pick_modal(scenario, law))
 
 
 def test_lists_and_spreads_give_the_decimals_that_are_meant():
@@ -34,11 +28,8 @@ def test_lists_and_spreads_give_the_decimals_that_are_meant():
     assert (table.roots[1437], table.roots[-1]) == (-1.563, -0.001)
     assert np.degrees(table.angles) == pytest.approx(np.arange(10, 181, 5), rel=1e-12)
     assert table.start_rate == pytest.approx((math.radians(20.0) / 3**0.5,) * 3)
-    assert parsed(("{ from = -3.0, to = -0.001, step = 0.05 }", "[-2, -1.5, -0.5]")).table.transient.roots == (
-        -2,
-        -1.5,
-        -0.5,
-    )
+    listed = parsed(("{ from = -3.0, to = -0.001, step = 0.05 }", "[-2, -1.5, -0.5]")).table.transient
+    assert listed.roots == (-2, -1.5, -0.5)
     given = parsed(('"20 deg/s"', '[0.1, "2 deg/s", 0]')).table.transient
     assert given.start_rate == pytest.approx((0.1, math.radians(2.0), 0.0))
 
@@ -51,62 +42,49 @@ def test_what_the_table_leaves_out():
     assert table.start_rate == (0.0, 0.0, 0.0)
 
 
-FAULTS = {
-    "a root of zero": ("to = -0.001", "to = 0", ["transient.roots", "below zero"]),
-    "roots that fall": ("{ from = -3.0, to = -0.001, step = 0.05 }", "[-1, -2]", ["transient.roots", "increase"]),
-    "no roots": ("{ from = -3.0, to = -0.001, step = 0.05 }", "[]", ["transient.roots", "a list of values"]),
-    "from beyond to": ("from = -3.0", "from = -1e-4", ["transient.roots", "from at most to"]),
-    "too many roots": ("step = 0.05", "step = 1e-7", ["transient.roots", "100000"]),
-    "a step of zero": ("step = 0.05", "step = 0", ["transient.roots", "above 0"]),
-    "a misspelt step": ("step = 0.05", "stop = 0.05", ["transient.roots", "step = .."]),
-    "an angle of zero": ('from = "10 deg"', "from = 0", ["transient.angles", "above 0"]),
-    "an angle beyond half a turn": ('to = "180 deg"', 'to = "190 deg"', ["transient.angles", "at most 3.14159"]),
-    "two for an axis": ("axis = [1, 1, 1]", "axis = [1, 1]", ["transient.axis", "3 numbers"]),
-    "no axis": ("axis = [1, 1, 1]", "axis = [0, 0, 0]", ["transient.axis", "not zero"]),
-    "four for a rate": ('"20 deg/s"', "[0.1, 0, 0, 0]", ["transient.rate", "3 numbers"]),
-    "the rate's unit": ('"20 deg/s"', '"20 deg"', ["transient.rate", "rad/s"]),
-    "a start beyond the limit": ('rate = "20 deg/s"', 'rate = "40 deg/s"', ["transient.rate", "rate_limit, 30 deg/s"]),
-    "a negative limit": ('"50 deg/s^2"', '"-50 deg/s^2"', ["transient.acceleration_limit", "above 0"]),
-    "a negative tolerance": ('"3 deg/s"', '"-3 deg/s"', ["transient.rate_tolerance", "at least 0"]),
-    "an end of zero": ('angle_end = "0.1 deg"', "angle_end = 0", ["transient.angle_end", "above 0"]),
-    "an unknown key": ("rate_end =", "rate_ends =", ["transient.rate_ends", "rate_end?"]),
-    "a fit with two numbers": ("below = [-0.991348, -2.12427, -0.862229]", "below = [1, 2]", ["law[2].below", "3 numbers"]),
-    "an unstable fit": (
-        "below = [-0.991348, -2.12427, -0.862229]",
-        "below = [0, 0, 1]\nangle = 1.0",
-        ["law[2]", "not stable"],
-    ),
-}
+FAULTS = rows("""
+to = -0.001 | to = 0 | transient.roots | below zero
+{ from = -3.0, to = -0.001, step = 0.05 } | [-1, -2] | transient.roots | increase
+{ from = -3.0, to = -0.001, step = 0.05 } | [] | transient.roots | a list of values
+from = -3.0 | from = -1e-4 | transient.roots | from at most to
+step = 0.05 | step = 1e-7 | transient.roots | 100000
+step = 0.05 | step = 0 | transient.roots | above 0
+step = 0.05 | stop = 0.05 | transient.roots | step = ..
+from = "10 deg" | from = 0 | transient.angles | above 0
+to = "180 deg" | to = "190 deg" | transient.angles | at most 3.14159
+axis = [1, 1, 1] | axis = [1, 1] | transient.axis | 3 numbers
+axis = [1, 1, 1] | axis = [0, 0, 0] | transient.axis | not zero
+"20 deg/s" | [0.1, 0, 0, 0] | transient.rate | 3 numbers
+"20 deg/s" | "20 deg" | transient.rate | rad/s
+rate = "20 deg/s" | rate = "40 deg/s" | transient.rate | rate_limit, 30 deg/s
+"50 deg/s^2" | "-50 deg/s^2" | transient.acceleration_limit | above 0
+"3 deg/s" | "-3 deg/s" | transient.rate_tolerance | at least 0
+angle_end = "0.1 deg" | angle_end = 0 | transient.angle_end | above 0
+rate_end = | rate_ends = | transient.rate_ends | rate_end?
+below = [-0.991348, -2.12427, -0.862229] | below = [1, 2] | law[2].below | 3 numbers
+below = [-0.991348, -2.12427, -0.862229] | below = [0, 0, 1]↵angle = 1.0 | law[2] | not stable
+""")
 
 
-@pytest.mark.parametrize("name", sorted(FAULTS))
-def test_a_fault_is_one_line_with_file_key_and_what_is_allowed(name):
-    old, new, words = FAULTS[name]
-    with refused(*words, start="my.toml: "):
-        parsed((old, new))
+@pytest.mark.parametrize("row", FAULTS, ids=lambda row: row[2])
+def test_a_fault_is_one_line_with_file_key_and_what_is_allowed(row):
+    with refused(*row[2:], start="my.toml: "):
+        parsed(row[:2])
 
 
-UNREACHABLE = {
-    "acceleration": ('"50 deg/s^2"', '"5 deg/s^2"', ["acceleration_limit: found 5 deg/s^2", "from 10 deg no root", "1/s"]),
-    "rate": (
-        'rate_limit = "30 deg/s"',
-        'rate_limit = "20.01 deg/s"',
-        ["rate_limit", "at least 25.6", "from 180 deg no root"],
-    ),
-    "time": ("duration = 40.0", "duration = 4.0", ["acceleration_limit", "within 4 s"]),
-    "duration": (
-        "duration = 40.0",
-        "duration = 1.0",
-        ["simulation.duration: found 1 s", "from 10 deg no root comes to its end"],
-    ),
-}
+UNREACHABLE = rows("""
+"50 deg/s^2" | "5 deg/s^2" | acceleration_limit: found 5 deg/s^2 | from 10 deg no root | 1/s
+rate_limit = "30 deg/s" | rate_limit = "20.01 deg/s" | rate_limit | at least 25.6 | from 180 deg no root
+duration = 40.0 | duration = 4.0 | acceleration_limit | within 4 s
+duration = 40.0 | duration = 1.0 | simulation.duration: found 1 s | from 10 deg no root comes to its end
+""")
 
 
-@pytest.mark.parametrize("name", sorted(UNREACHABLE))
-def test_a_limit_that_cannot_be_met_is_named(name):
-    old, new, words = UNREACHABLE[name]
-    with refused(*words):
-        searched((old, new))
+@pytest.mark.parametrize("row", UNREACHABLE, ids=lambda row: row[2])
+def test_a_limit_that_cannot_be_met_is_named(row):
+    scenario = parsed(row[:2])
+    with refused(*row[2:]):
+        study(scenario, pick_modal(scenario, None))
 
 
 def test_the_search_wants_a_modal_law_limits_and_a_target_at_rest():
@@ -119,12 +97,8 @@ def test_the_search_wants_a_modal_law_limits_and_a_target_at_rest():
         pick_modal(with_other, "pd")
     with pytest.raises(InputError, match="none that is modal"):
         pick_modal(parse(COARSE.split("[[law]]")[0] + other, "x"), None)
-    moving = parsed(
-        (
-            'mode = "inertial"\nattitude = [1, 0, 0, 0]',
-            'mode = "orbital"\n[orbit]\nposition = [7e6, 0, 0]\nvelocity = [0, 7550, 0]',
-        )
-    )
+    orbital = 'mode = "orbital"\n[orbit]\nposition = [7e6, 0, 0]\nvelocity = [0, 7550, 0]'
+    moving = parsed(('mode = "inertial"\nattitude = [1, 0, 0, 0]', orbital))
     with pytest.raises(InputError, match=r"target\.mode: found orbital"):
         pick_modal(moving, None)
 
