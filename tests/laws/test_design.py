@@ -1,14 +1,12 @@
 """`sh.design` and `starhold design` tell the same."""
 
-from dataclasses import FrozenInstanceError
-
 import numpy as np
 import pytest
 
 import starhold as sh
 from starhold.laws import lqr
 from starhold.scenario.reading import builtin_text
-from tests.refusals import refused
+from tests.refusals import complains, refused
 from tests.running import starhold
 
 TEXT = (
@@ -56,8 +54,6 @@ def test_every_law_with_a_form_is_designed(file):
     assert (second.name, second.law, second.form) == ("classical", "matrix-pd", "inertial")
     assert second.gains == {"k_rate": pytest.approx([0.2, 0.3, 0.4]), "k_attitude": pytest.approx([0.01] * 3)}
     assert second.figures == {}
-    with pytest.raises(FrozenInstanceError):
-        first.name = "other"
 
 
 def test_one_law_is_picked_from_a_scenario_or_a_path(file):
@@ -98,13 +94,9 @@ def test_the_command_prints_what_the_function_returns(file):
                 assert (number if isinstance(number, str) else f"{number:.6g}") in done.stdout
         for name, value in found.figures.items():
             assert name in done.stdout
-            if isinstance(value, float):
-                assert f"{name}: {value:.3g}" in done.stdout
-            else:
-                assert all(f"{number:.6g}" in done.stdout for number in np.ravel(value))
-    picture = told("--map", "map.xyz")
-    assert (picture.returncode, picture.stdout, picture.stderr.count("\n")) == (2, "", 1)
-    assert "--map: found map.xyz; allowed: the name of a PNG file" in picture.stderr
+            texts = [f"{name}: {value:.3g}"] if isinstance(value, float) else [f"{number:.6g}" for number in np.ravel(value)]
+            assert all(text in done.stdout for text in texts)
+    complains(told("--map", "map.xyz"), "--map: found map.xyz; allowed: the name of a PNG file")
     one = told("--law", "classical")
     assert "classical: " in one.stdout
     assert "lqr: " not in one.stdout

@@ -5,14 +5,14 @@ import tomllib
 
 import numpy as np
 import pytest
-from jsonschema import ValidationError, validate
+from jsonschema import Draft202012Validator
 
 import starhold as sh
 from starhold.checker import check_file, passed
 from starhold.conformance.suite import examine, find_law
 from starhold.laws.catalogue import Law, adopted, catalogue, from_file
 from starhold.scenario.json_schema import json_schema
-from tests.refusals import refused
+from tests.refusals import complains, refused, replaced, rows
 from tests.running import starhold
 
 LAW = '''"""Feedback."""
@@ -44,38 +44,30 @@ def lyapunov(measurement, gains, craft):
 def examples():
     return [Gains(0.09)]
 '''
-STATION = '''"""Feedback to the point."""
-
-from typing import Annotated, NamedTuple
+STATION = """from typing import Annotated, NamedTuple
 
 from starhold.algebra.scalar import clip
 from starhold.laws.interface import Card, Gain
 
 CARD = Card(title="Point", summary="u = -k x - d v - i", sources=("mine",), assumptions=("near",), claims="none")
 
-
 class Gains(NamedTuple):
     k: Annotated[float, Gain(above=0.0, text="on the position")]
     d: Annotated[float, Gain(above=0.0, text="on the velocity")]
 
-
-class Memory(NamedTuple):
-    sum: float
-
+Memory = NamedTuple("Memory", [("sum", float)])
 
 def remember(gains, plant, period):
     return Memory(0.0)
-
 
 def control(measurement, gains, plant, memory):
     whole = clip(memory.sum + measurement.period * measurement.position[1], 1.0)
     held = tuple(-gains.k * x - gains.d * v for x, v in zip(measurement.position, measurement.velocity))
     return (held[0], held[1] - whole, held[2]), Memory(whole)
 
-
 def examples():
     return [Gains(30.0, 9.0)]
-'''
+"""
 BODY = """
 name = "own"
 [spacecraft]
@@ -136,9 +128,6 @@ def test_command_line_compares_it_and_checks_its_certificate(folder):
     assert command[2] == "--law-file"
     assert starhold(*command, cwd=folder).returncode == 0
     assert "stiffness" in starhold("laws", "laws/my_law.py", cwd=folder).stdout
-    (folder / "point.toml").write_text(POINT + '[[law]]\nfile = "laws/point.py"\nk = 30.0\nd = 9.0\n')
-    starhold("compare", "point.toml", "-o", "held", cwd=folder, code=0)
-    starhold("check-law", "laws/my_law.py", cwd=folder, code=0)
 
 
 def test_its_certificate_fails_for_another_text_of_the_law(folder, tmp_path):
@@ -167,68 +156,50 @@ def test_a_station_law_from_a_file_with_a_memory(folder):
 
 
 def test_the_schema_of_scenario_files_takes_it(folder):
-    schema = json_schema()
+    schema = Draft202012Validator(json_schema())
     read = tomllib.loads((folder / "own.toml").read_text())
-    validate(read, schema)
-    with pytest.raises(ValidationError):
-        validate(read | {"law": [{"file": "my_law.py", "type": "pd"}]}, schema)
-    with pytest.raises(ValidationError):
-        validate(read | {"law": [{"k": 0.1}]}, schema)
+    assert schema.is_valid(read)
+    assert not schema.is_valid(read | {"law": [{"file": "my_law.py", "type": "pd"}]})
+    assert not schema.is_valid(read | {"law": [{"k": 0.1}]})
 
 
-@pytest.mark.parametrize("name", sorted(catalogue("libration-point")))
-def test_station_laws_of_starhold_conform(name):
-    assert [v for v in examine(catalogue("libration-point")[name]) if v.outcome == "failed"] == []
+WRONG = rows("""
+file = "nope.py" | law[1].file: found "nope.py": No such file or directory; allowed: a Python file
+file = "my_law.py"↵type = "pd" | either a type or a file, not both
+file = 3 | law[1].file: found 3; allowed: the name of a Python file
+file = "my_law.py"↵k = 1↵q = 2 | law[1].q: found an unknown key; allowed: one of
+file = "my_law.py"↵k = -1 | law[1].k: found -1; allowed: above 0
+file = "my_law.py"↵form = "I" | no form; my-law takes its gains
+k = 1 | law[1].type: found nothing; allowed: one of
+""")
 
 
-WRONG = {
-    "missing": ('file = "nope.py"', 'law[1].file: found "nope.py": No such file or directory; allowed: a Python file'),
-    "both": ('file = "my_law.py"\ntype = "pd"', "either a type or a file, not both"),
-    "a number": ("file = 3", "law[1].file: found 3; allowed: the name of a Python file"),
-    "unknown gain": ('file = "my_law.py"\nk = 1\nq = 2', "law[1].q: found an unknown key; allowed: one of"),
-    "bad gain": ('file = "my_law.py"\nk = -1', "law[1].k: found -1; allowed: above 0"),
-    "form": ('file = "my_law.py"\nform = "I"', "no form; my-law takes its gains"),
-    "nothing": ("k = 1", "law[1].type: found nothing; allowed: one of"),
-}
-
-
-@pytest.mark.parametrize("kind", WRONG)
-def test_what_is_wrong_with_a_law_table_is_one_line(kind, folder):
-    table, said = WRONG[kind]
+@pytest.mark.parametrize(("table", "said"), WRONG)
+def test_what_is_wrong_with_a_law_table_is_one_line(table, said, folder):
     path = folder / "laws" / "wrong.toml"
     path.write_text(BODY + f"[[law]]\n{table}\n")
     with refused(said):
         sh.load(path)
 
 
-BROKEN = {
-    "syntax": ("def torque(measurement,", "def torque(measurement", "my_law.py, line"),
-    "name": ("CARD = Card(", "CARD = Cards(", "my_law.py, line 10: NameError"),
-    "part missing": ("def torque", "def torques", "a law needs control or torque"),
-    "no unit": ('Annotated[float, Gain("N m s", above=0.0, text="damping")]', "float", "k declares no unit"),
-    "attribute": (
-        "gains.k, measurement.rate",
-        "gains.k, measurement.rates",
-        "law my-law: my_law.py, line 19: AttributeError",
-    ),
-    "shape": (", memory\n", "\n", "torque must return three numbers and the memory"),
-    "memory": (", memory\n", ", (1.0,)\n", "the memory that torque returns must be formed as it was given"),
-    "exit": ("CARD = Card(", "raise SystemExit(3)\nCARD = Card(", "my_law.py, line 10: SystemExit: 3"),
-    "its own kind of end": ("CARD = Card(", "raise type('Own', (BaseException,), {})\nCARD = Card(", "line 10: Own"),
-    "an equation ends the program": (
-        "    return scale(",
-        "    raise SystemExit(0)\n    return scale(",
-        "line 19: SystemExit",
-    ),
-    "not a card": ("CARD = Card(", "CARD = dict(", "CARD is not a Card"),
-}
+BROKEN = rows("""
+def torque(measurement, | def torque(measurement | my_law.py, line
+CARD = Card( | CARD = Cards( | my_law.py, line 10: NameError
+def torque | def torques | a law needs control or torque
+Annotated[float, Gain("N m s", above=0.0, text="damping")] | float | k declares no unit
+gains.k, measurement.rate | gains.k, measurement.rates | law my-law: my_law.py, line 19: AttributeError
+, memory↵↵ | ↵↵ | torque must return three numbers and the memory
+, memory↵↵ | , (1.0,)↵↵ | the memory that torque returns must be formed as it was given
+CARD = Card( | raise SystemExit(3)↵CARD = Card( | my_law.py, line 10: SystemExit: 3
+CARD = Card( | raise type('Own', (BaseException,), {})↵CARD = Card( | line 10: Own
+return scale( | raise SystemExit(0)↵    return scale( | line 19: SystemExit
+CARD = Card( | CARD = dict( | CARD is not a Card
+""")
 
 
-@pytest.mark.parametrize("kind", BROKEN)
-def test_what_is_wrong_in_a_law_file_is_one_line(kind, folder):
-    old, new, said = BROKEN[kind]
-    assert old in LAW
-    (folder / "laws" / "my_law.py").write_text(LAW.replace(old, new))
+@pytest.mark.parametrize(("old", "new", "said"), BROKEN)
+def test_what_is_wrong_in_a_law_file_is_one_line(old, new, said, folder):
+    (folder / "laws" / "my_law.py").write_text(replaced(LAW, old, new))
     with refused(said):
         sh.simulate(folder / "own.toml")
 
@@ -238,9 +209,7 @@ def test_an_interrupt_in_a_law_file_is_the_users_in_python_and_the_files_under_a
     (folder / "laws" / "my_law.py").write_text(LAW.replace("CARD = Card(", "raise KeyboardInterrupt\nCARD = Card("))
     with pytest.raises(KeyboardInterrupt):
         sh.load(folder / "own.toml")
-    done = starhold("run", "own.toml", cwd=folder)
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert "my_law.py, line 10: KeyboardInterrupt" in done.stderr
+    complains(starhold("run", "own.toml", cwd=folder), "my_law.py, line 10: KeyboardInterrupt")
 
 
 def test_links_in_a_circle_are_told_in_one_line(folder):
@@ -248,9 +217,7 @@ def test_links_in_a_circle_are_told_in_one_line(folder):
     (folder / "laws" / "my_law.py").symlink_to(folder / "other.py")
     (folder / "other.py").symlink_to(folder / "laws" / "my_law.py")
     for words in (("run", "own.toml"), ("check-part", "other.py"), ("laws", "other.py"), ("parts", "other.py")):
-        done = starhold(*words, cwd=folder)
-        assert (done.returncode, done.stderr.count("\n")) == (2, 1), words
-        assert "Too many levels of symbolic links" in done.stderr
+        complains(starhold(*words, cwd=folder), "Too many levels of symbolic links")
 
 
 def test_check_part_tells_the_line_that_fails(folder):
@@ -281,7 +248,6 @@ def test_laws_of_other_packages_for_both_bodies_are_found(folder, recwarn, offer
     assert sh.simulate(folder / "own.toml").attrs["law"] == "point"
     # A law that is installed is taken by its name and by its file.
     assert find_law("my-law") is find_law(str(folder / "laws" / "my_law.py")) is turning["my-law"]
-    assert [v for v in examine(find_law("my-law")) if v.outcome == "failed"] == []
 
 
 def test_one_that_takes_the_name_of_another_is_left_out(folder, offer):

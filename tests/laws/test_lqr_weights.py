@@ -29,10 +29,9 @@ def both(rate, attitude):
     return np.block([[np.array(rate), np.zeros((3, 3))], [np.zeros((3, 3)), np.array(attitude)]]).tolist()
 
 
-def one_line(text):
-    with refused(start="my.toml: law[1]") as caught:
+def says(text, *words):
+    with refused(*words, start="my.toml: law[1]"):
         parse(text, "my.toml")
-    return str(caught.value)
 
 
 ONES, WIDE = matrix(1, 1, 1), matrix(1e-3, 1, 1e10)
@@ -44,27 +43,11 @@ SPREADS = {
 
 
 @pytest.mark.parametrize("form", ["II", "III", "numeric"])
-@pytest.mark.parametrize("name", sorted(SPREADS))
+@pytest.mark.parametrize("name", SPREADS)
 def test_weights_too_far_apart_are_named(form, name):
     q, r, words = SPREADS[name]
     for head in (HEAD,) if form == "II" else (HEAD, FULL):
-        message = one_line(head + law(form=f'"{form}"', q=q, r=r))
-        for word in words:
-            assert word in message
-
-
-@pytest.mark.parametrize(
-    ("q", "r", "said"),
-    [
-        (both(WIDE, ONES), 1, "q: the weights of the rate"),
-        (both(ONES, WIDE), 1, "q: the weights of the attitude"),
-        (1, WIDE, "r"),
-    ],
-)
-def test_eigenvalues_too_far_apart_are_named(q, r, said):
-    message = one_line(HEAD + law(form='"numeric"', q=q, r=r))
-    assert said in message
-    assert "1e+13" in message
+        says(head + law(form=f'"{form}"', q=q, r=r), *words)
 
 
 @pytest.mark.parametrize("form", ["II", "III", "numeric"])
@@ -83,61 +66,53 @@ def test_full_weights_of_twelve_orders_are_taken():
     parse(HEAD + law(form='"numeric"', q=both(wide, wide), r=wide), "x")
 
 
-def test_weights_that_balance_would_drive_apart_are_refused():
-    message = one_line(HEAD + law(form='"II"', q="[1, 1, 1, 1e-12, 1, 1]", r="[1, 1, 1e-3]", balance='"r2"'))
-    assert "balanced r: the weights of the torque" in message
-    assert "1e+12" in message
-
-
 UNSYMMETRIC = [[1, 0.5, 0], [0.25, 1, 0], [0, 0, 1]]
 INDEFINITE = [[1, 2, 0], [2, 1, 0], [0, 0, 1]]
 
 
-@pytest.mark.parametrize(
-    ("entries", "said"),
-    [
-        ({"q": 1, "r": UNSYMMETRIC}, "r must be symmetric"),
-        ({"q": both(UNSYMMETRIC, ONES), "r": 1}, "q must be symmetric"),
-        ({"q": both(ONES, np.array(ONES) * 1e-9 + np.triu(np.ones((3, 3)), 1) * 1e-12), "r": 1}, "q must be symmetric"),
-        ({"q": 1, "r": INDEFINITE}, "r must be positive definite"),
-        ({"q": both(INDEFINITE, ONES), "r": 1}, "q must be positive definite"),
-        ({"q": both(np.array(ONES) * 1e9, np.array(INDEFINITE) * 1e-9), "r": 1}, "q must be positive definite"),
-        ({"q": 1, "r": [1, 1, 0]}, "r must be positive definite; its diagonal holds 0"),
-        ({"q": [1, 1, 1], "r": 1}, "6x6 matrix"),
-        ({"q": ONES, "r": 1}, "6x6 matrix"),
-        ({"q": 1, "r": both(ONES, ONES)}, "3x3 matrix"),
-        ({"q": '"a lot"', "r": 1}, "law[1].q"),
-        ({"q": "nan", "r": 1}, "finite"),
-        ({"q": 1, "r": "inf"}, "finite"),
-        ({"q": 1}, "law[1].r"),
-        ({"q": 1, "r": 1, "balance": '"least"'}, 'an input of another form than "numeric"'),
-    ],
-)
-def test_numeric_weights_that_are_wrong(entries, said):
-    assert said in one_line(HEAD + law(form='"numeric"', **entries))
+FAR = np.array(ONES) * 1e-9
+NUMERIC = [
+    ({"q": 1, "r": UNSYMMETRIC}, "r must be symmetric"),
+    ({"q": both(UNSYMMETRIC, ONES), "r": 1}, "q must be symmetric"),
+    ({"q": both(ONES, FAR + np.triu(np.ones((3, 3)), 1) * 1e-12), "r": 1}, "q must be symmetric"),
+    ({"q": 1, "r": INDEFINITE}, "r must be positive definite"),
+    ({"q": both(INDEFINITE, ONES), "r": 1}, "q must be positive definite"),
+    ({"q": both(np.array(ONES) * 1e9, np.array(INDEFINITE) * 1e-9), "r": 1}, "q must be positive definite"),
+    ({"q": 1, "r": [1, 1, 0]}, "r must be positive definite; its diagonal holds 0"),
+    ({"q": [1, 1, 1], "r": 1}, "6x6 matrix"),
+    ({"q": ONES, "r": 1}, "6x6 matrix"),
+    ({"q": 1, "r": both(ONES, ONES)}, "3x3 matrix"),
+    ({"q": '"a lot"', "r": 1}, "law[1].q"),
+    ({"q": "nan", "r": 1}, "finite"),
+    ({"q": 1, "r": "inf"}, "finite"),
+    ({"q": 1}, "law[1].r"),
+    ({"q": 1, "r": 1, "balance": '"least"'}, 'an input of another form than "numeric"'),
+    ({"q": both(WIDE, ONES), "r": 1}, "q: the weights of the rate differ by a factor of 1e+13"),
+    ({"q": both(ONES, WIDE), "r": 1}, "q: the weights of the attitude differ by a factor of 1e+13"),
+    ({"q": 1, "r": WIDE}, "r: the weights of the torque differ by a factor of 1e+13"),
+]
+DIAGONAL = [
+    ({"q": [1, 1, 1, 1, 1], "r": 1}, "6 numbers"),
+    ({"q": 1, "r": ONES}, "3 numbers"),
+    ({"q": [1, 1, 1, 1, 0, 1], "r": 1}, "above 0"),
+    ({"q": 1, "r": [1, -1, 1]}, "above 0"),
+    ({"q": 1, "r": 1, "balance": '"all"'}, "none, least"),
+    ({"q": [1, 1, 1, 1e-4, 1, 1], "r": 1, "balance": '"q6"'}, "no value of q6 balances the weights; q5 or r2 can"),
+    ({"q": [1, 1, 1, 1e-12, 1, 1], "r": [1, 1, 1e-3], "balance": '"r2"'}, "balanced r: the weights of the torque"),
+]
+WRONG = [("numeric", *one) for one in NUMERIC] + [(form, *one) for form in ("II", "III") for one in DIAGONAL]
+WRONG += [("I", {"a": 1, "b": 0}, "above 0"), ("optimal", {"q": 1, "r": 1}, "one of I, II, III, numeric")]
 
 
-@pytest.mark.parametrize("form", ["II", "III"])
-@pytest.mark.parametrize(
-    ("entries", "said"),
-    [
-        ({"q": [1, 1, 1, 1, 1], "r": 1}, "6 numbers"),
-        ({"q": 1, "r": ONES}, "3 numbers"),
-        ({"q": [1, 1, 1, 1, 0, 1], "r": 1}, "above 0"),
-        ({"q": 1, "r": [1, -1, 1]}, "above 0"),
-        ({"q": 1, "r": 1, "balance": '"all"'}, "none, least"),
-        ({"q": [1, 1, 1, 1e-4, 1, 1], "r": 1, "balance": '"q6"'}, "no value of q6 balances the weights; q5 or r2 can"),
-    ],
-)
-def test_diagonal_weights_that_are_wrong(form, entries, said):
-    assert said in one_line(HEAD + law(form=f'"{form}"', **entries))
+@pytest.mark.parametrize(("form", "entries", "said"), WRONG)
+def test_weights_that_are_wrong(form, entries, said):
+    says(HEAD + law(form=f'"{form}"', **entries), said)
 
 
 def test_form_ii_of_a_full_inertia_and_equal_moments_of_one():
-    assert "form 'II' needs a diagonal inertia" in one_line(FULL + law(form='"II"', q=1, r=1))
+    says(FULL + law(form='"II"', q=1, r=1), "form 'II' needs a diagonal inertia")
     turned = HEAD.replace("[2.0, 3.0, 4.0]", str(matrix(2, 3, 3)))
-    message = one_line(turned + law(form='"III"', q=1, r=[1, 1, 2]))
-    assert "principal moments 2 and 3 are equal (3 kg m^2)" in message
+    says(turned + law(form='"III"', q=1, r=[1, 1, 2]), "principal moments 2 and 3 are equal (3 kg m^2)")
     gains = parse(turned + law(form='"III"', q=1, r=[1, 2, 2]), "x").laws[0].gains
     expected = TURN * np.array([1.0, 0.5**0.5, 0.5**0.5]) @ TURN.T
     assert np.abs(np.array(gains.k_attitude) - expected).max() < 1e-15
@@ -163,18 +138,18 @@ def test_numbers_at_the_end_of_the_range_are_one_line_or_gains():
     assert not any("\n" in message for message in said)
 
 
-@pytest.mark.parametrize(
-    ("spec", "said"),
-    [
-        (lqr.FormI(-1.0, 1.0), "a must be"),
-        (lqr.FormI(1.0, 0.0), "b above 0"),
-        (lqr.FormI(float("nan"), 1.0), "a must be"),
-        (lqr.FormII((1.0,) * 5, (1.0,) * 3), "q must be 6 numbers"),
-        (lqr.FormIII((1.0,) * 6, (1.0, 1.0, -1.0)), "r must be 3 numbers"),
-        (lqr.Numeric(np.eye(3), np.eye(3)), "q must be a 6x6"),
-        (lqr.Numeric(np.eye(6), np.full((3, 3), np.nan)), "r must be a 3x3"),
-    ],
-)
+SPECS = [
+    (lqr.FormI(-1.0, 1.0), "a must be"),
+    (lqr.FormI(1.0, 0.0), "b above 0"),
+    (lqr.FormI(float("nan"), 1.0), "a must be"),
+    (lqr.FormII((1.0,) * 5, (1.0,) * 3), "q must be 6 numbers"),
+    (lqr.FormIII((1.0,) * 6, (1.0, 1.0, -1.0)), "r must be 3 numbers"),
+    (lqr.Numeric(np.eye(3), np.eye(3)), "q must be a 6x6"),
+    (lqr.Numeric(np.eye(6), np.full((3, 3), np.nan)), "r must be a 3x3"),
+]
+
+
+@pytest.mark.parametrize(("spec", "said"), SPECS)
 def test_weights_from_python_are_checked_too(spec, said):
     with pytest.raises(ValueError, match=said):
         lqr.design(make_craft([2.0, 3.0, 4.0]), spec)
@@ -184,6 +159,5 @@ def test_weights_from_python_are_checked_too(spec, said):
 def test_the_command_line_says_one_line(tmp_path, command):
     (tmp_path / "wide.toml").write_text(HEAD + law(form='"II"', q="[1, 1e13, 1, 1, 1, 1]", r=1))
     done = starhold(command, "wide.toml", cwd=tmp_path)
-    complains(done)
+    complains(done, "wide.toml: law[1]: q: the weights of the rate differ by a factor of 1e+13")
     assert done.stdout == ""
-    assert done.stderr.startswith("starhold: wide.toml: law[1]: q: the weights of the rate differ by a factor of 1e+13")

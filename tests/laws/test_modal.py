@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from starhold.algebra.quaternion import to_body
 from starhold.algebra.vector import ZERO, add, cross, gyroscopic_torque
 from starhold.conformance.bench import random_quaternions
-from starhold.errors import InputError
 from starhold.laws import modal
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.bodies.rigid_body import angular_acceleration
@@ -19,7 +18,9 @@ from starhold.parts.craft import make_craft, tensor
 from starhold.parts.environments.gravity_gradient import gravity_gradient
 from starhold.scenario.reading import parse
 from starhold.synthesis.pole_placement import place, reached
+from tests.refusals import refused
 from tests.small import CRAFT
+from tests.tiers import fewer
 
 INERTIA = ((12.0, -1.5, 0.7), (-1.5, 15.0, 2.0), (0.7, 2.0, 9.0))
 MU = 3.986e14
@@ -60,7 +61,7 @@ def test_places_the_poles_of_the_motion_at_every_step():
     craft = make_craft(INERTIA, gravity=MU)
     j, position = tensor(craft.inertia), (3e6, -4e6, 5e6)
     model = symbolic_torque(craft, position)
-    for attitude in random_quaternions(60, 12):
+    for attitude in random_quaternions(fewer(60), 12):
         rate = random.normal(size=3) * 10.0 ** random.uniform(-2.0, 0.0)
         phi_0, phi_1 = (-np.diag(random.uniform(0.2, 2.0, 3)) + 0.1 * random.normal(size=(3, 3)) for _ in range(2))
         b = -random.uniform(0.01, 0.3)
@@ -114,30 +115,30 @@ def test_needs_no_rate():
     np.testing.assert_allclose(crept, still, rtol=0, atol=1e-11)
 
 
+PAIR = "phi_0 = -0.1\nphi_1 = [[-1, 3, 0], [-3, {}, 0], [0, 0, -1]]\nb = -0.01"
+
+
 @pytest.mark.parametrize(
     ("lines", "reason"),
     [
         ('form = "equal"\na = 0.1', "phi_0 has the root 0.1 1/s, which is not stable"),
         ('form = "equal"\na = 0.0', "phi_0 has the root 0 1/s, which is not stable"),
         ('form = "equal"\na = -0.1\nb = 0.01', "b = 0.01 s gives the scalar part a root that is not stable"),
-        (
-            "phi_0 = -0.1\nphi_1 = [[-1, 3, 0], [-3, 1.5, 0], [0, 0, -1]]\nb = -0.01",
-            "phi_1 has a root with a real part of zero or more",
-        ),
+        (PAIR.format(1.5), "phi_1 has a root with a real part of zero or more"),
         ("phi_0 = -0.1\nphi_1 = [-1, -2]\nb = -0.01", "phi_1"),
         ('form = "fit"\nangle = 4.0', "angle"),
     ],
 )
 def test_unstable_or_miscounted_spectra_are_refused(lines, reason):
     law = f'[[law]]\ntype = "modal"\n{lines}\n'
-    with pytest.raises(InputError, match=rf"^small\.toml: law\[1\].*{reason}"):
+    with refused(reason, start="small.toml: law[1]"):
         parse(CRAFT + law, "small.toml")
     if "not stable" in reason:
         assert parse(CRAFT + law, "small.toml", allow_unstable=True).laws[0].name == "modal"
 
 
 def test_complex_pairs_are_as_good_as_real_roots():
-    law = '[[law]]\ntype = "modal"\nphi_0 = -0.1\nphi_1 = [[-1, 3, 0], [-3, 0.5, 0], [0, 0, -1]]\nb = -0.01\n'
+    law = f'[[law]]\ntype = "modal"\n{PAIR.format(0.5)}\n'
     assert parse(CRAFT + law, "small").laws[0].gains.phi_0 == (-0.1, -0.1, -0.1)
 
 

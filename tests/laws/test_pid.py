@@ -8,6 +8,7 @@ import starhold as sh
 from starhold.laws import pd, pid
 from starhold.parts.craft import make_craft
 from tests.laws.motion import fly
+from tests.refusals import refused
 
 INERTIA = np.array([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]])
 CRAFT = make_craft(INERTIA)
@@ -110,7 +111,5 @@ def test_gravity_gradient_in_the_orbital_frame_is_held_off():
 
 
 def test_unstable_gains_of_a_scenario_are_one_line():
-    told = r"k_integral must be below .* N m/s, or the linear loop is unstable; .*--allow-unstable"
-    with pytest.raises(sh.InputError, match=told) as caught:
+    with refused("k_integral must be below ", " N m/s, or the linear loop is unstable; ", "--allow-unstable"):
         scenario(WHOLE | {"k_integral": 1.0})
-    assert "\n" not in str(caught.value)

@@ -15,6 +15,7 @@ from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.craft import make_craft, tensor
 from tests.refusals import refused
+from tests.tiers import fewer, leading
 
 BODY = {
     "name": "slew_angle",
@@ -61,7 +62,7 @@ def modes(law, gains, craft):
     return np.linalg.eigvals(loop)
 
 
-@settings(max_examples=40)
+@settings(max_examples=fewer(40, 4))
 @given(bodies(), st.floats(1e-3, 1.0), st.floats(0.2, 2.0), st.sampled_from(["pd", "lyapunov"]))
 def test_bandwidth_and_damping_are_had_about_the_axis_of_the_largest_moment_and_more_about_the_others(craft, w, zeta, name):
     law = catalogue()[name]
@@ -79,7 +80,7 @@ def test_bandwidth_and_damping_are_had_about_the_axis_of_the_largest_moment_and_
     assert np.sort(told["eigenvalues of the linear loop (1/s)"].real) == pytest.approx(np.sort(found.real), rel=2e-2)
 
 
-@settings(max_examples=40)
+@settings(max_examples=fewer(40, 4))
 @given(bodies(), st.floats(0.01, 0.5), st.floats(1.1, 3.0), st.floats(1e-3, 0.1))
 def test_sliding_has_the_roots_of_its_surface_and_its_layer(craft, w, zeta, reach):
     law = catalogue()["sliding"]
@@ -106,7 +107,7 @@ STARTS = {
 }
 
 
-@pytest.mark.parametrize("start", STARTS)
+@pytest.mark.parametrize("start", leading(STARTS, 2))
 @pytest.mark.parametrize("law", LAWS)
 def test_flights_settle_when_asked_within_the_torque_and_not_much_sooner(law, start):
     if start == "the long way" and law == "sliding":
@@ -122,11 +123,10 @@ def test_flights_settle_when_asked_within_the_torque_and_not_much_sooner(law, st
         assert told["largest torque (N m)"] == pytest.approx(found["peak_torque_norm"], rel=0.03)
 
 
-@pytest.mark.parametrize("law", ["pd", "lyapunov"])
-def test_lower_gains_settle_too_late(law):
-    scenario = sh.scenario(BODY | {"law": [asked(law, 200)]})
+def test_lower_gains_settle_too_late():
+    scenario = sh.scenario(BODY | {"law": [asked("pd", 200)]})
     k_rate, k_attitude = scenario.laws[0].gains[:2]
-    lower = [{"type": law, "k_rate": 0.95 * k_rate, "k_attitude": 0.95**2 * k_attitude}]
+    lower = [{"type": "pd", "k_rate": 0.95 * k_rate, "k_attitude": 0.95**2 * k_attitude}]
     assert sh.metrics(sh.simulate(scenario.with_({"law": lower})))["settling_time"] > 200.0
 
 
@@ -155,6 +155,9 @@ def test_wheels_bound_torque_and_momentum():
         sh.scenario(tables | {"wheels": wheels | {"momentum_limit": 50.0}, "law": [asked("lyapunov", 40)]})
 
 
+BAND = {"form": "bandwidth", "bandwidth": 1, "switching_gain": 1, "damping": 0.5}
+
+
 @pytest.mark.parametrize(
     ("law", "changes", "said"),
     [
@@ -164,11 +167,7 @@ def test_wheels_bound_torque_and_momentum():
         ("pd", {"law[1].time": 1e-30}, "too short"),
         ("pd", {"law[1].form": "bandwith"}, "did you mean bandwidth?"),
         ("pd", {"law[1]": {"type": "pd", "form": "bandwidth", "bandwidth": 1e200}}, "between 1e-30 and 1e+30"),
-        (
-            "sliding",
-            {"law[1]": {"type": "sliding", "form": "bandwidth", "bandwidth": 1, "switching_gain": 1, "damping": 0.5}},
-            "at least 1",
-        ),
+        ("sliding", {"law[1]": {"type": "sliding", **BAND}}, "at least 1"),
     ],
 )
 def test_what_cannot_be_designed_is_one_line(law, changes, said):
