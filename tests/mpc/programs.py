@@ -11,6 +11,7 @@ from scipy.optimize import minimize
 
 from starhold.laws.predictive.problem import Problem
 from starhold.laws.predictive.single import Solution, pose, solve
+from tests.tiers import fewer
 
 
 class Program:
@@ -62,7 +63,7 @@ class Program:
         return np.tile(self.centre + self.bound, self.horizon)
 
 
-SEEDS = range(120)
+SEEDS = range(fewer(120, 3))
 
 
 def by_piqp(program: Program) -> Any:

@@ -9,7 +9,6 @@ from scipy.linalg import solve_discrete_are
 from starhold.algebra.quaternion import normalise
 from starhold.algebra.vector import ZERO
 from starhold.laws import mpc
-from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import Measurement, tracking_torque
 from starhold.parts.craft import make_craft, tensor
 from tests.mpc.setting import CRAFTS, POSITION, WEIGHTS, fresh, seen_at
@@ -31,12 +30,6 @@ def test_riccati_terminal_gives_the_endless_horizon(craft: Any, horizon: int):
     command, memory = mpc.torque(measurement, gains, craft, mpc.remember(gains, craft, period))
     assert command == pytest.approx(best, rel=1e-6)
     assert mpc.counters(memory) == (1, 1, 1, 0, 0)
-
-
-def test_nothing_to_do_at_rest_on_target():
-    for gains in mpc.examples():
-        command, _ = mpc.torque(seen_at((1.0, 0.0, 0.0, 0.0), ZERO), gains, CRAFTS["principal"], fresh(gains))
-        assert command == ZERO
 
 
 @pytest.mark.parametrize("limit", ["axis", "norm"])
@@ -92,29 +85,7 @@ def test_tracking_torque_counts_towards_the_limit(limit: str):
     assert mpc.counters(memory)[mpc.EXHAUSTED] == 0
 
 
-@pytest.mark.parametrize("factors", [(1e3, 1.0, 1.0), (1.0, 1e3, 1.0), (1.0, 1.0, 60.0)])
-def test_units_do_not_matter(factors: tuple[float, float, float]):
-    kg, m, s = factors
-    torque_unit = kg * m**2 / s**2
-    # The limit is active in the one and must be in the other.
-    gains = mpc.Gains(*WEIGHTS, horizon=8)
-    changed = gains._replace(q_rate=tuple(x * s**2 for x in gains.q_rate), r=tuple(x / torque_unit**2 for x in gains.r))
-    craft = make_craft([2.0, 3.0, 4.0], 0.004)
-    other = make_craft([x * kg * m**2 for x in (2.0, 3.0, 4.0)], 0.004 * torque_unit, craft.gravity * m**3 / s**2)
-    q, w = (0.3, 0.8, -0.4, 0.2), (0.05, -0.04, 0.06)
-    measurement = seen_at(q, w, POSITION)
-    seen_other = seen_at(q, tuple(x / s for x in w), tuple(x * m for x in POSITION), 0.1 * s)
-    one = np.array(mpc.torque(measurement, gains, craft, fresh(gains, craft))[0])
-    two = np.array(mpc.torque(seen_other, changed, other, fresh(changed, other, 0.1 * s))[0])
-    assert two / torque_unit == pytest.approx(one, rel=1e-6)
-
-
-def test_gains_are_checked_as_declared():
-    for field in catalogue()["mpc"].fields():
-        if field.gain.choices:
-            assert field.gain.check(field.gain.choices[0]) == 0
-            with pytest.raises(ValueError, match="must be one of"):
-                field.gain.check("other")
+def test_weights_without_a_solution_are_refused():
     with pytest.raises(ValueError, match="no terminal weight"):
         mpc.remember(mpc.Gains((1e-300,) * 3, (0.0,) * 3, (1e300,) * 3), CRAFTS["principal"], 0.1)
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from starhold.algebra.structured import Buffer, repeat
+from starhold.algebra.vector import ZERO
 from starhold.laws import mpc
 from starhold.laws.interface import Measurement
 from starhold.laws.predictive.problem import Problem
@@ -14,7 +15,6 @@ from starhold.laws.predictive.solver import PATIENCE
 from starhold.trace.program import Memory
 from tests.mpc.programs import Program
 from tests.mpc.setting import CRAFTS, WEIGHTS, fresh
-from tests.tiers import leading
 from tests.trace.machines import Job, Subject, column, on_c, on_lanes, on_node, same
 
 LANES, BUDGET = 8, 100
@@ -84,40 +84,9 @@ def jumping_rows(seed: int) -> Any:
         attitude, rate = attitude + 0.05 * random.normal(size=4), rate + 0.006 * random.normal(size=3)
         target, acceleration = random.normal(size=(2, 3)) * ((0.01,), (0.001,))
         turn = attitude / np.linalg.norm(attitude)
-        row[:] = (
-            *turn,
-            *rate,
-            *(rate + target),
-            *target,
-            *acceleration,
-            0.0,
-            0.0,
-            0.0,
-            *random.normal(size=3) * 5e6,
-            PERIOD,
-        )
+        position = random.normal(size=3) * 5e6
+        row[:] = (*turn, *rate, *(rate + target), *target, *acceleration, *ZERO, *position, PERIOD)
     return rows
-
-
-@pytest.mark.parametrize(("shape", "limit"), leading([("full", "norm"), ("principal", "axis"), ("full", "none")]))
-def test_law(shape: str, limit: str):
-    craft = CRAFTS[shape]
-    gains = mpc.Gains(*WEIGHTS[:2], (0.5, 0.5, 0.5), horizon=6, limit=mpc.LIMITS.index(limit))
-    subject = law_over_rows(gains, craft)
-    program = subject.program()
-    memories = {
-        "rows": np.array([jumping_rows(seed).ravel() for seed in range(LANES)]).T,
-        "numbers": np.tile(np.array(fresh(gains, craft, PERIOD).numbers.cells)[:, None], (1, LANES)),
-        "commands": np.zeros((3 * STEPS, LANES)),
-    }
-    columns = [column(program, memories, lane) for lane in range(LANES)]
-    expected = [subject.plain(own, {}, lane) for lane, own in enumerate(columns)]
-    many = on_lanes(Job(program, memories, {}), LANES)
-    for lane, want in enumerate(expected):
-        same(want, on_lanes(Job(program, columns[lane], {})), "one lane")
-        same(want, column(program, many, lane), f"lane {lane}")
-    warm = [want["numbers"][mpc.SHAPED] for want in expected]
-    assert max(warm) == (limit != "none")
 
 
 @pytest.mark.parametrize("language", ["gcc", "node"])

@@ -6,38 +6,26 @@ import pytest
 from tests.mpc.programs import SEEDS, Program, by_clarabel, by_daqp, by_piqp, by_slsqp
 
 
-def test_box_against_two_solvers():
-    pressing = []
+@pytest.mark.parametrize("ball", [False, True])
+def test_against_library_solvers(ball: bool):
+    pressing, slsqp = [], []
     for seed in SEEDS:
         program = Program(seed)
-        plan, cost, _, solved = program.solve(ball=False)
-        away = np.abs(plan - program.centre)
+        plan, cost, _, solved = program.solve(ball=ball)
+        out = plan - program.centre
+        away = np.linalg.norm(out, axis=1) if ball else np.abs(out)
         assert solved
         assert away.max() <= program.bound + 1e-9
         assert cost == pytest.approx(program.cost(plan), rel=1e-9)
         pressing.append(float(np.mean(away > program.bound * (1.0 - 1e-9))))
-        for reference in (by_piqp(program), by_daqp(program)):
-            assert abs(program.cost(plan) - program.cost(reference)) <= 1e-6 * abs(cost), f"seed {seed}"
-    assert np.mean(pressing) > 0.4
-    assert np.mean(np.array(pressing) > 0.0) > 0.8
-
-
-def test_ball_against_two_solvers():
-    pressing, compared = [], 0
-    for seed in SEEDS:
-        program = Program(seed)
-        plan, cost, _, solved = program.solve(ball=True)
-        away = np.linalg.norm(plan - program.centre, axis=1)
-        assert solved
-        assert away.max() <= program.bound + 1e-9
-        pressing.append(float(np.mean(away > program.bound * (1.0 - 1e-9))))
-        assert abs(program.cost(plan) - program.cost(by_clarabel(program))) <= 1e-6 * abs(cost), f"seed {seed}"
-        if program.horizon <= 6:
+        for reference in (by_clarabel,) if ball else (by_piqp, by_daqp):
+            assert abs(program.cost(plan) - program.cost(reference(program))) <= 1e-6 * abs(cost), f"seed {seed}"
+        if ball and program.horizon <= 6:
             # SLSQP is a local method of moderate accuracy: it may fall short, but must never find anything better.
             other = program.cost(by_slsqp(program))
             assert program.cost(plan) <= other + 1e-6 * abs(cost), f"seed {seed}"
-            compared += other <= program.cost(plan) + 1e-6 * abs(cost)
-    assert compared > 0.7 * sum(1 + seed % 20 <= 6 for seed in SEEDS)
+            slsqp.append(other <= program.cost(plan) + 1e-6 * abs(cost))
+    assert not ball or np.mean(slsqp) > 0.7
     assert np.mean(pressing) > 0.4
     assert np.mean(np.array(pressing) > 0.0) > 0.8
 
