@@ -3,29 +3,15 @@
 import itertools
 import math
 
-import pytest
-import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from starhold.algebra import vector
 from starhold.algebra.cosines import from_angles, from_quaternion, to_angles, to_quaternion
-from starhold.algebra.quaternion import multiply, nearer, normalise, stretch, to_body
+from starhold.algebra.quaternion import multiply, nearer, normalise, to_body
 from starhold.algebra.vector import apply, combine, determinant, transpose
-from tests.algebra.readers import (
-    agree,
-    angles,
-    close,
-    directions,
-    from_axis_angle,
-    quaternions,
-    rotation,
-    same,
-    small_vectors,
-    symbols,
-    zero,
-)
+from tests.algebra.readers import agree, angles, close, from_axis_angle, quaternions, rotation, small_vectors, symbols, zero
 
 P, Q, R = symbols("p0:4"), symbols("q0:4"), symbols("r1:4")
 N2 = sum(c * c for c in Q)
@@ -35,15 +21,6 @@ N2 = sum(c * c for c in Q)
 @given(quaternions)
 def test_every_reader_gives_the_same(q):
     agree(to_quaternion, agree(from_quaternion, q))
-
-
-@settings(max_examples=30)
-@given(st.tuples(*[st.tuples(*[st.floats()] * 3)] * 3), st.tuples(*[st.floats()] * 4))
-def test_compiled_equals_floats_for_any_float(a, q):
-    same(from_quaternion, q)
-    size = 1.0 + abs(a[0][0] + a[1][1] + a[2][2])
-    if 0.0 < size < math.inf:
-        same(to_quaternion, vector.combine(0.5 / size, a, 0.0, a))
 
 
 def test_orthogonality_is_exact():
@@ -82,26 +59,13 @@ def test_round_trip_at_every_attitude(q):
     assert max(back) == max(map(abs, back)) or max(map(abs, back)) - max(back) < 1e-15
 
 
-@settings(max_examples=200)
-@given(directions, st.sampled_from((0.0, 1e-16, 1e-12, 1e-9, 1e-8, 1e-7, 1e-4, -1e-12, -1e-8)))
-def test_round_trip_at_half_turns_about_any_axis(axis, short_by):
-    q = from_axis_angle(axis, math.pi - short_by)
-    assert distance(to_quaternion(from_quaternion(q)), q) < 1e-15
-
-
-@pytest.mark.parametrize("components", list(itertools.product((-1.0, 0.0, 1.0), repeat=4))[:40])
-def test_round_trip_where_the_largest_component_ties(components):
-    q = normalise(components)
-    back = to_quaternion(from_quaternion(q))
-    assert distance(back, q) < 1e-15
-    assert close(from_quaternion(back), from_quaternion(q), 1e-15)
-
-
-@given(directions, st.floats(-15.0, -5.0))
-def test_a_small_turn_keeps_its_digits(axis, exponent):
-    q = from_axis_angle(axis, 10.0**exponent)
-    assert distance(to_quaternion(from_quaternion(q)), q) < 3e-16
-    assert close(to_quaternion(from_quaternion(q))[1:], q[1:], 1e-14 * 10.0**exponent)
+def test_round_trip_where_the_largest_component_ties():
+    for components in itertools.product((-1.0, 0.0, 1.0), repeat=4):
+        if any(components):
+            q = normalise(components)
+            back = to_quaternion(from_quaternion(q))
+            assert distance(back, q) < 1e-15
+            assert close(from_quaternion(back), from_quaternion(q), 1e-15)
 
 
 @given(angles, st.floats(-0.5 * math.pi, 0.5 * math.pi), angles)
@@ -138,37 +102,3 @@ def test_gimbal_lock(yaw, roll, sign, short_by):
     assert abs(abs(found[1]) - (0.5 * math.pi - short_by)) < 3e-8
     if short_by <= 1e-9:
         assert found[2] == 0.0
-
-
-@given(directions, angles, st.floats(1e-6, 1e6))
-def test_axis_angle(axis, angle, size):
-    q = from_axis_angle(vector.scale(size, axis), angle)
-    n = vector.scale(1.0 / math.hypot(*axis), axis)
-    witness = Rotation.from_rotvec(vector.scale(angle, n)).as_quat(scalar_first=True).tolist()
-    assert distance(tuple(witness), q) < 2e-15
-    assert close(to_body(q, n), n, 2e-15)
-    assert abs(sum(c * c for c in q) - 1.0) < 2e-15
-
-
-def test_signs_of_small_angles():
-    # Yaw to the left, nose down, right wing down: positive turns about the third, second and first axis.
-    assert to_angles(from_axis_angle((0.0, 0.0, 1.0), 0.1)) == pytest.approx((0.1, 0.0, 0.0), abs=1e-16)
-    assert to_angles(from_axis_angle((0.0, 1.0, 0.0), 0.1)) == pytest.approx((0.0, 0.1, 0.0), abs=1e-16)
-    assert to_angles(from_axis_angle((1.0, 0.0, 0.0), 0.1)) == pytest.approx((0.0, 0.0, 0.1), abs=1e-16)
-    assert to_angles(stretch(-1.0, from_angles(0.3, 0.2, 0.1))) == to_angles(from_angles(0.3, 0.2, 0.1))
-
-
-def test_angle_matrix_symbolically():
-    # The first row of the matrix of yaw, pitch, roll, from elementary turns.
-    yaw, pitch, roll = sympy.symbols("psi theta phi", real=True)
-
-    def turn(axis, angle):
-        half = angle / 2
-        return (sympy.cos(half), *(sympy.sin(half) * int(i == axis) for i in range(3)))
-
-    a = from_quaternion(multiply(multiply(turn(2, yaw), turn(1, pitch)), turn(0, roll)))
-    expected = (sympy.cos(pitch) * sympy.cos(yaw), sympy.cos(pitch) * sympy.sin(yaw), -sympy.sin(pitch))
-    values = {yaw: 0.7, pitch: -0.4, roll: 1.9}
-    for found, wanted in zip(a[0], expected, strict=True):
-        assert float((found - wanted).subs(values)) == pytest.approx(0.0, abs=1e-15)
-    assert float((a[1][2] - sympy.sin(roll) * sympy.cos(pitch)).subs(values)) == pytest.approx(0.0, abs=1e-15)

@@ -23,7 +23,7 @@ from starhold.algebra.quaternion import (
     to_reference,
     vector_part,
 )
-from starhold.algebra.vector import ZERO, add, cross, dot, norm, scale, subtract
+from starhold.algebra.vector import cross, dot
 from tests.algebra.readers import (
     agree,
     angles,
@@ -34,7 +34,6 @@ from tests.algebra.readers import (
     quaternions,
     reduced_by_unit_norm,
     rotation,
-    same,
     small_vectors,
     symbols,
     vectors,
@@ -71,17 +70,6 @@ def test_every_reader_gives_the_same(p, q, r, c):
     agree(stretch, c, q)
 
 
-@settings(max_examples=30)
-@given(st.tuples(*[st.floats()] * 4), st.tuples(*[st.floats()] * 4), st.tuples(*[st.floats()] * 3))
-def test_compiled_equals_floats_for_any_float(p, q, r):
-    for operation in (multiply, relative, nearer):
-        same(operation, p, q)
-    for operation in (to_body, to_reference, derivative):
-        same(operation, q, r)
-    for operation in (conjugate, renormalise, half_angle_sine):
-        same(operation, q)
-
-
 def test_group_axioms_are_exact():
     assert zero(minus(multiply(multiply(P, Q), S), multiply(P, multiply(Q, S))))
     assert multiply((1, 0, 0, 0), Q) == Q
@@ -97,54 +85,12 @@ def test_group_axioms_are_exact():
     assert multiply(i, i) == (-1, 0, 0, 0)
 
 
-@given(quaternions, quaternions, quaternions)
-def test_group_axioms_of_floats(p, q, s):
-    assert close(multiply(multiply(p, q), s), multiply(p, multiply(q, s)), 2e-15)
-    assert multiply(q, NO_TURN) == q
-    assert multiply(NO_TURN, q) == q
-    assert close(multiply(q, conjugate(q)), NO_TURN, 1e-15)
-    assert conjugate(conjugate(q)) == q
-    assert abs(length2(multiply(p, q)) - 1.0) < 4e-15
+@given(quaternions, quaternions)
+def test_products_agree_with_scipy(p, q):
     witness = (rotation(p) * rotation(q)).as_matrix()
     np.testing.assert_allclose(rotation(multiply(p, q)).as_matrix(), witness, rtol=0.0, atol=4e-15)
-
-
-@given(directions, st.floats(-15.0, -5.0))
-def test_small_turns_keep_their_relative_accuracy(axis, exponent):
-    angle = 10.0**exponent
-    n = scale(1.0 / math.hypot(*axis), axis)
-    q = from_axis_angle(axis, angle)
-    assert math.isclose(half_angle_sine(q), 0.5 * angle, rel_tol=1e-10)
-    # The turn of a turn by its own axis doubles; a small error quaternion keeps all its digits.
-    twice = vector_part(multiply(q, q))
-    assert close(twice, scale(angle, n), 1e-10 * angle)
-    assert close(subtract(to_reference(q, R0), R0), scale(angle, cross(n, R0)), 2e-15 + angle**2)
-
-
-R0 = (0.3, -0.7, 0.2)
-
-
-@given(directions, st.sampled_from((0.0, 1e-15, 1e-12, 1e-8, -1e-12, -1e-8)), small_vectors)
-def test_half_turns(axis, short_by, r):
-    n = scale(1.0 / math.hypot(*axis), axis)
-    q = from_axis_angle(axis, math.pi - short_by)
-    mirrored = subtract(scale(2.0 * dot(n, r), n), r)
-    assert close(to_body(q, r), mirrored, 4e-15 + 2.0 * abs(short_by))
-    assert close(to_reference(q, r), mirrored, 4e-15 + 2.0 * abs(short_by))
-    assert abs(q[0]) <= 1e-15 + abs(short_by)
-
-
-@given(quaternions, small_vectors, small_vectors)
-def test_action_is_an_isometry_and_its_inverse_undoes_it(q, r, s):
-    body, other = to_body(q, r), to_body(q, s)
-    assert close(to_reference(q, body), r, 4e-15)
-    assert close(to_body(q, to_reference(q, r)), r, 4e-15)
-    assert close(to_body(conjugate(q), r), to_reference(q, r), 1e-15)
-    assert abs(dot(body, other) - dot(r, s)) < 6e-15
-    assert close(cross(body, other), to_body(q, cross(r, s)), 6e-15)
-    assert to_body(stretch(-1.0, q), r) == body
-    assert to_body(NO_TURN, r) == r
-    assert to_body(q, ZERO) == ZERO
+    assert multiply(q, NO_TURN) == multiply(NO_TURN, q) == q
+    assert conjugate(conjugate(q)) == q
 
 
 @given(quaternions, quaternions, small_vectors)
@@ -180,19 +126,6 @@ def test_kinematics_exactly():
             assert reduced_by_unit_norm(along(x, Q, W) - sign * y, Q) == 0
 
 
-@given(quaternions, small_vectors)
-def test_derivative_against_finite_differences(q, rate):
-    assume(norm(rate) > 1e-3)
-    h = 1e-4
-
-    def after(t):
-        return multiply(q, from_axis_angle(rate, norm(rate) * t))
-
-    central = tuple((x - y) / (2.0 * h) for x, y in zip(after(h), after(-h), strict=True))
-    assert close(derivative(q, rate), central, 1e-8)
-    assert abs(sum(x * y for x, y in zip(q, derivative(q, rate), strict=True))) < 1e-15
-
-
 @given(quaternions, quaternions, small_vectors)
 def test_relative(p, q, r):
     error = relative(p, q)
@@ -220,16 +153,6 @@ def test_renormalise_error_law():
     assert zero(length2(renormalise(Q)) - (1 - 3 * quarter * e**2 + quarter * e**3))
 
 
-@given(quaternions, st.floats(-6.0, -2.0), st.sampled_from((-1.0, 1.0)))
-def test_renormalise_and_normalise_keep_the_direction(q, exponent, sign):
-    e = sign * 10.0**exponent
-    long = stretch(math.sqrt(1.0 + e), q)
-    again = renormalise(long)
-    assert abs(math.sqrt(length2(again)) - (1.0 - 0.375 * e * e)) < abs(e) ** 3 + 1e-15
-    assert close(normalise(long), q, 1e-15)
-    assert close(normalise(again), q, 1e-15)
-
-
 @given(fours)
 def test_normalise(q):
     assume(any(q))
@@ -242,11 +165,3 @@ def test_half_angle(axis, angle):
     q = from_axis_angle(axis, angle)
     assert half_angle_sine(q) == pytest.approx(abs(math.sin(0.5 * angle)), rel=1e-14, abs=1e-150)
     assert 2.0 * math.atan2(half_angle_sine(q), abs(q[0])) == pytest.approx(rotation(q).magnitude(), rel=1e-14, abs=1e-15)
-
-
-def test_batches_of_scipy_rotations():
-    generator = np.random.default_rng(7)
-    for q, r in zip(generator.normal(size=(50, 4)).tolist(), generator.normal(size=(50, 3)).tolist(), strict=True):
-        q, r = normalise(tuple(q)), tuple(r)
-        assert close(to_body(q, r), tuple(rotation(q).inv().apply(r)), 4e-15)
-        assert close(add(to_body(q, r), to_body(q, scale(-1.0, r))), ZERO, 0.0)

@@ -40,11 +40,15 @@ def nested(matrices, v):
 
 
 @pytest.mark.parametrize("count", LENGTHS)
-def test_each_applies_the_equation_to_every_element(count):
+def test_each_element_and_sums_of_all(count):
     @settings(max_examples=20)
     @given(row(count), vectors(count), numbers, st.tuples(numbers, numbers, numbers))
     def check(a, v, slope, offset):
         assert agree(affine, a, v, slope, offset) == tuple(_affine(x, y, slope, offset) for x, y in zip(a, v, strict=True))
+        found = agree(weighted, a, v)
+        for axis in range(3):
+            terms = [x * y[axis] for x, y in zip(a, v, strict=True)]
+            assert found[axis] == pytest.approx(math.fsum(terms), abs=1e-14 * sum(map(abs, terms)) + 1e-300)
 
     check()
 
@@ -52,24 +56,8 @@ def test_each_applies_the_equation_to_every_element(count):
 @settings(max_examples=20)
 @given(vectors(2), vectors(3), st.tuples(numbers, numbers, numbers))
 def test_elements_may_differ_in_length(a, b, v):
+    assert nested((), v) == ()
     assert same(nested, (a, b), v) == ((dot(a[0], v), dot(a[1], v)), tuple(dot(x, v) for x in b))
-
-
-def test_nothing_to_apply_to():
-    assert nested((), (1.0, 2.0, 3.0)) == ()
-
-
-@pytest.mark.parametrize("count", LENGTHS)
-def test_weighted_sums(count):
-    @settings(max_examples=20)
-    @given(row(count), vectors(count))
-    def check(w, v):
-        found = agree(weighted, w, v)
-        for axis in range(3):
-            terms = [x * y[axis] for x, y in zip(w, v, strict=True)]
-            assert found[axis] == pytest.approx(math.fsum(terms), abs=1e-14 * sum(map(abs, terms)) + 1e-300)
-
-    check()
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """Whole states: moved and flattened; compiled code does what plain Python does."""
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,7 +35,6 @@ class Body(NamedTuple):
 
 SIZE = 4 + 4 + 8 + 1
 LIKE = unflatten([0.0] * SIZE, Body((0.0,) * 4, Pair((0.0,) * 3, 0.0), Empty(), (), (Pair((0.0,) * 3, 0.0),) * 2, 0.0))
-LANE_COUNTS = (1, 7, 8, 9, 100)
 
 states = st.lists(numbers, min_size=SIZE, max_size=SIZE).map(lambda x: unflatten(x, LIKE))
 any_states = st.lists(st.floats(), min_size=SIZE, max_size=SIZE).map(lambda x: unflatten(x, LIKE))
@@ -92,20 +90,15 @@ def test_every_reader_moves_alike(state, rate, step):
     agree(move, state, step, without(rate, 5))
 
 
-def test_move_symbols_and_numbers():
+def test_move_symbols():
     x, h, r = sympy.symbols("x h r")
     assert move((x, (x, 2 * x)), h, (r, None)) == (x + h * r, (x, 2 * x))
-    assert same(move, 1.0, 0.5, 3.0) == 2.5
-    assert same(move, 1.0, 0.5, None) == 1.0
-    assert same(move, Empty(), 0.5, Empty()) == Empty()
-    assert math.isnan(same(move, (math.nan,), 0.0, (1.0,))[0])
 
 
 def test_move_refuses_a_rate_of_another_shape():
-    with pytest.raises(ValueError, match="zip"):
-        move((1.0, 2.0), 0.1, (1.0,))
-    with pytest.raises(ValueError, match="zip"):
-        move((1.0, 2.0), 0.1, (1.0, 2.0, 3.0))
+    for rate in ((1.0,), (1.0, 2.0, 3.0)):
+        with pytest.raises(ValueError, match="zip"):
+            move((1.0, 2.0), 0.1, rate)
 
 
 @given(st.lists(st.floats(), min_size=SIZE, max_size=SIZE))
@@ -138,7 +131,7 @@ def test_buffers_change_in_place():
     assert memory.plan[0] == 2.0
 
 
-@pytest.mark.parametrize("lanes", LANE_COUNTS)
+@pytest.mark.parametrize("lanes", [1, 8, 9])
 def test_every_lane_moves_as_one_state_does(lanes):
     columns = np.random.default_rng(lanes).normal(size=(SIZE, lanes))
     rate = unflatten(np.random.default_rng(1).normal(size=SIZE), LIKE)._replace(inner=None)

@@ -10,16 +10,7 @@ from scipy.optimize import minimize, minimize_scalar
 
 from starhold.algebra.vector import norm
 from starhold.parts.bodies.libration_point import EARTH_DIAMETER, PRIMARIES, linear, nonlinear
-from starhold.synthesis.circle import (
-    Station,
-    best_rate,
-    demand,
-    peak_required,
-    pressure_at,
-    rates_held,
-    required,
-    time_on_limit,
-)
+from starhold.synthesis.circle import Station, best_rate, demand, peak_required, rates_held, required, time_on_limit
 
 PAIR = PRIMARIES["sun-earth"]
 PLANT = PAIR.point()
@@ -34,15 +25,7 @@ def test_the_best_rate_and_the_peak_demand_by_formula():
     for plant in (PLANT, PUBLISHED):
         assert best_rate(plant) == pytest.approx(math.sqrt(plant.stiffness - 2.0))
         assert demand(best_rate(plant), plant) == pytest.approx(2.0 * math.sqrt(plant.stiffness - 1.0))
-    assert best_rate(PUBLISHED) == pytest.approx(1.393, abs=5e-4)
-    assert demand(best_rate(PUBLISHED), PUBLISHED) == pytest.approx(3.429, abs=5e-4)
     assert round(PLANT.stiffness, 2) == 3.94
-
-
-def test_the_factor_printed_as_2_786_is_the_coriolis_part_alone():
-    rate = best_rate(PUBLISHED)
-    assert 2.0 * rate == pytest.approx(2.786, abs=5e-4)
-    assert math.sqrt(4.0 * rate**2 + (3.94 - rate**2) ** 2) == pytest.approx(3.429, abs=5e-4)
 
 
 @pytest.mark.parametrize("radius", [0.5, 1.0, 3.0])
@@ -58,7 +41,6 @@ def test_the_best_rate_and_the_peak_demand_by_optimisation(radius):
     found = minimize_scalar(peak, bounds=(0.1, 3.0), method="bounded", options={"xatol": 1e-8})
     assert found.x == pytest.approx(best_rate(PUBLISHED), abs=1e-4)
     assert found.fun == pytest.approx(3.429 * radius, abs=5e-4 * radius)
-    assert found.fun == pytest.approx(2.0 * math.sqrt(2.94) * radius, rel=1e-9)
 
 
 @given(rates, st.sampled_from(["sun-earth", "sun-jupiter", "earth-moon"]), st.sampled_from(["L1", "L2"]))
@@ -106,6 +88,9 @@ def test_area_per_kilogram_as_published():
     plain = Station(PAIR, "L2", 2.0e7, full_pressure=4.5e-6)
     per_diameter = [plain.area_per_mass(specular=part) * EARTH_DIAMETER / 2.0e7 for part in (1.0, 0.83, 0.5)]
     assert per_diameter == pytest.approx([0.5, 0.6, 1.0], rel=0.01)
+    assert HERE.margin(HERE.area_per_mass() * 300.0, 300.0) == pytest.approx(1.0)
+    assert HERE.period() / 86400.0 == pytest.approx(365.2568 / 1.39303, rel=1e-5)
+    assert HERE.pressure == pytest.approx(0.987 * 4.45e-6, rel=1e-3)
 
 
 def test_the_light_at_the_earth():
@@ -118,21 +103,6 @@ def test_the_light_at_the_earth():
     between = Station(PAIR, "L1", EARTH_DIAMETER)
     assert between.light(0.0) == 1.0
     assert between.clear_radius == 0.0
-
-
-def test_pressure():
-    assert pressure_at(149_597_870_700.0) == pytest.approx(4.54e-6, rel=1e-3)
-    assert CLEAR.pressure == pytest.approx(4.45e-6, rel=1e-3)
-    assert HERE.pressure == pytest.approx(0.987 * 4.45e-6, rel=1e-3)
-    assert Station(PAIR, "L2", 2.0e7, full_pressure=4.5e-6).pressure == pytest.approx(4.5e-6)
-
-
-def test_period_margin_and_the_table_over_the_rate():
-    assert HERE.period() / 86400.0 == pytest.approx(365.2568 / 1.39303, rel=1e-5)
-    assert HERE.margin(HERE.area_per_mass() * 300.0, 300.0) == pytest.approx(1.0)
-    assert HERE.area_per_mass(2.0) / HERE.area_per_mass() == pytest.approx(demand(2.0, PLANT) / demand(HERE.rate, PLANT))
-    mixed = Station(PAIR, "L2", EARTH_DIAMETER, 0.83, 0.17)
-    assert mixed.area_per_mass(specular=0.9) < mixed.area_per_mass() < HERE.area_per_mass(specular=0.83)
 
 
 @pytest.mark.parametrize("missing", [-0.2, -0.05, 0.0, 0.02, 0.05, 0.1, 0.5])
@@ -151,9 +121,3 @@ def test_what_a_deficit_leaves(station, missing):
     assert spare(left.radius_dimmed) == pytest.approx(0.0, abs=1e-9)
     above = np.linspace(left.radius_dimmed * 1.0001, 3.0 * station.radius, 400).tolist()
     assert max(spare(radius) for radius in above) < 0.0
-
-
-def test_a_tenth_less_control_than_a_circle_of_earth_size_asks_for():
-    left = HERE.deficit(0.1)
-    assert left.on_limit == pytest.approx(0.3012, abs=1e-4)
-    assert left.radius_dimmed == pytest.approx(1.00715e7, rel=1e-4)

@@ -12,7 +12,6 @@ from starhold.synthesis.sail import (
     LAMBERT,
     MIRROR_CENTRE,
     MIRROR_RADIUS,
-    Sail,
     Setting,
     ball,
     cone_for,
@@ -105,11 +104,8 @@ def test_a_mirror_in_closed_form(cone, clock):
     assert set_for(force_of(setting, MIRROR), MIRROR)[:2] == pytest.approx(setting[:2])
 
 
-def test_no_force_takes_no_panel():
-    assert set_for((0.0, 0.0, 0.0), MIRROR) == Setting(0.0, 0.0, 0.0)
-
-
 def test_forces_that_cannot_be_had():
+    assert set_for((0.0, 0.0, 0.0), MIRROR) == Setting(0.0, 0.0, 0.0)
     with pytest.raises(ValueError, match="needs 300 m2 of sail"):
         set_for(tuple(2.0 * x for x in force_of(Setting(150.0, 0.3, 0.0), MIRROR)), MIRROR)
     for sail in (MIRROR, make_sail(PRESSURE, 150.0, 300.0, 0.5)):
@@ -151,20 +147,11 @@ def test_the_ball_of_a_mirror():
     assert ball(1.0 - 1e-12, 0.0).radius == pytest.approx(MIRROR_RADIUS, rel=1e-10)
 
 
-@given(st.floats(0.05, 0.999))
-def test_without_scattering_the_ball_is_that_of_a_mirror_times_the_reflectivity(specular):
-    assert ball(specular, 0.0).radius == pytest.approx(specular * MIRROR_RADIUS, rel=1e-10)
-
-
-def test_the_ball_of_a_white_surface():
-    """Its forces fill a segment of light and a circle: 2/3 c normal has the diameter 2/3."""
-    assert ball(0.0, 1.0).radius == pytest.approx(1.0 / 3.0, rel=1e-10)
-
-
 @settings(max_examples=30)
 @given(optics)
 @example((0.83, 0.05))
 @example((1.0, 0.0))
+@example((0.0, 1.0))
 def test_the_ball_is_the_largest_by_trying_them_all(reflected):
     found = ball(*reflected)
     curve = outline(*reflected, 4001)
@@ -188,13 +175,6 @@ def test_the_light_of_equal_discs(offset):
     assert lit(offset) == pytest.approx(1.0 - 2.0 / math.pi * (math.acos(s) - s * math.sqrt(1.0 - s * s)))
     assert lit(offset) == pytest.approx(lit_discs(offset, 1.0, 1.0), abs=1e-12)
     assert lit(-offset) == lit(offset)
-
-
-def test_the_light_grows_from_none_to_all():
-    light = lit(np.linspace(0.0, 3.0, 301))
-    assert light[0] == 0.0
-    assert (np.diff(light[:201]) > 0.0).all()
-    assert (light[200:] == 1.0).all()
 
 
 @settings(max_examples=30)
@@ -225,7 +205,3 @@ def test_the_light_of_discs_by_counting_points(body, part):
 def test_what_is_no_sail_is_refused(numbers, said):
     with pytest.raises(ValueError, match=said):
         make_sail(*numbers)
-
-
-def test_make_sail_gives_floats():
-    assert make_sail(1, 2, 3) == Sail(1.0, 2.0, 3.0, 1.0, 0.0)
