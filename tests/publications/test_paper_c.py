@@ -6,7 +6,6 @@ from scipy.optimize import differential_evolution
 
 from starhold.publications.desk import Desk
 from starhold.publications.papers.C import measures
-from starhold.publications.reproduction import reproduce
 
 
 def slowest(gains, ratios):
@@ -35,9 +34,3 @@ def test_dotted_lines_are_of_equal_degree():
         eta = float(line.label.split("=")[1])
         # The end of the first leg lies beyond the picture; from the corner on all is of this degree.
         assert all(slowest(gains, ratios) == pytest.approx(eta, rel=2e-3) for gains in zip(line.x, line.y, strict=True))
-
-
-def test_verdicts_are_those_recorded():
-    made = reproduce("C")
-    assert made.changed == []
-    assert set(made.files) == {"three-wheels"}

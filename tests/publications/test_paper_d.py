@@ -7,26 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from starhold.publications.desk import Desk
-from starhold.publications.paper import read_paper
 from starhold.publications.papers.D import measures, placement
 from starhold.publications.papers.D.placement import Case, Spectra
-from starhold.publications.reproduction import measure_of
-from starhold.publications.verdicts import judge
 
-PAPER = read_paper("D")
-SEARCHES = {
-    "coefficients",
-    "in_whole_steps",
-    "inside_the_interval",
-    "least_squares",
-    "no_other_step",
-    "off_the_printed_fit",
-    "printed_fit_flies",
-    "roots_over_angle",
-    "times_over_angle",
-    "which_limit",
-}
-"""Measures that want one of the two searches, which take most of the time."""
 START = np.r_[0.3, -0.5, 0.8]
 END = math.radians(0.1)
 INERTIA = np.array([[3100.0, 200.0, -90.0], [200.0, 4700.0, 150.0], [-90.0, 150.0, 3900.0]])
@@ -97,21 +80,3 @@ def test_a_curve_is_found_again_from_three_of_its_points(wanted):
     angles = np.array([0.2, 0.7, 1.5])
     c, d, e = wanted
     assert measures.through(angles, c * np.exp(d * angles) + e) == pytest.approx(wanted, rel=1e-7)
-
-
-def verdict(desk, row):
-    return judge(measure_of("D", row)(desk, **row.given), row.printed, row.tolerance)
-
-
-@pytest.mark.parametrize("row", [row for row in PAPER.rows if row.by not in SEARCHES], ids=lambda row: row.name)
-def test_verdicts(desk, row):
-    assert verdict(desk, row) == row.verdict
-
-
-@pytest.mark.slow
-def test_verdicts_and_figures_of_the_search(desk):
-    changed = {row.name for row in PAPER.rows if row.by in SEARCHES and verdict(desk, row) != row.verdict}
-    assert changed == set()
-    roots, times = (measure_of("D", item)(desk) for item in PAPER.figures if item.by in SEARCHES)
-    assert len(roots.panels) == 2
-    assert [len(curve.x) for curve in times.panels[0].curves] == [35, 35]

@@ -8,25 +8,11 @@ from scipy.linalg import expm
 
 from starhold.certification.invariant import System, load
 from starhold.publications.desk import Desk
-from starhold.publications.paper import read_paper
 from starhold.publications.papers.E import loops, stations, sunlight
-from starhold.publications.reproduction import measure_of, reproduce
-from starhold.publications.verdicts import judge
 from starhold.studies.phase_portraits import paths
 
 DESK = Desk("E")
 BELOW = np.array([[0.0, 1.0], [-2.0, -3.0]])
-COSTLY = {
-    "theorem",
-    "theorems",
-    "largest_level",
-    "definition",
-    "all_come",
-    "where_from",
-    "sail_keeps",
-    "sail_figure",
-    "figure_5",
-}
 
 
 @pytest.mark.parametrize("c", [0.05, 0.4, 0.95])
@@ -127,17 +113,3 @@ def test_angles_of_discs_are_those_of_right_triangles():
     # 1.5 million km beyond the Earth, 149.6 million km from the Sun.
     assert earth == pytest.approx(math.degrees(2.0 * math.atan(6371.0 / 1.5076e6)), rel=1e-3)
     assert sun == pytest.approx(math.degrees(2.0 * math.atan(695_700.0 / (149.6e6 + 1.5076e6))), rel=1e-3)
-
-
-def test_cheap_verdicts_are_those_recorded():
-    rows = [row for row in read_paper("E").rows if row.by not in COSTLY]
-    assert len(rows) > 30
-    found = {row.name: judge(measure_of("E", row)(DESK, **row.given), row.printed, row.tolerance) for row in rows}
-    assert found == {row.name: row.verdict for row in rows}
-
-
-@pytest.mark.slow
-def test_all_verdicts_are_those_recorded():
-    made = reproduce("E")
-    assert [judged.row.name for judged in made.changed] == []
-    assert set(made.files) == {"near-the-edge", "l2-circle", "l2-deficit", "l2-equilibrium"}

@@ -3,6 +3,7 @@
 import inspect
 import json
 
+import numpy as np
 import pytest
 from pydantic import ValidationError
 
@@ -13,8 +14,8 @@ from starhold.publications.drawing import draw
 from starhold.publications.figure import Curve, Figure, Panel
 from starhold.publications.page import index_page
 from starhold.publications.paper import PAPERS, Paper, folder_of, read_paper, scenario_files
-from starhold.publications.reproduction import Judged, Reproduction, measure_of
-from starhold.publications.verdicts import VERDICTS, Finding
+from starhold.publications.reproduction import Judged, Reproduction, measure_of, reproduce
+from starhold.publications.verdicts import VERDICTS, Finding, judge
 from starhold.scenario.reading import parse
 from tests.browser import Browser
 from tests.running import starhold
@@ -31,6 +32,30 @@ def test_every_item_has_a_measure_that_takes_what_it_is_given(letter):
     for item in (*paper.rows, *paper.figures):
         inspect.signature(measure_of(letter, item)).bind(Desk(letter), **item.given)
         assert all(one.value == one.value for one in getattr(item, "printed", []))
+
+
+ONE = {"A": "riccati-I", "B": "gains", "C": "example", "D": "time", "E": "steepest-law"}
+FILES = {
+    "A": {"stabilisation", "skew-axes", "disturbed"},
+    "C": {"three-wheels"},
+    "E": {"near-the-edge", "l2-circle", "l2-deficit", "l2-equilibrium"},
+}
+
+
+@pytest.mark.parametrize("letter", PAPERS)
+def test_a_row_has_the_verdict_recorded(letter):
+    (row,) = (row for row in read_paper(letter).rows if row.name == ONE[letter])
+    assert judge(measure_of(letter, row)(Desk(letter), **row.given), row.printed, row.tolerance) == row.verdict
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("letter", PAPERS)
+def test_every_row_has_the_verdict_recorded(letter):
+    made = reproduce(letter)
+    assert made.changed == []
+    assert FILES.get(letter, set(made.files)) == set(made.files)
+    curves = [curve for figure in made.figures.values() for panel in figure.panels for curve in panel.curves]
+    assert all(np.isfinite(np.asarray(curve.y, dtype=float)).any() for curve in curves)
 
 
 @pytest.mark.parametrize("letter", PAPERS)

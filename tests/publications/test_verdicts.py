@@ -48,16 +48,10 @@ def test_several_numbers_get_the_worst_of_their_verdicts():
     assert judge(Finding([1.01, 2.3]), printed, 0.1) == "differs"
 
 
-@pytest.mark.parametrize(
-    ("value", "verdict"),
-    [
-        (True, "holds"),
-        (False, "fails"),
-        ({"a": True}, "holds"),
-        ({"a": True, "b": False}, "depends"),
-        ({"a": False}, "fails"),
-    ],
-)
+STATEMENTS = [(True, "holds"), (False, "fails"), ({"a": True}, "holds"), ({"a": True, "b": False}, "depends")]
+
+
+@pytest.mark.parametrize(("value", "verdict"), [*STATEMENTS, ({"a": False}, "fails")])
 def test_verdict_on_a_statement(value, verdict):
     assert judge(Finding(value), [], 0.0) == verdict
 
