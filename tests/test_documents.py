@@ -7,7 +7,6 @@ import shlex
 import subprocess
 import sys
 import tomllib
-from functools import cache
 from pathlib import Path
 
 import pytest
@@ -29,7 +28,6 @@ from starhold.certification.wording import HEADINGS, sentence
 from starhold.cli.main import app
 from starhold.conformance.suite import examine
 from starhold.laws.catalogue import catalogue, from_file
-from starhold.parts.catalogue import PACKAGES, parts
 from starhold.scenario.building import build
 from starhold.scenario.campaign import DISTRIBUTIONS
 from starhold.scenario.checking import RENAMED
@@ -102,11 +100,20 @@ def test_script_with_workers_of_the_campaigns_page_runs(acceptance):
 
 
 def test_commands_of_the_campaigns_page_are_commands(acceptance):
+    assert known_commands(re.findall(r"^starhold .*$", read("docs/campaigns.md"), flags=re.MULTILINE)) == {
+        "campaign",
+        "query",
+        "rerun",
+    }
+
+
+def known_commands(lines):
+    """The names of printed commands, after a check that they have the arguments and options of their lines."""
     known = typer.main.get_command(app).commands
-    lines = [shlex.split(line) for line in re.findall(r"^starhold .*$", read("docs/campaigns.md"), flags=re.MULTILINE)]
-    assert {name for _, name, *_ in lines} == {"campaign", "query", "rerun"}
-    for _, name, *words in lines:
+    for start, name, *words in map(shlex.split, lines):
+        assert start == "starhold"
         known[name].make_context(name, words)
+    return {line.split()[1] for line in lines}
 
 
 def keys_of_the_templates():
@@ -118,7 +125,6 @@ def keys_of_the_templates():
                 yield from re.findall(r"^(?:# )?(\w+) = ", keys, flags=re.MULTILINE)
 
 
-LAWS = [*catalogue(), *catalogue("libration-point")]
 COUNTED = {3: "three", 10: "ten", 11: "eleven", 12: "twelve", 13: "thirteen", 14: "fourteen", 15: "fifteen"}
 FAILURES = (0, 1, 2, 5, 10)
 FORMULAS = {
@@ -134,7 +140,6 @@ FORMULAS = {
 }
 """As the papers print them; Formula has compared each with the components of the equations."""
 NAMED = {
-    "README.md: laws": lambda: [f"| [`{name}`](docs/laws/{name}.md) |" for name in LAWS],
     "docs/campaigns.md: distributions": lambda: [f"| `{name}` |" for name in (*DISTRIBUTIONS, *SAMPLINGS)],
     "docs/campaigns.md: metrics": lambda: [
         f"`{metric}" for metric in (*make_meter(1, 1.0, "axis", (1.0, 1.0), wheels=True).table, *EXTRAS, LOST, CONE)
@@ -143,10 +148,7 @@ NAMED = {
         f"| {' | '.join(str(needed(0.9973, share, k)) for k in FAILURES)} |"
         for needed, share in ((runs_needed, 0.1), (runs_to_meet, 0.9))
     ],
-    "docs/laws.md: laws": lambda: [f"[`{law}`](laws/{law}.md)" for law in LAWS],
     **{f"docs/laws/{law}.md: formulas": lambda law=law: FORMULAS[law] for law in FORMULAS},
-    "docs/parts.md: parts": lambda: [f"[`{name}`](parts/{name}.md)" for role in PACKAGES for name in parts(role)],
-    "docs/parts/gyro.md: numbers": lambda: ["| `bias_walk` | rad/s |"],
     "docs/api.md: functions": lambda: [f"### sh.{name}\n" for name in set(sh.__all__) - {"InputError", "__version__"}],
     "docs/keys.md: keys": lambda: [f"| `{key}` |" for key in keys_of_the_templates()],
     "paper/paper.md: counts": lambda: [
@@ -189,15 +191,9 @@ def commands():
 
 
 def test_commands_of_the_readme_are_commands():
-    """Every printed command has the arguments and options that its line gives; a slow test runs them."""
-    known = typer.main.get_command(app).commands
-    lines = [shlex.split(line) for line in commands()]
-    assert len(lines) >= 15
-    for start, name, *words in lines:
-        assert start == "starhold"
-        known[name].make_context(name, words)
-    # All but those that lists or schemas come from, and an old name.
-    assert set(known) - {name for _, name, *_ in lines} <= {"schema", "wheels", "check-law"}
+    """All but those that lists or schemas come from, and an old name; a slow test runs them."""
+    assert len(commands()) >= 15
+    assert {*typer.main.get_command(app).commands} - known_commands(commands()) <= {"schema", "wheels", "check-law"}
 
 
 @pytest.mark.slow
@@ -205,9 +201,8 @@ def test_commands_of_the_readme_run_from_top_to_bottom(tmp_path):
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     for line in commands():
-        done = subprocess.run(
-            line, shell=True, cwd=tmp_path, env={**os.environ, "PATH": path}, capture_output=True, text=True
-        )
+        settings = {"cwd": tmp_path, "env": {**os.environ, "PATH": path}, "capture_output": True, "text": True}
+        done = subprocess.run(line, shell=True, **settings)
         # The template's laws are not all decided, which `certify` says by its exit code.
         assert done.returncode == (4 if line.startswith("starhold certify") else 0), (line, done.stderr)
         assert "Traceback" not in done.stderr, line
@@ -226,61 +221,50 @@ def pages():
     return [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md")), ROOT / "benchmarks" / "README.md"]
 
 
-@pytest.mark.parametrize("page", pages(), ids=lambda page: page.name)
-def test_every_link_leads_somewhere_in_the_clone(page):
+def anchors(path):
+    """The places in a page that links may lead to."""
+    headings = re.findall(r"^#+ (.+)$", path.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    return {"", *(re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings)}
+
+
+def test_every_link_leads_somewhere_in_the_clone():
     kept = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True).stdout.splitlines()
-    text = re.sub(r"```.*?```|`[^`]*`", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
-    for link in re.findall(r"\]\(([^)]+)\)", text):
-        if link.startswith(("https://", "http://")):
-            continue
-        name, _, anchor = link.partition("#")
-        found = page if not name else (page.parent / name).resolve()
-        assert found.is_relative_to(ROOT), link
-        if kept:
-            assert str(found.relative_to(ROOT)) in kept, link
-        assert found.is_file(), link
-        if anchor:
-            headings = re.findall(r"^#+ (.+)$", found.read_text(encoding="utf-8"), flags=re.MULTILINE)
-            assert anchor in {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}, link
+    for page in pages():
+        text = re.sub(r"```.*?```|`[^`]*`", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+        for link in re.findall(r"\]\((?!https?://)([^)]+)\)", text):
+            name, _, anchor = link.partition("#")
+            found = page if not name else (page.parent / name).resolve()
+            assert found.is_file(), (page, link)
+            assert not kept or str(found.relative_to(ROOT)) in kept, (page, link)
+            assert not anchor or anchor in anchors(found), (page, link)
 
 
-@pytest.mark.parametrize("name", ["run", "compare", "certify", "campaign", "failures", "budget", "modal-roots", "invariant"])
-def test_help_says_where_results_go(name):
-    known = typer.main.get_command(app).commands[name]
-    (output,) = (option for option in known.params if option.name == "output")
-    assert "else results/" in output.help
+def test_help_says_where_results_go():
+    for name in ("run", "compare", "certify", "campaign", "failures", "budget", "modal-roots", "invariant"):
+        (output,) = (option for option in typer.main.get_command(app).commands[name].params if option.name == "output")
+        assert "else results/" in output.help, name
 
 
-@pytest.mark.parametrize("name", PAGES)
-def test_generated_page_is_as_the_code_says(name):
-    assert PAGES[name]() == read(f"docs/{name}"), (
-        f"docs/{name} is not what the code says; write it anew: python docs/generate.py"
-    )
-
-
-@pytest.mark.parametrize("name", FILLED)
-def test_tables_inside_a_page_are_as_the_code_says(name):
+@pytest.mark.parametrize("name", [*PAGES, *FILLED])
+def test_page_is_as_the_code_says(name):
     page = read(f"docs/{name}")
-    assert "<!-- written by docs/generate.py: " in page
-    assert filled(page) == page, f"docs/{name} is not what the code says; write it anew: python docs/generate.py"
+    assert name in PAGES or "<!-- written by docs/generate.py: " in page
+    told = PAGES[name]() if name in PAGES else filled(page)
+    assert told == page, f"docs/{name} is not what the code says; write it anew: python docs/generate.py"
 
 
-@pytest.mark.parametrize("folder", ["laws", "parts"])
-def test_no_page_is_left_of_what_is_gone(folder):
-    kept = {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs" / folder).iterdir()}
-    assert kept == {name for name in PAGES if name.startswith(f"{folder}/")}
+def test_no_page_is_left_of_what_is_gone():
+    kept = {
+        path.relative_to(ROOT / "docs").as_posix() for name in ("laws", "parts") for path in (ROOT / "docs" / name).iterdir()
+    }
+    assert kept == {name for name in PAGES if name.startswith(("laws/", "parts/"))}
 
 
 @pytest.mark.parametrize("name", ["ARCHITECTURE.md", "CONTRIBUTING.md", "docs/changing.md"])
 def test_files_that_pages_for_maintainers_name_are_there(name):
-    named = re.findall(r"`((?:src|tests|docs|examples)/[\w./-]+)`", read(name))
-    assert [path for path in named if not (ROOT / path).exists()] == []
-
-
-def test_each_law_and_part_has_a_page():
-    for kind, names in (("laws", LAWS), ("parts", [name for role in PACKAGES for name in parts(role)])):
-        for name in names:
-            assert read(f"docs/{kind}/{name}.md").startswith(f"# {name}: ")
+    named = re.findall(r"`([\w.-]+/[\w./-]+\.\w+|(?:src|tests|docs|examples)/[\w./-]+)`", read(name))
+    assert [path for path in named if not any((ROOT / place / path).exists() for place in ("", "src/starhold"))] == []
+    assert len(read("ARCHITECTURE.md").splitlines()) <= 95
 
 
 def test_a_formula_that_is_not_the_law_is_not_found():
@@ -296,15 +280,6 @@ def test_laws_are_printed_without_conditions_that_hold_anyway():
     assert not [text for text in ("ITE", r"\tilde{\infty}", "not printed here") if text in page]
 
 
-def test_page_of_commands_has_every_option():
-    for name, command in typer.main.get_command(app).commands.items():
-        section = read("docs/commands.md").partition(f"## starhold {name}\n")[2].partition("\n## ")[0]
-        assert section, name
-        for parameter in command.params:
-            for option in parameter.opts if parameter.param_type_name == "option" else []:
-                assert f"`{option}`" in section, (name, option)
-
-
 def test_example_of_parts_flies(tmp_path):
     """The scenario of the page about scenario files, with what it says is recorded."""
     (example,) = (text for text in blocks("docs/scenarios.md", "toml") if "[[part]]" in text)
@@ -317,22 +292,14 @@ def test_example_of_parts_flies(tmp_path):
     assert abs(float(run["complementary_filter_gyro_bias"][-1, 0]) - 1.75e-4) < 5e-5
 
 
-WITH_EFFECTORS = """
-[wheels]
-layout = "pyramid"
-inertia = 2.2e-5
-torque_limit = 0.002
-momentum_limit = 0.015
-[[part]]
-type = "magnetometer"
-[[part]]
-type = "magnetorquers"
-dipole_limit = 0.2
-[[part]]
-type = "magnetic-unloading"
-dipole_limit = 0.2
-gain = 1e-3
-"""
+WITH_EFFECTORS = {
+    "wheels": {"layout": "pyramid", "inertia": 2.2e-5, "torque_limit": 0.002, "momentum_limit": 0.015},
+    "part": [
+        {"type": "magnetometer"},
+        {"type": "magnetorquers", "dipole_limit": 0.2},
+        {"type": "magnetic-unloading", "dipole_limit": 0.2, "gain": 1e-3},
+    ],
+}
 
 
 def test_mission_of_the_page_about_modes_flies():
@@ -346,8 +313,8 @@ def test_mission_of_the_page_about_modes_flies():
         "mission: sun to nadir",
     ]
     # Those with effectors of their own fly on a spacecraft that has them.
-    with_effectors = tomllib.loads(example.partition("[[law.mode]]")[0] + WITH_EFFECTORS + rods)
-    (flight,) = sh.compare(sh.scenario(with_effectors).with_({"simulation.duration": 60}))
+    with_effectors = tomllib.loads(example.partition("[[law.mode]]")[0] + rods)
+    (flight,) = sh.compare(sh.scenario(with_effectors | WITH_EFFECTORS).with_({"simulation.duration": 60}))
     assert [one.mode for one in flight.modes] == ["detumble"]
 
 
@@ -418,15 +385,6 @@ def test_architecture_draws_the_layers_as_they_are():
     assert {name for layer in layers for name in re.findall(r"\w+", layer)} == there - {"__init__", "__main__"}
 
 
-def test_files_that_architecture_names_are_there():
-    text = read("ARCHITECTURE.md")
-    named = {name for name in re.findall(r"`([\w/]+\.py)`", text) if "/" in name}
-    assert len(named) > 10
-    for name in named:
-        assert (ROOT / name).is_file() or (ROOT / "src" / "starhold" / name).is_file(), name
-    assert len(text.splitlines()) <= 95
-
-
 def test_changelog_names_all_that_was_renamed():
     assert dict(re.findall(r"^ *\| `([\w-]+)` \| `([\w-]+)` \|$", read("CHANGELOG.md"), flags=re.MULTILINE)) == RENAMED
 
@@ -447,30 +405,16 @@ def test_glossary_has_each_term_once_in_both_languages():
         assert meaning.endswith("."), term
 
 
-@cache
-def written():
-    """The text of README, of the pages but the glossary, and of the source, with the names of its files."""
+def test_words_of_the_glossary_are_used_and_its_keys_are_keys():
+    """In another page or in the source, be it as part of a name; what stands in code type is a key of scenario files, of
+    gains or of certificates. Every role of a loop, which has a folder of parts, has a word."""
     pages = [path for path in (ROOT / "docs").glob("*.md") if path.name != "glossary.md"]
     files = [ROOT / "README.md", *pages, *(ROOT / "src").rglob("*.py")]
-    return "\n".join(f"{path.relative_to(ROOT)}\n{path.read_text(encoding='utf-8')}" for path in files)
-
-
-@pytest.mark.parametrize("term", [row[0] for row in glossary()])
-def test_word_of_the_glossary_is_used(term):
-    """In another page or in the source, be it as part of a name."""
-    assert re.search(re.escape(term).replace(r"\ ", r"[\s_-]+"), written(), re.IGNORECASE)
-
-
-def test_keys_of_the_glossary_are_keys():
-    """What stands in code type is a key of scenario files, of laws' gains or of certificates."""
+    written = "\n".join(f"{path.relative_to(ROOT)}\n{path.read_text(encoding='utf-8')}" for path in files)
     for term, _, meaning in glossary():
+        assert re.search(re.escape(term).replace(r"\ ", r"[\s_-]+"), written, re.IGNORECASE), term
         for key in re.findall("`(.*?)`", meaning):
-            assert re.search(rf"\b{key}\b *[:=]|\"{key}\"", written()), (term, key)
-
-
-def test_every_role_has_a_word_in_the_glossary():
-    """The folders of `parts` are the roles of a loop."""
-    folders = {path.name for path in (ROOT / "src" / "starhold" / "parts").iterdir() if (path / "__init__.py").is_file()}
-    roles = {{"bodies": "body"}.get(name, name.rstrip("s")) for name in folders}
+            assert re.search(rf"\b{key}\b *[:=]|\"{key}\"", written), (term, key)
+    roles = {path.parent.name for path in (ROOT / "src" / "starhold" / "parts").glob("*/__init__.py")}
     assert len(roles) >= 7
-    assert roles <= {row[0] for row in glossary()}
+    assert {{"bodies": "body"}.get(name, name.rstrip("s")) for name in roles} <= {row[0] for row in glossary()}

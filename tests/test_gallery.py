@@ -27,7 +27,7 @@ def quiet_plots():
         mpl.pyplot.close("all")
 
 
-@pytest.mark.parametrize("name", leading(SCRIPTS, 2))
+@pytest.mark.parametrize("name", leading(SCRIPTS))
 def test_script_draws_its_picture(name, tmp_path, monkeypatch, quiet_plots):
     picture = tmp_path / f"{name}.png"
     monkeypatch.setattr(sys, "argv", [f"{name}.py", str(picture)])

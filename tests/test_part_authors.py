@@ -1,19 +1,13 @@
 """The page for authors of parts is true: its tables are those of the code, and its parts conform and fly together."""
 
-import inspect
 import re
 import tomllib
-from dataclasses import fields as dataclass_fields
 from pathlib import Path
 
 import pytest
 
 import starhold as sh
 from starhold.conformance.parts import examine_part, find_part
-from starhold.parts import roles
-from starhold.parts.catalogue import DEMANDED, EITHER, PACKAGES, parts
-from starhold.parts.contract import Card, Parameter
-from starhold.parts.random import RANGE, Dice
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "part-authors.md").read_text(encoding="utf-8")
@@ -28,31 +22,6 @@ def folder(tmp_path, monkeypatch):
         (tmp_path / name).write_text(text, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-def test_the_limits_of_all_models_are_written_from_their_cards():
-    page = (ROOT / "docs" / "not-claimed.md").read_text(encoding="utf-8")
-    for role, name in (("environment", "drag"), ("sensor", "star-tracker"), ("effector", "wheels")):
-        assert all(text in page for text in parts(role)[name].card.assumptions)
-
-
-def test_its_tables_are_written_from_the_code():
-    for cls in (Card, Parameter):
-        assert all(f"| `{field.name}` | " in PAGE for field in dataclass_fields(cls))
-    for name in ("vector", "normals"):
-        assert hasattr(Dice, name)
-        assert f"| `.{name}(" in PAGE
-    assert f"A part has {RANGE} places at each control step" in PAGE
-
-
-def test_it_shows_every_role_with_all_that_is_demanded_of_it():
-    for role in set(PACKAGES) - {"body"}:
-        section = PAGE.partition(f"### {role.capitalize()}\n")[2].partition("### ")[0]
-        for name in (*DEMANDED[role], *EITHER.get(role, ())):
-            if name not in ("Params", "examples"):
-                assert re.search(rf"\| `{name}\b[^|]*\| (required|or `)", section), (role, name)
-        equations = {n for n, item in vars(getattr(roles, role.capitalize())).items() if inspect.isfunction(item)}
-        assert {name for name in equations if not name.startswith("_")} <= set(re.findall(r"\| `(\w+)\(", section))
 
 
 def test_it_tells_all_that_a_part_may_add():

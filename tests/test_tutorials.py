@@ -12,6 +12,7 @@ import typer
 
 from starhold.cli.main import app
 from tests.running import starhold
+from tests.tiers import WHOLE, leading
 
 ROOT = Path(__file__).parents[1]
 TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
@@ -40,16 +41,18 @@ def run(line, folder):
     return done.stdout + done.stderr
 
 
-@pytest.mark.parametrize("page", TUTORIALS, ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", leading(TUTORIALS, 2), ids=lambda page: page.stem)
 def test_tutorial_runs(page, tmp_path, monkeypatch):
-    """All but the commands that draw pictures once more."""
-    go_through(page, tmp_path, monkeypatch, lambda block: block["unrun"] or block["slow"])
+    """All of it in `make test-all`, else all but the commands that draw pictures once more."""
+    go_through(page, tmp_path, monkeypatch, lambda block: block["unrun"] or (block["slow"] and not WHOLE))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("page", [page for page in TUTORIALS if "<!-- slow -->" in page.read_text()], ids=lambda p: p.stem)
-def test_whole_tutorial_runs(page, tmp_path, monkeypatch):
-    go_through(page, tmp_path, monkeypatch, lambda block: block["unrun"])
+@pytest.mark.parametrize("page", TUTORIALS, ids=lambda page: page.stem)
+def test_commands_of_a_tutorial_are_commands(page, tmp_path, monkeypatch):
+    go_through(page, tmp_path, monkeypatch, lambda block: True)
+    kinds = {block["language"] for block in blocks(page) if not block["unrun"] and not block["file"]}
+    assert kinds & {"sh", "python"}
+    assert page.read_text(encoding="utf-8").count("```") == 2 * len(blocks(page))
 
 
 def go_through(page, tmp_path, monkeypatch, left_out):
@@ -61,7 +64,8 @@ def go_through(page, tmp_path, monkeypatch, left_out):
         if block["file"]:
             Path(block["file"]).write_text(text, encoding="utf-8")
         elif left_out(block):
-            for _, name, *words in (shlex.split(line) for line in text.splitlines() if line.startswith("starhold ")):
+            for line in re.findall("^starhold (.*?)(?: # .*)?$", text, flags=re.MULTILINE):
+                name, *words = shlex.split(line)
                 known[name].make_context(name, words)
         elif language == "toml":
             tomllib.loads(text)
@@ -79,10 +83,3 @@ def go_through(page, tmp_path, monkeypatch, left_out):
                 found = re.compile(re.escape(plain(line)).replace("…", ".*?")).search(plain(said), at)
                 assert found, (line, said)
                 at = found.end()
-
-
-def test_every_tutorial_has_something_to_run():
-    for page in TUTORIALS:
-        kinds = {block["language"] for block in blocks(page) if not block["unrun"] and not block["file"]}
-        assert kinds & {"sh", "python"}, page
-        assert page.read_text(encoding="utf-8").count("```") == 2 * len(blocks(page)), page

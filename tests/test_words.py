@@ -1,4 +1,4 @@
-"""Docstrings begin with a sentence that stands by itself; names say what a value is."""
+"""Docstrings begin with a sentence that stands by itself, names say what a value is, and tests stand alone."""
 
 import ast
 import re
@@ -62,3 +62,10 @@ def test_names_say_what_a_value_is(place):
         if name in BARE
     ]
     assert bare == []
+
+
+def test_no_module_imports_a_test():
+    """What several test modules use stands in modules that are no tests, so that a test may be moved or run alone."""
+    texts = {path.name: path.read_text(encoding="utf-8") for path in Path(__file__).parent.rglob("*.py")}
+    assert len(texts) > 100
+    assert [name for name, text in texts.items() if re.search(r"^ *(from|import) .*\btest_", text, re.MULTILINE)] == []

@@ -26,14 +26,14 @@ def test_hard_limits_give_the_published_fit_at_every_angle():
     scenario = load("landing-limits")
     found = study(scenario, pick_modal(scenario, None))
     assert np.degrees(found.angles) == pytest.approx(np.arange(10.0, 181.0, 5.0))
-    own, published = (np.abs(pieces.errors(found.angles, found.roots)) for pieces in (found.own, found.published))
-    assert own.max() < published.max() < 0.015
-    assert np.sqrt(np.mean(own**2)) < 0.8 * np.sqrt(np.mean(published**2))
+    fitted, published = (np.abs(pieces.errors(found.angles, found.roots)) for pieces in (found.fitted, found.published))
+    assert fitted.max() < published.max() < 0.015
+    assert np.sqrt(np.mean(fitted**2)) < 0.8 * np.sqrt(np.mean(published**2))
     by_angle = dict(zip(np.rint(np.degrees(found.angles)).astype(int).tolist(), found.roots.tolist(), strict=True))
     for angle, root in CHECKED.items():
         assert by_angle[angle] == pytest.approx(root, rel=3e-3)
     # Tolerances buy five to twelve per cent.
-    gains = [1.0 - item.eased.time / item.hard.time for item in found.found]
+    gains = [1.0 - item.eased.time / item.hard.time for item in found.results]
     assert 0.05 < min(gains) < max(gains) < 0.12
 
 
@@ -41,8 +41,8 @@ def test_what_is_printed_is_read_back(tmp_path):
     text = COARSE
     scenario = parse(text, "coarse")
     found = study(scenario, scenario.laws[0])
-    scenario = parse(text[: text.index("[[law]]")] + "\n".join(law_lines(found.own, found.b)), "pasted")
-    assert scenario.laws[0].gains.phi_0[0] == pytest.approx(float(found.own.at(math.radians(90.0))), rel=1e-4)
+    scenario = parse(text[: text.index("[[law]]")] + "\n".join(law_lines(found.fitted, found.b)), "pasted")
+    assert scenario.laws[0].gains.phi_0[0] == pytest.approx(float(found.fitted.at(math.radians(90.0))), rel=1e-4)
     result = present(scenario, scenario.laws[0], found)
     write_table(result.numbers, tmp_path / "roots.csv")
     with (tmp_path / "roots.csv").open() as file:
@@ -66,4 +66,4 @@ def test_the_published_fit_is_shown_beside_the_published_problem_alone():
     scenario = parse(text, "same")
     found = study(scenario, scenario.laws[0])
     assert found.published is not None
-    assert found.own is None
+    assert found.fitted is None
