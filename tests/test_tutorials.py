@@ -41,7 +41,7 @@ def run(line, folder):
     return done.stdout + done.stderr
 
 
-@pytest.mark.parametrize("page", leading(TUTORIALS, 2), ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", leading(TUTORIALS), ids=lambda page: page.stem)
 def test_tutorial_runs(page, tmp_path, monkeypatch):
     """All of it in `make test-all`, else all but the commands that draw pictures once more."""
     go_through(page, tmp_path, monkeypatch, lambda block: block["unrun"] or (block["slow"] and not WHOLE))

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from starhold.algebra.vector import ZERO, add, apply, cross, gyroscopic_torque, subtract
-from starhold.conformance.bench import random_quaternions
-from starhold.laws import matrix_pd, sliding
+from starhold.conformance.bench import call, random_measurements, random_quaternions
+from starhold.laws import lyapunov, matrix_pd, sliding
 from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.bodies.rigid_body import angular_acceleration
@@ -43,6 +43,14 @@ def test_diagonal_family_refuses_a_full_inertia():
     craft = make_craft([[2.0, 0.1, 0.0], [0.1, 3.0, 0.0], [0.0, 0.0, 4.0]])
     with pytest.raises(ValueError, match="diagonal inertia"):
         matrix_pd.design(craft, matrix_pd.FORMS["diagonal"](1.0, 1.0, (1.0, 1.0, 1.0)))
+
+
+def test_known_torques_are_cancelled_so_that_v_falls_by_the_damping_alone():
+    gains = lyapunov.examples()[0]
+    for seen in random_measurements(50):
+        power = np.dot(seen.rate, add(call(catalogue()["lyapunov"], seen, gains), seen.external_torque))
+        slope = power + gains.k_attitude * np.dot(seen.attitude[1:], seen.rate)
+        assert slope == pytest.approx(-gains.k_rate * np.dot(seen.rate, seen.rate), abs=1e-15)
 
 
 def test_boundary_layer_is_continuous_and_ends_in_the_sign():
