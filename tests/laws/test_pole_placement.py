@@ -272,7 +272,7 @@ def test_uncontrollable_modes_are_named() -> None:
 
 def test_spacecraft_at_rest() -> None:
     random, a, b = np.random.default_rng(8), np.zeros((7, 7)), np.zeros((7, 3))
-    a[1:4, 4:], a[4:], b[4:] = 0.5 * random.normal(size=(3, 3)), random.normal(size=(3, 7)), random.normal(size=(3, 3))
+    a[1:4, 4:], a[4:], b[4:] = 0.5 * np.eye(3), random.normal(size=(3, 7)), np.diag([0.5, 0.3, 0.2])
     message = "no input moves s = 0; rank [A - sE, B] < 7 for s = 0 along w = (1, 0, 0, 0, 0, 0, 0)"
     with pytest.raises(UncontrollableError, match=re.escape(message)):
         place(a, b, -np.arange(1.0, 8.0))
