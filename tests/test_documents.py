@@ -29,8 +29,8 @@ from starhold.cli.main import app
 from starhold.conformance.suite import examine
 from starhold.laws.catalogue import catalogue, from_file
 from starhold.scenario.building import build
-from starhold.scenario.campaign import DISTRIBUTIONS
 from starhold.scenario.checking import RENAMED
+from starhold.scenario.distributions import DISTRIBUTIONS
 from starhold.scenario.reading import load
 
 ROOT = Path(__file__).parents[1]

@@ -33,6 +33,9 @@ class InputError(Exception):
         joint = "; " if given else ": "
         super().__init__(_one_line(": ".join(part for part in parts if part) + (f"{joint}{hint}" if allowed else "")))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return InputError, (self.where, self.key, self.given, self.allowed)
+
 
 def shortly(function: _Function) -> _Function:
     """Let a function of the Python interface raise its InputError without the frames below, which add nothing."""

@@ -2,7 +2,15 @@
 
 import math
 
+import numpy as np
+
 import starhold as sh
+from starhold.campaign.dispersions import read_dispersions
+from starhold.scenario.campaign import CampaignTable
+from starhold.scenario.checking import validate
+from starhold.scenario.making import plain
+from starhold.studies.body import study_of
+from starhold.studies.compare import build, record
 
 SMALL = {
     "name": "small",
@@ -10,7 +18,7 @@ SMALL = {
     "initial": {"attitude": [0.9, 0.1, -0.3, 0.2], "rate": [0.01, 0.0, -0.02]},
     "sensor": {"rate_noise": 1e-4},
     "environment": {"torque_noise": 1e-4},
-    "simulation": {"duration": 40.0, "control_period": 0.2, "seed": 7},
+    "simulation": {"duration": 40.0, "control_period": 0.2, "seed": 7, "record_every": 1},
     "settling": {"attitude_tolerance": 0.05, "rate_tolerance": 0.02},
     "law": [{"type": "pd", "k_rate": 2.0, "k_attitude": 0.8}, {"type": "lyapunov", "k_rate": 1.6, "k_attitude": 0.7}],
 }
@@ -46,6 +54,30 @@ def fly(folder=None, **options):
     """A small campaign, by one thread and without search unless more is said."""
     asked = {"runs": 90, "over": OVER, "requirement": ASKED, "threads": 1, "search": False} | options
     return sh.campaign(asked.pop("scenario", None) or small(), folder, **asked)
+
+
+def own_flight(found, run, law):
+    """The scenario of a run, its row and its recording by itself, whose metrics the row has."""
+    flown, frame = found.again(run, law), found.frame()
+    assert flown.differs == ()
+    own, recording = flown.scenario, flown.flight.recording
+    if own.table.simulation.record_every != 1:
+        own = own.with_({"simulation.record_every": 1})
+        recording = record(own, build(own, own.pick(law)))
+    row = frame[(frame.law == law) & (frame.run == run)].iloc[0]
+    metrics = study_of(own.body).metrics_of(recording)
+    shared = set(metrics) & set(frame.columns)
+    assert len(shared) > 3
+    for name in shared:
+        value = math.nan if metrics[name] is None else metrics[name]
+        np.testing.assert_allclose(row[name], value, rtol=1e-12, atol=1e-15, err_msg=name)
+    return own, row, recording
+
+
+def dispersed(scenario, over):
+    """The dispersions of raw tables."""
+    tables = plain(over, scenario.where, "campaign.over")
+    return read_dispersions(scenario, validate(CampaignTable, {"over": tables}, scenario.where, "campaign").over)
 
 
 def same(a, b):

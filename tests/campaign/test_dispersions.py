@@ -2,6 +2,7 @@
 
 import math
 import pickle
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pytest
@@ -9,19 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from starhold.campaign.dispersions import read_dispersions
-from starhold.campaign.distributions import (
-    Choice,
-    CorrelatedNormal,
-    LogNormal,
-    Normal,
-    Rotations,
-    Shell,
-    TruncatedNormal,
-    Uniform,
-)
 from starhold.errors import InputError
+from starhold.scenario import distribution
+from starhold.scenario.distribution import DISTRIBUTIONS, Spread
+from starhold.scenario.quantity import raw
 from starhold.scenario.reading import load
+from tests.campaign.flown import dispersed
 from tests.refusals import refused
 
 NOISE = load("three-laws-noise")
@@ -36,7 +30,17 @@ WIDTH = st.floats(1e-3, 1e3)
 def one(scenario, **over):
     """The only dispersion of a table, its key written with underscores doubled for dots."""
     ((key, table),) = over.items()
-    (found,) = read_dispersions(scenario, {key.replace("__", "."): table})
+    (found,) = dispersed(scenario, {key.replace("__", "."): table})
+    return found
+
+
+def made(name, width=1, factor=(), **numbers):
+    """A distribution of numbers that are read already."""
+    found = DISTRIBUTIONS[name].model_construct(distribution=name, **numbers)
+    if isinstance(found, Spread):
+        found._width = width
+    if factor:
+        found._factor = factor
     return found
 
 
@@ -50,20 +54,28 @@ def quantile(distribution, u):
 
 @given(UNIFORM, REAL, WIDTH)
 def test_quantiles_of_uniform_and_normal_are_scipys(u, place, width):
-    assert quantile(Uniform((place,), (place + width,), 1), u) == pytest.approx(stats.uniform(place, width).ppf(u), abs=1e-9)
-    assert quantile(Normal((place,), (width,), 1), u) == pytest.approx(stats.norm(place, width).ppf(u), rel=1e-9, abs=1e-9)
+    assert quantile(made("uniform", low=[place], high=[place + width]), u) == pytest.approx(
+        stats.uniform(place, width).ppf(u), abs=1e-9
+    )
+    assert quantile(made("normal", mean=[place], sigma=[width]), u) == pytest.approx(
+        stats.norm(place, width).ppf(u), rel=1e-9, abs=1e-9
+    )
 
 
 @given(UNIFORM, st.floats(1e-3, 1e3), st.floats(1e-2, 3.0))
 def test_quantiles_of_log_normal_are_scipys(u, median, sigma):
     expected = stats.lognorm(sigma, scale=median).ppf(u)
-    assert quantile(LogNormal((median,), (sigma,), 1), u) == pytest.approx(expected, rel=1e-9)
+    assert quantile(made("log-normal", median=[median], sigma=[sigma]), u) == pytest.approx(expected, rel=1e-9)
+
+
+def truncated(low, high, mean=0.0, sigma=1.0):
+    return made("truncated-normal", mean=[mean], sigma=[sigma], low=[low], high=[high])
 
 
 @given(UNIFORM, REAL, WIDTH, st.floats(-8.0, 8.0), st.floats(0.1, 5.0))
 def test_quantiles_of_truncated_normal_are_scipys(u, mean, sigma, first, length):
     low, high = mean + first * sigma, mean + (first + length) * sigma
-    found = TruncatedNormal((mean,), (sigma,), (low,), (high,), 1)
+    found = truncated(low, high, mean, sigma)
     expected = stats.truncnorm((low - mean) / sigma, (high - mean) / sigma, loc=mean, scale=sigma).ppf(u)
     assert found.reached
     assert quantile(found, u) == pytest.approx(expected, rel=1e-6, abs=1e-6 * sigma)
@@ -71,16 +83,17 @@ def test_quantiles_of_truncated_normal_are_scipys(u, mean, sigma, first, length)
 
 
 def test_a_truncated_normal_may_be_open_and_far_in_its_tail():
-    above = TruncatedNormal((0.0,), (1.0,), (20.0,), (math.inf,), 1)
+    above = truncated(20.0, math.inf)
     assert quantile(above, 0.5) == pytest.approx(stats.truncnorm(20.0, math.inf).ppf(0.5), rel=1e-9)
-    below = TruncatedNormal((0.0,), (1.0,), (-math.inf,), (-20.0,), 1)
+    below = truncated(-math.inf, -20.0)
     assert quantile(below, 0.5) == pytest.approx(-quantile(above, 0.5), rel=1e-12)
-    assert not TruncatedNormal((0.0,), (1.0,), (60.0,), (61.0,), 1).reached
+    assert (above.bounded, below.bounded, truncated(1.0, 2.0).bounded) == (False, False, True)
+    assert not truncated(60.0, 61.0).reached
 
 
 @given(st.lists(st.floats(0.1, 10.0), min_size=2, max_size=6))
 def test_choices_are_as_likely_as_their_weights(weights):
-    found = Choice(tuple((float(n),) for n in range(len(weights))), tuple(weights)).draw(EVEN)
+    found = made("choice", values=[(float(n),) for n in range(len(weights))], weights=weights).draw(EVEN)
     shares = np.array([(found == n).mean() for n in range(len(weights))])
     assert np.abs(shares - np.array(weights) / sum(weights)).max() <= 1.0 / EVEN.size
 
@@ -95,7 +108,7 @@ def test_whole_numbers_are_all_as_likely():
 def test_correlated_normals_have_the_covariance_that_is_asked():
     mean, covariance = np.array([1.0, -2.0, 0.5]), np.array([[4.0, 1.0, 0.3], [1.0, 9.0, -2.0], [0.3, -2.0, 1.0]])
     factor = tuple(map(tuple, np.linalg.cholesky(covariance).tolist()))
-    found = CorrelatedNormal(tuple(mean), factor).draw(random(3, 200_000))
+    found = made("correlated-normal", mean=mean, factor=factor).draw(random(3, 200_000))
     assert np.abs(found.mean(axis=1) - mean).max() < 0.03
     assert np.abs(np.cov(found) - covariance).max() < 0.08
     # The squared distance from the mean, in the metric of the covariance, is chi-squared.
@@ -105,7 +118,7 @@ def test_correlated_normals_have_the_covariance_that_is_asked():
 
 
 def test_rotations_are_uniform():
-    found = Rotations().draw(random(3))
+    found = made("rotations").draw(random(3))
     assert np.abs(np.linalg.norm(found, axis=0) - 1.0).max() < 1e-15
     # A coordinate on the sphere in four dimensions: density 2 / pi sqrt(1 - x^2).
     for component in found:
@@ -121,7 +134,7 @@ def test_rotations_are_uniform():
 
 def test_rotations_stay_uniform_when_turned():
     """The measure is that of the group: what is left of it by a fixed turn is uniform too."""
-    p, (a, b, c, d) = np.array([0.1, -0.7, 0.5, 0.5]), Rotations().draw(random(3, seed=8))
+    p, (a, b, c, d) = np.array([0.1, -0.7, 0.5, 0.5]), made("rotations").draw(random(3, seed=8))
     p = p / np.linalg.norm(p)
     turned = p[0] * a - p[1] * b - p[2] * c - p[3] * d
     assert stats.kstest(2.0 * np.arccos(np.abs(turned)), lambda x: (x - np.sin(x)) / math.pi).pvalue > 1e-3
@@ -129,7 +142,7 @@ def test_rotations_stay_uniform_when_turned():
 
 def test_shells_are_uniform_in_their_volume():
     low, high = 0.02, 0.07
-    found = Shell(low, high).draw(random(3))
+    found = made("shell", low=low, high=high).draw(random(3))
     radius = np.linalg.norm(found, axis=0)
     assert radius.min() >= low * (1.0 - 1e-15)
     assert radius.max() <= high * (1.0 + 1e-15)
@@ -140,11 +153,11 @@ def test_shells_are_uniform_in_their_volume():
 
 
 ALL = {
-    "rotations": Rotations(),
-    "shell": Shell(0.0, 1.0),
-    "correlated": CorrelatedNormal((1.0, 2.0), ((1.0, 0.0), (0.5, 0.8))),
-    "log-normal": LogNormal((1.0, 2.0), (0.1, 0.2), 2),
-    "truncated": TruncatedNormal((0.0, 3.0), (1.0, 1.0), (-1.0, 0.0), (2.0, 1.0), 2),
+    "rotations": made("rotations"),
+    "shell": made("shell", low=0.0, high=1.0),
+    "correlated": made("correlated-normal", mean=(1.0, 2.0), factor=((1.0, 0.0), (0.5, 0.8))),
+    "log-normal": made("log-normal", 2, median=(1.0, 2.0), sigma=(0.1, 0.2)),
+    "truncated": made("truncated-normal", 2, mean=(0.0, 3.0), sigma=(1.0, 1.0), low=(-1.0, 0.0), high=(2.0, 1.0)),
 }
 
 
@@ -164,7 +177,7 @@ def test_shares_are_of_what_the_file_has():
     found = one(NOISE, spacecraft__inertia=normal(sigma=0.05, relative=True, judged_apart=True))
     drawn = found.draw(random(3))
     assert found.columns == ("spacecraft.inertia[1]", "spacecraft.inertia[2]", "spacecraft.inertia[3]")
-    assert (found.judged_apart, found.nominal, found.shape) == (True, (2.0, 3.0, 4.0), (3,))
+    assert (found.distribution.judged_apart, found.scale, found.shape) == (True, (2.0, 3.0, 4.0), (3,))
     assert drawn.mean(axis=1) == pytest.approx([2.0, 3.0, 4.0], rel=0.01)
     assert drawn.std(axis=1) == pytest.approx([0.1, 0.15, 0.2], rel=0.03)
     together = one(NOISE, spacecraft__inertia=normal(sigma=0.05, relative=True, together=True))
@@ -178,7 +191,7 @@ def test_shares_are_of_what_the_file_has():
 
 def test_numbers_have_the_units_of_their_key():
     found = one(NOISE, initial__rate=normal(mean=["1 deg/s", 0, 0], sigma="0.1 deg/s"))
-    assert found.distribution == Normal((math.radians(1.0), 0.0, 0.0), (math.radians(0.1),) * 3, 3)
+    assert (found.distribution.mean, found.distribution.sigma) == ((math.radians(1.0), 0.0, 0.0), (math.radians(0.1),) * 3)
     both = one(
         NOISE,
         **{
@@ -190,8 +203,8 @@ def test_numbers_have_the_units_of_their_key():
         },
     )
     assert both.distribution.mean == (0.09, 0.009)
-    assert both.distribution.factor[0] == (0.01, 0.0)
-    assert np.hypot(*both.distribution.factor[1]) == pytest.approx(0.001)
+    assert tuple(both.distribution._factor[0]) == (0.01, 0.0)
+    assert np.hypot(*both.distribution._factor[1]) == pytest.approx(0.001)
 
 
 def test_a_symmetric_matrix_stays_one():
@@ -225,7 +238,7 @@ TABLES = {
 
 @pytest.mark.parametrize("number", range(5))
 def test_the_scenario_of_a_run_has_exactly_what_was_drawn(number):
-    found = read_dispersions(SLEW, TABLES)
+    found = dispersed(SLEW, TABLES)
     change = {}
     values = {}
     for place, dispersion in enumerate(found):
@@ -244,7 +257,7 @@ def test_the_scenario_of_a_run_has_exactly_what_was_drawn(number):
 
 
 def test_dispersions_can_be_sent_to_another_process():
-    found = read_dispersions(SLEW, TABLES)
+    found = dispersed(SLEW, TABLES)
     for before, after in zip(found, pickle.loads(pickle.dumps(found)), strict=True):
         u = random(before.dims, 5)
         assert (before.draw(u) == after.draw(u)).all()
@@ -255,6 +268,35 @@ def test_angles_beyond_a_turn_keep_their_value():
     found = one(scenario, initial__phase={"distribution": "uniform", "low": "-400 deg", "high": "800 deg"})
     drawn = found.draw(EVEN[:, -3:])
     assert scenario.with_(found.change({"initial.phase": drawn[0, 1]})).table.initial.phase == drawn[0, 1] > math.tau
+
+
+def test_a_distribution_is_one_class():
+    """It is found by its name, read in its key's units, drawn, and refused as those that come along are."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("starhold.scenario.distribution.DISTRIBUTIONS", dict(DISTRIBUTIONS))
+        patch.setattr("starhold.scenario.distributions.DISTRIBUTIONS", distribution.DISTRIBUTIONS)
+
+        class Triangular(Spread):
+            BOUNDED = True
+            distribution: Literal["triangular"]
+            half: Annotated[Any, *raw("half the width")]
+
+            def _numbers(self, key):
+                return {"half": key.numbers("half", held=False), "mean": key.centre("mean")}
+
+            mean: Annotated[Any, *raw("by default what the file has")] = None
+
+            def draw(self, u):
+                side = np.where(u < 0.5, np.sqrt(2.0 * u) - 1.0, 1.0 - np.sqrt(2.0 * (1.0 - u)))
+                return np.array(self.mean)[:, None] + np.array(self.half)[:, None] * side
+
+        found = one(NOISE, initial__rate={"distribution": "triangular", "half": "1 deg/s"})
+        assert (found.dims, found.distribution.bounded, found.distribution.independent) == (3, True, True)
+        rate = stats.triang(0.5, loc=found.distribution.mean[0] - math.radians(1.0), scale=math.radians(2.0))
+        assert stats.kstest(found.draw(random(3))[0], rate.cdf).pvalue > 1e-3
+        with refused(".half: found", start="three-laws-noise: campaign.over"):
+            one(NOISE, initial__rate={"distribution": "triangular", "half": "1 m"})
+    assert "triangular" not in DISTRIBUTIONS
 
 
 def test_a_draw_beyond_the_bounds_of_its_key_is_refused():
@@ -281,7 +323,10 @@ def choice(*values, **more):
 
 BAD = {
     "unknown key": ({"initial.rat": normal(sigma=1)}, "rate?"),
-    "unknown distribution": ({"initial.rate": {"distribution": "normel"}}, ".distribution: found"),
+    "unknown distribution": (
+        {"initial.rate": {"distribution": "normel"}},
+        '.distribution: found "normel"; did you mean normal?',
+    ),
     "unknown parameter": ({"initial.rate": normal(sigm=1)}, ".sigm: found an unknown key; did you mean sigma?"),
     "negative sigma": ({"initial.rate": normal(sigma=-1)}, ".sigma: found -1; allowed: above 0"),
     "sigma zero": ({"initial.rate": normal(sigma=0)}, ".sigma: found 0; allowed: above 0"),
@@ -344,4 +389,4 @@ BAD = {
 def test_what_cannot_be_dispersed_is_told_in_one_line(name):
     over, said = BAD[name]
     with refused(said, start="three-laws-noise: campaign.over"):
-        read_dispersions(NOISE.with_({"initial.rate": [0, 0.03, 0.02]}), over)
+        dispersed(NOISE.with_({"initial.rate": [0, 0.03, 0.02]}), over)

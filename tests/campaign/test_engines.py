@@ -1,6 +1,7 @@
 """Engines fly the same results, pass errors on, and keep few blocks under way."""
 
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -138,13 +139,13 @@ def test_workers_of_a_script_without_its_guard_leave_nothing(tmp_path):
     """Each worker reads the script too."""
     text = (
         "import starhold as sh\nfrom tests.campaign.flown import OVER, small\n"
-        "sh.campaign(small(), 'out', runs=20, over=OVER, search=False, workers=2)\n"
+        "sh.campaign(small(), 'out', runs=20, over=OVER, search=False, workers=1)\n"
     )
     (tmp_path / "script.py").write_text(text)
     done = subprocess.run(
         [sys.executable, "script.py"], cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False, timeout=60
     )
-    assert "InputError: 2 workers: cannot be started: one ended with code 1; a script needs `if __name__ ==" in done.stderr
+    assert "InputError: 1 workers: cannot be started: one ended with code 1; a script needs `if __name__ ==" in done.stderr
     assert not (tmp_path / "out").exists()
 
 
@@ -216,16 +217,17 @@ def test_other_versions_are_told(store, running, monkeypatch):
         fly(store, Scheduler(running))
 
 
-def test_a_worker_that_came_later_with_another_version_is_told():
-    _, refusal = engines._fly(b"", "9.9", "pd", 0, 1)
-    assert isinstance(refusal, engines._Refusal)
-    assert (refusal.where, refusal.allowed) == ("a worker", "9.9, as here")
-
-
-def test_a_job_that_a_worker_cannot_read_is_told():
-    _, refusal = engines._fly(b"cnowhere\nnothing\n.", engines.__version__, "pd", 0, 1)
-    assert isinstance(refusal, engines._Refusal)
-    assert "No module named 'nowhere'" in refusal.allowed
+@pytest.mark.parametrize(
+    ("packed", "version", "told"),
+    [
+        (b"", "9.9", "a worker: found starhold .*; allowed: 9.9, as here"),
+        (b"cnowhere\nnothing\n.", engines.__version__, "cannot read the campaign: No module named 'nowhere'"),
+    ],
+)
+def test_a_worker_of_another_version_or_without_a_module_tells(packed, version, told):
+    _, refusal = engines._fly(packed, version, "pd", 0, 1)
+    with pytest.raises(InputError, match=told):
+        raise pickle.loads(pickle.dumps(refusal))
 
 
 def test_all_laws_have_the_same_runs(store):

@@ -11,7 +11,7 @@ import starhold as sh
 from starhold.campaign.campaign import with_campaign
 from starhold.errors import InputError
 from starhold.report.campaign_files import write_campaign
-from tests.campaign.flown import SMALL, fly
+from tests.campaign.flown import SMALL, fly, small
 from tests.parts.files import ENVIRONMENT
 from tests.refusals import refused
 
@@ -171,6 +171,26 @@ WRONG = [
     ({"requirement": [{"name": "../x", "metric": "lost"}]}, "requirement[1].name"),
     ({"runs": 10**10}, "campaign.runs"),
     ({"law": "../pd"}, "law"),
+    ({"over": {"initial.rate": NORMAL, "law.pd.k_rate": NORMAL}, "scenario": small(), "law": "lyapunov"}, "changes nothing"),
+    ({"runs": 0}, "campaign.runs"),
+    ({"over": {"law.pd.k_rat": NORMAL}}, "k_rate"),
+    ({"over": {"settling.rate_tolerance": uniform(0.01, 0.02)}}, "settling.rate_tolerance"),
+    ({"over": {"spacecraft.inertia": NORMAL | {"sigma": 1.0}}, "runs": 90}, "moments"),
+    ({"requirement": [{"metric": "settling_tim", "at_most": 3}]}, "settling_time"),
+    ({"requirement": [{"metric": "settling_time"}]}, "at_most or at_least"),
+    ({"requirement": [{"at_most": 3}]}, "requirement[1].metric: found nothing; allowed: this key is required"),
+    ({"requirement": [{"metric": "effort", "at_most": "3 deg"}]}, "deg"),
+    ({"requirement": [{"metric": "exclusion-cone", "at_least": "3 deg"}]}, "axis"),
+    ({"until_decided": True}, "requirement"),
+    ({"requirement": [{"metric": "lost"}], "sampling": "sobol", "until_decided": True}, "independent"),
+    ({"requirement": [{"metric": "effort", "at_most": 3, "share": 1}]}, "requirement[1].share: found 1.0; allowed: below 1"),
+    ({"requirement": [{"metric": "effort", "at_most": 3, "at_least": 2}]}, "either at_most or at_least"),
+    ({"requirement": [{"metric": "lost"}, {"metric": "lost"}]}, "requirement[2].name"),
+    ({"over": {"initial.rate": uniform(0, True)}}, "high: found True"),
+    ({"sampling": "halton"}, "campaign.sampling"),
+    ({"workers": 2}, "beside threads"),
+    ({"threads": 0}, "at least 1"),
+    ({"metrics": ["overshot"]}, "overshot"),
 ]
 
 
@@ -179,7 +199,7 @@ def test_what_is_hostile_is_told_in_a_line(tmp_path, options, told):
     with refused(told) as failure:
         campaign(tmp_path / "c", **options)
     assert len(str(failure.value)) < 600
-    assert not (tmp_path / "c").exists()
+    assert not list((tmp_path / "c").rglob("*.parquet"))
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="nothing is read-only to root")

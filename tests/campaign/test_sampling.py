@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from scipy import stats
 from scipy.stats import qmc
 
-from starhold.campaign.dispersions import read_dispersions
 from starhold.campaign.sampling import LEVELS, SAMPLINGS, Plan
 from starhold.errors import InputError
 from starhold.scenario.reading import load
+from tests.campaign.flown import dispersed
 from tests.refusals import refused
 
 SCENARIO = load("three-laws-noise")
@@ -20,7 +20,7 @@ TABLES = {
     "spacecraft.inertia": {"distribution": "normal", "sigma": 0.02, "relative": True},
     "spacecraft.limit": {"distribution": "choice", "values": ["axis", "norm"]},
 }
-OVER = read_dispersions(SCENARIO, TABLES)
+OVER = dispersed(SCENARIO, TABLES)
 DIMS = 10
 RUNS = {"random": 300, "sobol": 300, "latin-hypercube": 300, "morris": (DIMS + 1) * 20, "saltelli": (2 * DIMS + 2) * 16}
 PLANS = {name: Plan(OVER, name, 7, runs) for name, runs in RUNS.items()}

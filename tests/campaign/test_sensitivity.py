@@ -57,7 +57,6 @@ def test_sobol_indices_of_ishigami():
     found = sobol(NAMES, unit, ishigami(unit))
     assert isinstance(found, Sobol)
     assert np.array([found.first, found.total]) == pytest.approx(published, abs=0.01)
-    assert found.sentence().startswith("x1 moves it most: 0.31")
 
 
 def test_sobol_indices_are_those_of_salib_where_it_crosses_points_both_ways():
@@ -164,7 +163,6 @@ def test_morris_drops_the_trajectories_with_failed_runs():
     assert (found.trajectories, found.dropped, expected.dropped) == (20, 2, 0)
     for field in ("mu", "mu_star", "mu_star_width", "sigma"):
         assert np.array_equal(getattr(found, field), getattr(expected, field))
-    assert "2 of 20 trajectories were dropped" in found.sentence()
     holes[4:] = np.nan
     assert morris(NAMES, unit, holes) == Refused("1 of 20 trajectories have all their values, two are the least")
 

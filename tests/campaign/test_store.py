@@ -336,11 +336,16 @@ REFUSED = {
     "select 1; select 2": "query: found 2 statements; allowed: one SELECT",
     "": "query: found 0 statements; allowed: one SELECT",
     "create table t as select 1": "query: found a statement of type CREATE; allowed: one SELECT",
+    "drop view runs": "query: found a statement of type DROP",
     "set threads = 1": "query: found a statement of type SET",
     "copy runs to '{folder}/out.csv'": "query: found a statement of type COPY",
     "select * from read_csv('{folder}/manifest.json')": "query: Permission Error: Cannot access file",
     "select * from '{folder}/manifest.json'": "query: Permission Error: Cannot access file",
     "select * from glob('/*')": "query: Permission Error",
+    "select": "query: Parser Error",
+    "attach '{folder}/stolen.db'": "query: found a statement of type ATTACH",
+    "install httpfs": "query: found a statement of type",
+    "select * from read_text('/etc/passwd')": "query: Permission Error",
     "select * from store": "query: Catalog Error: Table with name store does not exist",
 }
 

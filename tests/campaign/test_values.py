@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from starhold.campaign.dispersions import read_dispersions
-from starhold.campaign.values import _filled, accepted, locate, width_at
 from starhold.scenario.building import build
 from starhold.scenario.json_schema import json_schema
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.scenario.template import template_text
+from starhold.scenario.values import _filled, accepted, locate, width_at
 from tests.refusals import refused
 
 NOISE = load("three-laws-noise")
@@ -166,19 +166,6 @@ metric = "settling_time"
 at_most = "2 min"
 share = "99.73 %"
 """
-FAULTS = {
-    "zero runs": ("runs = 852", "runs = 0", "campaign.runs: found 0; allowed: at least 1"),
-    "unknown sampling": ('"latin-hypercube"', '"latin"', "campaign.sampling"),
-    "unknown key": ("runs =", "run =", "campaign.run: found an unknown key; did you mean runs?"),
-    "unknown distribution": ('"shell"', '"shel"', '"initial.rate".distribution: found "shel"; did you mean shell?'),
-    "unknown parameter": ("high =", "hihg =", '"initial.rate".hihg: found an unknown key; did you mean high?'),
-    "no number": ('"4 deg/s"', "true", '"initial.rate".high: found True'),
-    "no table": ('{ distribution = "shell", high = "4 deg/s" }', "3", 'campaign.over."initial.rate": found 3'),
-    "no metric": ('metric = "settling_time"', "", "campaign.requirement[1].metric: found nothing"),
-    "share of all": ('"99.73 %"', "1", "campaign.requirement[1].share: found 1.0; allowed: below 1"),
-    "bounds both": ('at_most = "2 min"', "at_most = 1\nat_least = 0", "campaign.requirement[1].at_least"),
-    "names alike": ("[[campaign", '[[campaign.requirement]]\nmetric = "settling_time"\n[[campaign', "requirement[2].name"),
-}
 
 
 def test_every_body_takes_a_campaign():
@@ -200,11 +187,3 @@ def test_the_commented_campaign_of_a_template_is_one(body):
     check = jsonschema.Draft202012Validator(json_schema())
     assert not list(check.iter_errors(tomllib.loads(scenario.text)))
     assert list(check.iter_errors(tomllib.loads(scenario.text.replace("sampling =", "sampler ="))))
-
-
-@pytest.mark.parametrize("name", FAULTS)
-def test_a_wrong_campaign_is_refused_in_one_line(name):
-    before, after, said = FAULTS[name]
-    assert before in TABLE
-    with refused(said, start="my.toml: campaign"):
-        parse(f"{builtin_text('geostationary')}{TABLE.replace(before, after, 1)}", "my.toml")

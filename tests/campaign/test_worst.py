@@ -98,8 +98,6 @@ def test_a_flight_beyond_what_is_proved_is_told_as_a_fault_of_starhold(tmp_path,
 
 
 def test_rounding_contradicts_nothing():
-    bracket = fly(scenario=short(), over=RATE, requirement=[PEAK], runs=2, search=False).laws[0]
-    assert bracket.brackets == ()
     one = worst.Bracket("peak_torque", "N m", 0.1 * (1 + 1e-15), "", 0, 0.1, "")
     assert not one.contradicted
     assert replace(one, flown=0.1001).contradicted

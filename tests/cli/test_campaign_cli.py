@@ -118,9 +118,7 @@ def test_what_is_missed_and_what_is_not_decided_have_codes_of_their_own(tmp_path
     undecided = flies(tmp_path, "--runs", "8", "-o", "open", text=SMALL.replace("share = 0.5", "share = 0.999"))
     assert (undecided.returncode, undecided.stderr) == (4, "")
     assert "not decided" in undecided.stdout
-    nothing = flies(
-        tmp_path, "--runs", "1", "-o", "none", text=SMALL[: SMALL.index("[[campaign")] + SMALL[SMALL.index("[[law") :]
-    )
+    nothing = flies(tmp_path, "--runs", "1", "-o", "none", text=WITHOUT)
     assert (nothing.returncode, nothing.stderr) == (0, "")
     assert "nothing is required of it" in nothing.stdout
     assert not list((tmp_path / "none").glob("worst-*"))
@@ -207,30 +205,12 @@ def test_runs_are_asked_in_sql(flown):
     assert "the first 60 of 2304 rows" in ask("select a.run from runs a, runs b").stdout
 
 
-HOSTILE = [
-    ("select nothing from runs", '"nothing" not found'),
-    ("select", "Parser Error"),
-    ("", "0 statements"),
-    ("select 1; select 2", "2 statements"),
-    ("drop view runs", "a statement of type DROP"),
-    ("copy runs to 'stolen.csv'", "a statement of type COPY"),
-    ("attach 'stolen.db'", "a statement of type ATTACH"),
-    ("install httpfs", "a statement of type"),
-    ("set enable_external_access = true", "a statement of type"),
-    ("select * from read_csv('small.toml')", ""),
-    ("select * from 'small.toml'", ""),
-    ("select * from read_text('/etc/passwd')", ""),
-    ("select * from glob('/*')", ""),
-]
-
-
-@pytest.mark.parametrize(("sql", "told"), HOSTILE)
-def test_questions_that_are_none_or_reach_further_are_refused(flown, sql, told):
+def test_a_question_that_reaches_further_is_refused(flown):
+    """All that are none, or reach further, stand in the tests of the store."""
     place, _ = flown
     before = listed(place)
-    done = starhold("query", "out", sql, cwd=place)
-    one_line(done, told)
-    assert "root:" not in done.stderr
+    done = starhold("query", "out", "select * from read_csv('small.toml')", cwd=place)
+    one_line(done, "Permission Error")
     assert "name = " not in done.stderr
     assert listed(place) == before
 
@@ -285,50 +265,27 @@ def other(old, new):
     return SMALL.replace(old, new)
 
 
-CORRELATED = 'distribution = "correlated-normal", sigma = 0.1, correlation = [[1, 2, 0], [2, 1, 0], [0, 0, 1]] }'
+WITHOUT = SMALL[: SMALL.index("[[campaign")] + SMALL[SMALL.index("[[law") :]
 BAD = {
-    "unknown key": (other("law.pd.k_rate", "law.pd.k_rat"), [], ['campaign.over."law.pd.k_rat"', "k_rate"]),
     "unknown key of the table": (other("runs = 24", "rnus = 24"), [], ["campaign.rnus", "did you mean runs?"]),
     "negative sigma": (
         other('"uniform", low = 1.5, high = 2.5', '"normal", sigma = -0.1'),
         [],
         ['over."law.pd.k_rate".sigma', "-0.1", "above 0"],
     ),
-    "zero runs": (other("runs = 24", "runs = 0"), [], ["campaign.runs", "at least 1"]),
     "zero runs by option": (SMALL, ["--runs", "0"], ["campaign.runs", "at least 1"]),
-    "requirement without metric": (
-        other('metric = "final_rate_error"', ""),
-        [],
-        ["campaign.requirement[1].metric", "this key is required"],
-    ),
-    "requirement without bound": (other('at_most = "60 deg/s"', ""), [], ["requirement[1]", "at_most or at_least"]),
-    "names that differ in case": (
-        other("[[law]]", '[[campaign.requirement]]\nname = "EFFORT"\nmetric = "lost"\n[[law]]'),
-        [],
-        ["campaign.requirement[2].name", "EFFORT"],
-    ),
-    "correlation that is none": (
-        other('distribution = "shell", high = "4 deg/s" }', CORRELATED),
-        [],
-        ['over."initial.rate".correlation', "a positive definite matrix"],
-    ),
     "two engines": (SMALL, ["--threads", "2", "--workers", "2"], ["workers", "beside threads"]),
-    "no threads": (SMALL, ["--threads", "0"], ["threads", "at least 1"]),
     "unknown sampling": (SMALL, ["--sampling", "halton"], ["campaign.sampling", "halton"]),
     "runs that no design has": (SMALL, ["--sampling", "morris", "--runs", "23"], ["campaign.runs", "20 or 25"]),
     "unknown law": (SMALL, ["--law", "lqr"], ["law", "lyapunov, pd"]),
     "no TOML": ("campaign = [", [], ["not TOML"]),
     "campaign that is no table": (other("[campaign]\nruns = 24", "campaign = 3"), [], ["campaign"]),
     "nothing to draw": (
-        SMALL[: SMALL.index("[[campaign")].partition("[campaign")[0] + SMALL[SMALL.index("[[law") :],
+        WITHOUT.partition("[campaign")[0] + "[[law]]\n" + WITHOUT.partition("[[law]]\n")[2],
         [],
-        ["campaign", "no [campaign] table"],
+        ["no [campaign]"],
     ),
-    "decided by no requirement": (
-        SMALL[: SMALL.index("[[campaign")] + SMALL[SMALL.index("[[law") :],
-        ["--until-decided"],
-        ["campaign.requirement"],
-    ),
+    "decided by no requirement": (WITHOUT, ["--until-decided"], ["campaign.requirement"]),
 }
 
 

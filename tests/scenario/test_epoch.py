@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import starhold as sh
-from starhold.campaign.values import locate
 from starhold.errors import InputError
 from starhold.parts.catalogue import PACKAGES, parts
 from starhold.parts.epoch import EPOCH, START, date_of
@@ -16,6 +15,7 @@ from starhold.report.page_parts import settings
 from starhold.scenario.json_schema import json_schema
 from starhold.scenario.parts import part_schemas
 from starhold.scenario.reading import make_scenario, parse
+from starhold.scenario.values import locate
 from starhold.simulation.lane import fly
 from starhold.studies.compare import build
 from starhold.studio.editing import check, choices, words

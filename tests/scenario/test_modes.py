@@ -5,7 +5,6 @@ import tomllib
 import jsonschema
 import pytest
 
-from starhold.campaign.values import locate
 from starhold.errors import InputError
 from starhold.laws.modes import mode_laws
 from starhold.loop.modes import loop_of_mode
@@ -13,6 +12,7 @@ from starhold.scenario.building import build
 from starhold.scenario.designing import design
 from starhold.scenario.json_schema import json_schema
 from starhold.scenario.reading import parse
+from starhold.scenario.values import locate
 from tests.making import built
 from tests.missions import BASE, DETUMBLE, POINT
 from tests.refusals import refused, replaced, rows

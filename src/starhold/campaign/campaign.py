@@ -71,7 +71,7 @@ def begin(scenario: Scenario, laws: Sequence[str]) -> Job:
         job.requirements(law)
         reached |= {key for key, places in job.lanes(law).moved.items() if places}
     for dispersion in job.dispersions:
-        told = ", ".join(dispersion.keys)
+        told = dispersion.called
         if told not in reached:
             flown = f"law {laws[0]}" if len(laws) == 1 else "any law"
             raise InputError(
@@ -151,7 +151,7 @@ def fly_campaign(
         "lost": {result.law: result.lost for result in results},
     }
     store.finish(told, totals)
-    over = {", ".join(one.keys): in_words(one, table) for one in job.dispersions}
+    over = {one.called: in_words(one, table) for one in job.dispersions}
     asked = job.requirements(laws[0])
     return CampaignResult(scenario.name, folder, runs, table.sampling, over, results, told, seconds, flown, asked)
 
@@ -198,18 +198,15 @@ def _chunk(runs: int, engine: Engine, at_once: bool) -> int:
     return max(1, min(most, runs))
 
 
-_SAID = {"judged_apart": "known before flight", "known_to_law": "known to the law"}
-"""Options of a dispersion beside its distribution."""
-
-
 def in_words(dispersion: Dispersion, table: CampaignTable) -> str:
     """A dispersion as the file has it, in one line."""
-    given = table.over[dispersion.places[0].table].model_dump(exclude_defaults=True, exclude={"distribution", *_SAID})
-    told = [f"{name} {_brief(value)}" if value is not True else name for name, value in given.items()]
-    told += [words for name, words in _SAID.items() if getattr(dispersion, name)]
-    told += ["not known to the law"] if dispersion.nominal_tables and not dispersion.known_to_law else []
-    return ", ".join([table.over[dispersion.places[0].table].distribution, *told])
-
-
-def _brief(value: Any) -> str:
-    return value if isinstance(value, str) else show(value)
+    given = table.over[dispersion.places[0].table]
+    options = {"judged_apart": "known before flight", "known_to_law": "known to the law"}
+    numbers = given.model_dump(exclude_defaults=True, exclude={"distribution", *options})
+    told = [
+        name if value is True else f"{name} {value if isinstance(value, str) else show(value)}"
+        for name, value in numbers.items()
+    ]
+    told += [words for name, words in options.items() if getattr(given, name)]
+    told += ["not known to the law"] if dispersion.nominal_tables and not given.known_to_law else []
+    return ", ".join([given.distribution, *told])

@@ -54,18 +54,9 @@ better by little."""
 
 
 @dataclass(frozen=True)
-class MetricDriver:
-    """How an input moves a metric over the `runs` that have it: rank correlation, or correlation ratio for a choice of
-    words.
+class _Driver:
+    """A dependence that was looked at: `p` is its p-value by itself, `corrected` that among all that was looked at."""
 
-    `p` is the p-value by itself, `corrected` the one among all that was looked at.
-    """
-
-    input: str
-    metric: str
-    correlation: float
-    runs: int
-    words: bool
     p: float
     corrected: float
 
@@ -74,15 +65,21 @@ class MetricDriver:
         """Tell whether chance is ruled out as an explanation, all that was looked at considered."""
         return self.corrected <= RISK
 
-    def sentence(self) -> str:
-        """Tell what was found."""
-        how = "changes" if self.words else "grows" if self.correlation > 0.0 else "falls"
-        kind = "correlation ratio" if self.words else "rank correlation"
-        return f"{self.metric} {how} with {self.input}: {kind} {self.correlation:.2f}, {_chance(self.corrected)}"
+
+@dataclass(frozen=True)
+class MetricDriver(_Driver):
+    """How an input moves a metric over the `runs` that have it: rank correlation, or correlation ratio for a choice of
+    words."""
+
+    input: str
+    metric: str
+    correlation: float
+    runs: int
+    words: bool
 
 
 @dataclass(frozen=True)
-class FailureDriver:
+class FailureDriver(_Driver):
     """How failed runs differ from passed ones in an input: `distance` between the distributions, from 0 to 1, and `above`,
     the probability that a failed run has the greater value, ties split evenly (None for words). `range` (low, high) has
     nine in ten failed runs; for words it says with which of them runs fail most often. `p`: of a number, which is tested
@@ -93,25 +90,10 @@ class FailureDriver:
     distance: float
     above: float | None
     range: tuple[float, float] | str
-    p: float
-    corrected: float
-
-    @property
-    def significant(self) -> bool:
-        """Tell whether chance is ruled out as an explanation, all that was looked at considered."""
-        return self.corrected <= RISK
-
-    def sentence(self) -> str:
-        """Tell what was found."""
-        if self.above is None or isinstance(self.range, str):
-            return f"runs fail most often where {self.range}: distance {self.distance:.2f}, {_chance(self.corrected)}"
-        low, high = self.range
-        how = f"nine in ten failed runs have {self.input} from {low:.4g} to {high:.4g}"
-        return f"{how}: distance {self.distance:.2f}, greater in a failed run {self.above:.2f}, {_chance(self.corrected)}"
 
 
 @dataclass(frozen=True)
-class PairDriver:
+class PairDriver(_Driver):
     """How two inputs make runs fail together: twice the logarithm of the likelihood ratio against independent causes, which
     by chance is chi-square with `degrees` of freedom; in the cell `where` of their grid the share `failed` of the runs
     fails. `drawn_together`: the draws of the two depend on each other, so that one may stand for the other.
@@ -123,20 +105,6 @@ class PairDriver:
     where: str
     failed: float
     drawn_together: bool
-    p: float
-    corrected: float
-
-    @property
-    def significant(self) -> bool:
-        """Tell whether chance is ruled out as an explanation, all that was looked at considered."""
-        return self.corrected <= RISK
-
-    def sentence(self) -> str:
-        """Tell what was found."""
-        share = f"{100.0 * self.failed:.3g} % of the runs fail where {self.where}"
-        warning = "; they are drawn together, so one may stand for the other" if self.drawn_together else ""
-        first, second = self.inputs
-        return f"{first} and {second} together: {share} (G = {self.statistic:.4g}, {_chance(self.corrected)}){warning}"
 
 
 @dataclass(frozen=True)
@@ -153,18 +121,6 @@ class Drivers:
     metrics: tuple[MetricDriver, ...]
     skipped: tuple[str, ...]
     remark: str
-
-    def sentences(self) -> list[str]:
-        """Tell all that is significant, and what cannot be told."""
-        found = [
-            driver.sentence()
-            for drivers in (self.inputs, self.pairs, self.metrics)
-            for driver in drivers
-            if driver.significant
-        ]
-        flown = f"{self.failures} of {self.runs} runs failed"
-        nothing = [] if found else ["nothing that was looked at stands out from chance"]
-        return [flown, *found, *nothing, *([self.remark] if self.remark else [])]
 
 
 def find_drivers(inputs: Mapping[str, NDArray], failed: NDArray[np.bool_], metrics: Mapping[str, NDArray]) -> Drivers:
@@ -207,7 +163,7 @@ def _between(column: Column, failed: NDArray[np.bool_]) -> FailureDriver:
         expected = table.sum(1, keepdims=True) * table.sum(0) / total
         p = float(special.chdtrc(max(1, len(labels) - 1), _misfit(table, expected, (0, 1))))
         gap = 0.5 * float(np.abs(table[0] / bad - table[1] / good).sum())
-        return FailureDriver(column.name, gap, None, labels[np.argmax(table[0] / table.sum(0))], p, p)
+        return FailureDriver(p, p, column.name, gap, None, labels[np.argmax(table[0] / table.sum(0))])
     last = np.append(np.flatnonzero(np.diff(column.steps)), total - 1)
     low = failed[column.order].cumsum()[last]
     distance = float(np.abs(low / bad - (last + 1 - low) / good).max())
@@ -220,7 +176,7 @@ def _between(column: Column, failed: NDArray[np.bool_]) -> FailureDriver:
     # Either test may have been lucky.
     p = min(1.0, 2.0 * by_distance, 2.0 * by_order)
     low_end, high_end = np.quantile(column.values[failed], (0.05, 0.95))
-    return FailureDriver(column.name, distance, above, (float(low_end), float(high_end)), p, p)
+    return FailureDriver(p, p, column.name, distance, above, (float(low_end), float(high_end)))
 
 
 def _pairs(used: list[Column], failed: NDArray[np.bool_], bins: int) -> list[PairDriver]:
@@ -318,7 +274,7 @@ def _moved(used: list[Column], metrics: Mapping[str, NDArray]) -> list[MetricDri
                 continue
             for name, ranks in ranked:
                 strength, p = correlate(ranks)
-                drivers.append(MetricDriver(column.name, name, strength, len(ranks), column.words, p, p))
+                drivers.append(MetricDriver(p, p, column.name, name, strength, len(ranks), column.words))
     return drivers
 
 
@@ -372,8 +328,3 @@ def _remark(failures: int, passed: int, bins: int) -> str:
         fewer = "failures" if failures < passed else "passed runs"
         return f"too few {fewer} to say what pairs of inputs do: {min(failures, passed)}, where {4 * LEAST} are the least"
     return ""
-
-
-def _chance(p: float) -> str:
-    """Show a corrected p-value; below the least float there is nothing to show."""
-    return f"p = {p:.2g}" if p > 1e-300 else "p < 1e-300"

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import islice
 from queue import Empty, SimpleQueue
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,8 +123,8 @@ def _believed(job: Job, results: Iterator[tuple[Block, _Told]], name: str) -> It
     with ThreadPool(1) as pool:
         for (law, first, count), (who, result) in results:
             runs = f"runs {first} to {first + count - 1} of {law}"
-            if isinstance(result, _Refusal):
-                raise InputError(result.where, result.key, result.found, result.allowed)
+            if isinstance(result, InputError):
+                raise result
             if not _is_chunk(result, law, first, count) or columns.setdefault(law, _kinds(result)) != _kinds(result):
                 raise InputError(name, who, f"something else than {runs}", _KEPT)
             if who not in seen or spent < _CHECKED * (time.monotonic() - begun):
@@ -170,47 +170,34 @@ def _bits(values: NDArray[Any]) -> Any:
     return values.tolist() if values.dtype.kind in "OU" else values.tobytes()
 
 
-@dataclass(frozen=True)
-class _Refusal:
-    """An InputError on its way from a worker: its four texts."""
-
-    where: str
-    key: str
-    found: str
-    allowed: str
-
-
 @lru_cache(maxsize=1)
 def _unpacked(packed: bytes) -> Job:
     """The job, kept between blocks together with what it has compiled."""
     return extra("cloudpickle").loads(packed)
 
 
-class _Told(NamedTuple):
-    """A worker's name, and what it returns for a block."""
-
-    who: str
-    result: Chunk | _Refusal
+_Told: TypeAlias = tuple[str, Chunk | InputError]
+"""A worker's name, and what it returns for a block."""
 
 
 def _fly(packed: bytes, version: str, law: str, first: int, count: int) -> _Told:
     """Fly a block in a worker. version: of starhold in the process that asks."""
     who = f"process {os.getpid()} on {platform.node()}"
     if version != __version__:
-        return _Told(who, _Refusal("a worker", "", f"starhold {__version__}", f"{version}, as here"))
+        return who, InputError("a worker", "", f"starhold {__version__}", f"{version}, as here")
     try:
         job = _unpacked(packed)
     except ImportError as error:
         told = f"cannot read the campaign: {error}; it needs the packages that are here"
-        return _Told(who, _Refusal("a worker", "", "", told))
+        return who, InputError("a worker", "", "", told)
     try:
         with ThreadPool(1) as pool:
-            return _Told(who, job(law, first, count, pool)())
+            return who, job(law, first, count, pool)()
     except InputError as error:
-        return _Told(who, _Refusal(error.where, error.key, error.given, error.allowed))
+        return who, error.with_traceback(None)
     except Exception as error:
         told = f"failed in runs {first} to {first + count - 1} of {law}: {_in_a_line(error)}; {_KEPT}"
-        return _Told(who, _Refusal("a worker", who, "", told))
+        return who, InputError("a worker", who, "", told)
 
 
 def _in_a_line(error: BaseException) -> str:
@@ -279,7 +266,7 @@ class _Cluster:
         try:
             while True:
                 try:
-                    return _Told(*future.result(timeout=_LOOK))
+                    return future.result(timeout=_LOOK)
                 except TimeoutError:
                     alone = self._still_alone(alone)
         except InputError:

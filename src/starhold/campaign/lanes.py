@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.structure import flatten, leaves, mapped
-from starhold.campaign.flat import Flat, named, named_carry, named_phases, same, shown_name
 from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop, Phase
 from starhold.loop.kernels import Numbers, numbers_of
 from starhold.scenario.building import build
 from starhold.scenario.making import variants
 from starhold.simulation.lanes import carry_columns, stacked
+from starhold.studies.flat import Flat, named, named_numbers, shown_name
 from starhold.trace.calling import Compiled
 from starhold.trace.handles import Handle
 
@@ -74,7 +74,7 @@ class Lanes:
         probes = {*range(min(plan.runs, PROBES))}
         for dispersion in plan.dispersions:
             others = self._others(dispersion, more)
-            self.moved[", ".join(dispersion.keys)] = self._moved_by(dispersion, more, others)
+            self.moved[dispersion.called] = self._moved_by(dispersion, more, others)
             probes.update(others)
         fixed = not any(_FORM in places for places in self.moved.values())
         self.at_once = fixed and self._agrees(_some(more, sorted(probes)), np.array(sorted(probes)))
@@ -172,15 +172,12 @@ class Lanes:
         """Whether the numbers of these runs, made at once, are those of each one's own scenario. InputError where one is
         refused; where that is not strict, they do not agree."""
         try:
-            found = _table(self._together(columns, runs))
+            found = np.array([*_numbers(self._together(columns, runs)).values()])
         except (ValueError, TypeError):
             return False
         pairs = enumerate(runs.tolist())
         flats = self._each(columns, runs.tolist()) if strict else (self._tried(columns, *pair) for pair in pairs)
-        for lane, flat in enumerate(flats):
-            if flat is None or flat.form != self.base.form or not same(flat.numbers, found[:, lane]):
-                return False
-        return True
+        return all(self.base.gives(flat, found[:, lane]) for lane, flat in enumerate(flats))
 
     def _by_key(self, columns: Columns) -> dict[str, Array]:
         """The values that are numbers, (components..., lanes), by key."""
@@ -196,7 +193,7 @@ class Lanes:
         """The columns that numbers are equal to, by the numbers' places, as far as the first run tells."""
         found: dict[int, str] = {}
         for dispersion in self.plan.dispersions:
-            for place in self.moved[", ".join(dispersion.keys)] - {_FORM}:
+            for place in self.moved[dispersion.called] - {_FORM}:
                 number = self.base.numbers[place]
                 equal = [n for n in dispersion.columns if not dispersion.wordy and self.first[n][0] == number]
                 if equal:
@@ -261,14 +258,9 @@ class Lanes:
 
     def _told(self, lot: Lot) -> dict[str, Array]:
         """The numbers read back of a lot, from the arrays that fly; NaN where its form has no such number."""
-        lanes = len(lot.runs)
-        found = dict(zip(named_carry(lot.loop), lot.carries, strict=True)) | dict(named_phases(lot.loop, lot.phases))
-        return {
-            f"flown.{shown_name(lot.loop, name)}": np.broadcast_to(
-                np.asarray(found.get(name, np.nan), dtype=float), (lanes,)
-            )
-            for name in self.flown
-        }
+        found = _numbers(lot)
+        missing = np.full(len(lot.runs), np.nan)
+        return {f"flown.{shown_name(lot.loop, name)}": found.get(name, missing) for name in self.flown}
 
 
 def _phases(phases: Sequence[Phase], begin: int, rows: Mapping[int, Array]) -> tuple[Phase, ...]:
@@ -291,11 +283,10 @@ def _phases(phases: Sequence[Phase], begin: int, rows: Mapping[int, Array]) -> t
     return tuple(found)
 
 
-def _table(lot: Lot) -> Array:
-    """The numbers of a lot as `Flat` has them, (numbers, lanes)."""
-    lanes = len(lot.runs)
-    rest = [value for _, value in named_phases(lot.loop, lot.phases)]
-    return np.array([*lot.carries, *(np.broadcast_to(np.asarray(value), (lanes,)) for value in rest)])
+def _numbers(lot: Lot) -> dict[str, Array]:
+    """The numbers of a lot, each (lanes,), by their names as `Flat` has them."""
+    found = named_numbers(lot.loop, [*lot.carries], lot.phases)
+    return {name: np.broadcast_to(np.asarray(value, dtype=float), (len(lot.runs),)) for name, value in found.items()}
 
 
 def _some(columns: Columns, places: Sequence[int] | NDArray[np.int64]) -> dict[str, NDArray[Any]]:

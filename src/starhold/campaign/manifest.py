@@ -8,7 +8,7 @@ import math
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, cast
 
 import numpy as np
@@ -20,6 +20,8 @@ from starhold.version import __version__
 FILE = "manifest.json"
 _LONGEST_VALUE = 60
 _MISSING = object()
+_KEYS = {"version": "starhold_version", "settings": "campaign"}
+"""How the file calls fields that it does not call by their names."""
 
 
 @dataclass(frozen=True)
@@ -67,21 +69,8 @@ class Manifest:
 
     def to_json(self) -> str:
         """The manifest as the text of a JSON file."""
-        content = {
-            "starhold_version": self.version,
-            "scenario": self.scenario,
-            "fingerprint": self.fingerprint(),
-            "laws": self.laws,
-            "runs": self.runs,
-            "chunk": self.chunk,
-            "seed": self.seed,
-            "extensible": self.extensible,
-            "campaign": plain(self.settings),
-            "columns": {law: list(names) for law, names in self.columns.items()},
-            "folder": self.folder,
-            "allow_unstable": self.allow_unstable,
-            "text": self.text,
-        }
+        content = {_KEYS.get(one.name, one.name): plain(getattr(self, one.name)) for one in fields(self)}
+        content["fingerprint"] = self.fingerprint()
         return json.dumps({**content, "seal": _seal(content)}, indent=2, allow_nan=False) + "\n"
 
     @classmethod
@@ -92,20 +81,9 @@ class Manifest:
             # Whatever bears its seal has the types that were written.
             if data.pop("seal") != _seal(data) or not isinstance(data["folder"], str):
                 raise InputError(where, "", "a file that was changed by hand", "the file as starhold wrote it")
-            return cls(
-                scenario=data["scenario"],
-                text=data["text"],
-                settings=data["campaign"],
-                laws=tuple(data["laws"]),
-                runs=data["runs"],
-                chunk=data["chunk"],
-                seed=data["seed"],
-                extensible=data["extensible"],
-                columns={law: tuple(names) for law, names in data["columns"].items()},
-                version=data["starhold_version"],
-                folder=data["folder"],
-                allow_unstable=data["allow_unstable"],
-            )
+            given = {one.name: data[_KEYS.get(one.name, one.name)] for one in fields(cls)}
+            columns = {law: tuple(names) for law, names in given["columns"].items()}
+            return cls(**given | {"laws": tuple(given["laws"]), "columns": columns})
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             raise InputError(where, "", "no manifest of a campaign", "the file as starhold wrote it") from None
 

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.campaign.dispersions import Dispersion
-from starhold.campaign.distributions import Array
 from starhold.campaign.extras import extra
 from starhold.campaign.sensitivity import saltelli_design
 from starhold.errors import InputError
 from starhold.scenario.checking import nearest, show
+from starhold.scenario.distribution import Array
 from starhold.scenario.making import path_of
 
 SAMPLINGS = ("random", "sobol", "latin-hypercube", "morris", "saltelli")
@@ -90,13 +90,11 @@ class Plan:
         """The names of the uniforms: of the column that one alone moves, or else of the key and its place from 1."""
         found: list[str] = []
         for dispersion in self.dispersions:
-            names, told = dispersion.columns, ", ".join(dispersion.keys)
-            if dispersion.dims == 1:
-                found.append(told)
-            elif dispersion.independent:
-                found += names
+            told, dims = dispersion.called, dispersion.dims
+            if dims > 1 and dispersion.distribution.independent:
+                found += dispersion.columns
             else:
-                found += [f"{told} ({number} of {dispersion.dims})" for number in range(1, dispersion.dims + 1)]
+                found += [told] if dims == 1 else [f"{told} ({number} of {dims})" for number in range(1, dims + 1)]
         return tuple(found)
 
     def unit(self, first: int, count: int) -> Array:
@@ -123,7 +121,7 @@ class Plan:
 
     def _key(self, dispersion: Dispersion) -> int:
         """128 bits that no other seed or dispersion has."""
-        told = f"starhold campaign {self.seed} {', '.join(dispersion.keys)}"
+        told = f"starhold campaign {self.seed} {dispersion.called}"
         return int.from_bytes(hashlib.sha256(told.encode()).digest()[:16], "little")
 
     def columns(self, first: int, count: int) -> dict[str, NDArray[Any]]:
@@ -154,7 +152,7 @@ class Plan:
         for dispersion in self.dispersions:
             own = dispersion.change(values)
             found |= own
-            if dispersion.known_to_law or not dispersion.nominal_tables:
+            if dispersion.distribution.known_to_law or not dispersion.nominal_tables:
                 found |= {f"nominal.{key}": value for key, value in own.items() if path_of(key, {}, "")[0] in nominal}
         return found
 

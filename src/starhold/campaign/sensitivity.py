@@ -37,10 +37,6 @@ class Refused:
 
     reason: str
 
-    def sentence(self) -> str:
-        """Tell the reason."""
-        return f"No sensitivity indices: {self.reason}."
-
 
 @dataclass(frozen=True)
 class Morris:
@@ -61,16 +57,6 @@ class Morris:
     dropped: int
     confidence: float
 
-    def sentence(self) -> str:
-        """Tell the input that matters most, and what was dropped."""
-        first = int(np.argmax(self.mu_star))
-        lost = (
-            f"; {self.dropped} of {self.trajectories} trajectories were dropped, which hold failed runs"
-            if self.dropped
-            else ""
-        )
-        return f"{self.names[first]} moves it most: mu* = {_pm(self.mu_star[first], self.mu_star_width[first])}{lost}."
-
 
 @dataclass(frozen=True)
 class Sobol:
@@ -83,12 +69,6 @@ class Sobol:
     total: Array
     total_width: Array
     confidence: float
-
-    def sentence(self) -> str:
-        """Tell the input that matters most."""
-        most = int(np.argmax(self.total))
-        alone, all_in = _pm(self.first[most], self.first_width[most]), _pm(self.total[most], self.total_width[most])
-        return f"{self.names[most]} moves it most: {alone} of the variance by itself, {all_in} with others."
 
 
 def morris(names: Sequence[str], unit: Array, values: Array, confidence: float = 0.95) -> Morris | Refused:
@@ -185,9 +165,3 @@ def _cross(one: Array, other: Array) -> Array:
     """Cross pairs of points, each (pairs, 1, inputs): blocks (pairs, 2 inputs + 2, inputs)."""
     swap = np.eye(one.shape[2], dtype=bool)
     return np.concatenate([one, np.where(swap, other, one), np.where(swap, one, other), other], axis=1)
-
-
-def _pm(value: float, width: float) -> str:
-    """Show a value and its half-width with the digits that the half-width leaves."""
-    digits = max(0, min(6, 1 - math.floor(math.log10(width)))) if width > 0.0 and math.isfinite(width) else 3
-    return f"{value:.{digits}f} ± {width:.{digits}f}"

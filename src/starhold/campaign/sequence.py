@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -57,21 +57,21 @@ def require_counts(failures: int, runs: int) -> None:
 def log_evidence_below(failures: ArrayLike, runs: ArrayLike, rate: float) -> NDArray[np.float64]:
     """The logarithm of the evidence that the failure probability is below `rate`; see the module. Arrays of counts may be
     given."""
-    k, n = np.asarray(failures, float), np.asarray(runs, float)
-    a, b = k + 0.5, n - k + 0.5
-    with np.errstate(divide="ignore"):
-        # Where the weight of all rates below is less than the least float, there is no evidence.
-        weighed = special.betaln(a, b) + np.log(special.betainc(a, b, rate))
-    return weighed - math.log(2.0 * math.asin(math.sqrt(rate))) - special.xlogy(k, rate) - special.xlog1py(n - k, -rate)
+    return _log_evidence(failures, runs, rate, special.betainc, math.asin)
 
 
 def log_evidence_above(failures: ArrayLike, runs: ArrayLike, rate: float) -> NDArray[np.float64]:
     """The logarithm of the evidence that the failure probability is above `rate`; passing runs are failures mirrored."""
+    return _log_evidence(failures, runs, rate, special.betaincc, math.acos)
+
+
+def _log_evidence(failures: ArrayLike, runs: ArrayLike, rate: float, tail: Any, angle: Any) -> NDArray[np.float64]:
     k, n = np.asarray(failures, float), np.asarray(runs, float)
     a, b = k + 0.5, n - k + 0.5
     with np.errstate(divide="ignore"):
-        weighed = special.betaln(a, b) + np.log(special.betaincc(a, b, rate))
-    return weighed - math.log(2.0 * math.acos(math.sqrt(rate))) - special.xlogy(k, rate) - special.xlog1py(n - k, -rate)
+        # Where the weight of all rates on this side is less than the least float, there is no evidence.
+        weighed = special.betaln(a, b) + np.log(tail(a, b, rate))
+    return weighed - math.log(2.0 * angle(math.sqrt(rate))) - special.xlogy(k, rate) - special.xlog1py(n - k, -rate)
 
 
 def bounds(failures: int, runs: int, confidence: float) -> Bounds:
@@ -133,11 +133,8 @@ def least(holds: Callable[[int], bool], start: int) -> int:
 
 def greatest(holds: Callable[[int], bool], end: int) -> int | None:
     """Return the greatest whole number from 0 to `end` for which something holds that holds for all smaller ones as well."""
-    low, high = -1, end + 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (middle, high) if holds(middle) else (low, middle)
-    return None if low < 0 else low
+    found = least(lambda number: number > end or not holds(number), 0) - 1
+    return None if found < 0 else found
 
 
 def _edge(ruled_out: Callable[[float], bool], inside: float, outside: float) -> float:

@@ -15,7 +15,6 @@ from starhold.analysis.meter import Meter
 from starhold.campaign import envelopes, sensitivity
 from starhold.campaign.chunk import LEAST, MOST
 from starhold.campaign.dispersions import Dispersion
-from starhold.campaign.distributions import Rotations, Shell
 from starhold.campaign.drivers import Drivers, find_drivers
 from starhold.campaign.job import Job
 from starhold.campaign.requirements import Requirement
@@ -110,7 +109,7 @@ def verdicts_of(store: Store, job: Job, law: str, until_decided: bool, runs: int
 
 
 def _verdict(store: Store, job: Job, law: str, requirement: Requirement, until_decided: bool, runs: int | None) -> Verdict:
-    known = [name for dispersion in job.dispersions if dispersion.judged_apart for name in dispersion.columns]
+    known = [name for dispersion in job.dispersions if dispersion.distribution.judged_apart for name in dispersion.columns]
     margin = f"margin.{requirement.name}"
     columns = {name: values[:runs] for name, values in store.columns([margin, *known], law).items()}
     return judge(
@@ -129,7 +128,8 @@ def _knowledge(dispersions: Sequence[Dispersion]) -> str:
     """A sentence on which drawn values the law is told; none where it is told no number of its craft in any case."""
     found: list[str] = []
     for told, words in ((False, "supposes the file's own"), (True, "is told each drawn")):
-        keys = [key for one in dispersions for key in one.keys if one.known_to_law == told and (told or one.nominal_tables)]
+        among = [one for one in dispersions if one.distribution.known_to_law == told and (told or one.nominal_tables)]
+        keys = [key for one in among for key in one.keys]
         found += [f"{words} {' and '.join(keys)}"] if keys else []
     return f"The law {', and '.join(found)}." if found else ""
 
@@ -152,11 +152,8 @@ def _sizes(job: Job, inputs: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[np
     """The angle of an attitude and the norm of a vector in any direction, which may matter more than their components."""
     found: dict[str, NDArray[np.float64]] = {}
     for dispersion in job.dispersions:
-        told, rows = ", ".join(dispersion.keys), [inputs[name] for name in dispersion.columns]
-        if isinstance(dispersion.distribution, Rotations):
-            found[f"angle of {told}"] = 2.0 * np.arccos(np.minimum(np.abs(rows[0]), 1.0))
-        elif isinstance(dispersion.distribution, Shell):
-            found[f"norm of {told}"] = np.sqrt(sum(np.square(row) for row in rows))
+        if size := dispersion.distribution.size([inputs[name] for name in dispersion.columns]):
+            found[f"{size[0]} of {dispersion.called}"] = size[1]
     return found
 
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -84,7 +85,10 @@ def quantile_bound(values: ArrayLike, share: float, confidence: float) -> float 
 
 @dataclass(frozen=True)
 class Part:
-    """A part of the runs, of one condition that is known before flight, judged by itself; `more` as in Verdict."""
+    """A part of the runs, of one condition that is known before flight, judged by itself. `lower` and `upper` bound the
+    failure probability, each by itself with the confidence: Clopper-Pearson's bounds, or those of `sequence` where the
+    campaign stopped when it knew enough; None where the draws are not independent. `more` runs without another failure would
+    make the outcome "met" (None: nothing would, or it cannot be told)."""
 
     name: str
     runs: int
@@ -101,29 +105,19 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Verdict(Part):
     """A campaign's answer whether a requirement is kept by at least `share` of all flights, with `confidence`.
 
-    `lower` and `upper` bound the failure probability, each by itself with the confidence: Clopper-Pearson's bounds, or
-    those of `sequence` where the campaign stopped when it knew enough (`until_decided`); None where the draws are not
-    `independent`. `allowed` failures are accepted with these runs (None: none are, there are too few runs); `more` runs
-    without another failure would make the outcome "met", about, as the runs that fall in a part are not chosen (None:
-    nothing would, or it cannot be told). `worst_margin` is flown by the run numbered `worst_run`; `margin_bound` is a
-    margin that at least `share` of all flights keep, with the confidence, by order statistics (None: too few runs, or no
-    fixed number of them). `parts` are the conditions known before flight, `worst_part` the one that speaks most against the
-    requirement.
+    `allowed` failures are accepted with these runs (None: none are, there are too few runs); `more` is about, where there
+    are parts, as the runs that fall in a part are not chosen. `worst_margin` is flown by the run numbered `worst_run`;
+    `margin_bound` is a margin that at least `share` of all flights keep, with the confidence, by order statistics (None: too
+    few runs, or no fixed number of them). `parts` are the conditions known before flight, `worst_part` the one that speaks
+    most against the requirement.
     """
 
-    name: str
-    runs: int
-    failures: int
     share: float
     confidence: float
-    outcome: Outcome
-    lower: float | None
-    upper: float | None
     allowed: int | None
-    more: int | None
     worst_margin: float
     worst_run: int
     margin_bound: float | None
@@ -133,11 +127,6 @@ class Verdict:
     until_decided: bool
     knowledge: str = ""
     """A sentence on what laws know of the draws."""
-
-    @property
-    def observed(self) -> float:
-        """Return the share of the runs that kept the requirement."""
-        return 1.0 - self.failures / self.runs
 
     def sentence(self) -> str:
         """Tell the verdict and what it rests on."""
@@ -195,35 +184,29 @@ def judge(
         raise InputError("verdict", name, "no runs", "one or more")
     missed = margins < 0.0
     pieces = list(_parts(known or {}))
-    judged = [
-        _judge(part, missed[rows], share, confidence, independent, until_decided, 1.0 - (1.0 - confidence) / len(pieces))
-        for part, rows in pieces
-    ]
-    whole = _judge(name, missed, share, confidence, independent, until_decided, confidence)
-    worst = max(judged, key=_badness, default=None)
-    outcome = SEVERITY[max(SEVERITY.index(part.outcome) for part in (whole, *judged))]
-    row, risk = int(np.argmin(margins)), 1.0 - confidence
+
+    def judged(name: str, rows: Any, missed_confidence: float) -> Part:
+        return _judge(name, missed[rows], share, confidence, independent, until_decided, missed_confidence)
+
+    parts = tuple(judged(*piece, 1.0 - (1.0 - confidence) / len(pieces)) for piece in pieces)
+    whole = judged(name, slice(None), confidence)
+    outcome = SEVERITY[max(SEVERITY.index(part.outcome) for part in (whole, *parts))]
+    more = [math.ceil(part.more * len(margins) / part.runs) for part in (whole, *parts) if part.more is not None]
     if until_decided:
         allowed = sequence.failures_to_meet(share, confidence, len(margins))
     else:
-        allowed = allowed_failures(share, risk, len(margins))
-    more = [None if part.more is None else math.ceil(part.more * len(margins) / part.runs) for part in (whole, *judged)]
+        allowed = allowed_failures(share, 1.0 - confidence, len(margins))
+    row = int(np.argmin(margins))
     return Verdict(
-        name=name,
-        runs=whole.runs,
-        failures=whole.failures,
+        **vars(whole) | {"outcome": outcome, "more": None if outcome == "missed" else max(more, default=None)},
         share=share,
         confidence=confidence,
-        outcome=outcome,
-        lower=whole.lower,
-        upper=whole.upper,
         allowed=allowed if independent else None,
-        more=None if outcome == "missed" else max((n for n in more if n is not None), default=None),
         worst_margin=float(margins[row]),
         worst_run=row if run is None else int(run[row]),
         margin_bound=quantile_bound(margins, share, confidence) if independent and not until_decided else None,
-        parts=tuple(judged),
-        worst_part=worst,
+        parts=parts,
+        worst_part=max(parts, key=_badness, default=None),
         independent=independent,
         until_decided=until_decided,
         knowledge=knowledge,

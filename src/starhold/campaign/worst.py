@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.campaign.distributions import Choice, Rotations, Shell, TruncatedNormal, Uniform
 from starhold.campaign.job import scenario_of
 from starhold.campaign.requirements import LOST, Requirement
 from starhold.campaign.results import Bracket, LawResult
@@ -70,15 +69,9 @@ def box(job: Job) -> list[tuple[float, float]]:
     """The bounds of each uniform: all of a distribution that has bounds, else all but its tails."""
     found: list[tuple[float, float]] = []
     for dispersion in job.dispersions:
-        tail = EDGE if _bounded(dispersion.distribution) else TAIL
+        tail = EDGE if dispersion.distribution.bounded else TAIL
         found += [(tail, 1.0 - tail)] * dispersion.dims
     return found
-
-
-def _bounded(own: Any) -> bool:
-    if isinstance(own, TruncatedNormal):
-        return bool(np.isfinite([*own.low, *own.high]).all())
-    return isinstance(own, Uniform | Choice | Rotations | Shell)
 
 
 def search(

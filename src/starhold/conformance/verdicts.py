@@ -86,8 +86,8 @@ def gives_reasons(certificate: Certificate) -> None:
     """Check that a certificate says of everything it does not prove why."""
     for claim in certificate.claims:
         for obligation in claim.obligations:
-            told = obligation.outcome == "proved" or bool(obligation.evidence)
-            require(told, f"{claim.kind}: {obligation.name} is {obligation.outcome} without a reason")
+            explained = obligation.outcome == "proved" or bool(obligation.evidence)
+            require(explained, f"{claim.kind}: {obligation.name} is {obligation.outcome} without a reason")
 
 
 def declares_itself(law: Law) -> None:

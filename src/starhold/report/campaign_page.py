@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from starhold.report.campaign_drivers import drivers, indices
+from starhold.campaign.verdicts import percent
+from starhold.report import campaign_tables as tables
+from starhold.report.campaign_drivers import drivers, indices, picture
 from starhold.report.campaign_plots import box, envelopes, histograms
-from starhold.report.campaign_tables import again, brackets, code, dispersions, headlines, laws, metrics, named, verdicts
+from starhold.report.campaign_tables import Section
 from starhold.report.campaign_units import Wording, headings_of
-from starhold.report.campaign_words import flown_text
+from starhold.report.campaign_words import flown_text, headline, outcome_of
 from starhold.report.colours import colour
+from starhold.report.html_tables import code, note, pill, table_html
 from starhold.report.page_parts import document, versions
+from starhold.report.proved import swatch
 
 if TYPE_CHECKING:
     from starhold.campaign.results import CampaignResult
@@ -37,6 +42,11 @@ READING = {
 }
 
 
+MOST_AGAIN, MOST_DRIVERS = 25, 10
+"""Runs worth flying again that are listed of a law, and its drivers of a kind."""
+NBSP = "\N{NO-BREAK SPACE}"
+
+
 def write_page(path: Path, scenario: Scenario, result: CampaignResult) -> None:
     """Write the report of a campaign as one HTML file; the same results give the same bytes."""
     path.write_text(render(scenario, result), encoding="utf-8", newline="\n")
@@ -46,19 +56,21 @@ def render(scenario: Scenario, result: CampaignResult) -> str:
     """Make the report as HTML text; whatever comes from files is escaped."""
     words = Wording.of(scenario.body, result)
     spreads, over_time = histograms(result, words), envelopes(result, words)
+    required = tables.verdicts(result, words)
     sections = [
-        f'<p class="note">{escape(flown_text(result))}</p>',
-        headlines(result, words),
-        verdicts(result, words),
-        laws(result),
-        metrics(result, words),
+        note(flown_text(result)),
+        *_headlines(result, words),
+        _shown(required) or f"<h2>Verdicts</h2>{note('The campaign requires nothing, so there are no verdicts.')}",
+        _in_words(result) if required else "",
+        _shown(tables.runs(result), fit=True),
+        _shown(tables.metrics(result, words)),
         _distributions(spreads, result),
         _over_time(over_time, result),
-        again(result),
-        brackets(result, words),
-        drivers(result, words),
-        indices(result, words),
-        dispersions(result),
+        _shown(tables.again(result, MOST_AGAIN)),
+        _shown(tables.brackets(result, words)),
+        *_drivers(result, words),
+        *_indices(result, words),
+        _shown(tables.dispersions(result)),
         _store(result, words),
         _reading(),
     ]
@@ -72,14 +84,63 @@ def render(scenario: Scenario, result: CampaignResult) -> str:
     return document(scenario, sections, data, ["campaign.js"], f"{versions()}.")
 
 
+def _shown(section: Section | None, level: int = 2, fit: bool = False) -> str:
+    """A section as HTML; nothing where there is none."""
+    if section is None:
+        return ""
+    head = f"<h{level}>{escape(section.heading)}</h{level}>\n" if section.heading else ""
+    return f"{head}{table_html(section.table, fit=fit) if section.table.rows else ''}\n{note(section.note)}"
+
+
+def _headlines(result: CampaignResult, words: Wording) -> Iterator[str]:
+    """Tell of each law what its verdicts come to."""
+    for number, law in enumerate(result.laws):
+        told = escape(headline(law, result.sampling, words).replace(" %", f"{NBSP}%"))
+        yield f'<p class="said">{pill(outcome_of(law))}<span><b>{swatch(number)}{escape(law.law)}</b> {told}</span></p>'
+
+
+def _in_words(result: CampaignResult) -> str:
+    told = "".join(
+        f"<li>{swatch(number)}{escape(f'{law.law}: {verdict.sentence()}')}</li>"
+        for number, law in enumerate(result.laws)
+        for verdict in law.verdicts
+    )
+    return f'<details><summary>The verdicts in words</summary><ul class="note">{told}</ul></details>'
+
+
+def _drivers(result: CampaignResult, words: Wording) -> Iterator[str]:
+    """Show what makes runs of each law fail and what moves its metrics, as a picture and as a table."""
+    from starhold.campaign.drivers import RISK
+
+    looked = [(number, law) for number, law in enumerate(result.laws) if law.drivers is not None]
+    if looked:
+        yield "<h2>What drives failures and metrics</h2>"
+        yield note(
+            "Shown is what stands out from chance: all tests of a law are corrected together, so that with "
+            f"{percent(1.0 - RISK)} confidence nothing is shown by chance, if inputs were drawn independently. Numbers of "
+            "inputs are in the units of their keys."
+        )
+    for number, law in looked:
+        assert law.drivers is not None
+        yield f"<h3>{swatch(number)}{escape(law.law)}</h3>\n{picture(law.drivers, words)}"
+        yield _shown(drivers(law.drivers, words, MOST_DRIVERS))
+
+
+def _indices(result: CampaignResult, words: Wording) -> Iterator[str]:
+    found = indices(result, words)
+    yield "<h2>Sensitivity indices</h2>" if found else ""
+    yield from (_shown(section, 3, fit=True) for section in found)
+
+
 def _for_script(plot: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in plot.items() if key not in {"title", "notes"}}
 
 
 def _switches(result: CampaignResult, more: str = "") -> str:
     """Buttons that show and hide laws in all pictures."""
+    pressed = 'type="button" aria-pressed="true"'
     buttons = "".join(
-        f'<button class="law-switch" data-law="{number}" type="button" aria-pressed="true">{named(number, law)}</button>'
+        f'<button class="law-switch" data-law="{number}" {pressed}>{swatch(number)}{escape(law.law)}</button>'
         for number, law in enumerate(result.laws)
     )
     shown = buttons if len(result.laws) > 1 else ""

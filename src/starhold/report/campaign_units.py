@@ -59,6 +59,11 @@ class Wording:
             return "the motion is not lost"
         return f"{measure.heading} at {'most' if item.at_most else 'least'} {with_unit(item.bound, measure)}"
 
+    def called(self, name: str) -> str:
+        """Tell the requirement of this name, and what it asks for."""
+        asks = self.asks(name)
+        return f"{name}: {asks}" if asks and name != self.asked[name].metric else asks or name
+
     def margin(self, name: str, value: float | None) -> str:
         """Show a margin of the requirement of this name, with its unit; it is minus infinity where a run has no value."""
         if value is None:

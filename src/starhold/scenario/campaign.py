@@ -6,183 +6,16 @@ package `campaign` reads them with those keys' units.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal, TypeAlias, cast
+from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
+from pydantic import Field, model_validator
 
-from starhold.errors import InputError
 from starhold.laws.interface import Gain
-from starhold.scenario.checking import cut, nearest, show, validate
-from starhold.scenario.quantity import quantity
-from starhold.scenario.tables import Flag, Name, Table, at_key, refuse, told_at
+from starhold.scenario.distributions import Dispersed
+from starhold.scenario.quantity import quantity, raw
+from starhold.scenario.tables import Name, Table, at_key
 
 MOST_RUNS = 10**9
-RAW = 'a number, a string with a unit such as "0.1 N m", or a list of them'
-
-
-def _raw(value: Any) -> Any:
-    """The value, if it may stand for a number or numbers of another key."""
-    if isinstance(value, list | tuple):
-        return [_raw(item) for item in cast(list[Any], value)]
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise refuse(RAW)
-    if not isinstance(value, str) and not math.isfinite(value):
-        raise refuse("finite numbers")
-    return value
-
-
-_SINGLE = [{"type": "number"}, {"type": "string"}]
-_ROW = {"type": "array", "items": {"anyOf": _SINGLE}}
-
-
-def raw(text: str) -> tuple[BeforeValidator, WithJsonSchema]:
-    """The annotations for numbers with the unit of another key: `Annotated[Any, *raw("the least value")]`."""
-    schema = {"anyOf": [*_SINGLE, _ROW, {"type": "array", "items": _ROW}], "description": text}
-    return BeforeValidator(_raw), WithJsonSchema(schema)
-
-
-class DispersionTable(Table):
-    """One key, or several that are drawn together; each table adds its `distribution`."""
-
-    judged_apart: Annotated[
-        Flag, Field(description="known before flight, as the day of launch: runs of equal values are judged by themselves")
-    ] = False
-    known_to_law: Annotated[
-        Flag, Field(description="laws know each drawn value and are designed for it; else for the file's value")
-    ] = False
-
-
-class RelativeTable(DispersionTable):
-    """A dispersion whose numbers may be shares."""
-
-    relative: Annotated[Flag, Field(description="the numbers are shares of the file's value")] = False
-
-
-class SpreadTable(RelativeTable):
-    """A dispersion that is drawn for each component on its own, or once for all."""
-
-    together: Annotated[Flag, Field(description="all components move together, by one draw")] = False
-
-
-class UniformTable(SpreadTable):
-    """Every value between two bounds is equally likely."""
-
-    distribution: Literal["uniform"]
-    low: Annotated[Any, *raw("the least value")]
-    high: Annotated[Any, *raw("the greatest value")]
-
-
-class NormalTable(SpreadTable):
-    """Gauss's distribution."""
-
-    distribution: Literal["normal"]
-    mean: Annotated[Any, *raw("by default the file's value")] = None
-    sigma: Annotated[Any, *raw("standard deviation")]
-
-
-class TruncatedNormalTable(SpreadTable):
-    """Gauss's distribution between two bounds."""
-
-    distribution: Literal["truncated-normal"]
-    mean: Annotated[Any, *raw("of the distribution before it is cut; by default the file's value")] = None
-    sigma: Annotated[Any, *raw("standard deviation before it is cut")]
-    low: Annotated[Any, *raw("the least value, if there is one")] = None
-    high: Annotated[Any, *raw("the greatest value, if there is one")] = None
-
-    @model_validator(mode="after")
-    def _is_cut(self) -> TruncatedNormalTable:
-        if self.low is None and self.high is None:
-            raise at_key("low", "low, high or both; without them it is normal", None)
-        return self
-
-
-class LogNormalTable(SpreadTable):
-    """The logarithm has Gauss's distribution."""
-
-    distribution: Literal["log-normal"]
-    median: Annotated[Any, *raw("by default the file's value")] = None
-    sigma: Annotated[Any, *raw("standard deviation of the natural logarithm, no unit")]
-
-
-class ChoiceTable(RelativeTable):
-    """One of several values."""
-
-    distribution: Literal["choice"]
-    values: Annotated[list[Any], Field(description="words, truths or numbers")]
-    weights: Annotated[list[Any] | None, Field(description="how likely they are to one another; equally if absent")] = None
-
-
-class CorrelatedNormalTable(RelativeTable):
-    """Gauss's distribution of several numbers together: of the keys that commas divide, or of one vector."""
-
-    distribution: Literal["correlated-normal"]
-    mean: Annotated[Any, *raw("by default the file's value")] = None
-    sigma: Annotated[Any, *raw("standard deviations")] = None
-    correlation: Annotated[Any, *raw("correlations, a row for each number")] = None
-    covariance: Annotated[Any, *raw("covariances (SI), a row for each number, in place of sigma and correlation")] = None
-
-    @model_validator(mode="after")
-    def _one_matrix(self) -> CorrelatedNormalTable:
-        if (self.covariance is None) == (self.correlation is None):
-            raise at_key("correlation", "either correlation with sigma, or covariance", self.correlation)
-        if (self.covariance is None) == (self.sigma is None):
-            allowed = "the standard deviations" if self.sigma is None else "no sigma beside a covariance"
-            raise at_key("sigma", allowed, self.sigma)
-        return self
-
-
-class RotationsTable(DispersionTable):
-    """An attitude, uniform on the rotation group."""
-
-    distribution: Literal["rotations"]
-
-
-class ShellTable(RelativeTable):
-    """A vector in any direction, uniform in the volume between two norms."""
-
-    distribution: Literal["shell"]
-    low: Annotated[Any, *raw("the least norm")] = 0.0
-    high: Annotated[Any, *raw("the greatest norm")]
-
-
-DISTRIBUTIONS: dict[str, type[DispersionTable]] = {
-    "uniform": UniformTable,
-    "normal": NormalTable,
-    "truncated-normal": TruncatedNormalTable,
-    "log-normal": LogNormalTable,
-    "choice": ChoiceTable,
-    "correlated-normal": CorrelatedNormalTable,
-    "rotations": RotationsTable,
-    "shell": ShellTable,
-}
-"""The tables of dispersions, by the names of distributions."""
-
-
-def _read_dispersion(given: Any) -> DispersionTable:
-    if isinstance(given, DispersionTable):
-        return given
-    if not isinstance(given, Mapping):
-        raise told_at("", show(given), 'a table such as { distribution = "normal", sigma = 0.1 }')
-    table = cast(Mapping[str, Any], given)
-    name = table.get("distribution")
-    if not isinstance(name, str) or name not in DISTRIBUTIONS:
-        described = "nothing" if name is None else show(name)
-        raise told_at("distribution", described, nearest(str(name), list(DISTRIBUTIONS)))
-    try:
-        return validate(DISTRIBUTIONS[name], dict(table), "", "")
-    except InputError as error:
-        # Raised again by the table around, which knows the rest of the key.
-        raise told_at(error.key, error.given, error.allowed) from None
-
-
-Dispersed: TypeAlias = Annotated[
-    Any,
-    BeforeValidator(_read_dispersion),
-    WithJsonSchema({"anyOf": [table.model_json_schema() for table in DISTRIBUTIONS.values()]}),
-]
-"""The table of one dispersion, by its distribution."""
 
 
 class RequirementTable(Table):
@@ -249,11 +82,3 @@ class CampaignTable(Table):
                 called = self.requirement[number - 1].called
                 raise at_key(f"requirement[{number}].name", "a name that no other requirement has, in any case", called)
         return self
-
-
-def read_over(over: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """The validated tables of dispersions, by key, from raw ones or from such tables. InputError for the first fault."""
-    for key in over:
-        if not isinstance(key, str):
-            raise InputError(where, "campaign.over", cut(str(key)), 'keys such as "spacecraft.inertia"')
-    return validate(CampaignTable, {"over": dict(over)}, where, "campaign").over

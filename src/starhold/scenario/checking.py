@@ -161,9 +161,9 @@ def in_file(table: Mapping[str, Any], read: Callable[[Path], _Part], what: str, 
     if "type" in table:
         raise InputError(where, key, show(given), "either a type or a file, not both")
     try:
-        found = read(folder / given)
-        check_name(found.name)
-        return found
+        part = read(folder / given)
+        check_name(part.name)
+        return part
     except OSError as error:
         raise InputError(where, key, f"{show(given)}: {error.strerror}", f"a Python file that holds a {what}") from None
     except PydanticCustomError as error:

@@ -10,9 +10,9 @@ from typing import Any, Literal, TypeAlias, cast
 import numpy as np
 from pydantic import BeforeValidator, ValidationInfo, WithJsonSchema
 from pydantic.fields import FieldInfo
-from pydantic_core import PydanticCustomError
 
 from starhold.laws.interface import Gain
+from starhold.scenario.tables import refuse
 from starhold.scenario.units import shown, to_number
 
 LEAST, MOST = 1e-30, 1e30
@@ -42,6 +42,28 @@ def quantity_or(word: str, meaning: float, gain: Gain) -> Annotations:
     read, schema = reader(gain), _schema(gain)
     described = {"anyOf": [{"const": word}, *schema["anyOf"]], "description": schema["description"]}
     return BeforeValidator(lambda value: meaning if value == word else read(value)), WithJsonSchema(described), gain
+
+
+RAW = 'a number, a string with a unit such as "0.1 N m", or a list of them'
+_SINGLE = [{"type": "number"}, {"type": "string"}]
+_ROW = {"type": "array", "items": {"anyOf": _SINGLE}}
+
+
+def raw(text: str) -> tuple[BeforeValidator, WithJsonSchema]:
+    """The annotations for numbers with the unit of another key: `Annotated[Any, *raw("the least value")]`."""
+    schema = {"anyOf": [*_SINGLE, _ROW, {"type": "array", "items": _ROW}], "description": text}
+    return BeforeValidator(_raw), WithJsonSchema(schema)
+
+
+def _raw(value: Any) -> Any:
+    """The value, if it is what may stand for a number or numbers of another key."""
+    if isinstance(value, list | tuple):
+        return [_raw(item) for item in cast(list[Any], value)]
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise refuse(RAW)
+    if not isinstance(value, str) and not math.isfinite(value):
+        raise refuse("finite numbers")
+    return value
 
 
 SCALED = {"length": "m", "velocity": "m/s", "acceleration": "m/s^2", "time": "s", "rate": "rad/s"}
@@ -77,7 +99,7 @@ def reader(gain: Gain) -> Callable[..., Any]:
             _check_size(checked)
             return checked
         except (ValueError, OverflowError) as error:
-            raise PydanticCustomError("quantity", "{reason}", {"reason": _plain(error)}) from None
+            raise refuse(_plain(error)) from None
 
     return read
 

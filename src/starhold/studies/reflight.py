@@ -1,8 +1,7 @@
 """A scenario that flies again elsewhere with other numbers: each law's loop as a program, and the equations that give its
 numbers from values of the file's keys.
 
-Which keys a loop can follow is told by no list: scenarios with other values are built, and a key counts where the equations
-give their bits. What follows a key otherwise, such as a law's matrices, holds the key.
+What follows a key by no equation, such as a law's matrices, holds the key.
 """
 
 from __future__ import annotations
@@ -20,11 +19,12 @@ from numpy.typing import NDArray
 from starhold.algebra.structure import flatten, leaves, mapped
 from starhold.errors import InputError
 from starhold.laws.modes import mode_laws
-from starhold.loop.kernels import Arguments, Numbers, form, make_step, numbers_of, one
+from starhold.loop.kernels import Arguments, Numbers, make_step, numbers_of, one
 from starhold.scenario.building import build
 from starhold.scenario.checking import read_toml
 from starhold.scenario.making import changed, plain, variants
 from starhold.simulation.lane import recorded
+from starhold.studies.flat import Flat
 from starhold.studies.questions import Asked, ask
 from starhold.trace.calling import record_call
 from starhold.trace.handles import Handle
@@ -208,9 +208,8 @@ def _others(value: Any) -> Iterator[Any]:
 def _reflown(
     scenario: Scenario, entry: LawEntry, loop: ClosedLoop, own: Values, tried: _Tried, fixed: Mapping[str, str]
 ) -> Reflown:
-    timing = scenario.table.simulation
-    steps = timing.steps
-    numbers, like = _numbers(loop, steps), _form(loop, steps)
+    steps = scenario.table.simulation.steps
+    flat = Flat.of(loop, steps, entered=True)
 
     def follows(*keys: str) -> bool:
         """Whether the equation of all kept keys gives the numbers of a scenario in which these are moved."""
@@ -223,14 +222,14 @@ def _reflown(
             # A key that goes with another has its value, unless it is moved itself.
             along = {key: values[leader] for key, leader in scenario.hooks.linked.items() if leader in values}
             given = {key: (own | along | values)[key] for key in kept}
-            return _form(made, steps) == like and _same(_numbers(made, steps), _given(scenario, loop, given))
+            return flat.gives(Flat.of(made, steps, entered=True), _given(scenario, loop, given))
         except (InputError, ValueError, ZeroDivisionError):
             return False
 
     held: dict[str, str] = {}
     # The start is the file's own with no key moved, as with all of them given.
     kept = [key for key in own if not key.startswith("law.")]
-    kept = kept if _same(numbers, _given(scenario, loop, {key: own[key] for key in kept})) else []
+    kept = kept if flat.gives(flat, _given(scenario, loop, {key: own[key] for key in kept})) else []
     held |= {key: COMPUTED for key in own if not key.startswith("law.") and key not in kept}
     kept += [key for key in own if key.startswith("law.")]
     held |= {key: fixed[key] for key in kept if key in fixed}
@@ -255,7 +254,7 @@ def _reflown(
         tuple(kept),
         places,
         len(numbers_of(carry)),
-        numbers,
+        flat.numbers,
         Arguments(*Numbers.of(phase)).tables,
         lost,
         tuple((name, size) for name, _, size in recorded(loop)),
@@ -268,23 +267,8 @@ def _reflown(
     )
 
 
-def _numbers(loop: ClosedLoop, steps: int) -> Array:
-    """The numbers of a loop as its motion begins: of the carry, then those that the kernel's lanes share."""
-    phase = loop.phases(steps)[0]
-    return np.array([*numbers_of(phase.entered(loop.carry())), *_shared(Numbers.of(phase))], dtype=float)
-
-
 def _shared(numbers: Any) -> list[Any]:
     return [leaf for leaf in leaves(numbers) if isinstance(leaf, float | Handle)]
-
-
-def _form(loop: ClosedLoop, steps: int) -> Any:
-    """Equal for loops that one program flies."""
-    return loop.composition(), form(loop.carry()), form(Numbers.of(loop.phases(steps)[0])), loop.substeps
-
-
-def _same(a: Array, b: Array) -> bool:
-    return a.shape == b.shape and a.tobytes() == b.tobytes()
 
 
 def _equation(scenario: Scenario, loop: ClosedLoop, keys: Sequence[str]) -> Callable[[Any], list[Any]]:
@@ -306,8 +290,8 @@ def _equation(scenario: Scenario, loop: ClosedLoop, keys: Sequence[str]) -> Call
     return numbers
 
 
-def _given(scenario: Scenario, loop: ClosedLoop, values: Values) -> Array:
-    return np.array(_equation(scenario, loop, list(values))(tuple(values.values())), dtype=float)
+def _given(scenario: Scenario, loop: ClosedLoop, values: Values) -> list[Any]:
+    return _equation(scenario, loop, list(values))(tuple(values.values()))
 
 
 def _recorded(scenario: Scenario, loop: ClosedLoop, own: Values) -> tuple[Program, tuple[int, ...]]:

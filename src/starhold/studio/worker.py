@@ -60,13 +60,6 @@ def _certify(scenario: Scenario, folder: Path, tell: Tell) -> str:
     return _page(folder, text)
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = ["".join(f"<td>{escape(text)}</td>" for text in row) for row in rows]
-    heads = "".join(f"<th>{escape(text)}</th>" for text in head)
-    body = "".join(f"<tr>{line}</tr>" for line in lines)
-    return f'<div class="wide"><table class="text"><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table></div>'
-
-
 def _studied(name: str, scenario: Scenario, folder: Path, tell: Tell) -> str:
     """A page of a study: its picture, what it shows, and its files."""
     from starhold.report.results import write_result
@@ -89,11 +82,14 @@ def _studied(name: str, scenario: Scenario, folder: Path, tell: Tell) -> str:
 def _block(block: commands.Block) -> str:
     from rich.text import Text
 
+    from starhold.report.html_tables import table_html
+
     if isinstance(block, commands.Heading):
         return f"<h2>{escape(block.name + block.rest)}</h2>"
     if isinstance(block, str):
         return f'<p style="white-space:pre-wrap">{escape(block)}</p>' if block else ""
-    return _table(block.heads(), [[Text.from_markup(text).plain for text in row] for row in block.texts()])
+    rows = [[Text.from_markup(text).plain for text in row] for row in block.texts()]
+    return table_html(block._replace(rows=rows), "text")
 
 
 def _export(scenario: Scenario, folder: Path, tell: Tell) -> str:

@@ -22,9 +22,23 @@ class Column(NamedTuple):
     format: str = ""
 
 
+class Cell(NamedTuple):
+    """Words of a table that look in a way of their own. kind: "law", in the colour of the law of this number; an outcome,
+    "met", "missed" or "not decided"; "typed", to be copied; "share", with a bar of this share of the column below it;
+    "shade", in the colour that detail names, as strong as the number is far from 0; else detail says what the words mean."""
+
+    text: str
+    kind: str = ""
+    number: float = 0.0
+    detail: str = ""
+
+    def __format__(self, form: str) -> str:
+        return self.text
+
+
 class Table(NamedTuple):
-    """Columns and rows. A cell is a number, several of them, words or None for nothing; bold and ends are the numbers of
-    rows that stand out and of those that a line follows."""
+    """Columns and rows. A cell is a number, several of them, words, a `Cell` or None for nothing; bold and ends are the
+    numbers of rows that stand out and of those that a line follows."""
 
     columns: Sequence[Column]
     rows: Sequence[Sequence[Any]]

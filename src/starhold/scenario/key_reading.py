@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from starhold.campaign.distributions import Numbers
-from starhold.campaign.values import Place, accepted, width_at
 from starhold.parts.epoch import EPOCH, date_of
 from starhold.scenario.checking import show
+from starhold.scenario.distribution import SYMMETRIC, Distribution
 from starhold.scenario.reading import Scenario
+from starhold.scenario.values import Place, accepted, width_at
 
-SYMMETRIC = 1e-9
-"""Difference of a matrix from its transpose, as a share of its largest entry, that counts as none."""
+Numbers: TypeAlias = tuple[float, ...]
 
 
 def components(shape: tuple[int, ...], symmetric: bool = False) -> list[tuple[int, ...]]:
@@ -37,24 +36,21 @@ class KeyReading:
     @staticmethod
     def of(scenario: Scenario, place: Place, table: Any) -> KeyReading:
         """InputError where values of the distribution cannot be such a key's."""
-        kind, relative, value = table.distribution, getattr(table, "relative", False), place.value
-        if place.wordy and kind != "choice":
-            raise place.refuse("distribution", show(kind), "choice, for the key holds a word")
-        if place.whole and kind not in ("uniform", "choice"):
-            raise place.refuse("distribution", show(kind), "uniform or choice, for the key holds a whole number")
-        if place.gain == EPOCH and kind != "choice":
-            raise place.refuse("distribution", show(kind), "choice, for the key holds a date")
+        relative, value = getattr(table, "relative", False), place.value
+        for holds, flag, what in (
+            (place.wordy, "WORDS", "a word"),
+            (place.whole, "WHOLE", "a whole number"),
+            (place.gain == EPOCH, "WORDS", "a date"),
+        ):
+            if holds and not getattr(table, flag):
+                allowed = f"{Distribution.named(flag)}, for the key holds {what}"
+                raise place.refuse("distribution", show(table.distribution), allowed)
         if relative and (place.wordy or place.whole):
             raise place.refuse("relative", "true", "false, for the key holds a word or a whole number")
         if relative and (value is None or not np.isfinite(value).all() or not np.any(value)):
             raise place.refuse("relative", "true", f"false, for there are no shares of {_shown(value)}")
         index = components(place.shape, symmetric=_is_symmetric(place))
         return KeyReading(scenario, place, table, tuple(index), relative)
-
-    @property
-    def dims(self) -> int:
-        """Uniforms for components that are drawn one by one, or together."""
-        return 1 if self.table.together else len(self.index)
 
     @property
     def unit(self) -> str | None:
@@ -79,39 +75,49 @@ class KeyReading:
         full = np.asarray(array, dtype=float)
         return tuple(float(full[item]) for item in self.index)
 
-    def centre(self, name: str, held: bool = True) -> Numbers:
+    def centre(self, name: str, checked: bool = True) -> Numbers:
         """A mean or a median, by default what the file has."""
         value = self.place.value
         if getattr(self.table, name) is not None:
-            return self.numbers(name, held)
+            return self.numbers(name, checked)
         if not self.relative and (value is None or not np.isfinite(value).all()):
             raise self.place.refuse(name, "nothing", f"a value, for the file has {_shown(value)}")
         return (1.0,) * len(self.index) if self.relative else self.nominal
 
-    def numbers(self, name: str, held: bool = True) -> Numbers:
+    def numbers(self, name: str, checked: bool = True) -> Numbers:
         """The numbers of a parameter in the key's unit, or as shares; `held`: whether the key must take them. InputError
         where it does not."""
-        return self.read(getattr(self.table, name), name, held)
+        return self.read(getattr(self.table, name), name, checked)
 
-    def read(self, raw: Any, name: str, held: bool = True) -> Numbers:
-        """The numbers that a raw value means, which errors call by a name; `held` as of `numbers`."""
+    def norm(self, name: str) -> float:
+        """The number of a parameter that is of a whole vector."""
+        return float(width_at(replace(self.place, shape=()), getattr(self.table, name), name, self.unit))
+
+    def accept(self, value: Any, name: str) -> Any:
+        """The validated form of a value. InputError, which calls it by a name, where the key does not take it."""
+        return accepted(self.scenario, self.place, value, name)
+
+    def read(self, raw: Any, name: str, checked: bool = True) -> tuple[Any, ...]:
+        """The numbers, or the word, that a raw value means, which errors call by a name; `checked` as of `numbers`."""
+        if self.place.wordy:
+            return (word(self.accept(raw, name)),)
         if self.place.gain == EPOCH and isinstance(raw, str):
             try:
                 raw = list(date_of(raw))
             except ValueError as error:
                 raise self.place.refuse(name, show(raw), str(error)) from None
         read = width_at(self.place, raw, name, self.unit)
-        if held:
-            accepted(self.scenario, self.place, (read * self.place.value if self.relative else read).tolist(), name)
+        if checked:
+            self.accept((read * self.place.value if self.relative else read).tolist(), name)
         return self.picked(read)
 
     def sigma(self, unit: str | None) -> Numbers:
         """Standard deviations in a unit, None for the key's. InputError where one is negative, or nothing is dispersed."""
         raw, scale = self.table.sigma, self.nominal if self.relative else (1.0,) * len(self.index)
-        found = self.picked(width_at(self.place, raw, "sigma", unit))
-        if min(found) < 0.0 or not any(share * size for share, size in zip(found, scale, strict=True)):
+        widths = self.picked(width_at(self.place, raw, "sigma", unit))
+        if min(widths) < 0.0 or not any(share * size for share, size in zip(widths, scale, strict=True)):
             raise self.place.refuse("sigma", show(raw), "above 0")
-        return found
+        return widths
 
 
 def _shown(value: Any) -> str:

@@ -87,10 +87,10 @@ class Place:
         turns = self.gain is not None and self.gain.unit == "rad" and isinstance(value, float) and abs(value) > math.tau
         return f"{value!r} rad" if turns else value
 
-    def refuse(self, name: str, found: str, allowed: str) -> InputError:
+    def refuse(self, name: str, given: str, allowed: str) -> InputError:
         """An error about the dispersion of the key, or about a parameter of it."""
-        told = f'campaign.over."{self.table}"'
-        return InputError(self.where, f"{told}.{name}" if name else told, found, allowed)
+        key_text = f'campaign.over."{self.table}"'
+        return InputError(self.where, f"{key_text}.{name}" if name else key_text, given, allowed)
 
 
 def accepted(scenario: Scenario, place: Place, value: Any, name: str = "") -> Any:
@@ -100,8 +100,8 @@ def accepted(scenario: Scenario, place: Place, value: Any, name: str = "") -> An
     except InputError as error:
         if error.key.rpartition(".")[2] == place.key.rpartition(".")[2]:
             raise place.refuse(name, error.given or show(value), error.allowed) from None
-        found = f"found {error.given}; " if error.given else ""
-        raise place.refuse(name, show(value), f"what {error.key or 'the scenario'} takes: {found}{error.allowed}") from None
+        seen = f"found {error.given}; " if error.given else ""
+        raise place.refuse(name, show(value), f"what {error.key or 'the scenario'} takes: {seen}{error.allowed}") from None
 
 
 def width_at(place: Place, raw: Any, name: str = "", unit: str | None = None) -> NDArray[np.float64]:
@@ -143,29 +143,29 @@ def _filled(place: Place, raw: Any, shape: Sequence[int], name: str) -> Any:
 def locate(scenario: Scenario, key: str) -> Place:
     """The place of a key. InputError where there is no such key, or none in which runs of a campaign may differ."""
     names = {"law": [entry.name for entry in scenario.laws], "part": [fitted.called for fitted in scenario.parts]}
-    told = f'campaign.over."{cut(key, 200)}"'
+    key_text = f'campaign.over."{cut(key, 200)}"'
     try:
         path = path_of(key, names, scenario.where)
         if path[0] in SHARED:
             raise _no("a key that all runs share", "a key of the craft, its surroundings, laws or parts")
         return _locate(scenario, key, tuple(path))
     except InputError as error:
-        raise InputError(scenario.where, told, error.given, error.allowed) from None
+        raise InputError(scenario.where, key_text, error.given, error.allowed) from None
 
 
-def _no(found: str, allowed: str) -> InputError:
+def _no(given: str, allowed: str) -> InputError:
     """An error about a key that leads nowhere; `locate` says which."""
-    return InputError("", "", found, allowed)
+    return InputError("", "", given, allowed)
 
 
 def _locate(scenario: Scenario, key: str, path: tuple[str | int, ...]) -> Place:
-    model, held, (name, *rest) = _table_of(scenario, path)
+    model, value_of, (name, *rest) = _table_of(scenario, path)
     known = [item for item in model.model_fields if item not in STRUCTURE]
     if name in STRUCTURE:
         raise _no("a key that says what a table is", "a key of a number or a word")
     if name not in model.model_fields:
         raise _no("an unknown key", nearest(str(name), known))
-    gain, value = declared(model.model_fields[str(name)]), held(str(name))
+    gain, value = declared(model.model_fields[str(name)]), value_of(str(name))
     if isinstance(value, Table | dict) or (gain is None and isinstance(value, list)) or _is_table(model, name):
         raise _no("a whole table", f"keys of it, such as {key}.KEY")
     if gain is not None and gain.columns:

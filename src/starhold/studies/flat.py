@@ -1,4 +1,8 @@
-"""All numbers that a loop flies with, in one row, each with its name."""
+"""All numbers that a loop flies with, in one row, each with its name; and the trial whether an equation gives them.
+
+Which keys of a file an equation follows is told by no list: scenarios with other values are built, and their numbers
+compared with what the equation gives, to the last bit.
+"""
 
 from __future__ import annotations
 
@@ -29,33 +33,36 @@ class Flat:
     numbers: Array
 
     @classmethod
-    def of(cls, loop: ClosedLoop, steps: int) -> Flat:
-        """The numbers of a loop that flies so many control steps."""
-        rest = named_phases(loop, loop.phases(steps))
-        names = (*named_carry(loop), *(name for name, _ in rest))
-        numbers = np.array([*numbers_of(loop.carry()), *(value for _, value in rest)], dtype=float)
-        return cls(loop, kernel_key(Flying(loop, steps, 1)), names, numbers)
+    def of(cls, loop: ClosedLoop, steps: int, entered: bool = False) -> Flat:
+        """The numbers of a loop that flies so many control steps; `entered`: with the carry as the first phase begins, which
+        may change it."""
+        phases = loop.phases(steps)
+        carry = phases[0].entered(loop.carry()) if entered else loop.carry()
+        found = named_numbers(loop, numbers_of(carry), phases)
+        return cls(loop, kernel_key(Flying(loop, steps, 1)), tuple(found), np.array([*found.values()], dtype=float))
+
+    def gives(self, other: Flat | None, numbers: Any) -> bool:
+        """Whether another loop, None for one that cannot be, is flown by this one's kernel with these numbers, to the last
+        bit."""
+        if other is None or other.form != self.form:
+            return False
+        given = np.ascontiguousarray(numbers, dtype=float)
+        return other.numbers.shape == given.shape and other.numbers.tobytes() == given.tobytes()
 
     def places(self, name: str) -> list[int]:
         """The places of a number of this name, in every phase that has it."""
         return [place for place, own in enumerate(self.names) if own == name or own.endswith(f"].{name}")]
 
 
-def named_carry(loop: ClosedLoop) -> list[str]:
-    """The names of the numbers of a loop's carry, what its buffers hold at the end."""
-    carry = loop.carry()
-    found = [name for name, _ in named(carry, "")]
-    return [*found, *(f"buffer[{k}]" for k in range(1, len(numbers_of(carry)) - len(found) + 1))]
-
-
-def named_phases(loop: ClosedLoop, phases: Sequence[Phase]) -> list[tuple[str, Any]]:
-    """The numbers of phases with their names, those of events by their number; then the times of events, in the body's unit
-    of time."""
-    found: list[tuple[str, Any]] = []
+def named_numbers(loop: ClosedLoop, carry: Sequence[Any], phases: Sequence[Phase]) -> dict[str, Any]:
+    """The numbers of a loop, or arrays (lanes,) in their places, by name: of its carry, what its buffers hold at the end; of
+    phases, those of events by their number; then the times of events, in the body's unit of time."""
+    names = [name for name, _ in named(loop.carry(), "")]
+    found = dict(zip([*names, *(f"buffer[{k}]" for k in range(1, len(carry) - len(names) + 1))], carry, strict=True))
     for number, phase in enumerate(phases):
         prefix = f"event[{number}]." if number else ""
-        found += [(f"{prefix}{name}", value) for name, value in named(Numbers.of(phase), "")]
-    return [*found, *((f"event[{number}].time", phase.first * loop.period) for number, phase in enumerate(phases) if number)]
+        found |= {f"{prefix}{name}": value for name, value in named(Numbers.of(phase), "")}
+    return found | {f"event[{number}].time": phase.first * loop.period for number, phase in enumerate(phases) if number}
 
 
 def named(value: Any, name: str) -> Iterator[tuple[str, Any]]:
@@ -82,8 +89,3 @@ def shown_name(loop: ClosedLoop, name: str) -> str:
 
     name = _OF_PART.sub(lambda m: called(m[1], loop.used(m[2])[int(m[3]) - 1]), name)
     return _OF_ONE.sub(lambda m: called(m[1], (*loop.used(m[2]), loop.target)[0]), name)
-
-
-def same(a: Array, b: Array) -> bool:
-    """Whether rows of numbers have the same bits."""
-    return a.shape == b.shape and np.ascontiguousarray(a).tobytes() == np.ascontiguousarray(b).tobytes()

@@ -1,0 +1,358 @@
+"""Distributions of the numbers that runs of a campaign differ in, one class each: its table in a file, how that is read as
+its key asks, and its inverse distribution function. A class whose field `distribution` names it is found by that; nothing
+else has to know of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field, PrivateAttr, WithJsonSchema, model_validator
+
+from starhold.errors import InputError
+from starhold.scenario.checking import nearest, show, validate
+from starhold.scenario.distribution import DISTRIBUTIONS, SYMMETRIC, Array, Distribution, Relative, Spread, column, ndtri
+from starhold.scenario.quantity import raw
+from starhold.scenario.tables import at_key, told_at
+
+if TYPE_CHECKING:
+    from starhold.scenario.key_reading import KeyReading
+
+
+class Uniform(Spread):
+    """Every value between two is as likely; whole ones from both ends inclusive."""
+
+    WHOLE = BOUNDED = True
+    distribution: Literal["uniform"]
+    low: Annotated[Any, *raw("the least value")]
+    high: Annotated[Any, *raw("the greatest value")]
+
+    def _numbers(self, key: KeyReading) -> dict[str, Any]:
+        return _ordered(key, key.numbers("low"), key.numbers("high"))
+
+    def draw(self, u: Array) -> Array:
+        """Numbers in proportion to the uniforms."""
+        low, high = column(self.low), column(self.high)
+        if self._whole:
+            return np.minimum(low + np.floor((high - low + 1.0) * u), high)
+        # Rounding may lead beyond an end, which the key may refuse.
+        return np.clip(low + (high - low) * u, low, high)
+
+
+class Normal(Spread):
+    """Gauss's distribution."""
+
+    distribution: Literal["normal"]
+    mean: Annotated[Any, *raw("by default what the file has")] = None
+    sigma: Annotated[Any, *raw("standard deviation")]
+
+    def _numbers(self, key: KeyReading) -> dict[str, Any]:
+        return {"mean": key.centre("mean"), "sigma": key.sigma(key.unit)}
+
+    def draw(self, u: Array) -> Array:
+        """mean + sigma z."""
+        return column(self.mean) + column(self.sigma) * ndtri(u)
+
+
+class TruncatedNormal(Spread):
+    """Gauss's distribution between two bounds."""
+
+    distribution: Literal["truncated-normal"]
+    mean: Annotated[Any, *raw("of the distribution before it is cut; by default what the file has")] = None
+    sigma: Annotated[Any, *raw("standard deviation before it is cut")]
+    low: Annotated[Any, *raw("the least value, if there is one")] = None
+    high: Annotated[Any, *raw("the greatest value, if there is one")] = None
+
+    @model_validator(mode="after")
+    def _is_cut(self) -> TruncatedNormal:
+        if self.low is None and self.high is None:
+            raise at_key("low", "low, high or both; without them it is normal", None)
+        return self
+
+    def _numbers(self, key: KeyReading) -> dict[str, Any]:
+        none = (math.inf,) * len(key.index)
+        low = tuple(-x for x in none) if self.low is None else key.numbers("low")
+        ends = _ordered(key, low, none if self.high is None else key.numbers("high"))
+        given = {"mean": key.centre("mean", checked=False), "sigma": key.sigma(key.unit), **ends}
+        if not self.model_copy(update=given).reached:
+            name = "high" if self.low is None else "low"
+            raise key.place.refuse(name, show(getattr(self, name)), "an interval that the normal distribution reaches")
+        return given
+
+    @property
+    def bounded(self) -> bool:
+        """Whether neither end is infinite."""
+        return bool(np.isfinite([*self.low, *self.high]).all())
+
+    @cached_property
+    def _tails(self) -> tuple[NDArray[np.bool_], Array, Array]:
+        """Whether each is turned about its mean, and the probabilities below its ends when it is. The upper tail's are too
+        near one to be told apart, so an interval there is turned into the lower."""
+        from scipy.special import ndtr
+
+        mean, sigma, low, high = (column(numbers) for numbers in (self.mean, self.sigma, self.low, self.high))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            first, last = (low - mean) / sigma, (high - mean) / sigma
+        turned = first > 0.0
+        return turned, ndtr(np.where(turned, -last, first)), ndtr(np.where(turned, -first, last))
+
+    @property
+    def reached(self) -> bool:
+        """Whether each interval has a probability that floats can hold."""
+        _, below, above = self._tails
+        return bool((above - below > 0.0).all())
+
+    def draw(self, u: Array) -> Array:
+        """Quantiles of the cut distribution."""
+        turned, below, above = self._tails
+        z = ndtri(below + np.where(turned, 1.0 - u, u) * (above - below))
+        values = column(self.mean) + column(self.sigma) * np.where(turned, -z, z)
+        return np.clip(values, column(self.low), column(self.high))
+
+
+class LogNormal(Spread):
+    """The logarithm has Gauss's distribution."""
+
+    distribution: Literal["log-normal"]
+    median: Annotated[Any, *raw("by default what the file has")] = None
+    sigma: Annotated[Any, *raw("standard deviation of the natural logarithm, no unit")]
+
+    def _numbers(self, key: KeyReading) -> dict[str, Any]:
+        median = key.centre("median")
+        if not all(median):
+            given = show(key.place.value if self.median is None else self.median)
+            raise key.place.refuse("median", given, "numbers that are not zero")
+        return {"median": median, "sigma": key.sigma("1")}
+
+    def draw(self, u: Array) -> Array:
+        """median exp(sigma z)."""
+        return column(self.median) * np.exp(column(self.sigma) * ndtri(u))
+
+
+class Choice(Relative):
+    """One of several values, each a tuple of numbers or a single word, by weights."""
+
+    WORDS = WHOLE = BOUNDED = True
+    distribution: Literal["choice"]
+    values: Annotated[list[Any], Field(description="words, truths or numbers")]
+    weights: Annotated[list[Any] | None, Field(description="how likely they are to one another; equally if absent")] = None
+
+    @property
+    def dims(self) -> int:
+        """One for all numbers of a value."""
+        return 1
+
+    def _numbers(self, key: KeyReading) -> dict[str, Any]:
+        weights = [1.0] * len(self.values) if self.weights is None else self.weights
+        if len(weights) != len(self.values):
+            raise key.place.refuse("weights", f"{len(weights)} weights", f"one for each of the {len(self.values)} values")
+        for number, weight in enumerate(weights, 1):
+            if isinstance(weight, bool) or not isinstance(weight, int | float) or not 0.0 < weight < math.inf:
+                raise key.place.refuse(f"weights[{number}]", show(weight), "a number above 0")
+        values = [key.read(value, f"values[{number}]") for number, value in enumerate(self.values, 1)]
+        if len(set(values)) < 2:
+            raise key.place.refuse("values", show(self.values), "at least two values that differ")
+        return {"values": values, "weights": weights}
+
+    def draw(self, u: Array) -> NDArray[Any]:
+        """The value in whose part of the line from 0 to 1 the uniform falls."""
+        ends = np.cumsum(np.array(self.weights, dtype=float))
+        return np.array(self.values).T[:, np.searchsorted(ends[:-1] / ends[-1], u[0], side="right")]
+
+
+class CorrelatedNormal(Relative):
+    """Gauss's distribution of several numbers together: of the keys that commas divide, or of one vector."""
+
+    SEVERAL = True
+    distribution: Literal["correlated-normal"]
+    mean: Annotated[Any, *raw("by default what the file has")] = None
+    sigma: Annotated[Any, *raw("standard deviations")] = None
+    correlation: Annotated[Any, *raw("correlations, a row for each number")] = None
+    covariance: Annotated[Any, *raw("covariances (SI), a row for each number, in place of sigma and correlation")] = None
+    _factor: Any = PrivateAttr(())
+    """The rows of the lower triangular L with the covariance L L^T."""
+
+    @model_validator(mode="after")
+    def _one_matrix(self) -> CorrelatedNormal:
+        if (self.covariance is None) == (self.correlation is None):
+            raise at_key("correlation", "either correlation with sigma, or covariance", self.correlation)
+        if (self.covariance is None) == (self.sigma is None):
+            allowed = "the standard deviations" if self.sigma is None else "no sigma beside a covariance"
+            raise at_key("sigma", allowed, self.sigma)
+        return self
+
+    @property
+    def dims(self) -> int:
+        """One for each number."""
+        return len(self.mean)
+
+    def read(self, keys: Sequence[KeyReading]) -> Self:
+        """The distribution with its numbers; of the vector of one key, or of keys of a number each."""
+        first = keys[0]
+        wanted = 1 if len(keys) == 1 else 0
+        if any(len(key.place.shape) != wanted for key in keys):
+            raise first.place.refuse(
+                "distribution", show(self.distribution), "numbers of several keys, or the vector of one"
+            )
+        mean = tuple(x for key in keys for x in key.centre("mean")) if self.mean is None else self._each(keys, "mean")
+        name = "covariance" if self.correlation is None else "correlation"
+        reading = self.model_copy(update={"mean": mean})
+        reading._factor = np.linalg.cholesky(_positive(first, getattr(self, name), len(mean), name))
+        if name == "correlation":
+            sigma = self._each(keys, "sigma", checked=False)
+            if min(sigma) <= 0.0:
+                raise first.place.refuse("sigma", show(self.sigma), "above 0")
+            reading._factor = np.array(sigma)[:, None] * reading._factor
+        return reading
+
+    def _each(self, keys: Sequence[KeyReading], name: str, checked: bool = True) -> tuple[float, ...]:
+        """A number for each of several keys, or for each component of one vector."""
+        if len(keys) == 1:
+            return keys[0].numbers(name, checked)
+        given = getattr(self, name)
+        if not isinstance(given, list) or len(cast(list[Any], given)) != len(keys):
+            raise keys[0].place.refuse(name, show(given), f"{len(keys)} values, one for each key")
+        pairs = enumerate(zip(keys, cast(list[Any], given), strict=True), 1)
+        return tuple(key.read(item, f"{name}[{number}]", checked)[0] for number, (key, item) in pairs)
+
+    def draw(self, u: Array) -> Array:
+        """mean + L z."""
+        z, values = ndtri(u), np.empty_like(u)
+        # Term by term: how a matrix product adds depends on its width.
+        for place, (mean, row) in enumerate(zip(self.mean, self._factor, strict=True)):
+            total = np.full(u.shape[1], mean)
+            for other in range(place + 1):
+                total += row[other] * z[other]
+            values[place] = total
+        return values
+
+
+class Rotations(Distribution):
+    """An attitude, uniform on the rotation group: both signs of each quaternion are as likely, for laws may tell them apart.
+
+    Source: K. Shoemake, Uniform random rotations, Graphics Gems III (1992): the subgroup algorithm.
+    """
+
+    BOUNDED = True
+    distribution: Literal["rotations"]
+
+    @property
+    def dims(self) -> int:
+        """Those of the group."""
+        return 3
+
+    def _numbers(self, key: KeyReading) -> dict[str, Any]:
+        if key.place.shape != (4,):
+            allowed = "another, for these are of an attitude as a quaternion"
+            raise key.place.refuse("distribution", show(self.distribution), allowed)
+        return {}
+
+    def draw(self, u: Array) -> Array:
+        """A turn about an axis, and a point of the sphere where that is turned to."""
+        near, far = np.sqrt(1.0 - u[0]), np.sqrt(u[0])
+        first, second = math.tau * u[1], math.tau * u[2]
+        return np.stack([far * np.cos(second), near * np.sin(first), near * np.cos(first), far * np.sin(second)])
+
+    def size(self, rows: Sequence[Array]) -> tuple[str, Array]:
+        """The angle of the rotation."""
+        return "angle", 2.0 * np.arccos(np.minimum(np.abs(rows[0]), 1.0))
+
+
+class Shell(Relative):
+    """A vector in any direction, uniform in the volume between two norms."""
+
+    BOUNDED = True
+    distribution: Literal["shell"]
+    low: Annotated[Any, *raw("the least norm")] = 0.0
+    high: Annotated[Any, *raw("the greatest norm")]
+
+    @property
+    def dims(self) -> int:
+        """Those of space."""
+        return 3
+
+    @property
+    def shares(self) -> bool:
+        """Never, once shares of a norm have become norms."""
+        return False
+
+    def _numbers(self, key: KeyReading) -> dict[str, Any]:
+        if key.place.shape != (3,) or key.place.gain is None or key.place.gain.shape != (3,):
+            raise key.place.refuse("distribution", '"shell"', "another, for this one is of a vector of three numbers")
+        low, high = key.norm("low"), key.norm("high")
+        if not 0.0 <= low < high:
+            raise key.place.refuse("low", show(self.low), f"from 0 to below high, which is {show(self.high)}")
+        size = math.hypot(*key.nominal) if self.relative else 1.0
+        # One direction stands for all.
+        key.accept([high * size, 0.0, 0.0], "high")
+        return {"low": low * size, "high": high * size}
+
+    def draw(self, u: Array) -> Array:
+        """A radius by its cube, a height on the unit sphere (Archimedes) and a longitude."""
+        hollow = (self.low / self.high) ** 3
+        radius = np.clip(self.high * np.cbrt(hollow + u[0] * (1.0 - hollow)), self.low, self.high)
+        height, longitude = 2.0 * u[1] - 1.0, math.tau * u[2]
+        level = np.sqrt(4.0 * u[1] * (1.0 - u[1]))
+        return radius * np.stack([level * np.cos(longitude), level * np.sin(longitude), height])
+
+    def size(self, rows: Sequence[Array]) -> tuple[str, Array]:
+        """The norm of the vector."""
+        return "norm", np.sqrt(sum(np.square(row) for row in rows))
+
+
+def _ordered(key: KeyReading, low: Sequence[float], high: Sequence[float]) -> dict[str, Any]:
+    """Ends by name. InputError where the lower is not below the upper."""
+    if not all(a < b for a, b in zip(low, high, strict=True)):
+        raise key.place.refuse("low", show(key.table.low), f"below high, which is {show(key.table.high)}")
+    return {"low": low, "high": high}
+
+
+def _positive(key: KeyReading, given: Any, size: int, name: str) -> Array:
+    """A matrix of correlations or covariances. InputError where it is none."""
+    allowed = f"{size} rows of {size} plain numbers"
+    try:
+        matrix = np.array(given, dtype=float)
+    except ValueError:
+        raise key.place.refuse(name, show(given), allowed) from None
+    if matrix.shape != (size, size) or any(isinstance(item, str) for row in given for item in row):
+        raise key.place.refuse(name, show(given), allowed)
+    if np.abs(matrix - matrix.T).max() > SYMMETRIC * np.abs(matrix).max():
+        raise key.place.refuse(name, show(given), "a symmetric matrix")
+    if name == "correlation" and np.abs(np.diagonal(matrix) - 1.0).max() > SYMMETRIC:
+        raise key.place.refuse(name, show(given), "ones on the diagonal")
+    # Scaled to correlations, for covariances may be of many units.
+    size_of = np.sqrt(np.abs(np.diagonal(matrix)))
+    with np.errstate(all="ignore"):
+        scaled = matrix / np.outer(size_of, size_of)
+    if not np.isfinite(scaled).all() or np.linalg.eigvalsh(scaled)[0] <= size * np.finfo(float).eps:
+        raise key.place.refuse(name, show(given), "a positive definite matrix")
+    return matrix
+
+
+def _read(given: Any) -> Distribution:
+    if isinstance(given, Distribution):
+        return given
+    if not isinstance(given, Mapping):
+        raise told_at("", show(given), 'a table such as { distribution = "normal", sigma = 0.1 }')
+    table = cast(Mapping[str, Any], given)
+    name = table.get("distribution")
+    if not isinstance(name, str) or name not in DISTRIBUTIONS:
+        given = "nothing" if name is None else show(name)
+        raise told_at("distribution", given, nearest(str(name), list(DISTRIBUTIONS)))
+    try:
+        return validate(DISTRIBUTIONS[name], dict(table), "", "")
+    except InputError as error:
+        # Told again by the table around, which knows the rest of the key.
+        raise told_at(error.key, error.given, error.allowed) from None
+
+
+Dispersed: TypeAlias = Annotated[
+    Any,
+    BeforeValidator(_read),
+    WithJsonSchema({"anyOf": [table.model_json_schema() for table in DISTRIBUTIONS.values()]}),
+]
+"""The table of one dispersion, by its distribution."""
