@@ -65,7 +65,7 @@ typedef struct {
     double inverse_square;
 } attraction_result_t;
 
-/* Beside the state all that a measurement is made of: the goal (None where the loop has no target),
+/* All that a measurement is made of beside the state: the goal (None where the loop has no target),
    whether it never turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s,
    body), the control period, the limit of the command, and all readings of the sensors, an attribute for
    each. */
@@ -74,7 +74,7 @@ typedef struct {
     vector_t torque;
 } scene_t;
 
-/* Quantities that a law is told at a control instant; vectors are in body axes. */
+/* Quantities that a law reads at a control instant; vectors are in body axes. */
 typedef struct {
     quaternion_t attitude; /* rotation from the target axes to the body axes, scalar first */
     vector_t rate; /* rad/s: angular velocity relative to the target */
@@ -299,11 +299,11 @@ void lyapunov_init(lyapunov_state_t *state)
 void lyapunov_step(lyapunov_state_t *state, const lyapunov_input_t *input, lyapunov_command_t *command)
 {
     (void)state;
-    const state_t found = {.attitude = input->attitude, .rate = input->rate, .position = input->position};
+    const state_t known = {.attitude = input->attitude, .rate = input->rate, .position = input->position};
     const scene_t scene = {.goal = inertial_goal(&parameters.setup.target),
-        .torque = gravity_gradient_torque(&found, &parameters.craft)};
-    const measurement_t told = observe(&found, &scene);
-    const vector_t wanted = limit_axis(lyapunov_torque(&told, &parameters.gains, &parameters.craft),
+        .torque = gravity_gradient_torque(&known, &parameters.craft)};
+    const measurement_t measurement = observe(&known, &scene);
+    const vector_t wanted = limit_axis(lyapunov_torque(&measurement, &parameters.gains, &parameters.craft),
         parameters.setup.limit);
     command->torque = wanted;
 }

@@ -54,7 +54,7 @@ typedef struct {
     quaternion_t attitude;
 } goal_t;
 
-/* Beside the state all that a measurement is made of: the goal (None where the loop has no target),
+/* All that a measurement is made of beside the state: the goal (None where the loop has no target),
    whether it never turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s,
    body), the control period, the limit of the command, and all readings of the sensors, an attribute for
    each. */
@@ -64,7 +64,7 @@ typedef struct {
     vector_t momentum;
 } scene_t;
 
-/* Quantities that a law is told at a control instant; vectors are in body axes. */
+/* Quantities that a law reads at a control instant; vectors are in body axes. */
 typedef struct {
     quaternion_t attitude; /* rotation from the target axes to the body axes, scalar first */
     vector_t rate; /* rad/s: angular velocity relative to the target */
@@ -217,9 +217,9 @@ static vector_t upper(vector_t q, vector_t w, const gains_t *gains, const craft_
     vector_t rest)
 {
     const vector_t half = apply(craft->inertia, straighten(q, w));
-    const vector_t own = scale(2.0, apply(craft->inertia, straighten(q, rest)));
+    const vector_t doubled = scale(2.0, apply(craft->inertia, straighten(q, rest)));
     const vector_t last = scale(4.0 * gains->b, half);
-    const vector_t pulled = apply(gains->phi_1, add(scale(first, last), own));
+    const vector_t pulled = apply(gains->phi_1, add(scale(first, last), doubled));
     return subtract(subtract(scale(first, half), scale(0.5 * dot(w, rest), last)), pulled);
 }
 
@@ -238,10 +238,10 @@ static vector_t modal_torque(const measurement_t *measurement, const gains_t *ga
 {
     const vector_t q = vector_part(measurement->attitude);
     const quaternion_t turning = derivative(measurement->attitude, measurement->rate);
-    const vector_t held = upper(q, measurement->rate, gains, craft, measurement->attitude.q0 - 1.0, q);
+    const vector_t steered = upper(q, measurement->rate, gains, craft, measurement->attitude.q0 - 1.0, q);
     const vector_t moved = upper(q, measurement->rate, gains, craft, turning.q0, vector_part(turning));
     const vector_t feedback = subtract(moved, apply(gains->phi_0,
-        add(held, apply(craft->inertia, measurement->rate))));
+        add(steered, apply(craft->inertia, measurement->rate))));
     const vector_t add_result = add(add(gyroscopic_torque(craft->inertia, measurement->body_rate),
         cross(measurement->body_rate, measurement->wheel_momentum)),
         apply(craft->inertia, measurement->target_acceleration));
@@ -259,9 +259,9 @@ void modal_init(modal_state_t *state)
 void modal_step(modal_state_t *state, const modal_input_t *input, modal_command_t *command)
 {
     (void)state;
-    const state_t found = {.attitude = input->attitude, .rate = input->rate};
+    const state_t known = {.attitude = input->attitude, .rate = input->rate};
     const scene_t scene = {.goal = inertial_goal(&parameters.setup.target), .torque = {0.0, 0.0, 0.0},
         .momentum = {0.0, 0.0, 0.0}};
-    const measurement_t told = observe(&found, &scene);
-    command->torque = modal_torque(&told, &parameters.gains, &parameters.craft);
+    const measurement_t measurement = observe(&known, &scene);
+    command->torque = modal_torque(&measurement, &parameters.gains, &parameters.craft);
 }

@@ -25,8 +25,7 @@ typedef struct {
 typedef struct {
     vector_t inertia; /* kg m^2: of a craft with wheels without their rotors' about their axes */
     vector_t inverse_inertia; /* 1/(kg m^2): its inverse */
-    /* N m: that a law may reckon with, per axis or in norm; infinite for none; with wheels at most what they
-       give */
+    /* N m: that a law may count on, per axis or in norm; infinite for none; with wheels at most what they give */
     double torque_limit;
     double gravity; /* m^3/s^2: gravitational parameter of the body that it orbits */
 } craft_t;
@@ -63,7 +62,7 @@ typedef struct {
     quaternion_t attitude;
 } goal_t;
 
-/* Beside the state all that a measurement is made of: the goal (None where the loop has no target),
+/* All that a measurement is made of beside the state: the goal (None where the loop has no target),
    whether it never turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s,
    body), the control period, the limit of the command, and all readings of the sensors, an attribute for
    each. */
@@ -72,7 +71,7 @@ typedef struct {
     double period;
 } scene_t;
 
-/* Quantities that a law is told at a control instant; vectors are in body axes. */
+/* Quantities that a law reads at a control instant; vectors are in body axes. */
 typedef struct {
     quaternion_t attitude; /* rotation from the target axes to the body axes, scalar first */
     vector_t rate; /* rad/s: angular velocity relative to the target */
@@ -172,15 +171,15 @@ typedef struct {
     double scalar1;
 } sweep_result_t;
 
-/* A trial plan tells whether a limit cut anything, and half the cost towards it, which changes by slope +
-   curvature / 2, free of the cancellation that a difference of two costs suffers. */
+/* A trial plan has a flag, whether a limit cut a move, and the change of half the cost towards it, slope +
+   curvature / 2, which is free of the cancellation that a difference of two costs suffers. */
 typedef struct {
     bool cut;
     double change;
 } trial_t;
 
-/* A run stands at half the cost of the plan, the sweeps so far, whether the interior-point method has been
-   used, whether the run is over, and what `Solved` says then. */
+/* The progress of a run is half the cost of the plan, the sweeps so far, whether the interior-point method
+   has been used, whether the run is over, and the fields of `Solved` at that time. */
 typedef struct {
     double half;
     double sweeps;
@@ -991,7 +990,7 @@ static project_result_t project(const limits_t *limits, vector_t v)
 
 /* -------------------------------- laws.predictive.solver -------------------------------- */
 
-/* Shift a solved plan by one move; the last is what the tail gives at its end. */
+/* Shift a solved plan by one move; the tail's feedback gives the last one. */
 static void advance(double *numbers)
 {
     const limits_t bounds = limits_1(numbers);
@@ -1229,7 +1228,7 @@ static repelled_result_t repelled(const limits_t *limits, vector_t v, vector_t m
 }
 
 /* Tell which axes of a box press against a limit, for the gradient g. */
-static bools3_t held(const limits_t *limits, vector_t v, vector_t g)
+static bools3_t pressing(const limits_t *limits, vector_t v, vector_t g)
 {
     const bool t7 = (g.x < 0.0 && limits->high.x <= v.x) || (0.0 < g.x && v.x <= limits->low.x);
     const bool t14 = (g.y < 0.0 && limits->high.y <= v.y) || (0.0 < g.y && v.y <= limits->low.y);
@@ -1261,14 +1260,14 @@ static doubles6_t box_inverse(doubles6_t m, bools3_t fixed)
 
 /* ------------------------------- laws.predictive.horizon -------------------------------- */
 
-/* Return the inverse of m on what no limit holds, and the number of limits that hold. */
+/* Return the inverse of m on the directions that no limit holds, and the number of limits that hold. */
 static held_inverse_result_t held_inverse(const limits_t *bounds, vector_t v, vector_t g, doubles6_t m,
     bool holds)
 {
-    const bools3_t held_result = held(bounds, v, g);
-    const bool t1 = holds && held_result.e[0];
-    const bool t2 = holds && held_result.e[1];
-    const bool t3 = holds && held_result.e[2];
+    const bools3_t pressing_result = pressing(bounds, v, g);
+    const bool t1 = holds && pressing_result.e[0];
+    const bool t2 = holds && pressing_result.e[1];
+    const bool t3 = holds && pressing_result.e[2];
     const bools3_t fixed = {{t1, t2, t3}};
     return (held_inverse_result_t){.symmetric = box_inverse(m, fixed),
         .scalar = (t1 ? 1.0 : 0.0) + (t2 ? 1.0 : 0.0) + (t3 ? 1.0 : 0.0)};
@@ -1725,8 +1724,8 @@ static trial_t follow(double *numbers, doubles6_t start)
 
 /* -------------------------------- laws.predictive.solver -------------------------------- */
 
-/* Fly the policy without limits through them: the optimum if nothing is cut, which it says, else a good
-   start. */
+/* Fly the policy without limits through the limits, and tell whether they cut it: if not, it is the
+   optimum. */
 static bool fly_freely(double *numbers)
 {
     for (int32_t k = 0; k < 10; k++) {
@@ -1813,7 +1812,7 @@ static vector_t weighed(vector_t r, vector_t v)
 /* Return the part of the gradient that no limit holds. */
 static vector_t loose(const limits_t *limits, vector_t v, vector_t g)
 {
-    const bools3_t fixed = held(limits, v, g);
+    const bools3_t fixed = pressing(limits, v, g);
     return (vector_t){fixed.e[0] ? 0.0 : g.x, fixed.e[1] ? 0.0 : g.y, fixed.e[2] ? 0.0 : g.z};
 }
 
@@ -1846,7 +1845,7 @@ static doubles6_t costate(doubles6_t q, doubles6s6_t columns, doubles6_t x, doub
         t54 + columns.e[3].e[5] * y.e[5], t68 + columns.e[4].e[5] * y.e[5], total}};
 }
 
-/* Find the gradient of half the cost, and a bound on its gap to the optimum if all that is held has to be. */
+/* Find the gradient of half the cost, and a bound on its gap to the optimum if the held limits are active. */
 static double adjoint(double *numbers)
 {
     const motion_result_t motion_result = motion(numbers);
@@ -2028,7 +2027,7 @@ static double shorten(double *numbers, double halvings)
     return change_;
 }
 
-/* Return a trial plan along the Newton step without limits; gives the change of half the cost, zero where
+/* Make a trial plan along the Newton step without limits; gives the change of half the cost, zero where
    none was found. */
 static double search(double *numbers)
 {
@@ -2042,8 +2041,8 @@ static bool is_zero(double x)
     return x <= 0.0 && 0.0 <= x;
 }
 
-/* Return a trial plan along the gradient, each move in its own scale: the projection guarantees descent
-   for short steps. */
+/* Make a trial plan along the gradient, each move in its own scale: the projection guarantees descent for
+   short steps. */
 static double gradient_step(double *numbers)
 {
     for (int32_t k = 0; k < 10; k++) {
@@ -2061,7 +2060,7 @@ static double gradient_step(double *numbers)
 
 /* ------------------------------- laws.predictive.horizon -------------------------------- */
 
-/* Take the trial plan over. */
+/* Put the trial plan in the place of the plan. */
 static void take_over(double *numbers)
 {
     for (int32_t k = 0; k < 10; k++) {
@@ -2089,8 +2088,7 @@ static void take_over(double *numbers)
 
 /* -------------------------------- laws.predictive.solver -------------------------------- */
 
-/* Return the projected Newton step, a search along it, or a gradient step, whichever first brings the cost
-   down. */
+/* Take the projected Newton step, a search along it, or a gradient step, whichever first reduces the cost. */
 static attempt_t newton(double *numbers, const progress_t *now)
 {
     const sweep_result_t sweep_result = sweep(numbers, 0.0);
@@ -2233,7 +2231,7 @@ static double go(double *numbers, double length)
     return gap_;
 }
 
-/* Take one step: towards the optimum that the barrier allows, which is then lowered. */
+/* Take one step towards the optimum that the barrier allows, then lower the barrier. */
 static turn_t turn_1(double *numbers, const turn_t *now, double count, double most)
 {
     adjoint(numbers);
@@ -2286,8 +2284,8 @@ static double restore(double *numbers)
 }
 
 /* Solve by the primal-dual interior-point method (Boyd and Vandenberghe 2004, section 11.7): it comes near
-   the optimum in a number of sweeps that hardly depends on the program, and what then lies near a limit is
-   put on it. */
+   the optimum in a number of sweeps that hardly depends on the program, and then puts moves near a limit
+   on it. */
 static interior_result_t interior(double *numbers, double half, double most)
 {
     const double barrier_2 = 0.1 * half / 30.0;
@@ -2319,7 +2317,7 @@ static interior_result_t interior(double *numbers, double half, double most)
 
 /* -------------------------------- laws.predictive.solver -------------------------------- */
 
-/* Return A Newton step, or the interior-point method where that does not serve. */
+/* Take a Newton step, or the interior-point method where that does not serve. */
 static progress_t better(double *numbers, const progress_t *now)
 {
     const bool slow = 12.0 <= now->sweeps && !now->rescued;
@@ -2541,11 +2539,11 @@ void mpc_init(mpc_state_t *state)
 void mpc_step(mpc_state_t *state, const mpc_input_t *input, mpc_command_t *command)
 {
     double *const numbers = state->numbers;
-    const state_t found = {.attitude = input->attitude, .rate = input->rate, .position = input->position};
+    const state_t known = {.attitude = input->attitude, .rate = input->rate, .position = input->position};
     const scene_t scene = {.goal = inertial_goal(&parameters.setup.target),
         .period = parameters.setup.period};
-    const measurement_t told = observe(&found, &scene);
-    const vector_t mpc_torque_result = mpc_torque(numbers, &told, &parameters.craft);
+    const measurement_t measurement = observe(&known, &scene);
+    const vector_t mpc_torque_result = mpc_torque(numbers, &measurement, &parameters.craft);
     const vector_t wanted = limit_axis(mpc_torque_result, parameters.setup.limit);
     command->torque = wanted;
 }

@@ -58,7 +58,7 @@ typedef struct {
     quaternion_t attitude;
 } goal_t;
 
-/* Beside the state all that a measurement is made of: the goal (None where the loop has no target),
+/* All that a measurement is made of beside the state: the goal (None where the loop has no target),
    whether it never turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s,
    body), the control period, the limit of the command, and all readings of the sensors, an attribute for
    each. */
@@ -66,7 +66,7 @@ typedef struct {
     goal_t goal;
 } scene_t;
 
-/* Quantities that a law is told at a control instant; vectors are in body axes. */
+/* Quantities that a law reads at a control instant; vectors are in body axes. */
 typedef struct {
     quaternion_t attitude; /* rotation from the target axes to the body axes, scalar first */
     vector_t rate; /* rad/s: angular velocity relative to the target */
@@ -230,7 +230,7 @@ static vector_t subtract(vector_t a, vector_t b)
 
 /* ------------------------------------- laws.sliding ------------------------------------- */
 
-/* Return the torque (N m) under which s = w + K q stays as it is where no torque acts from outside. */
+/* Return the torque (N m) that keeps s = w + K q constant without external torque. */
 static vector_t equivalent_torque(const measurement_t *measurement, vector_t surface_gain,
     const craft_t *craft)
 {
@@ -277,10 +277,10 @@ void sliding_init(sliding_state_t *state)
 void sliding_step(sliding_state_t *state, const sliding_input_t *input, sliding_command_t *command)
 {
     (void)state;
-    const state_t found = {.attitude = input->attitude, .rate = input->rate};
+    const state_t known = {.attitude = input->attitude, .rate = input->rate};
     const scene_t scene = {.goal = inertial_goal(&parameters.setup.target)};
-    const measurement_t told = observe(&found, &scene);
-    const vector_t wanted = limit_axis(sliding_torque(&told, &parameters.gains, &parameters.craft),
+    const measurement_t measurement = observe(&known, &scene);
+    const vector_t wanted = limit_axis(sliding_torque(&measurement, &parameters.gains, &parameters.craft),
         parameters.setup.limit);
     command->torque = wanted;
 }

@@ -41,9 +41,9 @@ typedef struct {
 } vectors4_t;
 
 /* N wheels: unit spin axes (body), rotor inertias about them (kg m2), largest motor torques (N m; 0 for a
-   lost wheel), largest axial momenta (N m s), viscous (N m s) and Coulomb friction (N m); and how to share
-   out a torque, by least squares (one row a wheel, zero for one that takes no part) or with the least peak
-   (see `with_facets`, without which there is nothing to share it out with). */
+   lost wheel), largest axial momenta (N m s), viscous (N m s) and Coulomb friction (N m); and how a torque
+   is allocated, by least squares (a row for each wheel, zero for one that takes no part) or with the least
+   peak, which needs `with_facets`. */
 typedef struct {
     vectors4_t axes;
 } wheels_t;
@@ -87,7 +87,7 @@ typedef struct {
     double inverse_square;
 } attraction_result_t;
 
-/* Beside the state all that a measurement is made of: the goal (None where the loop has no target),
+/* All that a measurement is made of beside the state: the goal (None where the loop has no target),
    whether it never turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s,
    body), the control period, the limit of the command, and all readings of the sensors, an attribute for
    each. */
@@ -97,7 +97,7 @@ typedef struct {
     vector_t momentum;
 } scene_t;
 
-/* Quantities that a law is told at a control instant; vectors are in body axes. */
+/* Quantities that a law reads at a control instant; vectors are in body axes. */
 typedef struct {
     quaternion_t attitude; /* rotation from the target axes to the body axes, scalar first */
     vector_t rate; /* rad/s: angular velocity relative to the target */
@@ -209,7 +209,7 @@ static double side(double x)
 
 /* ---------------------------------- algebra.quaternion ---------------------------------- */
 
-/* Choose of q and -q, the same attitude, the one nearer to `other`. */
+/* Return whichever of q and -q, the same attitude, is nearer to `other`. */
 static quaternion_t nearer(quaternion_t q, quaternion_t other)
 {
     return stretch(side(q.q0 * other.q0 + q.q1 * other.q1 + q.q2 * other.q2 + q.q3 * other.q3), q);
@@ -320,9 +320,9 @@ static vector_t wheel_momentum(doubles4_t momentum, const wheels_t *wheels)
 }
 
 /* The rotors' momentum in body axes (N m s). */
-static vector_t wheels_momentum(const wheels_state_t *own, const wheels_t *params)
+static vector_t wheels_momentum(const wheels_state_t *state, const wheels_t *params)
 {
-    return wheel_momentum(own->momentum, params);
+    return wheel_momentum(state->momentum, params);
 }
 
 /* ---------------------------------- algebra.quaternion ---------------------------------- */
@@ -397,7 +397,7 @@ static vector_t apply(vector_t m, vector_t a)
 
 /* -------------------------------------- laws.wheel -------------------------------------- */
 
-/* Return the torque asked of the wheels (N m, body). */
+/* Return the torque demanded of the wheels (N m, body). */
 static vector_t wheel_torque(const measurement_t *measurement, const gains_t *gains, const craft_t *craft)
 {
     const vector_t q = vector_part(measurement->attitude);
@@ -424,8 +424,8 @@ void wheel_step(wheel_state_t *state, const wheel_input_t *input, wheel_command_
     const goal_t goal = orbital_goal(&body_state, state->followed);
     const scene_t scene = {.goal = goal, .torque = gravity_gradient_torque(&body_state, &parameters.craft),
         .momentum = wheels_momentum(&input->wheels, &parameters.setup.effectors.wheels)};
-    const measurement_t told = observe(&body_state, &scene);
+    const measurement_t measurement = observe(&body_state, &scene);
     const quaternion_t followed = goal.attitude;
-    command->torque = wheel_torque(&told, &parameters.gains, &parameters.craft);
+    command->torque = wheel_torque(&measurement, &parameters.gains, &parameters.craft);
     state->followed = followed;
 }

@@ -85,7 +85,7 @@ class KeyReading:
         return (1.0,) * len(self.index) if self.relative else self.nominal
 
     def numbers(self, name: str, checked: bool = True) -> Numbers:
-        """The numbers of a parameter in the key's unit, or as shares; `held`: whether the key must take them. InputError
+        """The numbers of a parameter in the key's unit, or as shares; `checked`: whether the key must take them. InputError
         where it does not."""
         return self.read(getattr(self.table, name), name, checked)
 
