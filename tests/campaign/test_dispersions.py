@@ -282,7 +282,7 @@ def test_a_distribution_is_one_class():
             half: Annotated[Any, *raw("half the width")]
 
             def _numbers(self, key):
-                return {"half": key.numbers("half", held=False), "mean": key.centre("mean")}
+                return {"half": key.numbers("half", checked=False), "mean": key.centre("mean")}
 
             mean: Annotated[Any, *raw("by default what the file has")] = None
 
