@@ -5,9 +5,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
+from starhold.algebra.vector import ZERO
+from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.bodies.rigid_body import State
 from starhold.parts.catalogue import find, fit
+from starhold.parts.craft import make_craft
 from starhold.parts.effectors.wheels import ALLOCATIONS
 from starhold.parts.effectors.wheels import State as Rotors
 from starhold.parts.part import Fitted
@@ -16,6 +21,29 @@ from starhold.simulation.lane import Recording, fly, label
 
 ORBIT = (fit("environment", "two-body"), fit("environment", "gravity-gradient"))
 ORBITAL = fit("target", "orbital")
+HUB = np.array([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]])
+"""An inertia (kg m2) with products."""
+
+
+def hub(
+    *parts: Any, rate: Any = (0.02, -0.03, 0.05), attitude: Any = (0.6, 0.0, 0.8, 0.0), period: float = 0.1,
+    substeps: int = 4, gains: Any = (0.9, 0.09), **options: Any,
+) -> ClosedLoop:  # fmt: skip
+    """A body of the inertia HUB in free space, with these parts, under PD feedback; none acts with `command_limit=0.0`."""
+    law, start = catalogue()["pd"], State(attitude, rate, ZERO, ZERO, ZERO)
+    return ClosedLoop(make_craft(HUB.tolist()), law, law.gains(*gains), start, period, substeps, parts=parts, **options)
+
+
+def spun(torque: Any, times: Any, attitude: Any, rate: Any, inertia: Any = HUB) -> Any:
+    """Attitudes (n, 4) and rates (n, 3) at these times (s) by SciPy, under torque(t, attitude) (N m, body axes)."""
+
+    def slope(t: float, y: Any) -> Any:
+        q, w = y[:4], y[4:]
+        spin = np.linalg.solve(inertia, torque(t, q) - np.cross(w, inertia @ w))
+        return [-0.5 * q[1:] @ w, *(0.5 * (q[0] * w + np.cross(q[1:], w))), *spin]
+
+    found = solve_ivp(slope, (times[0], times[-1]), [*attitude, *rate], "DOP853", times, rtol=1e-12, atol=1e-15).y
+    return found[:4].T, found[4:].T
 
 
 def aimed(target: Any, knots: Any = ()) -> Fitted:

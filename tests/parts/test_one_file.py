@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
-from scipy.integrate import solve_ivp
 
 import starhold as sh
 from starhold.conformance.parts import examine_part, find_part
@@ -17,6 +16,7 @@ from starhold.scenario.json_schema import json_schema
 from starhold.scenario.parts import installed
 from starhold.scenario.reading import parse
 from tests.parts.files import BODY, LAW, PARTS, PD, part
+from tests.parts.test_control_moment_gyros import pyramid
 from tests.refusals import refused
 from tests.running import starhold
 
@@ -52,10 +52,15 @@ def own(tmp_path):
 
 
 @pytest.mark.parametrize("role", [*PARTS, "law"])
-def test_one_file_is_flown_recorded_and_checked(role, own, tmp_path):
+def test_one_file_is_read_flown_recorded_and_checked(role, own, tmp_path):
     before = package()
     path, text = own(role), text_of(role, 'file = "mine.py"\n')
-    assert [p.name for p in tmp_path.iterdir()] == ["mine.py"]
+    schema = Draft202012Validator(json_schema())
+    assert schema.is_valid(tomllib.loads(text))
+    assert not schema.is_valid(tomllib.loads(text.replace('file = "mine.py"\n', "")))
+    place = {"law": "law[1]", "estimator": "part[2]"}.get(role, "part[1]")
+    with refused(f"{place}.no_such_key: found an unknown key; allowed: one of"):
+        parse(text_of(role, 'file = "mine.py"\nno_such_key = 1\n'), "own", tmp_path)
     flown = sh.simulate(parse(text, "own", tmp_path))
     plain = sh.simulate(parse(BODY + PD, "own"))
     assert set(flown.data_vars) - set(plain.data_vars) == RECORDED.get(role, set())
@@ -68,23 +73,6 @@ def test_one_file_is_flown_recorded_and_checked(role, own, tmp_path):
     assert [v for v in verdicts if v.outcome == "failed"] == []
     assert len([v for v in verdicts if v.outcome == "passed"]) >= 5
     assert package() == before
-
-
-@pytest.fixture(scope="module")
-def schema():
-    """The JSON Schema without parts of other packages."""
-    return Draft202012Validator(json_schema())
-
-
-@pytest.mark.parametrize("role", [*PARTS, "law"])
-def test_its_table_takes_its_own_keys_alone(role, own, tmp_path, schema):
-    own(role)
-    text = text_of(role, 'file = "mine.py"\n')
-    assert schema.is_valid(tomllib.loads(text))
-    assert not schema.is_valid(tomllib.loads(text.replace('file = "mine.py"\n', "")))
-    place = "law[1]" if role == "law" else "part[2]" if role == "estimator" else "part[1]"
-    with refused(f"{place}.no_such_key: found an unknown key; allowed: one of"):
-        parse(text_of(role, 'file = "mine.py"\nno_such_key = 1\n'), "own", tmp_path)
 
 
 def test_the_files_in_another_package_are_listed_and_fly_by_their_names(own, tmp_path, offer, recwarn):
@@ -121,52 +109,24 @@ def test_all_of_them_fly_together_from_the_command_line(own, tmp_path):
         assert run.attrs["parts"].split(", ") == [f"my-{role}" for role in ("target", *(r for r in PARTS if r != "target"))]
 
 
-INERTIA = np.array([[8.0, 0.2, 0.1], [0.2, 9.0, 0.3], [0.1, 0.3, 7.0]])
-COUPLING, FREQUENCY = np.array([0.5, 0.2, 0.9]), 2.0
-"""As in the scenario of the files."""
+ROW = [0.2, 0.5, 0.1, 0.0, 0.1, 1.0, 0.2, 0.6, 0.1, 0.05, 0.010, 0.005, 0.015, 0.20, 0.01, 0.15]
+INSTALLED = {
+    "thrusters": ('torque = "50 mN m"\nminimum = "20 ms"\non = "5 mN m"\noff = "2 mN m"\n', "propellant", ("time",), "kg"),
+    "hinged-panels": (f'mass = "30 kg"\npanels = [{ROW}]\n', "panel_angle", ("time", "panel"), "rad"),
+    "control-moment-gyros": (
+        f"units = {[list(row) for row in pyramid(0.0, 0.0, 0.0, 0.0)]}\n", "rotor_momentum", ("time", "gyro"), "N m s"
+    ),
+}  # fmt: skip
 
 
-def flexible(own, damping):
-    """A flight of a hub with the appendage, without any torque."""
-    path = own("effector")
-    (path.parent / "idle.py").write_text(LAW)
-    keys = f'file = "mine.py"\ndamping = {damping}\n' + PARTS["effector"][1]
-    text = BODY.replace("control_period = 0.1", "control_period = 0.1\nsubsteps = 20").replace("10.0", "20.0")
-    return sh.simulate(parse(text + part(keys) + '[[law]]\nfile = "idle.py"\n', "own", path.parent))
-
-
-def inertial(q, v):
-    """Vectors (n, 3) in body axes turned to inertial ones by quaternions (n, 4)."""
-    return v + 2.0 * q[:, :1] * np.cross(q[:, 1:], v) + 2.0 * np.cross(q[:, 1:], np.cross(q[:, 1:], v))
-
-
-def test_an_appendage_keeps_momentum_and_energy_where_nothing_acts(own):
-    run = flexible(own, 0.0)
-    w, x, v = run.rate.values, run.deflection.values, run.speed.values
-    total = inertial(run.attitude.values, w @ INERTIA + v[:, None] * COUPLING)
-    assert np.abs(total - total[0]).max() < 1e-9 * np.linalg.norm(total[0])
-    energy = 0.5 * np.sum(w * (w @ INERTIA), 1) + v * (w @ COUPLING) + 0.5 * v**2 + 0.5 * (FREQUENCY * x) ** 2
-    assert np.abs(energy - energy[0]).max() < 1e-9 * energy[0]
-    # It swings and moves the hub: the hub's own momentum is not kept.
-    hub = inertial(run.attitude.values, w @ INERTIA)
-    assert np.ptp(x) > 0.02
-    assert np.abs(hub - hub[0]).max() > 1e-2 * np.linalg.norm(hub[0])
-
-
-@pytest.mark.parametrize("damping", [0.0, 0.05])
-def test_an_appendage_moves_as_the_coupled_equations_say(own, damping):
-    run = flexible(own, damping)
-    mass = np.block([[INERTIA, COUPLING[:, None]], [COUPLING[None], np.ones((1, 1))]])
-
-    def slope(_, y):
-        w, (x, v) = y[:3], y[3:]
-        turning = -np.cross(w, INERTIA @ w + COUPLING * v)
-        *spin, speeding = np.linalg.solve(mass, [*turning, -2.0 * damping * FREQUENCY * v - FREQUENCY**2 * x])
-        return [*spin, v, speeding]
-
-    times = run.time.values
-    start = [*run.rate.values[0], run.deflection.values[0], run.speed.values[0]]
-    exact = solve_ivp(slope, (0.0, times[-1]), start, "DOP853", times, rtol=1e-12, atol=1e-14).y
-    assert np.abs(run.rate.values - exact[:3].T).max() < 1e-9
-    assert np.abs(run.deflection.values - exact[3]).max() < 1e-9
-    assert np.abs(run.speed.values - exact[4]).max() < 1e-9
+@pytest.mark.parametrize("name", INSTALLED)
+def test_an_effector_flies_from_a_scenario_and_claims_leave_it_out(name):
+    keys, recorded, dimensions, unit = INSTALLED[name]
+    text = BODY.replace("[simulation]", "[simulation]\nsubsteps = 4") + part(f'type = "{name}"\nname = "wing"\n{keys}') + PD
+    run = sh.simulate(parse(text, "own"))
+    assert run[recorded].dims == dimensions
+    assert run[recorded].attrs["units"] == unit
+    assert float(np.abs(run[recorded]).max()) > 1e-6
+    (certificate,) = sh.certify(parse(text, "own"))
+    assert certificate.claims
+    assert all("without the effector wing" in claim.assumptions for claim in certificate.claims)

@@ -1,0 +1,159 @@
+"""Gravity: attraction, its torque and the Earth's flattening, against point masses, potentials, SciPy, and known orbits."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import sympy
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from starhold.algebra.quaternion import NO_TURN, derivative, to_body
+from starhold.algebra.vector import ZERO, apply, cross, dot, scale
+from starhold.parts.craft import Craft, make_craft
+from starhold.parts.environments import oblateness
+from starhold.parts.environments.gravity_gradient import gravity_gradient
+from starhold.parts.orbit import BODIES, Elements, from_elements
+from starhold.scenario.reading import parse
+from starhold.simulation.lane import fly
+from tests.algebra.readers import close, components, quaternions, reduced_by_unit_norm, symbols, vanishes
+from tests.equations import two_body, two_body_gravity_gradient
+from tests.making import built
+
+MU = 3.986e14
+DIAGONAL = make_craft([2.0, 3.0, 4.0])
+FULL = [[2.0, 0.1, -0.3], [0.1, 3.0, 0.2], [-0.3, 0.2, 4.0]]
+places = st.tuples(components, components, components).filter(lambda v: math.hypot(*v) > 0.1)
+positions = places.map(lambda v: scale(7.0e6 / math.hypot(*v), v))
+
+
+@given(positions, quaternions)
+def test_attraction(position, attitude):
+    for model in (two_body, two_body_gravity_gradient):
+        acceleration, torque = model(position, attitude, DIAGONAL)
+        expected = scale(-MU / math.hypot(*position) ** 3, position)
+        assert close(acceleration, expected, 1e-15 * MU / math.hypot(*position) ** 2)
+        assert model is not two_body or torque == ZERO
+
+
+def test_attraction_keeps_energy_and_angular_momentum():
+    r, v = symbols("x y z"), symbols("u v w")
+    mu = sympy.symbols("mu", positive=True)
+    acceleration, _ = two_body(r, NO_TURN, Craft((1, 1, 1), (1, 1, 1), sympy.oo, mu))
+    energy = dot(v, v) / 2 - mu / sympy.sqrt(dot(r, r))
+    change = sum(sympy.diff(energy, x) * dx for x, dx in zip((*r, *v), (*v, *acceleration), strict=True))
+    assert vanishes(sympy.simplify(sympy.nsimplify(change, rational=True)))
+    assert all(vanishes(part) for part in cross(r, acceleration))
+
+
+@given(st.integers(0, 2**32 - 1), places, quaternions)
+def test_torque_is_that_of_a_small_cloud_of_masses(seed, place, attitude):
+    # In units of the distance; the formula is the leading term in the size of the body, so its relative error shrinks
+    # with the size, and with its square for a body that is its own mirror image.
+    generator = np.random.default_rng(seed)
+    masses, points = np.tile(generator.uniform(0.5, 2.0, 5), 2), generator.normal(size=(5, 3))
+    points = np.concatenate([points, -points])
+    place = scale(1.0 / math.hypot(*place), place)
+    errors = []
+    for size in (2e-2, 1e-2):
+        shape = size * points
+        inertia = sum(m * (p @ p * np.eye(3) - np.outer(p, p)) for m, p in zip(masses, shape, strict=True))
+        _, torque = two_body_gravity_gradient(place, attitude, make_craft(inertia, gravity=2.5))
+        at = np.array(to_body(attitude, place)) + shape
+        forces = -2.5 * masses[:, None] * at / np.linalg.norm(at, axis=1)[:, None] ** 3
+        scale_of_torque = 2.5 * (masses * (shape**2).sum(axis=1)).sum()
+        errors.append(np.abs(np.array(torque) - np.cross(shape, forces).sum(axis=0)).max() / scale_of_torque)
+    largest = np.linalg.norm(points, axis=1).max()
+    assert errors[0] < 30.0 * (2e-2 * largest) ** 2
+    assert errors[1] < 0.3 * errors[0] + 1e-10
+
+
+def test_gravity_acts_on_the_rotors_too():
+    place, attitude = (7.0e6, -1.0e6, 2.0e6), (0.5, 0.5, -0.1, 0.7)
+    for rotors in ((2.1, 3.2, 4.1), make_craft(FULL).inertia):
+        craft = DIAGONAL._replace(with_rotors=rotors)
+        assert two_body_gravity_gradient(place, attitude, craft) == two_body_gravity_gradient(
+            place, attitude, make_craft(rotors)
+        )
+
+
+def test_torque_is_the_slope_of_the_potential():
+    # U = (3 mu / 2 r5) R.J R; turning the body at the rate w does the work w.M = -U'.
+    q, r, w = symbols("q0:4"), symbols("r1:4"), symbols("w1:4")
+    j = symbols("j1:7")
+    strength = sympy.symbols("s", positive=True)
+    for inertia in (j[:3], ((j[0], j[3], j[4]), (j[3], j[1], j[5]), (j[4], j[5], j[2]))):
+        craft = Craft(inertia, inertia, sympy.oo, 1)
+        # Body components turn as R' = -w x R; the exact quaternion kinematics say so for a unit quaternion.
+        body = symbols("b1:4")
+        potential = strength * dot(body, apply(inertia, body)) / 2
+        change = sum(sympy.diff(potential, x) * d for x, d in zip(body, scale(-1, cross(w, body)), strict=True))
+        assert vanishes(change + dot(w, gravity_gradient(body, strength, craft)))
+    turned = to_body(q, r)
+    for x, d in zip(turned, cross(w, turned), strict=True):
+        along = sum(sympy.diff(x, c) * dc for c, dc in zip(q, derivative(q, w), strict=True))
+        assert reduced_by_unit_norm(along + d, q) == 0
+
+
+GRAVITY, RADIUS = BODIES["Earth"]
+FLATTENING = 1.08262668e-3
+PLACE = sympy.symbols("x y z", real=True)
+MASS, J2, SIZE = sympy.symbols("mu J R", positive=True)
+
+
+def flattened():
+    """The energy per mass in the second zonal harmonic, by the Legendre polynomial of the sine of the latitude."""
+    r = sympy.sqrt(dot(PLACE, PLACE))
+    return MASS / r * J2 * (SIZE / r) ** 2 * sympy.legendre(2, PLACE[2] / r)
+
+
+def orbited(inclination, period, duration):
+    """The end of a flight from a circular orbit at 500 km, and its start."""
+    place, velocity = from_elements(Elements(RADIUS + 5e5, 0.0, inclination, 0.3, 0.0, 0.0), GRAVITY)
+    text = f"""
+name = "flattened"
+[spacecraft]
+inertia = [0.05, 0.065, 0.025]
+[initial]
+angles = [0, 0, 0]
+[orbit]
+position = {list(place)}
+velocity = {list(velocity)}
+gravitational_parameter = {GRAVITY}
+[simulation]
+duration = {duration}
+control_period = {period}
+[[part]]
+type = "oblateness"
+[[law]]
+type = "pd"
+k_rate = 0.004
+k_attitude = 0.0008
+"""
+    steps = round(duration / period)
+    return fly(built(parse(text, "flattened")), steps, steps)[1].state, (*place, *velocity)
+
+
+def test_flattening_is_the_slope_of_the_potential():
+    state, craft = SimpleNamespace(position=PLACE), SimpleNamespace(gravity=MASS)
+    found = oblateness.acceleration(state, oblateness.Params(J2, SIZE), craft, ())
+    for x, a in zip(PLACE, found, strict=True):
+        assert sympy.simplify(sympy.nsimplify(a, rational=True) + sympy.diff(flattened(), x)) == 0
+
+
+def test_motion_about_a_flattened_earth_is_scipy_s():
+    whole = (flattened() - MASS / sympy.sqrt(dot(PLACE, PLACE))).subs({MASS: GRAVITY, J2: FLATTENING, SIZE: RADIUS})
+    pull = sympy.lambdify(PLACE, [-sympy.diff(whole, x) for x in PLACE])
+    end, start = orbited(1.1, 1.0, 6000.0)
+    found = solve_ivp(lambda t, y: [*y[3:], *pull(*y[:3])], (0.0, 6000.0), start, "DOP853", rtol=1e-13, atol=1e-6)
+    assert np.abs(found.y[:3, -1] - end.position).max() < 1e-2
+
+
+def test_the_plane_of_an_orbit_that_keeps_pace_with_the_sun_turns_with_it():
+    # At 97.4 deg and 500 km: 0.9856 deg in a day.
+    end, start = orbited(math.radians(97.4), 10.0, 86400.0)
+    normals = np.cross(end.position, end.velocity), np.cross(start[:3], start[3:])
+    nodes = [math.degrees(math.atan2(n[0], -n[1])) for n in normals]
+    assert nodes[0] - nodes[1] == pytest.approx(0.9856, abs=0.01)
