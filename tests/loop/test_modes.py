@@ -52,28 +52,20 @@ def test_modes_fly_as_their_laws_one_after_another_from_the_switch():
         assert joined.tobytes() == both[name].tobytes(), name
 
 
-def test_one_lane_many_lanes_and_plain_python_agree_bit_for_bit():
+def test_a_dwell_is_counted_without_breaks_a_switch_leads_back_and_all_machines_agree():
     loop = loop_of(DETUMBLE + POINT + 'back = { rate_above = "1 deg/s" }\n')
     run, carry = flown(loop, 400)
-    # There and back again.
-    assert {(1.0, 2.0), (2.0, 1.0)} <= set(pairwise(run["mode"][0].tolist()))
-    plain = fly_plainly(loop, 400)
-    assert np.array(flatten(plain)).tobytes() == np.array(flatten(carry)).tobytes()
-    same_in_every_lane(loop, 400, (1.0, 3.0, 0.05))
-
-
-def test_a_dwell_is_counted_without_breaks_and_a_switch_leads_back():
-    loop = loop_of(DETUMBLE + POINT + 'back = { rate_above = "1 deg/s" }\n')
-    run, _ = flown(loop)
-    rate = np.degrees(np.linalg.norm(run["rate"], axis=0))
     mode, held, wanted = 1.0, 0, list[float]()
-    for now in rate:
+    for now in np.degrees(np.linalg.norm(run["rate"], axis=0)):
         held = held + 1 if now < 0.5 else 0
         # So many instants span 2 s.
         mode, held = (2.0, 0) if mode == 1.0 and held == 21 else (1.0, 0) if mode == 2.0 and now > 1.0 else (mode, held)
         wanted.append(mode)
     assert run["mode"][0].tolist() == wanted
+    # There and back again.
     assert {(1.0, 2.0), (2.0, 1.0)} <= set(pairwise(wanted))
+    assert np.array(flatten(fly_plainly(loop, 400))).tobytes() == np.array(flatten(carry)).tobytes()
+    same_in_every_lane(loop, 400, (1.0, 3.0, 0.05))
 
 
 SUN = """

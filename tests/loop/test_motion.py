@@ -1,25 +1,24 @@
 """The closed loop against an integrator starhold did not write, and against the invariants of mechanics."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from starhold.algebra.quaternion import NO_TURN
 from starhold.algebra.structure import flatten, unflatten
 from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.rigid_body import State, kinetic_energy
-from starhold.parts.catalogue import fit
 from starhold.parts.craft import make_craft
 from starhold.parts.targets import orbital
 from starhold.parts.targets.history import tabulate
 from starhold.simulation.lane import fly
 from tests.equations import angular_momentum
+from tests.making import HUB as J
 from tests.making import ORBIT, ORBITAL, aimed
 
-J = np.array([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]])
 MU = 3.986e14
 START = State((0.1, 0.5, -0.5, 0.7), (0.04, 0.03, -0.02), (7e6, 0.0, 0.0), (0.0, 7.0e3, 2.75e3), (0.0, 0.0, 0.0))
 START = START._replace(attitude=tuple(np.array(START.attitude) / np.linalg.norm(START.attitude)))
@@ -57,7 +56,7 @@ def fly_independently(flown, torques, count):
 
 
 def test_agrees_with_dop853_and_error_falls_16_fold():
-    steps, errors = 40, []
+    steps, errors = 20, []
     base = loop(period=2.0)
     torques = None
     for substeps in (1, 2, 4):
@@ -111,23 +110,6 @@ def test_lyapunov_function_falls_along_the_flight():
     assert energy[-1] < 1e-3 * energy[0]
 
 
-def test_lag_is_the_exact_exponential():
-    flown = loop("pd", period=0.5, parts=(*ORBIT, fit("actuator", "lag", 0.4)), substeps=8)
-    samples, _ = fly(flown, 10)
-    torque, command = samples[13:16], samples[16:19]
-    expected = command[:, :-1] + (torque[:, :-1] - command[:, :-1]) * math.exp(-0.5 / 0.4)
-    assert np.abs(torque[:, 1:] - expected).max() < 3e-8
-    assert np.abs(torque[:, 0]).max() == 0.0
-
-
-def test_rate_limit_holds_without_lag():
-    flown = loop("sliding", period=0.5, parts=(*ORBIT, fit("actuator", "rate-limit", 0.004)), substeps=5)
-    samples, _ = fly(flown, 200)
-    moves = np.abs(np.diff(samples[13:16], axis=1))
-    assert moves.max() == pytest.approx(0.004 * 0.5, rel=1e-9)
-    assert (moves <= 0.004 * 0.5 * (1 + 1e-9)).all()
-
-
 @pytest.mark.parametrize("kind", ["axis", "norm"])
 def test_limits_hold(kind):
     samples, _ = fly(loop("sliding", period=0.1, limit=kind), 500)
@@ -166,8 +148,6 @@ def test_history_is_tracked_to_the_hold_error():
 
 @pytest.mark.parametrize("name", ["pd", "matrix-pd", "lyapunov", "sliding"])
 def test_orbital_frame_is_held_from_the_start(name):
-    from starhold.algebra.quaternion import NO_TURN
-
     goal = orbital.goal((), START, 0, NO_TURN)
     start = START._replace(attitude=goal.attitude, rate=goal.rate)
     samples, _ = fly(loop(name, start=start, parts=(*ORBIT, ORBITAL), period=0.1), 12_000)

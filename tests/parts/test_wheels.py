@@ -11,11 +11,6 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from starhold.algebra.polynomial import Polynomial, constants, pieces
-from starhold.algebra.quaternion import derivative, renormalise, to_reference
-from starhold.algebra.structure import flatten, leaves, move, unflatten
-from starhold.algebra.structured import Buffer, repeat
-from starhold.algebra.vector import add, apply, dot, gyroscopic_torque, inverse, scale, subtract
-from starhold.parts.craft import bare_inertia, matrix
 from starhold.parts.effectors.layouts import nasa_standard, pyramid, three_orthogonal
 from starhold.parts.effectors.wheel_units import WHEEL_UNITS
 from starhold.parts.effectors.wheels import (
@@ -23,19 +18,15 @@ from starhold.parts.effectors.wheels import (
     CREEP,
     allocate,
     allocate_peak,
-    available,
-    axial_inertia,
+    body_inertia,
     lose,
     make_wheels,
     motor,
-    on_body,
     wheel_momentum,
     with_facets,
 )
-from starhold.trace.calling import Compiled
-from starhold.trace.machine import load
-from starhold.trace.recording import Recorder
-from tests.algebra.readers import agree, same
+from tests.making import HUB, flown, hub, rotors
+from tests.tiers import fewer
 
 finite = st.floats(-1.0, 1.0)
 torques = st.tuples(finite, finite, finite)
@@ -104,7 +95,7 @@ def test_least_peak_is_the_optimum_of_the_linear_program(seed, count, torque):
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
-def test_least_peak_of_special_layouts(layout):
+def test_least_peak_of_special_layouts_is_least_odd_and_continuous(layout):
     wheels = simple(LAYOUTS[layout])
     signs = [np.array(s, dtype=float) for s in itertools.product((-1, 0, 1), repeat=3) if any(s)]
     some = [*signs, *random_axes(1, 60), *np.array(wheels.axes)]
@@ -112,14 +103,8 @@ def test_least_peak_of_special_layouts(layout):
         taus = allocate_peak(tuple(torque.tolist()), wheels)
         np.testing.assert_allclose(total(taus, wheels), torque, rtol=0.0, atol=1e-9 if "nearly" in layout else 1e-13)
         assert max(map(abs, taus)) == pytest.approx(least_peak(wheels.axes, torque), rel=1e-8)
-
-
-@pytest.mark.parametrize("layout", LAYOUTS)
-def test_least_peak_is_odd_and_continuous(layout):
-    wheels = simple(LAYOUTS[layout])
     steepest = 1e6 if "nearly" in layout else 20.0
-    ends = random_axes(2, 12)
-    for a, b in itertools.pairwise(ends):
+    for a, b in itertools.pairwise(random_axes(2, fewer(12, 4))):
         way = [tuple((a + (b - a) * s).tolist()) for s in np.linspace(0.0, 1.0, 400)]
         taus = np.array([allocate_peak(torque, wheels) for torque in way])
         assert np.abs(np.diff(taus, axis=0)).max() <= steepest * np.linalg.norm(b - a) / 400
@@ -127,20 +112,13 @@ def test_least_peak_is_odd_and_continuous(layout):
 
 
 def test_where_the_peak_leaves_a_choice_the_next_largest_is_least_too():
-    """A torque mostly along z, whose one wheel sets the peak: the four in the xy plane share the rest with a peak of
-    their own."""
-    axes = (*three_orthogonal(), (1.0, 1.0, 0.0), (1.0, -2.0, 0.0))
-    wheels = simple(axes)
+    """A torque mostly along z, whose one wheel sets the peak: the four in the xy plane share the rest."""
+    wheels = simple(DEGENERATE["four in a plane"])
     taus = allocate_peak((0.3, 0.1, 5.0), wheels)
     assert abs(taus[2]) == pytest.approx(5.0)
     flat = [0, 1, 3, 4]
-    inner = linprog_in_plane(np.array(wheels.axes)[flat, :2], (0.3, 0.1))
-    assert max(abs(taus[k]) for k in flat) == pytest.approx(inner, rel=1e-9)
-
-
-def linprog_in_plane(axes, torque):
-    lifted = np.vstack([np.hstack([axes, np.zeros((len(axes), 1))]), [[0.0, 0.0, 1.0]]])
-    return least_peak(lifted, (*torque, 0.0))
+    plane = np.vstack([np.array(wheels.axes)[flat] * (1.0, 1.0, 0.0), [[0.0, 0.0, 1.0]]])
+    assert max(abs(taus[k]) for k in flat) == pytest.approx(least_peak(plane, (0.3, 0.1, 0.0)), rel=1e-9)
 
 
 def test_parallel_wheels_share_alike():
@@ -165,56 +143,6 @@ def test_layouts():
     for elevation in (0.0, -0.1, 2.0, math.nan):
         with pytest.raises(ValueError, match="elevation"):
             pyramid(elevation)
-
-
-# What compiled code and the other readers make of the equations.
-
-
-def everything(torque, momentum, rate, wheels):
-    first = allocate(torque, wheels)
-    h_rate = motor(first, momentum, rate, wheels)
-    peak = allocate_peak(torque, wheels)
-    return first, peak, h_rate, motor(peak, momentum, rate, wheels), on_body(h_rate, momentum, rate, wheels)
-
-
-@pytest.mark.parametrize("layout", ["orthogonal", "pyramid", "four in a plane"])
-def test_compiled_code_gives_the_same_bits(layout):
-    wheels = simple(LAYOUTS[layout], viscous=1e-4, coulomb=2e-3, momentum_limit=1.0)
-    count = len(wheels.axes)
-
-    @settings(max_examples=30)
-    @given(torques, st.tuples(*[finite] * count), torques)
-    def check(torque, momentum, rate):
-        same(everything, torque, momentum, rate, wheels)
-
-    check()
-
-
-def test_compiled_lanes_give_the_same_bits():
-    wheels = simple(pyramid(), viscous=1e-4, coulomb=2e-3)
-    states = np.random.default_rng(3).normal(size=(10, 130))
-    like = ((0.0,) * 3, (0.0,) * 4, (0.0,) * 3)
-
-    def shared(torque, momentum, rate, facets):
-        h_rate = motor(allocate_peak(torque, wheels._replace(facets=facets)), momentum, rate, wheels)
-        return on_body(h_rate, momentum, rate, wheels), h_rate
-
-    tables = np.repeat(np.array(wheels.facets.cells)[:, None], 130, axis=1)
-    found = Compiled(shared, *like, wheels.facets).over(np.vstack([states, tables]))
-    for k in range(130):
-        assert tuple(found[:, k]) == tuple(leaves(shared(*unflatten(states[:, k], like), wheels.facets)))
-
-
-@settings(max_examples=10)
-@given(torques, st.tuples(finite, finite, finite, finite), torques)
-def test_every_reader_agrees(torque, momentum, rate):
-    wheels = make_wheels(pyramid(), 0.01, 0.1, 5.0, viscous=1e-4, coulomb=2e-3)
-    agree(allocate, torque, wheels)
-    agree(on_body, momentum, momentum, rate, wheels)
-    agree(wheel_momentum, momentum, wheels)
-    agree(motor, momentum, momentum, rate, wheels)
-    agree(available, momentum, momentum, wheels)
-    same(allocate_peak, torque, with_facets(wheels))
 
 
 def test_polynomials_read_motor_and_allocation():
@@ -263,93 +191,31 @@ def test_friction():
     assert alone(0.3, 5.0, **friction) == pytest.approx(-(5e-2 + 2e-3))
 
 
-# Flights: body and wheels with no torque from outside.
-
-TOTAL = ((12.0, 0.5, -0.3), (0.5, 9.0, 0.2), (-0.3, 0.2, 15.0))
+# Flights without torque from outside; momentum is kept in `wheels/test_flights.py`.
 
 
-def slope(state, command, inertia, wheels):
-    attitude, rate, momentum = state
-    h_rate = motor(command, momentum, rate, wheels)
-    torque = subtract(on_body(h_rate, momentum, rate, wheels), gyroscopic_torque(inertia, rate))
-    return derivative(attitude, rate), apply(inverse(inertia), torque), h_rate
-
-
-def step(state, h, command, inertia, wheels):
-    a = slope(state, command, inertia, wheels)
-    b = slope(move(state, 0.5 * h, a), command, inertia, wheels)
-    c = slope(move(state, 0.5 * h, b), command, inertia, wheels)
-    d = slope(move(state, h, c), command, inertia, wheels)
-    end = move(state, h / 6.0, move(move(move(a, 2.0, b), 2.0, c), 1.0, d))
-    return renormalise(end[0]), end[1], end[2]
-
-
-def whole_momentum(state, inertia, wheels):
-    return to_reference(state[0], add(apply(inertia, state[1]), wheel_momentum(state[2], wheels)))
-
-
-def noted(state, inertia, wheels):
-    """Momentum of the whole (3), energy of the whole, wheel momenta."""
-    _, rate, momentum = state
-    energy = 0.5 * dot(apply(inertia, rate), rate)
-    for h, rotor in zip(momentum, wheels.inertia, strict=True):
-        energy = energy + 0.5 * h * h / rotor
-    return (*whole_momentum(state, inertia, wheels), energy, *momentum)
-
-
-def flight(wheels, commands, held, steps, rate=(0.01, -0.005, 0.008), size=1.0):
-    """Hold each row of `commands` for `held` steps; what `noted` gives before each step, and the last state."""
-    inertia = matrix(bare_inertia(size * np.array(TOTAL), axial_inertia(wheels)))
-    recorder = Recorder()
-    with recorder.recording():
-        cells, out = (recorder.memory(name, writable=True) for name in ("state", "out"))
-        given = Buffer(recorder.memory("commands"), 0, len(commands) * 4)
-
-        def turn(row, k, state):
-            for i, number in enumerate(noted(state, inertia, wheels)):
-                out[(row * held + k) * 8 + i] = number
-            return (step(state, 0.1, given.row(row, 4), inertia, wheels),)
-
-        start = Buffer(cells, 0, 11)
-        state = ((start.row(0, 4), start.part(4, 3).row(0, 3), start.part(7, 4).row(0, 4)),)
-        end = repeat(steps // held, lambda row, state: repeat(held, lambda k, now: turn(row, k, now), state), *state)
-        for i, number in enumerate(flatten(end)):
-            cells[i] = number
-    x = np.array([1.0, 0.0, 0.0, 0.0, *rate, 0.3, -0.2, 0.1, 0.25])
-    rows, table = np.empty((steps, 8)), np.ascontiguousarray(commands, dtype=float)
-    load(recorder.program("flight"), 1)(x.ctypes.data, rows.ctypes.data, table.ctypes.data)
-    return rows, unflatten(x, ((0.0,) * 4, (0.0,) * 3, (0.0,) * 4))
-
-
-@pytest.mark.parametrize("layout", ["pyramid", "nasa"])
-def test_momentum_of_the_whole_is_conserved(layout):
-    """One orbit of random commands, with friction and wheels that run into their momentum limits."""
-    wheels = simple(
-        LAYOUTS[layout], inertia=0.002, torque_limit=0.02, momentum_limit=0.4, viscous=1e-5, coulomb=[1e-4, 2e-4, 3e-4, 1e-4]
-    )
-    commands = np.random.default_rng(4).normal(size=(540, 4)) * 0.02
-    # So large a body that the fourth-order error of its attitude stays below the bound.
-    out, _ = flight(wheels, commands, 100, 54000, rate=(1e-3, -5e-4, 8e-4), size=30.0)
-    whole = out[:, :3]
-    assert np.abs(out[:, 4:]).max() > 0.4 * (1.0 - BAND)
-    assert np.linalg.norm(whole - whole[0], axis=1).max() <= 1e-12 * np.linalg.norm(whole[0])
+def flight(steps, limit=5e-324, **more):
+    """A body on a pyramid of wheels, whose law commands at most so much."""
+    wheels = simple(pyramid(), inertia=0.002, torque_limit=0.02, momentum_limit=0.4, **more)
+    own = rotors(wheels, (0.3, -0.2, 0.1, 0.25))
+    return wheels, flown(hub(own, rate=(0.01, -0.005, 0.008), limit="axis", command_limit=limit), steps)
 
 
 def test_friction_alone_takes_energy():
-    wheels = simple(pyramid(), inertia=0.002, torque_limit=0.02, momentum_limit=0.4, viscous=1e-6, coulomb=1e-4)
-    out, last = flight(wheels, [[0.0] * 4], 60000, 60000)
-    assert (np.diff(out[:, 3]) <= 1e-13 * out[0, 3]).all()
-    assert out[-1, 3] < 0.2 * out[0, 3]
-    relative = np.array(last[2]) / 0.002 - np.array(wheels.axes) @ np.array(last[1])
+    wheels, run = flight(20000, viscous=1e-6, coulomb=1e-4)
+    body = np.array(body_inertia(HUB, wheels))
+    energy = 0.5 * np.einsum("ti,ij,tj->t", run["rate"], body, run["rate"])
+    energy += 0.5 * (run["wheel_momentum"] ** 2).sum(axis=1) / 0.002
+    assert (np.diff(energy) <= 1e-13 * energy[0]).all()
+    assert energy[-1] < 0.2 * energy[0]
+    relative = run["wheel_momentum"][-1] / 0.002 - np.array(wheels.axes) @ run["rate"][-1]
     assert np.abs(relative).max() < 0.01 * CREEP
 
 
 @pytest.mark.parametrize("coulomb", [0.0, 1e-3])
 def test_a_wheel_saturates_at_its_momentum_limit(coulomb):
-    wheels = simple(pyramid(), inertia=0.002, torque_limit=0.02, momentum_limit=0.4, coulomb=coulomb)
-    out, _ = flight(wheels, [[1.0, 1.0, -1.0, -1.0]], 3000, 3000)
-    assert np.abs(out[:, 4:]).max() <= 0.4 * (1.0 + 1e-12)
-    assert np.abs(out[-1, 4:]).min() > 0.4 * (1.0 - BAND)
+    momenta = np.abs(flight(3000, limit=1.0, coulomb=coulomb)[1]["wheel_momentum"])
+    assert 0.4 * (1.0 - BAND) < momenta.max() <= 0.4 * (1.0 + 1e-12)
 
 
 def test_rotors_at_rest_in_the_body_are_part_of_it():
@@ -357,8 +223,8 @@ def test_rotors_at_rest_in_the_body_are_part_of_it():
     wheels = simple(pyramid(), inertia=0.2, viscous=1e3)
     rate = (0.3, -0.2, 0.5)
     momentum = tuple(0.2 * float(np.dot(a, rate)) for a in wheels.axes)
-    whole = np.array(bare_inertia(TOTAL, axial_inertia(wheels))) @ rate + np.array(wheel_momentum(momentum, wheels))
-    np.testing.assert_allclose(whole, np.array(TOTAL) @ rate, rtol=1e-14)
+    whole = np.array(body_inertia(HUB, wheels)) @ rate + np.array(wheel_momentum(momentum, wheels))
+    np.testing.assert_allclose(whole, HUB @ rate, rtol=1e-14)
 
 
 # Loss of a wheel.
@@ -451,10 +317,3 @@ def test_catalogue():
         assert unit.source
         assert (unit.inertia is None) == (unit.top_speed is None)
     assert WHEEL_UNITS["HR16-100"].inertia == pytest.approx(100.0 / (100.0 * 2.0 * math.pi))
-
-
-def test_scaled_torques_need_scaled_wheels():
-    wheels = simple(HEXAGON)
-    torque = (0.3, -0.1, 0.2)
-    once, twice = allocate_peak(torque, wheels), allocate_peak(scale(2.0, torque), wheels)
-    assert twice == pytest.approx([2.0 * x for x in once])

@@ -11,7 +11,7 @@ from starhold.loop.kernels import Arguments, Numbers, form, make_step, numbers_o
 from starhold.simulation.lane import fly
 from starhold.simulation.lanes import simulate_many
 from tests.simulation.loops import builtin, choices
-from tests.tiers import fewer
+from tests.tiers import fewer, leading
 from tests.trace.machines import LEVELS, Job, on_c, on_node
 
 STEPS = 450
@@ -24,8 +24,7 @@ COSTLY = 30
 SLOW = pytest.mark.slow
 """Each compiler's other level, and what takes long to compile, is left to `make test-all`."""
 
-BUILTIN = builtin()
-LOOPS = BUILTIN | choices()
+LOOPS = builtin() | choices()
 
 
 def is_costly(name: str) -> bool:
@@ -33,7 +32,7 @@ def is_costly(name: str) -> bool:
 
 
 def steps_of(name: str) -> int:
-    return COSTLY if is_costly(name) else STEPS if LOOPS[name].events else fewer(STEPS)
+    return COSTLY if is_costly(name) else STEPS if LOOPS[name].events else fewer(STEPS, 15)
 
 
 class Leg(NamedTuple):
@@ -74,10 +73,8 @@ def test_one_lane(name):
     same(numbers_of(fly(LOOPS[name], steps_of(name), run=RUN)[1]), numbers_of(legs(name)[-1].end))
 
 
-LANES = [(name, 8) for name in LOOPS] + [
-    pytest.param(name, 16, marks=SLOW if is_costly(name) or name not in BUILTIN else ()) for name in LOOPS
-]
-"""Every loop on eight lanes; on sixteen those of the built-in scenarios, and by `make test-all` all."""
+LANES = [*((name, 8) for name in LOOPS), *leading([(name, 16) for name in LOOPS if not is_costly(name)], 2)]
+"""Every loop on eight lanes; on sixteen two, and by `make test-all` all."""
 
 
 @pytest.mark.parametrize(("name", "width"), LANES)

@@ -8,7 +8,6 @@ import pytest
 from starhold.algebra.quaternion import to_reference
 from starhold.algebra.structure import flatten
 from starhold.algebra.vector import ZERO
-from starhold.errors import InputError
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.loop.kernels import make_step
 from starhold.parts.craft import make_craft, tensor
@@ -21,6 +20,7 @@ from starhold.simulation.lanes import simulate_many
 from starhold.studies.certificates import certify_scenario
 from tests import small
 from tests.making import wheels_after
+from tests.refusals import refused
 
 WHEELS = builtin_text("wheels-orbital").replace("gravity_gradient = true", "gravity_gradient = false")
 PLAIN = small.CRAFT.replace("rate = [0, 0, 0]", "rate = [0.03, -0.02, 0.04]").replace("duration = 5.0", "duration = 30.0")
@@ -205,17 +205,15 @@ def test_moments_may_have_units():
     ],
 )
 def test_inertia_faults_that_cannot_be(text, said):
-    with pytest.raises(InputError, match="here: ") as refused:
+    with refused(said, start="here: "):
         made(PLAIN + LYAPUNOV + text)
-    assert said in str(refused.value)
-    assert "\n" not in str(refused.value)
 
 
 def test_inertia_faults_that_the_wheels_or_the_law_cannot_bear():
-    with pytest.raises(InputError, match=r"fault\[1\].inertia: the rotors have more inertia than the craft"):
+    with refused("fault[1].inertia: the rotors have more inertia than the craft"):
         made(WHEELS + fault("[1e-3, 1e-3, 1e-3]"))
-    with pytest.raises(InputError, match=r"fault\[1\]: no gains for law lqr: form 'II' needs a diagonal inertia"):
+    with refused("fault[1]: no gains for law lqr: form 'II' needs a diagonal inertia"):
         made(PLAIN + FORM_II + fault(TURNED))
     pd = '\n[[law]]\ntype = "pd"\nname = "given"\nk_rate = 0.3\nk_attitude = 0.03\n'
-    with pytest.raises(InputError, match="retune for law given; allowed: a law with a form"):
+    with refused("retune for law given; allowed: a law with a form"):
         made(WHEELS + pd + fault(WHEELED, wheel=1, lost="true"), law=2)

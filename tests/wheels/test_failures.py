@@ -10,13 +10,11 @@ import pytest
 from scipy.optimize import linprog
 
 from starhold.analysis.rigid_body import measure
-from starhold.cli.show import print_blocks
-from starhold.errors import InputError
+from starhold.cli.study import print_result
 from starhold.parts.effectors.layouts import pyramid
 from starhold.parts.effectors.wheels import lose, make_wheels
 from starhold.report.commands.failures import draw, present
 from starhold.report.figures import save
-from starhold.report.results import open_folder
 from starhold.report.tables import write_table
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.building import build
@@ -111,7 +109,8 @@ def test_authority_is_what_a_linear_programme_finds_about_the_weakest_axis(found
 
 
 def test_three_orthogonal_wheels_name_the_axis_of_each_loss():
-    found = study(*with_first_law(changed(('"pyramid"', '"orthogonal"'))))
+    scenario = changed(('"pyramid"', '"orthogonal"'))
+    found = study(scenario, scenario.laws[0])
     assert len(found) == 1 + 3 + 3
     for failure in found[1:4]:
         assert np.abs(failure.lacking) == pytest.approx(np.eye(3)[[failure.lost[0] - 1]], abs=1e-12)
@@ -120,22 +119,15 @@ def test_three_orthogonal_wheels_name_the_axis_of_each_loss():
         assert np.array(failure.lacking).T @ np.array(failure.lacking) == pytest.approx(gone.T @ gone, abs=1e-12)
 
 
-def with_first_law(scenario):
-    return scenario, scenario.laws[0]
-
-
-def test_six_wheels_bear_double_losses_and_a_law_with_given_gains_keeps_them():
-    wheels = "".join(
-        f"\n[[wheel]]\naxis = {axis}\n" for axis in ([1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1])
-    )
-    given = '\n[[law]]\ntype = "wheel"\nname = "given"\nk_rate = 0.3\nk_attitude = 0.003\n'
-    scenario = changed(('layout = "pyramid"', "#"), ('allocation = "least-squares"', wheels.strip()))
-    scenario = parse(scenario.text.replace("[settling]", f"{given}\n[settling]", 1), "here")
-    entry = scenario.pick("given")
-    heard = []
-    found = study(scenario, entry, lambda done, total, name: heard.append((done, total, name)))
-    assert heard[0] == (0, 22, "none")
-    assert heard[-1][:2] == (22, 22)
+def test_five_wheels_bear_double_losses_and_a_law_with_given_gains_keeps_them():
+    axes = ([1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1], [1, 2, -1])
+    wheels = "".join(f"\n[[wheel]]\naxis = {axis}\n" for axis in axes)
+    given = '\n[[law]]\ntype = "wheel"\nname = "given"\nk_rate = 0.3\nk_attitude = 0.003\n[settling]'
+    parts = ('layout = "pyramid"', "#"), ('allocation = "least-squares"', wheels.strip()), ("[settling]", given)
+    scenario, heard = changed(*parts, ("control_period = 0.1", "control_period = 1.0")), []
+    found = study(scenario, scenario.pick("given"), lambda done, total, name: heard.append((done, total, name)))
+    assert heard[0] == (0, 16, "none")
+    assert heard[-1][:2] == (16, 16)
     assert all(failure.controllable for failure in found)
     for failure in found:
         assert failure.eta is None
@@ -224,16 +216,6 @@ def test_the_picture_shows_something_and_is_the_same_again(found, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.png", "b.png"]
 
 
-def test_a_folder_that_holds_results_is_kept_unless_forced(tmp_path):
-    (tmp_path / "failures.csv").write_text("kept")
-    (tmp_path / "other.csv").write_text("kept")
-    with pytest.raises(InputError, match="results already there"):
-        open_folder(tmp_path, force=False)
-    assert (tmp_path / "failures.csv").read_text() == "kept"
-    open_folder(tmp_path, force=True)
-    assert [path.name for path in tmp_path.iterdir()] == ["other.csv"]
-
-
 def test_the_command(tmp_path):
     done = starhold("failures", "wheels-orbital", cwd=tmp_path, code=0)
     assert "1 and 2" in done.stdout
@@ -250,37 +232,34 @@ def test_what_cannot_be_is_said_in_one_line(words, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_names_among_the_gains_are_told_as_they_are_written(tmp_path, capsys):
-    law = '\n[[law]]\ntype = "mpc"\nq_attitude = 0.2\nq_rate = 0.2\nr = 50.0\nlimit = "norm"\n'
-    scenario = parse(BUILTIN + law, "here")
+def intact_and_struck(law, folder, capsys):
+    """A law flown for an instant on all wheels and on three: what is found, what is printed of it, and its table."""
+    scenario = parse(f"{BUILTIN}\n[[law]]\n{law}", "here")
     entry, table = scenario.laws[-1], scenario.table.simulation.model_copy(update={"duration": 0.2})
     short = replace(scenario, table=scenario.table.model_copy(update={"simulation": table}))
     found = [_flown(short, entry, _left(wheels_of(short), lost, 0.02)) for lost in ((), (1,))]
     result = present(short, entry, found)
-    print_blocks(result.blocks)
-    assert "The gains are the same in all of them." in capsys.readouterr().out
-    write_table(result.numbers, tmp_path / "table.csv")
-    with (tmp_path / "table.csv").open(encoding="utf-8") as file:
-        assert [row["limit (1)"] for row in csv.DictReader(file)] == ["norm", "norm"]
+    print_result(result)
+    write_table(result.numbers, folder / "table.csv")
+    assert save(result.figure(), folder / "picture.png").is_file()
+    rows = csv.DictReader((folder / "table.csv").read_text(encoding="utf-8").splitlines())
+    return found, " ".join(capsys.readouterr().out.split()), list(rows)
+
+
+def test_names_among_the_gains_are_told_as_they_are_written(tmp_path, capsys):
+    law = 'type = "mpc"\nq_attitude = 0.2\nq_rate = 0.2\nr = 50.0\nlimit = "norm"\n'
+    _, said, rows = intact_and_struck(law, tmp_path, capsys)
+    assert "The gains are the same in all of them." in said
+    assert [row["limit (1)"] for row in rows] == ["norm", "norm"]
 
 
 def test_a_law_that_what_is_left_does_not_suit_leaves_the_rest_of_the_study(tmp_path, capsys):
-    law = '\n[[law]]\ntype = "pd"\nk_rate = 0.3\nk_attitude = 0.013\nlimit = "axis"\n'
-    scenario = parse(BUILTIN + law, "here")
-    entry, table = scenario.laws[-1], scenario.table.simulation.model_copy(update={"duration": 0.2})
-    short = replace(scenario, table=scenario.table.model_copy(update={"simulation": table}))
-    intact, struck = (_flown(short, entry, _left(wheels_of(short), lost, 0.02)) for lost in ((), (1,)))
+    law = 'type = "pd"\nk_rate = 0.3\nk_attitude = 0.013\nlimit = "axis"\n'
+    (intact, struck), said, rows = intact_and_struck(law, tmp_path, capsys)
     assert intact.gains is not None
     assert intact.refused == ""
     assert struck.gains is None
     assert struck.authority > 0.0
-    result = present(short, entry, [intact, struck])
-    print_blocks(result.blocks)
-    said = " ".join(capsys.readouterr().out.split())
-    assert (
-        'without 1 not flown: limit = "axis" needs k_attitude below the torque limit of 0.011547 N m, not 0.013 N m' in said
-    )
-    write_table(result.numbers, tmp_path / "table.csv")
-    with (tmp_path / "table.csv").open(encoding="utf-8") as file:
-        assert [bool(row["not flown because"]) for row in csv.DictReader(file)] == [False, True]
-    assert save(result.figure(), tmp_path / "picture.png").is_file()
+    words = 'without 1 not flown: limit = "axis" needs k_attitude below the torque limit of 0.011547 N m, not 0.013 N m'
+    assert words in said
+    assert [bool(row["not flown because"]) for row in rows] == [False, True]
