@@ -53,11 +53,7 @@ COMPOSED = {
     "an estimator without one of its sensors": (BODY + TRACKER + FILTER + PD, "no rate", "a sensor that measures rate"),
     "two estimators": (BODY + GYRO + TRACKER + FILTER * 2 + PD, "a second estimator", "one estimator"),
     "two sensors of the rate": (BODY + GYRO * 2 + PD, "a second sensor of rate, beside gyro", "one of each"),
-    "a sensor beside [sensor]": (
-        BODY + "[sensor]\nrate_noise = 1e-4\n" + GYRO + PD,
-        "a second sensor of rate",
-        "one of each",
-    ),
+    "a sensor beside [sensor]": (BODY + "[sensor]\nrate_noise = 1e-4\n" + GYRO + PD, "a second sensor of rate"),
     "a part of another body": (
         POINT + part('type = "constant-torque"\ntorque = [0, 0, 1e-5]\n') + CIRCLE,
         "part[1]: found constant-torque, for the body rigid-body",
@@ -68,16 +64,8 @@ COMPOSED = {
         "part residual-dipole: found an orbit about Mars",
         "one about Earth",
     ),
-    "a target that is about the Earth elsewhere": (
-        BODY + MARS + part('type = "sun"\n') + PD,
-        "part sun: found an orbit about Mars",
-        "one about Earth",
-    ),
-    "a mode's target that is about the Earth elsewhere": (
-        BODY + MARS + MODES,
-        "found an orbit about Mars",
-        "one about Earth",
-    ),
+    "a target about the Earth elsewhere": (BODY + MARS + part('type = "sun"\n') + PD, "part sun: found an orbit about Mars"),
+    "a mode's target about the Earth elsewhere": (BODY + MARS + MODES, "found an orbit about Mars"),
     "an unknown type": (BODY + part('type = "gyroo"\n') + PD, 'part[1].type: found "gyroo"', "did you mean gyro?"),
     "no type": (BODY + part("noise = 1\n") + PD, "part[1].type: found nothing", "or a file"),
     "what another table gives": (BODY + part('type = "wheels"\n') + PD, '"wheels"', "the [wheels] table, which gives it"),
@@ -111,6 +99,57 @@ def test_parts_that_do_not_go_together(kind, tmp_path):
     text, *said = COMPOSED[kind]
     line = told(tmp_path, text)
     assert all(words in line for words in said), line
+
+
+THRUSTERS = 'type = "thrusters"\ntorque = "50 mN m"\n'
+PANEL = [0.4, 0.5, 0.1, 0.0, 0.1, 1.0, 0.2, 0.6, 0.1, 0.05, 0.010, 0.005, 0.015, 0.20, 0.01, 0.15]
+GYROSCOPE = [0.8165, 0.0, 0.57735, 0.0, 1.0, 0.0, 8e-4, 1e-3, 6e-4, 8e-4, 1.0, 0.2, 0.01, 0.6, 0.0, 0.4]
+
+
+def panel(change):
+    return f'type = "hinged-panels"\nmass = 30.0\npanels = [{[change.get(k, x) for k, x in enumerate(PANEL)]}]\n'
+
+
+def gyroscope(change):
+    return f'type = "control-moment-gyros"\nunits = [{[change.get(k, x) for k, x in enumerate(GYROSCOPE)]}]\n'
+
+
+PLATE = 'type = "solar-pressure"\nplates = [[{}, 0, 0, 0.05, 0, 0.02, {}]]\n'
+IMPOSSIBLE = [
+    (THRUSTERS + "off = 0.1\n", "off must be at most on"),
+    (THRUSTERS + "minimum = 0.2\n", "the shortest pulse must be at most the control period of 0.1 s, not 0.2 s"),
+    (THRUSTERS + part('type = "lag"\nlag = 0.5\n'), "none before thrusters, which takes the command at control instants"),
+    (panel({0: 40.0}), "part hinged-panels: the panels together must have less than the craft's mass of 30 kg"),
+    (panel({0: 0.0}), "panel 1 needs a mass above 0"),
+    (panel({4: 0.0, 5: 0.0, 6: 0.0}), "the hinge of panel 1 has no direction"),
+    (panel(dict(zip(range(4, 10), [0.6, 0.1, 0.05] * 2, strict=True))), "the centre of mass of panel 1 lies on its hinge"),
+    # 8 kg at 1.1 m have more inertia than the whole, or leave the hub two moments whose sum is less than the third.
+    (panel({0: 8.0}), "without its panels the craft of 30 kg is no body"),
+    (panel({12: 6.0}), "no body has these principal moments"),
+    ('type = "flexible-modes"\nmodes = [[0.6, 0.005, 3.0, 0, 0, 0]]\n', "the modes carry more inertia than the craft has"),
+    (gyroscope({3: 1.0, 4: 0.0}), "the spin axis of unit 1 is not perpendicular to its gimbal"),
+    (gyroscope({0: 0.0, 2: 0.0}), "the gimbal of unit 1 has no direction"),
+    (gyroscope({6: 2e-3}), "unit 1 needs moments of inertia above 0, of the rotor at most about_spin"),
+    (gyroscope({11: 0.0}), "the gimbal of unit 1 needs a rate limit of at least 0 and a torque limit above 0"),
+    (gyroscope({15: 0.7}), "torque limit of at least 0, a momentum limit above 0, and a momentum within it"),
+    (gyroscope({10: 0.0}), "there is no unit with momentum in a gimbal that turns"),
+    (gyroscope({}), "the units give no torque about some axis: two gimbals that are not parallel are needed"),
+    (PLATE.format("0.06, 1", "0.8, 0.3"), "plate 1 needs shares"),
+    (PLATE.format("0.06, 0", "0.2, 0.3"), "plate 1 needs an area of at least 0 and a normal"),
+    ('type = "sun"\naxis = [0, 0, 2]\nother = [0, 0, -1]\n', "the two body axes must have directions"),
+    ('type = "sun"\nreference = [0, 0, 0]\n', "the reference needs a direction"),
+    ('type = "ground-station"\nlatitude = 2.0\nlongitude = 0.0\n', "latitude"),
+    ('type = "magnetometer"\noutage = [2, 1]\n', "outage ends"),
+    ('type = "star-tracker"\ncross = 0\nroll = 0\noutage = [2, 1]\n', "outage ends"),
+    ('type = "sun-sensor"\nboresight = [0, 0, 0]\n', "boresight"),
+    ('type = "residual-dipole"\ndipole = [0, 0, 1]\n', "no two-body, which residual-dipole needs"),
+]
+
+
+@pytest.mark.parametrize(("keys", "said"), IMPOSSIBLE)
+def test_numbers_that_no_part_can_have(keys, said, tmp_path):
+    orbit = "" if "residual" in keys else '[orbit]\nposition = ["6878 km", 0, 0]\nvelocity = [0, 0, "7.6 km/s"]\n'
+    assert said in told(tmp_path, BODY + orbit + part(keys) + PD)
 
 
 def test_two_targets_and_two_effectors_that_take_the_command(tmp_path):

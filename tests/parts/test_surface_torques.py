@@ -1,7 +1,5 @@
 """Drag, sunlight, and its shadow against Basilisk, an independent simulator in C++, and against sums by hand."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -10,24 +8,13 @@ from starhold.parts import sun
 from starhold.parts.environments import drag, solar_pressure
 from starhold.parts.plates import BOX
 from starhold.parts.sun import EARTH
+from tests.parts.places import states
 
 PERIOD = 0.5
 EPOCH = (2026.0, 10.0, 9.0, 8.0, 7.0, 6.0)
 AIR = drag.Params(BOX, 2.1, 3.5e-12, 4e5, 5.8515e4, 1.2)
 SIDES = tuple((*row, 0.1 * k, 0.5 - 0.1 * k) for k, row in enumerate(BOX))
 LIGHT = solar_pressure.Params(SIDES, EPOCH)
-
-
-def states(count=12, seed=4):
-    """Attitudes, positions (m) and velocities (m/s) about the Earth, a third of them in its shadow."""
-    random = np.random.default_rng(seed)
-    for _ in range(count):
-        q, r, v = random.normal(size=4), random.normal(size=3), random.normal(size=3)
-        r *= (EARTH + random.uniform(3e5, 6e5)) / np.linalg.norm(r)
-        v = np.cross(r, v)
-        v *= 7.6e3 / np.linalg.norm(v)
-        vectors = (tuple(map(float, x)) for x in (q / np.linalg.norm(q), r, v))
-        yield SimpleNamespace(**dict(zip(("attitude", "position", "velocity"), vectors, strict=True)))
 
 
 def torque(part, params, state, step=0):
@@ -37,7 +24,7 @@ def torque(part, params, state, step=0):
     return np.array(part.torque(state, numbers, CRAFT, memory))
 
 
-def in_basilisk(effector, state, models=()):
+def in_basilisk(effector, state):
     """The torque (N m, body axes) that an effector of Basilisk gives a spacecraft at a state."""
     from Basilisk.simulation import spacecraft
     from Basilisk.utilities import RigidBodyKinematics, SimulationBaseClass, macros
@@ -49,15 +36,12 @@ def in_basilisk(effector, state, models=()):
     craft.hub.sigma_BNInit = RigidBodyKinematics.EP2MRP(np.array(state.attitude)).tolist()
     craft.hub.r_CN_NInit, craft.hub.v_CN_NInit = list(state.position), list(state.velocity)
     craft.addDynamicEffector(effector)
-    for model in (*models, craft, effector):
+    for model in (craft, effector):
         simulation.AddModelToTask("t", model)
-    for model in models:
-        if hasattr(model, "addSpacecraftToModel"):
-            model.addSpacecraftToModel(craft.scStateOutMsg)
     simulation.InitializeSimulation()
     simulation.ConfigureStopTime(macros.sec2nano(2e-6))
     simulation.ExecuteSimulation()
-    return np.array(effector.torqueExternalPntB_B).ravel(), craft
+    return np.array(effector.torqueExternalPntB_B).ravel()
 
 
 def test_drag_against_basilisk():
@@ -65,7 +49,7 @@ def test_drag_against_basilisk():
     from Basilisk.architecture import messaging
     from Basilisk.simulation import facetDragDynamicEffector
 
-    for state in states():
+    for state in states(12):
         effector = facetDragDynamicEffector.FacetDragDynamicEffector()
         for area, nx, ny, nz, *centre in BOX:
             effector.addFacet(area, AIR.coefficient, [nx, ny, nz], centre)
@@ -78,7 +62,7 @@ def test_drag_against_basilisk():
         moving.v_air_N = np.cross((0.0, 0.0, AIR.rotation * drag.TURN), state.position).tolist()
         wind = messaging.WindMsg().write(moving)
         effector.windVelInMsg.subscribeTo(wind)
-        expected, _ = in_basilisk(effector, state)
+        expected = in_basilisk(effector, state)
         found = torque(drag, AIR, state)
         assert np.abs(found - expected).max() < 1e-8 * np.abs(expected).max(), (found, expected)
 
@@ -89,7 +73,7 @@ def test_sunlight_against_basilisk():
     from Basilisk.simulation import facetSRPDynamicEffector
 
     shaded = 0
-    for step, state in enumerate(states()):
+    for step, state in enumerate(states(12)):
         seen = sun.sun(step * PERIOD, sun.prepared(EPOCH))
         effector = facetSRPDynamicEffector.FacetSRPDynamicEffector()
         effector.setNumFacets(len(SIDES))
@@ -105,7 +89,7 @@ def test_sunlight_against_basilisk():
         eclipse = messaging.EclipseMsg().write(shadow)
         effector.sunEclipseInMsg.subscribeTo(eclipse)
         shaded += shadow.illuminationFactor == 0.0
-        expected, _ = in_basilisk(effector, state)
+        expected = in_basilisk(effector, state)
         found = torque(solar_pressure, LIGHT, state, step)
         # Its solar constant is 1368 W/m2.
         assert np.abs(1368.0 / 1361.0 * found - expected).max() <= 1e-7 * np.abs(expected).max(), (found, expected)

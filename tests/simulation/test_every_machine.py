@@ -90,10 +90,10 @@ def test_every_lane_of_many(name, width):
     assert len(np.unique(batch.states[differs.start])) == width
 
 
-SIBLINGS = {name for name in LOOPS if is_costly(name) and name != "three-laws-noise: mpc"} | {
-    name for name in LOOPS if name.endswith("example 0, noise")
-}
-"""Of one law and the same parts as another loop: printed by `make test-all`. All are flown on lanes."""
+SCENARIOS = {name.partition(":")[0]: name for name in reversed(LOOPS)}
+FIRST = set(SCENARIOS.values()) | {"three-laws-noise: mpc"}
+SIBLINGS = {name for name in LOOPS if name not in FIRST or name.endswith("example 0, noise") or name.startswith("mpc")}
+"""Of the same parts or the same law as another loop: printed by `make test-all`. All are flown on lanes."""
 
 
 @cache
