@@ -23,8 +23,7 @@ from starhold.parts.bodies.libration_point import (
     motion,
     nonlinear,
 )
-from tests.algebra.readers import agree, components, symbols, vanishes
-from tests.equations import Dynamics, lagging
+from tests.algebra.readers import components, symbols, vanishes
 
 EARTH_L2 = PRIMARIES["sun-earth"].point()
 POINTS_OF_ALL = [(name, point) for name in PRIMARIES for point in POINTS]
@@ -48,18 +47,6 @@ def potential_of(position, distance, pull):
     return pull * (bent - dot(position, position)) / (s * (1.0 + s))
 
 
-@settings(max_examples=25)
-@given(places, places, sizes)
-def test_every_reader_gives_the_same(direction, velocity, size):
-    position = scale(size, direction)
-    for plant in (EARTH_L2, PRIMARIES["earth-moon"].point("L1")):
-        for field in (linear, nonlinear, jacobi):
-            agree(field, position, velocity, plant)
-    state = PointState(position, velocity, direction)
-    agree(motion, state, position, velocity)
-    agree(motion, state, position, None)
-
-
 @pytest.mark.parametrize(
     ("name", "point", "distance", "stiffness"),
     [
@@ -78,12 +65,6 @@ def test_points_and_stiffness_as_published(name, point, distance, stiffness):
     assert plant.from_smaller * EARTH_DIAMETER / pair.separation == pytest.approx(distance, rel=3e-5)
     assert plant.stiffness == pytest.approx(stiffness, rel=2e-5)
     assert plant.rate == 1.0
-
-
-def test_the_published_3_94_holds_with_the_moon_and_without():
-    for name in ("sun-earth", "sun-earth-alone"):
-        assert round(PRIMARIES[name].point().stiffness, 2) == 3.94
-    assert abs(EARTH_L2.from_smaller) * EARTH_DIAMETER == pytest.approx(1.5077e9, rel=1e-4)
 
 
 @pytest.mark.parametrize(("name", "days"), [("sun-earth", 365.256), ("sun-mars", 686.98), ("sun-jupiter", 4332.6)])
@@ -160,16 +141,6 @@ def test_the_linear_model_is_the_derivative_of_the_nonlinear_one():
         assert vanishes(derived - simple)
 
 
-def test_the_jacobi_constant_is_the_potential_of_the_field():
-    r, v = symbols("x y z"), symbols("u v w")
-    plant = Libration(1, 0, 7, -2, sympy.Rational(1, 3), 5)
-    constant = jacobi(r, v, plant)
-    change = sum(sympy.diff(constant, x) * dx for x, dx in zip((*r, *v), (*v, *nonlinear(r, v, plant)), strict=True))
-    for numbers in ((0.3, -0.2, 0.1, 0.5, 0.7, -0.4), (1.0, 1.5, -0.3, -1.0, 0.2, 0.1)):
-        values = dict(zip((*r, *v), map(sympy.Rational, numbers), strict=True))
-        assert abs(change.subs(values)) < 1e-13
-
-
 def flown(field, plant, position, velocity, until, **settings):
     def rates(time, x):
         return [*x[3:], *field(tuple(x[:3].tolist()), tuple(x[3:].tolist()), plant)]
@@ -209,12 +180,6 @@ def test_the_jacobi_constant_is_kept():
     assert kept == pytest.approx([kept[0]] * len(kept), rel=1e-9)
 
 
-def test_near_the_point_both_models_fly_alike():
-    start = (1e-5, -2e-5, 1e-5), (0.0, 1e-5, 2e-5)
-    full, simple = (flown(field, EARTH_L2, *start, 1.0).y[:, -1] for field in (nonlinear, linear))
-    assert full == pytest.approx(simple, rel=1e-5)
-
-
 def test_units():
     units = PRIMARIES["sun-earth"].units()
     assert units.length == EARTH_DIAMETER
@@ -225,10 +190,10 @@ def test_units():
     assert 12.0 * 3600.0 / PRIMARIES["sun-earth"].period == pytest.approx(0.0014, abs=5e-5)
 
 
-def test_control_surfaces_lag():
-    state, command, dynamics = PointState(ZERO, ZERO, (1.0, 0.0, 0.0)), (0.0, 2.0, 0.0), Dynamics(0.5, math.inf)
-    rate = lagging(state.control, command, state.control, 0.0, dynamics)
-    assert motion(state, linear(ZERO, ZERO, EARTH_L2), rate) == (ZERO, (1.0, 0.0, 0.0), (-2.0, 4.0, 0.0))
+def test_the_control_pushes_and_lags():
+    state = PointState(ZERO, ZERO, (1.0, 0.0, 0.0))
+    assert motion(state, linear(ZERO, ZERO, EARTH_L2), (-2.0, 4.0, 0.0)) == (ZERO, (1.0, 0.0, 0.0), (-2.0, 4.0, 0.0))
+    assert motion(state, (0.5, 0.0, 1.0), None) == (ZERO, (1.5, 0.0, 1.0), None)
 
 
 @pytest.mark.parametrize(

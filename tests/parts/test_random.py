@@ -1,5 +1,6 @@
 """Counter-based random numbers: published answers, compiled code bit for bit, stated errors, the right distribution."""
 
+import itertools
 import math
 import struct
 
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.special import ndtr
+from scipy.stats import kstest, norm
 
 from starhold.algebra.words import bits_of, with_bits
 from starhold.parts.random import (
@@ -95,17 +96,11 @@ def test_known_answers(counter, key, answer):
     assert [tuple(map(int, lane)) for lane in on_lanes.T] == [answer] * 9
 
 
-@given(words, words, words, words)
-def test_compiled_words(k0, k1, c0, c1):
-    assert fast_threefry((k0, k1), (c0, c1)) == threefry((k0, k1), (c0, c1))
-
-
 @given(*[st.integers(-(2**70), 2**70)] * 4)
-def test_any_integer_stands_for_a_word(k0, k1, c0, c1):
-    a, b = threefry((k0, k1), (c0, c1))
-    assert 0 <= a <= ONES
-    assert 0 <= b <= ONES
-    assert (a, b) == threefry((k0 & ONES, k1 & ONES), (c0 & ONES, c1 & ONES))
+def test_any_integer_stands_for_a_word_in_compiled_code_too(k0, k1, c0, c1):
+    found = threefry((k0, k1), (c0, c1))
+    assert found == threefry((k0 & ONES, k1 & ONES), (c0 & ONES, c1 & ONES)) == fast_threefry((k0, k1), (c0, c1))
+    assert all(0 <= word <= ONES for word in found)
 
 
 @pytest.mark.parametrize("seed", [-1, 2**63, -(2**63), 2**200 + 7, 1 - 2**64])
@@ -138,18 +133,6 @@ def test_the_counter_can_be_got_back(k0, k1, c0, c1):
     assert undo((k0, k1), threefry((k0, k1), (c0, c1))) == (c0, c1)
 
 
-@settings(max_examples=30)
-@given(words, words, words, words, st.integers(0, 255))
-def test_one_bit_of_input_turns_half_of_the_output(k0, k1, c0, c1, bit):
-    inputs = [k0, k1, c0, c1]
-    first = threefry((k0, k1), (c0, c1))
-    inputs[bit // 64] ^= 1 << (bit % 64)
-    second = threefry((inputs[0], inputs[1]), (inputs[2], inputs[3]))
-    changed = sum((x ^ y).bit_count() for x, y in zip(first, second, strict=True))
-    # 128 fair coins: 64 +- 5.7.
-    assert 30 < changed < 98
-
-
 @given(words | telling | st.sampled_from((0, ONES, FRACTION, 2**52, 2**51, 2**51 - 1)))
 def test_uniform_numbers_are_exact(word):
     k = word & FRACTION
@@ -172,35 +155,15 @@ EDGES = [x * 2.0**-e for e in range(54) for x in (1.0, ROOT)]
 NEAR = [x for edge in EDGES for x in (math.nextafter(edge, 0.0), edge, math.nextafter(edge, 2.0)) if 2.0**-53 <= x < 1.0]
 
 
-def check_squared_radius(x):
-    found = squared_radius(x)
-    with mpmath.workdps(40):
-        assert relative(found, -2 * mpmath.log(mpmath.mpf(x))) < 2.8e-14
-    assert same_bits([SQUARED_RADIUS(x)], [found])
-
-
-@given(
-    st.floats(2.0**-53, 1.0 - 2.0**-53)
-    | st.floats(-53.0, -1e-9).map(lambda e: 2.0**e)
-    | st.floats(-52.0, -1.0).map(lambda e: 1.0 - 2.0**e)
-)
-def test_squared_radius(x):
-    check_squared_radius(x)
-
-
-def test_squared_radius_at_the_edges_of_its_pieces():
-    for x in NEAR:
-        check_squared_radius(x)
-    assert squared_radius(1.0) == 0.0
-
-
-def test_squared_radius_has_its_stated_error():
+def test_squared_radius_has_its_stated_error_at_the_edges_of_its_pieces_too():
     # The largest error is that of the polynomial: where the fraction comes to the square root of 1/2, and x to 1.
-    with mpmath.workdps(40):
-        worst = max(
-            relative(squared_radius(x), -2 * mpmath.log(mpmath.mpf(x))) for x in np.linspace(ROOT, 1.0, 400)[:-1].tolist()
-        )
+    worst = 0.0
+    for x in NEAR + np.linspace(ROOT, 1.0, 400)[:-1].tolist():
+        with mpmath.workdps(40):
+            worst = max(worst, relative(squared_radius(x), -2 * mpmath.log(mpmath.mpf(x))))
+        assert same_bits([SQUARED_RADIUS(x)], [squared_radius(x)])
     assert 2.5e-14 < worst < 2.8e-14
+    assert squared_radius(1.0) == 0.0
 
 
 def check_cosine_and_sine(x):
@@ -212,22 +175,11 @@ def check_cosine_and_sine(x):
     assert same_bits(COSINE_AND_SINE(x), (c, s))
 
 
-@given(
-    st.floats(-0.5, 0.5, allow_subnormal=False) | st.floats(-52.0, -1.0).map(lambda e: 2.0**e) | st.sampled_from((0.0, -0.0))
-)
-def test_cosine_and_sine(x):
-    # The smallest angle on the grid is 2^-52; what underflows is not met.
-    x = x if abs(x) >= 2.0**-60 else 0.0
-    check_cosine_and_sine(x)
-    assert cosine_and_sine(-x) == (cosine_and_sine(x)[0], -cosine_and_sine(x)[1])
-
-
 def test_cosine_and_sine_over_their_range():
-    for k in range(-256, 257):
-        check_cosine_and_sine(k / 512)
-    for edge in (0.5, math.nextafter(0.5, 0.0), 2.0**-52):
-        check_cosine_and_sine(edge)
-        check_cosine_and_sine(-edge)
+    # The smallest angle on the grid is 2^-52; what underflows is not met.
+    for x in (*(k / 512 for k in range(257)), math.nextafter(0.5, 0.0), *(2.0**-e for e in range(10, 53, 6))):
+        check_cosine_and_sine(x)
+        check_cosine_and_sine(-x)
 
 
 def exact_transform(a, b):
@@ -247,10 +199,12 @@ def check_transform(a, b):
     assert same_bits(TRANSFORM(with_bits(a), with_bits(b)), pair)
 
 
-@settings(max_examples=300)
+@settings(max_examples=200)
 @given(words | telling, words | telling)
 def test_transform(a, b):
     check_transform(a, b)
+    # Bits 52 to 62 of either word do not matter.
+    assert transform(a, b) == transform(a | 0x7FF << 52, b | 0x7FF << 52)
 
 
 # Smallest and largest uniform number, both sides of the middle, each with both choices of a bit of the quarter.
@@ -258,24 +212,9 @@ EXTREMES = [top | k for top in (0, 1 << 63) for k in (0, 1, 2**51 - 1, 2**51, 2*
 
 
 @pytest.mark.parametrize("a", EXTREMES)
-@pytest.mark.parametrize("b", EXTREMES)
-def test_transform_at_the_extremes_and_the_edges_of_all_quarters(a, b):
-    check_transform(a, b)
-
-
-def test_the_bits_between_do_not_matter():
-    # Bits 52 to 62 of either word.
-    assert transform(7 | 0x7FF << 52, 9 | 0x7FF << 52) == transform(7, 9)
-
-
-def test_all_quarters():
-    # The same angle with each choice of sign and exchange: mirrored in the diagonal and in the origin.
-    k, top = 2**51 + 2**49, 1 << 63
-    x, y = transform(123456, k)
-    assert 0.0 < y < x
-    assert transform(123456, k | top) == (y, x)
-    assert transform(123456 | top, k) == (-x, -y)
-    assert transform(123456 | top, k | top) == (-y, -x)
+def test_transform_at_the_extremes_and_the_edges_of_all_quarters(a):
+    for b in EXTREMES:
+        check_transform(a, b)
 
 
 def test_the_largest_and_the_smallest_radius():
@@ -283,13 +222,6 @@ def test_the_largest_and_the_smallest_radius():
     assert largest == pytest.approx(math.sqrt(106.0 * math.log(2.0)), rel=1e-13)
     assert largest == pytest.approx(8.5717, abs=1e-4)
     assert smallest == pytest.approx(2.0**-26, rel=1e-13)
-
-
-@given(st.lists(telling, min_size=1, max_size=20), st.data())
-def test_lanes_give_the_bits_of_plain_python(first, data):
-    second = data.draw(st.lists(telling, min_size=len(first), max_size=len(first)))
-    found = TRANSFORM.over(doubles(first, second))
-    assert all(same_bits(found[:, i], transform(a, b)) for i, (a, b) in enumerate(zip(first, second, strict=True)))
 
 
 COUNT = 20000
@@ -303,23 +235,14 @@ def nine(seed, run):
 SAMPLE = nine(1, 0)
 
 
-@settings(max_examples=30)
-@given(st.integers(-(2**70), 2**70), words, words)
-def test_compiled_numbers(seed, run, step):
-    plain = normals((seed, run), step, 0, 9)
-    assert all(math.isfinite(x) and abs(x) < 8.6 for x in plain)
-    assert same_bits(NINE(*(with_bits(w & ONES) for w in (seed, run, step))), plain)
-
-
 def test_numbers_of_an_array_are_those_of_plain_python():
     for step in (0, 1, 2, 7, 8, 9, 999, COUNT - 1):
         assert same_bits(SAMPLE[:, step], normals((1, 0), step, 0, 9))
 
 
-@pytest.mark.parametrize("first", range(7))
-@pytest.mark.parametrize("count", range(7))
-def test_a_number_does_not_depend_on_what_else_is_drawn(first, count):
-    assert normals((1, 2), 3, first, count) == normals((1, 2), 3, 0, 20)[first : first + count]
+def test_a_number_does_not_depend_on_what_else_is_drawn():
+    for first, count in itertools.product(range(7), repeat=2):
+        assert normals((1, 2), 3, first, count) == normals((1, 2), 3, 0, 20)[first : first + count]
 
 
 def test_a_number_is_one_of_the_two_of_its_call():
@@ -355,34 +278,15 @@ def test_moments():
         assert abs((x**4).mean() - 3.0) < error * math.sqrt(96.0)
 
 
-def distance_to_normal(x):
-    """The Kolmogorov-Smirnov distance to the standard normal distribution, times the root of the count."""
-    f, n = ndtr(np.sort(x)), len(x)
-    steps = np.arange(n + 1) / n
-    return math.sqrt(n) * max((steps[1:] - f).max(), (f - steps[:-1]).max())
-
-
 def test_distribution():
-    # 1.95 is exceeded by one sample of a thousand; a wrong deviation by a few per cent is seen.
-    for x in SAMPLE:
-        assert distance_to_normal(x) < 1.95
-    assert distance_to_normal(SAMPLE.ravel()) < 1.95
-    assert distance_to_normal(1.02 * SAMPLE.ravel()) > 1.95
-    assert distance_to_normal(SAMPLE.ravel() + 0.02) > 1.95
-
-
-def test_distribution_of_the_tail():
+    # A wrong deviation or mean by two per cent is seen in all numbers together.
+    for x in (*SAMPLE, SAMPLE.ravel()):
+        assert kstest(x, "norm").pvalue > 1e-3
+    assert kstest(1.02 * SAMPLE.ravel(), "norm").pvalue < 1e-3
+    assert kstest(SAMPLE.ravel() + 0.02, "norm").pvalue < 1e-3
     # Beyond three deviations: 0.27 per cent, within four standard errors of a count.
-    found, p = np.count_nonzero(np.abs(SAMPLE) > 3.0), 2.0 * ndtr(-3.0)
+    found, p = np.count_nonzero(np.abs(SAMPLE) > 3.0), 2.0 * norm.cdf(-3.0)
     assert abs(found - p * SAMPLE.size) < 4.0 * math.sqrt(p * SAMPLE.size)
-
-
-def test_pairs_point_everywhere_alike():
-    # Both numbers of a call as a vector: as many in each of 64 directions. Chi squared with 63 degrees of freedom.
-    angles = np.arctan2(SAMPLE[1:8:2], SAMPLE[0:8:2]).ravel()
-    counts = np.histogram(angles, 64, (-math.pi, math.pi))[0]
-    expected = angles.size / 64
-    assert abs(np.sum((counts - expected) ** 2) / expected - 63.0) < 4.0 * math.sqrt(126.0)
 
 
 def test_independence():
