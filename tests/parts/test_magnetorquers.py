@@ -5,15 +5,15 @@ from datetime import datetime
 
 import erfa
 import numpy as np
-import ppigrf
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import starhold as sh
 from starhold.parts.effectors.layouts import pyramid
 from starhold.parts.effectors.magnetorquers import dipole_for, within
 from starhold.scenario.reading import parse
+from tests.making import spun
+from tests.parts.fields import reference
 
 INERTIA = np.array([0.05, 0.065, 0.025])
 CRAFT = """
@@ -52,14 +52,7 @@ def test_the_torque_is_that_of_the_dipole_in_the_field_that_an_independent_imple
     days = sum(erfa.cal2jd(2026, 3, 5)) - 2400000.5 + 6.5 / 24.0
     places, turns = run.position.values, Rotation.from_quat(run.attitude.values, scalar_first=True)
     spins = Rotation.from_rotvec([[0.0, 0.0, erfa.gmst82(2400000.5, days + t / 86400.0)] for t in run.time.values])
-    x, y, z = spins.inv().apply(places).T
-    east, south = np.arctan2(y, x), np.arctan2(np.hypot(x, y), z)
-    where = np.linalg.norm(places, axis=1) / 1e3, np.degrees(south), np.degrees(east)
-    parts = [1e-9 * np.ravel(part) for part in ppigrf.igrf_gc(*where, datetime(2026, 3, 5, 6, 30))]
-    # The axes of its components, outward, south and east, are those of the Earth turned by both angles.
-    local = Rotation.from_euler("ZY", np.stack([east, south], axis=1))
-    outward, southward, eastward = parts
-    fields = turns.inv().apply(spins.apply(local.apply(np.stack([southward, eastward, outward], axis=1))))
+    fields = turns.inv().apply(spins.apply(reference(spins.inv().apply(places), datetime(2026, 3, 5, 6, 30))))
     wanted = np.cross(run.magnetic_dipole.values, fields)
     size = np.linalg.norm(run.magnetic_dipole.values, axis=1) * np.linalg.norm(fields, axis=1)
     # The field here has coefficients up to degree 8, that of the reference all.
@@ -77,14 +70,11 @@ def test_the_body_turns_as_scipy_says_under_the_recorded_dipoles():
         field = turns[k].apply(run.magnetometer_magnetic_field.values[k])
         assert np.abs(np.cross(dipole, turns[k].inv().apply(field)) - torques[k]).max() < 1e-18
 
-        def slope(_, y, dipole=dipole, field=field):
-            q, w = y[:4], y[4:]
-            body = Rotation.from_quat(q, scalar_first=True).inv().apply(field)
-            turning = 0.5 * np.array([-q[1:] @ w, *(q[0] * w + np.cross(q[1:], w))])
-            return [*turning, *((np.cross(dipole, body) - np.cross(w, INERTIA * w)) / INERTIA)]
+        def torque(t, q, dipole=dipole, field=field):
+            return np.cross(dipole, Rotation.from_quat(q, scalar_first=True).inv().apply(field))
 
-        end = solve_ivp(slope, (0.0, 0.5), [*attitude[k], *rate[k]], "DOP853", rtol=1e-12, atol=1e-15).y[:, -1]
-        assert np.abs(end[4:] - rate[k + 1]).max() < 1e-9
+        _, end = spun(torque, (0.0, 0.5), attitude[k], rate[k], np.diag(INERTIA))
+        assert np.abs(end[-1] - rate[k + 1]).max() < 1e-9
 
 
 def test_a_dipole_gives_what_lies_across_the_field_and_no_more_than_it_can():

@@ -5,75 +5,44 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 
 from starhold.algebra.vector import ZERO
-from starhold.laws.catalogue import catalogue
-from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.rigid_body import State
 from starhold.parts.catalogue import fit
-from starhold.parts.craft import make_craft
 from starhold.parts.random import Dice
 from starhold.simulation.lane import fly
-from tests.making import flown
+from tests.making import flown, hub, spun
 
-INERTIA = np.array([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]])
-LAW = catalogue()["pd"]
 HOUR = 3600.0
 
 
-def free(*parts, rate=(0.02, -0.03, 0.05), period=0.1, substeps=4, limit=0.0, **gains):
+def free(*parts, limit=0.0, **options):
     """A body under these parts; with a limit of zero no command acts."""
-    start = State((0.6, 0.0, 0.8, 0.0), rate, ZERO, ZERO, ZERO)
-    own = LAW.gains(**({"k_rate": 0.9, "k_attitude": 0.09} | gains))
-    craft = make_craft(INERTIA.tolist(), torque_limit=0.05)
-    return ClosedLoop(craft, LAW, own, start, period, substeps, parts=parts, command_limit=limit)
+    return hub(*parts, **{"command_limit": limit} | options)
 
 
-def product(p, q):
-    """Quaternions (..., 4) multiplied."""
-    a, b, v, w = p[..., :1], q[..., :1], p[..., 1:], q[..., 1:]
-    return np.concatenate([a * b - np.sum(v * w, -1, keepdims=True), a * w + b * v + np.cross(v, w)], -1)
+def turns(attitudes):
+    return Rotation.from_quat(attitudes, scalar_first=True)
 
 
 def angles(true, measured):
-    """Small rotation vectors (n, 3) from true attitudes (n, 4) to measured ones, body axes."""
-    error = product(true * [1.0, -1.0, -1.0, -1.0], measured)
-    return 2.0 * error[:, 1:] * np.sign(error[:, :1])
+    """Rotation vectors (n, 3) from true attitudes (n, 4) to measured ones, body axes."""
+    return (turns(true).inv() * turns(measured)).as_rotvec()
 
 
-def to_body(q, v):
-    """A vector in inertial axes turned to those of a body with attitude q (inertial to body)."""
-    full = product(product(q * [1.0, -1.0, -1.0, -1.0], np.array([0.0, *v])), q)
-    return full[1:]
-
-
-def integrated(run, torque):
-    """Attitudes and rates of the free body under torque(t, q) (N m, body axes), by SciPy."""
-
-    def slope(t, y):
-        q, w = y[:4], y[4:]
-        spin = np.linalg.solve(INERTIA, torque(t, q) - np.cross(w, INERTIA @ w))
-        return [*(0.5 * product(q, np.array([0.0, *w]))), *spin]
-
-    times = run["time"]
-    start = [*run["attitude"][0], *run["rate"][0]]
-    steps = solve_ivp(slope, (0.0, times[-1]), start, "DOP853", times, rtol=1e-12, atol=1e-13).y
-    return steps[:4].T, steps[4:].T
+def acting(axes, torque):
+    """A torque (N m) in these axes as one in body axes at an attitude."""
+    return lambda t, q: np.array(torque) if axes == "body" else turns(q).inv().apply(torque)
 
 
 @pytest.mark.parametrize("axes", ["body", "inertial"])
 def test_a_constant_torque_turns_the_body_as_euler_s_equations_say(axes):
     torque = (2e-3, -1e-3, 3e-3)
     run = flown(free(fit("environment", "constant-torque", torque, ("body", "inertial").index(axes))), 300)
-    given = (lambda t, q: np.array(torque)) if axes == "body" else (lambda t, q: to_body(q, torque))
-    attitude, rate = integrated(run, given)
+    attitude, rate = spun(acting(axes, torque), run["time"], run["attitude"][0], run["rate"][0])
     assert np.abs(run["attitude"] - attitude).max() < 1e-8
     assert np.abs(run["rate"] - rate).max() < 1e-9
-    if axes == "inertial":
-        # The angular momentum in inertial axes grows by the torque's impulse.
-        momentum = [to_body(q * [1, -1, -1, -1], INERTIA @ w) for q, w in zip(run["attitude"], run["rate"], strict=True)]
-        assert np.abs(momentum[-1] - momentum[0] - 30.0 * np.array(torque)).max() < 1e-9
 
 
 @pytest.mark.parametrize("axes", ["body", "inertial"])
@@ -81,38 +50,13 @@ def test_a_table_is_interpolated_at_control_steps_and_held_between(axes):
     rows = ((0.55, 1e-3, 0.0, 0.0), (1.0, 2e-3, -3e-3, 1e-3), (2.5, 0.0, 4e-3, -1e-3), (4.25, 3e-3, 1e-3, 2e-3))
     columns = np.array(rows).T
     run = flown(free(fit("environment", "torque-table", rows, ("body", "inertial").index(axes))), 60)
-
-    def held(t):
-        # Held from the control step on; a step that ends there belongs to the one before.
-        begun = 0.1 * math.floor(t / 0.1 + 1e-9)
-        return np.array([np.interp(begun, columns[0], column, left=0.0, right=0.0) for column in columns[1:]])
-
-    rate, attitude = run["rate"], run["attitude"]
+    held = np.array([np.interp(run["time"], columns[0], column, left=0.0, right=0.0) for column in columns[1:]]).T
+    assert not held[[1, 5, 43, 59]].any()
+    assert np.abs(held[[6, 10, 25, 42]]).max(axis=1).min() > 1e-4
     for k in range(60):
         # A step at a time, for the torque jumps between them.
-        value = held(0.1 * k)
-
-        def slope(t, y, value=value):
-            own = value if axes == "body" else to_body(y[:4], value)
-            spin = np.linalg.solve(INERTIA, own - np.cross(y[4:], INERTIA @ y[4:]))
-            return [*(0.5 * product(y[:4], np.array([0.0, *y[4:]]))), *spin]
-
-        end = solve_ivp(slope, (0.0, 0.1), [*attitude[k], *rate[k]], "DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
-        assert np.abs(end[4:] - rate[k + 1]).max() < 1e-11, k
-    for outside in (0.1, 0.5, 4.3, 9.0):
-        assert not held(outside).any()
-    assert all(np.abs(held(t)).max() > 1e-4 for t in (0.6, 1.0, 2.5, 4.2))
-
-
-def readings(fitted, steps, run=0, rate=ZERO, period=0.1, name=None):
-    """What a sensor tells of a body that turns at a steady rate, as its equation says: readings (steps,)."""
-    numbers, found = fitted.prepared(period), []
-    state = State((1.0, 0.0, 0.0, 0.0), rate, ZERO, ZERO, ZERO)
-    memory = fitted.remembered(numbers, state)
-    for k in range(steps):
-        reading, memory = fitted.part.module.measure(state, memory, numbers, Dice((3, run), k, 0), k)
-        found.append(reading)
-    return found
+        _, end = spun(acting(axes, held[k]), (0.0, 0.1), run["attitude"][k], run["rate"][k])
+        assert np.abs(end[-1] - run["rate"][k + 1]).max() < 1e-11, k
 
 
 def test_the_noise_of_a_gyro_is_white_and_as_strong_as_it_says():
@@ -155,8 +99,9 @@ def test_the_bias_of_a_gyro_walks_with_the_square_root_of_time():
 
 
 def test_a_gyro_s_scale_and_limit():
-    gyro = fit("sensor", "gyro", 0.0, (0.01, 0.0, 0.0), 0.0, 0.05, 0.2)
-    (reading,) = readings(gyro, 1, rate=(0.1, -0.3, 0.02))
+    fitted = fit("sensor", "gyro", 0.0, (0.01, 0.0, 0.0), 0.0, 0.05, 0.2)
+    state, numbers = State((1.0, 0.0, 0.0, 0.0), (0.1, -0.3, 0.02), ZERO, ZERO, ZERO), fitted.prepared(0.1)
+    reading, _ = fitted.part.module.measure(state, fitted.remembered(numbers, state), numbers, Dice((3, 0), 0, 0), 0)
     assert reading.rate == pytest.approx((0.115, -0.2, 0.021))
 
 
@@ -215,16 +160,6 @@ def test_a_filter_finds_the_bias_of_the_gyro():
         assert np.abs(found[k] - bias - left).max() < 1e-6, k
 
 
-def test_a_filter_of_a_body_that_turns_is_off_by_half_a_step_s_change_of_rate():
-    parts = (fit("sensor", "gyro", 0.0, (2e-3, -1e-3, 3e-3)), fit("sensor", "star-tracker", 0.0, 0.0))
-    filtering = fit("estimator", "complementary-filter", 0.1, 0.05)
-    run = flown(free(*parts, filtering, rate=(0.01, 0.02, -0.01)), 3000)
-    error = run["complementary_filter_rate"][2000:] - run["rate"][2000:]
-    change = np.abs(np.diff(run["rate"][2000:], axis=0)).max()
-    assert 0.1 * change < np.abs(error).max() < change
-    assert np.abs(angles(run["attitude"], run["complementary_filter_attitude"])[2000:]).max() < 1e-5
-
-
 def test_a_filter_halves_the_noise_as_its_gain_says():
     gain, noise, steps = 0.05, 1e-3, 6000
     parts = (fit("sensor", "gyro"), fit("sensor", "star-tracker", noise, noise))
@@ -239,8 +174,7 @@ def test_a_filter_halves_the_noise_as_its_gain_says():
 def test_a_lag_and_then_a_rate_limit_act_in_their_order():
     lag, rate_limit, period = 0.5, 0.02, 0.1
     chain = (fit("actuator", "lag", lag), fit("actuator", "rate-limit", rate_limit))
-    loop = free(*chain, rate=ZERO, limit=None, substeps=10)
-    run = flown(loop, 60)
+    run = flown(free(*chain, rate=ZERO, limit=0.05, substeps=10), 60)
     command, torque = run["command"], run["torque"]
     assert np.abs(np.diff(torque, axis=0)).max() <= rate_limit * period * (1.0 + 1e-9)
     assert np.abs(np.diff(torque, axis=0)).max() > 0.99 * rate_limit * period
@@ -254,7 +188,7 @@ def test_a_lag_and_then_a_rate_limit_act_in_their_order():
             for share, weight in ((0.0, 1.0), (0.5, 4.0), (1.0, 1.0)):
                 between = command[k] + gap * math.exp(-share * h / lag)
                 acts = acts + weight / 6.0 * np.clip(between - begun, -h * rate_limit, h * rate_limit)
-    lone = flown(free(chain[0], rate=ZERO, limit=None, substeps=10), 60)
+    lone = flown(free(chain[0], rate=ZERO, limit=0.05, substeps=10), 60)
     exact = np.zeros(3)
     for k in range(60):
         assert np.abs(exact - lone["torque"][k]).max() < 1e-9, k
@@ -262,9 +196,7 @@ def test_a_lag_and_then_a_rate_limit_act_in_their_order():
 
 
 def test_two_random_torques_draw_different_numbers():
-    loop = free(
-        fit("environment", "random-torque", 1e-3, called="one"), fit("environment", "random-torque", 1e-3, called="two")
-    )
+    loop = free(*(fit("environment", "random-torque", 1e-3, called=name) for name in ("one", "two")))
     memories = [fly(loop, steps)[1].memories.environments for steps in range(1, 120)]
     first, second = (np.array([memory[place] for memory in memories]) for place in (0, 1))
     assert not (first == second).any()
@@ -274,15 +206,9 @@ def test_two_random_torques_draw_different_numbers():
     assert alone[0] == memories[-1][0]
 
 
-def test_two_sensors_and_a_torque_draw_different_numbers():
-    parts = [
-        fit("sensor", "gyro", 1e-3),
-        fit("sensor", "star-tracker", 1e-3, 1e-3),
-        fit("environment", "random-torque", 1e-3),
-    ]
-    loop = free(*parts)
-    run = flown(loop, 2000)
+def test_two_sensors_draw_different_numbers():
+    parts = fit("sensor", "gyro", 1e-3), fit("sensor", "star-tracker", 1e-3, 1e-3), fit("environment", "random-torque", 1e-3)
+    run = flown(free(*parts), 2000)
     gyro = (run["gyro_rate"] - run["rate"])[:2000] / 1e-3 * math.sqrt(0.1)
     tracker = angles(run["attitude"], run["star_tracker_attitude"])[:2000] / 1e-3
-    together = np.corrcoef(np.column_stack([gyro, tracker]).T)
-    assert np.abs(together - np.eye(6)).max() < 4.5 / math.sqrt(2000)
+    assert np.abs(np.corrcoef(np.column_stack([gyro, tracker]).T) - np.eye(6)).max() < 4.5 / math.sqrt(2000)
