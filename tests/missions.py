@@ -1,4 +1,25 @@
-"""Scenarios of laws of modes, in pieces."""
+"""Scenarios of CubeSats, in pieces; those of laws of modes."""
+
+
+def cubesat(*tables, duration=300, period=0.5, angles='["20 deg", "-10 deg", "30 deg"]', rate=(0.02, -0.03, 0.025)):
+    """A 6U CubeSat on a polar orbit, with these tables; `angles` and `rate` are those at the start."""
+    return f"""
+name = "own"
+[spacecraft]
+inertia = [0.05, 0.065, 0.025]
+torque_limit = "2 mN m"
+[orbit]
+position = ["6878 km", 0, 0]
+velocity = [0, "-1.017 km/s", "7.544 km/s"]
+epoch = "2026-03-05T06:30:00Z"
+[initial]
+angles = {angles}
+rate = {list(rate)}
+[simulation]
+duration = {duration}
+control_period = {period}
+{"".join(tables)}"""
+
 
 BASE = """
 name = "mission"

@@ -8,10 +8,13 @@ import pytest
 
 import starhold as sh
 from starhold.conformance.parts import examine_part, find_part
+from starhold.parts import roles
+from starhold.parts.catalogue import DEMANDED, EITHER, PACKAGES, parts
+from starhold.parts.contract import Card, Parameter
+from starhold.parts.random import RANGE, Dice
+from tests.parts.files import FILES, PAGE
 
 ROOT = Path(__file__).parents[1]
-PAGE = (ROOT / "docs" / "part-authors.md").read_text(encoding="utf-8")
-FILES = dict(re.findall(r"`(\w+\.(?:py|toml))`:\n\n```\w+\n(.*?)```", PAGE, flags=re.DOTALL))
 PARTS = {"sunlight": "environment", "drifting_tracker": "sensor", "rate_from_attitude": "estimator"}
 PARTS |= {"dead_zone": "actuator", "flexible_panel": "effector"}
 
@@ -40,8 +43,9 @@ def test_it_has_an_example_for_each_role():
     assert set(FILES) == {f"{name}.py" for name in PARTS} | {"own.toml", "pyproject.toml"}
 
 
-@pytest.mark.parametrize("name", PARTS)
+@pytest.mark.parametrize("name", ["sunlight", "drifting_tracker", "rate_from_attitude"])
 def test_its_parts_conform(name, folder):
+    """The others are examined where one file is told of."""
     part = find_part(f"{name}.py")
     assert part.role == PARTS[name]
     verdicts = list(examine_part(part))

@@ -1,72 +1,22 @@
 """Parts of every role as the text of one file each, and a scenario that takes them."""
 
+import re
+from pathlib import Path
+
 HEAD = '''"""A part."""
 
 from typing import Annotated, NamedTuple
 
 from starhold.algebra.quantity import Quantity
-from starhold.algebra.vector import ZERO, add, cross, dot, scale
+from starhold.algebra.vector import ZERO, add, dot, scale
 from starhold.parts.contract import Card, Parameter
 
 CARD = Card(title="Mine", summary="a part", sources=("mine",), assumptions=())
 '''
-EFFECTOR = f'''{HEAD}ROLE = "effector"
-
-
-class Params(NamedTuple):
-    """A mode of an appendage."""
-
-    coupling: Annotated[tuple, Parameter("sqrt(kg) m", shape=(3,), spread=False, text="of the mode with the rotation")]
-    frequency: Annotated[float, Parameter("rad/s", above=0.0, text="with the body held")]
-    damping: Annotated[float, Parameter("1", at_least=0.0, text="as a share of the critical")] = 0.0
-    deflection: Annotated[float, Parameter("sqrt(kg) m", text="at the start")] = 0.0
-
-
-class State(NamedTuple):
-    """Modal deflection and its rate."""
-
-    deflection: float
-    speed: float
-
-
-class Sample(NamedTuple):
-    """All of the state."""
-
-    deflection: Annotated[float, Quantity("sqrt(kg) m", "modal deflection")]
-    speed: Annotated[float, Quantity("sqrt(kg) m/s", "rate of the modal deflection")]
-
-
-def remember(params):
-    return State(params.deflection, 0.0)
-
-
-def spring(own, params):
-    return params.frequency * (2.0 * params.damping * own.speed + params.frequency * own.deflection)
-
-
-def inertia(own, params):
-    return tuple(scale(-x, params.coupling) for x in params.coupling)
-
-
-def reaction(own, command, body, params):
-    return add(scale(spring(own, params), params.coupling), cross(scale(-own.speed, body.rate), params.coupling))
-
-
-def rates(own, command, body, acceleration, params):
-    return State(own.speed, -dot(params.coupling, acceleration) - spring(own, params))
-
-
-def momentum(own, params):
-    return scale(own.speed, params.coupling)
-
-
-def record(own, command, body, params):
-    return Sample(own.deflection, own.speed)
-
-
-def examples():
-    return [Params((0.5, 0.2, 0.9), 2.0, 0.0, 0.03)]
-'''
+PAGE = (Path(__file__).parents[2] / "docs" / "part-authors.md").read_text(encoding="utf-8")
+FILES = dict(re.findall(r"`(\w+\.(?:py|toml))`:\n\n```\w+\n(.*?)```", PAGE, flags=re.DOTALL))
+"""The files that the page for authors of parts shows."""
+EFFECTOR, ACTUATOR = FILES["flexible_panel.py"], FILES["dead_zone.py"]
 ENVIRONMENT = f'''{HEAD}ROLE = "environment"
 
 
@@ -152,24 +102,6 @@ def goal(params, state, step, before):
 def examples():
     return [Params()]
 '''
-ACTUATOR = f'''{HEAD}from starhold.algebra.scalar import absolute, less, where
-
-ROLE = "actuator"
-
-
-class Params(NamedTuple):
-    """Where nothing happens."""
-
-    dead: Annotated[float, Parameter("N m", at_least=0.0, text="commands below it are left out, on each axis")]
-
-
-def command(command, params):
-    return tuple(where(less(absolute(x), params.dead), 0.0, x) for x in command)
-
-
-def examples():
-    return [Params(1e-3)]
-'''
 LAW = '''"""A law that does nothing or little."""
 
 from typing import Annotated, NamedTuple
@@ -193,12 +125,12 @@ def examples():
     return [Gains(0.09, 0.009)]
 '''
 PARTS = {
-    "effector": (EFFECTOR, "coupling = [0.5, 0.2, 0.9]\nfrequency = 2.0\ndeflection = 0.03\n"),
+    "effector": (EFFECTOR, "coupling = [0.5, 0.2, 0.9]\nfrequency = 2.0\n"),
     "environment": (ENVIRONMENT, 'drag = "1 mN m s"\n'),
     "sensor": (SENSOR, 'noise = "1e-4 rad/s"\nbias = 1e-4\n'),
     "estimator": (ESTIMATOR, "share = 0.5\n"),
     "target": (TARGET, ""),
-    "actuator": (ACTUATOR, 'dead = "30 mN m"\n'),
+    "actuator": (ACTUATOR, 'width = "30 mN m"\n'),
 }
 """For each role but the law's a part's text and its keys in a scenario."""
 BODY = """

@@ -198,13 +198,13 @@ BROKEN = {
     "no pair": ("sensor", ", memory\n", "\n", "a pair of a Reading and the memory"),
     "another effector's rates": ("effector", "return State(own.speed, ", "return (", "numbers formed as"),
     "a goal of three": ("target", "Goal(params.attitude, ZERO, ZERO)", "(params.attitude, ZERO, ZERO)", "a Goal of four"),
-    "an undeclared record": ("effector", 'Annotated[float, Quantity("sqrt(kg) m", "modal deflection")]', "float",
+    "an undeclared record": ("effector", 'Annotated[Scalar, Quantity("kg^0.5 m", "deflection of the panel\'s mode")]', "int",
                              "annotated with a Quantity"),
     "a reading that is none of the state": ("sensor", "    rate: Annotated", "    spin: Annotated",
                              'FIRST = {"spin": 0.0}'),
     "an equation ends the program": ("sensor", "    return Reading(", "    raise SystemExit\n    return Reading(",
                              "mine.py, line 27: SystemExit"),
-    "its start fails": ("effector", "State(params.deflection,", "State(params.deflexion,", "mine.py, line 37: Attr"),
+    "its start fails": ("effector", "State(0.0, 0.0)", "State(0.0, nought)", "mine.py, line 36: NameError"),
 }  # fmt: skip
 
 
@@ -219,10 +219,10 @@ def test_a_file_that_is_no_part_or_fails(kind, tmp_path):
 
 
 def test_a_branch_that_kernels_cannot_take(tmp_path):
-    line = "return tuple(where(less(absolute(x), params.dead), 0.0, x) for x in command)"
+    line = "return tuple(where(less(absolute(u), params.width), 0.0, u) for u in command)"
     assert line in ACTUATOR
     (tmp_path / "mine.py").write_text(ACTUATOR.replace(line, "return command if command[0] > 0.1 else (0.0, 0.0, 0.0)"))
-    (tmp_path / "own.toml").write_text(BODY + part(MINE + "dead = 1e-3\n") + PD)
+    (tmp_path / "own.toml").write_text(BODY + part(MINE + "width = 1e-3\n") + PD)
     complains(starhold("run", "own.toml", cwd=tmp_path), "mine.py")
 
 

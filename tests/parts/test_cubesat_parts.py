@@ -5,23 +5,9 @@ import math
 import numpy as np
 
 import starhold as sh
+from tests.missions import cubesat
 
-CRAFT = """
-name = "cubesat"
-[spacecraft]
-inertia = [0.05, 0.065, 0.025]
-torque_limit = "1 mN m"
-[orbit]
-altitude = "500 km"
-inclination = "97.4 deg"
-raan = "20 deg"
-epoch = [2026, 3, 20, 12, 0, 0]
-[initial]
-angles = ["40 deg", 0, "10 deg"]
-rate = ["1 deg/s", "-0.5 deg/s", "0.3 deg/s"]
-[simulation]
-duration = "10 min"
-control_period = 0.5
+PARTS = """
 [[law]]
 type = "pd"
 k_rate = 0.004
@@ -52,6 +38,7 @@ type = "gnss"
 position = "10 m"
 velocity = "0.1 m/s"
 """
+START = {"duration": 600, "angles": '["40 deg", 0, "10 deg"]', "rate": (0.0175, -0.0087, 0.0052)}
 FINE = """
 [[part]]
 type = "star-tracker"
@@ -80,7 +67,7 @@ ALIKE = {
 
 def flown(tmp_path, estimator):
     (tmp_path / "plates.csv").write_text(PLATES)
-    (tmp_path / "cubesat.toml").write_text(CRAFT + estimator)
+    (tmp_path / "cubesat.toml").write_text(cubesat(PARTS, estimator, **START))
     return sh.simulate(tmp_path / "cubesat.toml")
 
 

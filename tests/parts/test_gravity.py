@@ -21,6 +21,7 @@ from starhold.simulation.lane import fly
 from tests.algebra.readers import close, components, quaternions, reduced_by_unit_norm, symbols, vanishes
 from tests.equations import two_body, two_body_gravity_gradient
 from tests.making import built
+from tests.missions import cubesat
 
 MU = 3.986e14
 DIAGONAL = make_craft([2.0, 3.0, 4.0])
@@ -109,31 +110,17 @@ def flattened():
     return MASS / r * J2 * (SIZE / r) ** 2 * sympy.legendre(2, PLACE[2] / r)
 
 
+PARTS = '[[part]]\ntype = "oblateness"\n[[law]]\ntype = "pd"\nk_rate = 0.004\nk_attitude = 0.0008\n'
+
+
 def orbited(inclination, period, duration):
     """The end of a flight from a circular orbit at 500 km, and its start."""
     place, velocity = from_elements(Elements(RADIUS + 5e5, 0.0, inclination, 0.3, 0.0, 0.0), GRAVITY)
-    text = f"""
-name = "flattened"
-[spacecraft]
-inertia = [0.05, 0.065, 0.025]
-[initial]
-angles = [0, 0, 0]
-[orbit]
-position = {list(place)}
-velocity = {list(velocity)}
-gravitational_parameter = {GRAVITY}
-[simulation]
-duration = {duration}
-control_period = {period}
-[[part]]
-type = "oblateness"
-[[law]]
-type = "pd"
-k_rate = 0.004
-k_attitude = 0.0008
-"""
+    orbit = f"position = {list(place)}\nvelocity = {list(velocity)}\ngravitational_parameter = {GRAVITY}\n"
+    text = cubesat(PARTS, duration=duration, period=period, rate=(0, 0, 0))
+    text = text[: text.index("position")] + orbit + text[text.index("epoch") :]
     steps = round(duration / period)
-    return fly(built(parse(text, "flattened")), steps, steps)[1].state, (*place, *velocity)
+    return fly(built(parse(text, "own")), steps, steps)[1].state, (*place, *velocity)
 
 
 def test_flattening_is_the_slope_of_the_potential():

@@ -13,25 +13,10 @@ from starhold.parts.effectors.layouts import pyramid
 from starhold.parts.effectors.magnetorquers import dipole_for, within
 from starhold.scenario.reading import parse
 from tests.making import spun
+from tests.missions import cubesat
 from tests.parts.fields import reference
 
 INERTIA = np.array([0.05, 0.065, 0.025])
-CRAFT = """
-name = "own"
-[spacecraft]
-inertia = [0.05, 0.065, 0.025]
-torque_limit = "2 mN m"
-[orbit]
-position = ["6878 km", 0, 0]
-velocity = [0, "-1.017 km/s", "7.544 km/s"]
-epoch = "2026-03-05T06:30:00Z"
-[initial]
-angles = ["20 deg", "-10 deg", "30 deg"]
-rate = [0.02, -0.03, 0.025]
-[simulation]
-duration = 400
-control_period = 0.5
-"""
 WHEELS = """
 [wheels]
 layout = "pyramid"
@@ -48,7 +33,7 @@ PD = '[[law]]\ntype = "pd"\nk_rate = 4e-4\nk_attitude = 2e-6\n'
 
 
 def test_the_torque_is_that_of_the_dipole_in_the_field_that_an_independent_implementation_has():
-    run = sh.simulate(parse(CRAFT + METER + RODS + PD, "own"))
+    run = sh.simulate(parse(cubesat(METER, RODS, PD, duration=400), "own"))
     days = sum(erfa.cal2jd(2026, 3, 5)) - 2400000.5 + 6.5 / 24.0
     places, turns = run.position.values, Rotation.from_quat(run.attitude.values, scalar_first=True)
     spins = Rotation.from_rotvec([[0.0, 0.0, erfa.gmst82(2400000.5, days + t / 86400.0)] for t in run.time.values])
@@ -61,7 +46,7 @@ def test_the_torque_is_that_of_the_dipole_in_the_field_that_an_independent_imple
 
 
 def test_the_body_turns_as_scipy_says_under_the_recorded_dipoles():
-    run = sh.simulate(parse(CRAFT + METER + RODS + PD, "own"))
+    run = sh.simulate(parse(cubesat(METER, RODS, PD, duration=400), "own"))
     torques, rate, attitude = run.torque.values, run.rate.values, run.attitude.values
     turns = Rotation.from_quat(attitude, scalar_first=True)
     for k in (0, 100, 333, 700):
@@ -100,9 +85,8 @@ LAW = '[[law]]\ntype = "lyapunov"\nk_rate = 0.01\nk_attitude = 0.002\n'
 
 @pytest.mark.slow
 def test_wheels_are_unloaded_by_what_comes_from_outside():
-    text = CRAFT.replace("duration = 400", "duration = 6000")
-    plain = sh.simulate(parse(text + WHEELS + LAW, "own"))
-    run = sh.simulate(parse(text + WHEELS + METER + UNLOADING + "gain = 2e-3\n" + LAW, "own"))
+    plain = sh.simulate(parse(cubesat(WHEELS, LAW, duration=6000), "own"))
+    run = sh.simulate(parse(cubesat(WHEELS, METER, UNLOADING, "gain = 2e-3\n", LAW, duration=6000), "own"))
     before, after = (np.linalg.norm(one.wheel_momentum.values[-1] @ AXES) for one in (plain, run))
     assert after < 0.05 * before
     # The law holds the attitude meanwhile.
@@ -118,6 +102,6 @@ def test_wheels_are_unloaded_by_what_comes_from_outside():
 
 
 def test_the_unloading_of_a_wheel_keeps_what_it_is_told_to():
-    text = CRAFT.replace("duration = 400", "duration = 6000") + WHEELS + METER + UNLOADING
-    run = sh.simulate(parse(text + "gain = 2e-3\nmomentum = [0, 3e-3, 0]\n" + LAW, "own"))
+    unloading = UNLOADING + "gain = 2e-3\nmomentum = [0, 3e-3, 0]\n"
+    run = sh.simulate(parse(cubesat(WHEELS, METER, unloading, LAW, duration=6000), "own"))
     assert run.wheel_momentum.values[-1] @ AXES == pytest.approx([0.0, 3e-3, 0.0], abs=4e-4)

@@ -22,6 +22,7 @@ from starhold.parts.targets import history, orbital
 from starhold.parts.targets.history import tabulate
 from starhold.scenario.reading import parse
 from tests.algebra.readers import angles, close, directions, from_axis_angle, quaternions
+from tests.missions import cubesat
 from tests.parts.files import part
 
 erfa = pytest.importorskip("erfa", reason="the routines of the IAU come with the test extra")
@@ -272,24 +273,7 @@ def test_the_third_axis_points_at_the_sun():
         assert abs(turn.apply([0.0, 1.0, 0.0]) @ [0.0, 0.0, 1.0]) < 1e-12
 
 
-ORBITING = """
-name = "own"
-[spacecraft]
-inertia = [0.05, 0.065, 0.025]
-torque_limit = "2 mN m"
-[orbit]
-position = ["6878 km", 0, 0]
-velocity = [0, "-1.017 km/s", "7.544 km/s"]
-[initial]
-relative_to = "target"
-[simulation]
-duration = 300
-control_period = 0.5
-[[law]]
-type = "lyapunov"
-k_rate = 0.02
-k_attitude = 0.004
-"""
+LAW = '[[law]]\ntype = "lyapunov"\nk_rate = 0.02\nk_attitude = 0.004\n'
 
 
 @pytest.mark.parametrize(
@@ -301,8 +285,10 @@ k_attitude = 0.004
     ],
 )
 def test_a_law_holds_the_target_from_a_scenario(keys):
-    run = sh.simulate(parse(ORBITING + part(keys), "own"))
+    start = {"angles": '[0, 0, 0]\nrelative_to = "target"', "rate": (0, 0, 0)}
+    text = cubesat(LAW, part(keys), **start)
+    run = sh.simulate(parse(text, "own"))
     assert 2.0 * np.linalg.norm(run.attitude_error.values[:, 1:], axis=1).max() < 2e-4
-    (certificate,) = sh.certify(parse(ORBITING + part(keys), "own"))
+    (certificate,) = sh.certify(parse(text, "own"))
     name = keys.split('"')[1]
     assert all(f"without the target {name}" in claim.assumptions for claim in certificate.claims)
