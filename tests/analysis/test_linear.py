@@ -226,11 +226,10 @@ def examples():
 """
 
 
-def remembering(tmp_path, factor, after, first="0.0", damping=0.02):
-    path = tmp_path / "law.py"
-    path.write_text(LAW.format(factor=factor, after=after, first=first))
-    law = from_file(path)
-    return replace(loop_of("cubesat-slew", "pd"), law=law, gains=law.gains(damping))
+def remembering(tmp_path, factor, after, first="0.0"):
+    (tmp_path / "law.py").write_text(LAW.format(factor=factor, after=after, first=first))
+    law = from_file(tmp_path / "law.py")
+    return replace(loop_of("cubesat-slew", "pd"), law=law, gains=law.gains(0.02))
 
 
 @pytest.mark.parametrize(

@@ -118,7 +118,7 @@ PLATE = 'type = "solar-pressure"\nplates = [[{}, 0, 0, 0.05, 0, 0.02, {}]]\n'
 IMPOSSIBLE = [
     (THRUSTERS + "off = 0.1\n", "off must be at most on"),
     (THRUSTERS + "minimum = 0.2\n", "the shortest pulse must be at most the control period of 0.1 s, not 0.2 s"),
-    (THRUSTERS + part('type = "lag"\nlag = 0.5\n'), "none before thrusters, which takes the command at control instants"),
+    (THRUSTERS + part('type = "lag"\nlag = 0.5\n'), "thrusters, which takes the command at control instants alone"),
     (panel({0: 40.0}), "part hinged-panels: the panels together must have less than the craft's mass of 30 kg"),
     (panel({0: 0.0}), "panel 1 needs a mass above 0"),
     (panel({4: 0.0, 5: 0.0, 6: 0.0}), "the hinge of panel 1 has no direction"),

@@ -217,12 +217,7 @@ def test_a_lost_motion_is_told(folder: Path) -> None:
 
 
 FAULTS = {
-    "no such body": (
-        "pull.toml",
-        'file = "sledge.py"',
-        'type = "sled"',
-        'body.type: found "sled"; allowed: a file',
-    ),
+    "no such body": ("pull.toml", 'file = "sledge.py"', 'type = "sled"', 'found "sled"; allowed: a file, for no other'),
     "a body with a table": ("pull.toml", 'file = "sledge.py"', 'type = "rigid-body"', "allowed: the [spacecraft] table"),
     "no file": ("pull.toml", '"sledge.py"', '"sled.py"', 'body.file: found "sled.py": No such file or directory'),
     "another role": ("pull.toml", '"sledge.py"', '"rein.py"', 'body.file: "rein.py": '),
