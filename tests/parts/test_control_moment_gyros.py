@@ -18,6 +18,7 @@ from starhold.parts.catalogue import find
 from starhold.parts.effectors import control_moment_gyros as gyros
 from starhold.parts.part import Fitted, Part
 from tests.making import HUB, flown, hub
+from tests.oracles.basilisk import need, simulation
 
 ANGLES, RATE = (0.9, -0.4, 0.5), (0.05, -0.08, 0.06)
 AROUND = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
@@ -112,10 +113,9 @@ def test_what_motors_do_is_what_the_energy_grows_by(monkeypatch):
 
 
 def test_gimbals_rotors_and_body_move_as_in_basilisk(monkeypatch):
-    pytest.importorskip("Basilisk", reason="Basilisk comes with the test extra where it has a wheel")
+    need()
     from Basilisk.architecture import messaging
     from Basilisk.simulation import spacecraft, vscmgStateEffector
-    from Basilisk.utilities import SimulationBaseClass, macros
 
     shares = ((4e-3, -2e-3, 1e-3), (-3e-3, 4e-3, 2e-3), (1e-3, 2e-3, -5e-3), (2e-3, 3e-3, 3e-3))
 
@@ -125,8 +125,7 @@ def test_gimbals_rotors_and_body_move_as_in_basilisk(monkeypatch):
     # Gimbals that nothing steers move chaotically: of longer flights rounding decides.
     steps, substeps = 60, 20
     run = flown(made(UNEQUAL, prescribed(monkeypatch, shared), substeps=substeps), steps)
-    simulation, craft = SimulationBaseClass.SimBaseClass(), spacecraft.Spacecraft()
-    simulation.CreateNewProcess("p").addTask(simulation.CreateNewTask("t", macros.sec2nano(0.1 / substeps)))
+    craft = spacecraft.Spacecraft()
     craft.hub.mHub, craft.hub.r_BcB_B = 100.0, [[0.0]] * 3
     craft.hub.IHubPntBc_B = (HUB - sum(moving(row, 0.0)[0] for row in UNEQUAL)).tolist()
     x, y, z = Rotation.from_quat(run["attitude"][0], scalar_first=True).as_mrp()
@@ -147,15 +146,12 @@ def test_gimbals_rotors_and_body_move_as_in_basilisk(monkeypatch):
     asked = messaging.VSCMGArrayTorqueMsg()
     effector.cmdsInMsg.subscribeTo(asked)
     logs = craft.scStateOutMsg.recorder(), effector.speedOutMsg.recorder()
-    for model in (effector, craft, *logs):
-        simulation.AddModelToTask("t", model)
-    simulation.InitializeSimulation()
+    _running, run_to = simulation(0.1 / substeps, effector, craft, *logs)
     for k in range(steps):
         torques = messaging.VSCMGArrayTorqueMsgPayload()
         torques.gimbalTorque, torques.wheelTorque = run["gimbal_torque"][k].tolist(), run["rotor_torque"][k].tolist()
         asked.write(torques)
-        simulation.ConfigureStopTime(macros.sec2nano(0.1 * (k + 1)))
-        simulation.ExecuteSimulation()
+        run_to(0.1 * (k + 1))
     assert np.abs(run["rate"] - logs[0].omega_BN_B[::substeps]).max() < 1e-11
     # Its message of the gimbals is written before a step is taken.
     theirs = [array[1::substeps, :4] for array in (logs[1].gimbalAngles, logs[1].gimbalRates, logs[1].wheelSpeeds)]

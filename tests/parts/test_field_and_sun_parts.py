@@ -18,8 +18,7 @@ from starhold.parts.estimators import triad
 from starhold.parts.random import Dice
 from starhold.parts.sensors import gnss, magnetometer, star_tracker, sun_sensor
 from starhold.parts.sun import EARTH
-from tests.parts.fields import reference
-from tests.parts.places import states
+from tests.parts.fields import reference, states
 
 PERIOD = 0.5
 EPOCH = (2026.0, 9.0, 3.0, 4.0, 5.0, 6.0)

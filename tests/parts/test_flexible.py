@@ -14,6 +14,7 @@ from starhold.algebra.cosines import from_angles
 from starhold.parts.catalogue import fit
 from starhold.scenario.reading import parse
 from tests.making import HUB, flown, hub
+from tests.oracles.basilisk import need, simulation
 from tests.parts.files import BODY, PD, part
 from tests.refusals import refused
 
@@ -156,14 +157,12 @@ def test_panels_keep_energy_and_momentum_for_minutes():
 
 
 def test_panels_swing_as_in_basilisk():
-    pytest.importorskip("Basilisk", reason="Basilisk comes with the test extra where it has a wheel")
+    need()
     from Basilisk.simulation import hingedRigidBodyStateEffector, spacecraft
-    from Basilisk.utilities import SimulationBaseClass, macros
 
     rows = panels(0.02)
     run = flown(free(fit("effector", "hinged-panels", MASS, rows)), 200)
-    simulation, craft = SimulationBaseClass.SimBaseClass(), spacecraft.Spacecraft()
-    simulation.CreateNewProcess("p").addTask(simulation.CreateNewTask("t", macros.sec2nano(0.005)))
+    craft = spacecraft.Spacecraft()
     (mass, inertia, centre), others = bodies(rows)
     craft.hub.mHub, craft.hub.IHubPntBc_B, craft.hub.r_BcB_B = mass, inertia.tolist(), [[x] for x in centre]
     craft.hub.omega_BN_BInit = [[x] for x in RATE]
@@ -180,11 +179,8 @@ def test_panels_swing_as_in_basilisk():
         craft.addStateEffector(panel)
         made.append(panel)
     logs = [craft.scStateOutMsg.recorder(), *(panel.hingedRigidBodyOutMsg.recorder() for panel in made)]
-    for model in (craft, *made, *logs):
-        simulation.AddModelToTask("t", model)
-    simulation.InitializeSimulation()
-    simulation.ConfigureStopTime(macros.sec2nano(20.0))
-    simulation.ExecuteSimulation()
+    _running, run_to = simulation(0.005, craft, *made, *logs)
+    run_to(20.0)
     assert np.abs(run["rate"] - logs[0].omega_BN_B[::20]).max() < 1e-9
     assert np.abs(run["panel_angle"] - np.array([log.theta[::20] for log in logs[1:]]).T).max() < 1e-9
 

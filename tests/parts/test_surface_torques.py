@@ -1,14 +1,14 @@
 """Drag, sunlight, and its shadow against Basilisk, an independent simulator in C++, and against sums by hand."""
 
 import numpy as np
-import pytest
 
 from starhold.conformance.bench import CRAFT
 from starhold.parts import sun
 from starhold.parts.environments import drag, solar_pressure
 from starhold.parts.plates import BOX
 from starhold.parts.sun import EARTH
-from tests.parts.places import states
+from tests.oracles.basilisk import need, simulation
+from tests.parts.fields import states
 
 PERIOD = 0.5
 EPOCH = (2026.0, 10.0, 9.0, 8.0, 7.0, 6.0)
@@ -27,25 +27,20 @@ def torque(part, params, state, step=0):
 def in_basilisk(effector, state):
     """The torque (N m, body axes) that an effector of Basilisk gives a spacecraft at a state."""
     from Basilisk.simulation import spacecraft
-    from Basilisk.utilities import RigidBodyKinematics, SimulationBaseClass, macros
+    from Basilisk.utilities import RigidBodyKinematics
 
-    simulation = SimulationBaseClass.SimBaseClass()
-    simulation.CreateNewProcess("p").addTask(simulation.CreateNewTask("t", macros.sec2nano(1e-6)))
     craft = spacecraft.Spacecraft()
     craft.hub.mHub, craft.hub.IHubPntBc_B = 12.0, np.diag([2.0, 3.0, 4.0]).tolist()
     craft.hub.sigma_BNInit = RigidBodyKinematics.EP2MRP(np.array(state.attitude)).tolist()
     craft.hub.r_CN_NInit, craft.hub.v_CN_NInit = list(state.position), list(state.velocity)
     craft.addDynamicEffector(effector)
-    for model in (craft, effector):
-        simulation.AddModelToTask("t", model)
-    simulation.InitializeSimulation()
-    simulation.ConfigureStopTime(macros.sec2nano(2e-6))
-    simulation.ExecuteSimulation()
+    _running, run_to = simulation(1e-6, craft, effector)
+    run_to(2e-6)
     return np.array(effector.torqueExternalPntB_B).ravel()
 
 
 def test_drag_against_basilisk():
-    pytest.importorskip("Basilisk")
+    need()
     from Basilisk.architecture import messaging
     from Basilisk.simulation import facetDragDynamicEffector
 
@@ -68,7 +63,7 @@ def test_drag_against_basilisk():
 
 
 def test_sunlight_against_basilisk():
-    pytest.importorskip("Basilisk")
+    need()
     from Basilisk.architecture import messaging
     from Basilisk.simulation import facetSRPDynamicEffector
 
@@ -98,7 +93,7 @@ def test_sunlight_against_basilisk():
 
 
 def test_shadow_against_basilisk():
-    pytest.importorskip("Basilisk")
+    need()
     from Basilisk.architecture import messaging
     from Basilisk.simulation import eclipse
 

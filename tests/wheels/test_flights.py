@@ -180,7 +180,7 @@ def test_wheels_and_faults_that_cannot_be(text, said):
 
 
 def test_a_law_that_cannot_be_retuned_is_told_what_to_do():
-    with refused("law lyapunov", "or fault_action = 'reallocate' in its [[law]] table"):
+    with refused("law lyapunov", 'or fault_action = "reallocate" in its [[law]] table'):
         flight(fault(LOST, BUILTIN + UNTUNED), law=2, steps=1)
 
 
