@@ -35,6 +35,12 @@ def steps_of(name: str) -> int:
     return COSTLY if is_costly(name) else STEPS if LOOPS[name].events else fewer(STEPS, 15)
 
 
+SCENARIOS = {name.partition(":")[0]: name for name in reversed(LOOPS)}
+FIRST = set(SCENARIOS.values()) | {"three-laws-noise: mpc"}
+SIBLINGS = {name for name in LOOPS if name not in FIRST or name.endswith("example 0, noise") or name.startswith("mpc")}
+"""Of the same parts or the same law as another loop: printed by `make test-all`, which flies those that are costly."""
+
+
 class Leg(NamedTuple):
     """A phase of a flight in plain Python: what is carried into it, the sample of its last step, what is carried on."""
 
@@ -68,12 +74,16 @@ def same(found: Any, expected: Any) -> None:
     assert np.array_equal(np.asarray(found).view(np.uint64), np.asarray(expected).view(np.uint64))
 
 
-@pytest.mark.parametrize("name", LOOPS)
+FLOWN = [pytest.param(name, marks=SLOW if is_costly(name) and name in SIBLINGS else ()) for name in LOOPS]
+
+
+@pytest.mark.parametrize("name", FLOWN)
 def test_one_lane(name):
     same(numbers_of(fly(LOOPS[name], steps_of(name), run=RUN)[1]), numbers_of(legs(name)[-1].end))
 
 
-LANES = [*((name, 8) for name in LOOPS), *leading([(name, 16) for name in LOOPS if not is_costly(name)], 2)]
+EIGHT = [pytest.param(*flown.values, 8, marks=flown.marks) for flown in FLOWN]
+LANES = [*EIGHT, *leading([(name, 16) for name in LOOPS if not is_costly(name)], 2)]
 """Every loop on eight lanes; on sixteen two, and by `make test-all` all."""
 
 
@@ -88,12 +98,6 @@ def test_every_lane_of_many(name, width):
     batch = simulate_many(loop, starts, steps_of(name), first_run=RUN - width + 1, width=width)
     same(batch.states[:, -1], numbers_of(legs(name)[-1].end)[: len(batch.states)])
     assert len(np.unique(batch.states[differs.start])) == width
-
-
-SCENARIOS = {name.partition(":")[0]: name for name in reversed(LOOPS)}
-FIRST = set(SCENARIOS.values()) | {"three-laws-noise: mpc"}
-SIBLINGS = {name for name in LOOPS if name not in FIRST or name.endswith("example 0, noise") or name.startswith("mpc")}
-"""Of the same parts or the same law as another loop: printed by `make test-all`. All are flown on lanes."""
 
 
 @cache
