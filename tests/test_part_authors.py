@@ -8,10 +8,6 @@ import pytest
 
 import starhold as sh
 from starhold.conformance.parts import examine_part, find_part
-from starhold.parts import roles
-from starhold.parts.catalogue import DEMANDED, EITHER, PACKAGES, parts
-from starhold.parts.contract import Card, Parameter
-from starhold.parts.random import RANGE, Dice
 from tests.parts.files import FILES, PAGE
 
 ROOT = Path(__file__).parents[1]

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from starhold.algebra.polynomial import Polynomial, constants, pieces
+from starhold.parts.craft import bare_inertia
 from starhold.parts.effectors.layouts import nasa_standard, pyramid, three_orthogonal
 from starhold.parts.effectors.wheel_units import WHEEL_UNITS
 from starhold.parts.effectors.wheels import (
@@ -18,7 +19,7 @@ from starhold.parts.effectors.wheels import (
     CREEP,
     allocate,
     allocate_peak,
-    body_inertia,
+    axial_inertia,
     lose,
     make_wheels,
     motor,
@@ -203,7 +204,7 @@ def flight(steps, limit=5e-324, **more):
 
 def test_friction_alone_takes_energy():
     wheels, run = flight(20000, viscous=1e-6, coulomb=1e-4)
-    body = np.array(body_inertia(HUB, wheels))
+    body = bare_inertia(HUB, axial_inertia(wheels))
     energy = 0.5 * np.einsum("ti,ij,tj->t", run["rate"], body, run["rate"])
     energy += 0.5 * (run["wheel_momentum"] ** 2).sum(axis=1) / 0.002
     assert (np.diff(energy) <= 1e-13 * energy[0]).all()
@@ -223,7 +224,7 @@ def test_rotors_at_rest_in_the_body_are_part_of_it():
     wheels = simple(pyramid(), inertia=0.2, viscous=1e3)
     rate = (0.3, -0.2, 0.5)
     momentum = tuple(0.2 * float(np.dot(a, rate)) for a in wheels.axes)
-    whole = np.array(body_inertia(HUB, wheels)) @ rate + np.array(wheel_momentum(momentum, wheels))
+    whole = bare_inertia(HUB, axial_inertia(wheels)) @ rate + np.array(wheel_momentum(momentum, wheels))
     np.testing.assert_allclose(whole, HUB @ rate, rtol=1e-14)
 
 

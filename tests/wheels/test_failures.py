@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import linprog
 
 from starhold.analysis.rigid_body import measure
-from starhold.cli.study import print_result
+from starhold.cli.show import print_blocks
 from starhold.parts.effectors.layouts import pyramid
 from starhold.parts.effectors.wheels import lose, make_wheels
 from starhold.report.commands.failures import present
@@ -228,7 +228,7 @@ def intact_and_struck(law, folder, capsys):
     short = replace(scenario, table=scenario.table.model_copy(update={"simulation": table}))
     found = [_flown(short, entry, _left(wheels_of(short), lost, 0.02)) for lost in ((), (1,))]
     result = present(short, entry, found)
-    print_result(result)
+    print_blocks(result.blocks)
     write_table(result.numbers, folder / "table.csv")
     assert save(result.figure(), folder / "picture.png").is_file()
     rows = csv.DictReader((folder / "table.csv").read_text(encoding="utf-8").splitlines())
