@@ -6,31 +6,34 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from math import asin, cos, inf, isfinite, pi, sqrt
+from math import acos, asin, inf, isfinite, sqrt
 from typing import Any
 
 import numpy as np
 
 from starhold.algebra.quaternion import derivative
-from starhold.certification.evidence.finding import NotFoundError, complete, obligations
-from starhold.certification.evidence.squares import cofactors, largest_number, posed, settled
+from starhold.certification.evidence.finding import NotFoundError, complete, obligations, read
+from starhold.certification.evidence.squares import cofactors, largest_number, posed, rounded
 from starhold.certification.subject import Subject, above, make_subject
-from starhold.kernel.loops import MOVING, OUTSIDE, WHEELS
+from starhold.kernel.loops import MOVING, OUTSIDE, WHEELS, AttitudeLoop
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly
 from starhold.kernel.programs import digest
-from starhold.kernel.rules import Squares
+from starhold.kernel.rules import Contracts, Definite, Squares
 from starhold.kernel.theorems.attitude import HYSTERESIS, SHORTEST
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies import rigid_body
 from starhold.parts.craft import tensor
+from starhold.parts.effectors.wheels import BAND
 from starhold.trace.straight_line import labelled, straight_line
 
 V3, Q4 = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
 FULL = (V3, V3, V3)
 ASKED = Measurement(Q4, V3, V3, V3, V3, V3, V3, 0.0, V3, V3)
 """A measurement of which every number is an input."""
+CONVERGES, EVENLY = "converges", "converges from both quaternions"
+SAMPLED, SLIDING = "stays stable between samples", "reaches its surface"
 GIVEN_AWAY = Fraction(1, 10**6)
 """The share of a largest level that is given away, for at the largest the matrices are singular."""
 
@@ -57,7 +60,9 @@ class Loop:
         memory = law.remember(loop.gains, loop.known, loop.period)
         plant = loop.craft._replace(inertia=FULL, inverse_inertia=FULL)
         return {
-            "law": self.add(lambda m, g, c: law.command(m, g, c, memory)[0], measurement=ASKED, gains=loop.gains, craft=loop.known),
+            "law": self.add(
+                lambda m, g, c: law.command(m, g, c, memory)[0], measurement=ASKED, gains=loop.gains, craft=loop.known
+            ),
             "body": self.add(rigid_body.angular_acceleration, rate=V3, torque=V3, craft=plant),
             "turning": self.add(derivative, q=Q4, rate=V3),
         }
@@ -104,8 +109,15 @@ class Loop:
     def claim(self, theorem: str, taken: list[str], V: str | None, **numbers: Any) -> dict[str, Any]:
         """Return a claim without evidence."""
         roles = self.roles | ({} if V is None else {"lyapunov": V})
-        exact = {name.replace("__", "."): str(Fraction(x)) for name, x in numbers.items()}
-        return {"theorem": theorem, "taken": taken, "programs": roles, "subject": self.subject, "numbers": exact, "evidence": {}}
+        exact = {name: str(Fraction(x)) for name, x in numbers.items()}
+        return {
+            "theorem": theorem,
+            "taken": taken,
+            "programs": roles,
+            "subject": self.subject,
+            "numbers": exact,
+            "evidence": {},
+        }
 
     @property
     def by_digest(self) -> dict[str, Any]:
@@ -113,31 +125,26 @@ class Loop:
         return {digest(program): program for program in self.programs}
 
     def scales(self, V: str | None, level: float | None = None) -> dict[str, float]:
-        """Return about how large variables become."""
-        known, J = self.known, tensor(self.loop.craft.inertia)
-        found = {"q1": 1.0}
-        energy = level or self.potential(V)
-        mass = self.kinetic(V)
-        found |= {f"w{k}": sqrt(2.0 * energy / mass[k - 1]) for k in (1, 2, 3)}
+        """Return about how large variables become on {V <= level}."""
+        known, J, top = self.known, tensor(self.loop.craft.inertia), self.potential(V)
+        energy = min(level or top, top)
+        found = {f"q{k}": sqrt(energy / top) for k in (1, 2, 3)}
+        found |= {f"w{k}": sqrt(2.0 * energy / self.kinetic(V)[k - 1]) for k in (1, 2, 3)}
         found |= {f"r{k}": float(known.target_rate) or 1.0 for k in (1, 2, 3)}
         found |= {f"a{k}": float(known.target_acceleration) or 1.0 for k in (1, 2, 3)}
-        found |= {f"h{k}": float(known.total_momentum) or float(J.max()) * found["w1"] for k in (1, 2, 3)}
-        return found
+        return found | {f"h{k}": float(known.total_momentum) or float(J.max()) * found["w1"] for k in (1, 2, 3)}
 
     def form(self, V: str | None) -> Poly:
         """Return V as a polynomial."""
         if V is None:
             return Poly({})
-        from starhold.certification.evidence.finding import read
-        from starhold.kernel.loops import AttitudeLoop
-
         return AttitudeLoop(read(self.claim("converges", [], V), self.by_digest)).lyapunov
 
     def potential(self, V: str | None) -> float:
         """Return the largest of V at rest."""
         p = self.form(V).at({"w1": 0, "w2": 0, "w3": 0})
         values = [float(p.at(dict(zip(("q0", "q1", "q2", "q3"), q, strict=True))).number) for q in TURNS]
-        return max([abs(v) for v in values] + [1e-300]) if V is not None else 1.0
+        return max(*map(abs, values), 1e-300) if V is not None else 1.0
 
     def kinetic(self, V: str | None) -> list[float]:
         """Return twice the coefficients of the squares of the rates in V."""
@@ -152,6 +159,192 @@ class Loop:
             self.failed[claim["theorem"]] = str(reason)
             return False
         return True
+
+    def show_all(self) -> None:
+        """Find the claims that can be proved: where motions end, for every inertia, within limits, between samples."""
+        if self.loop.remembers:
+            return
+        if self.loop.law.lyapunov is not None:
+            self.show_end()
+        if hasattr(self.loop.law.module, "surface"):
+            self.show_sliding()
+        self.show_sampled()
+
+    def show_end(self) -> None:
+        """Find where motions end, by the law's own V or by the kinetic energy in its place."""
+        V, signs = self.lyapunov(), sign_words(self.loop)
+        widths = {"hysteresis": self.loop.hysteresis_width} if HYSTERESIS in signs else {}
+        ways = [
+            (theorem, words)
+            for theorem in (CONVERGES, EVENLY)
+            for words in (self.words, [w for w in self.words if w != OUTSIDE])
+        ]
+        for theorem, words in ways:
+            own = signs if theorem == CONVERGES else []
+            if SHORTEST in own:
+                shown = self.show_limits(theorem, [*words, *own], V, widths)
+            else:
+                claim = self.claim(theorem, [*words, *own], V, **(widths if own else {}))
+                shown = self.try_to_show(claim, self.scales(V)) and (
+                    self.show_limits(theorem, [*words, *own], V, widths if own else {}) or True
+                )
+            if shown:
+                wheels, every = [w for w in words if w == WHEELS], f"{theorem} whatever the inertia"
+                if SHORTEST not in own:
+                    self.try_to_show(self.claim(every, [*wheels, *own], V, **(widths if own else {})), self.scales(V))
+                return
+
+    def show_limits(self, theorem: str, words: list[str], V: str, more: dict[str, Any]) -> bool:
+        """Find the largest level on which everything is within its limits."""
+        loop, known, wheels = self.loop, self.known, self.loop.wheels
+        numbers: dict[str, Any] = dict(more)
+        if OUTSIDE in words:
+            numbers |= {f"outside.{k}": above(x) for k, x in enumerate(known.modelled)}
+        if MOVING in words:
+            numbers |= {"target.rate": above(known.target_rate), "target.acceleration": above(known.target_acceleration)}
+        if WHEELS in words:
+            numbers["momentum"] = float(known.total_momentum)
+        limit = loop.craft.torque_limit if loop.limit != "none" else inf
+        if wheels is not None and wheels.allocation == 0 and isfinite(max(*wheels.torque_limit, *wheels.momentum_limit)):
+            for k, (torque, momentum) in enumerate(zip(wheels.torque_limit, wheels.momentum_limit, strict=True)):
+                numbers |= {f"motors.{k}": torque, f"stored.{k}": momentum * (1.0 - BAND)}
+        elif isfinite(limit):
+            numbers["limit" if loop.limit == "axis" else "limit.norm"] = limit
+        elif SHORTEST not in words:
+            return False
+        else:
+            numbers = dict(more)
+        claim = self.claim(theorem, words, V, level=1, **numbers)
+        cap = self.cap(theorem, words, V)
+        level = self.largest_level(claim, V, cap)
+        if level is None:
+            self.failed[f"{theorem}, limits"] = "no level was found"
+            return False
+        form = self.form(V)
+        numbers |= self.contents(form, level)
+        return self.try_to_show(self.claim(theorem, words, V, level=level, **numbers), self.scales(V, float(level)))
+
+    def cap(self, theorem: str, words: list[str], V: str) -> float:
+        """Return a level below V where other rests are, or where the sign of the quaternion changes."""
+        p = self.form(V).at({"w1": 0, "w2": 0, "w3": 0})
+        values = [float(p.at(dict(zip(("q0", "q1", "q2", "q3"), q, strict=True))).number) for q in TURNS]
+        half = theorem == EVENLY or SHORTEST in words
+        return inf if HYSTERESIS in words else min(values[1:]) if half else values[0]
+
+    def largest_level(self, claim: dict[str, Any], V: str, cap: float) -> Fraction | None:
+        """Return the largest level that keeps all limits of a claim, and stays below the cap."""
+        try:
+            wanted, _ = obligations(claim, self.by_digest)
+        except RefusedError:
+            return None
+        limits = [
+            o
+            for name, o in wanted.items()
+            if isinstance(o, Squares) and name.startswith(("torque", "norm", "motor", "wheel"))
+        ]
+        level = cap
+        for _ in range(3):
+            scales = self.scales(V, level if isfinite(level) else None)
+            found = [highest(o, scales) for o in limits]
+            if any(x is None or x <= 0.0 for x in found):
+                return None
+            level = min(cap, *(x for x in found if x is not None)) if found else cap
+        return Fraction(level) * (1 - GIVEN_AWAY) if isfinite(level) else None
+
+    def contents(self, form: Poly, level: Fraction) -> dict[str, Any]:
+        """Return the largest turn from rest and the largest rate on target that a set of this level holds, a little less."""
+        P = np.array([[float(form.terms.get(m, 0)) * (1.0 if i == k else 0.5) for k in (1, 2, 3) for m in [(f"w{min(i, k)}", f"w{max(i, k)}")]]
+                      for i in (1, 2, 3)])  # fmt: skip
+        N = np.array(
+            [
+                [float(form.terms.get((f"q{min(i, k)}", f"q{max(i, k)}"), 0)) * (1.0 if i == k else 0.5) for k in (1, 2, 3)]
+                for i in (1, 2, 3)
+            ]
+        )
+        less, s = 1.0 - 1e-7, -float(form.terms.get(("q0",), 0))
+        if s > 0.0:
+            angle = 2.0 * acos(max(1.0 - float(level) / s, -0.98))
+        else:
+            angle = 2.0 * asin(min(sqrt(float(level) / float(np.linalg.eigvalsh(N)[-1])), 1.0))
+        rate = sqrt(float(level) / float(np.linalg.eigvalsh(P)[-1]))
+        return {"angle": angle * less, "rate": rate * less}
+
+    def show_sampled(self) -> None:
+        """Find the claim about the torque held between samples."""
+        h = Fraction(self.loop.period)
+        try:
+            wanted, _ = obligations(
+                self.claim(SAMPLED, [], None, period=h, radius=Fraction(1, 2), longest=2 * h), self.by_digest
+            )
+        except RefusedError as reason:
+            self.failed[SAMPLED] = str(reason)
+            return
+        step, K = wanted["step"], wanted["stiffness"]
+        J, C = wanted["inertia outweighs damping at once"], wanted["damping outweighs stiffness at once"]
+        assert isinstance(step, Contracts)
+        assert isinstance(J, Definite)
+        assert isinstance(C, Definite)
+        assert isinstance(K, Definite)
+        radius = float(np.abs(np.linalg.eigvals(floats(step.A))).max())
+        told = {"period": h, "radius": rounded(radius + 1e-4 * (1.0 - radius), 9)}
+        with np.errstate(all="ignore"):
+            longest = min(2.0 / largest_ratio(C.a, J.a), 4.0 / largest_ratio(K.a, C.a))
+        if longest > float(h) and self.try_to_show(
+            self.claim(SAMPLED, [], None, **told, longest=rounded(longest * (1.0 - 1e-9), 15)), {}
+        ):
+            return
+        self.try_to_show(self.claim(SAMPLED, [], None, **told), {})
+
+    def show_sliding(self) -> None:
+        """Find the claim that the surface is reached."""
+        roles, loop = self.roles, self.loop
+        roles["surface"] = self.add(loop.law.module.surface, measurement=ASKED, gains=loop.gains)
+        m = [fraction(x) + Fraction(self.disturbance) for x in self.known.modelled]
+        told: dict[str, Any] = {f"outside.{k}": x for k, x in enumerate(m)} if any(m) else {}
+        words = [*([OUTSIDE] if any(m) else []), *([MOVING] if MOVING in self.words else [])]
+        layer = float(getattr(loop.gains, "boundary_layer", 0.0))
+        if layer > 0.0 and any(m):
+            told |= self.layer(layer, list(map(float, m)))
+        self.try_to_show(self.claim(SLIDING, words, None, **told), {})
+        del roles["surface"]
+
+    def layer(self, layer: float, m: list[float]) -> dict[str, Any]:
+        """Return the numbers of where motions end in a boundary layer."""
+        J, K, more = tensor(self.loop.craft.inertia), tensor(self.loop.gains.surface_gain), 1.0 + 1e-6
+        reach = np.array(self.loop.gains.switching_gain)
+        slope, bound = reach / layer, np.array(m)
+        total = float((bound**2 / (4.0 * slope)).sum())
+        far = np.maximum(total / (reach - bound), (bound + np.sqrt(bound**2 + 4.0 * slope * total)) / (2.0 * slope)) * more
+        moments, steep = np.linalg.eigvalsh(J), float(np.linalg.norm(K, 2)) * more
+        low, high = float(moments[0]) / more, float(moments[-1]) * more
+        k, size = float(np.linalg.eigvalsh(0.5 * (K + K.T))[0]) / more, float(np.sqrt(high / low * (far**2).sum())) * more
+        found = {f"far.{i}": float(x) for i, x in enumerate(far)} | {"inertia.low": low, "inertia.high": high}
+        found |= {"surface.low": k, "surface.high": steep, "surface": size, "rate": (size + steep * size / k) * more}
+        return found | {"angle": 2.0 * asin(min(size / k, 1.0)) * more}
+
+
+def highest(o: Squares, scales: Mapping[str, float]) -> float | None:
+    """Return the largest level of V for which an obligation about a limit holds: p >= 0 on {V <= level} where V - level is
+    a multiple of -p and sums of squares. It was made for the level 1."""
+    *bounds, inside = o.known
+    V, p = 1 - inside, o.p
+    others = [c * relation for relation, parts in zip(o.modulo, cofactors(o, p, len(o.z)), strict=True) for c in parts]
+    return largest_number(posed(V, [-p, *bounds], others, o.z), scales, Poly({(): Fraction(1)}))
+
+
+def floats(rows: Any) -> Any:
+    """Return a matrix in floats."""
+    return np.array([[float(x) for x in row] for row in rows])
+
+
+def largest_ratio(a: Any, b: Any) -> float:
+    """Return the largest eigenvalue of b^-1 a."""
+    return float(np.max(np.linalg.eigvals(np.linalg.solve(floats(b), floats(a))).real))
+
+
+def fraction(x: Any) -> Fraction:
+    """Return a rational number of FLINT."""
+    return Fraction(int(x.p), int(x.q))
 
 
 TURNS = [(-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)]

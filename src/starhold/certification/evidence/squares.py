@@ -43,7 +43,9 @@ def squares(o: Squares, scales: Mapping[str, float]) -> dict[str, Any] | None:
     p, known, fixed = settled(o)
     for count in sorted({max(o.least, 1), len(o.z)}):
         ansatz = cofactors(o, p, count)
-        problem = posed(p, known, [c * relation for relation, parts in zip(o.modulo, ansatz, strict=True) for c in parts], o.z[:count])
+        problem = posed(
+            p, known, [c * relation for relation, parts in zip(o.modulo, ansatz, strict=True) for c in parts], o.z[:count]
+        )
         guess = solved(problem, scales)
         for digits in DIGITS if guess is not None else ():
             found = exactly(problem, guess, digits)  # pyright: ignore[reportArgumentType]
@@ -153,7 +155,9 @@ def solved(problem: Problem, scales: Mapping[str, float]) -> Any | None:
     x = interior_point(np.r_[np.zeros(count), -1.0], whole, right, A.shape[0], problem.signed + 1, [size])
     if x is None or x[-1] < DEFINITE:
         return None
-    return x[:-1] * unit / largest
+    x = x[:-1]
+    # What is only rounding would have to be made up for elsewhere.
+    return np.where(np.abs(x) < 1e-11 * np.abs(x).max(), 0.0, x) * unit / largest
 
 
 def largest_number(problem: Problem, scales: Mapping[str, float], wanted: Poly) -> float | None:
@@ -166,7 +170,12 @@ def largest_number(problem: Problem, scales: Mapping[str, float], wanted: Poly) 
     signs = sparse.hstack([-sparse.eye(problem.signed), sparse.csc_matrix((problem.signed, count - problem.signed))])
     right = np.r_[b / unit, np.zeros(problem.signed + len(half))]
     x = interior_point(
-        np.r_[np.zeros(count - 1), -1.0], sparse.vstack([A, signs, cone]), right, A.shape[0], problem.signed, [len(problem.z)]
+        np.r_[np.zeros(count - 1), -1.0],
+        sparse.vstack([A, signs, cone]),
+        right,
+        A.shape[0],
+        problem.signed,
+        [len(problem.z)],
     )
     return None if x is None else float(x[-1] * unit / largest[-1])
 
@@ -183,8 +192,9 @@ def exactly(problem: Problem, guess: Any, digits: int) -> list[Fraction] | None:
     """Return exact factors near the guess; None where there are none."""
     x, head = [rounded(float(v), digits) for v in guess], len(problem.columns) - len(problem.pairs)
     x[: problem.signed] = [max(v, Fraction(0)) for v in x[: problem.signed]]
-    if all(len(z.terms) == 1 for z in problem.z):
-        return shared_out(problem, x, head)
+    found = shared_out(problem, x, head) if all(len(z.terms) == 1 for z in problem.z) else None
+    if found is not None:
+        return found
     rest = problem.p - dot(x, problem.columns)
     rows = {m: k for k, m in enumerate(sorted({m for q in (problem.p, *problem.columns) for m in q.terms}))}
     A, b = fmpq_mat(len(rows), len(x)), fmpq_mat(len(rows), 1)
@@ -201,7 +211,8 @@ def exactly(problem: Problem, guess: Any, digits: int) -> list[Fraction] | None:
 
 
 def shared_out(problem: Problem, x: list[Fraction], head: int) -> list[Fraction] | None:
-    """Put what is amiss of each monomial on the entries of the matrix that have it."""
+    """Put what is amiss of each monomial on the entries of the matrix that have it; None where none has."""
+    x = list(x)
     places: dict[Monomial, list[int]] = {}
     for k, column in enumerate(problem.columns[head:], head):
         places.setdefault(next(iter(column.terms)), []).append(k)
@@ -216,7 +227,9 @@ def shared_out(problem: Problem, x: list[Fraction], head: int) -> list[Fraction]
     return x
 
 
-def written(o: Squares, problem: Problem, x: list[Fraction], fixed: dict[int, Fraction], ansatz: list[list[Poly]]) -> dict[str, Any]:
+def written(
+    o: Squares, problem: Problem, x: list[Fraction], fixed: dict[int, Fraction], ansatz: list[list[Poly]]
+) -> dict[str, Any]:
     """Return the evidence as the kernel reads it."""
     loose, place = iter(x[: problem.signed]), problem.signed
     multipliers = [fixed[k] if k in fixed else next(loose) for k in range(len(o.strict) + len(o.known))]
