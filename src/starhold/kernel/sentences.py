@@ -55,12 +55,13 @@ def above(x: Fraction) -> str:
 
 
 def _rounded(x: Fraction, rounding: str) -> str:
-    context = Context(prec=7, rounding=rounding)
+    # A float of few digits as it was written.
+    if abs(x) < 2**60 and x.denominator < 2**200 and x == Fraction(float(x)) and len(repr(float(x))) <= 9:
+        return f"{float(x):g}" if float(x) == float(f"{float(x):g}") else repr(float(x))
     # Digits enough that the quotient of two exact numbers is rounded once only.
-    upper, lower = context.create_decimal(0), x.denominator
-    exact = Context(prec=400, rounding=rounding)
-    upper = exact.divide(exact.create_decimal(x.numerator), exact.create_decimal(lower))
-    return f"{context.plus(upper).normalize(context):f}" if 1e-4 < abs(x) < 1e7 or not x else f"{context.plus(upper):.6e}"
+    wide, narrow = Context(prec=400, rounding=rounding), Context(prec=7, rounding=rounding)
+    quotient = wide.divide(wide.create_decimal(x.numerator), wide.create_decimal(x.denominator))
+    return f"{narrow.plus(quotient):g}"
 
 
 def enumerated(parts: Sequence[str]) -> str:

@@ -11,15 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from starhold.algebra.quaternion import derivative
+from starhold.algebra.quaternion import derivative, vector_part
+from starhold.algebra.vector import apply, dot
 from starhold.certification.evidence.finding import NotFoundError, complete, obligations, read
-from starhold.certification.evidence.squares import cofactors, largest_number, posed, rounded
+from starhold.certification.evidence.squares import cofactors, largest_number, posed, rounded, solved
 from starhold.certification.subject import Subject, above, make_subject
 from starhold.kernel.loops import MOVING, OUTSIDE, WHEELS, AttitudeLoop
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly
 from starhold.kernel.programs import digest
-from starhold.kernel.rules import Contracts, Definite, Squares
+from starhold.kernel.rules import Contracts, Definite, Solves, Squares
 from starhold.kernel.theorems.attitude import HYSTERESIS, SHORTEST
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
@@ -32,10 +33,10 @@ V3, Q4 = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
 FULL = (V3, V3, V3)
 ASKED = Measurement(Q4, V3, V3, V3, V3, V3, V3, 0.0, V3, V3)
 """A measurement of which every number is an input."""
-CONVERGES, EVENLY = "converges", "converges from both quaternions"
+CONVERGES, EVENLY, STRICTLY = "converges", "converges from both quaternions", "converges strictly"
 SAMPLED, SLIDING = "stays stable between samples", "reaches its surface"
-GIVEN_AWAY = Fraction(1, 10**6)
-"""The share of a largest level that is given away, for at the largest the matrices are singular."""
+GIVEN_AWAY = [Fraction(1, 10**power) for power in (6, 5, 4, 3, 2)]
+"""Shares of a largest level that are given away, for at the largest the matrices are singular."""
 
 
 @dataclass
@@ -158,6 +159,7 @@ class Loop:
         except NotFoundError as reason:
             self.failed[claim["theorem"]] = str(reason)
             return False
+        self.failed.pop(claim["theorem"], None)
         return True
 
     def show_all(self) -> None:
@@ -189,10 +191,55 @@ class Loop:
                     self.show_limits(theorem, [*words, *own], V, widths if own else {}) or True
                 )
             if shown:
-                wheels, every = [w for w in words if w == WHEELS], f"{theorem} whatever the inertia"
                 if SHORTEST not in own:
-                    self.try_to_show(self.claim(every, [*wheels, *own], V, **(widths if own else {})), self.scales(V))
+                    self.show_any_inertia(theorem, [*(w for w in words if w == WHEELS), *own], V, widths if own else {})
                 return
+        if not signs:
+            self.show_strictly()
+
+    def show_any_inertia(self, theorem: str, words: list[str], V: str, more: dict[str, Any]) -> None:
+        """Find the claim for every inertia, by the law's own V or by the kinetic energy and its stiffness."""
+        every = f"{theorem} whatever the inertia"
+        if self.try_to_show(self.claim(every, words, V, **more), self.scales(V)) or theorem != CONVERGES:
+            return
+        rest = obligations(self.claim(theorem, words, V, **more), self.by_digest)[0]["only equilibrium"]
+        assert isinstance(rest, Solves)
+        V = self.lyapunov(-float(rest.given[0].terms.get(("q1",), 0)))
+        self.try_to_show(self.claim(every, words, V, **more), self.scales(V))
+
+    def show_strictly(self) -> None:
+        """Find V = w.Jw/2 + 2 s (1 - q0) + epsilon q.Jw that falls strictly: V' is linear in s and epsilon."""
+        words = [w for w in self.words if w != OUTSIDE]
+        try:
+            base, *own = (self.falling(words, *pair) for pair in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
+        except RefusedError as reason:
+            self.failed[STRICTLY] = str(reason)
+            return
+        steps = [o.p - base.p for o in own]
+        others = [c * r for r, parts in zip(base.modulo, cofactors(base, base.p, 18), strict=True) for c in parts]
+        unit = sqrt(float(abs(steps[0].terms[("q1", "w1")]) / tensor(self.loop.craft.inertia).max())) if steps[0].terms else 1.0
+        found = solved(posed(base.p, [-p for p in steps], others, base.z[:18]), {f"w{k}": unit for k in (1, 2, 3)})
+        if found is None:
+            self.failed[STRICTLY] = "no V was found"
+            return
+        V = self.crossed(*(float(f"{x:.4g}") for x in found[:2]))
+        self.try_to_show(self.claim(STRICTLY, words, V), self.scales(V))
+
+    def falling(self, words: list[str], s: float, epsilon: float) -> Squares:
+        """Return what has to be shown of V'."""
+        claim = self.claim(STRICTLY, words, self.crossed(s, epsilon))
+        found = obligations(claim, self.by_digest)[0]["V falls"]
+        assert isinstance(found, Squares)
+        return found
+
+    def crossed(self, s: float, epsilon: float) -> str:
+        """Record V = w.Jw/2 + 2 s (1 - q0) + epsilon q.Jw."""
+
+        def energy(measurement: Measurement, craft: Any) -> Any:
+            lean = dot(vector_part(measurement.attitude), apply(craft.inertia, measurement.rate))
+            return rigid_body.kinetic_energy(measurement.rate, craft) + 2.0 * s * (1.0 - measurement.attitude[0]) + epsilon * lean
+
+        return self.add(energy, measurement=ASKED, craft=self.loop.craft._replace(inertia=FULL, inverse_inertia=FULL))
 
     def show_limits(self, theorem: str, words: list[str], V: str, more: dict[str, Any]) -> bool:
         """Find the largest level on which everything is within its limits."""
@@ -220,9 +267,12 @@ class Loop:
         if level is None:
             self.failed[f"{theorem}, limits"] = "no level was found"
             return False
-        form = self.form(V)
-        numbers |= self.contents(form, level)
-        return self.try_to_show(self.claim(theorem, words, V, level=level, **numbers), self.scales(V, float(level)))
+        form, scales = self.form(V), self.scales(V, float(level))
+        for share in GIVEN_AWAY:
+            told = numbers | self.contents(form, level * (1 - share))
+            if self.try_to_show(self.claim(theorem, words, V, level=level * (1 - share), **told), scales):
+                return True
+        return False
 
     def cap(self, theorem: str, words: list[str], V: str) -> float:
         """Return a level below V where other rests are, or where the sign of the quaternion changes."""
@@ -249,7 +299,7 @@ class Loop:
             if any(x is None or x <= 0.0 for x in found):
                 return None
             level = min(cap, *(x for x in found if x is not None)) if found else cap
-        return Fraction(level) * (1 - GIVEN_AWAY) if isfinite(level) else None
+        return Fraction(level) if isfinite(level) else None
 
     def contents(self, form: Poly, level: Fraction) -> dict[str, Any]:
         """Return the largest turn from rest and the largest rate on target that a set of this level holds, a little less."""

@@ -22,8 +22,8 @@ from starhold.kernel.polynomials import Monomial, Poly, dot, poly
 from starhold.kernel.rules import Squares
 
 DIGITS = (12, 14, 9, 16)
-DEFINITE = 1e-9
-"""The least eigenvalue, in scaled units, of a matrix that is not made less definite than this by rounding."""
+DEFINITE = -1e-8
+"""The least eigenvalue, in scaled units, at which it is worth trying whether the exact matrix is definite."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Problem:
 def squares(o: Squares, scales: Mapping[str, float]) -> dict[str, Any] | None:
     """Return evidence that the kernel accepts; None where none was found. scales: about how large variables become."""
     p, known, fixed = settled(o)
-    for count in sorted({max(o.least, 1), len(o.z)}):
+    for count in counts(o):
         ansatz = cofactors(o, p, count)
         problem = posed(
             p, known, [c * relation for relation, parts in zip(o.modulo, ansatz, strict=True) for c in parts], o.z[:count]
@@ -58,6 +58,13 @@ def squares(o: Squares, scales: Mapping[str, float]) -> dict[str, Any] | None:
                 continue
             return evidence
     return None
+
+
+def counts(o: Squares) -> list[int]:
+    """Return how many of z a matrix may be about: up to where another kind of monomial begins."""
+    kinds = ["".join(sorted(name[0] for name in max(z.terms))) for z in o.z]
+    ends = [k for k in range(1, len(kinds)) if kinds[k] != kinds[k - 1]]
+    return sorted({max(o.least, 1), *(k for k in ends if k > o.least > 0), len(o.z)})
 
 
 def settled(o: Squares) -> tuple[Poly, list[Poly], dict[int, Fraction]]:
