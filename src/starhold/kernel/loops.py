@@ -24,6 +24,8 @@ from .rules import Definite, Shown, Vanishes
 AXES = range(3)
 OUTSIDE, MOVING, WHEELS = "outside torque", "moving target", "wheels"
 """What a loop may be taken with: otherwise there is none."""
+SHORTEST, HYSTERESIS = "shortest sign", "hysteresis"
+"""How the sign of the quaternion that is fed back is chosen: otherwise it never changes."""
 NONE = [Poly({})] * 3
 Matrix: TypeAlias = Sequence[Sequence[Poly | Fraction]]
 Wired: TypeAlias = Mapping[str, Poly]
@@ -65,7 +67,7 @@ class AttitudeLoop:
             for name, part in wired(f"measurement.{field}", value).items()
         }  # fmt: skip
         self.sphere = dot(self.q, self.q) - 1
-        self.still = dict.fromkeys(("w1", "w2", "w3"), 0)
+        self.still: dict[str, int] = dict.fromkeys(("w1", "w2", "w3"), 0)
         self.on_target, self.opposite = ({"q0": q0, "q1": 0, "q2": 0, "q3": 0} for q0 in (1, -1))
         # q' = q (0, w)/2.
         own, half = self.q[1:], Fraction(1, 2)

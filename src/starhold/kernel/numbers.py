@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 Rows: TypeAlias = list[list[Fraction]]
 
-WORK = 4_000_000
-"""Units of work that one check may do: about a microsecond each."""
+WORK = 2_000_000
+"""Units of work that one check may do: a few microseconds each."""
 LONGEST = 20_000
 """Bits of the longest number."""
 _TEXT = re.compile(r"-?[0-9]{1,3000}(/[0-9]{1,3000})?|-?0x[01](\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}", re.ASCII)
@@ -54,11 +54,13 @@ def longest(numbers: Iterable[Fraction]) -> int:
     return max(map(size, numbers), default=0)
 
 
-def rational(text: Any) -> Fraction:
+def rational(given: Any) -> Fraction:
     """Read an exact number: -2, 3/4, or the hexadecimal form of a float, which is its exact value."""
-    demand(isinstance(text, str) and _TEXT.fullmatch(text) is not None, "a number is not written as one")
+    text = given if isinstance(given, str) else ""
+    demand(_TEXT.fullmatch(text) is not None, "a number is not written as one")
     if "x" in text:
-        sign, digits, after, exponent = re.fullmatch(r"(-?)0x([01])\.?([0-9a-f]*)p(.*)", text).groups()  # pyright: ignore
+        sign, (mantissa, exponent) = text[0] == "-", text.lstrip("-0").lstrip("x").split("p")
+        digits, _, after = mantissa.partition(".")
         demand(abs(int(exponent)) <= 1100, "a float is out of range")
         size_of = Fraction(int(digits + after, 16), 16 ** len(after)) * Fraction(2) ** int(exponent)
         return -size_of if sign else size_of
@@ -70,14 +72,24 @@ def rational(text: Any) -> Fraction:
 def read_list(given: Any, count: int | None = None) -> list[Any]:
     """Read a list, of so many entries if that is told."""
     demand(isinstance(given, list), "evidence is not a list")
-    demand(count is None or len(given) == count, "a list has another length")
-    return given
+    found = cast(list[Any], given)
+    demand(count is None or len(found) == count, "a list has another length")
+    return found
+
+
+def read_dict(given: Any, most: int) -> dict[str, Any]:
+    """Read a table of no more than so many entries."""
+    demand(isinstance(given, dict), "evidence is not a table")
+    found = cast(dict[str, Any], given)
+    demand(len(found) <= most, "a table is too long")
+    return found
 
 
 def read_table(given: Any, *keys: str) -> list[Any]:
     """Read the entries of a table that has these keys and no other."""
-    demand(isinstance(given, dict) and set(given) == set(keys), f"evidence is not a table of {', '.join(keys)}")
-    return [given[key] for key in keys]
+    found = read_dict(given, len(keys))
+    demand(set(found) == set(keys), f"a table has other keys than {', '.join(keys)}")
+    return [found[key] for key in keys]
 
 
 def matrix(given: Any, rows: int, columns: int) -> Rows:
@@ -89,7 +101,7 @@ def definite(a: Rows, strictly: bool = True) -> bool:
     """Tell whether a matrix is symmetric and positive definite (not strictly: nowhere negative), by elimination."""
     rest = [list(row) for row in a]
     demand(all(len(row) == len(rest) for row in rest), "a matrix is not square")
-    demand(all(rest[i][k] == rest[k][i] for i in range(len(rest)) for k in range(i)), "a matrix is not symmetric")
+    demand(rest == transpose(rest), "a matrix is not symmetric")
     for k, pivots in enumerate(rest):
         if pivots[k] < 0 or (pivots[k] == 0 and (strictly or any(pivots[k:]))):
             return False

@@ -7,7 +7,7 @@ from fractions import Fraction
 from itertools import product
 from typing import Any, TypeAlias
 
-from .numbers import Account, demand, longest, rational
+from .numbers import Account, demand, longest, rational, read_dict
 
 Monomial: TypeAlias = tuple[str, ...]
 """The sorted names of its factors, each as often as it occurs."""
@@ -26,7 +26,7 @@ class Poly:
 
     def __add__(self, other: Poly | Fraction | int) -> Poly:
         found, more = dict(self.terms), poly(other).terms
-        Account.spend(len(more) + 1, longest(more.values()))
+        Account.spend(len(found) + len(more) + 1, longest(more.values()))
         for m, c in more.items():
             found[m] = found.get(m, Fraction(0)) + c
         return Poly(found)
@@ -43,6 +43,7 @@ class Poly:
         return Poly(found)
 
     def __neg__(self) -> Poly:
+        Account.spend(len(self.terms))
         return Poly({m: -c for m, c in self.terms.items()})
 
     def __sub__(self, other: Poly | Fraction | int) -> Poly:
@@ -66,6 +67,7 @@ class Poly:
 
     def slope(self, name: str) -> Poly:
         """Return the derivative: every monomial with the name loses one, and gains its count as a factor."""
+        Account.spend(len(self.terms))
         found: dict[Monomial, Fraction] = {}
         for m, c in self.terms.items():
             if name in m:
@@ -127,9 +129,8 @@ def cross(a: Sequence[Poly], b: Sequence[Poly]) -> list[Poly]:
 
 def read_poly(given: Any) -> Poly:
     """Read a polynomial of the evidence: {"q0 w1 w1": "3/4"}."""
-    demand(isinstance(given, dict) and len(given) <= TERMS, "a polynomial is not a table")
     found: dict[Monomial, Fraction] = {}
-    for names, c in given.items():
+    for names, c in read_dict(given, TERMS).items():
         m = tuple(sorted(names.split()))
         demand(m not in found and len(m) <= DEGREE, "a monomial stands twice, or is of too high a degree")
         found[m] = rational(c)

@@ -141,7 +141,7 @@ class Exactly:
             joined = [(cases, operation, [case.value for case in cases]) for cases in chosen]
         found: Piecewise = []
         for cases, name, x in joined:
-            guards: Guards = frozenset().union(*(case.guards for case in cases))
+            guards: Guards = frozenset(guard for case in cases for guard in case.guards)
             Account.spend(1 + len(guards))
             if not any((p, not truth) in guards for p, truth in guards):
                 found += self.cases(guards, name, x)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Generic, TypeVar
 
-from .numbers import RefusedError, demand, rational, read_list, read_table
+from .numbers import RefusedError, demand, rational, read_dict, read_list, read_table
 from .programs import Program
 
 FORMAT = "starhold certificate 3"
@@ -96,8 +96,7 @@ def _claim(given: Any, programs: Told[Program]) -> Claim:
 
 
 def _table(given: Any, read: Callable[[Any], _T]) -> dict[str, _T]:
-    demand(isinstance(given, dict) and len(given) <= NUMBERS, "a table is no table, or too long")
-    return {name: read(part) for name, part in given.items()}
+    return {name: read(part) for name, part in read_dict(given, NUMBERS).items()}
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -10,18 +10,18 @@ from math import acos, asin, inf, isfinite, sqrt
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.vector import apply, dot
 from starhold.certification.evidence.finding import NotFoundError, complete, obligations, read
 from starhold.certification.evidence.squares import cofactors, largest_number, posed, rounded, solved
 from starhold.certification.subject import Subject, above, make_subject
-from starhold.kernel.loops import MOVING, OUTSIDE, WHEELS, AttitudeLoop
-from starhold.kernel.numbers import RefusedError
+from starhold.kernel.loops import HYSTERESIS, MOVING, OUTSIDE, SHORTEST, WHEELS, AttitudeLoop
+from starhold.kernel.numbers import RefusedError, Rows
 from starhold.kernel.polynomials import Poly
 from starhold.kernel.programs import digest
 from starhold.kernel.rules import Contracts, Definite, Solves, Squares
-from starhold.kernel.theorems.attitude import HYSTERESIS, SHORTEST
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies import rigid_body
@@ -31,6 +31,7 @@ from starhold.trace.straight_line import labelled, straight_line
 
 V3, Q4 = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
 FULL = (V3, V3, V3)
+NOWHERE: dict[str, int] = dict.fromkeys(("q0", "q1", "q2", "q3", "w1", "w2", "w3"), 0)
 ASKED = Measurement(Q4, V3, V3, V3, V3, V3, V3, 0.0, V3, V3)
 """A measurement of which every number is an input."""
 CONVERGES, EVENLY, STRICTLY = "converges", "converges from both quaternions", "converges strictly"
@@ -60,10 +61,12 @@ class Loop:
         loop, law = self.loop, self.loop.law
         memory = law.remember(loop.gains, loop.known, loop.period)
         plant = loop.craft._replace(inertia=FULL, inverse_inertia=FULL)
+
+        def torque(measurement: Any, gains: Any, craft: Any) -> Any:
+            return law.command(measurement, gains, craft, memory)[0]
+
         return {
-            "law": self.add(
-                lambda m, g, c: law.command(m, g, c, memory)[0], measurement=ASKED, gains=loop.gains, craft=loop.known
-            ),
+            "law": self.add(torque, measurement=ASKED, gains=loop.gains, craft=loop.known),
             "body": self.add(rigid_body.angular_acceleration, rate=V3, torque=V3, craft=plant),
             "turning": self.add(derivative, q=Q4, rate=V3),
         }
@@ -183,16 +186,15 @@ class Loop:
         ]
         for theorem, words in ways:
             own = signs if theorem == CONVERGES else []
+            more: dict[str, Any] = widths if own else {}
             if SHORTEST in own:
-                shown = self.show_limits(theorem, [*words, *own], V, widths)
-            else:
-                claim = self.claim(theorem, [*words, *own], V, **(widths if own else {}))
-                shown = self.try_to_show(claim, self.scales(V)) and (
-                    self.show_limits(theorem, [*words, *own], V, widths if own else {}) or True
-                )
-            if shown:
-                if SHORTEST not in own:
-                    self.show_any_inertia(theorem, [*(w for w in words if w == WHEELS), *own], V, widths if own else {})
+                # Below V where the sign changes.
+                level = Fraction(self.cap(theorem, own, V)) * (1 - GIVEN_AWAY[0])
+                more = {"level": level, **self.contents(self.form(V), level)}
+            if self.try_to_show(self.claim(theorem, [*words, *own], V, **more), self.scales(V)):
+                self.show_limits(theorem, [*words, *own], V, widths if own else {})
+                more = {name: x for name, x in more.items() if name != "rate"}
+                self.show_any_inertia(theorem, [*(w for w in words if w == WHEELS), *own], V, more)
                 return
         if not signs:
             self.show_strictly()
@@ -204,8 +206,8 @@ class Loop:
             return
         rest = obligations(self.claim(theorem, words, V, **more), self.by_digest)[0]["only equilibrium"]
         assert isinstance(rest, Solves)
-        V = self.lyapunov(-float(rest.given[0].terms.get(("q1",), 0)))
-        self.try_to_show(self.claim(every, words, V, **more), self.scales(V))
+        energy = self.lyapunov(-float(rest.given[0].terms.get(("q1",), 0)))
+        self.try_to_show(self.claim(every, words, energy, **more), self.scales(energy))
 
     def show_strictly(self) -> None:
         """Find V = w.Jw/2 + 2 s (1 - q0) + epsilon q.Jw that falls strictly: V' is linear in s and epsilon."""
@@ -217,7 +219,9 @@ class Loop:
             return
         steps = [o.p - base.p for o in own]
         others = [c * r for r, parts in zip(base.modulo, cofactors(base, base.p, 18), strict=True) for c in parts]
-        unit = sqrt(float(abs(steps[0].terms[("q1", "w1")]) / tensor(self.loop.craft.inertia).max())) if steps[0].terms else 1.0
+        unit = (
+            sqrt(float(abs(steps[0].terms[("q1", "w1")]) / tensor(self.loop.craft.inertia).max())) if steps[0].terms else 1.0
+        )
         found = solved(posed(base.p, [-p for p in steps], others, base.z[:18]), {f"w{k}": unit for k in (1, 2, 3)})
         if found is None:
             self.failed[STRICTLY] = "no V was found"
@@ -237,7 +241,11 @@ class Loop:
 
         def energy(measurement: Measurement, craft: Any) -> Any:
             lean = dot(vector_part(measurement.attitude), apply(craft.inertia, measurement.rate))
-            return rigid_body.kinetic_energy(measurement.rate, craft) + 2.0 * s * (1.0 - measurement.attitude[0]) + epsilon * lean
+            return (
+                rigid_body.kinetic_energy(measurement.rate, craft)
+                + 2.0 * s * (1.0 - measurement.attitude[0])
+                + epsilon * lean
+            )
 
         return self.add(energy, measurement=ASKED, craft=self.loop.craft._replace(inertia=FULL, inverse_inertia=FULL))
 
@@ -257,10 +265,8 @@ class Loop:
                 numbers |= {f"motors.{k}": torque, f"stored.{k}": momentum * (1.0 - BAND)}
         elif isfinite(limit):
             numbers["limit" if loop.limit == "axis" else "limit.norm"] = limit
-        elif SHORTEST not in words:
-            return False
         else:
-            numbers = dict(more)
+            return False
         claim = self.claim(theorem, words, V, level=1, **numbers)
         cap = self.cap(theorem, words, V)
         level = self.largest_level(claim, V, cap)
@@ -303,20 +309,19 @@ class Loop:
 
     def contents(self, form: Poly, level: Fraction) -> dict[str, Any]:
         """Return the largest turn from rest and the largest rate on target that a set of this level holds, a little less."""
-        P = np.array([[float(form.terms.get(m, 0)) * (1.0 if i == k else 0.5) for k in (1, 2, 3) for m in [(f"w{min(i, k)}", f"w{max(i, k)}")]]
-                      for i in (1, 2, 3)])  # fmt: skip
-        N = np.array(
-            [
-                [float(form.terms.get((f"q{min(i, k)}", f"q{max(i, k)}"), 0)) * (1.0 if i == k else 0.5) for k in (1, 2, 3)]
-                for i in (1, 2, 3)
-            ]
+        P, N = (
+            np.array(
+                [[form.slope(f"{x}{i}").slope(f"{x}{k}").at(NOWHERE).number for k in (1, 2, 3)] for i in (1, 2, 3)],
+                dtype=float,
+            )
+            for x in "wq"
         )
         less, s = 1.0 - 1e-7, -float(form.terms.get(("q0",), 0))
         if s > 0.0:
             angle = 2.0 * acos(max(1.0 - float(level) / s, -0.98))
         else:
-            angle = 2.0 * asin(min(sqrt(float(level) / float(np.linalg.eigvalsh(N)[-1])), 1.0))
-        rate = sqrt(float(level) / float(np.linalg.eigvalsh(P)[-1]))
+            angle = 2.0 * asin(min(sqrt(2.0 * float(level) / float(np.linalg.eigvalsh(N)[-1])), 1.0))
+        rate = sqrt(2.0 * float(level) / float(np.linalg.eigvalsh(P)[-1]))
         return {"angle": angle * less, "rate": rate * less}
 
     def show_sampled(self) -> None:
@@ -335,7 +340,8 @@ class Loop:
         assert isinstance(J, Definite)
         assert isinstance(C, Definite)
         assert isinstance(K, Definite)
-        radius = float(np.abs(np.linalg.eigvals(floats(step.A))).max())
+        roots: Any = np.linalg.eigvals(floats(step.A))
+        radius = float(np.abs(roots).max())
         told = {"period": h, "radius": rounded(radius + 1e-4 * (1.0 - radius), 9)}
         with np.errstate(all="ignore"):
             longest = min(2.0 / largest_ratio(C.a, J.a), 4.0 / largest_ratio(K.a, C.a))
@@ -355,8 +361,17 @@ class Loop:
         layer = float(getattr(loop.gains, "boundary_layer", 0.0))
         if layer > 0.0 and any(m):
             told |= self.layer(layer, list(map(float, m)))
-        self.try_to_show(self.claim(SLIDING, words, None, **told), {})
+        if signs := sign_words(loop):
+            told |= self.signed(told)
+        self.try_to_show(self.claim(SLIDING, [*words, *signs], None, **told), {})
         del roles["surface"]
+
+    def signed(self, told: dict[str, Any]) -> dict[str, Any]:
+        """Return the numbers of the set from which the quaternion's sign never changes."""
+        J, K = tensor(self.loop.craft.inertia), tensor(self.loop.gains.surface_gain)
+        low = told.get("inertia.low", float(np.linalg.eigvalsh(J)[0]) * (1.0 - 1e-6))
+        k = told.get("surface.low", float(np.linalg.eigvalsh(0.5 * (K + K.T))[0]) * (1.0 - 1e-6))
+        return {"inertia.low": low, "surface.low": k, "level": 0.5 * low * k * k * (1.0 - 1e-6)}
 
     def layer(self, layer: float, m: list[float]) -> dict[str, Any]:
         """Return the numbers of where motions end in a boundary layer."""
@@ -368,7 +383,10 @@ class Loop:
         moments, steep = np.linalg.eigvalsh(J), float(np.linalg.norm(K, 2)) * more
         low, high = float(moments[0]) / more, float(moments[-1]) * more
         k, size = float(np.linalg.eigvalsh(0.5 * (K + K.T))[0]) / more, float(np.sqrt(high / low * (far**2).sum())) * more
-        found = {f"far.{i}": float(x) for i, x in enumerate(far)} | {"inertia.low": low, "inertia.high": high}
+        found: dict[str, Any] = {f"far.{i}": float(x) for i, x in enumerate(far)} | {
+            "inertia.low": low,
+            "inertia.high": high,
+        }
         found |= {"surface.low": k, "surface.high": steep, "surface": size, "rate": (size + steep * size / k) * more}
         return found | {"angle": 2.0 * asin(min(size / k, 1.0)) * more}
 
@@ -382,14 +400,15 @@ def highest(o: Squares, scales: Mapping[str, float]) -> float | None:
     return largest_number(posed(V, [-p, *bounds], others, o.z), scales, Poly({(): Fraction(1)}))
 
 
-def floats(rows: Any) -> Any:
+def floats(rows: Rows) -> NDArray[np.float64]:
     """Return a matrix in floats."""
-    return np.array([[float(x) for x in row] for row in rows])
+    return np.array([[float(x) for x in row] for row in rows], dtype=np.float64)
 
 
 def largest_ratio(a: Any, b: Any) -> float:
     """Return the largest eigenvalue of b^-1 a."""
-    return float(np.max(np.linalg.eigvals(np.linalg.solve(floats(b), floats(a))).real))
+    found: Any = np.linalg.eigvals(np.linalg.solve(floats(b), floats(a)))
+    return float(found.real.max())
 
 
 def fraction(x: Any) -> Fraction:

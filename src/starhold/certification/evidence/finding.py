@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from fractions import Fraction
+from importlib import import_module
 from typing import Any
 
 import numpy as np
-from scipy.linalg import solve_continuous_lyapunov, solve_discrete_lyapunov
 
 from starhold.certification.evidence.squares import rounded, squares, text
 from starhold.kernel import rules
-from starhold.kernel.numbers import Account, RefusedError, inverse
+from starhold.kernel.numbers import Account, RefusedError, inverse, rational
 from starhold.kernel.polynomials import Poly
 from starhold.kernel.programs import Program, digest
 from starhold.kernel.reading import Claim, Told
-from starhold.kernel.numbers import rational
 from starhold.kernel.theorems import THEOREMS
+
+linalg: Any = import_module("scipy.linalg")
 
 
 class NotFoundError(Exception):
@@ -84,7 +85,7 @@ def solves(o: rules.Solves) -> dict[str, Any]:
         taken = inverse(rows)
     except RefusedError:
         raise NotFoundError("the torque at rest vanishes elsewhere too") from None
-    none = [[{} for _ in o.modulo] for _ in o.wanted]
+    none = [[text(Poly({})) for _ in o.modulo] for _ in o.wanted]
     return {"matrix": [[str(x) for x in row] for row in taken], "cofactors": none}
 
 
@@ -99,9 +100,9 @@ def contracts(o: rules.Contracts) -> list[list[str]]:
     """Return Lyapunov's matrix of a motion."""
     A = np.array([[float(x) for x in row] for row in o.A])
     size = np.eye(len(A))
-    P: Any = solve_continuous_lyapunov(A.T, -size) if o.flow else solve_discrete_lyapunov((A / float(o.rate)).T, size)
-    P = (P + P.T) / (2.0 * np.abs(P).max())
-    return [[str(rounded(float(x), 15)) for x in row] for row in P]
+    solve: Any = linalg.solve_continuous_lyapunov if o.flow else linalg.solve_discrete_lyapunov
+    found = solve(A.T, -size) if o.flow else solve((A / float(o.rate)).T, size)
+    return [[str(rounded(float(x), 15)) for x in row] for row in (found + found.T) / (2.0 * np.abs(found).max())]
 
 
 def certificate(programs: list[dict[str, Any]], claims: list[dict[str, Any]]) -> dict[str, Any]:

@@ -9,18 +9,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from importlib import import_module
 from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
 from flint import fmpq, fmpq_mat
-from scipy import sparse
 
 from starhold.errors import InputError
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Monomial, Poly, dot, poly
 from starhold.kernel.rules import Squares
 
+sparse: Any = import_module("scipy.sparse")
 DIGITS = (12, 14, 9, 16)
 DEFINITE = -1e-8
 """The least eigenvalue, in scaled units, at which it is worth trying whether the exact matrix is definite."""
@@ -133,7 +134,7 @@ def equations(problem: Problem, scales: Mapping[str, float], more: Sequence[Poly
 def interior_point(cost: Any, A: Any, b: Any, equal: int, signed: int, sides: Sequence[int]) -> Any | None:
     """Minimise cost.x with A x + s = b, s in the cones; None where that fails."""
     try:
-        import clarabel
+        clarabel: Any = import_module("clarabel")
     except ImportError:
         raise InputError("certify", "", "no clarabel", "pip install clarabel, which guesses matrices") from None
     cones = [clarabel.ZeroConeT(equal), clarabel.NonnegativeConeT(signed), *map(clarabel.PSDTriangleConeT, sides)]
@@ -152,9 +153,8 @@ def solved(problem: Problem, scales: Mapping[str, float]) -> Any | None:
     count, size, head = A.shape[1], len(problem.z), A.shape[1] - len(problem.pairs)
     # The Gram matrix in scaled units: an entry's column has its largest coefficient for a scale.
     half = np.array([1.0 if i == k else np.sqrt(2.0) / 2.0 for i, k in problem.pairs])
-    cone = sparse.hstack([
-        sparse.csc_matrix((len(half), head)), -sparse.diags(half), sparse.csc_matrix([[float(i == k)] for i, k in problem.pairs])
-    ])  # fmt: skip
+    least = sparse.csc_matrix([[float(i == k)] for i, k in problem.pairs])
+    cone = sparse.hstack([sparse.csc_matrix((len(half), head)), -sparse.diags(half), least])
     signs = sparse.hstack([-sparse.eye(problem.signed), sparse.csc_matrix((problem.signed, count - problem.signed + 1))])
     top = sparse.csc_matrix(([1.0], ([0], [count])), (1, count + 1))
     whole = sparse.vstack([sparse.hstack([A, sparse.csc_matrix((A.shape[0], 1))]), signs, top, cone])

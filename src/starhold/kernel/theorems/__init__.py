@@ -8,7 +8,7 @@ from typing import TypeAlias
 from ..reading import Claim
 from ..rules import Obligation
 from ..sentences import Statement
-from . import attitude, disturbance, sampling, sliding
+from . import attitude, sampling, sliding
 
 Theorem: TypeAlias = Callable[[Claim], Generator[tuple[str, Obligation], None, Statement]]
 
@@ -18,7 +18,6 @@ THEOREMS: dict[str, Theorem] = {
     "converges whatever the inertia": attitude.converges_whatever_the_inertia,
     "converges from both quaternions": attitude.converges_evenly,
     "converges from both quaternions whatever the inertia": attitude.converges_evenly_whatever_the_inertia,
-    "ends near the target": disturbance.ends_near,
     "stays stable between samples": sampling.sampled,
     "reaches its surface": sliding.reaches_surface,
 }

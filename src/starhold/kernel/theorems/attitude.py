@@ -11,7 +11,7 @@ from collections.abc import Generator, Sequence
 from fractions import Fraction
 from typing import TypeAlias
 
-from ..loops import MOVING, OUTSIDE, WHEELS, AttitudeLoop
+from ..loops import HYSTERESIS, MOVING, OUTSIDE, SHORTEST, WHEELS, AttitudeLoop
 from ..numbers import cosine_below, demand
 from ..polynomials import Poly, apply, dot, poly
 from ..reading import Claim
@@ -21,8 +21,6 @@ from .limits import within_limits
 
 Proof: TypeAlias = Generator[tuple[str, Obligation], None, Statement]
 Part: TypeAlias = Generator[tuple[str, Obligation], None, list[str]]
-SHORTEST, HYSTERESIS = "shortest sign", "hysteresis"
-"""How the sign of the quaternion that is fed back is chosen: otherwise it never changes."""
 
 
 def converges(claim: Claim) -> Proof:
@@ -91,8 +89,8 @@ def _damped(loop: AttitudeLoop) -> list[Poly]:
 
 
 def least_on_target(loop: AttitudeLoop, turned: Sequence[Poly] = ()) -> Shown:
-    """V >= c (|turned|^2 + |w|^2), turned being (1 - q0, q) unless told: V is zero only on target at rest, and {V <= level} is
-    compact. Of an inertia that is not known V has the kinetic energy, of which only w.Jw > 0 is used."""
+    """V >= c (|turned|^2 + |w|^2), turned being (1 - q0, q) unless told: V is zero only on target at rest, and {V <= level}
+    is compact. Of an inertia that is not known V has the kinetic energy, of which only w.Jw > 0 is used."""
     yield from loop.sound()
     turned, momentum = turned or [1 - loop.q[0], *loop.q[1:]], apply(loop.J, loop.w)
     if loop.any_inertia:
@@ -117,10 +115,8 @@ def falls(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part:
         yield "level", Exceeds(level)
         said = [f"every motion from {{V <= {below(level)}}} stays there and"]
     if fastest is not None:
-        demand(level is not None, "a bound of the rate needs a level")
         slow = fastest * fastest - dot(loop.w, loop.w)
-        inside = [level - V]  # pyright: ignore[reportOptionalOperand]
-        yield "rates", Squares(slow, [poly(1), *loop.q, *loop.w], 0, inside, [loop.sphere])
+        yield "rates", Squares(slow, [poly(1), *loop.q, *loop.w], 0, [numbers["level"] - V], [loop.sphere])
         known = [slow * w * w for w in loop.w]
         said.append(f"turns no faster than {above(fastest)} rad/s and")
     if loop.any_inertia:
@@ -143,8 +139,8 @@ def only_equilibrium(loop: AttitudeLoop) -> Shown:
 def concluded(loop: AttitudeLoop, said: list[str]) -> Proof:
     """Settle the part that the rest at q0 = -1 and the quaternion's sign play."""
     claim, V = loop.claim, loop.lyapunov
-    level, half = claim.numbers.get("level"), V.at({"q0": 0})
-    one, z = poly(1), [poly(1), *loop.q, *loop.w]
+    level = claim.numbers.get("level")
+    z = [poly(1), *loop.q, *loop.w]
     inside = [] if level is None else [level - V]
     if claim.taken.get(HYSTERESIS):
         width = claim.numbers["hysteresis"]
@@ -153,9 +149,9 @@ def concluded(loop: AttitudeLoop, said: list[str]) -> Proof:
         yield "a jump lowers V", Squares(jump, z, 1, [-width - loop.q[0], *inside], [loop.sphere])
         said.append(f"comes to rest on target, with the quaternion's sign chosen anew at q0 < -{above(width)}")
     elif claim.taken.get(SHORTEST):
-        demand(level is not None, "the shorter turn needs a level, below V where the sign changes")
-        above_it = half - level  # pyright: ignore[reportOptionalOperand]
-        yield "the sign never changes", Squares(above_it, [one, *loop.q[1:], *loop.w], 1, modulo=[loop.sphere.at({"q0": 0})])
+        border, energy = [loop.sphere.at({"q0": 0})], [dot(loop.w, apply(loop.J, loop.w))] * loop.any_inertia
+        higher = V.at({"q0": 0}) - claim.numbers["level"]
+        yield "the sign never changes", Squares(higher, [poly(1), *loop.q[1:], *loop.w], 1, (), border, energy)
         said.append("comes to rest on target by the shorter turn")
     elif level is not None and not loop.any_inertia:
         yield "the other equilibrium is outside", Exceeds(V.at(loop.opposite | loop.still).number, level)

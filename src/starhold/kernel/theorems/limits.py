@@ -18,11 +18,10 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
 
     As no motion leaves the set (theorems of `attitude`), nothing is ever limited, and the loop is the one that was taken."""
     numbers, said, assumptions = loop.claim.numbers, list[str](), list[str]()
-    limit, norm, level = numbers.get("limit"), numbers.get("limit.norm"), numbers.get("level")
+    limit, norm = numbers.get("limit"), numbers.get("limit.norm")
     motors = "motors.0" in numbers or "stored.0" in numbers
     if limit is None and norm is None and not motors:
         return Statement("", ("unlimited-torque", *(["unlimited-wheels"] if loop.wheels else [])))
-    demand(level is not None, "a limit needs a level")
     known, z = list[Poly](), [poly(1), *loop.q, *loop.w]
     if loop.outside:
         outside = [numbers[f"outside.{k}"] for k in range(3)]
@@ -33,7 +32,7 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
     if loop.wheels:
         known, z = [*known, numbers["momentum"] * numbers["momentum"] - dot(loop.H, loop.H)], [*z, *loop.H]
         assumptions.append("bounded-momentum")
-    known.append(level - loop.lyapunov)  # pyright: ignore[reportOptionalOperand]
+    known.append(numbers["level"] - loop.lyapunov)
     if limit is not None:
         for axis, u in enumerate(loop.u):
             for sign in (1, -1):

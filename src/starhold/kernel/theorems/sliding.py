@@ -6,13 +6,13 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from fractions import Fraction
 
-from ..loops import AXES, AttitudeLoop, slopes
+from ..loops import AXES, HYSTERESIS, SHORTEST, AttitudeLoop, slopes
 from ..numbers import Rows, demand, plus, scalar, times, transpose
 from ..polynomials import Poly, apply, dot, poly
 from ..programs import Case
 from ..reading import Claim
-from ..rules import Definite, Exceeds, Obligation, Squares, Vanishes
-from ..sentences import Statement, above
+from ..rules import Definite, Exceeds, Obligation, Shown, Squares, Vanishes
+from ..sentences import Statement, above, below
 
 
 @dataclass(frozen=True)
@@ -49,16 +49,30 @@ def reaches_surface(claim: Claim) -> Generator[tuple[str, Obligation], None, Sta
         demand(outside[i] >= 0, "a bound is negative")
         yield f"reach {i}", Exceeds(axes[i].reach, outside[i])
     layered = any(axis.slope is not None for axis in axes)
-    ending = "slides to rest on target, on either quaternion"
+    squares, ending = Fraction(0), "slides to rest on target, on either quaternion"
     if layered and any(outside):
-        ending = yield from ending_in_the_layer(loop, axes, outside, K)
-    said = "approaches" if layered else "reaches in a finite time"
-    text = f"from every attitude and rate the motion {said} the law's surface and {ending}"
+        squares = yield from losses(loop, axes, outside)
+        ending = yield from ending_in_the_layer(loop, squares, K)
+    said, begun = "approaches" if layered else "reaches in a finite time", "every attitude and rate"
+    signed = bool(claim.taken.get(SHORTEST) or claim.taken.get(HYSTERESIS))
+    if signed:
+        # At q0 = 0 q0' = (q.Kq - s.q)/2 > 0 while |s| < k, and low |s|^2 <= s.Js.
+        level, low, k = numbers["level"], numbers["inertia.low"], numbers["surface.low"]
+        yield from bounded(loop, K)
+        yield (
+            "the sign never changes",
+            Exceeds(low * k * k, max(2 * level, numbers["inertia.high"] * squares if squares else 0)),
+        )
+        begun = f"{{s.Js/2 <= {below(level)}}}"
+    text = f"from {begun} the motion {said} the law's surface and {ending}"
     torque = "bounded-outside-torque" if loop.outside else "no-outside-torque"
     target = "known-target" if loop.moving else "target-at-rest"
     assumptions = ("rigid-body", "inertia-as-given", "exact-measurement", "ideal-actuators", "continuous-torque")
     demand(not loop.wheels, "no law of this kind is taken with wheels")
-    return Statement(text, (*assumptions, "unlimited-torque", torque, target, "no-wheels", "quaternion-as-fed"))
+    return Statement(
+        text,
+        (*assumptions, "unlimited-torque", torque, target, "no-wheels", "sign-at-once" if signed else "quaternion-as-fed"),
+    )
 
 
 def taken_apart(loop: AttitudeLoop, i: int, moved: Poly, s: Poly) -> Axis:
@@ -97,31 +111,42 @@ def on_surface(case: Case, s: Poly) -> bool:
     return all(any(sign * factor > 0 and offset == 0 for factor, offset in found) for sign in (1, -1))
 
 
-def ending_in_the_layer(
-    loop: AttitudeLoop, axes: list[Axis], outside: list[Fraction], K: Rows
-) -> Generator[tuple[str, Obligation], None, str]:
-    """Show where motions end in a boundary layer."""
-    numbers = loop.claim.numbers
+def losses(
+    loop: AttitudeLoop, axes: list[Axis], outside: list[Fraction]
+) -> Generator[tuple[str, Obligation], None, Fraction]:
+    """Show that s.Js/2 falls outside of the box |s_i| <= far_i, and return the sum of far_i^2."""
     total, squares = Fraction(0), Fraction(0)
     for axis, m in zip(axes, outside, strict=True):
         total += m * m / (4 * axis.slope) if axis.slope is not None else 0
     for i, (axis, m) in enumerate(zip(axes, outside, strict=True)):
-        far = numbers[f"far.{i}"]
-        yield f"far {i}", Exceeds(far)
+        far = loop.claim.numbers[f"far.{i}"]
+        demand(far > 0, "a bound is not positive")
         yield f"beyond the layer {i}", Exceeds((axis.reach - m) * far, total)
         if axis.slope is not None:
             yield f"in the layer {i}", Exceeds(axis.slope * far * far - m * far, total)
         squares += far * far
-    low, high, k, steep = (numbers[name] for name in ("inertia.low", "inertia.high", "surface.low", "surface.high"))
+    return squares
+
+
+def bounded(loop: AttitudeLoop, K: Rows) -> Shown:
+    """low |x|^2 <= x.Jx, and k |x|^2 <= x.Kx."""
+    low, k = loop.claim.numbers["inertia.low"], loop.claim.numbers["surface.low"]
+    demand(low > 0 and k > 0, "a bound is not positive")
     J: Rows = [[poly(x).number for x in row] for row in loop.J]
-    symmetric = [[x / 2 for x in row] for row in plus(K, transpose(K))]
     yield "least moment", Definite(plus(J, scalar(1), -low))
-    yield "largest moment", Definite(plus(scalar(high), J, -1))
-    yield "least slope", Definite(plus(symmetric, scalar(1), -k))
-    yield "largest slope", Definite(plus(scalar(steep * steep), times(transpose(K), K), -1))
+    yield "least slope", Definite(plus([[x / 2 for x in row] for row in plus(K, transpose(K))], scalar(1), -k))
+
+
+def ending_in_the_layer(loop: AttitudeLoop, squares: Fraction, K: Rows) -> Generator[tuple[str, Obligation], None, str]:
+    """Show where motions end in a boundary layer."""
+    numbers = loop.claim.numbers
+    low, high, k, steep = (numbers[name] for name in ("inertia.low", "inertia.high", "surface.low", "surface.high"))
     size, angle, rate = numbers["surface"], numbers["angle"], numbers["rate"]
-    for name, x in (("moment", low), ("slope", k), ("steepest", steep), ("surface", size), ("angle", min(angle, 3 - angle))):
-        yield f"positive {name}", Exceeds(x)
+    demand(min(high, steep, size, angle, 3 - angle) > 0, "a bound is not positive, or an angle too large")
+    yield from bounded(loop, K)
+    J: Rows = [[poly(x).number for x in row] for row in loop.J]
+    yield "largest moment", Definite(plus(scalar(high), J, -1))
+    yield "largest slope", Definite(plus(scalar(steep * steep), times(transpose(K), K), -1))
     yield "surface", Exceeds(size * size * low, high * squares)
     # sin^2 = 1 - cos^2 from below, as cos x <= 1 - x^2/2 + x^4/24.
     half = angle * angle / 4
