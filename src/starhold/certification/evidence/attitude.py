@@ -18,7 +18,7 @@ from starhold.certification.evidence.finding import NotFoundError, complete, obl
 from starhold.certification.evidence.squares import cofactors, largest_number, posed, rounded, solved
 from starhold.certification.subject import Subject, above, make_subject
 from starhold.kernel.loops import HYSTERESIS, MOVING, OUTSIDE, SHORTEST, WHEELS, AttitudeLoop
-from starhold.kernel.numbers import RefusedError, Rows
+from starhold.kernel.numbers import RefusedError, Rows, plus
 from starhold.kernel.polynomials import Poly
 from starhold.kernel.programs import digest
 from starhold.kernel.rules import Contracts, Definite, Solves, Squares
@@ -335,7 +335,7 @@ class Loop:
             self.failed[SAMPLED] = str(reason)
             return
         step, K = wanted["step"], wanted["stiffness"]
-        J, C = wanted["inertia outweighs damping at once"], wanted["damping outweighs stiffness at once"]
+        J, C = wanted["inertia outweighs damping"], wanted["damping outweighs stiffness"]
         assert isinstance(step, Contracts)
         assert isinstance(J, Definite)
         assert isinstance(C, Definite)
@@ -344,7 +344,9 @@ class Loop:
         radius = float(np.abs(roots).max())
         told = {"period": h, "radius": rounded(radius + 1e-4 * (1.0 - radius), 9)}
         with np.errstate(all="ignore"):
-            longest = min(2.0 / largest_ratio(C.a, J.a), 4.0 / largest_ratio(K.a, C.a))
+            # They were made for twice the period.
+            damping = plus(C.a, K.a, h / 2)
+            longest = min(2.0 / largest_ratio(damping, plus(J.a, damping, h)), 4.0 / largest_ratio(K.a, damping))
         if longest > float(h) and self.try_to_show(
             self.claim(SAMPLED, [], None, **told, longest=rounded(longest * (1.0 - 1e-9), 15)), {}
         ):
