@@ -112,7 +112,9 @@ class Oracle:
     def body(self):
         for _ in range(3):
             w, t, q = self.rng.normal(size=3), self.rng.normal(size=3), self.rng.normal(size=4)
-            given = self.subject | self.plant() | {f"rate.{k}": w[k] for k in range(3)} | {f"torque.{k}": t[k] for k in range(3)}
+            given = (
+                self.subject | self.plant() | {f"rate.{k}": w[k] for k in range(3)} | {f"torque.{k}": t[k] for k in range(3)}
+            )
             wanted = np.linalg.solve(self.J, t - np.cross(w, self.J @ w))
             flat = {f"craft.inertia.{k}": self.J[k, k] for k in range(3)}
             if not np.allclose(run(self.programs["body"], flat | given), wanted, rtol=1e-6, atol=1e-12):
@@ -271,6 +273,8 @@ class Oracle:
                     return False
         moments = np.linalg.eigvalsh(J)
         k, size = np.linalg.eigvalsh(K + K.T)[0] / 2, math.sqrt(moments[-1] / moments[0] * (layer**2).sum())
-        if "angle" in n and not (math.sin(min(n["angle"], 3.0) / 2) > size / k and n["rate"] > size * (1 + np.linalg.norm(K, 2) / k)):
+        if "angle" in n and not (
+            math.sin(min(n["angle"], 3.0) / 2) > size / k and n["rate"] > size * (1 + np.linalg.norm(K, 2) / k)
+        ):
             return False
         return "level" not in n or 2 * n["level"] < moments[0] * k * k

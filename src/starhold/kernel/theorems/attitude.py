@@ -114,6 +114,7 @@ def falls(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part:
     if level is not None:
         said = [f"every motion from {{V <= {below(level)}}} stays there and"]
     if fastest is not None:
+        demand(fastest > 0, "a rate is not positive")
         slow = fastest * fastest - dot(loop.w, loop.w)
         yield "rates", Squares(slow, [poly(1), *loop.q, *loop.w], 0, [numbers["level"] - V], [loop.sphere])
         known = [slow * w * w for w in loop.w]

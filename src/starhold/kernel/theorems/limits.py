@@ -9,7 +9,7 @@ from ..loops import AttitudeLoop
 from ..numbers import definite, demand, inverse, times, transpose
 from ..polynomials import Poly, dot, poly, variables
 from ..rules import Exceeds, Obligation, Squares
-from ..sentences import Statement, above, enumerated
+from ..sentences import Statement, above, below, enumerated
 
 
 def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None, Statement]:
@@ -17,7 +17,7 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
     (`limit.norm`: their norm); each motor gives at most motors.k, each wheel stores at most stored.k.
 
     As no motion leaves the set (theorems of `attitude`), nothing is ever limited, and the loop is the one that was taken."""
-    numbers, said, assumptions = loop.claim.numbers, list[str](), list[str]()
+    numbers, said, bounds = loop.claim.numbers, list[str](), list[str]()
     limit, norm = numbers.get("limit"), numbers.get("limit.norm")
     motors = "motors.0" in numbers or "stored.0" in numbers
     if limit is None and norm is None and not motors:
@@ -25,13 +25,19 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
     known, z = list[Poly](), [poly(1), *loop.q, *loop.w]
     if loop.outside:
         outside = [numbers[f"outside.{k}"] for k in range(3)]
+        demand(min(outside) >= 0, "a bound is negative")
         known += [most - sign * e for most, e in zip(outside, loop.e, strict=True) for sign in (1, -1)]
-    for name, taken, vector in (("target.rate", loop.moving, loop.r), ("target.acceleration", loop.moving, loop.a)):
+        bounds.append(f"a torque from outside of up to {', '.join(map(below, outside))} N m about the axes")
+    for name, taken, vector, text in (
+        ("target.rate", loop.moving, loop.r, "a target that turns at up to {} rad/s"),
+        ("target.acceleration", loop.moving, loop.a, "a target that speeds up by up to {} rad/s^2"),
+        ("momentum", loop.wheels, loop.H, "a momentum of up to {} N m s"),
+    ):
         if taken:
-            known, z = [*known, numbers[name] * numbers[name] - dot(vector, vector)], [*z, *vector]
-    if loop.wheels:
-        known, z = [*known, numbers["momentum"] * numbers["momentum"] - dot(loop.H, loop.H)], [*z, *loop.H]
-        assumptions.append("bounded-momentum")
+            most = numbers[name]
+            demand(most >= 0, "a bound is negative")
+            known, z = [*known, most * most - dot(vector, vector)], [*z, *vector]
+            bounds.append(text.format(below(most)))
     known.append(numbers["level"] - loop.lyapunov)
     if limit is not None:
         for axis, u in enumerate(loop.u):
@@ -44,8 +50,10 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
         wide = [*z, *d, *(x * w for x in d for w in loop.w)]
         yield "norm of the torque", Squares(norm - dot(d, loop.u), wide, 0, known, [loop.sphere, dot(d, d) - 1])
         said.append(f"the law asks for a torque of no more than {above(norm)} N m")
+    told = f"with {enumerated(bounds)} " if bounds else ""
+    assumptions = ("bounded-momentum",) if loop.wheels else ()
     if not motors:
-        return Statement(enumerated(said), (*assumptions, *(["unlimited-wheels"] if loop.wheels else [])))
+        return Statement(told + enumerated(said), (*assumptions, *(["unlimited-wheels"] if loop.wheels else [])))
     shares, held = allocated(loop)
     for k, (share, own) in enumerate(zip(shares, held, strict=True)):
         for name, load, most in (
@@ -58,7 +66,7 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
                 yield f"{name} {sign * (k + 1):+d}", Squares(most - sign * load, z, 0, known, [loop.sphere])
     torques, momenta = (", ".join(above(numbers[f"{n}.{k}"]) for k in range(len(shares))) for n in ("motors", "stored"))
     said.append(f"motors give no more than {torques} N m and wheels store no more than {momenta} N m s")
-    return Statement(enumerated(said), tuple(assumptions))
+    return Statement(told + enumerated(said), assumptions)
 
 
 def allocated(loop: AttitudeLoop) -> tuple[list[list[Fraction]], list[Fraction]]:

@@ -44,7 +44,7 @@ def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
     J: Rows = [[poly(x).number for x in row] for row in loop.J]
     push = [[poly(x).number for x in row] for row in loop.J_inverse]
     h, radius, longest = claim.numbers["period"], claim.numbers["radius"], claim.numbers.get("longest")
-    demand(h > 0, "a period is not positive")
+    demand(h > 0 and radius > 0, "a period or a radius is not positive")
     held = times(push, [[*a, *b] for a, b in zip(C, K, strict=True)])
     upper = plus([[*a, *b] for a, b in zip(scalar(1), scalar(0), strict=True)], held, -h)
     lower = plus([[*a, *b] for a, b in zip(scalar(h / 2), scalar(1), strict=True)], held, -h * h / 4)
