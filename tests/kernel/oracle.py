@@ -5,6 +5,7 @@ import math
 from fractions import Fraction
 
 import numpy as np
+from scipy.optimize import least_squares
 
 STEP = 1e-6
 PLAIN = {
@@ -90,7 +91,7 @@ class Oracle:
         u = run(self.programs["law"], given)
         return u, u + e - np.cross(w + r, self.J @ (w + r) + h) - self.J @ a, h
 
-    def V(self, q, w):
+    def lyapunov(self, q, w):
         given, _ = self.inputs(q, w, *[np.zeros(3)] * 4)
         return run(self.programs["lyapunov"], given | self.plant())[0]
 
@@ -99,7 +100,7 @@ class Oracle:
         wd = np.linalg.solve(self.J, T)
         rate = max(np.linalg.norm(qd), np.linalg.norm(wd) / max(np.linalg.norm(w), 1e-3), 1e-12)
         h = STEP / rate
-        return (self.V(q + h * qd, w + h * wd) - self.V(q - h * qd, w - h * wd)) / (2 * h), rate
+        return (self.lyapunov(q + h * qd, w + h * wd) - self.lyapunov(q - h * qd, w - h * wd)) / (2 * h), rate
 
     def environment(self):
         r, a = self.bounded("target.rate", "moving target"), self.bounded("target.acceleration", "moving target")
@@ -128,14 +129,14 @@ class Oracle:
     def converges(self, tries):
         zero, level = np.zeros(3), self.numbers.get("level")
         target, even = np.eye(4)[0], "both" in self.claim["theorem"]
-        V0 = self.V(target, zero)
-        wide = self.V(np.array([0.0, 1.0, 0.0, 0.0]), zero) - V0 if level is None else level
+        V0 = self.lyapunov(target, zero)
+        wide = self.lyapunov(np.array([0.0, 1.0, 0.0, 0.0]), zero) - V0 if level is None else level
         if wide <= 0:
             return False
         for _ in range(tries):
             q, w = turned(self.rng), self.rng.normal(size=3)
             # As large a rate as the set holds, or one of the size that the potential gives.
-            moving = self.V(target, w) - V0
+            moving = self.lyapunov(target, w) - V0
             if moving <= 0:
                 return False
             w *= math.sqrt(wide / moving) * self.rng.uniform(0.1, 1.0)
@@ -143,25 +144,39 @@ class Oracle:
                 share = self.rng.uniform()
                 q = self.shrunk(q, V0, level * share)
                 w *= math.sqrt(max(1.0 - share, 0.0))
-            if level is not None and self.V(q, w) - V0 > level:
+            if level is not None and self.lyapunov(q, w) - V0 > level:
                 continue
             if not self.state(q, w, V0, level):
                 return False
-            if not even and abs(q[0]) < 0.999 and np.linalg.norm(self.law(q, zero, *[zero] * 4)[1]) < 1e-12 * wide:
-                return False
+        if not even and level is None and self.rests_elsewhere(wide):
+            return False
         return self.sign(V0, level, even) and self.contents(V0, level)
+
+    def rests_elsewhere(self, wide):
+        """Whether there is an attitude off target without a torque; where the quaternion's sign is chosen, one that is fed back."""
+        least = -self.numbers.get("hysteresis", 1.0)
+
+        def torque(x):
+            return self.law(x / np.linalg.norm(x), np.zeros(3), *[np.zeros(3)] * 4)[1] / wide
+
+        for _ in range(4):
+            x = least_squares(torque, turned(self.rng), max_nfev=60).x
+            q = x / np.linalg.norm(x)
+            if np.linalg.norm(torque(x)) < 1e-9 and np.linalg.norm(q[1:]) > 0.05 and q[0] >= least:
+                return True
+        return False
 
     def shrunk(self, q, V0, most):
         """A state at rest turned less, until V is as low."""
         for _ in range(60):
-            if self.V(q, np.zeros(3)) - V0 <= most:
+            if self.lyapunov(q, np.zeros(3)) - V0 <= most:
                 return q
             q = np.concatenate([[q[0] + 0.2 * (1 - q[0])], 0.8 * q[1:]])
             q /= np.linalg.norm(q)
         return np.eye(4)[0]
 
     def state(self, q, w, V0, level):
-        if self.V(q, w) <= V0:
+        if self.lyapunov(q, w) <= V0:
             return False
         before = None
         for _ in range(3):
@@ -173,7 +188,7 @@ class Oracle:
                 return False
         slope, rate = self.slope(q, w, before)
         # Differences are rounded.
-        return slope <= 1e-7 * (abs(self.V(q, w)) + abs(V0)) * rate / STEP * 1e-2
+        return slope <= 1e-7 * (abs(self.lyapunov(q, w)) + abs(V0)) * rate / STEP * 1e-2
 
     def limits(self, u, h):
         n, more = self.numbers, 1 + 1e-7
@@ -196,16 +211,16 @@ class Oracle:
         if "hysteresis" in self.words:
             width = self.numbers["hysteresis"]
             states = [turned(self.rng) for _ in range(300)]
-            lower = [self.V(q, zero) > self.V(-q, zero) for q in states if q[0] < -width]
+            lower = [self.lyapunov(q, zero) > self.lyapunov(-q, zero) for q in states if q[0] < -width]
             return 0 < width < 1 and all(lower)
         if "shortest sign" in self.words or (even and level is not None):
             halves = [turned(self.rng) * [0, 1, 1, 1] for _ in range(100)]
-            return all(self.V(q / np.linalg.norm(q), zero) - V0 > level for q in halves)
+            return all(self.lyapunov(q / np.linalg.norm(q), zero) - V0 > level for q in halves)
         if even:
             return True
         if level is not None:
-            return self.V(other, zero) - V0 > level
-        return all(self.V(other, zero) > self.V(turned(self.rng), zero) for _ in range(30))
+            return self.lyapunov(other, zero) - V0 > level
+        return all(self.lyapunov(other, zero) > self.lyapunov(turned(self.rng), zero) for _ in range(30))
 
     def contents(self, V0, level):
         n, zero = self.numbers, np.zeros(3)
@@ -214,15 +229,23 @@ class Oracle:
             axis /= np.linalg.norm(axis)
             if "angle" in n:
                 q = np.concatenate([[math.cos(n["angle"] / 2)], math.sin(n["angle"] / 2) * axis])
-                if n["angle"] > 6 or self.V(q, zero) - V0 > level * (1 + 1e-9):
+                if n["angle"] > 6 or self.lyapunov(q, zero) - V0 > level * (1 + 1e-9):
                     return False
-            if "rate" in n and self.V(np.eye(4)[0], n["rate"] * axis) - V0 > level * (1 + 1e-9):
+            if "rate" in n and self.lyapunov(np.eye(4)[0], n["rate"] * axis) - V0 > level * (1 + 1e-9):
                 return False
+            if "start.rate" in n:
+                q = np.concatenate([[math.cos(n["start.angle"] / 2)], math.sin(n["start.angle"] / 2) * axis])
+                if self.lyapunov(q, n["start.rate"] * self.direction()) - V0 > level * (1 + 1e-9):
+                    return False
             if "fastest" in n:
-                w = axis * math.sqrt(level / (self.V(np.eye(4)[0], axis) - V0))
+                w = axis * math.sqrt(level / (self.lyapunov(np.eye(4)[0], axis) - V0))
                 if np.linalg.norm(w) > n["fastest"] * (1 + 1e-9):
                     return False
         return True
+
+    def direction(self):
+        found = self.rng.normal(size=3)
+        return found / np.linalg.norm(found)
 
     def linear(self):
         """Damping and stiffness near rest."""

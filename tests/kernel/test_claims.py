@@ -76,7 +76,7 @@ def test_every_claim_of_today_is_proved_by_the_kernel_alone(scenario, law, bundl
 
 
 def test_strict_functions_and_limits_of_the_norm_are_found():
-    assert [claim["theorem"] for claim in contents("by hand", "strict")["claims"]][0] == "converges strictly"
+    assert contents("by hand", "strict")["claims"][0]["theorem"] == "converges strictly"
     (limited,) = (c for c in contents("by hand", "norm")["claims"] if "limit.norm" in c["numbers"])
     assert 0.98 * 0.006 < number(limited["numbers"]["level"]) < 0.0063
     for law in ("strict", "norm"):
@@ -97,11 +97,11 @@ def test_levels_are_nearly_the_largest():
 def edge(oracle):
     """States on the border of the set where its torque is largest: turned, and turning on, about one axis."""
     level, target, zero = oracle.numbers["level"], np.eye(4)[0], np.zeros(3)
-    V0 = oracle.V(target, zero)
+    V0 = oracle.lyapunov(target, zero)
     for axis in np.eye(3):
         for angle in np.linspace(0, oracle.numbers["angle"], 60):
             q = np.concatenate([[math.cos(angle / 2)], math.sin(angle / 2) * axis])
-            yield q, axis * math.sqrt((level - oracle.V(q, zero) + V0) / (oracle.V(target, axis) - V0))
+            yield q, axis * math.sqrt((level - oracle.lyapunov(q, zero) + V0) / (oracle.lyapunov(target, axis) - V0))
 
 
 def test_sentences_name_what_they_assume():

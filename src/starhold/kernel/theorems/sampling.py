@@ -32,7 +32,8 @@ def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
 
     With u = -Cw - Kq a step is w+ = w + h J^-1 u, q+ = q + h w/2 + h^2 J^-1 u/4. With z = (1 + x)/(1 - x) its eigenvalues z
     solve ((J - h C/2) x^2 + (C - h K/4) x + K/2) v = 0 up to a factor of x: where the three matrices are symmetric and
-    positive definite, Re x < 0 and so |z| < 1. The first two are linear in h and definite at 0, if K is and they are at the longest."""
+    positive definite, Re x < 0 and so |z| < 1. The first two are linear
+    in h, and so definite for every h up to the longest if they are for this, for at 0 they then are as well."""
     loop = AttitudeLoop(claim)
     yield from loop.sound()
     rest: dict[str, int] = loop.on_target | loop.still
