@@ -153,16 +153,16 @@ class Oracle:
         return self.sign(V0, level, even) and self.contents(V0, level)
 
     def rests_elsewhere(self, wide):
-        """Whether there is an attitude off target without a torque; where the quaternion's sign is chosen, one that is fed back."""
+        """Whether there is an attitude off target without a torque, among those that are fed back."""
         least = -self.numbers.get("hysteresis", 1.0)
 
         def torque(x):
             return self.law(x / np.linalg.norm(x), np.zeros(3), *[np.zeros(3)] * 4)[1] / wide
 
-        for _ in range(4):
-            x = least_squares(torque, turned(self.rng), max_nfev=60).x
+        for _ in range(8):
+            x = least_squares(torque, turned(self.rng), ftol=1e-15, xtol=1e-15, gtol=1e-15, max_nfev=60).x
             q = x / np.linalg.norm(x)
-            if np.linalg.norm(torque(x)) < 1e-9 and np.linalg.norm(q[1:]) > 0.05 and q[0] >= least:
+            if np.linalg.norm(torque(x)) < 1e-7 and np.linalg.norm(q[1:]) > 0.05 and q[0] >= least:
                 return True
         return False
 

@@ -60,18 +60,9 @@ def surface(slope):
     return lambda m: add(m.rate, scale(slope, vector_part(m.attitude)))
 
 
-def case(
-    law=None,
-    V=None,
-    theorem="converges",
-    taken=(),
-    J=(1.0, 1.0, 1.0),
-    body=angular_acceleration,
-    turning=derivative,
-    s=None,
-    **numbers,
-):
+def case(law=None, V=None, theorem="converges", taken=(), J=(1.0,) * 3, s=None, **more):
     """A claim and its programs."""
+    body, turning = more.pop("body", angular_acceleration), more.pop("turning", derivative)
     programs = {
         "law": straight_line(law or feedback(), measurement=ASKED),
         "body": straight_line(body, rate=V3, torque=V3, craft=PLANT),
@@ -86,6 +77,10 @@ def case(
     claim = {"theorem": theorem, "taken": list(taken), "programs": {role: digest(p) for role, p in programs.items()},
              "subject": {} if "whatever" in theorem else subject, "numbers": told, "evidence": {}}  # fmt: skip
     return claim, {digest(p): p for p in programs.values()}
+
+
+def positive(m, craft):
+    return 0.5 * dot(m.rate, m.rate) + 2.0 * K * (1.0 - m.attitude[0])
 
 
 def no_gyroscopic(rate, torque, craft):
@@ -105,7 +100,7 @@ ANY = "converges whatever the inertia"
 CASES = {
     "Euler's equation": case(J=(1.0, 2.0, 3.0), body=no_gyroscopic),
     "turning": case(turning=faster),
-    "inertia": case(feedback(-C, -K), lambda m, craft: 0.5 * dot(m.rate, m.rate) + 2.0 * K * (1.0 - m.attitude[0]), J=(-1.0,) * 3),
+    "inertia": case(feedback(-C, -K), positive, J=(-1.0,) * 3),
     "V is least on target": case(feedback(-C, -K), energy(-1.0)),
     "V falls": case(feedback(-C)),
     "only equilibrium": case(hilly, hills, taken=["hysteresis"], hysteresis=0.75),
@@ -129,8 +124,8 @@ CASES = {
         sliding(0.1), theorem=REACHES, s=surface(0.1), taken=["outside torque"], outside_0=0.2, outside_1=0.0, outside_2=0.0
     ),
 }  # fmt: skip
-"""By what alone is not shown. No false claim is known for others: that V is level at the other equilibrium, which repels; that
-a jump lowers V; that V has the kinetic energy; rests at half turns only; the stiffness; the surface's form; what a layer adds."""
+"""No false claim is known for the others: that V is level at the other equilibrium, which repels; that a jump lowers V; that
+V has the kinetic energy; rests at half turns only; the stiffness; the form of the surface; what a layer adds."""
 
 
 @pytest.mark.parametrize("hypothesis", CASES)
