@@ -5,7 +5,7 @@ import json
 from functools import cache
 
 import starhold as sh
-from starhold.certification.evidence.attitude import Loop
+from starhold.certification.evidence.claims import find_claims
 from starhold.certification.evidence.finding import certificate
 from starhold.kernel.programs import digest
 from starhold.scenario.building import build
@@ -26,9 +26,7 @@ def found(scenario, law):
     else:
         given = sh.load(scenario)
         loop = build(given, given.pick(law))
-    known = Loop(loop)
-    known.show_all()
-    return known
+    return find_claims(loop)
 
 
 def contents(scenario, law, *claims):

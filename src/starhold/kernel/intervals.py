@@ -66,6 +66,10 @@ class Interval:
         low = 0 if n % 2 == 0 and self.low < 0 < self.high else ends[0]
         return Interval(low // scale, -(-ends[1] // scale))
 
+    def square(self) -> Interval:
+        """Enclose x^2."""
+        return self.power(2)
+
     def hull(self, other: Interval) -> Interval:
         """Return the least interval that holds both."""
         return Interval(min(self.low, other.low), max(self.high, other.high))

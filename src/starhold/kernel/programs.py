@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
+import operator as op
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
 from typing import Any, TypeAlias
 
 from .intervals import Interval
-from .numbers import Account, RefusedError, demand, rational, read_list, read_table
+from .numbers import Account, demand, rational, read_list, read_table
 from .polynomials import Monomial, Poly, poly
 
 OPERATIONS = {
@@ -162,31 +163,24 @@ class Exactly:
 
     def value(self, operation: str, x: list[Any]) -> Any:
         """Return the value of an operation."""
-        match operation:
-            case "plus":
-                return x[0] + x[1]
-            case "minus":
-                return x[0] - x[1]
-            case "product":
-                return x[0] * x[1]
-            case "square":
-                return x[0] * x[0]
-            case "negative":
-                return -x[0]
-            case "select":
-                return x[0]
-            case "divide":
-                demand(not x[1].names, "a program divides by the state")
-                demand(x[1].number != 0, "a program divides by zero")
-                return x[0] * (1 / x[1].number)
-            case "both":
-                return x[0] and x[1]
-            case "either":
-                return x[0] or x[1]
-            case "opposite":
-                return not x[0]
-            case _:
-                raise RefusedError(f"{operation} has no exact value")
+        demand(operation in EXACT, f"{operation} has no exact value")
+        return EXACT[operation](*x)
+
+
+def _quotient(x: Poly, y: Poly) -> Poly:
+    demand(not y.names, "a program divides by the state")
+    demand(y.number != 0, "a program divides by zero")
+    return x * (1 / y.number)
+
+
+def _square(x: Poly) -> Poly:
+    return x * x
+
+
+EXACT: dict[str, Callable[..., Any]] = {
+    "plus": op.add, "minus": op.sub, "product": op.mul, "square": _square, "negative": op.neg, "divide": _quotient,
+    "select": op.pos, "both": bool.__and__, "either": bool.__or__, "opposite": op.not_,
+}  # fmt: skip
 
 
 class Enclosing:
@@ -199,36 +193,43 @@ class Enclosing:
     def apply(self, operation: str, x: list[Any]) -> Any:
         """Return an enclosure of an operation's value."""
         Account.spend(4)
-        match operation:
-            case "plus":
-                return x[0] + x[1]
-            case "minus":
-                return x[0] - x[1]
-            case "product":
-                return x[0] * x[1]
-            case "square":
-                return x[0].power(2)
-            case "negative":
-                return -x[0]
-            case "divide":
-                return x[0] / x[1]
-            case "sqrt":
-                return x[0].sqrt()
-            case "less":
-                return True if x[0].high < x[1].low else False if x[0].low >= x[1].high else None
-            case "less_equal":
-                return True if x[0].high <= x[1].low else False if x[0].low > x[1].high else None
-            case "select":
-                return x[1].hull(x[2]) if x[0] is None else x[1] if x[0] else x[2]
-            case "minimum":
-                return Interval(min(x[1].low, x[2].low), min(x[1].high, x[2].high))
-            case "maximum":
-                return Interval(max(x[1].low, x[2].low), max(x[1].high, x[2].high))
-            case "both":
-                return False if False in x else None if None in x else True
-            case "either":
-                return True if True in x else None if None in x else False
-            case "opposite":
-                return None if x[0] is None else not x[0]
-            case _:
-                raise RefusedError(f"there is no operation {operation}")
+        return ENCLOSING[operation](*x[: 1 if operation == "square" else 3])
+
+
+def _less(x: Interval, y: Interval) -> bool | None:
+    return True if x.high < y.low else False if x.low >= y.high else None
+
+
+def _not(t: bool | None) -> bool | None:
+    return None if t is None else not t
+
+
+def _both(t: bool | None, u: bool | None) -> bool | None:
+    return False if False in (t, u) else None if None in (t, u) else True
+
+
+def _select(t: bool | None, x: Interval, y: Interval) -> Interval:
+    return x.hull(y) if t is None else x if t else y
+
+
+def _minimum(t: bool | None, x: Interval, y: Interval) -> Interval:
+    return Interval(min(x.low, y.low), min(x.high, y.high))
+
+
+def _maximum(t: bool | None, x: Interval, y: Interval) -> Interval:
+    return Interval(max(x.low, y.low), max(x.high, y.high))
+
+
+def _either(t: bool | None, u: bool | None) -> bool | None:
+    return _not(_both(_not(t), _not(u)))
+
+
+def _less_equal(x: Interval, y: Interval) -> bool | None:
+    return _not(_less(y, x))
+
+
+ENCLOSING: dict[str, Callable[..., Any]] = {
+    "plus": op.add, "minus": op.sub, "product": op.mul, "square": Interval.square, "negative": op.neg,
+    "divide": Interval.__truediv__, "sqrt": Interval.sqrt, "less": _less, "less_equal": _less_equal, "select": _select,
+    "minimum": _minimum, "maximum": _maximum, "both": _both, "either": _either, "opposite": _not,
+}  # fmt: skip

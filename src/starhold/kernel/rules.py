@@ -1,4 +1,5 @@
-"""The rules. Each decides what it says from the evidence that it is given, and searches nothing."""
+"""The rules. Each decides what it says from the evidence that it is given, and searches nothing: `check` refuses evidence
+that does not show it."""
 
 from __future__ import annotations
 
@@ -27,7 +28,6 @@ class Vanishes:
     modulo: Sequence[Poly] = ()
 
     def check(self, evidence: Any) -> None:
-        """Refuse evidence that does not show it."""
         demand(bool(self.modulo) or evidence is None, "evidence was not asked for")
         rest = self.p - combination(evidence, self.modulo) if self.modulo else self.p
         demand(not rest.terms, "an identity does not hold")
@@ -49,7 +49,6 @@ class Squares:
     strict: Sequence[Poly] = ()
 
     def check(self, evidence: Any) -> None:
-        """Refuse evidence that does not show it."""
         multipliers, cofactors, rows = read_table(evidence, "multipliers", "cofactors", "gram")
         known = [*self.strict, *self.known]
         weights = [rational(x) for x in read_list(multipliers, len(known))]
@@ -73,7 +72,6 @@ class Solves:
     modulo: Sequence[Poly] = ()
 
     def check(self, evidence: Any) -> None:
-        """Refuse evidence that does not show it."""
         rows, cofactors = read_table(evidence, "matrix", "cofactors")
         found = apply(matrix(rows, len(self.wanted), len(self.given)), self.given)
         for taken, p, own in zip(found, self.wanted, read_list(cofactors, len(self.wanted)), strict=True):
@@ -90,7 +88,6 @@ class Contracts:
     flow: bool = False
 
     def check(self, evidence: Any) -> None:
-        """Refuse evidence that does not show it."""
         A, P = self.A, matrix(evidence, len(self.A), len(self.A))
         PA = times(P, A)
         left = plus(PA, transpose(PA)) if self.flow else plus(times(transpose(A), PA), P, -self.rate * self.rate)
@@ -104,7 +101,6 @@ class Definite:
     a: Rows
 
     def check(self, evidence: Any) -> None:
-        """Refuse another matrix."""
         demand(evidence is None, "evidence was not asked for")
         demand(definite(self.a), "a matrix is not positive definite")
 
@@ -117,7 +113,6 @@ class Exceeds:
     small: Fraction | int = 0
 
     def check(self, evidence: Any) -> None:
-        """Refuse another order."""
         demand(evidence is None, "evidence was not asked for")
         demand(self.large > self.small, "a number is not the larger one")
 
@@ -131,7 +126,6 @@ class OnCells:
     reasons: Mapping[str, Callable[[Box], bool]]
 
     def check(self, evidence: Any) -> None:
-        """Refuse evidence that does not show it."""
         demand(isinstance(evidence, str) and len(evidence) <= CELLS, "a subdivision is not a text")
         names, waiting = list(self.box), [{name: Interval.of(*ends) for name, ends in self.box.items()}]
         for mark in evidence:
@@ -159,7 +153,6 @@ class Local:
     outside: Callable[[Box], bool]
 
     def check(self, evidence: Any) -> None:
-        """Refuse evidence that does not show it."""
         rows, tree = read_table(evidence, "gram", "tree")
         self.cells(rows).check(tree)
 

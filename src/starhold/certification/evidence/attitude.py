@@ -10,18 +10,17 @@ from math import acos, asin, inf, isfinite, sqrt
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.vector import apply, dot
 from starhold.certification.evidence.finding import NotFoundError, complete, obligations, read
-from starhold.certification.evidence.squares import cofactors, largest_number, posed, rounded, solved
+from starhold.certification.evidence.squares import cofactors, largest_number, posed, solved
 from starhold.certification.subject import Subject, above, make_subject
 from starhold.kernel.loops import HYSTERESIS, MOVING, OUTSIDE, SHORTEST, WHEELS, AttitudeLoop
-from starhold.kernel.numbers import RefusedError, Rows, plus
+from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly
 from starhold.kernel.programs import digest
-from starhold.kernel.rules import Contracts, Definite, Solves, Squares
+from starhold.kernel.rules import Solves, Squares
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies import rigid_body
@@ -34,6 +33,8 @@ FULL = (V3, V3, V3)
 NOWHERE: dict[str, int] = dict.fromkeys(("q0", "q1", "q2", "q3", "w1", "w2", "w3"), 0)
 ASKED = Measurement(Q4, V3, V3, V3, V3, V3, V3, 0.0, V3, V3)
 """A measurement of which every number is an input."""
+TURNS = [(-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)]
+"""The other quaternion of the target, and half turns."""
 CONVERGES, EVENLY, STRICTLY = "converges", "converges from both quaternions", "converges strictly"
 SAMPLED, SLIDING = "stays stable between samples", "reaches its surface"
 GIVEN_AWAY = [Fraction(1, 10**power) for power in (6, 5, 4, 3, 2)]
@@ -104,7 +105,7 @@ class Loop:
 
     @property
     def words(self) -> list[str]:
-        """What the loop is taken with, as far as it has it."""
+        """Name what the loop is taken with, as far as it has it."""
         loop, known = self.loop, self.known
         found = [OUTSIDE] if any(known.modelled) else []
         found += [MOVING] if known.moving else []
@@ -164,16 +165,6 @@ class Loop:
             return False
         self.failed.pop(claim["theorem"], None)
         return True
-
-    def show_all(self) -> None:
-        """Find the claims that can be proved: where motions end, for every inertia, within limits, between samples."""
-        if self.loop.remembers:
-            return
-        if self.loop.law.lyapunov is not None:
-            self.show_end()
-        if hasattr(self.loop.law.module, "surface"):
-            self.show_sliding()
-        self.show_sampled()
 
     def show_end(self) -> None:
         """Find where motions end, by the law's own V or by the kinetic energy in its place."""
@@ -324,74 +315,6 @@ class Loop:
         rate = sqrt(2.0 * float(level) / float(np.linalg.eigvalsh(P)[-1]))
         return {"angle": angle * less, "rate": rate * less}
 
-    def show_sampled(self) -> None:
-        """Find the claim about the torque held between samples."""
-        h = Fraction(self.loop.period)
-        try:
-            wanted, _ = obligations(
-                self.claim(SAMPLED, [], None, period=h, radius=Fraction(1, 2), longest=2 * h), self.by_digest
-            )
-        except RefusedError as reason:
-            self.failed[SAMPLED] = str(reason)
-            return
-        step, K = wanted["step"], wanted["stiffness"]
-        J, C = wanted["inertia outweighs damping"], wanted["damping outweighs stiffness"]
-        assert isinstance(step, Contracts)
-        assert isinstance(J, Definite)
-        assert isinstance(C, Definite)
-        assert isinstance(K, Definite)
-        roots: Any = np.linalg.eigvals(floats(step.A))
-        radius = float(np.abs(roots).max())
-        told = {"period": h, "radius": rounded(radius + 1e-4 * (1.0 - radius), 9)}
-        with np.errstate(all="ignore"):
-            # They were made for twice the period.
-            damping = plus(C.a, K.a, h / 2)
-            longest = min(2.0 / largest_ratio(damping, plus(J.a, damping, h)), 4.0 / largest_ratio(K.a, damping))
-        if longest > float(h) and self.try_to_show(
-            self.claim(SAMPLED, [], None, **told, longest=rounded(longest * (1.0 - 1e-9), 15)), {}
-        ):
-            return
-        self.try_to_show(self.claim(SAMPLED, [], None, **told), {})
-
-    def show_sliding(self) -> None:
-        """Find the claim that the surface is reached."""
-        roles, loop = self.roles, self.loop
-        roles["surface"] = self.add(loop.law.module.surface, measurement=ASKED, gains=loop.gains)
-        m = [fraction(x) + Fraction(self.disturbance) for x in self.known.modelled]
-        told: dict[str, Any] = {f"outside.{k}": x for k, x in enumerate(m)} if any(m) else {}
-        words = [*([OUTSIDE] if any(m) else []), *([MOVING] if MOVING in self.words else [])]
-        layer = float(getattr(loop.gains, "boundary_layer", 0.0))
-        if layer > 0.0 and any(m):
-            told |= self.layer(layer, list(map(float, m)))
-        if signs := sign_words(loop):
-            told |= self.signed(told)
-        self.try_to_show(self.claim(SLIDING, [*words, *signs], None, **told), {})
-        del roles["surface"]
-
-    def signed(self, told: dict[str, Any]) -> dict[str, Any]:
-        """Return the numbers of the set from which the quaternion's sign never changes."""
-        J, K = tensor(self.loop.craft.inertia), tensor(self.loop.gains.surface_gain)
-        low = told.get("inertia.low", float(np.linalg.eigvalsh(J)[0]) * (1.0 - 1e-6))
-        k = told.get("surface.low", float(np.linalg.eigvalsh(0.5 * (K + K.T))[0]) * (1.0 - 1e-6))
-        return {"inertia.low": low, "surface.low": k, "level": 0.5 * low * k * k * (1.0 - 1e-6)}
-
-    def layer(self, layer: float, m: list[float]) -> dict[str, Any]:
-        """Return the numbers of where motions end in a boundary layer."""
-        J, K, more = tensor(self.loop.craft.inertia), tensor(self.loop.gains.surface_gain), 1.0 + 1e-6
-        reach = np.array(self.loop.gains.switching_gain)
-        slope, bound = reach / layer, np.array(m)
-        total = float((bound**2 / (4.0 * slope)).sum())
-        far = np.maximum(total / (reach - bound), (bound + np.sqrt(bound**2 + 4.0 * slope * total)) / (2.0 * slope)) * more
-        moments, steep = np.linalg.eigvalsh(J), float(np.linalg.norm(K, 2)) * more
-        low, high = float(moments[0]) / more, float(moments[-1]) * more
-        k, size = float(np.linalg.eigvalsh(0.5 * (K + K.T))[0]) / more, float(np.sqrt(high / low * (far**2).sum())) * more
-        found: dict[str, Any] = {f"far.{i}": float(x) for i, x in enumerate(far)} | {
-            "inertia.low": low,
-            "inertia.high": high,
-        }
-        found |= {"surface.low": k, "surface.high": steep, "surface": size, "rate": (size + steep * size / k) * more}
-        return found | {"angle": 2.0 * asin(min(size / k, 1.0)) * more}
-
 
 def highest(o: Squares, scales: Mapping[str, float]) -> float | None:
     """Return the largest level of V for which an obligation about a limit holds: p >= 0 on {V <= level} where V - level is
@@ -400,25 +323,6 @@ def highest(o: Squares, scales: Mapping[str, float]) -> float | None:
     V, p = 1 - inside, o.p
     others = [c * relation for relation, parts in zip(o.modulo, cofactors(o, p, len(o.z)), strict=True) for c in parts]
     return largest_number(posed(V, [-p, *bounds], others, o.z), scales, Poly({(): Fraction(1)}))
-
-
-def floats(rows: Rows) -> NDArray[np.float64]:
-    """Return a matrix in floats."""
-    return np.array([[float(x) for x in row] for row in rows], dtype=np.float64)
-
-
-def largest_ratio(a: Any, b: Any) -> float:
-    """Return the largest eigenvalue of b^-1 a."""
-    found: Any = np.linalg.eigvals(np.linalg.solve(floats(b), floats(a)))
-    return float(found.real.max())
-
-
-def fraction(x: Any) -> Fraction:
-    """Return a rational number of FLINT."""
-    return Fraction(int(x.p), int(x.q))
-
-
-TURNS = [(-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)]
 
 
 def sign_words(loop: ClosedLoop) -> list[str]:

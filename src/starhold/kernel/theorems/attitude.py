@@ -37,8 +37,8 @@ def converges(claim: Claim) -> Proof:
 
 
 def converges_strictly(claim: Claim) -> Proof:
-    """The same by a V, of whatever origin, with V' <= -c (|w|^2 + |q|^2): it falls wherever the body is not at rest at q = 0
-    (Lyapunov)."""
+    """Motions end as in `converges` by a V, of whatever origin, with V' <= -c (|w|^2 + |q|^2): it falls wherever the body is
+    not at rest at q = 0 (Lyapunov)."""
     loop = AttitudeLoop(claim)
     yield from least_on_target(loop)
     w = loop.w
@@ -48,8 +48,8 @@ def converges_strictly(claim: Claim) -> Proof:
 
 
 def converges_whatever_the_inertia(claim: Claim) -> Proof:
-    """The same for every inertia of the body, whatever the one is that the law is told: V is the kinetic energy, of whatever
-    inertia, and a function of the attitude."""
+    """Motions end as in `converges` for every inertia of the body, whatever the law is told of it: V is the kinetic energy,
+    of whatever inertia, and a function of the attitude."""
     loop = AttitudeLoop(claim, any_inertia=True)
     yield from least_on_target(loop)
     said = yield from falls(loop, _damped(loop), 3)
@@ -65,7 +65,7 @@ def converges_evenly(claim: Claim) -> Proof:
 
 
 def converges_evenly_whatever_the_inertia(claim: Claim) -> Proof:
-    """The same for every inertia of the body, whatever the one is that the law is told."""
+    """Motions end as in `converges_evenly` for every inertia of the body, whatever the law is told of it."""
     return (yield from _evenly(AttitudeLoop(claim, any_inertia=True)))
 
 
