@@ -32,7 +32,7 @@ SUITES = {
 }
 COUNT = 400 if WHOLE else 25
 """Mutations of each certificate: 5 200 in all."""
-SLOW = ("wheels",)
+SLOW = ("evenly", "evenly whatever the inertia", "wheels")
 WORDS = ["outside torque", "moving target", "wheels", "shortest sign", "hysteresis"]
 
 

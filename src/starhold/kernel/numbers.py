@@ -9,7 +9,7 @@ from typing import Any, TypeAlias, cast
 
 Rows: TypeAlias = list[list[Fraction]]
 
-WORK = 2_000_000
+WORK = 4_000_000
 """Units of work that one check may do: a few microseconds each."""
 LONGEST = 20_000
 """Bits of the longest number."""

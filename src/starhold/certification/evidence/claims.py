@@ -117,6 +117,3 @@ def largest_ratio(a: Any, b: Any) -> float:
 def fraction(x: Any) -> Fraction:
     """Return a rational number of FLINT."""
     return Fraction(int(x.p), int(x.q))
-
-
-TURNS = [(-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)]
