@@ -200,6 +200,7 @@ def contents(loop: AttitudeLoop) -> Part:
         return [loop.q[0] - cosine, *([loop.q[0] * loop.q[0] - cosine * cosine] if cosine >= 0 else [])]
 
     def slow(rate: Fraction) -> list[Poly]:
+        demand(rate >= 0, "a rate is negative")
         return [rate * rate - dot(loop.w, loop.w)]
 
     if level is None:

@@ -55,6 +55,7 @@ def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
         f"near rest, with the torque held for {below(h)} s, the loop is stable, with all eigenvalues within {above(radius)}"
     )
     if longest is not None:
+        demand(longest >= h, "the longest period is shorter than the period")
         yield "stiffness", Definite(K)
         yield "inertia outweighs damping", Definite(plus(J, C, -longest / 2))
         yield "damping outweighs stiffness", Definite(plus(C, K, -longest / 4))
